@@ -26,7 +26,7 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.shared.threads import lower_priority, processors, unpin
-from kin.warmup import compiled, rest_compiled, warm_up_first, warm_up_rest
+from kin.warmup import compiled, parts, rest_compiled, warm_up_first, warm_up_rest
 from kin.warmup.preparation import Preparation
 
 if TYPE_CHECKING:
@@ -154,6 +154,7 @@ class Startup:
         self._wait_for_first(Phase.COMPLETE)
         try:
             if self._compiles and not rest_compiled():
+                parts()  # here and not where it is first asked for: it looks at all families of arms
                 self.preparation.begin()
                 if not self._compiler.run() and not self._stopping.is_set():
                     logger.warning("the compiling process ended early: kernels are compiled where they are used")

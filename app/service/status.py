@@ -7,6 +7,7 @@ from typing import Literal
 
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import PlainTextResponse
 
 from app.service.startup import Status
@@ -67,18 +68,20 @@ async def livez() -> Alive:
 async def readyz(request: Request, response: Response) -> Readiness:
     startup = request.app.state.startup
     status: Status = startup.readiness
+    done = startup.preparation.complete
     response.headers["cache-control"] = "no-store"
     response.status_code = 200 if status == "ready" else 503
     return Readiness(
         status=status,
         complete=startup.complete,
-        kernels=_kernels(startup.preparation) if status == "ready" else None,
+        # In a thread: the first call of a process looks at all families of arms.
+        kernels=None if status != "ready" or done else await run_in_threadpool(_kernels, startup.preparation),
         classrooms=_classrooms(request),
     )
 
 
 def _kernels(preparation: Preparation) -> Kernels | None:
-    if preparation.complete:
+    if preparation.complete:  # it may have become so since
         return None
     ready, preparing, waiting = preparation.state
     return Kernels(ready=ready, preparing=preparing, waiting=waiting)

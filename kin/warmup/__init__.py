@@ -47,6 +47,8 @@ from kin.workspace import (
 from kin.workspace.capability.kernels import raise_best
 
 TASKS: tuple[Task, ...] = ("pose", "approach")
+# Families of `made_up_arms`, in their order: to match a general arm compiles kernels for many seconds.
+MADE_UP = ("parallel5", "planar4", "general5", "pair2", "turned3")
 NUMERIC = "numeric"  # the family of arms without a closed form
 # Parts that do not belong to a family of arms.
 COLLISIONS, MOTIONS, CLOUDS, CAPABILITY = "collisions", "motions", "clouds", "capability"
@@ -231,15 +233,16 @@ def _solve_generally(robot: Robot) -> None:
 def _rest() -> Iterator[tuple[str, Step]]:
     """Names of parts, and their steps."""
     robots = one_of_each_family()
-    first, arms = robots[0], (*robots, *made_up_arms())
+    first = robots[0]
+    arms = [(family_of(robot), robot) for robot in robots] + list(zip(MADE_UP, made_up_arms(), strict=True))
     for step in _calls(first):
         yield all_of(family_of(first)), step
     for step in _collisions(first):
         yield COLLISIONS, step
-    for robot in arms[1:]:
-        yield from ((family_of(robot), step) for step in _moves(robot))
-    for robot in arms[1:]:
-        yield from ((all_of(family_of(robot)), step) for step in _calls(robot))
+    for family, robot in arms[1:]:
+        yield from ((family, step) for step in _moves(robot))
+    for family, robot in arms[1:]:
+        yield from ((all_of(family), step) for step in _calls(robot))
     # No built-in arm needs the general solvers, but for locked joints.
     for joints in (6, 7):
         robot = next(robot for robot in robots if robot.n == joints and robot.revolute.all())

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 from kin import builtin_robots
-from kin.warmup import MOTIONS, NUMERIC, all_of, family_of, first_family, parts
+from kin.warmup import MADE_UP, MOTIONS, NUMERIC, all_of, family_of, first_family, made_up_arms, parts
 from kin.warmup.preparation import ROOM, SIZE, Preparation
 
 
@@ -24,6 +27,17 @@ def test_every_family_has_its_parts_and_all_fit_into_the_memory():
         assert all_of(family_of(robot)) in parts()
     assert len(parts()) <= ROOM
     assert all(steps for steps in parts().values())
+
+
+def test_parts_are_listed_without_compiling_for_arms_that_visitors_may_bring():
+    """Matching a general arm compiles for many seconds, which an event loop would wait for."""
+    assert tuple(map(family_of, made_up_arms())) == MADE_UP
+    program = (
+        "from kin import warmup; from kin.solvers.general6.batch import branches_many\n"
+        "warmup.parts(); assert not branches_many.overloads\n"
+        "warmup.family_of(warmup.made_up_arms()[2]); assert branches_many.overloads"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 def test_parts_come_in_their_order_and_are_ready_with_their_last_step():
