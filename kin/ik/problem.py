@@ -306,7 +306,7 @@ def read_seed(robot: Robot, q_seed: ArrayLike, field: str = "q_seed") -> Array:
     """One configuration ``(n,)``, copied; an `InputError` names `field`."""
     if type(q_seed) is np.ndarray and q_seed.shape == robot.q_shape and q_seed.dtype == np.float64:
         seed = q_seed.copy()
-        if all(abs(x) <= FAR for x in seed.tolist()):
+        if sum(map(abs, seed.tolist())) <= FAR:  # then each of them is; the sum of NaN is not
             return seed
     seed = np.array(robot.check_q(q_seed, field))
     if seed.ndim != 1:

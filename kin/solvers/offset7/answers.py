@@ -7,28 +7,28 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
-from kin.solvers.canonical import at_every_turn, signed_box, turn_around
+from kin.solvers.canonical import signed_box, turn_around
 from kin.solvers.common import NEAR
 from kin.solvers.offset7.branches import all_branches, branches_one, joints_of
 from kin.solvers.offset7.geometry import OFFSET, REVERSED, SIGN
-from kin.solvers.offset7.ranges import INTERVALS, feasible
+from kin.solvers.offset7.ranges import feasible
 from kin.transforms import Array
 
 
 @jit
 def answer(
-    params: Array, T: Array, seed: Array, lower: Array, upper: Array, requested: float, limited: bool, q: Array,
-    values: Array,
-) -> Array:  # fmt: skip
-    """q ``(8, 7)``, values ``(8, 1)`` ← each branch at the requested value of the given joint, or, if that is NaN,
-    at the feasible one nearest to the seed's. NaN where a branch does not exist.
+    params: Array, T: Array, seed: Array, lower: Array, upper: Array, requested: float, limited: bool, arcs: Array,
+    out: Array,
+) -> int:  # fmt: skip
+    """out ``(8, 8)`` ← each branch at the requested value of the given joint; if that is NaN, at the feasible one
+    nearest to the seed's; behind the joint values, that value. NaN where a branch does not exist.
 
-    Returns the feasible intervals ``(k, 3)``, rows (branch, low, high); none if a value is requested and limits do
-    not matter. seed, lower, upper ``(7,)``: joint values of the arm.
+    arcs ``(INTERVALS, 3)`` ← the feasible intervals in one turn, rows (branch, low, high); returns their number, 0
+    if a value is requested and limits do not matter. seed, lower, upper ``(7,)``: joint values of the arm.
     """
     back = params[REVERSED] > 0.0
     given = 6 if back else 0
-    box, arcs, chosen = np.empty((3, 7)), np.empty((INTERVALS, 3)), np.empty(8)
+    box, chosen, q = np.empty((3, 7)), np.empty(8), np.empty((8, 7))
     order = -1 if back else 1
     signed_box(
         seed[::order], lower[::order], upper[::order], params[SIGN : SIGN + 7], params[OFFSET : OFFSET + 7], box
@@ -40,13 +40,14 @@ def answer(
         count = feasible(params, T, box, span, min(max(seed[given], span[0]), span[1]), arcs, chosen)
     if math.isnan(requested):
         _rows_at(params, T, box[NEAR], chosen, q)
-        for k in range(8):
-            values[k, 0] = chosen[k]
     else:
         branches_one(params, T, requested, seed, q)
-        for k in range(8):
-            values[k, 0] = math.nan if math.isnan(q[k, 0]) else requested
-    return at_every_turn(arcs[:count], low, high)
+    for k in range(8):
+        for i in range(7):
+            out[k, i] = q[k, i]
+        there = math.nan if math.isnan(q[k, 0]) else requested
+        out[k, 7] = chosen[k] if math.isnan(requested) else there
+    return count
 
 
 @jit

@@ -13,7 +13,7 @@ from kin.fk import jacobian
 from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers import rolled
-from kin.solvers.canonical import turn_around
+from kin.solvers.canonical import at_every_turn, turn_around
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -30,6 +30,7 @@ from kin.solvers.offset7.answers import answer
 from kin.solvers.offset7.branches import branches_many, branches_one, chain_values, forearm, gap_of
 from kin.solvers.offset7.geometry import SIN2, Geometry, geometry_of
 from kin.solvers.offset7.places import SAMPLES
+from kin.solvers.offset7.ranges import INTERVALS
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.transforms import Array
 
@@ -43,7 +44,7 @@ _OBSTACLES: dict[int, ObstacleCode] = {
 
 
 @cache
-def _answer() -> Callable[[Array, Array, Array, Array, Array, float, bool, Array, Array], Array]:
+def _answer() -> Callable[[Array, Array, Array, Array, Array, float, bool, Array, Array], int]:
     """`answer` without type dispatch."""
     return direct(answer, 1, 2, 1, 1, 1, float, bool, 2, 2)
 
@@ -99,18 +100,19 @@ class Offset7(ClosedForm):
         if problem.task == APPROACH:
             return rolled.solve_approach(self, problem, self._roll)
         p, requested, i = problem, problem.values[0], self.given
-        q, values = np.empty((8, 7)), np.empty((8, 1))
-        arcs = _answer()(
-            self.kernels.params, p.T, p.seed, p.lower, p.upper, requested, p.respect_limits, q, values
+        out, arcs = np.empty((8, 8)), np.empty((INTERVALS, 3))
+        count = _answer()(
+            self.kernels.params, p.T, p.seed, p.lower, p.upper, requested, p.respect_limits, arcs, out
         )
+        found = at_every_turn(arcs[:count], float(p.lower[i]), float(p.upper[i]))
         gap, obstacle = 0.0, None
-        if all(map(math.isnan, q[:, 0].tolist())):
+        if all(map(math.isnan, out[:, 0].tolist())):
             tried = [requested]
             if math.isnan(requested):
                 span = turn_around(float(p.lower[i]), float(p.upper[i]), float(p.seed[i]))
                 tried = np.linspace(*span, SAMPLES).tolist()
             gap, obstacle = self._obstacle(p.T, tried)
-        return Candidates(q, values, (arcs,), gap, obstacle)
+        return Candidates(out[:, :7], out[:, 7:], (found,), gap, obstacle)
 
     def _obstacle(self, T: Array, values: list[float]) -> tuple[float, Obstacle | None]:
         """Why no branch exists at any of these values of the given joint: the smallest gap, and what it is."""
