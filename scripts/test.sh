@@ -65,7 +65,7 @@ trap 'rm -f "$log"' EXIT
 pytest $twice -m "not slow and browser" $(files_of browser) >"$log" 2>&1 &
 browsing=$!
 failed=0
-pytest $twice -n 3 --dist loadfile -m "not slow and not browser and not bench" || failed=1
+pytest $twice -n 3 --dist loadfile --no-loadscope-reorder -m "not slow and not browser and not bench" || failed=1
 wait $browsing || failed=1
 cat "$log"
 pytest $twice -m "not slow and bench" $(files_of bench) || failed=1

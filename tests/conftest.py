@@ -1,12 +1,14 @@
-"""Profiles of hypothesis: new random examples in every local run, always the same ones in CI.
+"""Profiles of hypothesis, the order of files, and a check that tests leave the environment as it was.
 
-A test that fails in CI then fails because of a change, not by chance.
+Random examples of hypothesis are new in every local run and always the same in CI: a test that fails there fails
+because of a change, not by chance.
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -14,6 +16,32 @@ from hypothesis import settings
 settings.register_profile("local", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
+
+TESTS = Path(__file__).parent
+# Few tests that take tens of seconds together. Begun first, so that no process is left alone with one at the end:
+# pytest-xdist would begin with the files of most tests (scripts/test.sh switches that off).
+LONG = frozenset(
+    TESTS / file
+    for file in (
+        "test_docs.py",
+        "app/api/test_schemathesis.py",
+        "app/cli/test_xacro.py",
+        "app/service/test_faults.py",
+        "app/service/test_workers.py",
+        "app/viewer/room/test_leaks.py",
+        "app/viewer/scene/test_viewer_camera.py",
+        "app/viewer/tabs/robot/test_uploads.py",
+        "bench/test_load.py",
+        "kin/kernels/test_kernels.py",
+        "kin/kernels/test_loaded_kernels.py",
+        "kin/warmup/test_warmup.py",
+    )
+)
+assert not (moved := [str(file) for file in LONG if not file.exists()]), moved
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: item.path not in LONG)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

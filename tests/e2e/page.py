@@ -16,6 +16,7 @@ from app.viewer.panel.joints import label
 from app.viewer.scene import camera
 from app.viewer.scene.arm import FOR_FINGERS, GIZMO
 from app.viewer.scene.meshes import body
+from app.viewer.session.state import decode
 
 ARTIFACTS = Path(__file__).parents[1] / "artifacts"
 PICTURES = "KINBOARD_TEST_PICTURES" in os.environ  # save pictures of the screens: a second or two each
@@ -28,38 +29,53 @@ QUIET = """
 }
 """
 # Half of the work of a page is drawing the scene in software, and no test looks at the picture: its edges are not
-# smoothed, and after a frame the next ones are left out for a while. Pictures that are saved have all of it.
+# smoothed, there are ten frames a second, and after one that is drawn the next ones leave it as it is for a while.
+# Pictures that are saved have all of it.
 ROUGH = """
 {
   const { getContext } = HTMLCanvasElement.prototype, gl = WebGL2RenderingContext.prototype;
   HTMLCanvasElement.prototype.getContext = function (kind, options) {
     return getContext.call(this, kind, kind.startsWith("webgl") ? { ...options, antialias: false } : options);
   };
-  let leftOut = false, drawn = -Infinity, now = 0;
-  for (const name of ["drawElements", "drawArrays", "drawElementsInstanced", "drawArraysInstanced"]) {
+  let leftOut = false, drawn = -Infinity;
+  for (const name of ["clear", "drawElements", "drawArrays", "drawElementsInstanced", "drawArraysInstanced"]) {
     const draw = gl[name];
     gl[name] = function (...what) { if (!leftOut) draw.apply(this, what); };
   }
-  const { requestAnimationFrame } = window;
-  window.requestAnimationFrame = (act) => requestAnimationFrame((time) => {
-    if (time !== now) {
-      now = time;
-      leftOut = time - drawn < 500;
-      if (!leftOut) drawn = time;
+  const { requestAnimationFrame } = window, acts = new Map();
+  let last = -Infinity, ids = 0, asked = false;
+  const frame = (time) => {
+    last = time;
+    asked = false;
+    leftOut = time - drawn < 2000;
+    if (!leftOut) drawn = time;
+    const now = [...acts.keys()]; // what these request is for the next frame; they may cancel each other
+    for (const id of now) {
+      const act = acts.get(id);
+      acts.delete(id);
+      try { act?.(time); } catch (error) { reportError(error); }
     }
-    act(time);
-  });
+    leftOut = false;
+  };
+  window.requestAnimationFrame = (act) => {
+    acts.set(++ids, act);
+    if (!asked) setTimeout(() => requestAnimationFrame(frame), last + 90 - performance.now());
+    asked = true;
+    return ids;
+  };
+  window.cancelAnimationFrame = (id) => { acts.delete(id); };
 }
 """
 PLAIN = QUIET if PICTURES else QUIET + ROUGH
 # As after the first minute: the hints are closed.
 NO_HINTS = 'localStorage.setItem("kinboard-hints", "drag joint learn");'
 
+# For half a second and five looks: a page that is held up may be looked at twice before it acts on anything.
 UNCHANGED = """() => {
   const texts = [...document.querySelectorAll("[data-status], td, input")].map((e) => e.value ?? e.textContent);
   const now = texts.join("\\n"), before = window.kbRest;
-  if (before?.now !== now) window.kbRest = { now, since: performance.now() };
-  const rests = before?.now === now && performance.now() - before.since > 500;
+  if (before?.now !== now) window.kbRest = { now, since: performance.now(), looks: 0 };
+  const rests = before?.now === now && ++before.looks >= 5 && performance.now() - before.since > 500;
   if (rests) delete window.kbRest;
   return rests;
 }"""
@@ -164,6 +180,17 @@ class Tab:
         end = time.monotonic() + WAIT / 1000
         while np.abs(np.array(self.tool()) - 1000 * xyz).max() > within:
             assert time.monotonic() < end, f"the tool is at {self.tool()}, expected {1000 * xyz}"
+            self.page.wait_for_timeout(50)
+
+    def wait_for_link(self, robot: kin.Robot, index: int, degrees: float) -> None:
+        """Wait until the link has a joint at an angle: it is written a moment after the arm has come to rest."""
+        end = time.monotonic() + WAIT / 1000
+        while True:
+            text = self.page.evaluate("new URLSearchParams(location.hash.slice(1)).get('s') ?? ''")
+            q = decode(text, (robot,)).q
+            if q is not None and abs(math.degrees(q[index]) - degrees) < 1e-4:
+                return
+            assert time.monotonic() < end, f"the link has {q}, expected {degrees}° of joint {index + 1}"
             self.page.wait_for_timeout(50)
 
     def rest(self) -> None:

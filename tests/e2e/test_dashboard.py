@@ -58,6 +58,7 @@ def test_sliders_by_keyboard_mouse_and_number(tab: Tab) -> None:
     tab.page.mouse.down()
     tab.page.mouse.move(x + 50, y, steps=10)
     tab.page.mouse.up()
+    expect(tab.row("1 rotating base").locator("input:visible").last).not_to_have_value("42.25")
     tab.rest()
     degrees = tab.number("1 rotating base")
     assert degrees > 60

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import math
-import time
-
 import numpy as np
 import pytest
-from page import WAIT, Tab
+from page import Tab
 from playwright.sync_api import expect
 
 import kin
-from app.viewer.session.state import decode
 
 pytestmark = pytest.mark.browser
 
 PIONEER, PUMA = kin.get_robot("pioneer5"), kin.get_robot("puma560")
 ELBOW = "2 rotating elbow"
-# viser takes the small arrows of a number field out of the tab order; the arrow keys do the same there.
+# viser takes the small arrows of a number field out of the tab order; the arrow keys do the same there. A folder
+# that closes is inert at once; if the browser leaves its transition out, its controls stay displayed, unseen.
 NOT_REACHED = """() => {
   const area = document.querySelector("[data-status]").closest(".mantine-ScrollArea-viewport");
   const controls = 'input:not([type="hidden"]), button, summary, [role="slider"], [role="tab"], [role="button"]';
   return [...area.querySelectorAll(controls)]
-    .filter((e) => e.checkVisibility() && !e.dataset.reached && !e.closest(".mantine-NumberInput-controls"))
+    .filter((e) => e.checkVisibility() && !e.dataset.reached)
+    .filter((e) => !e.closest(".mantine-NumberInput-controls, [inert]"))
     .map((e) => e.outerHTML.slice(0, 200));
 }"""
 REACHED = """() => {
@@ -99,18 +97,6 @@ def with_elbow(degrees: float) -> np.ndarray:
     return point
 
 
-def stored(tab: Tab, degrees: float) -> None:
-    """Wait until the URL has the state with the elbow at this angle."""
-    end = time.monotonic() + WAIT / 1000
-    while True:
-        text = tab.page.evaluate("new URLSearchParams(location.hash.slice(1)).get('s') ?? ''")
-        q = decode(text, (PIONEER,)).q
-        if q is not None and abs(math.degrees(q[1]) - degrees) < 1e-6:
-            return
-        assert time.monotonic() < end, f"the URL has {q}, expected {degrees}° of joint 2"
-        tab.page.wait_for_timeout(50)
-
-
 def test_a_field_names_what_is_valid_and_keeps_its_digits(tab: Tab) -> None:
     field = tab.row(ELBOW).locator("input:visible").last
     for text in ("abc", "NaN", "   ", "200", "1e999"):
@@ -134,19 +120,19 @@ def test_slider_keys_undo_and_the_browsers_back(tab: Tab) -> None:
     for key, degrees in (("ArrowUp", 31), ("Shift+ArrowUp", 31.1), ("PageDown", 21.1), ("End", 150), ("Home", 0)):
         slider.press(key)
         expect(field).to_have_value(f"{degrees:g}")
-    stored(tab, 0)
+    tab.wait_for_link(PIONEER, 1, 0)
     tab.type_number(ELBOW, "60")
     expect(undo).to_have_attribute("title", "Undo: Typed value (Ctrl+Z)")
-    stored(tab, 60)
+    tab.wait_for_link(PIONEER, 1, 60)
     page.keyboard.press("Control+z")
     expect(field).to_have_value("0")
     tab.wait_for_tool(with_elbow(0), within=0.06)
     page.keyboard.press("Control+Shift+Z")
     expect(field).to_have_value("60")
-    stored(tab, 60)
+    tab.wait_for_link(PIONEER, 1, 60)
     page.go_back()
     expect(field).to_have_value("0")
-    stored(tab, 0)
+    tab.wait_for_link(PIONEER, 1, 0)
     page.go_forward()
     expect(field).to_have_value("60")
     tab.wait_for_tool(with_elbow(60), within=0.06)

@@ -297,7 +297,10 @@ def test_a_finger_drags_a_slider(phone: Tab) -> None:
     handle = thumb.bounding_box()
     assert handle is not None
     start = np.array([handle["x"] + handle["width"] / 2, handle["y"] + handle["height"] / 2 + 14])
+    field = phone.row("1 rotating base").locator("input:visible").last
+    expect(field).to_have_value("90")
     touch(phone, start, start + np.array([60.0, 0.0]))
+    expect(field).not_to_have_value("90")
     expect(phone.status).to_contain_text("Joints moved by hand")
     expect(phone.page.locator(".mantine-Tooltip-tooltip:visible")).to_have_count(0)
     phone.rest()

@@ -76,11 +76,9 @@ def is_kept(program: Tab) -> None:
     name.fill("above the part")
     name.press("Enter")
     expect(rows.nth(1)).to_contain_text("above the part")
-    page.wait_for_function("() => location.hash.includes('s=')")
-    before = page.url
     page.locator("[data-program-do=go]").click()
     program.wait_for_tool(at(ANGLES[1]), within=0.06)
-    page.wait_for_function("before => location.href !== before", arg=before)
+    program.wait_for_link(PIONEER, 0, ANGLES[1])
 
     page.reload()
     expect(rows).to_have_count(3)

@@ -116,6 +116,7 @@ def test_counters_are_summed_over_all_processes(service):
 
     before = counted()
     assert len(set(pids(port))) == 2
+    wait_for(lambda: counted() >= before + 40)  # a request is counted when its answer has left
     assert counted() == before + 40
 
 
