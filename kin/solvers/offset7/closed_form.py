@@ -10,7 +10,7 @@ import numpy as np
 
 from kin.axes import inverse
 from kin.fk import jacobian
-from kin.kernels.compile import counted, direct
+from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import at_every_turn, turn_around
@@ -46,8 +46,7 @@ _OBSTACLES: dict[int, ObstacleCode] = {
 @cache
 def _answer() -> Callable[[Array, Array, Array, Array, Array, float, bool, Array, Array], int]:
     """`answer` without type dispatch."""
-    # Its arrays are not borrowed, because it returns one.
-    return direct(answer, *map(counted, (1, 2, 1, 1, 1)), float, bool, counted(2), counted(2))
+    return direct(answer, 1, 2, 1, 1, 1, float, bool, 2, 2)
 
 
 def match(robot: Robot) -> Offset7 | None:
