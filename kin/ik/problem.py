@@ -304,7 +304,7 @@ def _rounding(T: Array) -> float:
 
 def read_seed(robot: Robot, q_seed: ArrayLike, field: str = "q_seed") -> Array:
     """One configuration ``(n,)``, copied; an `InputError` names `field`."""
-    if type(q_seed) is np.ndarray and q_seed.shape == robot.q_shape and q_seed.dtype == np.float64:
+    if type(q_seed) is np.ndarray and q_seed.shape == robot.q_shape and q_seed.dtype is _FLOAT:
         seed = q_seed.copy()
         if sum(map(abs, seed.tolist())) <= FAR:  # then each of them is; the sum of NaN is not
             return seed

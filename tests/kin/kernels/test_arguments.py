@@ -60,6 +60,7 @@ REFUSED = {
     "data type with metadata": lambda x: x.astype(np.dtype("f8", metadata={"unit": "rad"})),
     "objects": lambda x: x.astype(object),
     "subclass": lambda x: x.copy().view(Array),
+    "unpickled": lambda x: pickle.loads(pickle.dumps(x)),  # its data type is a copy
     "unaligned": unaligned,
 }
 WRONG = {
@@ -83,6 +84,7 @@ def found(*functions):
         "jacobian": (lambda q: kin.jacobian(ROBOT, q), Q),
         "branches": (lambda target: kin.ik_branches(ROBOT, target), T),
         "solutions": (lambda target: [s.q for s in kin.solve_ik(ROBOT, target).solutions], T),
+        "seed": (lambda q: [s.q for s in kin.solve_ik(ROBOT, T, q_seed=q).solutions], Q),
     }
     answers = {}
     for name in functions:
@@ -131,7 +133,7 @@ def test_a_kernel_that_returns_an_array_is_refused():
 
 
 @pytest.mark.parametrize("form", BORROWED | REFUSED)
-@pytest.mark.parametrize("function", ["fk", "jacobian", "branches", "solutions"])
+@pytest.mark.parametrize("function", ["fk", "jacobian", "branches", "solutions", "seed"])
 def test_every_form_of_the_same_values_gives_the_same_answer(function, form, answers):
     given, wanted = (np.array(answers[f"{function}, {kind}"]) for kind in (form, "list"))
     if function == "solutions":  # targets are made orthonormal in one of two ways, compiled or not
@@ -142,11 +144,11 @@ def test_every_form_of_the_same_values_gives_the_same_answer(function, form, ans
 
 @pytest.fixture(scope="module")
 def answers():
-    return found("fk", "jacobian", "branches", "solutions")
+    return found("fk", "jacobian", "branches", "solutions", "seed")
 
 
 def test_functions_that_are_not_compiled_answer_the_same(answers):
-    names = ("fk", "jacobian", "solutions")
+    names = ("fk", "jacobian", "solutions", "seed")
     program = f"import json, test_arguments; print(json.dumps(test_arguments.found{names}))"
     path = os.pathsep.join([str(Path(kin.__file__).parents[1]), str(Path(__file__).parent)])
     done = subprocess.run(
