@@ -19,6 +19,7 @@ from kin.ik.problem import IKProblem
 from kin.kernels import jacobian as jacobian_kernels
 from kin.solvers.common import wrap
 from kin.solvers.contract import POSE, POSITION
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _SAMPLES = 24
@@ -143,7 +144,7 @@ def _improve_together(problem: IKProblem, branches: Branches, score: Array, rows
     arcs = arcs[np.isin(arcs[:, 0], rows)]
     if not len(arcs):
         return
-    owner, low, high = arcs[:, 0].astype(np.intp), arcs[:, 1], arcs[:, 2]
+    owner, (low, high) = arcs[:, 0].astype(np.intp), _inside(arcs[:, 1], arcs[:, 2])
     total = np.bincount(owner, high - low)[owner]
     count = np.where(high > low, 3 + (_SAMPLES * (high - low) / np.where(total > 0.0, total, 1.0)).astype(int), 1)
     step = (high - low) / np.maximum(count - 1, 1)
@@ -154,6 +155,12 @@ def _improve_together(problem: IKProblem, branches: Branches, score: Array, rows
         best = values[np.arange(len(values)), reached.argmax(axis=1)]
         values = np.clip(best[:, None] + step[:, None] * np.linspace(-0.8, 0.8, 7), low[:, None], high[:, None])
         step = 0.27 * step
+
+
+def _inside(low: Array, high: Array) -> tuple[Array, Array]:
+    """Slightly inside the ends of intervals ``(k,)``: at the very end two branches may meet, and would be one."""
+    inset = np.minimum(TOLERANCES.interval_inset, 0.5 * (high - low))
+    return low + inset, high - inset
 
 
 def _try_all(
@@ -193,7 +200,7 @@ def _improve_row(problem: IKProblem, branches: Branches, score: Array, row: int,
         arcs = _solve(problem, branches, row, [v if i != k else math.nan for i, v in enumerate(fixed)]).arcs[k]
     arcs = arcs[arcs[:, 0] == row][:, 1:]
     total = float((arcs[:, 1] - arcs[:, 0]).sum())
-    for low, high in arcs.tolist():
+    for low, high in np.stack(_inside(arcs[:, 0], arcs[:, 1]), axis=1).tolist():
         count = 3 + int(_SAMPLES * (high - low) / total) if high > low else 1
         step = (high - low) / max(count - 1, 1)
         values = np.linspace(low, high, count)

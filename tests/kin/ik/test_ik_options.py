@@ -783,3 +783,15 @@ def test_a_seed_too_many_turns_away_is_refused(value):
     far = solve_ik(robot, T, q_seed=[9e5] * 6, respect_limits=False)
     assert far.status is Status.SOLVED
     assert far.best.position_error < 1e-9
+
+
+def test_branches_that_meet_where_they_are_best_are_both_answers():
+    # Both wrists are farthest from the limits where their intervals begin: there they are one configuration.
+    panda = kin.get_robot("panda")
+    T = kin.fk(panda, np.array([-2.09493, -1.706058, 2.307344, -2.714471, 2.88947, 0.199472, 2.028364]))
+    found, best = solve_ik(panda, T, q_seed=panda.q_home), solve_ik(panda, T, q_seed=panda.q_home, prefer="limits")
+    assert len(found.solutions) == 4
+    assert {s.branch for s in best.solutions} == {s.branch for s in found.solutions}
+    for solution in best.solutions:
+        value, intervals = solution.redundancy[0].value, solution.redundancy[0].intervals
+        assert any(low < value < high for low, high in intervals)
