@@ -31,8 +31,10 @@
     return new DOMRect(left, top, Math.min(x + arrows, area.right) - left, Math.min(y + arrows, area.bottom) - top);
   }
 
+  /** A slider of a joint; lessons and other tabs have sliders for other things. */
   function slider() {
-    const thumbs = [...document.querySelectorAll('[role="slider"]')].map((node) => node.getBoundingClientRect());
+    const move = [...document.querySelectorAll('[role="tab"][aria-selected="true"]')].some((tab) => tab.textContent.trim() === "Move");
+    const thumbs = (move ? [...document.querySelectorAll('[role="slider"]')] : []).map((node) => node.getBoundingClientRect());
     const seen = thumbs.filter(visible);
     return innerWidth < NARROW ? seen[0] : seen[Math.min(2, seen.length - 1)];
   }
@@ -100,11 +102,12 @@
 
   function draw() {
     if (document.querySelector("[data-hints]") === null) return;
-    const placed = [];
+    const status = document.querySelector("[data-status]").getBoundingClientRect();
+    const placed = [status]; // no hint covers the status card
     for (const hint of open.values()) {
       const box = hint.target();
       let node = document.querySelector(`.kb-hint[data-hint="${hint.key}"]`);
-      if (!visible(box) || (innerWidth < NARROW && placed.length)) { node?.remove(); continue; }
+      if (!visible(box) || (innerWidth < NARROW && placed.length > 1)) { node?.remove(); continue; }
       node ??= bubble(hint);
       put(node, box, hint.key);
       placed.push(apart(node, placed));

@@ -78,7 +78,9 @@ function card(robot) {
   title.append(link);
   const facts = element("ul", "", "facts");
   facts.append(element("li", `${robot.n} joints`), element("li", `${robot.convention} DH`));
-  if (robot.branches.length) facts.append(element("li", `${robot.branches.length} postures`));
+  // With a joint to spare, each posture is a continuum.
+  if (robot.n > 6) facts.append(element("li", "redundant"));
+  else if (robot.branches.length) facts.append(element("li", `${robot.branches.length} postures`));
   const text = element("p", robot.description.split(/(?<=\.) /)[0]);
   text.title = robot.description;
   const shown = element("div", "", "shown");

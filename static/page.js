@@ -5,7 +5,7 @@
   const DARK = matchMedia("(prefers-color-scheme: dark)");
   const SYSTEM_IS_DARK = "The system is dark"; // label of a check box: see app/viewer/panel/view.py
   const SCHEME = "kinboard-scheme";
-  const PATIENCE = 20000; // ms until the page is shown in any case
+  const PATIENCE = 120000; // ms until the page is shown in any case; a first start on a slow machine compiles for a minute
   // Buttons in a corner of the scene: name, drawing, message and argument for the server. The standard views are drawn
   // as an arm seen from there: towards the viewer, bent to the right, from above, and a cube.
   const TOOLS = [

@@ -42,3 +42,30 @@ def test_hints_come_once(browser: Browser, address: str) -> None:
     page.wait_for_timeout(1000)  # a hint would be drawn within 0.4 s
     assert hints.count() == 0
     page.close()
+
+
+def test_hint_on_joints_is_beside_joints_alone(browser: Browser, address: str) -> None:
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.add_init_script(PLAIN)
+    page.goto(address + "viewer/")
+    hint = page.locator('.kb-hint[data-hint="joint"]')
+    expect(hint).to_have_count(1, timeout=WAIT)
+    page.get_by_role("tab", name="Workspace").click(force=True)
+    expect(page.get_by_role("slider", name="Point size")).to_be_visible(timeout=WAIT)
+    expect(hint).to_have_count(0)
+    page.get_by_role("tab", name="Move").click(force=True)
+    expect(hint).to_have_count(1, timeout=WAIT)
+    page.close()
+
+
+def test_cover_says_why_a_page_waits(browser: Browser, address: str) -> None:
+    page = browser.new_page()
+    page.route_web_socket("**/viewer**", lambda _: None)  # a service that is silent
+    page.clock.install()
+    page.goto(address + "viewer/")
+    assert "compiles" in page.evaluate("getComputedStyle(document.documentElement, '::after').content")
+    page.clock.fast_forward(60_000)
+    expect(page.locator("html")).to_have_attribute("data-kb-cover", "light")
+    page.clock.fast_forward(61_000)
+    expect(page.locator("html")).not_to_have_attribute("data-kb-cover", "light")
+    page.close()

@@ -51,7 +51,7 @@ class ProgramKind(Kind):
         if fastest := variant.number(self.fastest):
             conditions.append(f"the tool point at most {fastest:.3g} m/s")
         start = _text(variant, [_segment("ptp", kin.fk(variant.robot, variant.q)[:3, 3])])
-        return Asked("program", note=f"Counts: {'; '.join(conditions)}.", start=start, goal=variant.pose)
+        return Asked("program", note=f"Required: {'; '.join(conditions)}.", start=start, goal=variant.pose)
 
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
         if not isinstance(given, str) or len(given) > LONGEST_PROGRAM:

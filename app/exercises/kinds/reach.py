@@ -69,7 +69,7 @@ class ReachKind(Kind):
             conditions.append(f"every joint {self.margin:g} % of its range away from its limits")
         if (least := variant.number(self.manipulability)) > 0.0:
             conditions.append(f"manipulability at least {least:.3g}")
-        return Asked("posture", note=f"Counts: {listed(conditions)}.", goal=variant.pose)
+        return Asked("posture", note=f"Required: {listed(conditions)}.", goal=variant.pose)
 
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
         robot = variant.robot

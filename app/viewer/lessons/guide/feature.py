@@ -144,7 +144,7 @@ class Guide(Feature):
         step = progress.outline.steps[progress.at]
         q: Configuration | None = step.start if where == "start" else step.end
         if q is not None:
-            words = "The pose before the prediction." if where == "start" else "The arm shows the answer."
+            words = "The arm is at the pose of this step." if where == "start" else "The arm shows the answer."
             self.stage.move_to(np.array(q), Notice("hand", f"Step {progress.at + 1}: {step.title}", words))
 
     def _show(self) -> None:

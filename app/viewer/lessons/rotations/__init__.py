@@ -24,6 +24,7 @@ from app.viewer.lessons.rotations.frames import FARTHEST, MOST, Motion, as_json,
 from app.viewer.lessons.rotations.questions import outline
 from app.viewer.lessons.rotations.typed import LONGEST, read_rotation
 from app.viewer.panel import assign, listen, listen_click, update_html
+from app.viewer.panel.fields import limit_marks
 from app.viewer.panel.status import Notice
 from kin import InputError
 from kin.transforms import Array
@@ -130,7 +131,10 @@ class RotationsLesson(Lesson):
             for k in range(3):
                 name = views.turn_name(self._convention, k)
                 value = min(max(unit.shown(self._angles[k]), low), high)
-                slider = gui.add_slider(name, low, high, unit.step(1), value, hint=ANGLE_HINT, order=3 + k)
+                marks = limit_marks(low, high)
+                slider = gui.add_slider(
+                    name, low, high, unit.step(1), value, marks=marks, hint=ANGLE_HINT, order=3 + k
+                )
                 listen(slider, self.post, ("angle", k, self._convention.key, self.stage.units))
                 self._sliders.append(slider)
 

@@ -288,7 +288,7 @@ def _lock(units: Units) -> Step:
         one_right(
             "What is lost there?",
             (
-                "Small turns about one axis, for the angles: roll and yaw do the same.",
+                "The angles lose one axis of small turns: roll and yaw do the same.",
                 "The frame can still turn there; only these three angles cannot follow smoothly.",
             ),
             (
@@ -322,7 +322,7 @@ def _inverse(T: Array, start: tuple[float, ...], units: Units) -> Step:
         f"({vectors[0]}), and p = ({vectors[1]}){lengths.suffix}.",
         apart(
             Number(
-                f"Which {'xyz'[k]} coordinate has the origin of the base, seen from the tool?",
+                f"What is the {'xyz'[k]} coordinate of the base’s origin, seen from the tool?",
                 float(back[k]),
                 lengths,
                 LENGTH,

@@ -191,9 +191,7 @@ def arm_of(name: str, text: str, tip: str | None = None, reading: bool = False) 
     words = [f"From link {report.base} to {report.tip}.", *report.notes]
     if report.tilts:
         words.append(f"Almost parallel axes are kept exactly by fixed rows: {', '.join(report.tilts)}.")
-    words.append(
-        f"The table and the URDF differ by at most {report.difference:.1g} (m) in {report.samples} poses."
-    )
+    words.append(f"The table and the URDF differ by at most {report.difference:.1g} m in {report.samples} poses.")
     if not reading:
         words.append(f"Collisions: {report.about_bodies}")
     return own_arm(kin.robot_to_dict(robot, length="mm")), " ".join(words)
