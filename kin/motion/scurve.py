@@ -4,8 +4,8 @@ It has seven phases of constant jerk: the acceleration rises, stays and falls; t
 in reverse (Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, section 3.4).
 Phases may be empty. Each phase is a cubic polynomial of the time since its beginning.
 
-The limit of jerk is lowered where the acceleration would rise in less than `SHORTEST` of the time: the rounding of
-such a short phase would exceed the limit of acceleration.
+The jerk is lower than its limit where the acceleration would rise in less than `SHORTEST` of the time: the
+rounding of such a short phase would exceed the limits of acceleration and velocity.
 """
 
 from __future__ import annotations
@@ -30,11 +30,12 @@ def phase_times(distance: float, v: float, a: float, j: float) -> Phases:
 
     v, a, j: the limits of velocity, acceleration and jerk.
     """
-    if distance <= 0.0:
+    least = SHORTEST * max(math.sqrt(distance / a), distance / v)
+    if least == 0.0:  # no distance, or one so short that it takes no time
         return 0.0, 0.0, 0.0
-    j = min(j, a / (SHORTEST * max(math.sqrt(distance / a), distance / v)))
+    j = min(j, a / least)
     if v * j <= a * a:
-        rise, steady = math.sqrt(v / j), 0.0
+        rise, steady = max(math.sqrt(v / j), least), 0.0
     else:
         rise, steady = a / j, v / a - a / j
     ramp = 2.0 * rise + steady

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kin
-from kin.motion import profiles
+from kin.motion import profiles, scurve
 from kin.motion.pieces import JointMotion
 from kin.motion.tasks import most_kept, motion_dimension
 
@@ -237,6 +237,23 @@ def test_a_large_jerk_does_not_exceed_the_acceleration(jerk):
     assert motion.duration == pytest.approx(0.33 + 0.25, rel=1e-4)
     alone = profiles.s_curve(0.0, 0.33, 1, 4, jerk)
     assert (np.abs(alone.sample(times)[2]) <= 4 * (1 + 1e-9)).all()
+
+
+@pytest.mark.parametrize(("v", "a", "j"), [(5e-8, 1e9, 1e12), (1e-9, 1.0, 1e12), (1e-6, 1e12, 1e12)])
+def test_a_velocity_reached_in_a_tiny_part_of_the_time_is_not_exceeded(v, a, j):
+    motion = JointMotion.between(np.array([0.97]), np.array([12.1]), limits_of([v], [a], [j]))
+    breaks = motion.breaks[0]
+    times = np.concatenate([motion.grid(), breaks, np.nextafter(breaks[1:], 0.0)])
+    peaks = np.abs(motion.at(times)).max(axis=(1, 2))[1:]
+    assert (peaks <= np.array([v, a, j]) * (1 + 1e-9)).all()
+    assert motion.at(breaks[-1:])[1, 0, 0] == pytest.approx(0.0, abs=1e-6 * v)
+    assert motion.duration == pytest.approx((12.1 - 0.97) / v, rel=1e-8)
+
+
+def test_a_distance_too_short_to_take_any_time_takes_none():
+    plain = getattr(scurve.phase_times, "py_func", scurve.phase_times)
+    for phase_times in (plain, scurve.phase_times):
+        assert phase_times(5e-324, 10.0, 1e12, 1.0) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
