@@ -78,8 +78,8 @@ def smallest(balls: Array) -> Segment:
 
 
 def rounded(balls: Array, axis: Array, size: float) -> Segment:
-    """The capsule about an axis ``(6,)`` that holds all balls, with three to four digits of the size."""
-    digits = 3 - math.floor(math.log10(size)) if size > 0.0 else 6
+    """The capsule about an axis ``(6,)`` that holds all balls, with at least three digits of the size."""
+    digits = max(3 - math.floor(math.log10(size)), 0) if size > 0.0 else 6
     axis = np.round(axis, digits)
     least = 10.0**-digits
     radius = float(radii(balls, axis[None])[0]) + _TINY * (size + float(np.abs(axis).max()))

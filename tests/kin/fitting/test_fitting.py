@@ -51,6 +51,13 @@ def test_no_point_of_a_random_body_is_outside(seed):
     assert outside(sampled(body), found).max() <= 1e-9 * np.abs(body).max()
 
 
+@pytest.mark.parametrize("size", [1e-300, 1e-12, 9999.0, 2e4, 1e6])
+def test_bodies_of_any_size_are_held(size):
+    """A file in millimetres has an arm of a thousand metres."""
+    body = bodies.box(0.9, 0.3, 0.2) * size
+    assert outside(body.reshape(-1, 3), capsules_around(body, most=1)).max() <= 0.0
+
+
 @pytest.mark.parametrize(
     ("body", "most", "within"),
     [
