@@ -62,7 +62,7 @@ def fit_all(bodies: Sequence[Body], reach: float, surfaces_of: Callable[[str], S
 
 
 def checked(fits: object, bodies: Sequence[Body]) -> list[Fitted]:
-    """The answer of the process; raises `ValueError` if it cannot be one."""
+    """The answer of the process; raises `ValueError` or `TypeError` if it cannot be one."""
     if not isinstance(fits, list) or len(fits) != len(bodies):
         raise ValueError("another number of bodies")
     found = []
@@ -72,9 +72,9 @@ def checked(fits: object, bodies: Sequence[Body]) -> list[Fitted]:
             raise ValueError("more capsules than there may be")
         segments = []
         for x, y, z, u, v, w, r in capsules:
-            numbers = [float(value) for value in (x, y, z, u, v, w, r)]
-            if not (all(map(math.isfinite, numbers)) and numbers[6] > 0.0):
+            x, y, z, u, v, w, r = numbers = [float(value) for value in (x, y, z, u, v, w, r)]
+            if not (all(map(math.isfinite, numbers)) and r > 0.0):
                 raise ValueError("numbers that are not finite")
-            segments.append(Segment((numbers[0], numbers[1], numbers[2]), (numbers[3], numbers[4], numbers[5]), r))
+            segments.append(Segment((x, y, z), (u, v, w), r))
         found.append(Fitted(segments, [str(words)[:WORDS] for words in missing]))
     return found

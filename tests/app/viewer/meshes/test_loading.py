@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
@@ -19,12 +20,14 @@ from app.shared.memory.answers import MemoryFullError
 from app.viewer.meshes import reader as readers
 from app.viewer.meshes.archive import MOST_BYTES, MeshError
 from app.viewer.meshes.child import answer_to
+from app.viewer.meshes.fitting import checked
 from app.viewer.meshes.links import shapes_of
 from app.viewer.meshes.loading import PARSED, finished, read_surfaces
-from app.viewer.meshes.placing import Piece
+from app.viewer.meshes.placing import Body, Fit, Piece
 from app.viewer.meshes.reader import PACKAGES, ClientMeshes, Meshes, MeshReader
 from app.viewer.meshes.surface import GREY, LinkBody, Surface, by_color, pack, unpack
 from kin.files.urdf.visuals import read_visuals
+from kin.fitting import Segment
 
 ROOT = Path(__file__).parents[4]
 
@@ -167,6 +170,30 @@ WRONG = {
 def test_an_answer_of_the_process_is_checked(what: str) -> None:
     with pytest.raises((ValueError, KeyError, TypeError)):
         unpack(WRONG[what], 1)
+
+
+BODY = Body([], 1)
+NO_FITS = {
+    "none": [],
+    "no list": None,
+    "not finite": [Fit([[0, 0, 0, 0, 0, 1, math.nan]], [])],
+    "no radius": [Fit([[0, 0, 0, 0, 0, 1, 0]], [])],
+    "a number too few": [Fit([[0, 0, 0, 0, 0, 1]], [])],
+    "too many": [Fit([[0, 0, 0, 0, 0, 1, 1]] * 10_000, [])],
+    "another number of links": [Fit([], [])] * 2,
+    "no number": [Fit([[0, 0, 0, 0, 0, None, 1]], [])],
+}
+
+
+@pytest.mark.parametrize("what", NO_FITS)
+def test_capsules_that_the_process_answers_are_checked(what: str) -> None:
+    with pytest.raises((ValueError, TypeError)):
+        checked(NO_FITS[what], [BODY])
+
+
+def test_every_number_of_an_answered_capsule_becomes_a_float() -> None:
+    (fitted,) = checked([Fit([[0, 0, 0, 0, 0, 1, "0.1"]], [])], [BODY])
+    assert fitted.capsules == [Segment((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.1)]
 
 
 TWO, URDF = kin.load_urdf(TWO_JOINTS), "two/urdf/two.urdf"
