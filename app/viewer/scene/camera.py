@@ -29,6 +29,7 @@ FARTHEST = 1e6  # metres; viser's own limit of zooming out is 1e4
 SAME = 1e-3  # tolerance, relative to the distance to the look-at point
 _MARGIN = 1.06  # of the sphere around the arm
 _AROUND = 0.12  # room around each frame of the arm, in radii of the sphere around the arm
+_ARROWS = 0.28  # room around the tool in the default view, in these radii: the gizmo's arrows and some space
 _NEAREST, _REMOTEST = 0.4, 14.0  # limits of zooming in and out, in these radii
 _FARTHEST_ASIDE = 3.0  # limit of panning, in these radii
 _LOWEST = 0.03  # least height of the camera above the floor, in these radii: from below, the floor hides the arm
@@ -111,7 +112,8 @@ class VisitorCamera:
     def aim(self, body: Body, points: Array | None = None, glide: bool = False) -> None:
         """Move to the default view, at once or in a glide; for another arm, what `fit` added is dropped.
 
-        The view also contains the origins of the arm's frames `points` ``(n, 3)``, by default the last ones given.
+        The view also contains the origins of the arm's frames `points` ``(n, 3)``, by default the last ones given,
+        and the arrows at the last of them, the tool.
         """
         if body is not self._body:
             self._body, self._room = body, ()
@@ -123,8 +125,11 @@ class VisitorCamera:
         self.chosen = None
         self._framed = self._aspect
         viewpoint = np.stack([*view(body, self._framed, self._room), UP])
-        if not self._shows(viewpoint, self._points):
-            viewpoint = np.stack([*view(body, self._framed, [*self._room, self._arm(self._points)]), UP])
+        arrows = _ARROWS * body.radius
+        tool = self._points[-1:]
+        if not self._shows(viewpoint, self._points) or not contains(viewpoint, self._framed, tool, arrows):
+            room = [*self._room, self._arm(self._points), (tool[0], arrows)]
+            viewpoint = np.stack([*view(body, self._framed, room), UP])
         if len(self._extra):
             least = distance_to_see(viewpoint, self._framed, self._extra, _INSIDE)
             viewpoint = _at_distance(viewpoint, max(1.0, least / _distance(viewpoint)))

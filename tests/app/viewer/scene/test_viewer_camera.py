@@ -15,7 +15,7 @@ from fake_browser import FakeBrowser
 import kin
 from app.shared.store import Store
 from app.viewer.scene import camera, viewpoints
-from app.viewer.scene.arm import FOR_FINGERS
+from app.viewer.scene.arm import FOR_FINGERS, GIZMO
 from app.viewer.scene.meshes import body
 from app.viewer.session.state import PageState, decode, encode
 
@@ -277,6 +277,22 @@ def test_a_typed_target_and_the_arm_are_both_in_the_picture(target: tuple[float,
     assert viewpoints.contains(there, 956 / 720, np.array([target]), 0.0) != far
     if far:
         assert np.linalg.norm(lens.position - arm.center) < 20.0 * arm.radius, "the arm is not lost from sight"
+
+
+def test_the_default_view_shows_the_arrows_at_the_tool() -> None:
+    lens = SimpleNamespace(
+        image_width=956, image_height=720, position=np.ones(3), look_at=np.zeros(3), up_direction=camera.UP,
+        on_update=lambda act: act,
+    )  # fmt: skip
+    of_visitor = camera.VisitorCamera(SimpleNamespace(camera=lens), lambda key, value: None)  # type: ignore[arg-type]
+    rng = np.random.default_rng(5)
+    for robot in (PIONEER, UR5):
+        arm = body(robot)
+        for _ in range(40):
+            origins = frames(robot, rng.uniform(robot.lower, robot.upper))
+            of_visitor.aim(arm, origins)
+            there = np.stack([lens.position, lens.look_at, lens.up_direction])
+            assert viewpoints.contains(there, 956 / 720, origins[-1:], GIZMO * arm.radius)
 
 
 def test_a_sphere_round_two() -> None:
