@@ -2,38 +2,33 @@
 
 from __future__ import annotations
 
-import json
-import shlex
 from collections.abc import Callable
 
 from app.exports.motion import FORMATS
-from app.exports.snippets import LOCAL, named
+from app.exports.snippets import Service, named, posted
 from kin import InputError, Motion, robot_to_dict
 from kin.motion import program_to_dict
 
 RATE = 100.0  # samples per second
 
 
-def python(motion: Motion, own: bool) -> str:
+def python(motion: Motion, own: bool, service: Service) -> str:
     """Python, with this package and without any service."""
     return _text("python", motion)
 
 
-def curl(motion: Motion, own: bool) -> str:
-    """A command for a shell that asks a service; `own`: the arm is sent along."""
+def curl(motion: Motion, own: bool, service: Service) -> str:
+    """A command for a shell that asks this service; `own`: the arm is sent along."""
     body: dict[str, object] = {
         "program": program_to_dict(motion.program), "q_start": motion.q_start.tolist(), "rate": RATE,
     }  # fmt: skip
-    address = f"{LOCAL}api/v1/robots/{motion.robot.id}/motion"
+    address = f"{service.address}api/v1/robots/{motion.robot.id}/motion"
     if own:
-        address, body = f"{LOCAL}api/v1/motion", {"robot": robot_to_dict(named(motion.robot)), **body}
-    return (
-        f"curl -s {shlex.quote(address)} \\\n  -H 'Content-Type: application/json' \\\n"
-        f"  -d {shlex.quote(json.dumps(body))}\n"
-    )
+        address, body = f"{service.address}api/v1/motion", {"robot": robot_to_dict(named(motion.robot)), **body}
+    return posted(address, service.token, body)
 
 
-def urscript(motion: Motion, own: bool) -> str:
+def urscript(motion: Motion, own: bool, service: Service) -> str:
     """URScript; for other arms a comment that says why there is none."""
     try:
         return _text("urscript", motion)
@@ -45,4 +40,6 @@ def _text(name: str, motion: Motion) -> str:
     return b"".join(FORMATS[name].pieces(motion, RATE)).decode()
 
 
-SNIPPETS: dict[str, Callable[[Motion, bool], str]] = {"Python, kin": python, "curl": curl, "URScript": urscript}
+SNIPPETS: dict[str, Callable[[Motion, bool, Service], str]] = {
+    "Python, kin": python, "curl": curl, "URScript": urscript,
+}  # fmt: skip

@@ -29,6 +29,14 @@ DIGITS = 9
 LOCAL = "http://127.0.0.1:8000/"
 
 
+@dataclass(frozen=True)
+class Service:
+    """A service that code asks: its address, as that of a `Moment`, and whether it asks for a token."""
+
+    address: str = LOCAL
+    token: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Moment:
     """The subject of a snippet.
@@ -56,17 +64,22 @@ class Moment:
     avoid: bool = False
 
 
+def posted(address: str, token: bool, body: dict[str, object]) -> str:
+    """A command for a shell that posts JSON; `token`: with the service's token."""
+    header = ' -H "Authorization: Bearer $KINBOARD_TOKEN"' if token else ""
+    return (
+        f"curl -s {shlex.quote(address)}{header} \\\n"
+        f"  -H 'Content-Type: application/json' \\\n"
+        f"  -d {shlex.quote(json.dumps(body))}\n"
+    )
+
+
 def curl(moment: Moment) -> str:
     """Two commands for a shell: forward, then inverse kinematics."""
-    header = ' -H "Authorization: Bearer $KINBOARD_TOKEN"' if moment.token else ""
 
     def command(operation: str, body: dict[str, object]) -> str:
         sent = {**body, "robot": robot_to_dict(named(moment.robot))} if moment.own else body
-        return (
-            f"curl -s {shlex.quote(_address(moment) + '/' + operation)}{header} \\\n"
-            f"  -H 'Content-Type: application/json' \\\n"
-            f"  -d {shlex.quote(json.dumps(sent))}\n"
-        )
+        return posted(f"{_address(moment)}/{operation}", moment.token, sent)
 
     return command("fk", {"q": _list(moment.q)}) + command("ik", _question(moment))
 

@@ -13,6 +13,7 @@ from typing import ClassVar, Protocol
 
 import viser
 
+from app.exports.snippets import Service
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
@@ -93,6 +94,10 @@ class Stage(Protocol):
     @property
     def frame(self) -> float:
         """Seconds between two frames of a moving arm, which depend on how many visitors' arms move."""
+
+    @property
+    def service(self) -> Service:
+        """Where this page has come from, for code that asks the service."""
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:

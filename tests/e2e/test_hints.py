@@ -60,7 +60,8 @@ def test_hint_on_joints_is_beside_joints_alone(browser: Browser, address: str) -
 
 def test_cover_says_why_a_page_waits(browser: Browser, address: str) -> None:
     page = browser.new_page()
-    page.route_web_socket("**/viewer**", lambda _: None)  # a service that is silent
+    silent = "window.Worker = class extends EventTarget { postMessage() {} terminate() {} }"
+    page.add_init_script(silent)
     page.clock.install()
     page.goto(address + "viewer/")
     assert "compiles" in page.evaluate("getComputedStyle(document.documentElement, '::after').content")

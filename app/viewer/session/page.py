@@ -14,6 +14,7 @@ from collections.abc import Callable, Hashable, Sequence
 import viser
 
 import kin
+from app.exports.snippets import Service
 from app.shared.security import Rights
 from app.viewer.feature import Feature
 from app.viewer.frames import Frames
@@ -154,6 +155,10 @@ class VisitorPage(ShownArm, Worker):
 
     def fit_view(self, spheres: Sequence[Sphere], points: Array | None = None) -> None:
         self.camera.fit(spheres, points)
+
+    @property
+    def service(self) -> Service:
+        return self._persistence.service
 
     # SavedPage: what persistence may use besides
 

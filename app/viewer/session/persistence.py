@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Protocol
 
 import kin
-from app.exports.snippets import LOCAL, Moment
+from app.exports.snippets import LOCAL, Moment, Service
 from app.shared.security import Rights
 from app.viewer.feature import Feature, Stage
 from app.viewer.panel.share import SharePanel
@@ -94,6 +94,11 @@ class Persistence:
         self._share: SharePanel
         self.due: float | None = None
         self.led = False
+
+    @property
+    def service(self) -> Service:
+        """The service, at the address that the browser has for it."""
+        return Service(self._address, self._token)
 
     def load(self) -> None:
         """Read the stored state from the browser, and wait for it. A page that does not answer starts fresh."""

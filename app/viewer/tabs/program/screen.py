@@ -100,7 +100,7 @@ class Screen:
         """Saving, opening, and the program as code."""
         code = ""
         if motion is not None:
-            code = box_html(SNIPPETS[self.language](motion, own), "Copy code")
+            code = box_html(SNIPPETS[self.language](motion, own, self._stage.service), "Copy code")
         self._show(
             "files",
             render(

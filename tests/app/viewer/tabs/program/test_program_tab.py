@@ -13,6 +13,8 @@ import pytest
 from fake_browser import FakeBrowser
 
 import kin
+from app.exports.motion_snippets import SNIPPETS
+from app.exports.snippets import Service
 from app.shared.store import Store
 from app.viewer.session.state import decode
 from app.viewer.tabs.program.items import MOST
@@ -333,3 +335,22 @@ def test_ghosts_and_frames_are_switched(tab: FakeBrowser) -> None:
         assert any(node.endswith(f"/{name}") for node in tab.nodes)
         press(tab, name, value=False)
         assert not any(node.endswith(f"/{name}") for node in tab.nodes)
+
+
+def test_the_command_asks_the_service_of_the_page(port: int) -> None:
+    memory = json.dumps({"address": "https://arms.example/kin/", "state": ""})
+    with FakeBrowser(port, memory=memory) as tab:
+        tab.settle()
+        record(tab, 20, 80)
+        press(tab, "language", value="curl")
+        shown = html.unescape(part(tab, "files"))
+    assert "curl -s https://arms.example/kin/api/v1/robots/pioneer5/motion" in shown
+    assert "127.0.0.1" not in shown
+
+
+def test_the_command_of_a_service_with_a_token_sends_it() -> None:
+    program = {"segments": [{"kind": "ptp", "q": PIONEER.q_home.tolist()}]}
+    motion = kin.plan_motion(PIONEER, program, q_start=PIONEER.q_home)
+    text = SNIPPETS["curl"](motion, False, Service("https://arms.example/", token=True))
+    assert '-H "Authorization: Bearer $KINBOARD_TOKEN"' in text
+    assert "Bearer" not in SNIPPETS["curl"](motion, False, Service())
