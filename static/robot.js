@@ -220,7 +220,16 @@
     }
   });
 
+  // A file with several ends or robots asks which. That stands below the table, far from where a file was dropped.
+  let asked = false;
+  function showChoice() {
+    const choice = document.querySelector('select:is([data-cell="tip"], [data-cell="urdf"])');
+    if (choice && !asked) requestAnimationFrame(() => choice.scrollIntoView({ block: "center" }));
+    asked = choice !== null;
+  }
+
   addEventListener("DOMContentLoaded", () => {
+    new MutationObserver(showChoice).observe(document.body, { subtree: true, childList: true });
     new MutationObserver(() => { if (part("table")) { restore(); mark(); markWrong(); resized.observe(scroller()); showMore(); } }).observe(document.body, { subtree: true, childList: true });
   });
 })();

@@ -168,6 +168,18 @@ def test_a_zip_or_several_files_show_the_real_arm_and_delete_removes_it(tab: Tab
     tab.show(kin.get_robot("pioneer5"))
 
 
+def test_the_choice_between_several_ends_is_seen(tab: Tab) -> None:
+    page = tab.page
+    tab.open("Robot")
+    turn = "<joint name='{0}' type='revolute'><parent link='base'/><child link='{0}-end'/><axis xyz='0 0 1'/>"
+    limit = "<limit lower='-1' upper='1' velocity='1' effort='1'/></joint><link name='{0}-end'/>"
+    text = "<robot name='fork'><link name='base'/>" + "".join((turn + limit).format(x) for x in "ab") + "</robot>"
+    file = {"name": "fork.urdf", "mimeType": "", "buffer": text.encode()}
+    page.locator("[data-arm-file]").set_input_files([file])
+    expect(tab.status.first).to_contain_text("several ends")
+    expect(page.locator('select[data-cell="tip"]')).to_be_in_viewport(ratio=1)
+
+
 def test_three_poses_are_recorded_played_and_scrubbed(tab: Tab) -> None:
     angles = (30.0, 80.0, 120.0)
     places = [kin.fk(PIONEER, home_with(PIONEER, 0, angle))[:3, 3] for angle in angles]
