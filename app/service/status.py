@@ -28,7 +28,7 @@ class Kernels(BaseModel):
     """The parts of the compiled core: families of arms as `closed_form` names them, with "-all" what they do
     besides being moved, and what belongs to no family."""
 
-    ready: list[str]
+    ready: list[str] = Field(description="Those that are compiled.")
     preparing: str | None = Field(description="The part that is being compiled.")
     waiting: list[str] = Field(description="Those after it; what a visitor waits for comes first.")
 
