@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 MEMORY = 640 * 1024 * 1024  # bytes
 SECONDS = 20  # of processor time
 SLACK = 1.4  # of the triangles to draw
+ROUNDS = 3  # of simplification, at most
 ALL = 1_500_000  # triangles of all files, before they are simplified
 
 
@@ -87,15 +88,20 @@ def answer_to(request: dict[str, Any], data: bytes, report: Callable[[int, int],
             raise TooLargeError("meshes: triangles", f"more than {ALL}", f"at most {ALL} in all files")
         found[name] = surfaces
     share = min(1.0, request["most"] / max(drawn, 1))
-    for name in uses:
-        found[name] = [done for surface in found[name] if len((done := finished(surface, share)).faces)]
-        if not found[name]:
-            raise MeshError(f"mesh {name}", "no triangle with an area", "a mesh with triangles")
-    left = sum(count * len(surface.faces) for name, count in uses.items() for surface in found[name])
-    if left > SLACK * request["most"]:  # what is no surface cannot be simplified
-        expected = f"meshes that can be simplified to {request['most']}"
-        raise TooLargeError("meshes: triangles to draw", f"{left}", expected)
-    return pack(placed(shapes, {path: found[name] for path, name in names.items()}), drawn, fits)
+    for _ in range(ROUNDS):
+        simple = {name: [finished(surface, share) for surface in found[name]] for name in uses}
+        simple = {
+            name: [surface for surface in surfaces if len(surface.faces)] for name, surfaces in simple.items()
+        }
+        empty = next((name for name, surfaces in simple.items() if not surfaces), None)
+        if empty is not None:
+            raise MeshError(f"mesh {empty}", "no triangle with an area", "a mesh with triangles")
+        left = sum(count * len(surface.faces) for name, count in uses.items() for surface in simple[name])
+        if left <= SLACK * request["most"]:
+            return pack(placed(shapes, {path: simple[name] for path, name in names.items()}), drawn, fits)
+        share *= request["most"] / left  # what is no closed surface stays large, so the others get smaller
+    expected = f"meshes that can be simplified to {request['most']}"
+    raise TooLargeError("meshes: triangles to draw", f"{left}", expected)
 
 
 def _fits(

@@ -19,6 +19,7 @@ from kin.units import Units
 Kind = Literal[
     "reached", "compromise", "limits", "orientation", "unreachable", "hand", "advice", "error", "collision"
 ]
+_MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
 # s: news such as "Undone: Home" are shown this long, then again what is true now.
 NEWS = 10.0
 UNSEEN = 1.0  # s: news are shown at least this long, whatever else happens
@@ -46,7 +47,7 @@ class Notice:
     detail: str = ""
 
 
-READY = Notice("hand", "Ready", "Drag the coloured arrows at the gripper, or move a joint slider.")
+READY = Notice("hand", "Ready", "Drag the coloured arrows at the tool, or move a joint slider.")
 
 READY_IN_CONTACT = "Ready, but something touches"
 
@@ -61,7 +62,7 @@ def notice(result: IKResult, units: Units) -> Notice:
         detail = detail.replace(result.details.branch, short(result.details.branch))
     off = _farther_off(result, units)
     if off:
-        detail += f" The posture shown is {off} off, because it keeps the orientation as far as it can."
+        detail += f" The posture shown is {off} off: a compromise between point and orientation."
     return Notice(_kind(result), explanation.title, detail)
 
 
@@ -140,7 +141,15 @@ def html(shown: Notice, warning: str = "", waiting: str = "") -> str:
         symbol, color = ("!", "kb-amber") if shown.kind == "hand" else (symbol, "kb-amber")
         if shown.title == READY.title:
             shown = replace(shown, title=READY_IN_CONTACT)
-    return render("panel/status", notice=shown, warning=warning, waiting=waiting, symbol=symbol, color=color)
+    shown = replace(shown, title=_signed(shown.title), detail=_signed(shown.detail))
+    return render(
+        "panel/status", notice=shown, warning=_signed(warning), waiting=waiting, symbol=symbol, color=color
+    )
+
+
+def _signed(text: str) -> str:
+    """With true minus signs, as all numbers of the page have; sentences of the core have those of ASCII."""
+    return _MINUS.sub("−", text)
 
 
 class StatusLine:

@@ -371,12 +371,28 @@ except MemoryError:
     assert "KINBOARD_TOKEN" in os.environ
 
 
-def test_what_cannot_be_drawn_or_simplified_is_refused(tmp_path: Path) -> None:
+def soup() -> trimesh.Trimesh:
+    """6000 triangles that are no surface: most edges belong to many, so that they cannot be simplified."""
     rng = np.random.default_rng(1)
-    noise = rng.random((400, 3))[rng.integers(0, 400, (6000, 3))]  # no surface: most edges have many triangles
+    corners = rng.random((400, 3))[rng.integers(0, 400, 18_000)]
+    return trimesh.Trimesh(corners, np.arange(18_000).reshape(-1, 3), process=False)
+
+
+def test_smooth_meshes_make_room_for_those_that_cannot_be_simplified(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=7)
+    for name, mesh in (("soup.stl", soup()), ("ball.stl", ball)):
+        (tmp_path / name).write_bytes(mesh.export(file_type="stl"))
+    request, solids = asked("soup.stl", 10, tmp_path)
+    request["pieces"].append(Piece("ball.stl", 0, request["pieces"][0].pose))
+    links, drawn = unpack(answer_to(request, solids), 200_000)
+    assert drawn == 60_000 + len(ball.faces)
+    triangles = sum(len(surface.faces) for link in links for surface in link.surfaces)
+    assert 60_000 < triangles < 1.4 * 80_000
+
+
+def test_what_cannot_be_drawn_or_simplified_is_refused(tmp_path: Path) -> None:
     flat = trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False)
-    soup = trimesh.Trimesh(noise.reshape(-1, 3), np.arange(18_000).reshape(-1, 3), process=False)
-    for name, mesh in (("soup.stl", soup), ("flat.stl", flat)):
+    for name, mesh in (("soup.stl", soup()), ("flat.stl", flat)):
         (tmp_path / name).write_bytes(mesh.export(file_type="stl"))
     for name, count, expected in (("soup.stl", 300, "to draw"), ("flat.stl", 1, "area")):
         with pytest.raises(MeshError, match=expected):
