@@ -141,7 +141,8 @@ def html(shown: Notice, warning: str = "", waiting: str = "") -> str:
         symbol, color = ("!", "kb-amber") if shown.kind == "hand" else (symbol, "kb-amber")
         if shown.title == READY.title:
             shown = replace(shown, title=READY_IN_CONTACT)
-    shown = replace(shown, title=_signed(shown.title), detail=_signed(shown.detail))
+    if shown.kind != "error":  # which says what was typed
+        shown = replace(shown, title=_signed(shown.title), detail=_signed(shown.detail))
     return render(
         "panel/status", notice=shown, warning=_signed(warning), waiting=waiting, symbol=symbol, color=color
     )
