@@ -132,15 +132,20 @@ def test_a_drag_of_the_target_avoids_the_wall_on_request(port: int) -> None:
         tab.release()
 
 
+def gizmo_of_the_obstacle(tab):
+    """The name and the owner of the gizmo that appears when the only obstacle is clicked."""
+    tab.settle()
+    (node,) = bodies(tab)
+    tab.click(node)
+    tab.wait(lambda: any("obstacle-gizmo" in name for name in tab.nodes))
+    tab.settle()
+    (gizmo,) = (name for name in tab.nodes if "obstacle-gizmo" in name)
+    return gizmo, tab.nodes[gizmo]["owner"]
+
+
 def test_obstacles_are_dragged_with_their_gizmo(port: int) -> None:
     with FakeBrowser(port, memory=opened(PageState("ur5", obstacles=(WALL,)))) as tab:
-        tab.settle()
-        (node,) = bodies(tab)
-        tab.click(node)
-        tab.wait(lambda: any("obstacle-gizmo" in name for name in tab.nodes))
-        tab.settle()
-        (gizmo,) = (name for name in tab.nodes if "obstacle-gizmo" in name)
-        owner = tab.nodes[gizmo]["owner"]
+        gizmo, owner = gizmo_of_the_obstacle(tab)
         tab.send("TransformControlsDragStartMessage", name=gizmo, owner=owner)
         place = {"position": (0.1, 0.9, 0.5), "wxyz": (1.0, 0.0, 0.0, 0.0)}
         tab.send("TransformControlsUpdateMessage", name=gizmo, owner=owner, **place)
@@ -156,13 +161,7 @@ def test_a_drag_of_an_obstacle_is_one_step_however_long_it_rests(
     monkeypatch.setattr(history, "SHORT_PAUSE", 1e-6)
     places = [(0.1, 0.9, 0.5), (0.2, 0.9, 0.5), (0.3, 0.9, 0.5), (0.4, 0.9, 0.5)]
     with FakeBrowser(port, memory=opened(PageState("ur5", obstacles=(WALL,)))) as tab:
-        tab.settle()
-        (node,) = bodies(tab)
-        tab.click(node)
-        tab.wait(lambda: any("obstacle-gizmo" in name for name in tab.nodes))
-        tab.settle()
-        (gizmo,) = (name for name in tab.nodes if "obstacle-gizmo" in name)
-        owner = tab.nodes[gizmo]["owner"]
+        gizmo, owner = gizmo_of_the_obstacle(tab)
         for drag in (places[:2], places[2:]):
             tab.send("TransformControlsDragStartMessage", name=gizmo, owner=owner)
             for xyz in drag:

@@ -222,12 +222,17 @@ def test_an_address_without_a_camera_has_the_default_view(port: int) -> None:
         assert np.allclose(shown(tab), default(UR5, PHONE))
 
 
-def test_the_camera_makes_room_for_drawings_but_keeps_a_chosen_view() -> None:
+def a_camera() -> tuple[SimpleNamespace, camera.VisitorCamera]:
+    """The camera of a visitor, and what the browser's is in viser."""
     lens = SimpleNamespace(
         image_width=956, image_height=720, position=np.ones(3), look_at=np.zeros(3), up_direction=camera.UP,
         on_update=lambda act: act,
     )  # fmt: skip
-    of_visitor = camera.VisitorCamera(SimpleNamespace(camera=lens), lambda key, value: None)  # type: ignore[arg-type]
+    return lens, camera.VisitorCamera(SimpleNamespace(camera=lens), lambda key, value: None)  # type: ignore[arg-type]
+
+
+def test_the_camera_makes_room_for_drawings_but_keeps_a_chosen_view() -> None:
+    lens, of_visitor = a_camera()
     arm = body(PIONEER)
     of_visitor.aim(arm)
     near = lens.position
@@ -259,11 +264,7 @@ def test_the_camera_makes_room_for_drawings_but_keeps_a_chosen_view() -> None:
 
 @pytest.mark.parametrize("target", [(0.1, 0.2, 0.0), (1.0, 0.0, 0.0), (0.0, -1.5, 0.4), (400.0, 0.0, 0.0)])
 def test_a_typed_target_and_the_arm_are_both_in_the_picture(target: tuple[float, float, float]) -> None:
-    lens = SimpleNamespace(
-        image_width=956, image_height=720, position=np.ones(3), look_at=np.zeros(3), up_direction=camera.UP,
-        on_update=lambda act: act,
-    )  # fmt: skip
-    of_visitor = camera.VisitorCamera(SimpleNamespace(camera=lens), lambda key, value: None)  # type: ignore[arg-type]
+    lens, of_visitor = a_camera()
     arm = body(PIONEER)
     origins = frames(PIONEER, PIONEER.q_home)
     of_visitor.aim(arm, origins)
@@ -280,11 +281,7 @@ def test_a_typed_target_and_the_arm_are_both_in_the_picture(target: tuple[float,
 
 
 def test_the_default_view_shows_the_arrows_at_the_tool() -> None:
-    lens = SimpleNamespace(
-        image_width=956, image_height=720, position=np.ones(3), look_at=np.zeros(3), up_direction=camera.UP,
-        on_update=lambda act: act,
-    )  # fmt: skip
-    of_visitor = camera.VisitorCamera(SimpleNamespace(camera=lens), lambda key, value: None)  # type: ignore[arg-type]
+    lens, of_visitor = a_camera()
     rng = np.random.default_rng(5)
     for robot in (PIONEER, UR5):
         arm = body(robot)
