@@ -25,6 +25,7 @@ WIDTH, HEIGHT, MARGIN = 560.0, 340.0, 40.0  # drawing units
 EYE = np.array([0.62, -0.68, 0.40])  # the direction from which it is seen
 RED, BLUE, INK, SOFT = "#c0392b", "#1f5fbf", "#18212b", "#6b7683"
 SAME = 1e-9  # m
+SMALL = 10.5  # drawing units: the size of lengths
 
 Projection = Callable[[Array], Array]
 Path = list[tuple[Array, tuple[float, float]]]
@@ -217,7 +218,8 @@ def _lengths(sheet: Sheet, path: Path, to_page: Projection) -> list[Label]:
             if abs(size) > SAME:
                 text = unit.brief(abs(size))
                 start, end = to_page(ends)
-                out.append(Label(text, along(start, end, 0.5 * LETTER * 10.5 * len(text), 8.0), SOFT, 10.5))
+                half = 0.5 * LETTER * SMALL * len(text)
+                out.append(Label(text, along(start, end, half, 8.0), SOFT, SMALL))
     return out
 
 

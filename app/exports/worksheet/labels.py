@@ -36,9 +36,8 @@ class Label:
 
 def around(start: Array, tip: Array, off: float) -> Array:
     """Places for the name of an arrow ``(k, 2)``: beyond its tip, then beside it, then farther away."""
-    along = tip - start
-    size = float(np.hypot(*along))
-    direction = math.atan2(along[1], along[0]) if size > 1e-6 else -0.5 * math.pi
+    x, y = tip - start
+    direction = math.atan2(y, x) if math.hypot(x, y) > 1e-6 else -0.5 * math.pi
     turned = direction + _TURNS
     ways = np.stack([np.cos(turned), np.sin(turned)], axis=1)
     return np.concatenate([tip + far * ways for far in (off, 1.6 * off, 2.4 * off, 3.2 * off)])
