@@ -1,0 +1,354 @@
+"""Which one or two mistakes in a table explain why it is another arm.
+
+Every change of :mod:`kin.comparison.mistakes` is tried, and numbers are solved for: poses depend linearly on each
+length, and a wrong angle turns everything after it about one line, so that a single wrong number follows from the
+difference of poses. Where base, tool and zeros are free, lengths follow from the invariants instead.
+
+Without a likely single change, pairs are tried, the likely ones first, until the time is over. Every explanation
+is checked with forward kinematics before it is returned.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from kin.axes import generic_q
+from kin.comparison.frames import Mapping, no_mapping, plainest
+from kin.comparison.matching import Tolerance
+from kin.comparison.mistakes import Edit, edits, fewer_rows, more_rows, own_numbers, value_edit
+from kin.comparison.results import Change, Explanation
+from kin.comparison.tables import ALPHA, THETA, A, Chain, D, Invariants, Tables, chain, invariants
+from kin.fk import fk
+from kin.robot import Robot
+from kin.transforms import Array, rotation_angle
+
+PER_CHANGE = 3.0  # cost of any change: fewer changes come first
+LIKELY = 7.0  # a single change that costs less needs no pairs beside it
+FREE_FRAMES = 0.1  # what frames and zeros cost where they are expected to differ, as a share
+_BETTER = 1.5  # a change that leaves frames or zeros open must be this much plainer than none
+_MOST_MATCHES = 60  # of tables of one level whose axes are compared; each takes a millisecond
+_VALUE = 2.6  # cost of a number that has no better name
+_NEAR = 3  # invariants that one wrong number can change, about
+_PROBES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """Changed tables, with the changes that led to each and their cost."""
+
+    tables: Tables
+    history: list[tuple[Edit, ...]]
+    cost: Array
+
+
+class Search:
+    """The search for mistakes in b that make it another arm than a.
+
+    Args:
+        fixed: whether the poses should agree as they are, so that base, tool and zeros are mistakes too.
+        deadline: on `time.monotonic`; pairs are given up then.
+    """
+
+    def __init__(self, a: Robot, b: Robot, fixed: bool, tolerance: Tolerance, deadline: float) -> None:
+        self._a, self._b, self._fixed = a, b, fixed
+        self._tolerance, self._deadline = tolerance, deadline
+        self._probes = _probes(a)
+        self._poses = fk(a, self._probes)
+        table = Tables.of(a)
+        self._kinds = table.kinds[0, table.joint_rows]
+        self._invariants = invariants(table)
+        self._found: dict[bytes, Explanation] = {}
+        self._limit = math.inf  # cost up to which an explanation that leaves frames or zeros open is worth having
+        self.complete = True
+
+    def run(self, most: int, unchanged: float) -> list[Explanation]:
+        """At most so many explanations, the likeliest first.
+
+        Args:
+            unchanged: cost of the mapping without any change, infinite if there is none.
+        """
+        self._limit = unchanged - _BETTER
+        start = _Level(Tables.of(self._b), [()], np.zeros(1))
+        levels = list(self._changed_once(start))
+        self._solve(start)
+        for level in levels:
+            self._judge(level, frames=True)
+        if self._least() >= LIKELY and unchanged == math.inf:
+            self._pairs(levels)
+        return sorted(self._found.values(), key=lambda e: (e.cost, len(e.changes)))[:most]
+
+    def _least(self) -> float:
+        return min((e.cost for e in self._found.values()), default=math.inf)
+
+    # -- changed tables ----------------------------------------------------------------------------------------
+
+    def _changed_once(self, start: _Level) -> Iterator[_Level]:
+        """All tables with one change, by number of rows."""
+        single = start.tables
+        n = len(single.joint_rows)
+        if n == self._a.n:
+            several = [*edits(single.rows, self._a, self._fixed), *own_numbers(single.rows, self._a)]
+            yield _distinct([(e, e.apply(single)) for e in several], start)
+        rows = [each for each in fewer_rows(single) if n > self._a.n or each[0].mistake == "typed twice"]
+        if n >= self._a.n and rows:
+            yield _distinct(rows, start)
+        if n <= self._a.n:
+            yield _distinct(list(more_rows(single, self._a)), start)
+
+    def _pairs(self, levels: list[_Level]) -> None:
+        """Tables with two changes: every change of every changed table, likely ones first."""
+        for level in levels:
+            if len(level.tables.joint_rows) != self._a.n:
+                self._second_rows(level)
+                continue
+            self._solve(level)
+            second = sorted(
+                [*edits(level.tables.rows, self._a, self._fixed), *own_numbers(level.tables.rows, self._a)],
+                key=lambda edit: edit.cost,
+            )
+            for edit in second:
+                if time.monotonic() > self._deadline:
+                    self.complete = False
+                    return
+                total = level.cost + edit.cost + PER_CHANGE
+                index = np.flatnonzero(total < self._least())
+                if not index.size:
+                    break
+                changed = edit.apply(level.tables.take(index))
+                self._judge(
+                    _Level(changed, [(*level.history[i], edit) for i in index], total[index]), not self._fixed
+                )
+
+    def _second_rows(self, level: _Level) -> None:
+        """One more row left out or put in, of tables that still have another number of joints."""
+        for i, history in enumerate(level.history):
+            single = level.tables.take(np.array([i]))
+            start = _Level(single, [history], level.cost[i : i + 1])
+            if len(single.joint_rows) > self._a.n:
+                changed = list(fewer_rows(single))
+                if self._b.n == self._a.n:  # one row is missing, and another was typed twice
+                    changed = [each for each in changed if each[0].mistake == "typed twice"]
+            else:
+                changed = list(more_rows(single, self._a))
+            if changed:
+                self._judge(_distinct(changed, start), frames=True)
+
+    # -- judging -----------------------------------------------------------------------------------------------
+
+    def _judge(self, level: _Level, frames: bool) -> None:
+        """Keep the tables that are a: as they are, or with other frames and zeros."""
+        tables = level.tables
+        rows = tables.joint_rows
+        if len(rows) != self._a.n:
+            return
+        index = np.flatnonzero((tables.kinds[:, rows] == self._kinds).all(axis=1))
+        if not index.size:
+            return
+        first = chain(tables.take(index), self._probes[:1]).T[:, 0]
+        equal = np.abs(first - self._poses[0]).max(axis=(1, 2)) <= 10.0 * self._tolerance.length
+        for i in index[equal]:
+            self._keep(level, int(i), no_mapping(self._a.n))
+        rest = index[~equal]
+        if not frames or not rest.size:
+            return
+        wrong = invariants(tables.take(rest)).agree(
+            self._invariants, 10.0 * self._tolerance.length, 10.0 * self._tolerance.angle
+        )
+        fits = rest[wrong == 0]
+        for i in fits[np.argsort(level.cost[fits], kind="stable")][:_MOST_MATCHES]:
+            if level.cost[i] >= min(self._least(), self._limit) or time.monotonic() > self._deadline:
+                break
+            found = plainest(self._a, tables.robot(int(i), self._b), self._tolerance)
+            if not isinstance(found, int):
+                self._keep(level, int(i), found[0])
+
+    def _keep(self, level: _Level, i: int, mapping: Mapping) -> None:
+        """Keep an explanation that forward kinematics confirms."""
+        cost = float(level.cost[i])
+        if not mapping.is_trivial:
+            cost += mapping.cost(self._tolerance) * (1.0 if self._fixed else FREE_FRAMES)
+            if cost >= self._limit:
+                return
+        robot = level.tables.robot(i, self._b)
+        key = np.concatenate(
+            [np.round(level.tables.cells[i], 9).ravel() + 0.0, level.tables.kinds[i], [level.tables.modified[i]],
+             np.round(level.tables.base[i], 9).ravel() + 0.0, np.round(level.tables.tool[i], 9).ravel() + 0.0]
+        ).tobytes()  # fmt: skip
+        if key in self._found and self._found[key].cost <= cost:
+            return
+        position, rotation = differences(self._poses, mapping.poses(robot, self._probes))
+        if position.max() > 20.0 * self._tolerance.length or rotation.max() > 20.0 * self._tolerance.angle:
+            return
+        changes = _changes(Tables.of(self._b), level.history[i])
+        self._found[key] = Explanation(changes, robot, mapping, cost, float(position.max()), float(rotation.max()))
+
+    # -- numbers that follow from the difference ----------------------------------------------------------------
+
+    def _solve(self, level: _Level) -> None:
+        """Single numbers with which a table is a."""
+        tables = level.tables
+        rows = tables.joint_rows
+        if len(rows) != self._a.n:
+            return
+        index = np.flatnonzero((tables.kinds[:, rows] == self._kinds).all(axis=1))
+        if not index.size:
+            return
+        if self._fixed:
+            solved = list(_from_poses(chain(tables.take(index), self._probes), self._poses, self._tolerance))
+        else:
+            solved = list(self._from_invariants(tables.take(index)))
+        if not solved:
+            return
+        several, history, cost = [], [], []
+        for k, row, column, change in solved:
+            i = int(index[k])
+            value = float(tables.cells[i, row, column]) + change
+            if column in (THETA, ALPHA):
+                value = math.remainder(value, 2.0 * math.pi)
+            edit = value_edit(row, column, value, _VALUE)
+            several.append(edit.apply(tables.take(np.array([i]))))
+            history.append((*level.history[i], edit))
+            cost.append(float(level.cost[i]) + edit.cost + PER_CHANGE)
+        self._judge(_Level(Tables.joined(several), history, np.array(cost)), frames=not self._fixed)
+
+    def _from_invariants(self, tables: Tables) -> Iterator[tuple[int, int, int, float]]:
+        """Changes of single cells after which all invariants agree: (table, row, column, change)."""
+        length, angle = 10.0 * self._tolerance.length, 10.0 * self._tolerance.angle
+        wanted = self._invariants
+        near = np.flatnonzero(invariants(tables).agree(wanted, length, angle) <= _NEAR)
+        m = tables.rows
+        tried: list[tuple[int, int, int, float]] = []
+        for k in near:
+            single = tables.take(np.array([k]))
+            now = invariants(single)
+            for row in range(m):
+                for column in (A, D):
+                    moved = invariants(
+                        value_edit(row, column, float(single.cells[0, row, column]) + 1.0, 0.0).apply(single)
+                    )
+                    tried += [(int(k), row, column, change) for change in _linear(now, moved, wanted)]
+                twists = wanted.twist[0].tolist()
+                values = sorted({round(x, 12) for t in twists for x in (t, -t, math.pi - t, t - math.pi)})
+                tried += [(int(k), row, ALPHA, x - float(single.cells[0, row, ALPHA])) for x in values]
+        if not tried:
+            return
+        changed = Tables.joined([tables.take(np.array([k for k, *_ in tried]))])
+        cells = changed.cells.copy()
+        where = np.arange(len(tried))
+        cells[where, [t[1] for t in tried], [t[2] for t in tried]] += [t[3] for t in tried]
+        changed = Tables(cells, changed.kinds, changed.modified, changed.base, changed.tool)
+        fits = invariants(changed).agree(wanted, length, angle) == 0
+        yield from (
+            each for each, fit in zip(tried, fits, strict=True) if fit and abs(each[3]) > self._tolerance.length
+        )
+
+
+def _linear(now: Invariants, moved: Invariants, wanted: Invariants) -> Iterator[float]:
+    """Changes of a length that make a wrong distance or offset right; `moved` is after a change of one metre."""
+    for here, there, goal in zip(now[1:], moved[1:], wanted[1:], strict=True):
+        for value, after, size in zip(*(np.ravel(each).tolist() for each in (here, there, goal)), strict=True):
+            slope = after - value
+            if abs(slope) > 1e-3 and abs(abs(value) - abs(size)) > 1e-9:
+                yield from ((sign * abs(size) - value) / slope for sign in (1.0, -1.0))
+
+
+def _from_poses(lines: Chain, goal: Array, tolerance: Tolerance) -> Iterator[tuple[int, int, int, float]]:
+    """Changes of single cells after which all poses agree: (table, row, column, change).
+
+    A length moves the tool along the line of its row, and an angle turns it about that line.
+    """
+    R_t, p_t = lines.T[..., :3, :3], lines.T[..., :3, 3]
+    R_a, p_a = goal[..., :3, :3], goal[..., :3, 3]
+    R = R_a @ np.swapaxes(R_t, -1, -2)  # (N, Q, 3, 3): what is left to turn
+    unturned = (np.abs(R - np.eye(3)).max(axis=(1, 2, 3)) <= 10.0 * tolerance.angle)[:, None]
+    left = (p_a - p_t)[:, :, None]  # (N, Q, 1, 3)
+    axis = 0.5 * np.stack(
+        [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1
+    )
+    cosine = 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1.0)
+    for direction, point, length, angle in (
+        (lines.z, lines.z_point, D, THETA),
+        (lines.x, lines.x_point, A, ALPHA),
+    ):
+        along = (direction * left).sum(axis=-1)  # (N, Q, m)
+        change = along.mean(axis=1)
+        missed = np.abs(left - change[:, None, :, None] * direction).max(axis=(1, 3))
+        for k, row in np.argwhere(
+            (missed <= 10.0 * tolerance.length) & unturned & (np.abs(change) > tolerance.length)
+        ):
+            yield int(k), int(row), length, float(change[k, row])
+        turn = np.arctan2((direction * axis[:, :, None]).sum(axis=-1), cosine[:, :, None])  # (N, Q, m)
+        turned = turn[:, 0]
+        # The line stays where it is, and the turn is the same at all configurations.
+        same = np.abs(np.remainder(turn - turned[:, None] + math.pi, 2.0 * math.pi) - math.pi).max(axis=1)
+        moved = np.einsum("nqij,nqmj->nqmi", R, direction) - direction
+        shifted = np.einsum("nqij,nqmj->nqmi", R, point - p_t[:, :, None]) + p_a[:, None] - point
+        off = np.maximum(np.abs(moved).max(axis=(1, 3)), np.abs(shifted).max(axis=(1, 3)))
+        fits = (
+            (same <= 10.0 * tolerance.angle)
+            & (off <= 10.0 * tolerance.length)
+            & (np.abs(turned) > tolerance.angle)
+        )
+        for k, row in np.argwhere(fits):
+            yield int(k), int(row), angle, float(turned[k, row])
+
+
+def _distinct(changed: list[tuple[Edit, Tables]], start: _Level) -> _Level:
+    """Changed tables of one number of rows, each once, under the cheapest name."""
+    (before,), base_cost = start.history, float(start.cost[0])
+    seen: set[bytes] = {_key(start.tables)}
+    tables, history, cost = [], [], []
+    for edit, table in sorted(changed, key=lambda each: each[0].cost):
+        if (key := _key(table)) not in seen:
+            seen.add(key)
+            tables.append(table)
+            history.append((*before, edit))
+            cost.append(base_cost + edit.cost + PER_CHANGE)
+    if not tables:
+        return _Level(start.tables.take(np.array([], dtype=np.intp)), [], np.empty(0))
+    return _Level(Tables.joined(tables), history, np.array(cost))
+
+
+def _key(table: Tables) -> bytes:
+    parts = [
+        np.round(table.cells, 10).ravel() + 0.0,
+        table.kinds.ravel(),
+        table.modified,
+        table.base.ravel(),
+        table.tool.ravel(),
+    ]
+    return np.concatenate(parts).tobytes()
+
+
+def _changes(table: Tables, history: tuple[Edit, ...]) -> tuple[Change, ...]:
+    """The changes with the numbers of single cells before and after."""
+    found = []
+    for edit in history:
+        after = edit.apply(table)
+        was = now = None
+        if len(edit.rows) == 1 and len(edit.columns) == 1 and after.rows == table.rows:
+            column = ("theta", "d", "a", "alpha").index(edit.columns[0])
+            was, now = (float(t.cells[0, edit.rows[0], column]) for t in (table, after))
+        found.append(Change(edit.mistake, edit.rows, edit.columns, was, now))
+        table = after
+    return tuple(found)
+
+
+def _probes(a: Robot) -> Array:
+    """A few configurations in general position ``(Q, n)``, not too far from zero where a joint has no limits."""
+    q = generic_q(a)
+    spread = np.where(a.revolute, 0.7, 0.07)
+    shifts = np.random.default_rng(5).uniform(-1.0, 1.0, (_PROBES - 1, a.n)) * spread
+    return np.concatenate([q[None], q + shifts])
+
+
+def differences(one: Array, other: Array) -> tuple[Array, Array]:
+    """Distances (m) and angles (rad) ``(Q,)`` between poses ``(Q, 4, 4)``."""
+    position = np.linalg.norm(one[:, :3, 3] - other[:, :3, 3], axis=-1)
+    rotation = np.array([rotation_angle(x, y) for x, y in zip(one[:, :3, :3], other[:, :3, :3], strict=True)])
+    return position, rotation

@@ -1,0 +1,237 @@
+"""The frames, signs and zeros between two tables of one arm.
+
+Where the axes match (:mod:`kin.comparison.matching`), B, E, signs and offsets are not unique. A turn of the base
+and an offset of joint 1 cannot be separated, nor can the tool and the last joint; an arm with a spherical wrist
+can be mapped with several vectors of signs. The plainest mapping is chosen: each base or tool that is not the
+identity, each joint that counts the other way and each offset costs something, and a quarter turn costs less than
+another angle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kin.axes import inverse
+from kin.comparison.matching import NOBODY, Axis, Match, Tolerance, axes_of, matches
+from kin.dh.exponentials import exp_screw, screws
+from kin.fk import fk
+from kin.robot import Robot
+from kin.transforms import Array, rotation_angle
+
+# What makes a mapping less plain; only the order of sums matters.
+_FRAME, _FLIP, _QUARTER, _OFFSET = 4.6, 2.2, 2.0, 2.9
+
+
+@dataclass(frozen=True, eq=False)
+class Mapping:
+    """``T_a(q) = base · T_b(signs∘q + offsets) · tool``.
+
+    Attributes:
+        base, tool: ``(4, 4)``.
+        signs: ``(n,)`` ±1.
+        offsets: ``(n,)`` radians or metres.
+    """
+
+    base: Array
+    tool: Array
+    signs: Array
+    offsets: Array
+
+    def to_b(self, q: Array) -> Array:
+        """The configurations of b ``(..., n)`` for those of a."""
+        return self.signs * q + self.offsets
+
+    def poses(self, b: Robot, q: Array) -> Array:
+        """``base · T_b(…) · tool`` ``(..., 4, 4)`` for configurations of a."""
+        return self.base @ fk(b, self.to_b(q)) @ self.tool
+
+    def cost(self, tolerance: Tolerance) -> float:
+        """How far this is from no mapping at all."""
+        total = 0.0
+        for T in (self.base, self.tool):
+            total += 0.0 if is_identity(T, tolerance) else _FRAME
+        total += _FLIP * float(np.count_nonzero(self.signs < 0.0))
+        for offset in self.offsets.tolist():
+            if abs(offset) > tolerance.angle:
+                quarters = offset / (0.5 * math.pi)
+                total += _QUARTER if abs(quarters - round(quarters)) < 1e-6 else _OFFSET
+        return total
+
+    @property
+    def is_trivial(self) -> bool:
+        """Whether it maps nothing."""
+        frames = np.array_equal(self.base, np.eye(4)) and np.array_equal(self.tool, np.eye(4))
+        return frames and bool((self.signs > 0.0).all() and not self.offsets.any())
+
+
+def no_mapping(n: int) -> Mapping:
+    """The trivial mapping of n joints."""
+    return Mapping(np.eye(4), np.eye(4), np.ones(n), np.zeros(n))
+
+
+def is_identity(T: Array, tolerance: Tolerance) -> bool:
+    """Whether a transform ``(4, 4)`` is the identity within a tolerance."""
+    return bool(
+        np.linalg.norm(T[:3, 3]) <= tolerance.length and rotation_angle(np.eye(3), T[:3, :3]) <= tolerance.angle
+    )
+
+
+def plainest(a: Robot, b: Robot, tolerance: Tolerance) -> tuple[Mapping, int] | int:
+    """The plainest mapping of b onto a.
+
+    Returns:
+        the mapping and the number of vectors of signs with which there is one; without any, the first joint (from
+        0) whose axis cannot be matched.
+    """
+    axes_a = axes_of(a)
+    found, furthest = matches(axes_a, axes_of(b), tolerance)
+    if furthest is not None:
+        return furthest.joint
+    zero_a, zero_b = fk(a, np.zeros(a.n)), fk(b, np.zeros(b.n))
+    S = screws(b).S
+    best, least = None, math.inf
+    for match in sorted(found, key=lambda match: match.signs.count(-1)):
+        if _FLIP * match.signs.count(-1) >= least:
+            break
+        for mapping in _candidates(match, axes_a, S, zero_a, zero_b, tolerance):
+            if (cost := mapping.cost(tolerance)) < least:
+                best, least = mapping, cost
+    assert best is not None
+    return best, len(found)
+
+
+def _candidates(
+    match: Match, axes_a: Sequence[Axis], S: Array, zero_a: Array, zero_b: Array, tolerance: Tolerance
+) -> Iterator[Mapping]:
+    """Mappings of one vector of signs: with or without an offset of the first joint, and of the last ones."""
+    signs = np.array(match.signs, dtype=float)
+    M = match.M.matrix()
+    ends = [(M, np.array(match.offsets))]
+    if (closed := _closing(match, M, zero_a, zero_b, tolerance)) is not None:
+        ends.append(closed)
+    for M_n, offsets in ends:
+        product = np.eye(4)  # exp(S_1 o_1) … exp(S_n o_n)
+        for column, offset in zip(S.T, offsets.tolist(), strict=True):
+            product = product @ (exp_screw(column, offset) if offset else np.eye(4))
+        B = M_n @ inverse(product)
+        E = inverse(M_n @ zero_b) @ zero_a
+        for first in {float(offsets[0]), 0.0, _first_offset(axes_a[0], signs[0], B, offsets[0], tolerance)}:
+            chosen = offsets.copy()
+            chosen[0] = first
+            # B exp(S_1 o_1) stays what it is.
+            moved = B @ exp_screw(S[:, 0], offsets[0] - first)
+            yield Mapping(
+                _clean(moved, tolerance), _clean(E, tolerance), signs, _clean_offsets(chosen, S, tolerance)
+            )
+
+
+def _first_offset(axis: Axis, sign: float, B: Array, offset: float, tolerance: Tolerance) -> float:
+    """The offset of joint 1 that takes over the part of B along its axis."""
+    z = np.array(axis.z)
+    if axis.slides:
+        return offset + sign * float(B[:3, 3] @ z)
+    angle = _turn_about(B[:3, :3], z, tolerance)
+    return offset if angle is None else offset + sign * angle
+
+
+def _closing(
+    match: Match, M: Array, zero_a: Array, zero_b: Array, tolerance: Tolerance
+) -> tuple[Array, Array] | None:
+    """M and the offsets with which no tool is needed; None if the last joints cannot do that.
+
+    With E = I, ``T_a(0) = D · M · T_b(0)`` for a motion D that is still free.
+    """
+    D = zero_a @ inverse(M @ zero_b)
+    turn, slides = match.free
+    offsets = np.array(match.offsets)
+    angle = 0.0
+    if not np.allclose(D[:3, :3], np.eye(3), rtol=0.0, atol=tolerance.angle):
+        found = None if turn is None else _turn_about(D[:3, :3], np.array(turn.z), tolerance)
+        if turn is None or found is None:
+            return None
+        angle = found
+        if turn.joint != NOBODY:
+            offsets[turn.joint] += match.signs[turn.joint] * angle
+    turned = np.eye(4)
+    if turn is not None:
+        z, p = np.array(turn.z), np.array(turn.p)
+        turned = exp_screw(np.concatenate([z, np.cross(p, z)]), angle)
+    left = (D @ inverse(turned))[:3, 3]
+    if np.linalg.norm(left) > tolerance.length:
+        if not slides:
+            return None
+        V = np.array([s.v for s in slides]).T
+        shares = np.linalg.lstsq(V, left, rcond=1e-9)[0]
+        if np.linalg.norm(V @ shares - left) > tolerance.length:
+            return None
+        offsets += np.array(match.signs) * (shares @ np.array([s.weights for s in slides]))
+    return D @ M, offsets
+
+
+def _turn_about(R: Array, z: Array, tolerance: Tolerance) -> float | None:
+    """The angle of a rotation about the unit vector z, None if it is about another one."""
+    if np.linalg.norm(R @ z - z) > tolerance.angle:
+        return None
+    x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+    return math.atan2(float(np.cross(x, R @ x) @ z), float(x @ (R @ x)))
+
+
+def _clean(T: Array, tolerance: Tolerance) -> Array:
+    return np.eye(4) if is_identity(T, tolerance) else T
+
+
+def _clean_offsets(offsets: Array, S: Array, tolerance: Tolerance) -> Array:
+    """Angles within ±π, and zero where they are rounding."""
+    turns = np.linalg.norm(S[:3], axis=0) > 0.5
+    wrapped = np.where(turns, np.remainder(offsets + math.pi, 2.0 * math.pi) - math.pi, offsets)
+    wrapped = np.where(turns & (wrapped + math.pi <= tolerance.angle), math.pi, wrapped)
+    small = np.abs(wrapped) <= np.where(turns, tolerance.angle, tolerance.length)
+    return np.asarray(np.where(small, 0.0, wrapped))
+
+
+def free_offsets(a: Robot) -> tuple[tuple[int, ...], ...]:
+    """Groups of joints whose offsets cannot be observed from poses, where base and tool are free too.
+
+    A small change δ of the offsets and β of the base leaves all axes where they are if, for every i,
+    ``β × S_i + Σ_{j<i} δ_j [S_j, S_i] = 0``. Joints whose δ depend on each other are one group: only a combination
+    of their offsets counts.
+    """
+    S = screws(a).S
+    n = a.n
+    ad = [_ad(S[:, j]) for j in range(n)]
+    A = np.zeros((6 * n, 6 + n))
+    for i in range(n):
+        A[6 * i : 6 * i + 6, :6] = -_ad(S[:, i])
+        for j in range(i):
+            A[6 * i : 6 * i + 6, 6 + j] = ad[j] @ S[:, i]
+    scale = max(1e-3, float(np.abs(S[3:]).max()))
+    A[3::6], A[4::6], A[5::6] = A[3::6] / scale, A[4::6] / scale, A[5::6] / scale
+    _, values, Vt = np.linalg.svd(A)
+    rank = int(np.count_nonzero(values > 1e-9 * values[0])) if values.size and values[0] > 0.0 else 0
+    null = Vt[rank:, 6:]
+    free = [j for j in range(n) if np.abs(null[:, j]).max(initial=0.0) > 1e-7]
+    return _groups(null, free)
+
+
+def _groups(null: Array, free: list[int]) -> tuple[tuple[int, ...], ...]:
+    """The free joints, together where one's offset fixes another's."""
+    groups: list[list[int]] = []
+    for j in free:
+        for group in groups:
+            block = null[:, [*group, j]]
+            if np.linalg.matrix_rank(block, tol=1e-7) <= len(group):
+                group.append(j)
+                break
+        else:
+            groups.append([j])
+    return tuple(tuple(group) for group in groups)
+
+
+def _ad(S: Array) -> Array:
+    """The matrix of the Lie bracket ``[S, ·]`` ``(6, 6)`` for screws (ω, v)."""
+    W, V = np.cross(np.eye(3), S[:3]), np.cross(np.eye(3), S[3:])
+    return np.block([[W, np.zeros((3, 3))], [V, W]])

@@ -1,0 +1,350 @@
+"""Whether two sets of joint axes belong to one arm: an exact pass over the joints.
+
+Two arms a and b with the same kinds of joints are the same arm if constants B and E (rigid transforms), signs
+``s_i = ±1`` and offsets ``o_i`` exist with
+
+    ``T_a(q) = B · T_b(s∘q + o) · E``  for all q.
+
+Differentiate ``T`` at q = 0: this holds exactly if B maps every axis of b, taken at the configuration o, onto ±
+the axis of a. E follows then from one pose. So only the axes count; neither the convention nor the way in which
+rows share out a link matters.
+
+The pass goes from the base to the tool. It keeps one motion M that maps the axes found so far, and the group G of
+all motions that M may still be multiplied with: what leaves those axes in place, and what their joints do. G
+contains at most one turn, about one line, and some slides:
+
+- after a revolute joint G holds the turn about its axis, and a slide along it if that is still free;
+- after a prismatic joint it holds the slide along it, beside what was free before;
+- the next axis uses up what is needed to reach it, and leaves what does not move it.
+
+A turn or a slide in G is the motion of an earlier joint, so the amount that is used up is a part of that joint's
+offset; at the beginning it is a motion of the base and nobody's offset.
+
+Each joint may count either way, so both signs are tried at each; a wrong sign fails at the next axis, or is
+another valid answer: an arm with a spherical wrist has several. The product of exponentials that this rests on is
+in Lynch and Park, Modern Robotics, chapter 4.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from kin.axes import lines_of
+from kin.robot import Robot
+from kin.transforms import Array
+
+Vector = tuple[float, float, float]
+Rotation = tuple[Vector, Vector, Vector]
+
+NOBODY = -1  # the base: whose motion is no joint's offset
+
+
+class Axis(NamedTuple):
+    """A joint's axis at q = 0, in the positive direction of the joint."""
+
+    z: Vector
+    p: Vector
+    slides: bool
+
+
+class Motion(NamedTuple):
+    """A rigid motion ``x → R x + t`` in plain floats: on three numbers they are ten times faster than arrays."""
+
+    R: Rotation
+    t: Vector
+
+    def matrix(self) -> Array:
+        """The motion as a transform ``(4, 4)``."""
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = self.R, self.t
+        return T
+
+
+IDENTITY = Motion(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0))
+
+
+class Tolerance(NamedTuple):
+    """How far two axes may be apart and still count as one: metres, radians."""
+
+    length: float
+    angle: float
+
+
+class Slide(NamedTuple):
+    """A free slide: its direction, and how much of each prismatic joint's offset one metre of it is."""
+
+    v: Vector
+    weights: tuple[float, ...]
+
+
+class Turn(NamedTuple):
+    """A free turn about a line, as the motion of `joint`; `everywhere`: about all lines of that direction."""
+
+    z: Vector
+    p: Vector
+    joint: int
+    everywhere: bool = False
+
+
+class Free(NamedTuple):
+    """The group G: the motions that leave all axes matched so far where they are."""
+
+    turn: Turn | None
+    slides: tuple[Slide, ...]
+
+
+@dataclass(frozen=True)
+class Match:
+    """One way to map b onto a.
+
+    Attributes:
+        signs: ``s_i``.
+        offsets: ``o_i``; that of the last joint is 0, it is always free.
+        M: ``B · exp(S_1 o_1) … exp(S_{n−1} o_{n−1})`` of b: maps the last axis of b onto that of a.
+        free: what M may still be multiplied with from the left.
+    """
+
+    signs: tuple[int, ...]
+    offsets: tuple[float, ...]
+    M: Motion
+    free: Free = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Furthest:
+    """Where the pass ended: the first axis (from 0) that no choice could bring onto its counterpart."""
+
+    joint: int
+
+
+def axes_of(robot: Robot) -> tuple[Axis, ...]:
+    """The axes of an arm at q = 0."""
+    lines, turns = lines_of(robot, as_counted=True), robot.revolute.tolist()
+    return tuple(
+        Axis(tuple(z), tuple(p), not turning)
+        for z, p, turning in zip(lines.z.tolist(), lines.points.tolist(), turns, strict=True)
+    )
+
+
+def matches(a: Sequence[Axis], b: Sequence[Axis], tolerance: Tolerance) -> tuple[list[Match], Furthest | None]:
+    """All ways, one per vector of signs, to map the axes of b onto those of a.
+
+    Args:
+        a, b: axes at q = 0, of the same number and kinds.
+
+    Returns:
+        the matches; where there is none, how far the best attempt came.
+    """
+    reached = [0]
+    found = list(_search(a, b, tolerance, reached))
+    return found, None if found else Furthest(reached[0])
+
+
+class _State(NamedTuple):
+    signs: tuple[int, ...]
+    offsets: tuple[float, ...]
+    M: Motion
+    free: Free
+
+
+def _search(a: Sequence[Axis], b: Sequence[Axis], tolerance: Tolerance, reached: list[int]) -> Iterator[Match]:
+    n = len(a)
+    zero = (0.0,) * n
+    stack = [_State((sign,), zero, *_first(a[0], b[0], sign, n, tolerance)) for sign in (-1, 1)]
+    while stack:
+        state = stack.pop()
+        i = len(state.signs)
+        if i == n:
+            yield Match(*state)
+            continue
+        for sign in (-1, 1):
+            after = _next(state, a[i], b[i], sign, i, tolerance)
+            if after is not None:
+                reached[0] = max(reached[0], i)
+                stack.append(after)
+    reached[0] = min(reached[0] + 1, n - 1)
+
+
+def _first(a: Axis, b: Axis, sign: int, n: int, tolerance: Tolerance) -> tuple[Motion, Free]:
+    """A motion that maps the first axis, none if it is there already, and what is free then."""
+    none = (0.0,) * n
+    z = _scaled(b.z, sign)
+    M = IDENTITY
+    if _norm(_minus(z, a.z)) > tolerance.angle:
+        M = Motion(_between(z, a.z), (0.0, 0.0, 0.0))
+    if a.slides:
+        return M, Free(Turn(a.z, a.p, NOBODY, True), tuple(Slide(v, none) for v in IDENTITY.R))
+    p = _apply(M, b.p)
+    apart = _across(_minus(a.p, p), a.z)
+    if _norm(apart) > tolerance.length:
+        M = Motion(M.R, _plus(M.t, apart))
+    return M, Free(Turn(a.z, a.p, 0), (Slide(a.z, none),))
+
+
+def _next(state: _State, a: Axis, b: Axis, sign: int, i: int, tolerance: Tolerance) -> _State | None:
+    """The state with one more axis; None if this sign cannot bring it onto that of a."""
+    signs, offsets, M, (turn, slides) = state
+    z = _scaled(_rotate(M.R, b.z), sign)
+    along = turn is not None and _parallel(a.z, turn.z, tolerance.angle)
+    changed = list(offsets)
+
+    def turned(M: Motion, turn: Turn, angle: float) -> Motion:
+        if turn.joint != NOBODY:
+            changed[turn.joint] += signs[turn.joint] * angle
+        return _then_turn(M, turn, angle)
+
+    if turn is not None and not along:
+        flat, wanted = _across(z, turn.z), _across(a.z, turn.z)
+        if _norm(flat) > tolerance.angle and _norm(_minus(z, a.z)) > 0.0:
+            M = turned(M, turn, _angle(flat, wanted, turn.z))
+            z = _scaled(_rotate(M.R, b.z), sign)
+    if _norm(_minus(z, a.z)) > tolerance.angle:
+        return None
+    if not a.slides:
+        p = _apply(M, b.p)
+        apart = _across(_minus(a.p, p), a.z)
+        if turn is not None and along and not turn.everywhere:
+            here, there = _across(_minus(p, turn.p), turn.z), _across(_minus(a.p, turn.p), turn.z)
+            if min(_norm(here), _norm(there)) > tolerance.length and _norm(apart) > 0.0:
+                M = turned(M, turn, _angle(here, there, turn.z))
+                apart = _across(_minus(a.p, _apply(M, b.p)), a.z)
+        elif slides and _norm(apart) > 0.0:
+            M, apart = _slid(M, slides, apart, a.z, signs, changed)
+        if _norm(apart) > tolerance.length:
+            return None
+    return _State(
+        (*signs, sign), tuple(changed), M, _free_after(turn, slides, along, a, i, len(offsets), tolerance)
+    )
+
+
+def _free_after(
+    turn: Turn | None, slides: tuple[Slide, ...], along: bool, a: Axis, i: int, n: int, tolerance: Tolerance
+) -> Free:
+    """What leaves axis i in place too, and the motion of joint i."""
+    weights = _combination(slides, a.z, tolerance.angle)
+    if a.slides:
+        if weights is None:
+            slides = (*slides, Slide(a.z, tuple(float(k == i) for k in range(n))))
+        return Free(turn if along else None, slides)
+    left = () if weights is None else (Slide(a.z, weights),)
+    about = turn is not None and along and not turn.everywhere
+    if turn is not None and about and _norm(_across(_minus(a.p, turn.p), turn.z)) <= tolerance.length:
+        return Free(turn, left)  # both joints turn about one line
+    return Free(Turn(a.z, a.p, i), left)
+
+
+def _combination(slides: tuple[Slide, ...], z: Vector, tolerance: float) -> tuple[float, ...] | None:
+    """The weights of the slide along z, None if the free slides do not contain it."""
+    if not slides:
+        return None
+    V = np.array([s.v for s in slides]).T
+    shares = (
+        np.linalg.lstsq(V, np.array(z), rcond=1e-9)[0] if len(slides) > 1 else np.array([_dot(slides[0].v, z)])
+    )
+    if float(np.linalg.norm(V @ shares - z)) > tolerance:
+        return None
+    return tuple((shares @ np.array([s.weights for s in slides])).tolist())
+
+
+def _slid(
+    M: Motion, slides: tuple[Slide, ...], apart: Vector, z: Vector, signs: tuple[int, ...], offsets: list[float]
+) -> tuple[Motion, Vector]:
+    """M after the free slides that bring an axis of direction z nearest; what remains between the lines."""
+    V = np.array([_across(s.v, z) for s in slides]).T
+    shares = np.linalg.lstsq(V, np.array(apart), rcond=1e-9)[0].tolist()
+    t, left = M.t, apart
+    for share, slide in zip(shares, slides, strict=True):
+        t = _plus(t, _scaled(slide.v, share))
+        left = _minus(left, _scaled(_across(slide.v, z), share))
+        for j, weight in enumerate(slide.weights):
+            if weight:
+                offsets[j] += signs[j] * weight * share
+    return Motion(M.R, t), left
+
+
+# -- three numbers ---------------------------------------------------------------------------------------------
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def _plus(a: Vector, b: Vector) -> Vector:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _minus(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _scaled(a: Vector, share: float) -> Vector:
+    return share * a[0], share * a[1], share * a[2]
+
+
+def _norm(a: Vector) -> float:
+    return math.sqrt(_dot(a, a))
+
+
+def _across(a: Vector, z: Vector) -> Vector:
+    """The part of a that is perpendicular to the unit vector z."""
+    return _minus(a, _scaled(z, _dot(a, z)))
+
+
+def _parallel(a: Vector, b: Vector, tolerance: float) -> bool:
+    return _norm(_cross(a, b)) <= tolerance
+
+
+def _angle(a: Vector, b: Vector, z: Vector) -> float:
+    """The turn about z that takes the direction of a to that of b, both perpendicular to z."""
+    return math.atan2(_dot(_cross(a, b), z), _dot(a, b))
+
+
+def _rotate(R: Rotation, a: Vector) -> Vector:
+    return _dot(R[0], a), _dot(R[1], a), _dot(R[2], a)
+
+
+def _apply(M: Motion, a: Vector) -> Vector:
+    return _plus(_rotate(M.R, a), M.t)
+
+
+def _about(z: Vector, angle: float) -> Rotation:
+    """The rotation about a unit vector (Rodrigues)."""
+    c, s = math.cos(angle), math.sin(angle)
+    x, y, w = z
+    k = 1.0 - c
+    return (
+        (c + k * x * x, k * x * y - s * w, k * x * w + s * y),
+        (k * x * y + s * w, c + k * y * y, k * y * w - s * x),
+        (k * x * w - s * y, k * y * w + s * x, c + k * w * w),
+    )
+
+
+def _between(a: Vector, b: Vector) -> Rotation:
+    """A rotation that takes one unit vector to another: by the smaller angle, half a turn about any normal."""
+    normal = _cross(a, b)
+    sine = _norm(normal)
+    if sine > 1e-9:
+        return _about(_scaled(normal, 1.0 / sine), math.atan2(sine, _dot(a, b)))
+    if _dot(a, b) > 0.0:
+        return IDENTITY.R
+    smallest = min(range(3), key=lambda k: abs(a[k]))
+    normal = _across((float(smallest == 0), float(smallest == 1), float(smallest == 2)), a)
+    return _about(_scaled(normal, 1.0 / _norm(normal)), math.pi)
+
+
+def _then_turn(M: Motion, turn: Turn, angle: float) -> Motion:
+    """M, then a turn about the line."""
+    R = _about(turn.z, angle)
+    columns = tuple(zip(*M.R, strict=True))
+    product = tuple(tuple(_dot(row, column) for column in columns) for row in R)
+    t = _plus(_rotate(R, _minus(M.t, turn.p)), turn.p)
+    return Motion(product, t)  # type: ignore[arg-type]
