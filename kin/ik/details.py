@@ -48,19 +48,33 @@ class Redundancy(NamedTuple):
     intervals: tuple[tuple[float, float], ...]
 
 
+class SolutionCurve(NamedTuple):
+    """A curve of configurations that meet the target, at a singular wrist for example.
+
+    Attributes:
+        q: ``(n,)`` joint values of the solution that stands for it.
+        direction: ``(n,)`` unit vector of joint motion along the curve there, a null vector of the Jacobian.
+    """
+
+    q: tuple[float, ...]
+    direction: tuple[float, ...]
+
+
 class Solved(NamedTuple):
     """Exact solutions exist.
 
     Attributes:
-        configurations: how many were found; `max_solutions` may return fewer.
+        configurations: how many were found, one for each curve; `max_solutions` may return fewer.
         redundant: whether the task leaves a redundancy parameter.
         chosen_branches: how many postures, branches of one name, were requested; None for all.
         complete: whether these are all; see `kin.IKResult`.
-        infinite: whether the task leaves the joints a motion, so that there are infinitely many configurations.
+        infinite: whether there are infinitely many configurations, since the task leaves the joints a motion or
+            the target is met on a curve.
         postures: on how many branches the configurations are.
         free: labels of the redundancy parameters that may have other values.
         fixed: labels of those whose values were requested.
         touching: how many configurations were left out because something touches.
+        curves: the curves among the configurations of a task that usually has isolated ones only.
     """
 
     configurations: int
@@ -72,6 +86,7 @@ class Solved(NamedTuple):
     free: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
     touching: int = 0
+    curves: tuple[SolutionCurve, ...] = ()
 
 
 class Restriction(NamedTuple):

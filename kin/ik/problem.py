@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.errors import InputError
-from kin.ik.candidates import Requirement
+from kin.ik.candidates import Requirement, Whole
 from kin.ik.options import IKOptions, shape_of
 from kin.kernels.checks import straighten
 from kin.kernels.compile import direct
@@ -142,6 +142,12 @@ class IKProblem:
             rotation,
         )
 
+    @cached_property
+    def free(self) -> Whole:
+        """Indices ``(k,)`` of the joints that may move."""
+        narrow = self.respect & (self.lower >= self.upper)
+        return np.flatnonzero(~(np.array(self.locked, dtype=bool) | narrow))
+
     @property
     def requested(self) -> tuple[RedundancyParameter, ...]:
         """The redundancy parameters whose values were requested."""
@@ -214,7 +220,7 @@ def prepare(robot: Robot, options: IKOptions) -> IKProblem:
         values=values,
         branches=_requested_branches(robot, options, closed_form),
     )
-    _ = problem.requirement  # computed here, so that all copies share it
+    _ = problem.requirement, problem.free  # computed here, so that all copies share them
     return problem
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from kin.ik.details import Details, LimitViolation, Redundancy
 from kin.ik.messages import Explanation, explain, rounded_target
+from kin.solvers.contract import Completeness
 from kin.solvers.singular import Singularity
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -137,8 +138,9 @@ class IKResult(Deferred):
         nearest_orientation: the configuration with the exact point and the smallest rotation error (status
             ``orientation``), None if none was found.
         blocked: every posture that is outside the limits, the closest to them first (status ``limits``).
-        complete: whether a closed form gave every posture, so that there is no further one on the requested
-            branches; False after a numeric search, which may miss some.
+        completeness: how it is known that there is no further posture on the requested branches: ``"proved"`` by
+            the derivation of a closed form or by a certificate for this target, ``"agreed"`` if independent ways
+            found the same, or ``"unknown"``, as after a numeric search, which may miss some.
         tolerances: errors that count as none, metres and radians; larger than 1e-9 if that was asked for, or for a
             target of few digits.
         target_error: how rounded the entries of the target are, if its rotation had to be made one; else 0.
@@ -162,7 +164,7 @@ class IKResult(Deferred):
     nearest_orientation: IKSolution | None = None
     redundancy: tuple[Redundancy, ...] = ()
     singularities: tuple[Singularity, ...] = ()
-    complete: bool = False
+    completeness: Completeness = "unknown"
     tolerances: tuple[float, float] = (TOLERANCES.closure_position, TOLERANCES.closure_rotation)
     target_error: float = 0.0
 
@@ -171,6 +173,11 @@ class IKResult(Deferred):
         count = len(self.solutions)
         solutions = f"{count} solution{'s' * (count != 1)}"
         return f"IKResult({self.status.value}, {solutions}, {self.solver}: {self.reason!r})"
+
+    @property
+    def complete(self) -> bool:
+        """Whether there is no further posture on the requested branches, proved or agreed."""
+        return self.completeness != "unknown"
 
     @property
     def best(self) -> IKSolution | None:

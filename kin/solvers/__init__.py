@@ -30,7 +30,7 @@ from kin.solvers import (
 )
 from kin.solvers.contract import APPROACH, ClosedForm
 from kin.solvers.reversed import ReversedJoints, readings
-from kin.solvers.rounded import Rounded, meant
+from kin.solvers.rounded import Rounded, Rounded7, meant
 
 FAMILIES: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     wrist5.match,
@@ -81,8 +81,12 @@ def _closed_form(robot: Robot, solvers: tuple[Callable[[Robot], ClosedForm | Non
         general = _first_match(robot, solvers) if form is None or far else None
         if form is None or general is not None or (far and not solvers):
             return general
-        return Rounded(robot, form, intended.off)
-    return Rounded(robot, found, intended.off) if intended.hidden else found
+        return _rounded(robot, form, intended.off)
+    return _rounded(robot, found, intended.off) if intended.hidden else found
+
+
+def _rounded(robot: Robot, form: ClosedForm, off: float) -> ClosedForm:
+    return (Rounded7 if robot.n == 7 else Rounded)(robot, form, off)
 
 
 def _family(table: Robot, robot: Robot) -> ClosedForm | None:

@@ -36,6 +36,12 @@ ObstacleCode = Literal[
     "point",
     "given joint values",
 ]
+Completeness = Literal["proved", "agreed", "unknown"]
+"""How it is known that no configuration is missing.
+
+``proved``: by the derivation of a closed form, or by a certificate that was checked for this target. ``agreed``:
+not proved, but independent ways have found the same configurations. ``unknown``: some may be missing.
+"""
 One = Callable[[Array, Array, float, Array, Array], bool]
 Many = Callable[[Array, Array, Array, Array, Array], None]
 
@@ -103,7 +109,7 @@ class Candidates:
             other parameters held.
         gap: metres by which the geometry does not close when no branch exists.
         obstacle: what does not fit then; None if the solver cannot tell.
-        complete: whether no configuration is missing, as far as the solver can tell.
+        completeness: how it is known that no configuration is missing.
     """
 
     q: Array
@@ -111,7 +117,7 @@ class Candidates:
     arcs: tuple[Array, ...]
     gap: float = 0.0
     obstacle: Obstacle | None = None
-    complete: bool = True
+    completeness: Completeness = "proved"
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +146,11 @@ class BatchKernels:
         # `many` shares the machine code of calls with dispatch, which takes longer to compile than is saved here.
         many = direct(self.many, *map(counted, (1, 3, 1, 1, 3)))
         return replace(self, one=direct(self.one, 1, (4, 4), float, 1, 2), many=many)
+
+
+def weakest(*known: Completeness) -> Completeness:
+    """What is known of configurations of which each of several parts is known so."""
+    return "unknown" if "unknown" in known else "agreed" if "agreed" in known else "proved"
 
 
 class ClosedForm(ABC):
@@ -187,9 +198,16 @@ class ClosedForm(ABC):
     def solve(self, problem: SolverInput) -> Candidates:
         """All branches of a target, each with its redundancy parameters as near the seed as the limits allow."""
 
-    def add_missing(self, T: Array, near: Array, q: Array) -> bool:
-        """Add to the solutions ``(branches, n)`` of the batch kernels what they miss; whether none is missing."""
-        return True
+    def add_missing(self, T: Array, near: Array, q: Array) -> Completeness:
+        """Add to solutions ``(branches, n)`` of the batch kernels what they miss; how complete they are then."""
+        return "proved"
+
+    def relaxed(self, by: float) -> ClosedForm:
+        """The same with lengths that may miss by some more metres and still close, or itself.
+
+        Rows that exist only by that are close to postures at the end of the arm's reach. `by` may be negative.
+        """
+        return self
 
     @abstractmethod
     def branch_of(self, q: Array) -> int:

@@ -31,6 +31,7 @@ from kin.solvers.contract import (
     ClosedForm,
     RedundancyParameter,
     SolverInput,
+    weakest,
 )
 from kin.solvers.reduced import fixed
 from kin.solvers.reversed import WrappedKernels
@@ -143,11 +144,11 @@ class SingleValues(ClosedForm):
         rest = len(free) - 1
         q, values = np.full((len(self.branches), len(p.seed)), math.nan), np.empty((len(self.branches), rest))
         values[:] = math.nan
-        complete = first.complete
+        completeness = first.completeness
         arcs: list[list[tuple[float, float, float]]] = [[] for _ in range(rest)]
         for branch, value in _single_values(first.arcs[0]):
             found = form.solve(replace(p, values=(value, *p.values)))
-            complete &= found.complete
+            completeness = weakest(completeness, found.completeness)
             row = _place(q, branch)
             if math.isnan(found.q[branch, 0]) or row is None:
                 continue
@@ -155,7 +156,7 @@ class SingleValues(ClosedForm):
             for k in range(rest):
                 arcs[k] += [(row, x, y) for i, x, y in found.arcs[k + 1].tolist() if i == branch]
         kept = tuple(np.array(each, dtype=np.float64).reshape(-1, 3) for each in arcs)
-        return Candidates(q, values, kept, first.gap, first.obstacle, complete)
+        return Candidates(q, values, kept, first.gap, first.obstacle, completeness)
 
     def branch_of(self, q: Array) -> int:
         """The first row of the branch that a configuration ``(n,)`` is on."""

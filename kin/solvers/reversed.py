@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import islice, product
 
@@ -123,6 +124,7 @@ class ReversedJoints(ClosedForm):
     Attributes:
         form: the closed form of the arm with these joints reversed.
         joints: indices of the reversed joints.
+        signs: ``(n,)`` −1.0 for those, else 1.0.
     """
 
     def __init__(self, form: ClosedForm, joints: Joints, robot: Robot) -> None:
@@ -131,11 +133,21 @@ class ReversedJoints(ClosedForm):
         *most, last = (str(i + 1) for i in joints)
         which = f"joints {', '.join(most)} and {last} are" if most else f"joint {last} is"
         self.reason = f"{form.reason}; {which} reversed"
-        self._signs = np.ones(robot.n)
-        self._signs[list(joints)] = -1.0
-        self.branches, self.meanings = form.names(robot, self._signs)
-        requested = [r.joint for r in form.redundancies(POSE)[:1] if not r.rare]
-        self.kernels = _reversed_kernels(form.kernels, self._signs, joints, requested)
+        self.signs = np.ones(robot.n)
+        self.signs[list(joints)] = -1.0
+        self.branches, self.meanings = form.names(robot, self.signs)
+        self.kernels = self._kernels(form.kernels)
+
+    def _kernels(self, form: BatchKernels) -> BatchKernels:
+        requested = [r.joint for r in self.form.redundancies(POSE)[:1] if not r.rare]
+        return _reversed_kernels(form, self.signs, self.joints, requested)
+
+    def relaxed(self, by: float) -> ReversedJoints:
+        """The same of the relaxed family."""
+        other = copy(self)
+        other.form = self.form.relaxed(by)
+        other.kernels = self._kernels(other.form.kernels)
+        return other
 
     def handles(self, task: int) -> bool:
         """The tasks of the family."""
@@ -155,20 +167,20 @@ class ReversedJoints(ClosedForm):
         for i in self.joints:
             lower[i], upper[i] = -p.upper[i], -p.lower[i]
         values = tuple([value * sign for value, sign in zip(p.values, signs, strict=True)])
-        found = self.form.solve(replace(p, values=values, seed=p.seed * self._signs, lower=lower, upper=upper))
+        found = self.form.solve(replace(p, values=values, seed=p.seed * self.signs, lower=lower, upper=upper))
         arcs = [x if sign > 0.0 else _opposite(x) for x, sign in zip(found.arcs, signs, strict=True)]
-        return replace(found, q=found.q * self._signs, values=found.values * signs, arcs=tuple(arcs))
+        return replace(found, q=found.q * self.signs, values=found.values * signs, arcs=tuple(arcs))
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration ``(n,)`` is on."""
-        return self.form.branch_of(q * self._signs)
+        return self.form.branch_of(q * self.signs)
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """Those of the family, with the arm's own joint values."""
-        signs = self._signs.tolist()
+        signs = self.signs.tolist()
         return tuple(
             replace(s, met_at=tuple(JointValue(i, signs[i] * value) for i, value in s.met_at))
-            for s in self.form.singularities(q * self._signs, within)
+            for s in self.form.singularities(q * self.signs, within)
         )
 
 

@@ -195,6 +195,11 @@ def _counted(details: Solved, task: str) -> str:
         if chosen is not None:
             return f"{free}{target}"
         return f"{count(details.postures, 'posture', 'postures')}; {free}"
+    if details.curves:
+        text = f"infinitely many configurations{target}, on {count(len(details.curves), 'curve', 'curves')}"
+        if alone := details.configurations - len(details.curves):
+            text += f", and {count(alone, 'isolated one', 'isolated ones')}"
+        return text if details.complete else f"{text}; others may exist"
     if details.infinite:
         found = "one was" if details.configurations == 1 else f"{details.configurations} were"
         return f"infinitely many configurations{target}; {found} found"

@@ -149,7 +149,7 @@ class General5(ClosedForm):
         obstacle = found.obstacle
         if self._point:
             obstacle = None if exists.any() else Obstacle("point")
-        return Candidates(q, columns, tuple(arcs), found.gap, obstacle, found.complete)
+        return Candidates(q, columns, tuple(arcs), found.gap, obstacle, found.completeness)
 
     def _rows(self, q: Array) -> Array:
         """The solution of the six joints, q ``(N, k, 6)``, that each row ``(N, b)`` takes; −1 for none."""

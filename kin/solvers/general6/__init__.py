@@ -8,8 +8,10 @@ gives the other joints by linear algebra, and least squares on the whole loop ma
 
 The loop may be cut at any of its six joints. Special axes make some of the cuts degenerate: the determinant then
 is zero for every angle, and its computed values are rounding errors, which no polynomial of this degree fits. The
-best cuts are chosen once for an arm. Real solutions come in pairs, so an odd number means that one was missed, and
-another cut is tried.
+best cuts are chosen once for an arm.
+
+Discs around the roots prove for most targets that no solution is missing. Where they do not, another cut is tried,
+and solutions of targets close by, until independent ways have found the same (`General6.add_missing`).
 """
 
 from kin.solvers.general6.closed_form import General6 as General6

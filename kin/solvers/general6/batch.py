@@ -23,11 +23,12 @@ from kin.solvers.general6.cuts import (
 )
 from kin.solvers.general6.elimination import QUANTITIES, UNKNOWN, condense, eliminate
 from kin.solvers.general6.recovery import angles_of, monomials, null_vectors, others, polish
-from kin.solvers.general6.roots import ROOTS, coefficients, polynomial_at, zeros
+from kin.solvers.general6.roots import ROOTS, coefficients, covers_circle, polynomial_at, zeros
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 SOLUTIONS = 16
+NOT_FINITE, OPEN, AGREED, PROVED = range(-1, 3)  # what `solve_all` knows of its solutions
 _CLOSE = 1e-3  # rad; a solution farther from the root that led to it belongs to another root
 _MERGE = TOLERANCES.merge
 # Rows are sorted by a weighted sum of cosines, which does not jump where an angle passes ±180°.
@@ -66,16 +67,22 @@ def _times(X: Array, Y: Array, out: Array) -> None:
 
 
 @jit
-def solve_cut(params: Array, T: Array, doubtful: bool, out: Array, count: int) -> int:
-    """Add the solutions found with one cut to the first `count` rows of out ``(16, 6)``; returns their number."""
+def solve_cut(params: Array, T: Array, doubtful: bool, out: Array, count: int) -> tuple[int, int, bool]:
+    """Add the solutions found with one cut to the first `count` rows of out ``(16, 6)``.
+
+    Returns the number of rows, how many of them this cut has found, and whether discs around its roots prove that
+    none is missing.
+    """
     F, E = np.empty((6, 3, 4)), np.empty((3, 6, 9))
     B, Q, diagonal = np.empty((QUANTITIES, 9)), np.empty((QUANTITIES, 9)), np.empty(UNKNOWN)
     A, W, vectors = np.empty((2, 6, 9)), np.empty((6, 6)), np.empty((2, 6))
     found, t = np.empty(ROOTS), np.empty(6)
+    z, radius = np.empty(ROOTS, dtype=np.complex128), np.empty(ROOTS)
+    row, angles, met = np.empty(6), np.empty(SOLUTIONS), np.zeros(SOLUTIONS, dtype=np.bool_)
     shift = int(params[SHIFT])
     loop_of(params, T, F)
     eliminate(F, B, Q, diagonal, E)
-    for k in range(zeros(E, doubtful, found)):
+    for k in range(zeros(E, doubtful, z, radius, found)):
         own = False
         for least in range(1, 3):
             # A root that leads to a known solution has a close neighbour: two null vectors span both solutions.
@@ -86,31 +93,41 @@ def solve_cut(params: Array, T: Array, doubtful: bool, out: Array, count: int) -
                 t[2] = found[k]
                 t[3], t[4] = angles_of(vectors[m])
                 others(F, B, Q, diagonal, t)
-                if not polish(F, t) or count == SOLUTIONS:
+                if not polish(F, t):
                     continue
                 close = abs(wrap(t[2] - found[k])) < _CLOSE
                 t[3] += TURN_D
                 t[4] += TURN_E
                 for i in range(6):
                     j = (i + shift) % 6
-                    out[count, j] = wrap(params[SIGN + j] * (t[i] - params[OFFSET + j]))
-                if _is_new(out, count):
+                    row[j] = wrap(params[SIGN + j] * (t[i] - params[OFFSET + j]))
+                same = _place_of(row, out, count)
+                if same == SOLUTIONS or (same < count and met[same]):
+                    continue
+                if same == count:
+                    for i in range(6):
+                        out[count, i] = row[i]
                     count += 1
-                    own = own or close
-    return count
+                met[same] = True
+                own = own or close
+    number, joint = 0, (2 + shift) % 6
+    for k in range(count):
+        number += 1 if met[k] else 0
+        angles[k] = params[SIGN + joint] * out[k, joint] + params[OFFSET + joint]
+    return count, number, covers_circle(z, radius, angles, count)
 
 
 @jit
-def _is_new(out: Array, count: int) -> bool:
-    """Whether row `count` of out differs from all before it."""
+def _place_of(row: Array, out: Array, count: int) -> int:
+    """The first of `count` rows of out ``(16, 6)`` that equals row ``(6,)``; `count` if none does."""
     for k in range(count):
         apart = 0.0
         for i in range(6):
-            gap = abs(out[k, i] - out[count, i])
+            gap = abs(out[k, i] - row[i])
             apart = max(apart, min(gap, TURN - gap))
         if apart < _MERGE:
-            return False
-    return True
+            return k
+    return count
 
 
 @jit
@@ -131,29 +148,41 @@ def _sort(out: Array, count: int) -> None:
 
 
 @jit
-def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-    """out ``(16, 6)`` ← all solutions of the target T ``(4, 4)``, then NaN; False if T is not finite.
+def solve_all(params: Array, T: Array, out: Array) -> int:
+    """out ``(16, 6)`` ← all solutions of the target T ``(4, 4)``, then NaN; returns OPEN, AGREED or PROVED.
 
-    Solutions come in pairs, but for double ones: with an odd number, or none, the next cut is tried too, and at
-    last the first one with doubtful roots. `value` and `near` are not used: a pose leaves nothing free.
+    A cut whose discs prove that none is missing ends the search. Else the next one is asked too, until one has
+    found the same as those before it. With an odd number, or none, the first cut is tried with doubtful roots.
     """
     clear(out)
     for r in range(4):
         for k in range(4):
             if not math.isfinite(T[r, k]):
-                return False
-    count = 0
+                return NOT_FINITE
+    count, before, known = 0, -1, OPEN
     cuts = params.shape[0] // SIZE
-    for k in range(cuts + 1):
-        first = (k % cuts) * SIZE
-        count = solve_cut(params[first : first + SIZE], T, k == cuts, out, count)
-        if count > 0 and count % 2 == 0:
+    for k in range(cuts):
+        count, found, proved = solve_cut(params[k * SIZE : (k + 1) * SIZE], T, False, out, count)
+        if count % 2 == 0 and proved:
+            known = PROVED
             break
-    if count < SOLUTIONS:  # the row after the last may hold a duplicate
-        for i in range(6):
-            out[count, i] = math.nan
+        if count > 0 and count % 2 == 0 and found == count == before:
+            known = AGREED
+            break
+        before = count
+    if count == 0 or count % 2 == 1:
+        count = solve_cut(params[:SIZE], T, True, out, count)[0]
     _sort(out, count)
-    return True
+    return known
+
+
+@jit
+def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+    """out ``(16, 6)`` ← all solutions of the target T ``(4, 4)``, then NaN; False if T is not finite.
+
+    `value` and `near` are not used: a pose leaves nothing free.
+    """
+    return solve_all(params, T, out) != NOT_FINITE
 
 
 @jit

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from kin.axes import is_along, is_zero, links_of, screw_x, screw_z
+from kin.axes import inverse, is_along, is_zero, links_of, screw_x, screw_z
 from kin.fk import fk, jacobian
 from kin.robot import Robot
 from kin.solvers.canonical import free_last, without_last
@@ -17,12 +17,22 @@ from kin.solvers.contract import (
     BatchKernels,
     Candidates,
     ClosedForm,
+    Completeness,
     RedundancyParameter,
     SolverInput,
 )
+from kin.solvers.curves import curves_among
 from kin.solvers.general6.backwards import backwards, turned_round
-from kin.solvers.general6.batch import SOLUTIONS, branches_many, branches_one, misfit_of_degree
-from kin.solvers.general6.cuts import SHIFT, SIZE, cut_at
+from kin.solvers.general6.batch import (
+    AGREED,
+    PROVED,
+    SOLUTIONS,
+    branches_many,
+    branches_one,
+    misfit_of_degree,
+    solve_all,
+)
+from kin.solvers.general6.cuts import cut_at
 from kin.solvers.numeric import each_of
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.transforms import Array
@@ -32,8 +42,10 @@ TITLE = "elimination, any six revolute joints"
 BRANCHES = tuple(f"solution {i + 1}" for i in range(SOLUTIONS))
 _THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
 _VALID = 1e-9  # largest misfit of degree of a valid cut
+_EXACT = 1e-14  # a misfit that is rounding error
+_SIMILAR = 30.0  # misfits within this factor are as good
 _POSES = 24  # random poses that decide among valid cuts
-_PROBES = 5  # of these poses, those on which the degree is checked
+_PROBES = 9  # of these poses, those on which the degree is checked
 _CUTS = 3  # the most that are kept
 # Targets close by, in radians and shares of the reach; the error of a solution, how far apart two are, and the
 # smallest singular value of a double one.
@@ -42,7 +54,12 @@ _STEPS = tuple(
     for a, b, c, d in ((1.0, 0.6, -0.8, 0.9), (-0.7, 0.8, 1.1, -0.5), (0.3, -1.2, 0.9, 0.4))
 )
 _MASK = np.array([1.0] * 6 + [0.0])
-_MET, _SAME, _SHARED, _DOUBLE = 1e-10, 1e-6, 1e-5, 1e-5
+_MET, _SAME = 1e-10, 1e-6
+_JOINTS = np.arange(6)
+# Beside curves: random starts of each of two searches, rows that are compared.
+_STARTS, _MOST_ROWS = 40, 60
+_FOLD, _NEAR_FOLD = 1e-2, 1e-4  # smallest singular values: near a fold, and so near that nothing is agreed
+_ALONG = np.array([1e-3, -1e-3, 3e-3, -3e-3, 1e-2, -1e-2, 3e-2, -3e-2, 0.1, -0.1, 0.3, -0.3])
 _RARE = 1  # of these poses, those with an odd number of solutions on an arm without special axes
 
 
@@ -85,15 +102,17 @@ def _missed(robot: Robot, params: Array) -> int:
 
 
 def _best_cuts(robot: Robot, cuts: list[Array]) -> Array:
-    """The parameters of the best valid cuts, concatenated: those that find most configurations of random poses.
+    """The parameters of the best valid cuts, concatenated: the most exact ones, and of these those that find most.
 
-    A cut counts as valid if it is for most of a few poses; one that misses a quarter of the poses is not used.
+    A cut counts as valid if it is for most of a few poses; one that misses a quarter of the poses is not used. A
+    cut that would be degenerate but for the rounding of the table is valid with a large misfit.
     """
     q, T = _poses(robot)
-    ranked: list[tuple[int, int, int, Array]] = []
+    ranked: list[tuple[int, int, int, int, Array]] = []
     out = np.empty((_POSES, SOLUTIONS, 6))
     for cut in cuts:
-        if np.median([misfit_of_degree(cut, pose) for pose in T[:_PROBES]]) > _VALID:
+        misfit = max(float(np.median([misfit_of_degree(cut, pose) for pose in T[:_PROBES]])), _EXACT)
+        if not misfit <= _VALID:
             continue
         branches_many(cut, T, np.array([math.nan]), q[0], out)
         there = ~np.isnan(out[:, :, 0])
@@ -101,9 +120,15 @@ def _best_cuts(robot: Robot, cuts: list[Array]) -> Array:
         apart[~there] = math.inf
         missed = int((apart.min(axis=1) > 1e-6).sum())
         if missed < _POSES // 4:
-            ranked.append((missed, -int(there.sum()), len(ranked), cut))
-    ranked.sort(key=lambda entry: entry[:3])
-    return np.concatenate([entry[3] for entry in ranked[:_CUTS]] or [np.empty(0)])
+            off = int(math.log(misfit / _EXACT) / math.log(_SIMILAR))
+            ranked.append((off, missed, -int(there.sum()), len(ranked), cut))
+    ranked.sort(key=lambda entry: entry[:4])
+    return np.concatenate([entry[4] for entry in ranked[:_CUTS]] or [np.empty(0)])
+
+
+def _apart(rows: Array, q: Array) -> Array:
+    """The largest joint difference ``(k,)`` of each row ``(k, 6)`` from q ``(6,)``, whole turns aside."""
+    return np.asarray(np.abs((rows - q + math.pi) % TURN - math.pi).max(axis=1, initial=0.0))
 
 
 class General6(ClosedForm):
@@ -122,8 +147,7 @@ class General6(ClosedForm):
         self.robot = robot
         self.tool_on_axis = tool_on_axis
         self.kernels = kernels
-        solved = {int(2 + shift) % 6 for shift in kernels.params[SHIFT::SIZE]}
-        self._solved_for = [5 - joint if turned else joint for joint in sorted(solved)]
+        self._turned = turned
 
     def handles(self, task: int) -> bool:
         """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
@@ -137,49 +161,111 @@ class General6(ClosedForm):
         """All solutions; with an approach direction only, joint 6 stays or takes the value requested."""
         out, free_roll = np.empty((SOLUTIONS, 6)), problem.task == APPROACH
         T = without_last(problem)[0] if free_roll else problem.T
-        self.kernels.one(self.kernels.params, T, math.nan, problem.seed, out)
-        complete = self.add_missing(T, problem.seed, out)
+        completeness = self.add_missing(T, problem.seed, out)
         values, ranges = np.full((SOLUTIONS, int(free_roll)), math.nan), []
         if free_roll:
             ranges.append(free_last(problem, out))
             values[:, -1] = out[:, 5]
-        return Candidates(out, values, tuple(ranges), complete=complete)
+        return Candidates(out, values, tuple(ranges), completeness=completeness)
 
-    def add_missing(self, T: Array, near: Array, q: Array) -> bool:
-        """Add to solutions ``(16, 6)`` those that share an angle with another and may be missing."""
-        return self._is_plain(q) or self._add_nearby(T, near, q)
+    def add_missing(self, T: Array, near: Array, q: Array) -> Completeness:
+        """q ``(16, 6)`` ← all solutions; how it is known that these are all."""
+        known = self._solve_all(T, q)
+        rows = q[~np.isnan(q[:, 0])]
+        if curves_among(self.robot, T, POSE, _JOINTS, rows, list(range(len(rows))))[0]:
+            return self._beside_curves(T, near, q)
+        if known == PROVED:
+            return "proved"
+        if known == AGREED and not self._doubtful(q):
+            return "agreed"
+        return "agreed" if self._add_nearby(T, q) else "unknown"
 
-    def _is_plain(self, q: Array) -> bool:
-        """Whether solutions ``(16, 6)`` come in pairs, and none share an angle that the elimination solves for."""
-        there = q[~np.isnan(q[:, 0])]
-        return len(there) % 2 == 0 and all(
-            np.diff(np.sort(there[:, joint])).min(initial=1.0) > _SHARED for joint in self._solved_for
-        )
+    def _solve_all(self, T: Array, q: Array) -> int:
+        """q ``(16, 6)`` ← the solutions that the kernels find, and what `solve_all` knows of them."""
+        if not self._turned:
+            return int(solve_all(self.kernels.params, np.ascontiguousarray(T), q))
+        known = int(solve_all(self.kernels.params, np.ascontiguousarray(inverse(T)), q))
+        q[:] = q[:, ::-1].copy()
+        return known
 
-    def _add_nearby(self, T: Array, near: Array, q: Array) -> bool:
-        """Add to doubtful solutions ``(16, 6)`` what targets close by lead to; whether none is missing.
+    def _beside_curves(self, T: Array, near: Array, q: Array) -> Completeness:
+        """Find the isolated solutions of a pose that a curve meets too; q ``(16, 6)`` has one row for each.
 
-        Where several share the angle that the elimination solves for, it may miss one. Close by they differ.
+        The elimination has no isolated roots there. Targets close by and random starts lead to the others.
         """
-        rows, count = np.empty((SOLUTIONS, 6)), int((~np.isnan(q[:, 0])).sum())
-        wide, errors = np.full(6, UNBOUNDED), np.empty(SOLUTIONS)
+        # Of a curve the point nearest to the seed comes first.
+        rows = self._thinned(T, np.concatenate([self._descended(T, near[None]), q[~np.isnan(q[:, 0])]]))
+        close = [self._near_target(T, step) for step in _STEPS]
+        starts = np.random.default_rng(8).uniform(-math.pi, math.pi, (2, _STARTS, 6))
+        for each in (np.concatenate(close), *starts):
+            before = len(rows)
+            rows = self._thinned(T, np.concatenate([rows, self._descended(T, each)]))
+        q[:] = math.nan
+        q[: min(len(rows), SOLUTIONS)] = rows[:SOLUTIONS]
+        return "agreed" if len(rows) == before <= SOLUTIONS else "unknown"
+
+    def _thinned(self, T: Array, rows: Array) -> Array:
+        """The configurations ``(k, 6)``, each once, and of those on one curve the first."""
+        kept: list[int] = []
+        for i, row in enumerate(rows):
+            if all(_apart(rows[kept], row) > _SAME) and len(kept) < _MOST_ROWS:
+                kept.append(i)
+        rows = np.ascontiguousarray(rows[kept])
+        return rows[curves_among(self.robot, T, POSE, _JOINTS, rows, list(range(len(rows))))[1]]
+
+    def _doubtful(self, q: Array) -> bool:
+        """Whether a solution of q ``(16, 6)`` is so near a fold that its twin may be missing."""
+        there = q[~np.isnan(q[:, 0])]
+        return len(there) % 2 == 1 or bool(self._folds(there).min(initial=math.inf) < _NEAR_FOLD)
+
+    def _folds(self, q: Array) -> Array:
+        """The smallest singular value ``(k,)`` at each configuration, lengths in shares of the reach."""
+        J = jacobian(self.robot, q)
+        J[:, :3] /= self.robot.reach or 1.0
+        return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1])
+
+    def _add_nearby(self, T: Array, q: Array) -> bool:
+        """Add to doubtful solutions ``(16, 6)`` what targets close by lead to; whether they lead to nothing else.
+
+        Where several share the angle that the elimination solves for, it may miss one. Close by they differ. The
+        twin of a solution near a fold is looked for along the direction in which the arm barely moves.
+        """
+        count = found = int((~np.isnan(q[:, 0])).sum())
         for step in _STEPS:
-            moved = T @ step
-            moved[:3, 3] = T[:3, 3] + self.robot.reach * step[:3, 3]
-            self.kernels.one(self.kernels.params, moved, math.nan, near, rows)
-            there = rows[~np.isnan(rows[:, 0])].copy()
-            goal = (np.ascontiguousarray(T), POSE, _MASK, 1.0)
-            each_of(self.robot.model, goal, (-wide, wide, np.zeros(6)), -1.0, len(there) + 1, there, errors)
-            for row, error in zip(there, errors, strict=False):
-                apart = np.abs((q[:count] - row + math.pi) % TURN - math.pi).max(axis=1, initial=0.0)
-                if error < _MET and count < SOLUTIONS and (count == 0 or apart.min() > _SAME):
-                    q[count] = math.pi - (math.pi - row) % TURN
-                    count += 1
-        if count and count % 2 == 0:
-            return True
-        # A double solution counts once.
-        sigma = np.linalg.svd(jacobian(self.robot, q[:count]), compute_uv=False)[:, -1]
-        return bool(sigma.min(initial=math.inf) < _DOUBLE)
+            count = self._add(T, self._near_target(T, step), q, count)
+        done = 0
+        while done < count:
+            near = q[done:count][self._folds(q[done:count]) < _FOLD]
+            done = count
+            if len(near):
+                J = jacobian(self.robot, near)
+                weak = np.linalg.svd(J)[2][:, -1]
+                starts = near[:, None] + _ALONG[None, :, None] * weak[:, None]
+                count = self._add(T, starts.reshape(-1, 6), q, count)
+        even = count > 0 and count % 2 == 0
+        return even and count == found and bool(self._folds(q[:count]).min() > _NEAR_FOLD)
+
+    def _add(self, T: Array, starts: Array, q: Array, count: int) -> int:
+        """Add to the first `count` rows of q ``(16, 6)`` where descents from `starts` end; their number."""
+        for row in self._descended(T, starts):
+            if count < SOLUTIONS and all(_apart(q[:count], row) > _SAME):
+                q[count] = row
+                count += 1
+        return count
+
+    def _near_target(self, T: Array, step: Array) -> Array:
+        """The solutions ``(k, 6)`` of a target close by."""
+        moved, rows = T @ step, np.empty((SOLUTIONS, 6))
+        moved[:3, 3] = T[:3, 3] + self.robot.reach * step[:3, 3]
+        self._solve_all(moved, rows)
+        return rows[~np.isnan(rows[:, 0])]
+
+    def _descended(self, T: Array, starts: Array) -> Array:
+        """Where descents from `starts` ``(k, 6)`` meet the target."""
+        rows, errors, wide = starts.copy(), np.empty(len(starts)), np.full(6, UNBOUNDED)
+        goal = (np.ascontiguousarray(T), POSE, _MASK, 1.0)
+        each_of(self.robot.model, goal, (-wide, wide, np.zeros(6)), -1.0, len(rows) + 1, rows, errors)
+        return np.asarray(math.pi - (math.pi - rows[errors < _MET]) % TURN)
 
     def branch_of(self, q: Array) -> int:
         """The row of q ``(6,)`` among all solutions of its pose."""

@@ -7,6 +7,14 @@ angles.
 The function may vary by a factor of 1e16 around the circle, and coefficients keep only what is large. A root where
 the function is small is therefore corrected with values of the determinant itself, which are accurate relative to
 their own size (Weierstrass's correction, one root at a time, the others held).
+
+How exact the coefficients are is measured on each target: at a few more angles the determinant differs from the
+polynomial by its *noise*. It is rounding error for most arms, but far larger where the cut is nearly degenerate,
+as on a table whose angles were typed with a few decimals.
+
+With this noise each root gets a disc that bounds how far it may be off (Smith, J. ACM 17(4), 1970). Any k discs
+that hang together, apart from the others, hold exactly k roots. Groups that do not reach the unit circle hold no
+angle. If each group that does holds as many solutions as it has discs, no solution is missing (`covers_circle`).
 """
 
 from __future__ import annotations
@@ -32,7 +40,15 @@ _START = np.exp(1j * (0.4 + 2.0 * np.pi * np.arange(ROOTS) / ROOTS)) * 1.07
 _START_X, _START_Y = _START.real.copy(), _START.imag.copy()
 _STEPS = 40
 _SETTLED = 1e-16  # square of a step; the iteration is of third order
-_NOISE = 4e-15  # of the largest coefficient
+_NOISE = 4e-15  # of the largest coefficient, at least
+_MOST_NOISE = 1e-6  # of coefficients that mean anything
+_TWINS = 1e-3  # how close the approximations of a double root are, at most
+_MARGIN = 10.0  # times the noise measured at a few angles: the noise at any other
+_PROBES = 2.0 * np.pi * (np.array([1.0, 6.0, 12.0]) + 0.43) / TERMS  # between the samples
+_PROBE_X, _PROBE_Y = np.cos(_PROBES), np.sin(_PROBES)
+_PROBE_COSINES = 2.0 * np.cos(np.outer(_PROBES, np.arange(DEGREE + 1)))
+_PROBE_SINES = 2.0 * np.sin(np.outer(_PROBES, np.arange(DEGREE + 1)))
+_PROBE_COSINES[:, 0] = 1.0
 _SURE = 1e-7  # radius of uncertainty below which a root needs no correction
 _NEARBY = 0.4  # |log |z||: roots that are corrected
 _ON_CIRCLE = 0.03  # |log |z||: roots that are tried as real angles
@@ -68,7 +84,20 @@ def coefficients(E: Array, re: Array, im: Array) -> float:
 
 
 @jit
-def aberth(re: Array, im: Array, zx: Array, zy: Array, slope: Array) -> None:
+def _noise_of(E: Array, re: Array, im: Array, largest: float) -> float:
+    """How far the determinant is from the polynomial between the samples, in largest coefficients."""
+    A, W = np.empty((2, 6, 9)), np.empty((6, 6))
+    worst = _NOISE
+    for j in range(_PROBES.shape[0]):
+        value = times_determinant(condense(E, _PROBE_X[j], _PROBE_Y[j], A, W), W) / largest
+        for k in range(DEGREE + 1):
+            value -= re[DEGREE + k] * _PROBE_COSINES[j, k] - im[DEGREE + k] * _PROBE_SINES[j, k]
+        worst = max(worst, abs(value))
+    return worst
+
+
+@jit
+def aberth(re: Array, im: Array, noise: float, zx: Array, zy: Array, slope: Array) -> None:
     """zx, zy ``(16,)`` ← all roots of the polynomial, slope ``(16,)`` ← |derivative| there.
 
     Roots are columns of arrays of real numbers, so that the loops over them are vectorised.
@@ -104,7 +133,7 @@ def aberth(re: Array, im: Array, zx: Array, zy: Array, slope: Array) -> None:
             zy[i] -= y
             size = zx[i] * zx[i] + zy[i] * zy[i]
             # Where the polynomial is noise, or far from the circle, steps need not become small.
-            moves = 0.25 < size < 4.0 and px[i] * px[i] + py[i] * py[i] > _NOISE * _NOISE
+            moves = 0.25 < size < 4.0 and px[i] * px[i] + py[i] * py[i] > noise * noise
             largest = max(largest, x * x + y * y if moves else 0.0)
         if largest < _SETTLED:
             break
@@ -120,14 +149,14 @@ def _near_circle(z: complex, bound: float) -> bool:
 
 
 @jit
-def _correct(E: Array, z: Numbers, slope: Array) -> None:
+def _correct(E: Array, noise: float, z: Numbers, slope: Array) -> None:
     """Correct the roots z ``(16,)`` complex whose place is uncertain, in place."""
     A, W = np.empty((2, 6, 9), dtype=np.complex128), np.empty((6, 6), dtype=np.complex128)
     lead = 0.0 + 0.0j
     for _ in range(_CORRECTIONS):
         largest = 0.0
         for i in range(ROOTS):
-            if slope[i] * _SURE > _NOISE or not _near_circle(z[i], _NEARBY):
+            if slope[i] * _SURE > noise or not _near_circle(z[i], _NEARBY):
                 continue
             if lead == 0.0:
                 lead = _leading(E, z)
@@ -138,7 +167,7 @@ def _correct(E: Array, z: Numbers, slope: Array) -> None:
             if not 0.0 < square < math.inf:
                 continue
             step = polynomial_at(E, z[i], A, W) * far.conjugate() / square
-            size, most = abs(step), min(_STRIDE, _RADII * _NOISE / (slope[i] + _NOISE))
+            size, most = abs(step), min(_STRIDE, _RADII * noise / (slope[i] + noise))
             if not size < most:
                 step *= most / size
             z[i] -= step
@@ -173,22 +202,110 @@ def _leading(E: Array, z: Numbers) -> complex:
 
 
 @jit
-def zeros(E: Array, doubtful: bool, out: Array) -> int:
+def zeros(E: Array, doubtful: bool, z: Numbers, radius: Array, out: Array) -> int:
     """out ``(16,)`` ← the angles of all roots on the unit circle or almost there; returns their number.
 
-    With `doubtful` these are also roots that lie beside the circle by more than rounding explains.
+    z ``(16,)`` complex ← centres of discs around all roots, radius ``(16,)`` ← theirs. With `doubtful` the angles
+    are also those of roots that lie beside the circle by more than rounding explains.
     """
     re, im, zx, zy, slope = np.empty(TERMS), np.empty(TERMS), np.empty(ROOTS), np.empty(ROOTS), np.empty(ROOTS)
-    coefficients(E, re, im)
-    aberth(re, im, zx, zy, slope)
-    z = np.empty(ROOTS, dtype=np.complex128)
+    noise = _noise_of(E, re, im, coefficients(E, re, im))
+    aberth(re, im, noise, zx, zy, slope)
     for i in range(ROOTS):
         z[i] = complex(zx[i], zy[i])
-    _correct(E, z, slope)
+    _correct(E, noise, z, slope)
     count = 0
     for i in range(ROOTS):
         off = abs(math.hypot(z[i].real, z[i].imag) - 1.0)
-        if off < _ON_CIRCLE and (doubtful or off * slope[i] < _OFF_CIRCLE * _NOISE):
+        if off < _ON_CIRCLE and (doubtful or off * slope[i] < _OFF_CIRCLE * noise):
             out[count] = math.atan2(z[i].imag, z[i].real)
             count += 1
+    # A polynomial that is noise itself, as where a whole curve of configurations meets the pose, tells nothing.
+    _discs(re, im, _MARGIN * noise if noise < _MOST_NOISE else math.inf, z, radius)
     return count
+
+
+@jit
+def _discs(re: Array, im: Array, noise: float, z: Numbers, radius: Array) -> None:
+    """radius ``(16,)`` ← those of discs around the approximate roots z ``(16,)``, of which twins are moved apart.
+
+    r = 16 (|p(z)| + noise max(1, |z|¹⁶)) / |a₁₆ Π (z − z_j)|: any polynomial whose coefficients differ by no more
+    than the noise has its roots in the union of the discs, and k in each group of k.
+    """
+    lead = math.hypot(re[ROOTS], im[ROOTS])
+    _part_twins(lead, noise, z)
+    for i in range(ROOTS):
+        x, y = z[i].real, z[i].imag
+        u, v = re[ROOTS], im[ROOTS]
+        for k in range(ROOTS - 1, -1, -1):
+            u, v = u * x - v * y + re[k], u * y + v * x + im[k]
+        far = lead * lead
+        for j in range(ROOTS):
+            if j != i:
+                far *= (x - z[j].real) ** 2 + (y - z[j].imag) ** 2
+        growth = max(1.0, (x * x + y * y) ** DEGREE)
+        radius[i] = ROOTS * (math.hypot(u, v) + noise * growth) / math.sqrt(far) if far > 0.0 else math.inf
+        if not radius[i] >= 0.0:  # NaN
+            radius[i] = math.inf
+
+
+@jit
+def _part_twins(lead: float, noise: float, z: Numbers) -> None:
+    """Move the centres z ``(16,)`` of a double root apart, as far as makes their discs small.
+
+    Centres may be anywhere. Those of a double root that are closer than the noise explains would get huge discs.
+    """
+    for i in range(ROOTS):
+        for j in range(i):
+            square = (z[i].real - z[j].real) ** 2 + (z[i].imag - z[j].imag) ** 2
+            if square > _TWINS * _TWINS:
+                continue
+            middle = 0.5 * (z[i] + z[j])
+            far = lead
+            for k in range(ROOTS):
+                if k != i and k != j:
+                    far *= abs(middle - z[k])
+            size = abs(middle)
+            wanted = ROOTS * noise * max(1.0, size**ROOTS) / far if far > 0.0 else math.inf
+            if square < wanted < 1e-4 and size > 0.0:
+                step = complex(-middle.imag, middle.real) * (0.5 * math.sqrt(wanted) / size)
+                z[i], z[j] = middle + step, middle - step
+
+
+@jit
+def covers_circle(z: Numbers, radius: Array, angles: Array, count: int) -> bool:
+    """Whether the first `count` angles ``(16,)`` of solutions are one for each root that may be on the circle.
+
+    z, radius ``(16,)``: the roots and their discs, as `zeros` leaves them.
+    """
+    if not np.isfinite(radius).all():
+        return False
+    group = np.arange(ROOTS)
+    for i in range(ROOTS):
+        for j in range(i):
+            apart = math.hypot(z[i].real - z[j].real, z[i].imag - z[j].imag)
+            if apart <= radius[i] + radius[j] and group[i] != group[j]:
+                old = group[i]
+                for k in range(ROOTS):
+                    if group[k] == old:
+                        group[k] = group[j]
+    balance = np.zeros(ROOTS, dtype=np.int64)  # of each group: discs less solutions
+    reaches = np.zeros(ROOTS, dtype=np.bool_)
+    for i in range(ROOTS):
+        balance[group[i]] += 1
+        if abs(math.hypot(z[i].real, z[i].imag) - 1.0) <= radius[i]:
+            reaches[group[i]] = True
+    for k in range(count):
+        x, y = math.cos(angles[k]), math.sin(angles[k])
+        own = -1
+        for i in range(ROOTS):
+            if math.hypot(z[i].real - x, z[i].imag - y) <= radius[i]:
+                own = group[i]
+                break
+        if own < 0:
+            return False
+        balance[own] -= 1
+    missing = 0
+    for i in range(ROOTS):
+        missing += 1 if reaches[i] and balance[i] != 0 else 0
+    return missing == 0

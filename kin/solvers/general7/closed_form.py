@@ -19,8 +19,10 @@ from kin.solvers.contract import (
     BatchKernels,
     Candidates,
     ClosedForm,
+    Completeness,
     RedundancyParameter,
     SolverInput,
+    weakest,
 )
 from kin.solvers.general7.motion import end_of_motion
 from kin.solvers.reduced import fixed
@@ -134,10 +136,11 @@ class General7(ClosedForm):
         out = self._at(p, np.array([value]))[0]
         if math.isnan(requested) and p.respect_limits and not self._inside(p, out).any():
             value, out = self._nearest_value(p, value, out)
-        complete = self._add_missing(p, value, out)
+        # All solutions at one value of the given joint: at others there may be further branches.
+        completeness = weakest(self._add_missing(p, value, out), "agreed")
         values = np.where(np.isnan(out[:, :1]), math.nan, value)
         arcs = self._ranges(p, out) if p.respect_limits else np.empty((0, 3))
-        return Candidates(out, values, (arcs,), complete=complete)
+        return Candidates(out, values, (arcs,), completeness=completeness)
 
     def _at(self, problem: SolverInput, values: Array) -> Array:
         """All solutions ``(N, rows, 7)`` at these values of the given joint."""
@@ -146,14 +149,14 @@ class General7(ClosedForm):
         self.kernels.many(self.kernels.params, T, values, problem.seed, out)
         return out
 
-    def _add_missing(self, problem: SolverInput, value: float, out: Array) -> bool:
-        """Add to solutions ``(rows, 7)`` what the solver of six joints finds besides; whether none is missing."""
+    def _add_missing(self, problem: SolverInput, value: float, out: Array) -> Completeness:
+        """Add to solutions ``(rows, 7)`` what the solver of six joints finds besides; how complete they are."""
         others = self._fold.others
         q, T = np.ascontiguousarray(out[:, others]), self._fold.targets(problem.T, np.array([value]))[0]
-        complete = self.form.add_missing(T, problem.seed[others], q)
+        completeness = self.form.add_missing(T, problem.seed[others], q)
         out[:, others] = q
         out[:, self.given] = np.where(np.isnan(q[:, 0]), math.nan, value)
-        return complete
+        return completeness
 
     def _outside(self, problem: SolverInput, q: Array) -> Array:
         """How far configurations ``(..., 7)`` are outside the limits, in all; ∞ for those that do not exist."""

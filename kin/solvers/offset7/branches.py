@@ -27,6 +27,7 @@ from kin.solvers.offset7.geometry import (
     D2,
     D3,
     OFFSET,
+    REACH,
     REVERSED,
     SIGN,
     SIN1,
@@ -40,7 +41,6 @@ from kin.solvers.offset7.geometry import (
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-_REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 _FREE = 1e6  # rad; limits that never bind
 
@@ -84,12 +84,15 @@ def two_roots(a: float, b: float, rest: float, slack: float, out: Array) -> floa
 
     Returns how far `rest` is inside the amplitude, as a share of it: negative where there is no root. Up to
     `slack` outside, both roots are φ or φ + π. Where the amplitude is 0 the roots are NaN, if `rest` is 0 too.
+    A negative slack is what `rest` has to be inside the amplitude at least.
     """
     size = math.sqrt(a * a + b * b)
     if size < _SINGULAR:
         out[0] = out[1] = math.nan
         return 1.0 if abs(rest) <= slack else -1.0
     room = size - abs(rest)
+    if slack < 0.0 and room < -slack:
+        return (room + slack) / size
     if room < 0.0 and room >= -slack:
         room = 0.0
     middle = math.atan2(b, a)
@@ -133,7 +136,7 @@ def all_branches(params: Array, T: Array, near: Array, t: Array, only: int, rows
     wx, wy, wz = M[0, 3], M[1, 3], M[2, 3]
     square = wx * wx + wy * wy + wz * wz
     constant, a, b = distances(p)
-    bent = two_roots(a, b, 0.5 * (square - constant), _REACH * math.sqrt(square), roots)
+    bent = two_roots(a, b, 0.5 * (square - constant), p[REACH] * math.sqrt(square), roots)
     for k in range(8):
         room[k] = bent
     if bent < 0.0:
@@ -143,7 +146,7 @@ def all_branches(params: Array, T: Array, near: Array, t: Array, only: int, rows
             continue
         t[3] = roots[elbow]
         y0, y1, y2 = forearm(p, t[3])
-        level = two_roots(p[SIN2] * y1, p[SIN2] * y0, wz - p[COS2] * y2, _REACH, sides)
+        level = two_roots(p[SIN2] * y1, p[SIN2] * y0, wz - p[COS2] * y2, p[REACH], sides)
         for k in range(4):
             room[4 * elbow + k] = min(bent, level) if level >= 0.0 else level
         if level < 0.0:
@@ -203,7 +206,7 @@ def gap_of(params: Array, T: Array, value: float) -> tuple[int, float, float]:
     square = M[0, 3] * M[0, 3] + M[1, 3] * M[1, 3] + M[2, 3] * M[2, 3]
     constant, a, b = distances(p)
     far = math.sqrt(square)
-    if two_roots(a, b, 0.5 * (square - constant), _REACH * far, roots) < 0.0:
+    if two_roots(a, b, 0.5 * (square - constant), p[REACH] * far, roots) < 0.0:
         most = math.sqrt(constant + 2.0 * math.sqrt(a * a + b * b))
         least = math.sqrt(max(constant - 2.0 * math.sqrt(a * a + b * b), 0.0))
         return (1, far - most, most) if far > most else (2, least - far, least)
@@ -211,7 +214,7 @@ def gap_of(params: Array, T: Array, value: float) -> tuple[int, float, float]:
     for elbow in range(2):
         y0, y1, y2 = forearm(p, roots[elbow])
         rest = M[2, 3] - p[COS2] * y2
-        if two_roots(p[SIN2] * y1, p[SIN2] * y0, rest, _REACH, sides) >= 0.0:
+        if two_roots(p[SIN2] * y1, p[SIN2] * y0, rest, p[REACH], sides) >= 0.0:
             return 0, 0.0, 0.0
         gap = min(gap, abs(rest) - abs(p[SIN2]) * math.sqrt(y0 * y0 + y1 * y1))
     return 3, gap, math.nan

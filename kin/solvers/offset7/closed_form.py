@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from copy import copy
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -28,7 +30,7 @@ from kin.solvers.contract import (
 from kin.solvers.names import Names, Part, bent, eight, flipped, front_or_back, names_of, stance_of
 from kin.solvers.offset7.answers import answer
 from kin.solvers.offset7.branches import branches_many, branches_one, chain_values, forearm, gap_of
-from kin.solvers.offset7.geometry import SIN2, Geometry, geometry_of
+from kin.solvers.offset7.geometry import REACH, SIN2, Geometry, geometry_of
 from kin.solvers.offset7.places import SAMPLES
 from kin.solvers.offset7.ranges import INTERVALS
 from kin.solvers.singular import Singularity, by_jacobian, those_within
@@ -112,7 +114,14 @@ class Offset7(ClosedForm):
                 span = turn_around(float(p.lower[i]), float(p.upper[i]), float(p.seed[i]))
                 tried = np.linspace(*span, SAMPLES).tolist()
             gap, obstacle = self._obstacle(p.T, tried)
-        return Candidates(out[:, :7], out[:, 7:], (found,), gap, obstacle)
+        return Candidates(out[:, :7], out[:, 7:], (found,), gap, obstacle, "agreed")
+
+    def relaxed(self, by: float) -> Offset7:
+        """The same with a reach that is wider by some metres, or narrower."""
+        other, params = copy(self), self.kernels.params.copy()
+        params[REACH] += by
+        other.kernels = replace(self.kernels, params=params)
+        return other
 
     def _obstacle(self, T: Array, values: list[float]) -> tuple[float, Obstacle | None]:
         """Why no branch exists at any of these values of the given joint: the smallest gap, and what it is."""

@@ -19,10 +19,10 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 # Layout of the parameter array: the first three rows of base⁻¹ and of tool⁻¹, signs and offsets of the chain's
-# joints, lengths d and a, cosines and sines of the twists, the wrist centre as seen from joint 4, and 1.0 if the
-# chain is reversed.
+# joints, lengths d and a, cosines and sines of the twists, the wrist centre as seen from joint 4, 1.0 if the chain
+# is reversed, and the metres by which lengths may miss and still close.
 SIGN, OFFSET = 24, 31
-D1, A1, COS1, SIN1, D2, COS2, SIN2, A3, D3, COS3, SIN3, X4, Y4, Z4, COS4, SIN4, REVERSED = range(38, 55)
+D1, A1, COS1, SIN1, D2, COS2, SIN2, A3, D3, COS3, SIN3, X4, Y4, Z4, COS4, SIN4, REVERSED, REACH = range(38, 56)
 _TWISTS = (1, 1, 1, 1, -1, 1)
 _REVERSED_TWISTS = (-1, 1, 1, 1, 1, 1)
 
@@ -31,7 +31,7 @@ class Geometry(NamedTuple):
     """A chain of seven joints of which the first is given.
 
     Attributes:
-        params: the array ``(55,)`` that the kernels read.
+        params: the array ``(56,)`` that the kernels read.
         reversed: whether the chain runs from the tool to the base.
         sign, offset: ``(7,)``, in the order of the chain.
         elbow: t4 where the wrist centre is farthest from the meeting point of axes 2 and 3.
@@ -88,6 +88,7 @@ def _geometry(links: Links, is_reversed: bool, base: Array) -> Geometry | None:
     if math.hypot(cosine, sine) < TOLERANCES.geometry:
         return None
     shape = [d[0], a[0], c1, s1, d[1], c2, s2, a[2], d[2], c3, s3, x4, y4, z4, c4, s4, float(is_reversed)]
+    shape.append(TOLERANCES.closure_position * 0.1)
     params = np.array([*pose_params(links.base, links.tool), *links.sign, *links.theta, *shape])
     along = 1.0 if d[4] <= 0.0 else -1.0
     return Geometry(params, is_reversed, links.sign, links.theta, math.atan2(sine, cosine), base, along)

@@ -18,7 +18,7 @@ from kin.solvers.blocks import Entries, rows_of
 from kin.solvers.canonical import canonical_pose
 from kin.solvers.common import HIGH, LOW, NEAR, wrap
 from kin.solvers.offset7.branches import all_branches, distances
-from kin.solvers.offset7.geometry import D1, OFFSET, REVERSED, SIGN, Y4
+from kin.solvers.offset7.geometry import D1, OFFSET, REACH, REVERSED, SIGN, Y4
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -36,7 +36,6 @@ SPACE = ANGLES + JOINTS * STRIDE
 # `distances` gives and the first joint; middles and halves of the limits of joints 2 to 7.
 _SHAPE, _DISTANCES, _LIMITS, _HALVES, SETUP = 12, 24, 36, 48, 60
 Angles = tuple[float, float, float, float, float, float]
-_REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 _TINY = 1e-300
 _LIMIT = TOLERANCES.limit
@@ -65,6 +64,7 @@ def set_up(params: Array, T: Array, box: Array, setup: Array) -> None:
     setup[_DISTANCES + 4], setup[_DISTANCES + 5] = constant, size
     setup[_DISTANCES + 6], setup[_DISTANCES + 7] = a / size, b / size
     setup[_DISTANCES + 8], setup[_DISTANCES + 9] = params[SIGN], params[OFFSET]
+    setup[_DISTANCES + 10] = params[REACH]
     for i in range(6):
         half, middle = 0.5 * (box[HIGH, i + 1] - box[LOW, i + 1]), 0.5 * (box[HIGH, i + 1] + box[LOW, i + 1])
         bound = half < math.pi
@@ -97,18 +97,18 @@ def _lane(
 ) -> tuple[float, float, bool, Angles]:
     """(room of the elbow, of the side, whether an angle is free, angles) of one lane; n, p, d, m, h: its setup."""
     D1, A1, C1, S1, D2, C2, S2, A3, D3, C3, S3, X4 = p
-    Y4, Z4, C4, S4, constant, size, along, beside, sign, offset, _, _ = d
+    Y4, Z4, C4, S4, constant, size, along, beside, sign, offset, reach, _ = d
     s, c = sin_cos(sign * value + offset)
     x, y, z = c * n[3] + s * n[7] - A1, c * n[7] - s * n[3], n[11] - D1
     wx, wy, wz = x, C1 * y + S1 * z, C1 * z - S1 * y - D2
     square = wx * wx + wy * wy + wz * wz
-    bent, cosine, sine = _root(0.5 * (square - constant), size, _REACH * math.sqrt(square), elbow)
+    bent, cosine, sine = _root(0.5 * (square - constant), size, reach * math.sqrt(square), elbow)
     c4, s4 = along * cosine - beside * sine, beside * cosine + along * sine
     x, y = c4 * X4 - s4 * Y4, s4 * X4 + c4 * Y4
     y0, y1, y2 = A3 + x, C3 * y - S3 * Z4, D3 + S3 * y + C3 * Z4
     a, b = S2 * y1, S2 * y0
     wide = math.sqrt(a * a + b * b)
-    level, cosine, sine = _root(wz - C2 * y2, wide, _REACH, side)
+    level, cosine, sine = _root(wz - C2 * y2, wide, reach, side)
     # A share of the arm's size: a share of `wide` would have poles beside narrow gaps, where it is small.
     level *= (wide + _TINY) / math.sqrt(size)
     scale = 1.0 / (wide + _TINY)
@@ -117,7 +117,7 @@ def _lane(
     cosine, sine = wx * x + wy * y, wy * x - wx * y
     far = math.sqrt(cosine * cosine + sine * sine)
     c2, s2 = cosine / (far + _TINY), sine / (far + _TINY)
-    level = level if wide >= _SINGULAR else (1.0 if abs(wz - C2 * y2) <= _REACH else -1.0)
+    level = level if wide >= _SINGULAR else (1.0 if abs(wz - C2 * y2) <= reach else -1.0)
     # The rotation left for the wrist, its columns 0 to 2; of its last row the last entry only.
     twists, turned = (C1, S1, C2, S2, C3, S3, C4, S4), (c2, s2, c3, s3, c4, s4)
     x, y, z = c * n[0] + s * n[4], c * n[4] - s * n[0], n[8]

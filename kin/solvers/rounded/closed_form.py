@@ -19,16 +19,18 @@ from kin.solvers.contract import (
     ClosedForm,
     RedundancyParameter,
     SolverInput,
+    weakest,
 )
 from kin.solvers.numeric import each_of
 from kin.solvers.reversed import WrappedKernels
+from kin.solvers.rounded.six import SixJoints
 from kin.solvers.singular import Singularity
 from kin.transforms import Array
 
 Flags = NDArray[np.bool_]
 _MASK = np.array([1.0] * 6 + [0.0])
 _MOVED = 0.1  # rad, m: a descent that goes farther has left the posture
-_DIRECTIONS = np.concatenate([np.eye(3), -np.eye(3)])
+_DIRECTIONS = np.concatenate([np.eye(6), -np.eye(6)])
 _MARGIN = 10.0  # times the rounding: how far from a target starts are looked for
 _ABOUT = 1e-9  # m, rad: what is closer needs no descent with another task
 
@@ -51,6 +53,7 @@ class Rounded(ClosedForm):
             "every posture is made exact on the table as it is"
         )
         self.branches, self.meanings = form.names(robot, np.ones(robot.n))
+        self._six = SixJoints(robot, form, off) if robot.n == 6 else None
         self._margin = _MARGIN * off * size(robot)
         self.kernels = self._kernels(form.kernels)
 
@@ -69,14 +72,19 @@ class Rounded(ClosedForm):
         parameters = tuple(enumerate(self.redundancies(p.task)))
         held = [r.joint for k, r in parameters if r.joint >= 0 and not math.isnan(p.values[k])]
         known = ~np.isnan(q[:, 0])
-        if p.task == POSE and self.robot.n == 6:
+        six = self._six if p.task == POSE else None
+        if six is not None:
             q = self._with_starts(self.form.kernels, p.T, p.seed, q)
+        starts = q
         q, met = self._exact(p.T, p.task, q, held, known)
         for k, r in parameters:
             if r.joint >= 0:
                 values[:, k] = np.where(np.isnan(values[:, k]), math.nan, q[:, r.joint])
         obstacle = None if not np.isnan(q).all() else found.obstacle
-        return Candidates(q, values, found.arcs, found.gap, obstacle, met)
+        completeness = weakest(found.completeness, "agreed") if met else "unknown"
+        if six is not None:
+            q, completeness = six.completed(p.T, found.q, starts, q)
+        return Candidates(q, values, found.arcs, found.gap, obstacle, completeness)
 
     def _with_starts(self, form: BatchKernels, T: Array, near: Array, q: Array) -> Array:
         """The rows ``(k, 6)``, the missing ones from targets close by: the true table may just reach this one."""
@@ -85,7 +93,8 @@ class Rounded(ClosedForm):
             if not missing.any():
                 break
             moved = T.copy()
-            moved[:3, 3] += self._margin * direction
+            moved[:3, 3] += self._margin * direction[:3]
+            moved[:3, :3] = T[:3, :3] + _MARGIN * self.off * np.cross(direction[3:], T[:3, :3].T).T
             form.one(form.params, moved, math.nan, near, rows)
             out[missing] = rows[missing]
             missing = np.isnan(out[:, 0])

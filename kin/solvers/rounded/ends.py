@@ -1,0 +1,211 @@
+"""Ends of feasible intervals on a typed table, from those of the arm that was meant.
+
+The arm that was meant says what happens at an end: a joint meets a limit, the given joint turns back, or its own
+range ends. Newton's method then finds where that happens on the typed table (:mod:`kin.solvers.rounded.motion`).
+
+It is the same structure only if no interval appears, vanishes, divides or joins between the two tables. So it
+counts as certain only where the arm that was meant has the same intervals with limits and reach a little narrower,
+and a little wider.
+"""
+
+from __future__ import annotations
+
+import math
+
+from kin.kernels.compile import jit
+from kin.solvers.common import TURN, wrap
+from kin.solvers.rounded.motion import FOLD, OFF, SPAN, Point, Task, arrive, dial_of, new_point, task_of
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+_ACTIVE = 1e-7  # rad: a joint of the arm that was meant is at its limit
+_SLACK = TOLERANCES.limit
+_BOUND = 1e-10  # rad: an end of the joint's own range
+_WHOLE = TURN - 1e-9
+# Rad; times the rounding; at a fold times its root: a posture that moves farther may be another one.
+_MOVED, _MOVED_BY, _MOVED_ROOT = 0.5, 2000.0, 50.0
+_NARROW = 50.0  # times the rounding: intervals narrower than that are in doubt
+_TOUCH = 1e-9  # rad between intervals that touch
+_FIXED, _LOST = -4, -5  # the end of the joint's own range; nothing that is known
+
+
+@jit
+def slack_of(lower: Array, upper: Array, y: Array, c: int) -> float:
+    """How far joint c is inside its limits at its best whole turn; infinite where they leave a whole turn."""
+    half = 0.5 * (upper[c] - lower[c])
+    if half >= math.pi:
+        return math.inf
+    return float(half - abs(wrap(y[c] - 0.5 * (lower[c] + upper[c]))))
+
+
+@jit
+def limit_near(lower: Array, upper: Array, y: Array, c: int) -> float:
+    """The value of joint c, at the whole turn of y ``(7,)``, at which it meets the nearer one of its limits."""
+    off = wrap(y[c] - 0.5 * (lower[c] + upper[c]))
+    return float(y[c]) + (math.copysign(0.5 * (upper[c] - lower[c]), off) - off)
+
+
+@jit
+def is_inside(lower: Array, upper: Array, y: Array, but: int) -> bool:
+    """Whether all joints but one are inside their limits."""
+    inside = True
+    for c in range(7):
+        inside = inside and (c == but or slack_of(lower, upper, y, c) >= -_SLACK)
+    return inside
+
+
+@jit
+def _what_ends(task: Task, limits: Array, span: tuple[float, float], end: float, y: Array) -> int:
+    """What happens at an end where the arm that was meant, with wider limits, has the posture y.
+
+    FOLD, _FIXED or the joint that meets a limit.
+    """
+    joint, least = -1, _ACTIVE
+    for c in range(7):
+        slack = slack_of(limits[2], limits[3], y, c)
+        if c != task.joint and abs(slack) < least:
+            joint, least = c, abs(slack)
+    if joint >= 0:
+        return joint
+    if task.joint >= 0 and min(abs(end - span[0]), abs(end - span[1])) < _BOUND:
+        return _FIXED
+    return FOLD
+
+
+@jit
+def joined(arcs: Array, out: Array) -> int:
+    """out ``(m, 3)`` ← intervals (branch, low, high) of an angle, joined where they touch; their number.
+
+    They begin in (−π, π]; one that is whole turns is (−π, π).
+    """
+    n = 0
+    for i in range(arcs.shape[0]):
+        branch, low = arcs[i, 0], wrap(arcs[i, 1])
+        high = low + (arcs[i, 2] - arcs[i, 1])
+        k = 0
+        while k < n:
+            # One that begins in the other, or the other way round.
+            ahead, behind = (low - out[k, 1]) % TURN, (out[k, 1] - low) % TURN
+            if out[k, 0] == branch and (
+                ahead <= out[k, 2] - out[k, 1] + _TOUCH or behind <= high - low + _TOUCH or ahead > TURN - _TOUCH
+            ):
+                first, width = (out[k, 1], out[k, 2] - out[k, 1]), high - low
+                if ahead <= first[1] + _TOUCH:
+                    low, high = first[0], first[0] + max(first[1], ahead + width)
+                else:
+                    high = low + max(width, behind + first[1])
+                n -= 1
+                for c in range(3):
+                    out[k, c] = out[n, c]
+                k = 0
+            else:
+                k += 1
+        if high - low >= _WHOLE:
+            low, high = -math.pi, math.pi
+        out[n, 0], out[n, 1], out[n, 2] = branch, low, high
+        n += 1
+    return n
+
+
+@jit
+def _overlaps(a: Array, b: Array, circular: bool) -> bool:
+    """Whether two intervals (branch, low, high) are of one branch and overlap."""
+    if a[0] != b[0]:
+        return False
+    if circular:
+        return bool((a[1] - b[1]) % TURN <= b[2] - b[1] or (b[1] - a[1]) % TURN <= a[2] - a[1])
+    return bool(a[1] <= b[2] and b[1] <= a[2])
+
+
+@jit
+def _paired(branch: int, arcs: Array, others: Array, circular: bool) -> bool:
+    """Whether each interval of a branch overlaps exactly one of the others, and each of those one of these."""
+    for one, other in ((arcs, others), (others, arcs)):
+        for i in range(one.shape[0]):
+            if one[i, 0] == branch:
+                count = 0
+                for k in range(other.shape[0]):
+                    count += 1 if _overlaps(one[i], other[k], circular) else 0
+                if count != 1:
+                    return False
+    return True
+
+
+@jit
+def move_ends(
+    model: Array, T: Array, setting: Array, limits: Array, outer: Array, inner: Array, places: Array, out: Array,
+    sure: Array,
+) -> None:  # fmt: skip
+    """out ``(m, 3)`` ← the intervals of the typed table, from those of the arm that was meant.
+
+    sure ``(8,)`` ← 1.0 for each branch whose intervals certainly have the same structure; the others are in doubt.
+
+    Args:
+        model, T, setting: as for `task_of`.
+        limits: ``(4, 7)`` lower, upper, and both a little wider.
+        outer, inner: intervals ``(m, 3)`` with wider and with narrower limits and reach.
+        places: ``(m, 3, 7)`` postures at the ends of `outer`, overwritten by those at the ends of `out`; the third
+            is one inside, NaN if it is not known.
+    """
+    task, p = task_of(model, T, setting), new_point()
+    circular, off, span = task.joint < 0, setting[OFF], (setting[SPAN], setting[SPAN + 1])
+    for k in range(sure.shape[0]):
+        sure[k] = 1.0 if _paired(k, outer, inner, circular) else 0.0
+    for i in range(outer.shape[0]):
+        k = int(outer[i, 0])
+        out[i, 0], out[i, 1], out[i, 2] = outer[i, 0], outer[i, 1], outer[i, 2]
+        places[i, 2, 0] = math.nan
+        if sure[k] == 0.0:
+            continue
+        if circular and outer[i, 2] - outer[i, 1] > _WHOLE:
+            sure[k] = 1.0 if _is_whole(k, inner) else 0.0
+            continue
+        for side in range(2):
+            what = _moved_end(task, limits, span, off, places[i, side], out[i], side, p)
+            sure[k] = 0.0 if what == _LOST else sure[k]
+            if what >= 0 or what == _FIXED:
+                for c in range(7):
+                    places[i, 2, c] = places[i, side, c]
+        if not out[i, 2] - out[i, 1] > _NARROW * off:
+            sure[k] = 0.0
+        for j in range(i):
+            if _overlaps(out[i], out[j], circular):
+                sure[k] = 0.0
+
+
+@jit
+def _is_whole(branch: int, arcs: Array) -> bool:
+    """Whether a branch has all values of an angle."""
+    whole = False
+    for i in range(arcs.shape[0]):
+        whole = whole or (arcs[i, 0] == branch and arcs[i, 2] - arcs[i, 1] > _WHOLE)
+    return whole
+
+
+@jit
+def _moved_end(
+    task: Task, limits: Array, span: tuple[float, float], off: float, y: Array, arc: Array, side: int, p: Point
+) -> int:
+    """arc[1 + side] ← an end on the typed table, y ``(7,)`` ← the posture there; what happens there, or _LOST."""
+    lower, upper = limits[0], limits[1]
+    if math.isnan(y[0]):
+        return _LOST
+    end = arc[1 + side]
+    what = _what_ends(task, limits, span, end, y)
+    start = y.copy()
+    if what == _FIXED:
+        met = arrive(task, task.joint, end, y, p)
+    elif what == FOLD:
+        met = task.joint >= 0 and arrive(task, FOLD, 0.0, y, p)
+    else:
+        met = arrive(task, what, limit_near(lower, upper, y, what), y, p)
+    if not met or not is_inside(lower, upper, y, what):
+        return _LOST
+    most = min(_MOVED, _MOVED_ROOT * math.sqrt(off) if what == FOLD else _MOVED_BY * off)
+    for c in range(7):
+        if not abs(y[c] - start[c]) < most:
+            return _LOST
+    if what != _FIXED:
+        value = dial_of(task, y)
+        arc[1 + side] = end + wrap(value - end) if task.joint < 0 else value
+    return what

@@ -1,0 +1,288 @@
+"""Typed tables with seven joints: branches, feasible intervals and choices are those of the table as it is.
+
+The family gives the structure, the typed table the numbers. First the ends of the intervals are moved from the arm
+that was meant to the typed table (:mod:`kin.solvers.rounded.ends`). If the structure is in doubt, the self-motions
+of the typed table are followed (:mod:`kin.solvers.rounded.tracing`). Then each branch gets its row strictly inside
+the interval, with the redundancy parameter held (:mod:`kin.solvers.rounded.rows`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from kin.axes import size
+from kin.fk import fk
+from kin.kernels.compile import MODEL, direct
+from kin.robot import Robot
+from kin.solvers import rolled
+from kin.solvers.canonical import OFFSET, UPPER_ARM, at_every_turn, turn_around
+from kin.solvers.common import TURN
+from kin.solvers.contract import APPROACH, POSE, BatchKernels, Candidates, ClosedForm, SolverInput
+from kin.solvers.reversed import ReversedJoints, WrappedKernels
+from kin.solvers.rounded.closed_form import Flags, Rounded
+from kin.solvers.rounded.ends import joined, move_ends
+from kin.solvers.rounded.motion import FRAME, JOINT, MOST, OFF, SETTING, SPAN, WANTED, set_frame
+from kin.solvers.rounded.rows import choose_rows, move_rows
+from kin.solvers.rounded.tracing import PIECES, trace
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+_WIDER, _MOST = 50.0, 0.1  # times the rounding, rad at most: how far limits are moved, to see what changes
+_REACH = 10.0  # times the rounding: the same for lengths
+_MOVED, _MOVED_BY = 0.1, 100.0  # rad, or times the rounding: a row that moves farther has left the posture
+_ENDS, _MIDDLE = np.array([0.0, 1.0]), np.array([0.5])  # shares of an interval
+_SHARES = np.array([0.5, 0.02, 0.98])  # where curves are begun
+_ALIKE = 1e-7  # rad: intervals with ends this close are one
+_FREE = (math.nan,)
+
+
+class Rounded7(Rounded):
+    """The closed form of the arm with seven joints that was meant, and every number on the typed table."""
+
+    def __init__(self, robot: Robot, form: ClosedForm, off: float) -> None:
+        parameter = form.redundancies(POSE)[0]
+        plain = form.form if isinstance(form, ReversedJoints) else form
+        self._joint, self._params = parameter.joint, plain.kernels.params
+        self._setting = np.zeros(SETTING)
+        self._setting[[JOINT, OFF, MOST]] = self._joint, off, max(_MOVED, _MOVED_BY * off)
+        if self._joint < 0:
+            self._setting[FRAME : FRAME + 7] = form.signs if isinstance(form, ReversedJoints) else 1.0
+            self._setting[FRAME + 7 : FRAME + 16] = self._params[OFFSET : UPPER_ARM + 2]
+        super().__init__(robot, form, off)
+        self._roll = rolled.roll_sense(robot)
+        if form.handles(APPROACH) and form.redundancies(APPROACH) != rolled.parameters(parameter):
+            self._roll = 0.0
+        reach = _REACH * off * size(robot)
+        # The widest one has postures at the very ends of intervals of the wider one, too.
+        self._wider, self._narrower, widest = (form.relaxed(by * reach) for by in (1.0, -1.0, 1.5))
+        self._start = widest.kernels
+        self._move = min(_WIDER * off, _MOST)
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """All branches, each at the feasible value of the redundancy parameter nearest to the wanted one."""
+        if problem.task != POSE:
+            return rolled.solve_approach(self, problem, self._roll) if self._roll else super().solve(problem)
+        p, j = self._in_one_turn(problem), self._joint
+        requested = not math.isnan(p.values[0])
+        limits, setting = self._widened(p), self._set(p)
+        arcs, places, rows = np.empty((0, 3)), np.empty((0, 3, 7)), np.full((8, 8), math.nan)
+        sure, single = True, j >= 0 and bool(p.lower[j] == p.upper[j])
+        if single:
+            arcs, places = self._single(p, setting)
+        elif p.respect_limits or (j >= 0 and not requested):
+            arcs, places, rows, known, sure = self._intervals(p, setting, limits)
+        if requested or single or not len(arcs) or not p.respect_limits:
+            rows, known = self._rows(p)
+        if requested:
+            moved = np.ascontiguousarray(rows[:, :7])
+            self._move_rows(p, setting, moved)
+            rows[:, :7], rows[:, 7] = moved, np.where(np.isnan(moved[:, 0]), math.nan, p.values[0])
+            missed = np.isnan(rows[:, 0])
+        else:
+            bits = _choose()(self.robot.model, p.T, setting, limits, arcs, places, rows)
+            missed = (bits >> np.arange(8)) & 1 > 0
+        sure &= not (missed & known).any()
+        gap, obstacle = 0.0, None
+        if np.isnan(rows[:, 0]).all():
+            none = self.form.solve(p)
+            gap, obstacle = none.gap, none.obstacle
+        if j >= 0:
+            arcs = at_every_turn(arcs, float(problem.lower[j]), float(problem.upper[j]))
+        return Candidates(rows[:, :7], rows[:, 7:], (arcs,), gap, obstacle, "agreed" if sure else "unknown")
+
+    def prepare(self, q: Array) -> None:
+        """Load or compile every kernel, at a configuration ``(7,)`` inside the limits."""
+        p = SolverInput(fk(self.robot, q), POSE, _FREE, True, q, self.robot.lower.copy(), self.robot.upper.copy())
+        self.solve(p)
+        self.solve(replace(p, values=(float(q[self._joint]) if self._joint >= 0 else 0.0,)))
+        pieces, postures = np.empty((PIECES, 2)), np.empty((PIECES, 3, 7))
+        trace(self.robot.model, p.T, self._set(p), self._widened(p), self._move, q.copy(), pieces, postures)
+
+    def _in_one_turn(self, problem: SolverInput) -> SolverInput:
+        """The same with contiguous arrays, and the limits of the parameter's joint at most one turn apart."""
+        j, p = self._joint, problem
+        lower, upper = p.lower, p.upper
+        if j >= 0 and upper[j] - lower[j] > TURN:
+            lower, upper = lower.copy(), upper.copy()
+            lower[j], upper[j] = turn_around(float(lower[j]), float(upper[j]), float(p.seed[j]))
+        T = np.array(p.T)  # writable: kernels are compiled for such arrays
+        return SolverInput(T, POSE, p.values, p.respect_limits, p.seed, lower, upper, p.seed_roll)
+
+    def _set(self, p: SolverInput) -> Array:
+        """The setting of a problem."""
+        out, j = self._setting.copy(), self._joint
+        if j < 0:
+            set_frame(self._params, p.T, out[FRAME:])
+            out[WANTED] = math.nan
+        else:
+            low, high = float(p.lower[j]), float(p.upper[j])
+            out[SPAN], out[SPAN + 1], out[WANTED] = low, high, min(max(float(p.seed[j]), low), high)
+        return out
+
+    def _widened(self, p: SolverInput) -> Array:
+        """``(6, 7)`` lower and upper limits: as they are, a little wider, a little narrower."""
+        out = np.empty((6, 7))
+        move = np.minimum(self._move, 0.25 * (p.upper - p.lower))
+        if self._joint >= 0:
+            move[self._joint] = 0.0
+        out[0], out[1], out[2], out[3] = p.lower, p.upper, p.lower - move, p.upper + move
+        out[4], out[5] = p.lower + move, p.upper - move
+        return out
+
+    def _rows(self, p: SolverInput) -> tuple[Array, Flags]:
+        """Rows ``(8, 8)`` of the arm that was meant, with their values, and which exist for certain."""
+        found = self.form.solve(p)
+        rows = np.column_stack([found.q, found.values])
+        missing = np.isnan(rows[:, 0])
+        value = p.values[0]
+        if missing.any() and self._wider is not self.form and not math.isnan(value):
+            more = np.empty(found.q.shape)
+            self._start.one(self._start.params, p.T, value, p.seed, more)
+            rows[missing, :7], rows[missing, 7] = more[missing], value
+        return rows, ~missing
+
+    def _intervals(self, p: SolverInput, setting: Array, limits: Array) -> tuple[Array, Array, Array, Flags, bool]:
+        """The intervals of the typed table, and what choosing rows needs.
+
+        Returns intervals ``(m, 3)``, their postures ``(m, 3, 7)``, rows ``(8, 8)`` of the arm that was meant,
+        which of these exist for certain, and whether the intervals are certain.
+        """
+        wide, narrow = (
+            form.solve(SolverInput(p.T, POSE, _FREE, p.respect_limits, p.seed, limits[k], limits[k + 1]))
+            for form, k in ((self._wider, 2), (self._narrower, 4))
+        )
+        outer, inner = self._joined(wide.arcs[0]), self._joined(narrow.arcs[0])
+        arcs, sure, places = np.empty(outer.shape), np.empty(8), np.empty((len(outer), 3, 7))
+        places[:, :2] = self._postures(p, outer, _ENDS)
+        _ends()(self.robot.model, p.T, setting, limits, outer, inner, places, arcs, sure)
+        certain = True
+        if not sure.all():
+            arcs, places, certain = self._traced(p, setting, limits, outer, inner, (arcs, places, sure))
+        inside = np.isnan(places[:, 2, 0])
+        if inside.any():
+            places[inside, 2] = self._postures(p, arcs[inside], _MIDDLE)[:, 0]
+        rows = np.empty((8, 8))
+        rows[:, :7], rows[:, 7:] = wide.q, wide.values
+        return arcs, places, rows, ~np.isnan(narrow.q[:, 0]), certain
+
+    def _joined(self, arcs: Array) -> Array:
+        """The same intervals, those of an angle joined where they touch."""
+        out = np.empty(arcs.shape)  # not an array that compiled code has made: `direct` takes none of these
+        if self._joint >= 0:
+            out[:] = arcs
+            return out
+        return out[: joined(np.ascontiguousarray(arcs), out)]
+
+    def _postures(self, p: SolverInput, arcs: Array, shares: Array) -> Array:
+        """Postures ``(m, k, 7)`` of the arm that was meant at shares ``(k,)`` of intervals ``(m, 3)``."""
+        m, k = len(arcs), len(shares)
+        if not m:
+            return np.empty((0, k, 7))
+        values = (arcs[:, 1:2] + shares * (arcs[:, 2:] - arcs[:, 1:2])).ravel()
+        T = np.empty((m * k, 4, 4))
+        T[:] = p.T
+        out = np.empty((m * k, 8, 7))
+        self._start.many(self._start.params, T, values, p.seed, out)
+        branch = np.repeat(arcs[:, 0].astype(int), k)
+        return np.asarray(out[np.arange(m * k), branch].reshape(m, k, 7))
+
+    def _move_rows(self, p: SolverInput, setting: Array, rows: Array) -> None:
+        """Move rows ``(8, 7)`` onto the target at the requested value, in place."""
+        move_rows(self.robot.model, self._params, p.T[None], setting, np.array(p.values[:1]), rows[None])
+
+    def _single(self, p: SolverInput, setting: Array) -> tuple[Array, Array]:
+        """The intervals of a joint that has one value only, and their postures."""
+        value = float(p.lower[self._joint])
+        p = replace(p, values=(value,))
+        q = np.ascontiguousarray(self._rows(p)[0][:, :7])
+        self._move_rows(p, setting, q)
+        half, middle = 0.5 * (p.upper - p.lower), 0.5 * (p.upper + p.lower)
+        off = np.abs(math.pi - (math.pi - (q - middle)) % TURN)
+        inside = np.flatnonzero(((off <= half + TOLERANCES.limit) | (half >= math.pi)).all(axis=1))
+        arcs = np.column_stack([inside, np.full((len(inside), 2), value)]).astype(np.float64)
+        return arcs, np.repeat(q[inside][:, None], 3, axis=1)
+
+    def _traced(
+        self,
+        p: SolverInput,
+        setting: Array,
+        limits: Array,
+        outer: Array,
+        inner: Array,
+        moved: tuple[Array, Array, Array],
+    ) -> tuple[Array, Array, bool]:
+        """Intervals and postures as in `moved`, but by following the curves where it is in doubt; whether certain.
+
+        A curve begins inside each interval that such a branch has with wider or with narrower limits, and at the
+        ends of the wider ones.
+        """
+        sure = moved[2][moved[0][:, 0].astype(int)] > 0.0
+        arcs, places, certain = [(a, b, c) for a, b, c in moved[0][sure].tolist()], list(moved[1][sure]), True
+        pieces, postures = np.empty((PIECES, 2)), np.empty((PIECES, 3, 7))
+        for intervals, shares in ((inner, _MIDDLE), (outer, _SHARES)):
+            doubtful = intervals[moved[2][intervals[:, 0].astype(int)] == 0.0]
+            starts = self._postures(p, doubtful, shares)
+            for (branch, low, high), row in zip(doubtful.tolist(), starts, strict=True):
+                for share, start in zip(shares.tolist(), row, strict=True):
+                    if math.isnan(start[0]) or _is_known(arcs, branch, low + share * (high - low)):
+                        continue
+                    count = trace(
+                        self.robot.model, p.T, setting, limits, 3.0 * self._move, start.copy(), pieces, postures
+                    )
+                    certain &= count >= 0
+                    for k in range(count):
+                        ends = self._in_span(p, *pieces[k].tolist())
+                        whose = float(self.branch_of(postures[k, 2]))
+                        if not any(whose == b and _are_alike(ends, (x, y)) for b, x, y in arcs):
+                            arcs.append((whose, *ends))
+                            places.append(postures[k].copy())
+        return np.array(arcs).reshape(-1, 3), np.array(places).reshape(-1, 3, 7), certain
+
+    def _in_span(self, p: SolverInput, low: float, high: float) -> tuple[float, float]:
+        """An interval at the whole turn at which the range of the parameter has it."""
+        first = float(p.lower[self._joint]) if self._joint >= 0 else -math.pi
+        shift = TURN * math.floor((0.5 * (low + high) - first) / TURN)
+        return low - shift, high - shift
+
+    def _kernels(self, form: BatchKernels) -> BatchKernels:
+        """The batch kernels: those of the family, and each row moved onto the target on the typed table."""
+        model, params, setting = self.robot.model, self._params, self._setting
+
+        def many(_: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+            form.many(form.params, T, values, near, out)
+            move_rows(model, params, T, setting, values, out)
+
+        def one(_: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+            if not form.one(form.params, T, value, near, out):
+                return False
+            move_rows(model, params, T[None], setting, np.array([value]), out[None])
+            return True
+
+        return WrappedKernels(form.params, one, many, self._kernels, form)
+
+
+def _is_known(arcs: list[tuple[float, float, float]], branch: float, value: float) -> bool:
+    """Whether a value is in one of the intervals (branch, low, high), at some whole turn."""
+    return any(whose == branch and (value - low) % TURN <= high - low for whose, low, high in arcs)
+
+
+def _are_alike(a: tuple[float, float], b: tuple[float, float]) -> bool:
+    """Whether two intervals of an angle have the same ends."""
+    return abs(math.remainder(a[0] - b[0], TURN)) < _ALIKE and abs(a[1] - a[0] - b[1] + b[0]) < _ALIKE
+
+
+@cache
+def _ends() -> Callable[[Array, Array, Array, Array, Array, Array, Array, Array, Array], None]:
+    """`move_ends` without type dispatch."""
+    return direct(move_ends, MODEL, (4, 4), 1, 2, 2, 2, 3, 2, 1)
+
+
+@cache
+def _choose() -> Callable[[Array, Array, Array, Array, Array, Array, Array], int]:
+    """`choose_rows` without type dispatch."""
+    return direct(choose_rows, MODEL, (4, 4), 1, 2, 2, 3, 2)

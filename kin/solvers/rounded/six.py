@@ -1,0 +1,185 @@
+"""Six joints on a rounded table: which postures of the exact arm carry over, and what is looked for besides.
+
+The pose of the typed arm differs from that of the exact one by no more than η, about the rounding. Where the
+smallest singular value σ of the Jacobian is well above √η, a theorem of Newton and Kantorovich gives each posture
+of either arm exactly one of the other arm, within 2 η/σ. Such postures are *regular*. Eight regular postures are
+all that the family can have, at this target and at those within η: then none is missing, which is proved.
+
+Elsewhere the two arms may differ. Where the exact arm has fewer postures than its family, targets a little off
+show whether more are near. Close to folds, postures are looked for along the directions in which the arm barely
+moves, from two sets of starts. Where both find the same, the answer is agreed, not proved.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kin.axes import size
+from kin.fk import fk, jacobian
+from kin.robot import Robot
+from kin.solvers.common import TURN, UNBOUNDED
+from kin.solvers.contract import POSE, ClosedForm, Completeness
+from kin.solvers.curves import curves_among
+from kin.solvers.numeric import each_of
+from kin.transforms import Array
+
+Flags = NDArray[np.bool_]
+_MASK = np.array([1.0] * 6 + [0.0])
+_JOINTS = np.arange(6)
+_REGULAR = 2.5  # times the root of the rounding: singular values of regular postures
+_MOVED = 20.0  # times the rounding, over the singular value: how far a regular posture moves at most
+_MET, _SAME = 1e-10, 1e-6
+_NEAR = 1e-4  # of the arm's size: a descent that stalled with less error may be between two postures
+_NEWTON = 8
+_CLOSE = 0.02  # rad: how far Newton's steps may lead
+_STEP = 1e-3  # rad, of second differences
+_DOUBLE = 1e-5  # smallest singular value of a posture whose twin may be the same in floating point
+_SHARES = np.array([0.003, -0.01, 0.03, -0.1, 0.3, -1.0, 3.0])  # rad along a weak direction
+
+
+class SixJoints:
+    """The search for the postures of one rounded arm with six joints, in the rows of its family."""
+
+    def __init__(self, robot: Robot, form: ClosedForm, off: float) -> None:
+        self.robot, self.form, self.off, self.size = robot, form, off, size(robot)
+
+    def completed(self, T: Array, exact: Array, starts: Array, q: Array) -> tuple[Array, Completeness]:
+        """The postures ``(k, 6)`` of a pose, and how it is known that these are all.
+
+        Args:
+            exact: ``(k, 6)`` those of the exact arm, NaN where there is none.
+            starts: the same, the missing ones from targets close by.
+            q: the starts moved onto the target; NaN, or as they were, where that failed.
+        """
+        given = ~np.isnan(starts[:, 0])
+        there = given & ~np.isnan(q[:, 0])
+        there[there] = np.abs(fk(self.robot, q[there]) - T).max(axis=(1, 2), initial=0.0) < _MET
+        sigma = self._weak(q[there])[0][:, 0]
+        moved = _apart(q[there], starts[there])
+        regular = there.copy()
+        regular[there] = (sigma > _REGULAR * math.sqrt(self.off)) & (moved * sigma < _MOVED * self.off)
+        as_exact = np.array_equal(given, ~np.isnan(exact[:, 0]))
+        if not as_exact or not np.array_equal(regular, given):
+            return self._searched(T, starts, q, there, given if not as_exact else given & ~regular)
+        if len(_unique(q[there])) < there.sum():
+            return q, "unknown"
+        return q, "proved" if given.all() else "agreed"
+
+    def _searched(
+        self, T: Array, starts: Array, q: Array, there: Flags, doubtful: Flags
+    ) -> tuple[Array, Completeness]:
+        """`completed` by a search around the postures that are not regular: the flags are ``(k,)``."""
+        known = np.ascontiguousarray(q[there])
+        rows = starts[doubtful]
+        sigma, vectors = self._weak(rows)
+        flat = sigma[:, 1] < math.sqrt(self.off)
+        sets, stalled = [], False
+        for shares in (_SHARES, -_SHARES):
+            tried = rows[:, None] + shares[:, None] * vectors[:, None, 5]
+            grid = np.stack(np.meshgrid(shares, shares), axis=-1).reshape(-1, 2)
+            wide = rows[flat][:, None] + np.einsum("gc,kcn->kgn", grid, vectors[flat][:, 4:])
+            ends, stopped = self._descended(T, np.concatenate([tried.reshape(-1, 6), wide.reshape(-1, 6)]))
+            stalled |= stopped
+            sets.append(self._without_curves(T, np.concatenate([known, ends]))[0])
+        found, curves = self._without_curves(T, np.concatenate([known, *sets]))
+        agreed = len(found) == len(sets[0]) == len(sets[1]) <= len(q) and not flat.any()
+        # As many as the family has at most: what stalled is none.
+        agreed &= not stalled or len(found) + curves == len(q)
+        apart = bool((self._weak(found)[0][:, 0] > _DOUBLE).all())
+        even = curves > 0 or (len(found) % 2 == 0 and apart)
+        return self._in_rows(q, there, found), "agreed" if agreed and even and len(found) else "unknown"
+
+    def _weak(self, q: Array) -> tuple[Array, Array]:
+        """The two smallest singular values ``(k, 2)``, lengths in arm sizes, and right singular vectors."""
+        _, sigma, vectors = np.linalg.svd(self._jacobian(q))
+        return np.asarray(sigma[:, :3:-1]), np.asarray(vectors)
+
+    def _descended(self, T: Array, starts: Array) -> tuple[Array, bool]:
+        """Where descents from `starts` ``(k, 6)`` meet the target, and whether some stalled just beside it.
+
+        A descent creeps in the valley between two postures that have almost merged. Newton's steps leave it.
+        """
+        rows, errors, wide = starts.copy(), np.empty(len(starts)), np.full(6, UNBOUNDED)
+        goal = (np.ascontiguousarray(T), POSE, _MASK, 1.0)
+        each_of(self.robot.model, goal, (-wide, wide, np.zeros(6)), -1.0, len(rows) + 1, rows, errors)
+        beside = _unique(rows[(errors >= _MET) & (errors < _NEAR * self.size)])
+        ends, met = self._newton(T, beside)
+        others, reached = self._newton(T, self._across(T, beside[~met]).reshape(-1, 6))
+        doubt = not reached.reshape(-1, 2).all()
+        # Near a fold the error of a posture is far larger than that of its pose: only exact ones can be compared.
+        exact, _ = self._newton(T, _unique(rows[errors < _MET]))
+        return np.concatenate([exact, ends[met], others[reached]]), doubt
+
+    def _errors(self, T: Array, q: Array) -> Array:
+        """Twists ``(k, 6)`` that would bring the tool from where it is onto the target, lengths in arm sizes."""
+        at = fk(self.robot, q)
+        turn = 0.5 * np.cross(at[:, :3, :3], T[:3, :3], axis=1).sum(axis=2)
+        return np.concatenate([(T[:3, 3] - at[:, :3, 3]) / self.size, turn], axis=1)
+
+    def _newton(self, T: Array, q: Array) -> tuple[Array, Flags]:
+        """Newton's method without damping from rows ``(k, 6)``, and which it brings onto the target close by.
+
+        The others stay: a step from between two postures may lead to any other one.
+        """
+        out = q
+        for _ in range(_NEWTON if len(q) else 0):
+            inverse = np.linalg.pinv(self._jacobian(out), rcond=1e-14)
+            out = out + np.clip(np.einsum("kij,kj->ki", inverse, self._errors(T, out)), -1.0, 1.0)
+        met = (np.abs(self._errors(T, out)).max(axis=1, initial=0.0) < 0.1 * _MET) & (_apart(out, q) < _CLOSE)
+        return np.where(met[:, None], out, q), met
+
+    def _across(self, T: Array, q: Array) -> Array:
+        """Near the two postures ``(k, 2, 6)`` on either side of configurations between them, if there are two.
+
+        Along the weak direction v the error that no motion corrects is a quadratic: its value and its curvature.
+        """
+        if not len(q):
+            return np.empty((0, 2, 6))
+        U, _, V = np.linalg.svd(self._jacobian(q))
+        weak, lost, step = V[:, 5], U[:, :, 5], _STEP * V[:, 5]
+        here = self._errors(T, q)
+        bent = (self._errors(T, q + step) + self._errors(T, q - step) - 2.0 * here) / _STEP**2
+        value, curvature = ((lost * each).sum(axis=1) for each in (here, bent))
+        square = -2.0 * value / np.where(curvature == 0.0, 1e-300, curvature)
+        along = np.sqrt(np.clip(square, 0.0, 1.0))[:, None] * weak
+        return np.stack([q + along, q - along], axis=1)
+
+    def _jacobian(self, q: Array) -> Array:
+        """Jacobians ``(k, 6, 6)``, lengths in arm sizes."""
+        J = jacobian(self.robot, q)
+        J[:, :3] /= self.size
+        return J
+
+    def _without_curves(self, T: Array, rows: Array) -> tuple[Array, int]:
+        """The configurations ``(k, 6)``, each once and of those on one curve the first, and how many curves."""
+        rows = _unique(rows)
+        curves, kept = curves_among(self.robot, T, POSE, _JOINTS, rows, list(range(len(rows))))
+        return rows[kept], len(curves)
+
+    def _in_rows(self, q: Array, there: Flags, found: Array) -> Array:
+        """The rows ``(k, 6)`` with what was found besides in the rows of its branch, or in any that are free."""
+        out, free = q.copy(), ~there
+        for row in found:
+            if (_apart(q[there], row) < _SAME).any() or not free.any():
+                continue
+            own = self.form.branch_of(row)
+            place = own if free[own] else int(np.flatnonzero(free)[0])
+            out[place], free[place] = row, False
+        return out
+
+
+def _apart(a: Array, b: Array) -> Array:
+    """The largest joint difference ``(k,)``, whole turns aside."""
+    return np.asarray(np.abs((a - b + math.pi) % TURN - math.pi).max(axis=1, initial=0.0))
+
+
+def _unique(rows: Array) -> Array:
+    """The configurations ``(k, 6)``, each once."""
+    kept: list[int] = []
+    for i, row in enumerate(rows):
+        if (_apart(rows[kept], row) > _SAME).all():
+            kept.append(i)
+    return np.ascontiguousarray(rows[kept])

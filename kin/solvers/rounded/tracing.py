@@ -1,0 +1,305 @@
+"""The self-motion of a typed table followed step by step: its feasible intervals, whatever their structure.
+
+Used where the intervals of the arm that was meant may have another structure than those of the typed table. From a
+posture the curve is followed both ways, until a joint is outside its limits by more than a margin or the curve is
+closed: tangent steps, shortened where the curve bends, each followed by Newton's method. Between two points of the
+curve every joint is a cubic in the length. Its roots are where the joint meets a limit, and those of the
+derivative of the given joint are folds; Newton's method makes each such *event* exact. Between neighbouring events
+nothing changes, so one posture decides whether a piece is feasible.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.kernels.compile import jit
+from kin.solvers.common import wrap
+from kin.solvers.rounded.ends import is_inside, slack_of
+from kin.solvers.rounded.motion import FOLD, LAND, Point, Task, arrive, dial_of, new_point, task_of
+from kin.transforms import Array
+
+PIECES = 128
+_EVENTS = 32  # in one step at most
+_STEP, _FIRST, _LEAST = 0.15, 0.05, 1e-6  # rad of all joints together
+_STRAIGHT, _TURN = 0.995, 0.95  # cosines between tangents: of a step that may grow, and of one that is too long
+_POINTS = 6000
+_EMPTY = 1e-12  # rad: what is between two events as close as that is no piece
+FAILED, OPEN, CLOSED = range(3)
+Curve = tuple[Array, Array, Array, Array]  # two points (7,) and the tangents there
+
+
+@jit
+def _least_slack(limits: tuple[Array, Array], y: Array) -> float:
+    least = math.inf
+    for c in range(7):
+        least = min(least, slack_of(limits[0], limits[1], y, c))
+    return least
+
+
+@jit
+def _advance(task: Task, curve: Curve, h: float, sense: float, p: Point) -> float:
+    """Fill the second point of the curve, a step ahead of the first; returns the length to try next, 0 if none."""
+    y0, n0, y1, n1 = curve
+    while h > _LEAST:
+        for i in range(7):
+            y1[i] = y0[i] + h * n0[i]
+        if arrive(task, LAND, 0.0, y1, p):
+            dot, off = 0.0, 0.0
+            for i in range(7):
+                n1[i] = sense * p.n[i]
+                dot += n0[i] * n1[i]
+                off = max(off, abs(y1[i] - y0[i] - h * n0[i]))
+            if dot > _TURN and off < 0.3 * h:
+                return min(1.5 * h, _STEP) if dot > _STRAIGHT else h
+        h *= 0.5
+    return 0.0
+
+
+@jit
+def _length(curve: Curve) -> float:
+    total = 0.0
+    for i in range(7):
+        total += (curve[2][i] - curve[0][i]) ** 2
+    return math.sqrt(total)
+
+
+@jit
+def _cubic(curve: Curve, c: int) -> tuple[float, float, float]:
+    """(a, b, d) of joint c as ``y0 + a s + b s² + d s³`` between the points s = 0 and 1."""
+    y0, n0, y1, n1 = curve
+    length = _length(curve)
+    rise, a, z = y1[c] - y0[c], n0[c] * length, n1[c] * length
+    return a, 3.0 * rise - 2.0 * a - z, a + z - 2.0 * rise
+
+
+@jit
+def _at(curve: Curve, s: float, y: Array) -> None:
+    """y ``(7,)`` ← the point of the cubics at s."""
+    for c in range(7):
+        a, b, d = _cubic(curve, c)
+        y[c] = curve[0][c] + s * (a + s * (b + s * d))
+
+
+@jit
+def _turning(a: float, b: float, d: float, stops: Array) -> int:
+    """stops ← 0, the zeros in (0, 1) of ``a + 2 b s + 3 d s²`` in their order, and 1; returns how many."""
+    stops[0] = 0.0
+    n = 1
+    if abs(d) < 1e-14 * (abs(a) + abs(b)):
+        if b != 0.0 and 0.0 < -0.5 * a / b < 1.0:
+            stops[n] = -0.5 * a / b
+            n += 1
+    else:
+        inside = b * b - 3.0 * a * d
+        if inside > 0.0:
+            far = -(b + math.copysign(math.sqrt(inside), b))
+            x, y = far / (3.0 * d), (a / far if far != 0.0 else math.nan)
+            for s in (min(x, y), max(x, y)):
+                if 0.0 < s < 1.0:
+                    stops[n] = s
+                    n += 1
+    stops[n] = 1.0
+    return n + 1
+
+
+@jit
+def _add_event(s: float, what: int, value: float, events: Array, count: int) -> int:
+    """Insert an event into those sorted by s, rows (s, what, value)."""
+    if count == events.shape[0]:
+        return count
+    i = count
+    while i > 0 and events[i - 1, 0] > s:
+        for k in range(3):
+            events[i, k] = events[i - 1, k]
+        i -= 1
+    events[i, 0], events[i, 1], events[i, 2] = s, what, value
+    return count + 1
+
+
+@jit
+def _crossings(curve: Curve, c: int, value: float, stops: Array, n: int, events: Array, count: int) -> int:
+    """Add where joint c passes a value, between the n stops at which its cubic turns."""
+    a, b, d = _cubic(curve, c)
+    start = curve[0][c] - value
+    for i in range(n - 1):
+        low, high = stops[i], stops[i + 1]
+        f, g = start + low * (a + low * (b + low * d)), start + high * (a + high * (b + high * d))
+        if (f >= 0.0) == (g >= 0.0):
+            continue
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            if (start + middle * (a + middle * (b + middle * d)) >= 0.0) == (f >= 0.0):
+                low = middle
+            else:
+                high = middle
+        count = _add_event(0.5 * (low + high), c, value, events, count)
+    return count
+
+
+@jit
+def _events_between(task: Task, limits: tuple[Array, Array], curve: Curve, events: Array) -> int:
+    """events ``(n, 3)`` ← rows (s, what, value) between the points of the curve, in their order; their number."""
+    lower, upper = limits
+    stops = np.empty(4)
+    count = 0
+    for c in range(7):
+        a, b, d = _cubic(curve, c)
+        n = _turning(a, b, d, stops)
+        if c == task.joint:
+            for i in range(1, n - 1):
+                count = _add_event(stops[i], FOLD, 0.0, events, count)
+        half, middle = 0.5 * (upper[c] - lower[c]), 0.5 * (upper[c] + lower[c])
+        if half < math.pi:
+            centre = curve[0][c] - wrap(curve[0][c] - middle)
+            count = _crossings(curve, c, centre - half, stops, n, events, count)
+            count = _crossings(curve, c, centre + half, stops, n, events, count)
+    return count
+
+
+@jit
+def _closes(curve: Curve, start: Array, tangent: Array) -> bool:
+    """Whether the curve passes its start between the two points."""
+    length = _length(curve)
+    along = squared = dot = 0.0
+    for i in range(7):
+        d = wrap(start[i] - curve[0][i])
+        along += d * curve[1][i]
+        squared += d * d
+        dot += tangent[i] * curve[1][i]
+    beside = math.sqrt(max(squared - along * along, 0.0))
+    return dot > 0.8 and 0.0 <= along < length and beside < 0.2 * length
+
+
+@jit
+def _copy(source: Array, out: Array) -> None:
+    for i in range(7):
+        out[i] = source[i]
+
+
+@jit
+def _far_end(task: Task, limits: tuple[Array, Array], margin: float, curve: Curve, sense: float) -> int:
+    """Follow the curve from its first point, which becomes the last one; returns why it ended."""
+    p = new_point()
+    start, tangent = curve[0].copy(), curve[1].copy()
+    h = _FIRST
+    for count in range(_POINTS):
+        h = _advance(task, curve, h, sense, p)
+        if h == 0.0:
+            return FAILED
+        if count > 2 and _closes(curve, start, tangent):
+            return CLOSED
+        _copy(curve[2], curve[0])
+        _copy(curve[3], curve[1])
+        if _least_slack(limits, curve[0]) < -margin:
+            return OPEN
+    return FAILED
+
+
+@jit
+def trace(
+    model: Array, T: Array, setting: Array, box: Array, margin: float, start: Array, arcs: Array, places: Array
+) -> int:
+    """The feasible intervals of the redundancy parameter on the curve through a posture; their number, −1 if lost.
+
+    arcs ``(PIECES, 2)`` ← their ends; places ``(PIECES, 3, 7)`` ← postures at the low end, the high end, inside.
+    An interval that is whole turns of the parameter has the same posture in all three.
+
+    Args:
+        model, T, setting: as for `task_of`.
+        box: ``(≥ 2, 7)`` lower and upper limits.
+        margin: radians by which a joint may be outside its limits on the way.
+        start: ``(7,)`` a posture close to the curve.
+    """
+    task, limits = task_of(model, T, setting), (box[0], box[1])
+    y, p = start.copy(), new_point()
+    if not arrive(task, LAND, 0.0, y, p):
+        return -1
+    curve = (y, np.empty(7), np.empty(7), np.empty(7))
+    for i in range(7):
+        curve[1][i] = -p.n[i]
+    if _least_slack(limits, y) < -margin:
+        return 0
+    kind = _far_end(task, limits, margin, curve, -1.0)
+    if kind == FAILED:
+        return -1
+    for i in range(7):
+        curve[1][i] = -curve[1][i]
+    return _record(task, limits, margin, curve, kind == CLOSED, arcs, places)
+
+
+@jit
+def _record(
+    task: Task, limits: tuple[Array, Array], margin: float, curve: Curve, closed: bool, arcs: Array, places: Array
+) -> int:
+    """Follow the curve from its first point and write down its feasible pieces, see `trace`."""
+    p, events, at, best = new_point(), np.empty((_EVENTS, 3)), np.empty(7), curve[0].copy()
+    start, tangent, piece = curve[0].copy(), curve[1].copy(), curve[0].copy()
+    value = dial_of(task, start)
+    first, score, there = value, _least_slack(limits, start), math.inf
+    begun, around, found = not closed, False, 0
+    entered = closed  # the curve begins outside the margin if it is not closed
+    h = _FIRST
+    for count in range(_POINTS):
+        h = _advance(task, curve, h, 1.0, p)
+        if h == 0.0:
+            return -1
+        n = _events_between(task, limits, curve, events)
+        done = 0.0
+        for i in range(n):
+            _at(curve, 0.5 * (done + events[i, 0]), at)
+            done = events[i, 0]
+            slack = _least_slack(limits, at)
+            if slack > score:
+                score = slack
+                _copy(at, best)
+            _at(curve, done, at)
+            if not arrive(task, int(events[i, 1]), events[i, 2], at, p):
+                return -1
+            there = value + wrap(dial_of(task, at) - value)
+            if begun and abs(there - first) > _EMPTY and is_inside(limits[0], limits[1], best, -1):
+                found = _put(task, (first, there), (piece, at, best), arcs, places, found)
+                if found < 0:
+                    return -1
+            if around:
+                return found
+            begun, value, first, score = True, there, there, -math.inf
+            _copy(at, piece)
+        there = dial_of(task, curve[2])
+        value += wrap(there - value)
+        slack = _least_slack(limits, curve[2])
+        if slack > score:
+            score = slack
+            _copy(curve[2], best)
+        if closed and count > 2 and not around and _closes(curve, start, tangent):
+            if not begun:
+                if is_inside(limits[0], limits[1], best, -1):
+                    return _put(task, (value - 2.0 * math.pi, value), (best, best, best), arcs, places, found)
+                return found
+            around = True
+        entered = entered or n > 0 or slack >= -margin
+        if not closed and entered and slack < -margin:
+            return found
+        _copy(curve[2], curve[0])
+        _copy(curve[3], curve[1])
+    return -1
+
+
+@jit
+def _put(
+    task: Task, ends: tuple[float, float], postures: tuple[Array, Array, Array], arcs: Array, places: Array,
+    found: int,
+) -> int:  # fmt: skip
+    """Append a piece, the inner posture moved onto the curve; returns their number, −1 if they do not fit."""
+    if found == arcs.shape[0]:
+        return -1
+    inner, p = postures[2].copy(), new_point()
+    if not arrive(task, LAND, 0.0, inner, p):
+        return -1
+    back = 0 if ends[0] <= ends[1] else 1
+    arcs[found, back], arcs[found, 1 - back] = ends
+    _copy(postures[0], places[found, back])
+    _copy(postures[1], places[found, 1 - back])
+    _copy(inner, places[found, 2])
+    return found + 1

@@ -1,0 +1,214 @@
+"""Typed tables with seven joints, judged by a dense search of their own postures (`dense7`)."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arms import GEN3, XARM7
+from dense7 import Chain, postures, width
+
+import kin
+from kin import Status
+from kin.solvers import closed_form_of
+from kin.solvers.rounded import Rounded
+
+PI = math.pi
+PANDA = kin.get_robot("panda")
+EXAMPLE = np.array((-2.72143, -1.32953, 2.70694, -1.0972, -0.41593, 1.957, 2.16028))
+
+
+def typed(robot, quarter):
+    """The table with right angles typed as `quarter`, and 180° as twice that."""
+
+    def rounded(angle):
+        turns = round(angle / (PI / 2))
+        return turns * quarter if abs(angle - turns * PI / 2) < 1e-9 else angle
+
+    rows = tuple(replace(row, alpha=rounded(row.alpha), theta=rounded(row.theta)) for row in robot.rows)
+    return replace(robot, id=f"{robot.id} {quarter}", rows=rows)
+
+
+def urdf(name, quarter, origins, limits):
+    """An arm from a URDF with these origins (xyz, roll) and limits; right angles are typed as `quarter`."""
+    joints = "".join(
+        f'<link name="l{i + 1}"/><joint name="j{i + 1}" type="revolute">'
+        f'<origin xyz="{xyz}" rpy="{roll * quarter} 0 0"/><axis xyz="0 0 1"/>'
+        f'<parent link="l{i}"/><child link="l{i + 1}"/>'
+        f'<limit lower="{low}" upper="{high}" effort="1" velocity="1"/></joint>'
+        for i, ((xyz, roll), (low, high)) in enumerate(zip(origins, limits, strict=True))
+    )
+    robot = kin.load_urdf(f'<robot name="{name}"><link name="l0"/>{joints}</robot>')
+    return replace(robot, id=f"{name} {quarter}")
+
+
+_XARM = (
+    [("0 0 0.267", 0), ("0 0 0", -1), ("0 -0.293 0", 1), ("0.0525 0 0", 1), ("0.0775 -0.3425 0", 1), ("0 0 0", 1),
+     ("0.076 0.097 0", -1)],
+    [(-6.2832, 6.2832), (-2.059, 2.0944), (-6.2832, 6.2832), (-0.19198, 3.927), (-6.2832, 6.2832),
+     (-1.69297, 3.1416), (-6.2832, 6.2832)],
+)  # fmt: skip
+_RM75 = (
+    [("0 0 0.2405", 0), ("0 0 0", -1), ("0 -0.256 0", 1), ("0 0 0", -1), ("0 -0.21 0", 1), ("0 0 0", -1),
+     ("0 -0.144 0", 1)],
+    [(-3.106, 3.106), (-2.269, 2.269), (-3.106, 3.106), (-2.356, 2.356), (-3.106, 3.106), (-2.234, 2.234),
+     (-6.283, 6.283)],
+)  # fmt: skip
+# A spherical shoulder, and offsets at elbow and wrist.
+_GEN72 = (
+    [("0 0 0.218", 0), ("0 0 0", -1), ("0 -0.28 0", 1), ("0.04 0 0", -1), ("-0.019 -0.2525 0", 1), ("0 0 0", -1),
+     ("0.0678 -0.1 0", 1)],
+    [(-3.0, 3.0), (-1.832, 1.832), (-3.0, 3.0), (-2.879, 0.959), (-3.0, 3.0), (-1.658, 1.779), (-6.283, 6.283)],
+)  # fmt: skip
+
+
+def arm_named(name):
+    """An arm of the campaign and the exact one it stands for."""
+    kind, _, digits = name.partition(" ")
+    quarter, makers = float(digits), {"xarm7-urdf": _XARM, "rm75-urdf": _RM75, "gen72-urdf": _GEN72}
+    if kind in makers:
+        return urdf(kind, quarter, *makers[kind]), urdf(kind, 0.5 * PI, *makers[kind])
+    exact = {"gen3": GEN3, "xarm7": XARM7}.get(kind) or kin.get_robot(kind)
+    return typed(exact, quarter), exact
+
+
+CAMPAIGN = (
+    "panda 1.57", "panda 1.571", "panda 1.5708", "panda 1.570796", "xarm7 1.571", "xarm7-urdf 1.5708", "gen3 1.57",
+    "gen3 1.5708", "gen72-urdf 1.5708", "gen72-urdf 1.571", "rm75-urdf 1.5708", "iiwa14 1.57", "iiwa14 1.5708",
+    "redundant7-craig 1.5708", "redundant7 1.5708",
+)  # fmt: skip
+arms = pytest.mark.parametrize("name", CAMPAIGN)
+
+
+def given_joint(robot):
+    """The joint whose values the search holds: that of the redundancy parameter, or joint 3 for an arm angle."""
+    joint = closed_form_of(robot).redundancies(0)[0].joint
+    return joint if joint >= 0 else 2
+
+
+class Judge:
+    """What an arm's answers miss of what a dense search finds."""
+
+    def __init__(self, name):
+        self.robot, self.exact = arm_named(name)
+        self.form = closed_form_of(self.robot)
+        assert isinstance(self.form, Rounded)
+        self.chain, self.joint = Chain(self.robot), given_joint(self.robot)
+        self.by_joint = self.form.redundancies(0)[0].joint >= 0
+
+    def postures(self, T, q, rng, values=50, random=200):
+        """Those inside the limits ``(k, 7)``, found by descents from random starts and from the exact arm's."""
+        low, high = max(-PI, self.chain.lower[self.joint]), min(PI, self.chain.upper[self.joint])
+        held = np.linspace(low, high, values)
+        starts = [q[None]]
+        asked = held if self.by_joint else np.linspace(-PI, PI, values)
+        near = kin.ik_branches(self.exact, np.repeat(T[None], values, axis=0), asked).reshape(-1, 7)
+        starts.append(near[~np.isnan(near[:, 0])])
+        return postures(self.chain, T, self.joint, held, np.concatenate(starts), rng, random)
+
+    def lists(self, T, result, q):
+        """Whether an answer has a posture ``(7,)`` in an interval of its branch, or where branches merge."""
+        branch = kin.branch_names(self.robot)[self.form.branch_of(q)]
+        if self.by_joint:
+            own = [s for s in result.solutions if s.branch == branch]
+            if any(self._holds(s, float(q[self.joint])) for s in own):
+                return True
+            others = [s for s in result.solutions if self._holds(s, float(q[self.joint]))]
+            asked = {result.redundancy[0].name: float(q[self.joint])} if result.redundancy else {}
+        else:
+            own = others = list(result.solutions)
+            asked = {"psi": self.arm_angle(q)}
+            own = [s for s in own if s.branch == branch and self._holds(s, asked["psi"], 100.0 * self.form.off)]
+            if own:
+                return True
+        if not others or not asked:
+            return False
+        # Beside a fold branches merge, and which one a posture is on is a matter of rounding.
+        there = kin.solve_ik(self.robot, T, q_seed=q, redundancy=asked)
+        names = {s.branch for s in others}
+        return any(s.branch in names and _apart(s.q, q) < 1e-5 for s in there.solutions)
+
+    def arm_angle(self, q):
+        """ψ of a posture: the direction of the elbow around the line from the shoulder to the wrist.
+
+        The family's ψ differs by the rounding.
+        """
+        points, z = self.chain.axes(q)
+        shoulder, elbow, wrist = points[1], points[3], points[5]
+        u = (wrist - shoulder) / np.linalg.norm(wrist - shoulder)
+        e2 = np.cross(u, z[0])
+        e2 /= np.linalg.norm(e2)
+        r = elbow - shoulder
+        return math.atan2(r @ e2, r @ np.cross(e2, u))
+
+    def _holds(self, solution, value, slack=1e-7):
+        return any(
+            low - slack <= value + turn <= high + slack
+            for low, high in solution.redundancy[0].intervals
+            for turn in (-2 * PI, 0.0, 2 * PI)
+        )
+
+    def count(self, targets, seed, values=50, random=200):
+        """Targets with a missing posture, with a missing branch, with a false claim, and incomplete answers."""
+        rng, found = np.random.default_rng(seed), Counter()
+        for q in self.robot.random_q(np.random.default_rng(seed), targets):
+            T = kin.fk(self.robot, q)
+            result = kin.solve_ik(self.robot, T)
+            found["incomplete"] += not result.complete
+            names = {s.branch for s in result.solutions}
+            missing = [
+                p for p in self.postures(T, q, rng, values, random)
+                if not self.lists(T, result, p) and width(self.chain, T, p, self.joint) >= 1e-3
+            ]  # fmt: skip
+            found["posture"] += bool(missing)
+            lost = {kin.branch_names(self.robot)[self.form.branch_of(p)] for p in missing} - names
+            found["branch"] += bool(lost)
+            found["false"] += bool(missing) and result.complete
+            if missing:
+                print(self.robot.id, "misses", q.tolist(), [p.tolist() for p in missing[:2]])
+        return found
+
+
+def _apart(a, b):
+    return np.abs((a - b + PI) % (2 * PI) - PI).max()
+
+
+def test_the_example_has_the_branches_and_the_interval_of_the_exact_arm():
+    robot = typed(PANDA, 1.5708)
+    found = kin.solve_ik(robot, kin.fk(robot, EXAMPLE))
+    exact = kin.solve_ik(PANDA, kin.fk(PANDA, EXAMPLE))
+    assert found.complete
+    assert {s.branch for s in found.solutions} == {s.branch for s in exact.solutions}
+    assert len(found.solutions) == 4
+    (interval,) = found.redundancy[0].intervals
+    assert interval == pytest.approx((1.7395607, 2.4046360), abs=1e-6)
+    assert interval == pytest.approx(exact.redundancy[0].intervals[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["panda 1.5708", "panda 1.571", "xarm7-urdf 1.5708", "gen72-urdf 1.5708"])
+def test_the_generating_configuration_is_found_with_the_given_joint_locked(name):
+    robot, _ = arm_named(name)
+    joint = given_joint(robot)
+    for q in robot.random_q(np.random.default_rng(6), 20):
+        locked = [float(q[i]) if i == joint else None for i in range(7)]
+        found = kin.solve_ik(robot, kin.fk(robot, q), locked=locked)
+        assert found.status is Status.SOLVED
+        assert min(_apart(s.q, q) for s in found.solutions) < 1e-6
+        assert all(s.q[joint] == q[joint] for s in found.solutions)
+
+
+@arms
+def test_no_posture_is_missing(name):
+    found = Judge(name).count(2, seed=5, values=12, random=30)
+    assert found["posture"] == found["false"] == 0
+
+
+@pytest.mark.slow
+@arms
+def test_no_posture_is_missing_of_a_thousand_targets(name):
+    found = Judge(name).count(1000, seed=1)
+    print(name, dict(found))
+    assert found["posture"] == found["branch"] == found["false"] == 0
