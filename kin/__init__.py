@@ -19,6 +19,7 @@ from kin.collision import (
     obstacle_from_dict,
     self_distance,
 )
+from kin.comparison import Comparison, compare
 from kin.dh import Screws, convert, exp_screw, robot_from_screws, screws
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.files import (
@@ -100,6 +101,7 @@ __all__ = [
     "CapabilityMap",
     "Capsule",
     "Circ",
+    "Comparison",
     "Contact",
     "Dwell",
     "Estimate",
@@ -155,6 +157,7 @@ __all__ = [
     "capability_map",
     "capsules",
     "clearance",
+    "compare",
     "configuration_at",
     "convert",
     "exp_screw",

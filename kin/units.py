@@ -9,12 +9,16 @@ Quantities other than plain angles and lengths (speeds, volumes, areas, manipula
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 Length = Literal["mm", "cm", "m"]
 LENGTHS: tuple[Length, ...] = get_args(Length)
 _LONG = 0.01  # metres; longer lengths are written without tenths of a millimetre
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_EXPONENT = re.compile(r"(?<=[0-9])e([-+][0-9]+)\b")
+_MINUS = re.compile(r"(?<![\w.)])-(?=[0-9])")
 _DECIMALS = 1  # of a degree or of a millimetre, in a sentence
 
 
@@ -24,6 +28,32 @@ def fixed(value: float, decimals: int = 3) -> str:
     if float(shown) == 0.0:
         shown = shown.lstrip("-")
     return shown.replace("-", "−")
+
+
+def general(value: float, digits: int = 6) -> str:
+    """A number with this many significant digits, without trailing zeros: 12.5, −0.001, 2.5·10⁻⁷."""
+    return typeset(f"{value + 0.0:.{digits}g}")
+
+
+def power(value: float, digits: int = 2) -> str:
+    """A number in powers of ten with this many digits, as 3.2·10⁻⁸; 0 as it is."""
+    return typeset(f"{value:.{digits - 1}e}") if value else "0"
+
+
+def grouped(number: int) -> str:
+    """A whole number in groups of three digits."""
+    return f"{number:,}".replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "−")
+
+
+def raised(exponent: int) -> str:
+    """A whole number as an exponent: ⁻³."""
+    return str(exponent).translate(_RAISED)
+
+
+def typeset(text: str) -> str:
+    """A text with ASCII numbers, such as a sentence of the core, with true minus signs and powers of ten."""
+    text = _EXPONENT.sub(lambda found: f"·10{raised(int(found[1]))}", text)
+    return _MINUS.sub("−", text)
 
 
 @dataclass(frozen=True)
@@ -53,13 +83,23 @@ class Unit:
         """One unit of the last decimal: the step of a slider."""
         return 10.0 ** -self.decimals(digits)
 
+    @property
+    def is_angle(self) -> bool:
+        """Whether it is a unit of angles."""
+        return self.name in ANGLES
+
+    @property
+    def is_length(self) -> bool:
+        """Whether it is a unit of lengths."""
+        return self.name in LENGTH_UNITS
+
     def shown(self, value: float, digits: int = 1) -> float:
         """A value (radians or metres) in this unit, rounded for a control."""
         return round(value * self.scale, self.decimals(digits))
 
     def read(self, shown: float) -> float:
-        """A value in this unit, converted to radians or metres."""
-        return shown / self.scale
+        """A value in this unit, converted to radians or metres: 102 mm is 0.102 m, not 0.10200000000000001 m."""
+        return shown / self.scale if self.scale.is_integer() else shown * (1.0 / self.scale)
 
     def number(self, value: float, digits: int = 1) -> str:
         """A value (radians or metres) with fixed decimals, without the unit."""
@@ -77,7 +117,12 @@ class Unit:
 
     def brief(self, value: float) -> str:
         """A round value (radians or metres), such as a chosen step: without trailing zeros."""
-        return f"{value * self.scale:.4g}{self.suffix}".replace("-", "−")
+        return general(value * self.scale, 4) + self.suffix
+
+    def short(self, value: float, digits: int = 1) -> str:
+        """`number` without trailing zeros."""
+        shown = self.number(value, digits)
+        return shown.rstrip("0").rstrip(".") if "." in shown else shown
 
     def size(self, value: float, digits: int = 1) -> str:
         """The size of a value for a sentence; one that would round to zero is written as ``< 0.1``."""
@@ -89,6 +134,15 @@ class Unit:
 
 DEGREES, RADIANS = Unit("°", 180.0 / math.pi, 0), Unit("rad", 1.0, 2)
 _OF_LENGTH: dict[Length, Unit] = {"mm": Unit("mm", 1e3, 0), "cm": Unit("cm", 1e2, 1), "m": Unit("m", 1.0, 3)}
+PLAIN = Unit("", 1.0, 2)  # of counts and ratios
+# By the names that people type and read.
+ANGLES: dict[str, Unit] = {"°": DEGREES, "deg": DEGREES, "rad": RADIANS}
+LENGTH_UNITS: dict[str, Unit] = dict(_OF_LENGTH.items())
+
+
+def family(unit: Unit) -> dict[str, Unit]:
+    """The units of the same quantity by name: of angles, of lengths, or this one alone."""
+    return ANGLES if unit.is_angle else LENGTH_UNITS if unit.is_length else {unit.name: unit}
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ configuration to a target that cannot be reached, and solve tasks and arms witho
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from functools import lru_cache
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -32,6 +32,7 @@ from kin.ik.options import (
     Preference,
     Solver,
     Task,
+    Values,
 )
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKResult
@@ -55,17 +56,18 @@ def solve_ik(
     robot: Robot | str,
     target: ArrayLike,
     *,
+    options: IKOptions | None = None,
+    q_seed: ArrayLike | None = None,
     task: Task = "pose",
     mask: Sequence[bool] | None = None,
     mask_frame: Frame = "tool",
-    q_seed: ArrayLike | None = None,
-    respect_limits: bool = True,
     limits: Limits | None = None,
     locked: Locks | None = None,
+    respect_limits: bool = True,
     branch: str | Sequence[str] | None = None,
     images: Images = "nearest",
     prefer: Preference = "nearest",
-    redundancy: float | Mapping[str, float] | None = None,
+    redundancy: Values | None = None,
     max_solutions: int | None = None,
     solver: Solver = "auto",
     position_tolerance: float | None = None,
@@ -75,34 +77,40 @@ def solve_ik(
 ) -> IKResult:
     """All configurations that bring the tool to `target`, or why there are none.
 
-    `solve` takes the same options as one value.
-
     Args:
         robot: the arm, or the id of a built-in one.
         target: T_base_tool ``(4, 4)``; for ``task="position"`` also a point ``(3,)`` in metres.
+        options: all further arguments but the seed as one value.
         q_seed: ``(n,)`` configuration to stay near; the home pose by default.
-        limits: n pairs (lower, upper) inside the robot's own limits, None for a joint that keeps its own.
-        locked: n joint values, None for a joint that may move.
-        task, mask, mask_frame, respect_limits, branch, images, prefer, redundancy, max_solutions, solver,
-            position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in `kin.IKOptions`.
+        task, mask, mask_frame, limits, locked, respect_limits, branch, images, prefer, redundancy, max_solutions,
+            solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in `kin.IKOptions`,
+            `limits` and `locked` as in `kin.JointConstraints`.
 
     Raises:
-        InputError: a malformed target, seed or option. An unreachable target is not an error.
+        InputError: a malformed target, seed or option; a keyword besides `options`. An unreachable target is not
+            an error.
     """
     plain = (
-        task, mask_frame, respect_limits, images, prefer, max_solutions, solver, position_tolerance,
-        rotation_tolerance,
+        task, mask_frame, respect_limits, branch, images, prefer, max_solutions, solver, position_tolerance,
+        rotation_tolerance, avoid_self_collision,
     )  # fmt: skip
-    if mask is None and limits is None and locked is None and branch is None and redundancy is None:
+    structured = mask is not None or limits is not None or locked is not None or redundancy is not None
+    if options is None and not structured and not obstacles:
         try:
-            options = _plain_options(*plain)
-        except TypeError:  # a value that cannot be looked up, a list for example, is no valid option
-            options = _options(*plain)
+            wanted = _plain_options(*plain)
+        except TypeError:  # a list, for example, cannot be looked up
+            wanted = _plain_options.__wrapped__(*plain)
     else:
-        options = _options(*plain, mask, JointConstraints(limits, locked), branch, redundancy)
-    if avoid_self_collision or obstacles:
-        options = replace(options, avoid_self_collision=avoid_self_collision, obstacles=obstacles)
-    return solve(robot, target, options, q_seed)
+        wanted = IKOptions.of(
+            options,
+            mask=mask,
+            limits=limits,
+            locked=locked,
+            redundancy=redundancy,
+            obstacles=obstacles,
+            **dict(zip(_PLAIN, plain, strict=True)),
+        )
+    return answer(IKProblem.of(robot_of(robot), target, wanted, q_seed))
 
 
 def solve(
@@ -112,7 +120,7 @@ def solve(
     q_seed: ArrayLike | None = None,
     rounding: float = 0.0,
 ) -> IKResult:
-    """`solve_ik` with all options in one value; None stands for the default options.
+    """`solve_ik` for callers that have an `IKOptions`, or rounded frames; None stands for the default options.
 
     Args:
         rounding: how rounded the numbers are from which `target` was computed, such as the pose of a workpiece. It
@@ -121,7 +129,7 @@ def solve(
     Raises:
         InputError: a malformed target or seed, or an option that does not fit the arm.
     """
-    given = _plain_options() if options is None else options
+    given = _DEFAULT if options is None else options
     return answer(IKProblem.of(robot_of(robot), target, given, q_seed, rounding))
 
 
@@ -152,38 +160,16 @@ def branch_of(robot: Robot | str, q: ArrayLike) -> str:
     return closed_form.branches[closed_form.branch_of(values)]
 
 
-def _options(
-    task: Task = "pose",
-    mask_frame: Frame = "tool",
-    respect_limits: bool = True,
-    images: Images = "nearest",
-    prefer: Preference = "nearest",
-    max_solutions: int | None = None,
-    solver: Solver = "auto",
-    position_tolerance: float | None = None,
-    rotation_tolerance: float | None = None,
-    mask: Sequence[bool] | None = None,
-    constraints: JointConstraints | None = None,
-    branch: str | Sequence[str] | None = None,
-    redundancy: float | Mapping[str, float] | None = None,
-) -> IKOptions:
-    """The keywords of `solve_ik` as one value."""
-    return IKOptions(
-        task=task,
-        mask=mask,
-        mask_frame=mask_frame,
-        constraints=JointConstraints() if constraints is None else constraints,
-        respect_limits=respect_limits,
-        branch=branch,
-        images=images,
-        prefer=prefer,
-        redundancy=redundancy,
-        max_solutions=max_solutions,
-        solver=solver,
-        position_tolerance=position_tolerance,
-        rotation_tolerance=rotation_tolerance,
-    )
+_DEFAULT = IKOptions()
+# The options of which most calls give no others, in the order of `_plain_options`.
+_PLAIN = (
+    "task", "mask_frame", "respect_limits", "branch", "images", "prefer", "max_solutions", "solver",
+    "position_tolerance", "rotation_tolerance", "avoid_self_collision",
+)  # fmt: skip
 
 
 # Typed, since True, 1 and 1.0 are not equally valid.
-_plain_options = lru_cache(maxsize=256, typed=True)(_options)
+@lru_cache(maxsize=256, typed=True)
+def _plain_options(*values: Any) -> IKOptions:
+    """The options of a call by the values of `_PLAIN`, which can be looked up."""
+    return IKOptions(**dict(zip(_PLAIN, values, strict=True)))

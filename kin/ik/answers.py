@@ -12,7 +12,7 @@ import numpy as np
 from kin.axes import size
 from kin.fk import fk
 from kin.ik import avoidance, failures, nearest, preferences
-from kin.ik.assembly import Found, by_key, leaves_motion, make_result, with_images
+from kin.ik.assembly import Found, by_key, curves_of, leaves_motion, make_result, with_images
 from kin.ik.branches import Branches, Flags, is_closed, measure, solution, solve_branches
 from kin.ik.candidates import DISTANCE, OVERRUN
 from kin.ik.details import NotOnBranch, Solved
@@ -48,6 +48,14 @@ def _answer(problem: IKProblem) -> IKResult:
     missed = _missed(problem, branches, closed)
     if missed is not None:
         return missed
+    refused = _refused(problem, branches, closed, good, allowed)
+    if refused.status is not Status.SOLVED:
+        refused.completeness = branches.completeness
+    return refused
+
+
+def _refused(problem: IKProblem, branches: Branches, closed: Flags, good: Flags, allowed: Flags) -> IKResult:
+    """The answer where no row ``(k,)`` that is allowed is a solution."""
     if (closed & allowed).any():
         return failures.outside_limits(problem, branches, closed & allowed, good)
     if closed.any():
@@ -65,9 +73,10 @@ def _solved(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
             preferences.improve(problem, branches, good)
         free = avoidance.free_rows(problem, branches, good)
         if not free.any():
-            return avoidance.all_touch(
-                problem, branches.q[good], np.flatnonzero(good), bool(branches.redundancies)
-            )
+            searched = bool(branches.redundancies)
+            refused = avoidance.all_touch(problem, branches.q[good], np.flatnonzero(good), searched)
+            refused.completeness = "unknown" if searched else branches.completeness
+            return refused
         touching, good = int((good & ~free).sum()), free
     result = _ordered(problem, branches, good)
     return result if touching == 0 else avoidance.with_count(result, touching)
@@ -93,7 +102,10 @@ def _ordered(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
             r._replace(value=own.value) for r, own in zip(redundancy, solutions[0].redundancy, strict=True)
         )
     details = found.details._replace(configurations=len(solutions))
-    return make_result(problem, Status.SOLVED, "", details, solutions=solutions, redundancy=redundancy)
+    known = found.completeness
+    return make_result(
+        problem, Status.SOLVED, "", details, solutions=solutions, redundancy=redundancy, completeness=known
+    )
 
 
 def _missed(problem: IKProblem, branches: Branches, closed: Flags) -> IKResult | None:
@@ -159,25 +171,27 @@ def _by_descents(problem: IKProblem) -> IKResult | None:
         details = NotOnBranch(len({problem.branch_of(row) for row in q}), 0)
         closest = nearest.closest(problem, None)
         return make_result(problem, Status.UNREACHABLE, "branch", details, closest=closest)
-    solutions = tuple(solution(problem, q[i], stats[i], branch) for branch, i in best.items())
+    form = problem.closed_form if len(related[0]) else None
+    return _descended(problem, q, stats, best, "numeric" if form is None else form.name)
+
+
+def _descended(problem: IKProblem, q: Array, stats: Array, best: dict[int, int], solver: str) -> IKResult:
+    """The answer with the best rows of q ``(k, n)`` that descents found, by branch."""
+    rows, moves = list(best.values()), leaves_motion(problem)
+    curves, kept = ((), rows) if moves else curves_of(problem, q, rows)
+    solutions = tuple(solution(problem, q[i], stats[i], branch) for branch, i in best.items() if i in kept)
     if problem.options.images == "all":
         solutions = with_images(problem, solutions)
-    closed_form = problem.closed_form if len(related[0]) else None
-    return make_result(
-        problem,
-        Status.SOLVED,
-        "",
-        Solved(
-            len(solutions),
-            False,
-            problem.chosen_branches,
-            complete=False,
-            infinite=leaves_motion(problem),
-            postures=len(best),
-        ),
-        solutions=solutions,
-        solver="numeric" if closed_form is None else closed_form.name,
+    details = Solved(
+        len(solutions),
+        False,
+        problem.chosen_branches,
+        complete=False,
+        infinite=bool(curves) or moves,
+        postures=len(best),
+        curves=curves,
     )
+    return make_result(problem, Status.SOLVED, "", details, solutions=solutions, solver=solver)
 
 
 def _usable(problem: IKProblem, q: Array, stats: Array) -> tuple[Array, Array]:

@@ -13,17 +13,19 @@ from kin.fk import jacobian
 from kin.ik import preferences
 from kin.ik.branches import Branches, Flags, measure, redundancy_of, solution
 from kin.ik.candidates import select
-from kin.ik.details import Details, Redundancy, Solved
+from kin.ik.details import Details, Redundancy, SolutionCurve, Solved
 from kin.ik.options import Frame
 from kin.ik.problem import IKProblem
 from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
 from kin.singularity import Singularity, singularities_at
-from kin.solvers.contract import APPROACH, MASK, POSITION, ClosedForm
+from kin.solvers.contract import APPROACH, MASK, POSITION, ClosedForm, Completeness, weakest
+from kin.solvers.curves import curves_among
 from kin.solvers.numeric import spread
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 MOST_IMAGES = 4096  # of one solution
+_STEP = 1e-4  # rad or m along a curve
 Parameters = tuple[list[tuple[Redundancy, ...]], tuple[Redundancy, ...]]
 
 
@@ -42,11 +44,12 @@ class Found:
         every: ``(k,)`` the rows whose intervals together are those of the best solution's redundancy.
     """
 
-    __slots__ = ("_branches", "_every", "_order", "_problem", "_redundancies")
+    __slots__ = ("_branches", "_curves", "_every", "_given", "_problem", "_redundancies")
 
     def __init__(self, problem: IKProblem, branches: Branches, order: list[int], every: Flags) -> None:
-        self._problem, self._branches, self._order, self._every = problem, branches, order, every
+        self._problem, self._branches, self._given, self._every = problem, branches, order, every
         self._redundancies: Parameters | None = None
+        self._curves: tuple[tuple[SolutionCurve, ...], list[int]] | None = None
 
     def result(self) -> IKResult:
         """The answer; its solutions, details, redundancy and singularities are those below."""
@@ -57,10 +60,29 @@ class Found:
             Status.SOLVED, "", 0.0, problem.target_error,
         )  # fmt: skip
         result.closest = result.nearest_orientation = None
-        result.blocked, result.complete, result.task = (), self._branches.complete, problem.task
+        result.blocked, result.task = (), problem.task
         result.solver, result.solver_reason = form.name, form.reason
         result.tolerances = (requirement.position, requirement.rotation)
         return result
+
+    @property
+    def curves(self) -> tuple[SolutionCurve, ...]:
+        """The curves on which solutions are; one solution is kept of each."""
+        if self._curves is None:
+            # A redundancy parameter tells the same, unless it is free at singular targets only.
+            moves = any(not parameter.rare for parameter in self._branches.redundancies)
+            self._curves = ((), self._given) if moves else curves_of(self._problem, self._branches.q, self._given)
+        return self._curves[0]
+
+    @property
+    def _order(self) -> list[int]:
+        """The rows that are solutions, the best first."""
+        return self._given if not self.curves else self._curves[1]  # type: ignore[index]  # set by `curves`
+
+    @property
+    def completeness(self) -> Completeness:
+        """How it is known that no solution is missing; where there is a curve, no proof covers it."""
+        return weakest(self._branches.completeness, "agreed") if self.curves else self._branches.completeness
 
     @property
     def solutions(self) -> tuple[IKSolution, ...]:
@@ -100,11 +122,18 @@ class Found:
     def details(self) -> Solved:
         """How many solutions there are, and what the task leaves free."""
         problem, names = self._problem, form_of(self._problem).branches
-        redundancy = self.redundancy
+        redundancy, complete = self.redundancy, self.completeness != "unknown"
         postures = len({names[row] for row in self._order})
         if not redundancy and problem.options.redundancy is None:
-            chosen, complete = problem.chosen_branches, self._branches.complete
-            return Solved(len(self._order), False, chosen, complete, postures=postures)
+            return Solved(
+                len(self._order),
+                False,
+                problem.chosen_branches,
+                complete,
+                infinite=bool(self.curves),
+                postures=postures,
+                curves=self.curves,
+            )
         fixed = tuple([parameter.label for parameter in problem.requested])
         free = tuple([r.label for r in redundancy if r.label not in fixed and _has_width(r)])
         movable = redundancy and {
@@ -114,11 +143,12 @@ class Found:
             configurations=len(self._order),
             redundant=any(r.name in movable for r in redundancy),
             chosen_branches=problem.chosen_branches,
-            infinite=bool(free),
+            infinite=bool(free or self.curves),
+            curves=self.curves,
             postures=postures,
             free=free,
             fixed=fixed,
-            complete=self._branches.complete,
+            complete=complete,
         )
 
     @property
@@ -140,6 +170,22 @@ class _Place:
     def redundancy(self) -> tuple[Redundancy, ...]:
         """The parameters on its branch."""
         return self._found.redundancies()[0][self._place]
+
+
+def curves_of(problem: IKProblem, q: Array, rows: list[int]) -> tuple[tuple[SolutionCurve, ...], list[int]]:
+    """The curves through solutions q[rows] that the limits leave, and the rows with one row for each of them."""
+    found, kept = curves_among(problem.robot, problem.T, problem.code, problem.free, q, rows)
+    return tuple(
+        SolutionCurve(tuple(q[curve.row].tolist()), tuple(curve.direction.tolist()))
+        for curve in found
+        if not problem.respect or _is_inside(problem, q[curve.row], curve.direction)
+    ), kept
+
+
+def _is_inside(problem: IKProblem, q: Array, direction: Array) -> bool:
+    """Whether the limits leave a motion along a direction or against it."""
+    steps = q + np.outer((_STEP, -_STEP), direction)
+    return bool(((steps >= problem.lower) & (steps <= problem.upper) | (direction == 0.0)).all(axis=1).any())
 
 
 def form_of(problem: IKProblem) -> ClosedForm:
@@ -176,6 +222,7 @@ def make_result(
     distance: float = 0.0,
     nearest_orientation: IKSolution | None = None,
     redundancy: tuple[Redundancy, ...] = (),
+    completeness: Completeness = "unknown",
 ) -> IKResult:
     """A result, with the singularities of the configuration it shows."""
     best = solutions[0] if solutions else closest
@@ -184,7 +231,6 @@ def make_result(
         singular = singularities_at(problem.robot, best.q, TOLERANCES.at_singularity)
     if solver is None:
         solver = "numeric" if problem.closed_form is None else problem.closed_form.name
-    known = problem.closed_form is not None and problem.closed_form.handles(problem.code)
     return IKResult(
         status=status,
         cause=cause,
@@ -201,7 +247,7 @@ def make_result(
         singularities=singular,
         tolerances=(problem.requirement.position, problem.requirement.rotation),
         target_error=problem.target_error,
-        complete=known and (details.complete if isinstance(details, Solved) else True),
+        completeness=completeness,
     )
 
 

@@ -11,14 +11,15 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any, NamedTuple, overload
+from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kin.collision import Obstacle
 from kin.errors import InputError
 from kin.ik.answers import answer
-from kin.ik.options import IKOptions, JointConstraints
+from kin.ik.options import Frame, IKOptions, Images, Limits, Locks, Preference, Solver, Task, Values
 from kin.ik.problem import listed, prepare, read_poses, read_seed
 from kin.ik.results import IKResult, Status
 from kin.kernels import fk as fk_kernels
@@ -73,38 +74,77 @@ def solve_ik_many(
     robot: Robot | str,
     targets: Sequence[ArrayLike] | Array,
     *,
+    options: IKOptions | None = None,
     q_seed: ArrayLike | None = None,
-    **options: Any,
+    task: Task = "pose",
+    mask: Sequence[bool] | None = None,
+    mask_frame: Frame = "tool",
+    limits: Limits | None = None,
+    locked: Locks | None = None,
+    respect_limits: bool = True,
+    branch: str | Sequence[str] | None = None,
+    images: Images = "nearest",
+    prefer: Preference = "nearest",
+    redundancy: Values | None = None,
+    max_solutions: int | None = None,
+    solver: Solver = "auto",
+    position_tolerance: float | None = None,
+    rotation_tolerance: float | None = None,
+    avoid_self_collision: bool = False,
+    obstacles: Sequence[Obstacle] = (),
 ) -> IKResults:
     """`kin.solve_ik` for each target of a stack, each on its own; `kin.solve_path` finds one path through all.
+
+    Long because every option is a keyword, for editors and type checkers.
 
     Args:
         robot: the arm, or the id of a built-in one.
         targets: T_base_tool ``(k, 4, 4)``; for ``task="position"`` also points ``(k, 3)`` in metres.
+        options: all further arguments but the seed as one value.
         q_seed: ``(n,)`` one seed for all targets, or ``(k, n)`` one for each; the home pose by default.
-        options: those of `kin.solve_ik`.
+        task, mask, mask_frame, limits, locked, respect_limits, branch, images, prefer, redundancy, max_solutions,
+            solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in `kin.solve_ik`,
+            for every target.
 
     Raises:
         InputError: a malformed target (named ``targets[i]``), seed or option.
     """
     robot = robot_of(robot)
-    constraints = JointConstraints(options.pop("limits", None), options.pop("locked", None))
-    wanted = IKOptions(constraints=constraints, **options)
-    given = listed(targets)
-    prepared = prepare(robot, wanted)
+    wanted = IKOptions.of(
+        options,
+        task=task,
+        mask=mask,
+        mask_frame=mask_frame,
+        limits=limits,
+        locked=locked,
+        respect_limits=respect_limits,
+        branch=branch,
+        images=images,
+        prefer=prefer,
+        redundancy=redundancy,
+        max_solutions=max_solutions,
+        solver=solver,
+        position_tolerance=position_tolerance,
+        rotation_tolerance=rotation_tolerance,
+        avoid_self_collision=avoid_self_collision,
+        obstacles=obstacles,
+    )
+    given, prepared = listed(targets), prepare(robot, wanted)
     poses = read_poses(given, prepared.code, always=robot.n < 6)
-    seeds = [prepared.seed] * len(given)
-    if q_seed is not None:
-        rows = robot.check_q(q_seed, "q_seed")
-        if rows.shape not in (robot.q_shape, (len(given), robot.n)):
-            expected = f"one configuration of {robot.n} values, or one for each of the {len(given)} targets"
-            raise InputError("q_seed", f"shape {rows.shape}", expected)
-        if rows.ndim == 1:
-            seeds = [read_seed(robot, rows)] * len(given)
-        else:
-            seeds = [read_seed(robot, row, f"q_seed[{i}]") for i, row in enumerate(rows)]
+    seeds = [prepared.seed] * len(given) if q_seed is None else _seeds(robot, q_seed, len(given))
     found = [answer(prepared.at(*pose, seed)) for pose, seed in zip(poses, seeds, strict=True)]
     return IKResults(found, robot.n)
+
+
+def _seeds(robot: Robot, q_seed: ArrayLike, count: int) -> list[Array]:
+    """One seed ``(n,)`` for each target, of one for all ``(n,)`` or of one for each ``(k, n)``."""
+    rows = robot.check_q(q_seed, "q_seed")
+    if rows.shape not in (robot.q_shape, (count, robot.n)):
+        expected = f"one configuration of {robot.n} values, or one for each of the {count} targets"
+        raise InputError("q_seed", f"shape {rows.shape}", expected)
+    if rows.ndim == 1:
+        return [read_seed(robot, rows)] * count
+    return [read_seed(robot, row, f"q_seed[{i}]") for i, row in enumerate(rows)]
 
 
 class _Prepared(NamedTuple):

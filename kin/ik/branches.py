@@ -13,7 +13,7 @@ from kin.ik.candidates import Rows, accept, measure_rows, ranges, unchecked
 from kin.ik.details import JointKind, LimitViolation, Redundancy
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKSolution
-from kin.solvers.contract import APPROACH, Obstacle, RedundancyParameter, SolverInput
+from kin.solvers.contract import APPROACH, Completeness, Obstacle, RedundancyParameter, SolverInput
 from kin.transforms import Array
 
 _NO_LIMIT = 1e6
@@ -32,7 +32,7 @@ class Branches:
         closed, good: ``(k,)``, which rows meet the task, and which of them the limits allow (if they count).
         order: the good rows, nearest to the seed first, each configuration once.
         redundancies: the redundancy parameters of `values` and `arcs`.
-        values, arcs, gap, obstacle, complete: as in `kin.solvers.contract.Candidates`.
+        values, arcs, gap, obstacle, completeness: as in `kin.solvers.contract.Candidates`.
     """
 
     q: Array
@@ -45,7 +45,7 @@ class Branches:
     arcs: list[Array]
     gap: float
     obstacle: Obstacle | None
-    complete: bool
+    completeness: Completeness
 
 
 def is_closed(problem: IKProblem, stats: Array) -> Flags:
@@ -89,7 +89,7 @@ def solve_branches(
     count = unchecked()(problem.requirement, problem.T, seed, problem.seed, rows)
     return Branches(
         q, rows.stats, rows.closed, rows.good, rows.order[:count].tolist(), redundancies, found.values,
-        list(found.arcs), found.gap, found.obstacle, found.complete,
+        list(found.arcs), found.gap, found.obstacle, found.completeness,
     )  # fmt: skip
 
 

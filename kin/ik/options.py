@@ -3,15 +3,20 @@
 `IKOptions` says what a solution has to meet (task, limits, branch) and which solutions are preferred. The target
 and the seed are not options: they change from call to call. Whatever does not depend on an arm is checked when the
 value is made; :mod:`kin.ik.problem` checks the rest against an arm, once for each pair of arm and options.
+
+The class is the only description of the options: its annotations hold the choices, ranges and units, its docstring
+the texts. The fields of REST requests and the flags of the command line follow from it, and tests compare the
+keywords of `kin.solve_ik`, `kin.solve_ik_many`, `kin.solve_path` and `kin.plan_motion` with it. The command line
+reads this module without importing it: the choices of an option are an alias of `Literal` here.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from functools import cached_property
-from typing import Literal, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields
+from functools import cache, cached_property, partial
+from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,8 +36,7 @@ Preference = Literal["nearest", "limits", "manipulability"]
 Limits = Sequence[Sequence[float] | None]
 Locks = Sequence[float | None]
 Values = float | Mapping[str, float] | tuple[tuple[str, float], ...]
-TASKS: tuple[Task, ...] = ("pose", "approach", "position")
-PREFERENCES: tuple[Preference, ...] = ("nearest", "limits", "manipulability")
+TASKS: tuple[Task, ...] = get_args(Task)
 LEAST_TOLERANCE, MOST_METRES, MOST_RADIANS = TOLERANCES.closure_position, 0.1, 0.5
 MASK_NAMES = ("x", "y", "z", "rx", "ry", "rz")
 # Masks that are equivalent to one of the three tasks; the first and the last one in either frame.
@@ -41,6 +45,14 @@ _EQUIVALENT: dict[tuple[bool, ...], int] = {
     (True,) * 5 + (False,): APPROACH,
     (True,) * 3 + (False,) * 3: POSITION,
 }
+
+
+class Range(NamedTuple):
+    """The valid values of a number, and their unit; annotates an option that is a number or None."""
+
+    least: float
+    most: float
+    unit: Literal["m", "rad"]
 
 
 class Bounds(NamedTuple):
@@ -69,8 +81,9 @@ class JointConstraints:
     """Limits and locks in addition to the robot's own limits. Lists and arrays are accepted and kept as tuples.
 
     Attributes:
-        limits: per joint (lower, upper), inside the robot's own limits; None for a joint that keeps its own.
-        locked: per joint the value at which it is locked; None for a joint that may move.
+        limits: narrower joint limits, inside the robot's own, in radians (metres). One pair (lower, upper) per
+            joint, none for a joint that keeps its own.
+        locked: joint values to keep, in radians (metres). One per joint, none for a joint that may move.
     """
 
     limits: Limits | None = None
@@ -136,28 +149,32 @@ FREE = JointConstraints()
 class IKOptions:
     """What a solution has to meet, and which solutions are returned. Lists and arrays are kept as tuples.
 
+    Where collisions are avoided, redundancy parameters are searched for values without a touch.
+
     Attributes:
-        task: ``"pose"`` (all six coordinates), ``"approach"`` (point and direction of the tool's z axis) or
-            ``"position"``.
+        task: pose: the whole pose. approach: the point and the direction of the tool's z axis. position: the point
+            alone.
         mask: instead of a task, which of the six coordinates x, y, z, rx, ry, rz of the error must be zero; the
             last three are the rotation vector from the target to the tool.
-        mask_frame: the frame of these coordinates: the target's own (``"tool"``) or ``"base"``.
-        constraints: limits and locks of the joints.
+        mask_frame: directions of the mask's coordinates: of the target (tool) or of the world frame (base).
+        constraints: limits and locks of the joints; calls take `limits` and `locked` as keywords instead.
         respect_limits: leave out configurations outside the joint limits (each joint at its best whole turn).
-        branch: only these branches: a name of `kin.branch_names`, parts of one (``"elbow up"``), ``"seed"`` for
+        branch: only these branches: a name as in the robot's branches, parts of one such as "elbow up", "seed" for
             the branch of the seed, or several of these.
-        images: ``"all"`` adds every whole-turn image inside the limits to the nearest one of each branch.
-        prefer: choose redundancy parameters ``"nearest"`` to the seed, farthest from the ``"limits"`` or with the
-            largest ``"manipulability"``; solutions are sorted by the same criterion.
-        redundancy: values of redundancy parameters by name (``{"psi": 0.3}``), radians; a bare number is the value
-            of the first one. None lets `prefer` choose.
-        max_solutions: at most so many solutions, the best first.
-        solver: ``"numeric"`` ignores the arm's closed form.
-        position_tolerance, rotation_tolerance: errors of a solution that count as none, metres and radians. None
-            stands for 1e-9, or for the digits of a target whose rotation had to be made one.
-        avoid_self_collision: leave out configurations in which links of the arm touch each other, judged by
-            `kin.capsules`; redundancy parameters are searched for values without a touch.
-        obstacles: leave out configurations in which the arm touches one of these.
+        images: nearest: of each branch the solution nearest to the seed. all: every whole-turn image inside the
+            limits.
+        prefer: how to choose redundancy parameters, and how to sort solutions: nearest to the seed, farthest from
+            the joint limits, or largest manipulability.
+        redundancy: values of redundancy parameters by name, such as psi, in radians; a bare number is the value of
+            the first one. By default the feasible value chosen by `prefer`.
+        max_solutions: at most so many solutions per target, the best first. By default all.
+        solver: numeric: descend from many starts, even where the arm has a closed form.
+        position_tolerance: error of the tool's point that counts as none, in metres. By default 1e-9 m, or what
+            the digits of a target allow whose rotation had to be made orthonormal.
+        rotation_tolerance: the same for the rotation error, in radians.
+        avoid_self_collision: leave out configurations in which links of the arm touch each other, judged by the
+            capsules of the arm.
+        obstacles: bodies in the world frame that the arm must not touch.
 
     Raises:
         InputError: an option that is malformed whatever the arm.
@@ -174,31 +191,35 @@ class IKOptions:
     redundancy: Values | None = None
     max_solutions: int | None = None
     solver: Solver = "auto"
-    position_tolerance: float | None = None
-    rotation_tolerance: float | None = None
+    position_tolerance: Annotated[float | None, Range(LEAST_TOLERANCE, MOST_METRES, "m")] = None
+    rotation_tolerance: Annotated[float | None, Range(LEAST_TOLERANCE, MOST_RADIANS, "rad")] = None
     avoid_self_collision: bool = False
     obstacles: Sequence[Obstacle] = ()
 
     def __post_init__(self) -> None:
-        _check_choice("task", self.task, TASKS)
-        _check_choice("mask_frame", self.mask_frame, ("tool", "base"))
-        _check_choice("images", self.images, ("nearest", "all"))
-        _check_choice("prefer", self.prefer, PREFERENCES)
-        _check_choice("solver", self.solver, ("auto", "numeric"))
+        for name, check in _checks():
+            object.__setattr__(self, name, check(name, getattr(self, name)))
+        if self.mask is not None and self.task != "pose":
+            raise InputError("task", self.task, "no task besides a mask")
         if self.constraints and not self.respect_limits:
             raise InputError("respect_limits", False, "true when limits or locked joints are given")
-        for name, value in (
-            ("mask", None if self.mask is None else _flags(self.mask, self.task)),
-            ("respect_limits", bool(self.respect_limits)),
-            ("branch", None if self.branch is None else _names(self.branch)),
-            ("redundancy", None if self.redundancy is None else _values(self.redundancy)),
-            ("max_solutions", None if self.max_solutions is None else _whole_number(self.max_solutions)),
-            ("position_tolerance", _tolerance("position_tolerance", self.position_tolerance, "m", MOST_METRES)),
-            ("rotation_tolerance", _tolerance("rotation_tolerance", self.rotation_tolerance, "rad", MOST_RADIANS)),
-            ("avoid_self_collision", bool(self.avoid_self_collision)),
-            ("obstacles", checked_obstacles(self.obstacles) if self.obstacles != () else ()),
-        ):
-            object.__setattr__(self, name, value)
+
+    @classmethod
+    def of(cls, options: IKOptions | None, **keywords: Any) -> IKOptions:
+        """The options of a call that takes them as keywords or as one value; `InputError` if as both.
+
+        Keywords are the fields of this class, with `limits` and `locked` in the place of `constraints`.
+        """
+        if options is None:
+            constraints = JointConstraints(keywords.pop("limits", None), keywords.pop("locked", None))
+            return cls(constraints=constraints, **keywords)
+        if not isinstance(options, cls):
+            raise InputError("options", options, "a kin.IKOptions, or none")
+        for name, value in keywords.items():
+            default = DEFAULTS[name]
+            if value is not default and not (type(value) is type(default) and value == default):
+                raise InputError(name, value, f"no {name} besides options")
+        return options
 
     def __hash__(self) -> int:
         return self._hash
@@ -209,11 +230,15 @@ class IKOptions:
 
     @cached_property
     def _hash(self) -> int:
-        return hash((
-            self.task, self.mask, self.mask_frame, self.constraints, self.respect_limits, self.branch, self.images,
-            self.prefer, self.redundancy, self.max_solutions, self.solver, self.position_tolerance,
-            self.rotation_tolerance, self.avoid_self_collision, self.obstacles,
-        ))  # fmt: skip
+        return hash(tuple(getattr(self, f.name) for f in fields(self)))
+
+    def check_only(self, *names: str) -> None:
+        """Raise `InputError` for an option that is not the default, unless it is one of `names`."""
+        for f in fields(self):
+            default = FREE if f.name == "constraints" else f.default
+            if f.name not in names and getattr(self, f.name) != default:
+                expected = "the default; these are used here: " + ", ".join(names)
+                raise InputError(f"options.{f.name}", getattr(self, f.name), expected)
 
     @cached_property
     def avoids(self) -> bool:
@@ -258,9 +283,55 @@ def _is_list(value: object) -> bool:
     return isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
 
 
-def _check_choice(field: str, value: object, choices: Sequence[str]) -> None:
+def _defaults() -> dict[str, Any]:
+    """The keywords of a call, with their defaults."""
+    found: dict[str, Any] = {}
+    for f in fields(IKOptions):
+        if f.name == "constraints":
+            found |= {each.name: each.default for each in fields(JointConstraints)}
+        else:
+            assert f.default is not MISSING
+            found[f.name] = f.default
+    return found
+
+
+DEFAULTS: Mapping[str, Any] = _defaults()
+
+
+@cache
+def _checks() -> tuple[tuple[str, Callable[[str, Any], object]], ...]:
+    """For each option the function ``(name, value)`` that checks it and returns what is kept."""
+    found: dict[str, Callable[[str, Any], object]] = {}
+    for name, hint in get_type_hints(IKOptions, include_extras=True).items():
+        if get_origin(hint) is Literal:
+            found[name] = partial(_choice, get_args(hint))
+        elif hint is bool:
+            found[name] = _flag
+        elif get_origin(hint) is Annotated:
+            found[name] = partial(_in_range, hint.__metadata__[0])
+    found |= {"mask": _mask, "branch": _names, "redundancy": _values, "max_solutions": _whole_number}
+    found["obstacles"] = _obstacles
+    return tuple(found.items())
+
+
+def _choice(choices: Sequence[str], field: str, value: object) -> object:
     if not isinstance(value, str) or value not in choices:
         raise InputError(field, value, "one of " + ", ".join(f'"{choice}"' for choice in choices))
+    return value
+
+
+def _flag(_field: str, value: object) -> bool:
+    return bool(value)
+
+
+def _in_range(allowed: Range, field: str, value: float | None) -> float | None:
+    if value is None:
+        return None
+    expected = f"a number from {allowed.least:g} to {allowed.most:g} {allowed.unit}, or none"
+    number = finite_number(field, value, expected)
+    if not allowed.least <= number <= allowed.most:
+        raise InputError(field, value, expected)
+    return number
 
 
 def _pairs(limits: Limits) -> tuple[tuple[float, float] | None, ...]:
@@ -287,50 +358,50 @@ def _lock_values(locked: Locks) -> tuple[float | None, ...]:
     return tuple(v if v is None else finite_number(f"locked[{i}]", v, expected) for i, v in enumerate(locked))
 
 
-def _flags(mask: Sequence[bool], task: str) -> tuple[bool, ...]:
-    if task != "pose":
-        raise InputError("task", task, "no task besides a mask")
+def _mask(field: str, mask: Sequence[bool] | None) -> tuple[bool, ...] | None:
+    if mask is None:
+        return None
     flags = tuple(mask) if _is_list(mask) else ()
     if len(flags) != 6 or not all(isinstance(flag, bool | np.bool_) for flag in flags):
-        raise InputError("mask", mask, "six of true or false: " + ", ".join(MASK_NAMES))
+        raise InputError(field, mask, "six of true or false: " + ", ".join(MASK_NAMES))
     if not any(flags):
-        raise InputError("mask", mask, "at least one of the six to be true")
+        raise InputError(field, mask, "at least one of the six to be true")
     return tuple(bool(flag) for flag in flags)
 
 
-def _names(branch: str | Sequence[str]) -> tuple[str, ...]:
+def _names(field: str, branch: str | Sequence[str] | None) -> tuple[str, ...] | None:
+    if branch is None:
+        return None
     names = (branch,) if isinstance(branch, str) else tuple(branch) if isinstance(branch, Sequence) else ()
     if not names:
-        raise InputError("branch", branch, "at least one branch")
+        raise InputError(field, branch, "at least one branch")
     for name in names:
         if not isinstance(name, str):
-            raise InputError("branch", name, 'names of branches, parts of them such as "elbow up", or "seed"')
+            raise InputError(field, name, 'names of branches, parts of them such as "elbow up", or "seed"')
     return tuple(name.strip() for name in names)
 
 
-def _values(redundancy: Values) -> float | tuple[tuple[str, float], ...]:
+def _values(field: str, redundancy: Values | None) -> float | tuple[tuple[str, float], ...] | None:
+    if redundancy is None:
+        return None
     expected = "a finite value in radians"
     if isinstance(redundancy, tuple):
         redundancy = dict(redundancy)
     if not isinstance(redundancy, Mapping):
-        return finite_number("redundancy", redundancy, expected)
-    return tuple((str(k), finite_number(f"redundancy.{k}", v, expected)) for k, v in redundancy.items())
+        return finite_number(field, redundancy, expected)
+    return tuple((str(k), finite_number(f"{field}.{k}", v, expected)) for k, v in redundancy.items())
 
 
-def _tolerance(field: str, value: float | None, unit: str, most: float) -> float | None:
+def _whole_number(field: str, value: int | None) -> int | None:
     if value is None:
         return None
-    expected = f"a number from {LEAST_TOLERANCE:g} to {most:g} {unit}, or none"
-    number = finite_number(field, value, expected)
-    if not LEAST_TOLERANCE <= number <= most:
-        raise InputError(field, value, expected)
-    return number
-
-
-def _whole_number(value: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise InputError("max_solutions", value, "a whole number from 1, or none")
+        raise InputError(field, value, "a whole number from 1, or none")
     return int(value)
+
+
+def _obstacles(_field: str, value: Sequence[Obstacle] | None) -> tuple[Obstacle, ...]:
+    return () if value is None or value == () else checked_obstacles(value)
 
 
 def _span(low: float, high: float) -> str:

@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 
 from numba import config, njit, types
 
-from kin.kernels.arguments import Borrowed
+from kin.kernels.arguments import READABLE, Borrowed
 from kin.kernels.cache import LaterCache
 
 MODEL = "model"
@@ -80,15 +80,16 @@ def direct(kernel: Any, *arguments: Any) -> Callable[..., Any]:
     wanted = tuple(map(_argument, arguments))
     if PLAIN:
         return partial(_checked, kernel, wanted)
-    entry: Callable[..., Any] = kernel.compile(wanted)
-    returned = kernel.overloads[wanted].signature.return_type
+    passed = wanted if READABLE else tuple(map(_settled, wanted))
+    entry: Callable[..., Any] = kernel.compile(passed)
+    returned = kernel.overloads[passed].signature.return_type
     if not isinstance(returned, types.Number | types.Boolean | types.NoneType):
         raise TypeError(f"{kernel} returns {returned}, which might be a part of a borrowed array")
-    return entry
+    return entry if READABLE else partial(_checked, entry, wanted)
 
 
 def _checked(kernel: Callable[..., Any], wanted: tuple[Any, ...], *arguments: Any) -> Any:
-    """A plain function called with the checks that compiled ones make."""
+    """A function called with the checks that compiled code makes of borrowed arrays."""
     for kind, value in zip(wanted, arguments, strict=True):
         if isinstance(kind, Borrowed) and not kind.fits(value):
             raise TypeError(f"{value!r} is not {kind}")

@@ -20,8 +20,8 @@ from numpy.typing import ArrayLike
 
 from kin.collision import Obstacle
 from kin.collision.contacts import surroundings
-from kin.collision.obstacles import checked_obstacles
 from kin.errors import InputError
+from kin.ik.options import IKOptions
 from kin.ik.problem import never_cancel
 from kin.motion.limits import MotionLimits, limits_of
 from kin.motion.planner import planned
@@ -61,6 +61,7 @@ def plan_motion(
     q_start: ArrayLike | None = None,
     *,
     limits: MotionLimits | None = None,
+    options: IKOptions | None = None,
     avoid_self_collision: bool = False,
     obstacles: Sequence[Obstacle] = (),
     stop: Callable[[], None] = never_cancel,
@@ -72,6 +73,8 @@ def plan_motion(
         program: a `Program`, its segments, or plain data as in `program_from_dict`.
         q_start: ``(n,)`` where the arm is; the home pose by default.
         limits: other limits than those of `limits_of`.
+        options: the next two as one value. All others have to be the default: the program states the task, and
+            its start the posture.
         avoid_self_collision, obstacles: the motion is checked, and refused at the first place where the arm
             touches itself or an obstacle. It is not led around them.
         stop: called now and then; cancels the computation by raising.
@@ -93,7 +96,9 @@ def plan_motion(
         limits = limits_of(robot)
     elif not isinstance(limits, MotionLimits) or len(limits.velocity) != robot.n:
         raise InputError("limits", limits, f"MotionLimits of {robot.n} joints")
+    wanted = IKOptions.of(options, avoid_self_collision=avoid_self_collision, obstacles=obstacles)
+    wanted.check_only("avoid_self_collision", "obstacles")
     found = planned(robot, program, limits, q.copy(), stop)
-    if avoid_self_collision or obstacles:
-        return checked(found, surroundings(robot, checked_obstacles(obstacles), avoid_self_collision), stop)
+    if wanted.avoids:
+        return checked(found, surroundings(robot, wanted.obstacles, wanted.avoid_self_collision), stop)
     return found

@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike
 
 from kin.collision import Obstacle
 from kin.errors import InputError
-from kin.ik.options import Frame, IKOptions, JointConstraints, Limits, Locks, Task, finite_number
+from kin.ik.options import Frame, IKOptions, Limits, Locks, Task, finite_number
 from kin.ik.problem import IKProblem, listed, never_cancel, read_poses
 from kin.named import robot_of
 from kin.path.details import JumpCause
@@ -52,10 +52,11 @@ def solve_path(
     robot: Robot | str,
     targets: Sequence[ArrayLike] | Array,
     *,
+    options: IKOptions | None = None,
+    q_start: ArrayLike | None = None,
     task: Task = "pose",
     mask: Sequence[bool] | None = None,
     mask_frame: Frame = "tool",
-    q_start: ArrayLike | None = None,
     limits: Limits | None = None,
     locked: Locks | None = None,
     branch: str | Sequence[str] | None = None,
@@ -68,35 +69,37 @@ def solve_path(
 ) -> PathResult:
     """One joint path through all `targets`: as few jumps as possible, then as little joint motion as possible.
 
-    `kin.path.solve` takes the options as one value.
-
     Args:
         robot: the arm, or the id of a built-in one.
         targets: T_base_tool ``(k, 4, 4)``, k ≥ 1; for ``task="position"`` also points ``(k, 3)`` in metres.
-        task, mask, mask_frame, limits, locked, branch, position_tolerance, rotation_tolerance,
-            avoid_self_collision, obstacles: as in `kin.solve_ik`, for every waypoint; the branch ``"seed"`` is
-            that of `q_start`.
+        options: the arguments from `task` to `obstacles` as one value. Those that choose among the solutions of
+            one target (`images`, `prefer`, `max_solutions`) have no effect: the path chooses.
         q_start: ``(n,)`` where the arm is. The way from there to the first waypoint counts as motion, but never as
             a jump: the path begins at its first waypoint. Without it the path may start anywhere; of equally good
             paths, the one that starts nearest to the home pose is taken.
+        task, mask, mask_frame, limits, locked, branch, position_tolerance, rotation_tolerance,
+            avoid_self_collision, obstacles: as in `kin.solve_ik`, for every waypoint; the branch ``"seed"`` is
+            that of `q_start`.
         max_step: the most a joint may move between neighbouring waypoints: radians, or 4 per metre.
         stop: called now and then; cancels the computation by raising.
 
     Raises:
         InputError: a malformed target (named ``targets[i]``) or option. An unreachable target is not an error.
     """
-    options = IKOptions(
+    wanted = IKOptions.of(
+        options,
         task=task,
         mask=mask,
         mask_frame=mask_frame,
-        constraints=JointConstraints(limits, locked),
+        limits=limits,
+        locked=locked,
         branch=branch,
         position_tolerance=position_tolerance,
         rotation_tolerance=rotation_tolerance,
         avoid_self_collision=avoid_self_collision,
         obstacles=obstacles,
     )
-    return solve(robot, targets, options, q_start, max_step, stop)
+    return solve(robot, targets, wanted, q_start, max_step, stop)
 
 
 def solve(
@@ -108,10 +111,9 @@ def solve(
     stop: Callable[[], None] = never_cancel,
     roundings: Sequence[float] | None = None,
 ) -> PathResult:
-    """`solve_path` with the options in one value.
+    """`solve_path` for callers that have an `IKOptions`, or rounded frames.
 
-    Of the options, those that choose among the solutions of one target (`images`, `prefer`, `max_solutions`) have
-    no effect: the path chooses. `roundings` are one per target, each as in `kin.ik.solve`.
+    `roundings` are one per target, each as in `kin.ik.solve`.
     """
     robot = robot_of(robot)
     if q_start is not None and robot.check_q(q_start, "q_start").ndim != 1:

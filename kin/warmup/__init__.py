@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import cache, partial
 from types import MappingProxyType
 
@@ -34,6 +35,7 @@ from kin.path import solve_path
 from kin.robot import Robot
 from kin.solvers import closed_form_of, general6, general7
 from kin.solvers.contract import POSE, ClosedForm, SolverInput
+from kin.solvers.rounded import Rounded7
 from kin.transforms import Array
 from kin.workspace import (
     MEASURES,
@@ -230,6 +232,21 @@ def _solve_generally(robot: Robot) -> None:
         form.solve(SolverInput(T, POSE, values, True, robot.q_home.copy(), robot.lower.copy(), robot.upper.copy()))
 
 
+def _solve_typed(robot: Robot) -> None:
+    """The same arm with twists that are rounded: what is true of the table only, not of its family."""
+    rows = tuple(replace(row, alpha=round(row.alpha, 4)) for row in robot.rows)
+    form = closed_form_of(replace(robot, id=f"{robot.id}-typed", rows=rows))
+    if isinstance(form, Rounded7):
+        form.prepare(robot.q_home.copy())
+
+
+def _solve_singular(robot: Robot) -> None:
+    """A target that a curve of configurations meets: an arm with a spherical wrist, which is stretched."""
+    q = robot.q_home.copy()
+    q[4] = 0.0
+    _ = solve_ik(robot, fk(robot, q)).solutions  # made when they are read
+
+
 def _rest() -> Iterator[tuple[str, Step]]:
     """Names of parts, and their steps."""
     robots = one_of_each_family()
@@ -248,6 +265,11 @@ def _rest() -> Iterator[tuple[str, Step]]:
         robot = next(robot for robot in robots if robot.n == joints and robot.revolute.all())
         yield f"general{joints}", partial(_solve_generally, robot)
         yield MOTIONS, partial(_plan, robot)
+    for robot in robots:
+        if robot.n == 7:
+            yield all_of(family_of(robot)), partial(_solve_typed, robot)
+        if family_of(robot) == "wrist6":
+            yield all_of("wrist6"), partial(_solve_singular, robot)
     # Two moving joints call the same kernels and take the least time.
     locked = [None, None, *first.q_home[2:].tolist()]
     for strategy in STRATEGIES:

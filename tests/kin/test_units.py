@@ -10,7 +10,18 @@ import numpy as np
 import pytest
 
 import kin
-from kin.units import DEFAULT_UNITS, DEGREES, LENGTHS, RADIANS, Unit, Units
+from kin.units import (
+    DEFAULT_UNITS,
+    DEGREES,
+    LENGTHS,
+    RADIANS,
+    Unit,
+    Units,
+    general,
+    grouped,
+    power,
+    typeset,
+)
 
 ALL = [Units(degrees, length) for degrees, length in itertools.product((True, False), LENGTHS)]
 MM, CM, M = (Units(length=length).lengths for length in LENGTHS)
@@ -19,6 +30,28 @@ MM, CM, M = (Units(length=length).lengths for length in LENGTHS)
 def test_degrees_and_millimetres_are_the_default() -> None:
     assert Units() == DEFAULT_UNITS == Units(True, "mm")
     assert (DEFAULT_UNITS.angles.name, DEFAULT_UNITS.lengths.name) == ("°", "mm")
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        (general(12.5), "12.5"),
+        (general(-0.0), "0"),
+        (general(-1e-3, 3), "−0.001"),
+        (general(2.5e-7), "2.5·10⁻⁷"),
+        (general(-1.25e12), "−1.25·10¹²"),
+        (power(3.21e-8), "3.2·10⁻⁸"),
+        (power(9.7e-5, 1), "1·10⁻⁴"),
+        (power(0.0), "0"),
+        (grouped(1_234_567), "1\u202f234\u202f567"),
+        (MM.short(0.35, 6), "350"),
+        (MM.short(-1e-12), "0"),
+        (MM.brief(-2.5e-9), "−2.5·10⁻⁶ mm"),
+        (typeset("off by -2.0e-05 mm, x-1, 5-3, (-4)"), "off by −2.0·10⁻⁵ mm, x-1, 5-3, (−4)"),
+    ],
+)
+def test_numbers_are_written_with_a_true_minus_and_powers_of_ten(text: str, shown: str) -> None:
+    assert text == shown
 
 
 @pytest.mark.parametrize("digits", [0, 1, 2, 3])

@@ -224,3 +224,78 @@ def test_the_fields_of_arrays_are_where_machine_code_reads_them():
         for other in (n - 1, n + 1):
             with pytest.raises(InputError, match=f"{n} joint values"):
                 kin.fk(robot, np.zeros(other))
+
+
+# A finder that loads the module with something in its text replaced, before the core is imported.
+CHANGED = """
+import importlib.machinery, json, sys, sysconfig, warnings
+
+class Loader(importlib.machinery.SourceFileLoader):
+    def get_data(self, path):
+        data = super().get_data(path)
+        if not path.endswith("arguments.py"):
+            return b"" if path.endswith(".pyc") else data  # bytecode would be that of the true text
+        assert {old!r}.encode() in data
+        return data.replace({old!r}.encode(), {new!r}.encode())
+
+class Finder:
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        if name == "kin.kernels.arguments":
+            return importlib.util.spec_from_loader(name, Loader(name, path[0] + "/arguments.py"))
+
+import importlib.util
+sys.dont_write_bytecode = True
+sys.meta_path.insert(0, Finder)
+with warnings.catch_warnings(record=True) as warned:
+    warnings.simplefilter("always")
+    import numpy as np
+    import kin
+    from kin.kernels import arguments
+robot = kin.get_robot("pioneer5")
+q = np.array({q})
+fixed, refused = q.copy(), []
+fixed.flags.writeable = False
+for wrong in (q.tolist(), q[:4], q.astype("f4"), q.astype(">f8"), np.repeat(q, 2)[::2], None, fixed):
+    try:
+        refused.append(kin.fk(robot, wrong).tolist())
+    except kin.InputError as error:
+        refused.append(str(error))
+print(json.dumps([arguments.READABLE, [str(w.message) for w in warned], kin.fk(robot, q).tolist(), refused]))
+"""
+
+WRONG_PLACES = {
+    "true": ("(-1, 1, 2, 3, 5, 6)", "(-1, 1, 2, 3, 5, 6)", ""),
+    "type": ("(-1, 1, 2, 3, 5, 6)", "(-2, 1, 2, 3, 5, 6)", "another type"),
+    "data": ("_DATA = object.__basicsize__", "_DATA = object.__basicsize__ + 8", "another"),
+    "axes": ("(-1, 1, 2, 3, 5, 6)", "(-1, 2, 2, 3, 5, 6)", "another number of axes"),
+    "shape and strides swapped": ("(-1, 1, 2, 3, 5, 6)", "(-1, 1, 3, 2, 5, 6)", "another shape"),
+    "strides": ("(-1, 1, 2, 3, 5, 6)", "(-1, 1, 2, 4, 5, 6)", "another shape"),
+    "data type": ("(-1, 1, 2, 3, 5, 6)", "(-1, 1, 2, 3, 4, 6)", "another data type"),
+    "flags": ("(-1, 1, 2, 3, 5, 6)", "(-1, 1, 2, 3, 5, 7)", "another flags"),
+    "beyond the end": ("(-1, 1, 2, 3, 5, 6)", "(-1, 1, 2, 3, 5, 600)", "shorter"),
+    "no GIL": ('sysconfig.get_config_var("Py_GIL_DISABLED")', "1", "no GIL"),
+}
+
+
+@pytest.mark.parametrize("place", WRONG_PLACES)
+def test_arrays_that_are_laid_out_otherwise_are_passed_as_numba_does(place):
+    old, new, why = WRONG_PLACES[place]
+    code = CHANGED.replace("{old!r}", repr(old)).replace("{new!r}", repr(new)).replace("{q}", str(Q.tolist()))
+    environment = os.environ | {"PYTHONPATH": str(Path(kin.__file__).parents[1])}
+    run = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert run.returncode == 0, run.stderr
+    readable, warned, pose, answers = json.loads(run.stdout)
+    assert readable is (not why)
+    assert np.array_equal(pose, kin.fk(ROBOT, Q))
+    assert [np.array_equal(one, pose) for one in (*answers[:1], *answers[3:5], answers[6])] == [True] * 4
+    assert "5 joint values" in answers[1]
+    assert "joint values" in answers[5]
+    if why:
+        (line,) = warned
+        assert why in line
+        assert np.__version__ in line
+    else:
+        assert warned == []
