@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import os
 import secrets
 import sqlite3
 import threading
@@ -20,17 +21,27 @@ from sqlalchemy import URL, Connection, Engine, create_engine, event, insert, in
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import SQLAlchemyError
 
-from app.classroom import marks
+from app.classroom import erasure, marks
 from app.classroom.clock import steady
+from app.classroom.revisions import REVISIONS
 from app.classroom.tables import REVISION, Setting
 from app.classroom.views import ClassroomUnavailable
 
 logger = logging.getLogger("kinboard.classroom")
 
 WAIT = 3.0  # seconds for a lock, or for a connection
+ERASE_WAIT = 100  # milliseconds for short readers; writers wait too
 LOG_EVERY = 10.0  # seconds between two lines about errors
 _MIGRATION_LOCK = 0x6B696E  # of PostgreSQL
 _KEY = "key"
+NEWER = (
+    "The classroom's database was written by a newer version of Kinboard than this one. "
+    "Tell the operator of this service; everything else works."
+)
+
+
+class NewerDatabaseError(Exception):
+    """The database has had a migration that this version does not know."""
 
 
 class Database:
@@ -46,6 +57,7 @@ class Database:
         self._url = make_url(url) if url else URL.create("sqlite", database=str(file))
         if self._url.drivername in ("postgresql", "postgres"):
             self._url = self._url.set(drivername="postgresql+psycopg")
+        self.newer = False  # whether it was found to be of a newer version when it was last opened
         self._engine: Engine | None = None
         self._inode: tuple[int, int] | None = None
         self._lock = threading.Lock()
@@ -94,13 +106,43 @@ class Database:
         with self._words():
             _resume_time(self._ready())
 
-    def shrink(self) -> None:
-        """Erase what was deleted from SQLite's files; elsewhere the database does so."""
-        if self._file is not None:
-            with contextlib.suppress(ClassroomUnavailable), self._words(), self._ready().connect() as connection:
-                raw = connection.connection.driver_connection
-                assert raw is not None
-                raw.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+    @property
+    def lost(self) -> bool:
+        """Whether SQLite's file was there and has gone."""
+        return self._file is not None and self._inode is not None and not os.access(self._file, os.F_OK)
+
+    @property
+    def overwrites(self) -> bool:
+        """Whether `erase` can say that something is erased."""
+        return self._file is not None
+
+    def erase(self) -> bool:
+        """Erase what was deleted from SQLite's files; returns whether nothing of it is left.
+
+        It does not wait for programs that read: they may do so for long. Raises `ClassroomUnavailable`.
+        """
+        if self._file is None:
+            return False
+        with self.read() as connection:
+            note = erasure.noted(connection)
+        if not note:
+            return True
+        with self._words(), self._ready().connect() as connection:
+            raw = connection.connection.driver_connection
+            assert raw is not None
+            _, frames, copied = raw.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()[0]
+            if copied < frames:
+                return False  # somebody reads what the file had before; emptying the log would stop all writers
+            raw.execute(f"PRAGMA busy_timeout={ERASE_WAIT}")
+            try:
+                busy, *_ = raw.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()[0]
+            finally:
+                raw.execute(f"PRAGMA busy_timeout={int(1000 * WAIT)}")
+        if busy:
+            return False
+        with self.write() as connection:
+            erasure.forget(connection, note)
+        return True
 
     def close(self) -> None:
         """Close all connections."""
@@ -126,7 +168,7 @@ class Database:
                 connect_args={"connect_timeout": max(2, int(WAIT))},
             )
         else:
-            if self._inode is not None and not self._file.exists():
+            if self.lost:
                 raise FileNotFoundError(f"{self._file} has disappeared")  # an empty one would end all rooms
             self._file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             engine = create_engine(
@@ -135,6 +177,7 @@ class Database:
             event.listen(engine, "connect", _configure_sqlite)
             event.listen(engine, "begin", _begin_sqlite)
         try:
+            self.newer = False
             _migrate(engine)
             _resume_time(engine)
         except BaseException:
@@ -160,13 +203,20 @@ class Database:
         except ModuleNotFoundError as error:
             logger.error("the database's driver is missing: install kinboard[postgres]")
             raise ClassroomUnavailable(_sentence(error)) from error
+        except NewerDatabaseError as error:
+            self.newer = True
+            self._log(f"{error}")
+            raise ClassroomUnavailable(NEWER) from error
         except (SQLAlchemyError, sqlite3.Error, OSError) as error:
             if isinstance(error, OSError):
                 self.close()  # the next transaction opens the file that is there then
-            if steady() - self._logged > LOG_EVERY:
-                self._logged = steady()
-                logger.warning("the classroom's database failed: %s", _brief(error))
+            self._log(_brief(error))
             raise ClassroomUnavailable(_sentence(error)) from error
+
+    def _log(self, words: str) -> None:
+        if steady() - self._logged > LOG_EVERY:
+            self._logged = steady()
+            logger.warning("the classroom's database failed: %s", words)
 
 
 def _configure_sqlite(connection: Any, _: object) -> None:
@@ -185,8 +235,11 @@ def _migrate(engine: Engine) -> None:
     """Run the migrations that this database lacks, in one transaction; others wait."""
     with engine.connect() as connection:
         with connection.begin():
-            if _revision(connection) == REVISION:
+            found = _revision(connection)
+            if found == REVISION:
                 return
+            if found is not None and found not in REVISIONS:
+                raise NewerDatabaseError(f"its revision is {found[:32]}; this version knows up to {REVISION}")
         connection.execution_options(kinboard_write=True)
         with connection.begin():
             if engine.dialect.name == "postgresql":

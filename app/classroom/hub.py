@@ -29,12 +29,20 @@ import os
 import threading
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from app.classroom.attendance import Attendance
 from app.classroom.clock import steady
-from app.classroom.live import ENDED, LiveRoom, Pending
-from app.classroom.views import ClassroomUnavailable, RoomView, Ticket
+from app.classroom.live import LiveRoom, Pending
+from app.classroom.revisions import REVISIONS, revision_of
+from app.classroom.views import (
+    ERASING,
+    NO_ROOM,
+    ClassroomUnavailable,
+    RoomView,
+    Ticket,
+    UnknownRoomError,
+)
 from app.shared.settings import Settings
 
 if TYPE_CHECKING:
@@ -86,7 +94,39 @@ class Hub:
     def in_use(self) -> bool:
         """Whether there is a database with rooms, perhaps of an earlier process."""
         folder, url = self._source
-        return url is not None or (folder / DATABASE_FILE).exists()
+        return url is not None or os.access(folder / DATABASE_FILE, os.F_OK)  # `Path.exists` may raise
+
+    @property
+    def opened(self) -> bool:
+        """Whether this process has used the database."""
+        return self._rooms is not None
+
+    @property
+    def absent(self) -> bool:
+        """Whether there is no database because nobody has opened a room; one that went away is not absent."""
+        return not self.in_use and not self.opened and self.writable
+
+    @property
+    def state(self) -> Literal["ready", "read-only", "missing", "newer-database"]:
+        """Whether rooms can be opened and joined, as far as that is known without waiting for a database."""
+        folder, url = self._source
+        if url is None and self.in_use:
+            stored = revision_of(folder / DATABASE_FILE)
+            newer = stored is not None and stored not in REVISIONS
+        else:
+            newer = self._database is not None and self._database.newer
+        if newer:
+            return "newer-database"
+        if not self.writable:
+            return "read-only"
+        return "missing" if self._database is not None and self._database.lost else "ready"
+
+    def check(self) -> None:
+        """Ask a server of databases, so that the log has what is wrong with it; of a file, `state` tells."""
+        if self._source[1] is None:
+            return
+        with contextlib.suppress(ClassroomUnavailable):
+            self.database.key()
 
     @property
     def writable(self) -> bool:
@@ -95,9 +135,9 @@ class Hub:
         if url is not None:
             return True
         file = folder / DATABASE_FILE
-        if file.exists() and not os.access(file, os.W_OK):
+        if os.access(file, os.F_OK) and not os.access(file, os.W_OK):
             return False
-        there = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+        there = next(each for each in (folder, *folder.absolute().parents) if os.access(each, os.F_OK))
         return there.is_dir() and os.access(there, os.W_OK | os.X_OK)
 
     @property
@@ -122,7 +162,13 @@ class Hub:
 
     def ticket(self, token: str) -> Ticket | None:
         """The ticket of a token from a cookie or a link; None if there is none, or we did not sign it."""
-        return self.rooms.tokens.read(token) if token else None
+        return self.rooms.tokens.read(token) if token and not self.absent else None
+
+    def join(self, code: str, alias: str, known: Ticket | None = None) -> Ticket:
+        """As `Rooms.join`; makes no database, which would be without rooms."""
+        if self.absent:
+            raise UnknownRoomError(NO_ROOM, "code")
+        return self.rooms.join(code, alias, known)
 
     def attend(self, ticket: Ticket, changed: Callable[[], None]) -> Attendance:
         """Take part from now on; `changed` is called after each change, from any thread."""
@@ -184,10 +230,19 @@ class Hub:
 
     def closed(self, room: str) -> None:
         """A room has been ended by one of its pages."""
+        self._close([room])
+
+    def _close(self, rooms: Iterable[str]) -> None:
+        """Say to the pages of rooms that have ended what is true of them."""
+        try:
+            words = self.rooms.said_of_ended()
+        except ClassroomUnavailable:
+            words = ERASING
         with self._lock:
-            if room in self._lives:
-                self._lives[room].closed = ENDED
-        self._notify([room])
+            ended = [room for room in rooms if room in self._lives]
+            for room in ended:
+                self._lives[room].closed = words
+        self._notify(ended)
 
     def leave(self, page: Attendance) -> None:
         """Forget an attendance; what it has reported is still stored."""
@@ -253,7 +308,10 @@ class Hub:
             return False
         with self._lock:
             open_rooms = [live.id for live in self._lives.values() if not live.closed]
+            erasing = [live.id for live in self._lives.values() if beat and live.closed == ERASING]
         answered = self._poll(open_rooms)
+        if erasing:
+            self._close(erasing)
         with self._lock:
             absent = [live.id for live in self._lives.values() if live.note_absence()]
             for room in [room for room, pages in self._attendances.items() if not pages]:
@@ -307,13 +365,11 @@ class Hub:
         with self._lock:
             for room, loaded in found.items():
                 live = self._lives.get(room)
-                if live is None:
-                    continue
-                if loaded is None:
-                    live.closed = ENDED
-                elif loaded[0]["version"] >= live.version:
+                if live is not None and loaded is not None and loaded[0]["version"] >= live.version:
                     live.load(*loaded)
         self._notify(found)
+        if ended := [room for room, loaded in found.items() if loaded is None]:
+            self._close(ended)
         self._set_problem(known, "")
         return True
 

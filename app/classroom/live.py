@@ -14,7 +14,6 @@ from app.classroom.clock import steady
 from app.classroom.views import Poll, RoomView, SeatView, Shown, Task, Ticket
 
 AWAY = 7.0  # seconds without a beat after which nobody is assumed to be there
-ENDED = "The room has ended. Everything in it was erased."
 REMOVED = "The teacher has removed you."
 _UNSEEN = {"beat", "version"}  # columns that no page shows
 _PAGE = {"page"}

@@ -7,20 +7,32 @@ import secrets
 import unicodedata
 from dataclasses import dataclass, fields
 
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import Connection, Text, cast, delete, func, insert, select, update
 
-from app.classroom import marks
+from app.classroom import erasure, marks
 from app.classroom.clock import now
 from app.classroom.database import Database
-from app.classroom.tables import TOKEN_BYTES, Attempt, Room, Seat
+from app.classroom.tables import TOKEN_BYTES, Attempt, LtiSeat, Room, Seat
 from app.classroom.tokens import Tokens, new_code, read_code
-from app.classroom.views import ANSWER_SHOWN, Confirmed, NewAttempt, RefusedError, Ticket, UnknownRoomError
+from app.classroom.views import (
+    ANSWER_SHOWN,
+    DELETED,
+    ERASED,
+    ERASING,
+    NO_ROOM,
+    ClassroomUnavailable,
+    Confirmed,
+    NewAttempt,
+    RefusedError,
+    Ticket,
+    UnknownRoomError,
+)
 from app.shared.clients import share_of
 
 LONGEST_ALIAS, LONGEST_TITLE = 32, 80  # characters
 MIN_LIFE, MAX_LIFE = 60.0, 200 * 24 * 3600.0  # seconds: a term
 MAX_SEATS = 200
-MAX_ATTEMPTS = 2000  # of one seat
+MAX_ATTEMPTS, MAX_STORED = 2000, 1_000_000  # of one seat: answers, and characters of them
 UNSEEN = 60.0  # seconds after which a seat whose page has never come may be given to somebody else
 LONGEST_ANSWER = 20_000  # characters, as JSON
 _TRIES = 20  # of random codes
@@ -112,12 +124,13 @@ class Rooms:
             query = select(Room.id).where(Room.code == code, Room.ends > now())
             room = connection.scalar(query.with_for_update())
             if room is None:
-                raise UnknownRoomError("No room has this code. Ask your teacher; rooms end after a while.", "code")
+                raise UnknownRoomError(NO_ROOM, "code")
             alias = clean_name(alias, LONGEST_ALIAS, "alias")
             version = next_version(connection, room)
             if known is not None and known.room == room and known.seat:
                 mine = update(Seat).where(Seat.id == known.seat, Seat.room_id == room, Seat.removed.is_(False))
                 if connection.execute(mine.values(alias=alias, version=version)).rowcount:
+                    erasure.note(connection)  # of the alias before
                     return known
             taken = select(func.count()).where(Seat.room_id == room, Seat.removed.is_(False))
             full = (connection.scalar(taken) or 0) >= MAX_SEATS
@@ -165,25 +178,46 @@ class Rooms:
         return [room for room in (self.find(Ticket(each)) for each in ids) if room is not None]
 
     def end(self, room: str) -> bool:
-        """Erase a room and everything in it; returns whether there was one."""
+        """End a room and delete everything in it; returns whether there was one. `erased` says what is left."""
         with self._database.write() as connection:
             ended = connection.execute(delete(Room).where(Room.id == room)).rowcount > 0
+            if ended:
+                erasure.note(connection)
         if ended:
-            self._database.shrink()
+            self.erase()
         return ended
 
+    def erase(self) -> bool:
+        """Erase what was deleted, if the database lets us; returns whether there is nothing left to be tried."""
+        try:
+            return self._database.erase() or not self._database.overwrites
+        except ClassroomUnavailable:
+            return False
+
+    def said_of_ended(self) -> str:
+        """What is true of rooms that have ended, as a sentence; raises `ClassroomUnavailable`."""
+        if not self._database.overwrites:
+            return DELETED
+        with self._database.read() as connection:
+            return ERASING if erasure.noted(connection) else ERASED
+
     def remove_seat(self, room: str, seat: str) -> None:
-        """Erase a seat: its alias, page and attempts."""
+        """Erase a seat: its alias, page and attempts, and whom a learning platform has it for."""
         with self._database.write() as connection:
             version = next_version(connection, room)
-            one = update(Seat).where(Seat.id == seat, Seat.room_id == room)
-            connection.execute(one.values(**_ERASED, version=version))
-            connection.execute(delete(Attempt).where(Attempt.seat_id == seat, Attempt.room_id == room))
+            mine = Seat.id == seat, Seat.room_id == room
+            if connection.execute(update(Seat).where(*mine).values(**_ERASED, version=version)).rowcount:
+                connection.execute(delete(Attempt).where(Attempt.seat_id == seat, Attempt.room_id == room))
+                connection.execute(delete(LtiSeat).where(LtiSeat.seat_id == seat))
+                erasure.note(connection)
+        self.erase()
 
     def remove_unseen(self, room: str) -> int:
         """Remove who has joined a while ago and whose page has never come; returns how many."""
         with self._database.write() as connection:
-            return _remove_unseen(connection, room, next_version(connection, room))
+            removed = _remove_unseen(connection, room, next_version(connection, room))
+        self.erase()
+        return removed
 
     def rename_seat(self, room: str, seat: str, alias: str) -> None:
         """Give a seat another alias; raises `RefusedError`."""
@@ -192,6 +226,8 @@ class Rooms:
             version = next_version(connection, room)
             one = update(Seat).where(Seat.id == seat, Seat.room_id == room, Seat.removed.is_(False))
             connection.execute(one.values(alias=alias, version=version))
+            erasure.note(connection)
+        self.erase()
 
     def submit(self, ticket: Ticket, attempt: NewAttempt) -> Confirmed:
         """Store an attempt; the same attempt again is stored once. Raises `RefusedError` if the seat is gone."""
@@ -212,9 +248,13 @@ class Rooms:
                 if stored.seat_id != ticket.seat:
                     raise RefusedError("This attempt belongs to another student.")
                 return Confirmed(attempt.id, stored.at)
-            made = connection.scalar(select(func.count()).where(Attempt.seat_id == ticket.seat)) or 0
+            size = func.coalesce(func.sum(func.length(cast(Attempt.answer, Text))), 0)
+            mine_all = select(func.count(), size).where(Attempt.seat_id == ticket.seat)
+            made, stored_size = connection.execute(mine_all).one()
             if made >= MAX_ATTEMPTS:
                 raise RefusedError(f"You have made {MAX_ATTEMPTS} attempts in this room; no more are stored.")
+            if stored_size >= MAX_STORED:
+                raise RefusedError(f"Your answers in this room have {MAX_STORED} characters; no more are stored.")
             if not attempt.gave_up and _was_shown(connection, ticket.seat, attempt):
                 raise RefusedError("You have seen the answer to this task. Answers to other numbers count.")
             at = now()
@@ -243,7 +283,9 @@ class Rooms:
         if going_on:
             with self._database.write(durable=False) as connection:
                 marks.keep(connection)
-        return sum(self.end(room) for room in over)
+        ended = sum(self.end(room) for room in over)
+        self.erase()  # also what other processes have deleted, and what an earlier one could not erase
+        return ended
 
 
 _ERASED: dict[str, object] = {
@@ -258,7 +300,10 @@ def _remove_unseen(connection: Connection, room: str, version: int | None) -> in
         Seat.room_id == room, Seat.removed.is_(False), Seat.beat == 0, Seat.joined < now() - UNSEEN,
         Seat.id.not_in(answered),
     )  # fmt: skip
-    return connection.execute(unseen.values(**_ERASED, version=version)).rowcount
+    count = connection.execute(unseen.values(**_ERASED, version=version)).rowcount
+    if count:
+        erasure.note(connection)
+    return count
 
 
 def clean_name(text: str, longest: int, field: str) -> str:

@@ -1,7 +1,7 @@
 """The tables of the classroom. `REVISION` names the migration that makes them as they are here.
 
-A change of a table comes with a new file in ``migrations/versions`` and a new `REVISION`; a test compares what the
-migrations make with what is written here.
+A change of a table comes with a new file in ``migrations/versions`` and its name in `REVISIONS`; a test compares
+what the migrations make with what is written here.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ from typing import Any
 from sqlalchemy import JSON, BigInteger, Double, ForeignKey, Index, String, Text, false, text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-REVISION = "0004"
+from app.classroom.revisions import REVISIONS
+
+REVISION = REVISIONS[-1]
 ID = String(32)
 TOKEN_BYTES = 8  # of random ids
 

@@ -6,6 +6,18 @@ import secrets
 from dataclasses import dataclass, field
 from enum import Enum
 
+NO_ROOM = "No room has this code. Ask your teacher; rooms end after a while."
+# What can be said of a room that has ended.
+ERASED = "The room has ended. Everything in it was erased."
+ERASING = (
+    "The room has ended, and nobody can open it any more. Another program is reading the database: "
+    "what was in the room is erased from its file as soon as that program lets go."
+)
+DELETED = (
+    "The room has ended. Everything in it was deleted from the database; "
+    "its server overwrites it later, and backups may have it."
+)
+
 
 class ClassroomUnavailable(Exception):  # noqa: N818 - a state of the service, not a mistake of the caller
     """The classroom's database is gone, locked or full. The message is a sentence for the page."""

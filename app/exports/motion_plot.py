@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from html import escape
-
 import numpy as np
 
-from app.exports.svg import joint_colour, tick_labels
+from app.exports.svg import joint_colour, text_of, tick_labels
 from kin import Motion
 from kin.transforms import Array
 
@@ -24,9 +22,9 @@ def motion_plot(motion: Motion) -> str:
         f'height="{HEIGHT:g}" font-family="system-ui, sans-serif" font-size="12" fill="{INK}">'
         f'<rect width="{WIDTH:g}" height="{HEIGHT:g}" fill="#fff"/>'
     )
-    title = escape(motion.program.name or motion.robot.name)
+    title = text_of(motion.program.name or motion.robot.name)
     parts = [f'<text x="{LEFT:g}" y="30" font-size="17" font-weight="600">{title}</text>']
-    parts.append(f'<text x="{LEFT:g}" y="50">{escape(_cut(motion.reason))}</text>')
+    parts.append(f'<text x="{LEFT:g}" y="50">{text_of(_cut(motion.reason))}</text>')
     if motion.planned and motion.duration > 0.0:
         times = np.linspace(0.0, motion.duration, SAMPLES)
         q, qd = motion.derivatives(times)[:2]
@@ -95,5 +93,5 @@ def _legend(motion: Motion) -> str:
         parts.append(f'<path d="M{x:.1f} {HEIGHT - 18:g}h18" stroke="{joint_colour(i)}" stroke-width="3"/>')
         plain = joint.name.lower() in (f"joint {i + 1}", str(i + 1))
         name = joint.name if plain else f"{i + 1} {joint.name}"
-        parts.append(f'<text x="{x + 23:.1f}" y="{HEIGHT - 14:g}">{escape(name[:16])}</text>')
+        parts.append(f'<text x="{x + 23:.1f}" y="{HEIGHT - 14:g}">{text_of(name[:16])}</text>')
     return "".join(parts)

@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.exports.svg import AxisStyle, Plot, axes, joint_colour, png_url
+from app.exports.svg import AxisStyle, Plot, axes, joint_colour, png_url, text_of
 from kin import Robot, Section, WorkspaceChunk, WorkspaceFacts
+from kin.units import fixed, grouped
 from kin.workspace import Span
 
 CELLS = 360  # along the longest side
@@ -96,7 +96,7 @@ class Picture:
         rows = [max(box[1] for k, box in enumerate(boxes) if k // 2 == r) for r in (0, 1)]
         width = 2 * MARGIN + GAP + sum(columns)
         top = MARGIN + 40.0
-        title = f"Workspace of {escape(self._robot.name)}"
+        title = f"Workspace of {text_of(self._robot.name)}"
         height = top + MARGIN + GAP + sum(rows)
         parts = [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" role="img" '
@@ -121,7 +121,7 @@ class Picture:
 
     def _words(self) -> str:
         facts = self._facts
-        words = [f"{self._points:,} points".replace(",", " ")]
+        words = [f"{grouped(self._points)} points"]
         words.append(f"reach {_mm(facts.reach.largest.value)} mm from the shoulder")
         if facts.reach.least.value > 5e-4:
             words.append(f"hole {_mm(facts.reach.least.value)} mm")
@@ -136,7 +136,7 @@ class Picture:
         )
         names = [f"{name.replace('along', 'z')} (mm)" for name in (view.right, view.up)]
         parts = [
-            f'<text y="-12" font-size="13" font-weight="600">{escape(view.title)}</text>',
+            f'<text y="-12" font-size="13" font-weight="600">{text_of(view.title)}</text>',
             f'<image width="{width:.1f}" height="{height:.1f}" preserveAspectRatio="none" '
             f'style="image-rendering:pixelated" href="{png_url(coloured(counts))}"/>',
             f'<rect width="{width:.1f}" height="{height:.1f}" fill="none" stroke="{SOFT}"/>',
@@ -185,4 +185,4 @@ def _legend(joints: list[int], x: float) -> str:
 
 
 def _mm(metres: float) -> str:
-    return f"{round(1000 * metres)}".replace("-", "−")
+    return fixed(1000.0 * metres, 0)

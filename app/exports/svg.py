@@ -8,17 +8,22 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from base64 import b64encode
 from dataclasses import dataclass
+from html import escape
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from kin.transforms import Array
+from kin.units import fixed
 
 # The colours of joints 1, 2, … in plots; all of them are legible on white.
 JOINT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#a8518a", "#b87a00", "#2f8fbf", "#8a5a00")
+
+_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 @dataclass(frozen=True)
@@ -90,8 +95,7 @@ def tick_labels(low: float, high: float, unit: float) -> list[tuple[float, str]]
     values = ticks(low, high)
     step = unit * (values[1] - values[0])
     decimals = max(0, math.ceil(-math.log10(step) - 1e-9))
-    # Adding zero turns -0.0 into 0.0.
-    return [(value, f"{round(unit * value, decimals) + 0.0:.{decimals}f}".replace("-", "−")) for value in values]
+    return [(value, fixed(unit * value, decimals)) for value in values]
 
 
 def few(labels: list[tuple[float, str]], most: int) -> list[tuple[float, str]]:
@@ -99,6 +103,11 @@ def few(labels: list[tuple[float, str]], most: int) -> list[tuple[float, str]]:
     every = math.ceil(len(labels) / most)
     step = labels[1][0] - labels[0][0] if len(labels) > 1 else 1.0
     return [label for label in labels if round(label[0] / step) % every == 0]
+
+
+def text_of(name: str) -> str:
+    """A name as the text of an element. XML has no control characters, not even escaped: they become a mark."""
+    return escape(_NO_XML.sub("\ufffd", name))
 
 
 def axes(plot: Plot, titles: tuple[str, str], unit: float, style: AxisStyle) -> str:

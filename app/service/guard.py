@@ -97,10 +97,10 @@ class Guard:
             del self._clients[client]
         CONNECTIONS.dec()
 
-    def note(self, why: str, line: str) -> None:
+    def note(self, why: str, line: str, error: Exception | None = None) -> None:
         """Count a refusal and log it: the first of its kind at once, those of the next seconds as a number."""
         REFUSED.labels(why).inc()
-        self._notes.note(why, line)
+        self._notes.note(why, line, error)
 
     def _schedule(self) -> None:
         tick = min(TICK, 0.25 * self.receive_timeout, 0.25 * self.send_timeout)

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Final
 
+from app.shared import metrics
 from kin.warmup.preparation import SIZE
 
 logger = logging.getLogger("kinboard.connections")
@@ -73,6 +74,7 @@ class Member:
         listener: the socket of this and its partners.
         phases: of all processes, in memory that they share.
         kernels: memory of `kin.warmup.preparation`, which they share.
+        counts: memory of `app.shared.metrics`, which they share.
         group: numbers of this and its partners, the process of the viewer first.
         links: sockets to the partners, by their numbers.
     """
@@ -82,6 +84,7 @@ class Member:
     listener: socket.socket
     phases: MutableSequence[int]
     kernels: MutableSequence[int]
+    counts: MutableSequence[int]
     group: Sequence[int]
     links: dict[int, socket.socket]
 
@@ -108,18 +111,19 @@ def members(
         shared: makes an array of bytes in shared memory.
     """
     size = 1 + partners
-    phases, kernels = shared(size * len(listeners)), shared(SIZE)
+    count = size * len(listeners)
+    memory = shared(count), shared(SIZE), shared(count * metrics.SIZE)
     found = []
-    for first, listener in zip(range(0, size * len(listeners), size), listeners, strict=True):
+    for first, listener in zip(range(0, count, size), listeners, strict=True):
         group = range(first, first + size)
         pairs = {
             number: socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for number in group[1:] if SUPPORTED
         }
         ours = {number: pair[0] for number, pair in pairs.items()}
         role = Role.VIEWER if pairs else Role.ALL
-        found.append(Member(role, first, listener, phases, kernels, group, ours))
+        found.append(Member(role, first, listener, *memory, group, ours))
         for number, pair in pairs.items():
-            found.append(Member(Role.REST, number, listener, phases, kernels, group, {first: pair[1]}))
+            found.append(Member(Role.REST, number, listener, *memory, group, {first: pair[1]}))
     return found
 
 

@@ -48,6 +48,7 @@ def require_shape(kind: type, *names: str) -> None:
 require_shape(
     HttpToolsProtocol,
     *("connection_made", "connection_lost", "data_received", "resume_writing", "_unset_keepalive_if_required"),
+    "timeout_keep_alive_handler",
     *("on_message_begin", "on_headers_complete", "on_message_complete", "on_response_complete"),
     *("_start_asgi_task", "handle_websocket_upgrade", "_should_upgrade", "_unsupported_upgrade_warning"),
     *("cycle", "flow", "headers", "parser", "pipeline", "server_state"),
@@ -55,6 +56,7 @@ require_shape(
 require_shape(
     RequestResponseCycle,
     *("keep_alive", "response_started", "response_complete", "chunked_encoding", "expected_content_length"),
+    *("transport", "disconnected", "message_event"),
 )
 
 
@@ -138,10 +140,18 @@ class HttpProtocol(HttpToolsProtocol):
     # the connection
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        self.transport = transport
+        try:
+            self._accept(transport)
+        except Exception as error:  # noqa: BLE001 - asyncio would leave the connection open, and nobody would answer
+            self.guard.note("failed", "a connection could not be accepted and is closed", error)
+            self.ended = True
+            transport.abort()
+
+    def _accept(self, transport: asyncio.Transport) -> None:
         host = (transport.get_extra_info("peername") or ("unknown",))[0]
         number = transport.get_extra_info("socket").fileno()
         if reason := self.guard.refusal(host, number):
-            self.transport = transport
             self.ended = True
             self._write(ProblemError(503, "busy", f"No connection is free: {reason}.", "Try again in a moment."))
             return
@@ -161,7 +171,7 @@ class HttpProtocol(HttpToolsProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         if self._host is not None:
             self.guard.remove(self, self._host)
-            super().connection_lost(exc)
+        super().connection_lost(exc)
 
     def resume_writing(self) -> None:
         self._outflow.flowed = True
@@ -243,7 +253,8 @@ class HttpProtocol(HttpToolsProtocol):
         self._since = self.loop.time()
 
     def on_headers_complete(self) -> None:
-        if len(self.headers) > MAX_HEADERS:
+        size = len(self.url) + sum(len(name) + len(value) + 4 for name, value in self.headers)
+        if size > MAX_HEAD or len(self.headers) > MAX_HEADERS:  # a whole head may have come at once
             raise _head_too_large()
         if self._handover is not None and not self._first:
             path = urllib.parse.unquote((httptools.parse_url(self.url).path or b"").decode("ascii", "replace"))
@@ -333,7 +344,19 @@ class HttpProtocol(HttpToolsProtocol):
     def _start_asgi_task(self, cycle: RequestResponseCycle, app: ASGI3Application) -> None:
         if cycle.scope["http_version"] == "1.0":
             app = cast("ASGI3Application", _unchunked(app, cycle))
-        super()._start_asgi_task(cycle, app)
+        super()._start_asgi_task(cycle, cast("ASGI3Application", _while_connected(app, cycle)))
+
+
+class SupervisorLine(HttpProtocol):
+    """The connection on which the supervisor asks whether this process answers: not counted, and never idle."""
+
+    def _accept(self, transport: asyncio.Transport) -> None:
+        self._handover = None
+        HttpToolsProtocol.connection_made(self, transport)
+        self.client = None  # tells the application whose requests these are
+
+    def timeout_keep_alive_handler(self) -> None:
+        """Nothing: a supervisor that was stopped for a while still needs the line."""
 
 
 def raw_answer(error: ProblemError, headers: Iterable[tuple[bytes, bytes]]) -> bytes:
@@ -363,6 +386,25 @@ class _ElsewhereError(Exception):
 def _head_too_large() -> ProblemError:
     detail = f"The head of the request has more than {MAX_HEAD} bytes or {MAX_HEADERS} fields."
     return ProblemError(431, "head-too-large", detail, "Send fewer or shorter header fields.")
+
+
+def _while_connected(app: Any, cycle: RequestResponseCycle) -> Any:
+    """`app`, whose answer ends when writing fails.
+
+    asyncio reports a lost connection only in the next round of the loop. An answer that is ready is written in one
+    round, and asyncio logs a line for each piece after the failure.
+    """
+
+    async def connected(scope: Scope, receive: Receive, send: Send) -> None:
+        async def send_while_connected(message: Message) -> None:
+            if cycle.transport.is_closing() and not cycle.response_complete:
+                cycle.disconnected = True
+                cycle.message_event.set()
+            await send(message)
+
+        await app(scope, receive, send_while_connected)
+
+    return connected
 
 
 def _unchunked(app: Any, cycle: RequestResponseCycle) -> Any:

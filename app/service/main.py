@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import multiprocessing
 import os
 import random
 import signal
+import socket
 import sys
 import tempfile
-from collections.abc import AsyncIterator, Callable, MutableSequence
+from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from functools import partial
 from pathlib import Path
-from typing import cast
 
 from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
@@ -59,7 +58,8 @@ from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.memory.answers import AnswerMemory
 from app.shared.memory.process import MemoryKeeper
-from app.shared.metrics import forget_process
+from app.shared.memory.shared import shared_bytes
+from app.shared.metrics import count_together, forget_process
 from app.shared.places import Places
 from app.shared.security import SecurityHeaders
 from app.shared.settings import Settings
@@ -82,6 +82,10 @@ DESCRIPTION = (
     "Metres and radians everywhere; quaternions are `wxyz`. "
     "A target out of reach is an answer with a `status` and a `reason`, not an error."
 )
+
+NEWER_DATABASE = """\
+kinboard: the database of classrooms in {} was written by a newer version of Kinboard. Rooms cannot be used:
+install that version, or set KINBOARD_DATA to another folder. Everything else works."""
 
 OPEN_TO_ALL = """\
 **************************************************************************
@@ -221,22 +225,26 @@ def run(settings: Settings, open_browser: bool = False) -> int:
                 print(OPEN_TO_ALL, file=sys.stderr, flush=True)
             elif not settings.allowed_hosts:
                 settings = settings.model_copy(update={"allowed_hosts": (*LOCAL_NAMES, settings.host)})
+        if Hub.of(settings).state == "newer-database":
+            print(NEWER_DATABASE.format(settings.data_folder), file=sys.stderr, flush=True)
         clock.now()  # processes that start later, after the clock was set, count from here too
         port = listeners[0].getsockname()[1]
         others = url_for_others(settings.host, port, clean_prefix(settings.root_path))
         greeting = Greeting(url_of(settings, port), open_browser, others)
         partners = settings.rest_workers if SUPPORTED else 0
-        parts = members(
-            listeners, partners, lambda size: cast("MutableSequence[int]", multiprocessing.RawArray("B", size))
-        )
+        parts = members(listeners, partners, shared_bytes)
         for part in parts:
             for link in part.links.values():
                 stack.enter_context(link)
         bench = None
-        if settings.bench and len(parts) > 1:
-            bench = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="kinboard-bench-")))
+        if settings.bench:
+            try:
+                bench = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="kinboard-bench-")))
+            except OSError as error:
+                print(f"kinboard: no folder for runs of the benchmark, which are off: {error}", file=sys.stderr)
+                settings = settings.model_copy(update={"bench": False})
         if len(parts) == 1:
-            return _serve(settings, parts[0], store=store, greeting=greeting)
+            return _serve(settings, parts[0], store=store, greeting=greeting, bench=bench)
         return supervise(
             # One reading of the robots for all processes, also for those that start later.
             partial(_serve, settings, store=store, bench=bench, processor=random.randrange(1024)),
@@ -251,13 +259,13 @@ def run(settings: Settings, open_browser: bool = False) -> int:
 def _forget(member: Member, pid: int) -> None:
     """Drop what a process that has ended reported."""
     member.report(Phase.AWAY)
-    forget_process(pid)
+    forget_process(member.counts, member.number)
 
 
 def _serve(
     settings: Settings,
     member: Member,
-    alive: Callable[[], None] | None = None,
+    line: socket.socket | None = None,
     store: Store | None = None,
     greeting: Greeting | None = None,
     processor: int = 0,
@@ -266,12 +274,14 @@ def _serve(
     """Serve until a signal ends this process; returns 1 if it could not start.
 
     Args:
-        alive: what this process calls once a second, if there are several.
-        bench: folder for runs of the benchmark, if there are several.
+        line: connection to the supervisor, if there are several processes.
+        bench: folder for runs of the benchmark, if there are any.
         processor: on which the first of several processes is kept, and the others on those that follow.
     """
     if settings.pin:
-        pin(None if alive is None else processor + member.number)
+        pin(None if line is None else processor + member.number)
+    if line is not None:
+        count_together(member.counts, member.number, len(member.phases))
     if member.role is Role.REST:
         os.nice(NICENESS)
     if settings.access_log:
@@ -279,7 +289,7 @@ def _serve(
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.set_threshold(*COLLECTIONS)
     # Kernels and routes live as long as the process: one collection among them would stop all visitors for 50 ms.
-    server = Server(create_app(settings, store, member, gc.freeze, bench), settings, member, greeting, alive)
+    server = Server(create_app(settings, store, member, gc.freeze, bench), settings, member, greeting, line)
     # uvicorn shuts down in order and then raises the signal again, which is the expected end here.
     before = signal.signal(signal.SIGTERM, server.handle_exit)
     try:

@@ -7,6 +7,8 @@ import contextlib
 import errno
 import ipaddress
 import logging
+import os
+import signal
 import socket
 import sys
 import threading
@@ -20,10 +22,11 @@ from fastapi import FastAPI
 
 from app.service.guard import Guard
 from app.service.handover import AT_ONCE, Handover, Member, Phase
-from app.service.http_protocol import GuardedConfig, HttpProtocol
+from app.service.http_protocol import GuardedConfig, HttpProtocol, SupervisorLine
 from app.service.web.inspection import MAX_MESSAGE
 from app.service.web.prefix import clean_prefix
 from app.service.websocket_protocol import WebSocketProtocol
+from app.service.workers import is_orphan
 from app.shared.settings import Settings
 from app.shared.threads import end_process
 from kin import __version__
@@ -76,7 +79,7 @@ class Server(uvicorn.Server):
 
     Args:
         member: what this process is among those of the service.
-        alive: called about once a second by the event loop.
+        line: connection to the supervisor, which asks on it whether this process is well.
     """
 
     def __init__(
@@ -85,7 +88,7 @@ class Server(uvicorn.Server):
         settings: Settings,
         member: Member,
         greeting: Greeting | None = None,
-        alive: Callable[[], None] | None = None,
+        line: socket.socket | None = None,
     ) -> None:
         config = server_config(app, settings, open_files())
         super().__init__(config)
@@ -99,7 +102,7 @@ class Server(uvicorn.Server):
         self._end_work = app.state.compute.close
         self._drain = settings.drain
         self._greeting = greeting
-        self._alive = alive
+        self._line = line
         self._deadline: threading.Timer | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -108,6 +111,8 @@ class Server(uvicorn.Server):
         for listener in sockets or ():
             listener.listen(QUEUE)  # asyncio has just made the queue as short as `ACCEPTED`
         self._handover.start(self._adopt)
+        if self._line is not None:
+            self._take(self._line, lambda: self._protocol(SupervisorLine))
         if self._member.away(self._member.number):
             self._member.report(Phase.SERVING)
         if self._greeting is not None:
@@ -122,8 +127,8 @@ class Server(uvicorn.Server):
             loop.default_exception_handler(context)
 
     async def on_tick(self, counter: int) -> bool:
-        if self._alive is not None and counter % 10 == 0:  # called ten times a second
-            self._alive()
+        if counter % 10 == 0 and is_orphan():  # called ten times a second
+            os.kill(os.getpid(), signal.SIGTERM)
         if not self._member.accepts:
             await self._stand_in()
         return await super().on_tick(counter)
@@ -140,15 +145,24 @@ class Server(uvicorn.Server):
         elif not away and self.servers:
             self.servers.pop().close()
 
-    def _protocol(self, first: bytes = b"") -> HttpProtocol:
-        return HttpProtocol(
-            self._config, server_state=self.server_state, app_state=self.lifespan.state, first=first
-        )
+    def _protocol(self, kind: type[HttpProtocol] = HttpProtocol, first: bytes = b"") -> HttpProtocol:
+        return kind(self._config, server_state=self.server_state, app_state=self.lifespan.state, first=first)
 
     def _adopt(self, connection: socket.socket, data: bytes) -> None:
         """Go on with a connection that another process has accepted."""
+        self._take(connection, lambda: self._protocol(first=data))
+
+    def _take(self, connection: socket.socket, protocol: Callable[[], HttpProtocol]) -> None:
         loop = asyncio.get_running_loop()
-        task = loop.create_task(loop.connect_accepted_socket(lambda: self._protocol(data), connection))
+
+        async def take() -> None:
+            try:
+                await loop.connect_accepted_socket(protocol, connection)
+            except Exception as error:  # noqa: BLE001 - the client would wait for an answer
+                self._note("failed", "a connection could not be accepted and is closed", error)
+                connection.close()
+
+        task = loop.create_task(take())
         self._adopting.add(task)
         task.add_done_callback(self._adopting.discard)
 

@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import PlainTextResponse
 
+from app.classroom import Hub
 from app.service.startup import Status
 from app.shared.metrics import CONTENT_TYPE, exposition
 from kin.warmup.preparation import Preparation
@@ -43,9 +44,10 @@ class Readiness(BaseModel):
     kernels: Kernels | None = Field(
         description="Those besides the first arm's, while they are compiled; null before that, and when all are."
     )
-    classrooms: Literal["ready", "off", "read-only"] = Field(
-        description="Whether rooms can be opened: not if KINBOARD_MAX_ROOMS is 0 (off), and not if the folder "
-        "KINBOARD_DATA cannot be written (read-only). The service is ready all the same."
+    classrooms: Literal["ready", "off", "read-only", "missing", "newer-database"] = Field(
+        description="Whether rooms can be opened: not if KINBOARD_MAX_ROOMS is 0 (off), if the folder "
+        "KINBOARD_DATA cannot be written (read-only), if the database was there and has gone (missing), or if a "
+        "newer version of Kinboard has written it (newer-database). The service is ready all the same."
     )
 
 
@@ -76,7 +78,7 @@ async def readyz(request: Request, response: Response) -> Readiness:
         complete=startup.complete,
         # In a thread: the first call of a process looks at all families of arms.
         kernels=None if status != "ready" or done else await run_in_threadpool(_kernels, startup.preparation),
-        classrooms=_classrooms(request),
+        classrooms=await run_in_threadpool(_classrooms, request),
     )
 
 
@@ -87,8 +89,7 @@ def _kernels(preparation: Preparation) -> Kernels | None:
     return Kernels(ready=ready, preparing=preparing, waiting=waiting)
 
 
-def _classrooms(request: Request) -> Literal["ready", "off", "read-only"]:
+def _classrooms(request: Request) -> Literal["ready", "off", "read-only", "missing", "newer-database"]:
     state = request.app.state
-    if state.settings.max_rooms == 0:
-        return "off"
-    return "ready" if state.classroom.writable else "read-only"
+    hub: Hub = state.classroom
+    return "off" if state.settings.max_rooms == 0 else hub.state

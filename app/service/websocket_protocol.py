@@ -14,7 +14,8 @@ import struct
 import sys
 from typing import Any, Final
 
-from uvicorn._types import ASGIReceiveEvent
+from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
+from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import CloseCode, Frame
 from websockets.http11 import Request
@@ -36,7 +37,8 @@ LINGER: Final = 5.0  # seconds between two looks whether a line is still slow
 
 require_shape(
     WebSocketsSansIOProtocol,
-    *("connection_made", "connection_lost", "data_received", "resume_writing", "receive", "handle_connect"),
+    *("connection_made", "connection_lost", "data_received", "resume_writing", "receive", "send"),
+    *("handle_connect",),
     *("handle_text", "handle_bytes", "handle_cont", "handle_ping", "handle_pong", "handle_parser_exception"),
     *("send_receive_event_to_app", "curr_msg_data_type"),
     *("send_keepalive_ping", "keepalive_timeout", "conn", "queue", "frames", "transport"),
@@ -171,13 +173,19 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
 
     def handle_ping(self) -> None:
         self._spend(CONTROL_COST)
-        super().handle_ping()
+        if not self.transport.is_closing():  # otherwise asyncio logs a line for each answer
+            super().handle_ping()
 
     def handle_pong(self, event: Frame) -> None:
         self._spend(CONTROL_COST)
         super().handle_pong(event)
 
     # what the client reads
+
+    async def send(self, message: ASGISendEvent) -> None:
+        if self.handshake_complete and not self.close_sent and self.transport.is_closing():
+            raise ClientDisconnected  # asyncio says so in its next round, and logs a line for each write before
+        await super().send(message)
 
     def send_keepalive_ping(self) -> None:
         self._queued, self._resumed = self._unsent(), False

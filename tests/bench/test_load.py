@@ -162,6 +162,14 @@ def test_visitors_leave_nothing_behind(service):
     assert soak.left_behind(before, after, 6) == []
 
 
+def test_a_steady_load_is_weighed_each_minute(service):
+    rows, early, end = asyncio.run(soak.steady(service, 2, minute=10.0))
+    assert [row["minute"] for row in rows] == [1, 2]
+    assert all(8 <= row["requests"] <= 12 and row["drags"] > 0 for row in rows)
+    assert not any(row["lost"] for row in rows)
+    assert end.seconds > early.seconds > 0.0
+
+
 def test_a_siege_counts_what_visitors_and_attackers_met(service, monkeypatch):
     monkeypatch.setattr(siege, "VISITORS", 2)
     under = siege.Siege(service)
@@ -191,8 +199,9 @@ def test_each_attack_is_measured_alone(service, monkeypatch):
 def test_leaks_are_reported(more, word):
     before = Usage(1.0, 1 << 28, 10, 20)
     after = Usage(*(a + b for a, b in zip((1.0, 1 << 28, 10, 20), more, strict=True)))
-    (message,) = soak.left_behind(before, after, 100)
-    assert word in message
+    for visits in (100, 0):
+        (message,) = soak.left_behind(before, after, visits)
+        assert (word if visits or word != "kB" else "268 MB") in message
 
 
 @pytest.mark.slow

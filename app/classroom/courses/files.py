@@ -18,7 +18,7 @@ from typing import Any
 from app.classroom.courses.course import LONGEST, Course, Item
 from app.exercises import ExerciseFileError, Exercises
 from app.exercises.fields import Fields
-from app.exercises.files import LESSONS
+from app.exercises.lessons import LESSONS
 from kin import KinematicsError, Robot, get_robot
 
 BUILTIN = Path(__file__).parent / "library"

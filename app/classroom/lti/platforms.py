@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,6 +20,10 @@ _ADDRESSES = ("login_url", "token_url", "keys_url")
 _FIELDS = ("name", "issuer", "client_id", "deployments", *_ADDRESSES)
 KEY_BITS = 2048
 LOCAL = ("127.0.0.1", "::1", "localhost")
+PORTS = {"https": 443, "http": 80}
+_NEVER = frozenset(" \"'<>\\^`{|}")  # in addresses (RFC 3986)
+_HOST = re.compile(r"[a-z0-9_]([a-z0-9_.-]*[a-z0-9_])?|[0-9a-f:.]*:[0-9a-f:.]*", re.ASCII)
+Place = tuple[str, int]  # a host and a port
 
 
 class PlatformFileError(ValueError):
@@ -41,6 +46,12 @@ class Platform:
     login_url: str
     token_url: str
     keys_url: str
+
+    @property
+    def places(self) -> frozenset[Place]:
+        """Hosts that the operator names; they may be in a private network."""
+        named = map(place_of, (self.issuer, self.login_url, self.token_url, self.keys_url))
+        return frozenset(place for place in named if place is not None)
 
 
 @dataclass(frozen=True)
@@ -135,17 +146,34 @@ def _platform(row: Mapping[str, Any], where: str) -> Platform:
             raise PlatformFileError(f"{where}: {name}: got {value!r}; it must be {valid}")
     for name in _ADDRESSES:
         if not is_safe(row[name]):
-            raise PlatformFileError(f"{where}: {name}: got {row[name]!r}; it must be an address with https://")
+            raise PlatformFileError(
+                f"{where}: {name}: got {row[name]!r}; it must be an address with https://, in ASCII"
+            )
     values = {name: row[name] for name in _FIELDS if name in row}
     return Platform(**{"name": row["issuer"], **values, "deployments": tuple(row["deployments"])})
 
 
-def is_safe(address: str) -> bool:
-    """Whether we may send something secret to this address: HTTPS, or this machine."""
+def place_of(address: str) -> Place | None:
+    """The host and port of an address with http or https; None if it is none, or contains more than it should."""
+    if not (address.isascii() and address.isprintable()) or not _NEVER.isdisjoint(address):
+        return None
     try:
         parts = urlsplit(address)
-        return bool(parts.hostname) and (
-            parts.scheme == "https" or (parts.scheme == "http" and parts.hostname in LOCAL)
-        )
+        host, port = parts.hostname or "", parts.port or PORTS.get(parts.scheme, 0)
     except ValueError:
-        return False
+        return None
+    return (host, port) if port and _HOST.fullmatch(host) and "@" not in parts.netloc else None
+
+
+def is_safe(address: str) -> bool:
+    """Whether we may send something secret to this address: HTTPS, or this machine."""
+    place = place_of(address)
+    return place is not None and (urlsplit(address).scheme == "https" or place[0] in LOCAL)
+
+
+def origin_of(address: str) -> str:
+    """The origin of a safe address, as a content security policy names it."""
+    parts, place = urlsplit(address), place_of(address)
+    assert place is not None, address
+    host = f"[{place[0]}]" if ":" in place[0] else place[0]
+    return f"{parts.scheme}://{host}" + (f":{place[1]}" if place[1] != PORTS[parts.scheme] else "")

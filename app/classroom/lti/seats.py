@@ -13,12 +13,11 @@ from app.classroom.clock import now
 from app.classroom.database import Database
 from app.classroom.lti.contents import Content
 from app.classroom.lti.launches import Launch
-from app.classroom.rooms import Rooms, clean_name
+from app.classroom.rooms import LONGEST_ALIAS, LONGEST_TITLE, Rooms, clean_name
 from app.classroom.tables import Attempt, LtiNonce, LtiRoom, LtiSeat, Room, Seat
-from app.classroom.views import Ticket
+from app.classroom.views import RefusedError, Ticket
 
 LIFE = 120 * 24 * 3600.0  # s: a term
-LONGEST_ALIAS = 32
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,7 @@ class LtiSeats:
             known = connection.scalar(query.where(LtiSeat.id == user, Seat.removed.is_(False)))
         ticket = self._rooms.join(
             code,
-            clean_name(launch.alias, LONGEST_ALIAS, "alias"),
+            _named(launch.alias, LONGEST_ALIAS, "Student"),
             None if known is None else Ticket(room, known),
         )
         values = {
@@ -118,7 +117,7 @@ class LtiSeats:
             found = connection.execute(query.where(Room.ends > now())).one_or_none()
         if found is not None:
             return found.id, found.code
-        made = self._rooms.open(launch.title, LIFE)
+        made = self._rooms.open(_named(launch.title, LONGEST_TITLE, "Class"), LIFE)
         state = {} if content is None else content.state(made.created)
         with self._database.write() as connection:
             found = connection.execute(query).one_or_none()  # another launch may have been faster
@@ -129,6 +128,14 @@ class LtiSeats:
                 return made.id, made.code
         self._rooms.end(made.id)
         return found.id, found.code
+
+
+def _named(text: str, longest: int, default: str) -> str:
+    """A platform's name for somebody or something, shortened; the default if nothing is left of it."""
+    try:
+        return clean_name(text[:longest], longest, "name")
+    except RefusedError:
+        return default
 
 
 def _digest(*parts: str) -> str:

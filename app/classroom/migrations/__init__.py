@@ -1,1 +1,1 @@
-"""Migrations of the classroom's tables, run by Alembic when a database is first opened."""
+"""Migrations of the tables, one module per step in `versions`."""

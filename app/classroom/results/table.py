@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -13,10 +12,9 @@ from datetime import UTC, datetime
 from itertools import groupby
 
 from app.classroom.views import ANSWER_SHOWN
+from app.shared.spreadsheets import cell
 
 STUCK_TRIES, STUCK_SECONDS = 3, 300.0  # without a right answer
-FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "＝", "＋", "－", "＠")
-_SEPARATED = re.compile(r"([;\t]\s*)(?=[=+\-@＝＋－＠])")
 COLUMNS = (
     "alias", "exercise", "title", "attempt", "variant", "answer", "verdict", "score", "started",
     "answered", "seconds",
@@ -116,15 +114,6 @@ def _lines(rows: Iterable[Iterable[object]]) -> str:
     text = io.StringIO()
     csv.writer(text).writerows(rows)
     return text.getvalue().encode("utf-8", "replace").decode()  # half a letter is none
-
-
-def cell(text: str) -> str:
-    """A text that no spreadsheet takes for a formula: an apostrophe is put before what begins like one.
-
-    Where a comma separates decimals, spreadsheets separate cells at semicolons, so what follows one counts too.
-    """
-    text = _SEPARATED.sub(r"\1'", text)
-    return f"'{text}" if text.lstrip(" ").startswith(FORMULA) else text
 
 
 def _time(seconds: float) -> str:

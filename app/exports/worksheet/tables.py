@@ -7,6 +7,7 @@ import io
 import math
 
 from app.exports.worksheet.sheet import Sheet
+from app.shared.spreadsheets import cell
 from kin.transforms import Array
 
 ENTRIES = tuple(f"m{r}{c}" for r in range(1, 4) for c in range(1, 5))
@@ -32,7 +33,9 @@ def csv_text(sheet: Sheet) -> str:
             for k, value in enumerate((row.theta, row.d, row.a, row.alpha))
         ]
         value = values[i] * unit if i in values else ""
-        writer.writerow([i + 1, row.name, row.kind, *map(_clean, (*table, *limits, value)), *_entries(sheet, A)])
+        writer.writerow(
+            [i + 1, cell(row.name), row.kind, *map(_clean, (*table, *limits, value)), *_entries(sheet, A)]
+        )
     writer.writerow(["tool", "", "", *[""] * 7, *_entries(sheet, sheet.pose)])
     return file.getvalue()
 

@@ -20,6 +20,15 @@ _TEXT = {
     "…": r"\dots{}", "–": "--", "—": "---", "’": "'", "‘": "`", "“": "``", "”": "''", "\u00a0": "~",
     "\u202f": r"\,", "\u2009": r"\,", "✓": "", "✕": "", "ü": r'\"u', "ö": r'\"o', "ä": r'\"a',
 }  # fmt: skip
+_GREEK = {  # letters that LaTeX has commands for; others look like Latin ones, or have accents
+    "SMALL": {
+        *("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu"),
+        *("nu", "xi", "pi", "rho", "sigma", "tau", "upsilon", "phi", "chi", "psi", "omega"),
+    },
+    "CAPITAL": {
+        *("gamma", "delta", "theta", "lambda", "xi", "pi", "sigma", "upsilon", "phi", "psi", "omega"),
+    },
+}
 _INDICES = "₀₁₂₃₄₅₆₇₈₉ᵢₙ₋₊", "0123456789in-+"
 _EXPONENTS = "⁰¹²³⁴⁵⁶⁷⁸⁹ᵀ⁻⁺", "0123456789T-+"
 _RAISED = re.compile(f"([{_INDICES[0]}]+|[{_EXPONENTS[0]}]+)")
@@ -55,10 +64,9 @@ def _one(character: str) -> str:
     if character in _MATH:
         return f"${_MATH[character]}$"
     name = unicodedata.name(character, "")
-    if name.startswith(("GREEK SMALL LETTER ", "GREEK CAPITAL LETTER ")):
-        letter = name.rsplit(" ", 1)[1].lower()
-        letter = {"lamda": "lambda"}.get(letter, letter)
-        return f"$\\{letter.capitalize() if 'CAPITAL' in name else letter}$"
+    greek = re.fullmatch("GREEK (SMALL|CAPITAL) LETTER (FINAL )?([A-Z]+)", name)
+    if greek is not None and (letter := greek[3].lower().replace("lamda", "lambda")) in _GREEK[greek[1]]:
+        return f"$\\{letter.capitalize() if greek[1] == 'CAPITAL' else letter}$"
     raised = re.fullmatch("<(super|sub)> ([0-9A-F]+)", unicodedata.decomposition(character))
     if raised is not None:
         return f"${'^' if raised[1] == 'super' else '_'}{{{chr(int(raised[2], 16))}}}$"

@@ -6,21 +6,24 @@ cookie of ours except the one that ties a launch to the browser of its login.
 
 from __future__ import annotations
 
+import asyncio
 import html
 import json
+import threading
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qs, urlsplit
+from math import ceil
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
+from urllib.parse import parse_qs
 
 from itsdangerous import BadSignature, URLSafeTimedSerializer
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route
 
 from app.api.problems import ProblemError
-from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError
+from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError, Ticket
 from app.classroom.clock import now
 from app.classroom.courses import Courses
 from app.service.web.access import pass_guest
@@ -32,10 +35,16 @@ if TYPE_CHECKING:
     from app.classroom.lti.launches import Launch, Logins
     from app.classroom.lti.platforms import Platforms
     from app.classroom.lti.seats import LtiSeats
+    from app.classroom.rooms import OpenRoom
 
 STATE_COOKIE = "kinboard_lti"
 CHOICE_TIME = 3600  # seconds for choosing
 MAX_FORM = 80_000  # bytes; tokens have up to 64 KiB
+# Launches have threads of their own: rooms and visitors do not wait behind them.
+THREADS, MOST_WAITING = 6, 200
+PATIENCE = 4.0  # s that a launch waits for a thread
+P = ParamSpec("P")
+T = TypeVar("T")
 _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <meta name="color-scheme" content="light dark"><title>{title}</title>
 <link rel="stylesheet" href="../static/lti.css">
@@ -87,13 +96,39 @@ def check_platforms(settings: Settings) -> None:
         raise PlatformsRefused(f"KINBOARD_LTI: {error}") from None
 
 
+class _TooManyLaunchesError(Exception):
+    """More launches wait than may."""
+
+
+class _Threads:
+    """Where launches wait for the database; a bounded number for a bounded time."""
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(THREADS, "kinboard-launch")
+        self._places = threading.Semaphore(MOST_WAITING)
+
+    async def run(self, act: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """The result of a call in one of the threads; raises `_TooManyLaunchesError` if none is free in time."""
+        if not self._places.acquire(blocking=False):
+            raise _TooManyLaunchesError
+        job: Future[T] = self._pool.submit(act, *args, **kwargs)
+        job.add_done_callback(lambda _: self._places.release())
+        result = asyncio.wrap_future(job)
+        await asyncio.wait({result}, timeout=PATIENCE)
+        if job.cancel():
+            raise _TooManyLaunchesError
+        return await result
+
+
 class _Pages:
     def __init__(self, hub: Hub, platforms: Platforms, courses: Callable[[], Courses]) -> None:
         self._hub = hub
+        self._threads = _Threads()
         self._platforms = platforms
         self._courses = courses
         self._seats: LtiSeats | None = None
         self._logins: Logins | None = None
+        self._lock = threading.Lock()
 
     @property
     def seats(self) -> LtiSeats:
@@ -121,7 +156,10 @@ class _Pages:
         if self._logins is None:
             from app.classroom.lti.launches import Logins
 
-            self._logins = Logins(self._platforms, self._key(), self.seats.use_nonce)
+            key = self._key()  # waits for the database
+            with self._lock:  # all launches share what is known of a platform's keys
+                if self._logins is None:
+                    self._logins = Logins(self._platforms, key, self.seats.use_nonce)
         return self._logins
 
     async def keys(self, _: Request) -> Response:
@@ -136,10 +174,12 @@ class _Pages:
         if request.method == "POST":
             asked = {name: values[0] for name, values in (await _form(request)).items()}
         try:
-            logins = await run_in_threadpool(self._begun)
+            logins = await self._threads.run(self._begun)
             address, state = logins.begin(asked, f"{request.base_url}lti/launch")
         except LaunchRefused as error:
             return refused(str(error), 400)
+        except _TooManyLaunchesError:
+            return busy()
         except ClassroomUnavailable as error:
             return refused(str(error), 503)
         answer = RedirectResponse(address, 303, headers={"cache-control": "no-store"})
@@ -148,7 +188,7 @@ class _Pages:
 
     async def launch(self, request: Request) -> Response:
         """Verify a launch, and take the user to the room of its link, or to the choice of contents."""
-        from app.classroom.lti.contents import content_of
+        from app.classroom.lti.keys import PlatformAway
         from app.classroom.lti.launches import LINK, LaunchRefused
 
         form = {name: values[0] for name, values in (await _form(request)).items()}
@@ -156,21 +196,22 @@ class _Pages:
             return refused(f"The platform refused the launch: {form['error'][:200]}.", 400)
         cookie = request.cookies.get(STATE_COOKIE, "")
         try:
-            logins = await run_in_threadpool(self._begun)
-            launch = await run_in_threadpool(
-                logins.finish, form.get("id_token", ""), form.get("state", ""), cookie
-            )
-            contents = await run_in_threadpool(lambda: self._contents)
+            logins = await self._threads.run(self._begun)
+            launch = await logins.finish(form.get("id_token", ""), form.get("state", ""), cookie)
             if launch.kind == LINK:
-                return self._choices(launch)
-            ticket = await run_in_threadpool(self.seats.take, launch, content_of(launch, contents))
-            room = await run_in_threadpool(self._hub.rooms.find, ticket)
+                return await self._threads.run(self._choices, logins, launch)
+            entered = await self._threads.run(self._enter, logins, launch)
         except (LaunchRefused, RefusedError) as error:
             return refused(str(error), 403)
+        except PlatformAway as error:
+            return refused(str(error), 503, error.wait)
+        except _TooManyLaunchesError:
+            return busy()
         except ClassroomUnavailable as error:
             return refused(str(error), 503)
-        if room is None:
+        if entered is None:
             return refused("The teacher has removed you from this room, or it has ended.", 403)
+        ticket, room = entered
         answer = RedirectResponse("../viewer/", 303, headers={"cache-control": "no-store"})
         token = self._hub.rooms.tokens.sign(ticket)
         set_cookie(answer, COOKIE, token, int(room.ends - room.created), request.scope, framed=True)
@@ -178,22 +219,22 @@ class _Pages:
         set_cookie(answer, STATE_COOKIE, "", 0, request.scope, framed=True)
         return answer
 
-    def _choices(self, launch: Launch) -> Response:
-        from app.classroom.lti.platforms import is_safe
+    def _enter(self, logins: Logins, launch: Launch) -> tuple[Ticket, OpenRoom] | None:
+        """The seat of a launch and its room; waits for the database."""
+        from app.classroom.lti.contents import content_of
 
-        back = launch.linking.get("deep_link_return_url")
-        if not isinstance(back, str) or not is_safe(back):
-            return refused("The platform names no safe address for the answer.", 400)
-        many = launch.linking.get("accept_multiple") is not False
-        about = [
-            launch.platform.issuer,
-            launch.platform.client_id,
-            launch.deployment,
-            back,
-            launch.linking.get("data"),
-        ]
+        logins.use(launch)
+        ticket = self.seats.take(launch, content_of(launch, self._contents))
+        room = self._hub.rooms.find(ticket)
+        return None if room is None else (ticket, room)
+
+    def _choices(self, logins: Logins, launch: Launch) -> Response:
+        """The page on which a teacher chooses what the platform's link opens; waits for the database."""
+        logins.use(launch)
+        platform = launch.platform
+        about = [platform.issuer, platform.client_id, launch.deployment, launch.back, launch.data]
         signed = self._signer().dumps(about)
-        kind = "checkbox" if many else "radio"
+        kind = "checkbox" if launch.many else "radio"
 
         def rows(what: str) -> str:
             return "".join(
@@ -213,30 +254,32 @@ class _Pages:
 
     async def choose(self, request: Request) -> Response:
         """The signed answer with what was chosen, which the browser takes back to the platform."""
-        from app.classroom.lti.launches import LINK, Launch
+        from app.classroom.lti.platforms import origin_of
         from app.classroom.lti.services import link_answer
 
         form = await _form(request)
         signed = form.get("about", [""])[0]
         try:
-            issuer, client_id, deployment, back, data = self._signer().loads(signed, max_age=CHOICE_TIME)
+            about = await self._threads.run(lambda: self._signer().loads(signed, max_age=CHOICE_TIME))
+            issuer, client_id, deployment, back, data = about
+            known = {each.name: each for each in await self._threads.run(lambda: self._contents)}
         except (BadSignature, ValueError, TypeError):
             return refused("The choice is not valid any more. Start it again on the platform.", 403)
+        except _TooManyLaunchesError:
+            return busy()
+        except ClassroomUnavailable as error:
+            return refused(str(error), 503)
         platform = self._platforms.find(issuer, client_id)
         if platform is None:
             return refused("The platform is no longer registered here.", 403)
-        known = {each.name: each for each in await run_in_threadpool(lambda: self._contents)}
         chosen = [known[name] for name in dict.fromkeys(form.get("content", [])) if name in known]
-        linking: dict[str, Any] = {} if data is None else {"data": data}
-        launch = Launch(platform, LINK, deployment, "", "", True, "", "", "", "", "", linking)
-        answer = link_answer(self._platforms, launch, chosen, f"{request.base_url}lti/launch")
+        answer = link_answer(self._platforms, platform, deployment, data, chosen, f"{request.base_url}lti/launch")
         body_html = (
             f'<p>{len(chosen)} chosen.</p><form method="post" action="{html.escape(back)}">'
             f'<input type="hidden" name="JWT" value="{html.escape(answer)}">'
             "<button>Back to the course</button></form>"
         )
-        parts = urlsplit(back)
-        policy = PAGE_POLICY.replace("form-action 'self'", f"form-action {parts.scheme}://{parts.netloc}")
+        policy = PAGE_POLICY.replace("form-action 'self'", f"form-action {origin_of(back)}")
         page = _PAGE.format(title="Kinboard for your course", body=body_html)
         return HTMLResponse(page, headers={"content-security-policy": policy, "cache-control": "no-store"})
 
@@ -261,7 +304,14 @@ async def _form(request: Request) -> dict[str, list[str]]:
     return parse_qs(body.decode("utf-8", "replace"))
 
 
-def refused(words: str, status: int) -> Response:
-    """A page that says why."""
-    page = _PAGE.format(title="Kinboard could not be opened", body=f"<p>{html.escape(words)}</p>")
-    return HTMLResponse(page, status, headers={"cache-control": "no-store"})
+def refused(words: str, status: int, wait: float = 0.0) -> Response:
+    """A page that says why, and when it is worth another try."""
+    again = f"<p>Try again in {ceil(wait)} seconds.</p>" if wait else ""
+    page = _PAGE.format(title="Kinboard could not be opened", body=f"<p>{html.escape(words)}</p>{again}")
+    headers = {"cache-control": "no-store"} | ({"retry-after": str(ceil(wait))} if wait else {})
+    return HTMLResponse(page, status, headers=headers)
+
+
+def busy() -> Response:
+    """More launches come in than the database takes."""
+    return refused("Too many users of learning platforms arrive at the moment.", 503, PATIENCE)

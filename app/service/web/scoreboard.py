@@ -29,6 +29,7 @@ ALLOW = (
     "Its operator can allow it with KINBOARD_BENCH=1. "
     "On your own machine: kinboard bench --quick --html scoreboard.html"
 )
+FOLDER = "The operator finds it in the folder for temporary files, which may be full or read-only."
 
 
 class Scoreboard:
@@ -86,10 +87,13 @@ class Scoreboard:
                 raise ProblemError(409, "busy", "A run is under way already.", "Wait for it, or cancel it.")
             if request.method == "DELETE" and not runs.cancel():
                 raise ProblemError(409, "not-running", "No run is under way.", "There is nothing to cancel.")
+            status = runs.status()
         except ProblemError as error:
             return respond(error)
-        status = 202 if request.method in ("POST", "DELETE") else 200
-        return JSONResponse(asdict(runs.status()), status, _FRESH)
+        except OSError as error:
+            why = error.strerror or type(error).__name__
+            return respond(ProblemError(503, "busy", f"The folder of the runs cannot be used: {why}.", FOLDER))
+        return JSONResponse(asdict(status), 202 if request.method in ("POST", "DELETE") else 200, _FRESH)
 
     def _allowed(self, request: Request) -> Runs:
         """The runs; raises 403 if the operator does not allow them or the request is of another site, or 415."""

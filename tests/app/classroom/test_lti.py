@@ -5,149 +5,40 @@ from __future__ import annotations
 import html
 import json
 import re
-import threading
 import time
 from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import parse_qs, urlsplit
 
 import jwt
 import pytest
-from cryptography.hazmat.primitives.asymmetric import rsa
 from fastapi.testclient import TestClient
-from jwt.algorithms import RSAAlgorithm
 from live_server import wait_for
+from lti_platform import CLIENT, MEMBER, TOOL, Platform, launch, login, new_key, registered
 from pydantic import SecretStr
 
 from app.classroom import COOKIE, Hub, NewAttempt
 from app.classroom.courses import Courses, course_of
 from app.classroom.lti import passback as passback_module
-from app.classroom.lti.launches import CLAIM, GRADES, LEARN, LINK, LINKING, SCORE_SCOPE
+from app.classroom.lti.exchange import PlatformError
+from app.classroom.lti.launches import CLAIM, LINK, LINKING
 from app.classroom.lti.platforms import PlatformFileError, key_file, load_platforms, make_key
-from app.classroom.lti.services import GradeRefused, post_score
+from app.classroom.lti.services import post_score
 from app.cli.parser import main
 from app.exercises import Exercises
 from app.service.main import create_app, run
 from app.service.web.lti import STATE_COOKIE
 from app.shared.settings import Settings
 
-CLIENT = "kinboard-at-school"
-MEMBER = "http://purl.imsglobal.org/vocab/lis/v2/membership"
-TOOL = "https://testserver"
-
-
-def new_key() -> rsa.RSAPrivateKey:
-    return rsa.generate_private_key(65537, 2048)
-
-
-def key_set(key: rsa.RSAPrivateKey) -> dict:
-    return {
-        "keys": [{**json.loads(RSAAlgorithm.to_jwk(key.public_key())), "kid": "p1", "alg": "RS256", "use": "sig"}]
-    }
-
-
-class Platform:
-    """A learning platform: publishes its key, gives access tokens to who signs for them, keeps scores."""
-
-    def __init__(self) -> None:
-        self.key = new_key()
-        self.tool_keys: dict = {}
-        self.scores: list[tuple[str, dict]] = []
-        self.refusals = 0  # answers 500 to so many scores
-        self.redirects = 307  # of what is sent to /moved
-        self.followed: list[str] = []  # what came after such a redirect
-        self.published: str | None = None  # instead of the keys
-        platform = self
-
-        class Handler(BaseHTTPRequestHandler):
-            def do_GET(self) -> None:
-                if self.path.startswith("/elsewhere"):
-                    platform.followed.append(self.headers.get("authorization", ""))
-                if self.path == "/keys" and platform.published is not None:
-                    self.send_response(200)
-                    self.end_headers()
-                    self.wfile.write(platform.published.encode())
-                    return
-                self.answer(200, key_set(platform.key) if self.path == "/keys" else {})
-
-            def do_POST(self) -> None:
-                body = self.rfile.read(int(self.headers["content-length"]))
-                if self.path == "/token":
-                    self.answer(*platform.grant(parse_qs(body.decode())))
-                elif self.path.startswith("/moved"):
-                    self.send_response(platform.redirects)
-                    self.send_header("Location", f"{platform.issuer}/elsewhere")
-                    self.end_headers()
-                elif self.path.startswith("/elsewhere"):
-                    platform.followed.append(self.headers.get("authorization", ""))
-                    self.answer(200, {})
-                elif self.headers["authorization"] != "Bearer open-sesame":
-                    self.answer(401, {})
-                elif platform.refusals:
-                    platform.refusals -= 1
-                    self.answer(500, {})
-                else:
-                    platform.scores.append((self.path, json.loads(body)))
-                    self.answer(200, {})
-
-            def answer(self, status: int, body: dict) -> None:
-                self.send_response(status)
-                self.end_headers()
-                self.wfile.write(json.dumps(body).encode())
-
-            def log_message(self, *_: object) -> None:
-                pass
-
-        self.server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-        self.issuer = f"http://127.0.0.1:{self.server.server_address[1]}"
-        self.thread = threading.Thread(target=self.server.serve_forever)
-        self.thread.start()
-
-    def grant(self, form: dict[str, list[str]]) -> tuple[int, dict]:
-        key = jwt.PyJWKSet.from_dict(self.tool_keys).keys[0].key
-        claims = jwt.decode(form["client_assertion"][0], key, ["RS256"], audience=f"{self.issuer}/token")
-        good = claims["iss"] == claims["sub"] == CLIENT and form["scope"] == [SCORE_SCOPE] and "jti" in claims
-        return (200, {"access_token": "open-sesame"}) if good else (400, {})
-
-    def token(self, nonce: str, key: rsa.RSAPrivateKey | None = None, **changes: object) -> str:
-        now = int(time.time())
-        claims = {
-            "iss": self.issuer, "aud": CLIENT, "sub": "user-7", "iat": now, "exp": now + 60, "nonce": nonce,
-            "given_name": "Ada", "email": "ada@school.example", "name": "Ada Lovelace",
-            CLAIM + "version": "1.3.0", CLAIM + "message_type": LEARN, CLAIM + "deployment_id": "1",
-            CLAIM + "resource_link": {"id": "link-1", "title": "Week 3"}, CLAIM + "roles": [f"{MEMBER}#Learner"],
-            CLAIM + "custom": {"exercise": "two-elbows"},
-            GRADES: {"scope": [SCORE_SCOPE], "lineitem": f"{self.issuer}/columns/5?type=x"},
-        } | changes  # fmt: skip
-        return jwt.encode(
-            {k: v for k, v in claims.items() if v is not None}, key or self.key, "RS256", {"kid": "p1"}
-        )
-
-    def close(self) -> None:
-        self.server.shutdown()
-        self.thread.join()
-        self.server.server_close()
-
 
 @pytest.fixture(scope="module")
 def platform() -> Iterator[Platform]:
-    double = Platform()
-    yield double
-    double.close()
+    with Platform() as double:
+        yield double
 
 
 @pytest.fixture(scope="module")
 def settings(platform: Platform, tmp_path_factory) -> Settings:
-    folder = tmp_path_factory.mktemp("lti")
-    file = folder / "platforms.toml"
-    file.write_text(
-        f'[[platform]]\nissuer = "{platform.issuer}"\nclient_id = "{CLIENT}"\ndeployments = ["1", "2"]\n'
-        f'login_url = "{platform.issuer}/auth"\ntoken_url = "{platform.issuer}/token"\n'
-        f'keys_url = "{platform.issuer}/keys"\n'
-    )
-    assert make_key(key_file(file, {}))
-    platform.tool_keys = load_platforms(file).key_set()
-    return Settings(lti=file, data=folder / "data", frame_ancestors=platform.issuer)  # type: ignore[arg-type]
+    return registered(tmp_path_factory.mktemp("lti"), platform)
 
 
 @pytest.fixture(scope="module")
@@ -166,21 +57,6 @@ def hub_of(application) -> Hub:
 @pytest.fixture
 def browser(application) -> TestClient:
     return TestClient(application, base_url=TOOL, follow_redirects=False)
-
-
-def login(browser: TestClient, platform: Platform) -> dict[str, str]:
-    """The query with which the browser arrives at the platform."""
-    answer = browser.get("/lti/login", params={"iss": platform.issuer, "client_id": CLIENT, "login_hint": "7"})
-    assert answer.status_code == 303
-    place = urlsplit(answer.headers["location"])
-    assert f"{place.scheme}://{place.netloc}{place.path}" == f"{platform.issuer}/auth"
-    return {name: values[0] for name, values in parse_qs(place.query).items()}
-
-
-def launch(browser: TestClient, platform: Platform, **changes: object):
-    asked = login(browser, platform)
-    token = platform.token(asked["nonce"], **changes)  # type: ignore[arg-type]
-    return browser.post("/lti/launch", data={"id_token": token, "state": asked["state"]})
 
 
 def test_our_keys_are_public(browser: TestClient) -> None:
@@ -253,7 +129,7 @@ def test_a_teacher_gets_the_room(browser: TestClient, platform: Platform, applic
         ({CLAIM + "deployment_id": "3"}, "deployment &#x27;3&#x27; of the platform is not registered"),
         ({CLAIM + "version": "1.1"}, "not of LTI version 1.3.0"),
         ({CLAIM + "message_type": "Other"}, "are not understood"),
-        ({CLAIM + "resource_link": None}, "names no resource link"),
+        ({CLAIM + "resource_link": None}, "claim/resource_link.id of the launch is missing"),
     ],
 )
 def test_a_wrong_launch_is_refused_in_words(browser: TestClient, platform: Platform, changes, words) -> None:
@@ -379,7 +255,7 @@ def test_a_score_and_its_token_go_to_no_other_address(browser: TestClient, platf
     (registered,) = platforms.all
     for status in (301, 302, 303, 307, 308):
         platform.redirects = status
-        with pytest.raises(GradeRefused, match=f"answered {status}: redirects are not followed") as refused:
+        with pytest.raises(PlatformError, match=f"answered {status}: redirects are not followed") as refused:
             post_score(platforms, registered, f"{platform.issuer}/moved", "user-9", 1.0)
         assert refused.value.final
     assert platform.followed == []
@@ -388,17 +264,17 @@ def test_a_score_and_its_token_go_to_no_other_address(browser: TestClient, platf
 @pytest.mark.parametrize(
     "published", ["<html>Login</html>", "[]", '"x"', "{}", '{"keys": 5}', '{"keys": [{"kty": "RSA"}]}', ""]
 )
-def test_keys_that_are_none_are_said(browser: TestClient, platform: Platform, application, published: str) -> None:
-    for route in application.routes:
-        if getattr(route, "path", "") == "/lti/login":
-            route.endpoint.__self__._logins = None  # no keys are known from before
+def test_keys_that_are_none_are_said(platform: Platform, settings, published: str) -> None:
     platform.published = published
+    application = create_app(settings)
     try:
-        answer = launch(browser, platform)
+        answer = launch(TestClient(application, base_url=TOOL, follow_redirects=False), platform)
     finally:
         platform.published = None
-    assert answer.status_code == 403
-    assert "is not a set of public keys" in answer.text or "does not publish" in answer.text
+        hub_of(application).close()
+    assert answer.status_code == 503
+    assert int(answer.headers["retry-after"]) > 0
+    assert "is not a set of public keys" in answer.text
 
 
 def test_deep_linking(browser: TestClient, platform: Platform) -> None:

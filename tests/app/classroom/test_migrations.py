@@ -17,6 +17,7 @@ from sqlalchemy import Connection, MetaData, create_engine, event, insert, selec
 from test_hub import attempt, nothing, until
 
 from app.classroom import Hub, Ticket, clock, database
+from app.classroom.revisions import REVISIONS
 from app.classroom.tables import REVISION, Attempt, Base
 
 MIGRATIONS = Path(database.__file__).parent / "migrations"
@@ -100,8 +101,10 @@ def test_a_class_of_the_first_version_goes_on_after_all_migrations(hub, old) -> 
     goes_on(hub)
 
 
-def test_the_service_migrates_a_class_of_the_first_version(hub, old) -> None:
+@pytest.mark.parametrize("revision", REVISIONS[:-1])
+def test_the_service_migrates_a_class_of_each_earlier_version(hub, old, revision) -> None:
     with old.begin():
+        command.upgrade(config(old), revision)
         fill(old, clock.now())
     goes_on(hub)
     with old.begin():

@@ -19,7 +19,7 @@ from fastapi.testclient import TestClient
 from live_server import wait_for
 from sqlalchemy.exc import DBAPIError
 
-from app.classroom import COOKIE, ClassroomUnavailable, Hub, NewAttempt
+from app.classroom import COOKIE, ClassroomUnavailable, Hub, NewAttempt, RefusedError, erasure, rooms
 from app.classroom.database import Database
 from app.classroom.lti.passback import Passback
 from app.classroom.lti.seats import Column
@@ -145,7 +145,7 @@ def test_a_platform_that_speaks_no_http_does_not_end_the_sending_of_scores(
             before = _Babble.asked
             passback.attempted(seat)
             wait_for(lambda before=before: _Babble.asked >= before + 2)
-            wait_for(lambda: passback._thread is None)
+            wait_for(lambda: not passback.busy)
         passback.close()
         server.shutdown()
         thread.join()
@@ -158,12 +158,27 @@ def test_every_error_of_sqlite_is_said_in_words(tmp_path: Path) -> None:
     def refuse(action: int, *_: object) -> int:
         return sqlite3.SQLITE_DENY if action == sqlite3.SQLITE_PRAGMA else sqlite3.SQLITE_OK
 
+    with database.write() as connection:
+        erasure.note(connection)
     with database.read() as connection:
         connection.connection.driver_connection.set_authorizer(refuse)  # type: ignore[union-attr]
     with pytest.raises(ClassroomUnavailable), database.write():
         pass
-    database.shrink()
+    with pytest.raises(ClassroomUnavailable):
+        database.erase()
     database.close()
+
+
+def test_one_student_cannot_fill_the_disk_with_answers(hub: Hub) -> None:
+    """Long answers of one seat end at a sum; those of others are stored."""
+    code = hub.rooms.open("Class", 3600.0).code
+    greedy, other = (hub.rooms.join(code, alias) for alias in ("Greedy", "Ada"))
+    long = ["x" * 19_900]
+    for seed in range(rooms.MAX_STORED // 19_900 + 1):
+        hub.rooms.submit(greedy, NewAttempt("swing", seed, long, "wrong", 0.0, 0.0))
+    with pytest.raises(RefusedError, match="characters; no more are stored"):
+        hub.rooms.submit(greedy, NewAttempt("swing", 999, long, "wrong", 0.0, 0.0))
+    assert hub.rooms.submit(other, NewAttempt("swing", 1, long, "right", 1.0, 0.0))
 
 
 def test_sweeping_goes_on_after_any_error(hub: Hub, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -48,7 +48,7 @@ def test_there_are_three_views_and_the_section_each_with_its_axes(drawing):
     titles = ["seen along z, from above", "seen along y", "seen along x", "section through the axis of joint 1"]
     assert [word for word in words if word in titles] == titles
     assert [words.count(f"{name} (mm)") for name in "xyzr"] == [2, 2, 3, 1]
-    assert any("20 000 points" in word for word in words)
+    assert any("20\u202f000 points" in word for word in words)
     assert any("reach 487 mm" in word for word in words)
 
 

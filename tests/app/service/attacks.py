@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,19 +73,22 @@ class Victim:
 
 
 @contextmanager
-def victim(ready: bool = False, files: int | None = None, **environment: str) -> Iterator[Victim]:
+def victim(
+    ready: bool = False, files: int | None = None, before: Sequence[str] = (), **environment: str
+) -> Iterator[Victim]:
     """Start a service.
 
     Args:
         ready: wait until kernels and viewer are ready, not only until it answers.
         files: how many files it may open.
+        before: a command that becomes the one in its arguments.
         environment: its settings.
     """
     env = os.environ | {"PYTHONPATH": str(ROOT), "KINBOARD_PORT": "0"} | environment
     limit = f"import resource as r; r.setrlimit(r.RLIMIT_NOFILE, ({files},) * 2)\n" if files else ""
     code = f"{limit}import sys; from app.cli.parser import main; sys.exit(main(['serve']))"
     with subprocess.Popen(
-        [sys.executable, "-c", code],
+        [*before, sys.executable, "-c", code],
         cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
         try:

@@ -28,7 +28,6 @@ from app.service.web.rate_limit import TokenBucket
 from app.shared.clients import client_of
 from app.shared.security import Rights
 from app.shared.settings import Settings
-from app.viewer.lessons import LESSONS
 from app.viewer.own_arm import own_arm
 from app.viewer.panel.view import ViewState
 from app.viewer.session.state import PageState, encode
@@ -404,8 +403,6 @@ def test_the_rights_of_a_visitor_who_may_only_look():
     assert not look.allow_websocket("/api/v1/robots/pioneer5/workspace/stream")
     known = {kind for kind in ALLOWED if look.allow_message(kind)}
     assert known == {"ViewerCameraMessage", "LocalStorageGetItemResponseMessage"}
-    refused = [lesson.key for lesson in LESSONS if not look.allow_lesson(lesson.key)]
-    assert refused == ["rotations", "screws", "inverse", "postures", "numeric", "redundancy", "trajectories"]
 
 
 # Rate limits

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
+import struct
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
@@ -19,11 +21,15 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import Close
 from websockets.sync.client import ClientConnection, connect
 
+from app.api import ComputeSlots
 from app.api.body import UploadMemory
 from app.api.problems import ProblemError
 from app.service.guard import Guard
+from app.service.handover import members
 from app.service.http_protocol import MAX_HEAD, MAX_PIPELINE, HttpProtocol
+from app.service.server import Server
 from app.service.websocket_protocol import MAX_FRAGMENTS
+from app.shared.memory.answers import AnswerMemory
 from app.shared.settings import Settings
 
 
@@ -38,6 +44,92 @@ def service() -> Iterator[Victim]:
 
 
 UPLOAD = f"POST {ARM}/fk HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100000\r\n\r\n".encode()
+
+# -- clients that leave -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("what", ["answer", "websocket"])
+def test_a_client_that_leaves_while_it_is_sent_to_writes_no_log(what, caplog):
+    left = threading.Event()
+    pieces: list[int] = []
+
+    async def application(scope, receive, send) -> None:
+        """Sends many pieces in one round of the event loop, once the client has gone."""
+        await receive()
+        if scope["type"] == "lifespan":
+            await send({"type": "lifespan.startup.complete"})
+            return
+        if scope["type"] == "websocket":
+            await send({"type": "websocket.accept"})
+            left.wait(10)
+        else:
+            await send({"type": "http.response.start", "status": 200, "headers": []})
+            left.wait(10)
+        for k in range(200):
+            if scope["type"] == "websocket":
+                await send({"type": "websocket.send", "bytes": bytes(1000)})
+            else:
+                await send({"type": "http.response.body", "body": bytes(1000), "more_body": True})
+            pieces.append(k)
+        assert (await receive())["type"].endswith(".disconnect")
+        pieces.append(200)
+
+    asking = GET if what == "answer" else handshake("/")
+    with serve(application) as port:
+        with socket.create_connection(("127.0.0.1", port)) as connection:
+            connection.sendall(asking)
+            connection.recv(1)
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # a reset
+        left.set()
+        if what == "answer":
+            wait_for(lambda: 200 in pieces)
+    assert len(pieces) < 10 or what == "answer"  # sending to a websocket raises
+    assert [record.message for record in caplog.records if record.name == "asyncio"] == []
+
+
+# -- errors of our own -----------------------------------------------------------------------------------------
+
+
+def test_a_connection_that_cannot_be_accepted_is_closed(monkeypatch, caplog):
+    def fails(self: Guard, connection: object, host: str) -> None:
+        raise RuntimeError("an error of our own")
+
+    app = FastAPI()
+    with serve(app) as port:
+        monkeypatch.setattr(Guard, "add", fails)
+        for _ in range(3):
+            with socket.create_connection(("127.0.0.1", port), timeout=5) as connection:
+                connection.sendall(GET)
+                assert closed(connection, 5)
+        monkeypatch.undo()
+        with socket.create_connection(("127.0.0.1", port), timeout=5) as connection:
+            connection.sendall(GET)
+            assert answer_to(connection, until_closed=False).startswith(b"HTTP/1.1 404")
+    (record,) = [each for each in caplog.records if "could not be accepted" in each.message]
+    assert "an error of our own" in caplog.text
+    assert record.exc_info
+
+
+def test_a_connection_of_another_process_that_cannot_be_taken_is_closed(monkeypatch, caplog):
+    app = FastAPI()
+    app.state.compute = ComputeSlots(1, 1.0, 1.0, AnswerMemory(1 << 20, 1 << 20))
+
+    def fails(*_: object, **__: object) -> None:
+        raise RuntimeError("an error of our own")
+
+    async def run() -> bool:
+        with socket.create_server(("127.0.0.1", 0)) as listener:
+            server = Server(app, Settings(), members([listener], 0, bytearray)[0])
+            monkeypatch.setattr(server, "_protocol", fails)
+            ours, theirs = socket.socketpair()
+            theirs.setblocking(False)
+            server._adopt(theirs, GET)
+            with ours:
+                return await asyncio.to_thread(closed, ours, 5)
+
+    assert asyncio.run(run())
+    assert "could not be accepted" in caplog.text
+
 
 # -- requests --------------------------------------------------------------------------------------------------
 
@@ -95,6 +187,24 @@ def test_what_is_no_request_is_refused_in_time(service, sent, status, kind):
         return  # reset by the service, which had not read everything
     assert answer.startswith(b"HTTP/1.1 %d " % status)
     assert problem_in(answer)["type"] == f"urn:kinboard:problem:{kind}"
+
+
+@pytest.mark.parametrize("part", ["field", "fields", "address"])
+@pytest.mark.parametrize(("size", "passes"), [(60_000, True), (66_000, False), (130_000, False), (250_000, False)])
+def test_a_head_that_comes_at_once_is_bounded_too(service, part, size, passes):
+    sent = {
+        "field": b"GET /livez HTTP/1.1\r\nHost: localhost\r\na: " + b"b" * size,
+        "fields": b"GET /livez HTTP/1.1\r\nHost: localhost" + (b"\r\na: " + b"b" * (size // 100)) * 100,
+        "address": b"GET /livez?" + b"b" * size + b" HTTP/1.1\r\nHost: localhost",
+    }[part] + b"\r\nConnection: close\r\n\r\n"
+    with service.connection() as connection:
+        try:
+            connection.sendall(sent)
+        except ConnectionError:
+            assert not passes
+        answer = answer_to(connection)
+    if answer or passes:  # it may be lost with what the service has not read
+        assert answer.startswith(b"HTTP/1.1 200 " if passes else b"HTTP/1.1 431 "), answer[:200]
 
 
 def test_a_body_that_trickles_is_cut_off(service):

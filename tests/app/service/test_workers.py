@@ -18,7 +18,7 @@ import httpx2
 import pytest
 from fake_browser import FakeBrowser
 from live_server import wait_for
-from worker_processes import fails, ignores, stops_once
+from worker_processes import fails, fails_later, ignores, is_broken_once, stops_once
 
 from app.service.main import run
 from app.service.workers import supervise
@@ -153,7 +153,7 @@ def test_a_stopped_process_is_replaced(folder):
         process.send_signal(signal.SIGTERM)
         _, errors = process.communicate(timeout=30)
     assert process.returncode == 0
-    assert f"worker {victim} has not reported for 10.0 s and is killed" in errors
+    assert f"worker {victim} has not answered for 10.0 s and is killed" in errors
 
 
 def test_one_signal_stops_all_processes(service):
@@ -182,7 +182,22 @@ def test_a_process_without_a_sign_of_life_is_replaced(tmp_path, caplog):
     first, second = map(int, noted.read_text().split())
     assert ended == [("part", first)]
     assert first != second
-    assert f"worker {first} has not reported for 1.0 s and is killed" in caplog.text
+    assert f"worker {first} has not answered for 1.0 s and is killed" in caplog.text
+
+
+def test_a_process_whose_loop_turns_but_that_answers_with_an_error_is_replaced(tmp_path, caplog):
+    noted = tmp_path / "pids"
+    assert supervise(partial(is_broken_once, noted), ["part"], 5.0, 2.0) == 0
+    first, second = map(int, noted.read_text().split())
+    assert first != second
+    assert f"worker {first} has not answered for 2.0 s and is killed" in caplog.text
+
+
+def test_one_that_fails_again_and_again_after_it_has_answered_is_replaced_more_and_more_slowly(tmp_path, caplog):
+    noted = tmp_path / "pids"
+    assert supervise(partial(fails_later, noted), ["part"], 5.0, 30.0) == 0
+    assert len(noted.read_text().split()) == 5
+    assert re.findall(r"is restarted (now|in \S+ s)", caplog.text) == ["now", "now", "in 1 s", "in 2 s"]
 
 
 def test_a_process_that_does_not_stop_is_killed(caplog):

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import operator
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from live_server import wait_for
 
 from app.shared.memory import process as memory
 from app.shared.memory.process import BUSY_GROWTH, IDLE_GROWTH, MemoryKeeper, release_free_memory, resident_bytes
+from app.shared.memory.shared import shared_bytes
 
 ROOT = Path(__file__).parents[3]
 
@@ -100,3 +104,12 @@ def test_without_glibc_nothing_happens(monkeypatch):
     memory._malloc_trim.cache_clear()
     monkeypatch.setattr(memory, "_STATM", Path("/nowhere"))
     assert resident_bytes() == 0
+
+
+@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
+def test_processes_share_memory_however_they_were_started(method):
+    memory = shared_bytes(3)
+    process = multiprocessing.get_context(method).Process(target=operator.setitem, args=(memory, 1, 7))
+    process.start()
+    process.join()
+    assert list(memory) == [0, 7, 0]

@@ -1,9 +1,12 @@
-"""Which processors threads run on: read back from the system."""
+"""Which processors threads run on, read back from the system; how a forked process ends."""
 
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -50,3 +53,39 @@ def test_workers_are_pinned_in_turn(as_before):
 def test_without_it_nothing_changes(as_before):
     threads.unpin()
     assert os.sched_getaffinity(0) == as_before
+
+
+FORKED = """
+import atexit, os, sys, tempfile
+from multiprocessing.util import Finalize
+from app.shared.threads import end_process, forget_exit_handlers
+
+folder = tempfile.TemporaryDirectory()
+atexit.register(print, "exit handler of the parent")
+Finalize(None, print, ("finalizer of the parent",), exitpriority=1)
+sys.stdout.flush()
+if os.fork() == 0:
+    forget_exit_handlers()
+    own = tempfile.TemporaryDirectory()
+    atexit.register(print, "exit handler of the child")
+    print(own.name)
+    end_process(0)
+os.wait()
+print(os.path.isdir(folder.name))
+"""
+
+
+def test_a_forked_process_runs_its_own_exit_handlers_and_not_those_of_its_parent():
+    root = Path(__file__).parents[3]
+    said = subprocess.run(
+        [sys.executable, "-c", FORKED], env=os.environ | {"PYTHONPATH": str(root)},
+        capture_output=True, text=True, check=True,
+    ).stdout.splitlines()  # fmt: skip
+    own, *rest = said
+    assert not Path(own).exists()
+    assert rest == [
+        "exit handler of the child",
+        "True",
+        "exit handler of the parent",
+        "finalizer of the parent",
+    ]

@@ -37,7 +37,9 @@ def main() -> int:
         nargs="+",
         help="numbers of visitors, of points, of rounds; names of requests, of attacks",
     )
-    parser.add_argument("--minutes", type=int, help="how long the siege lasts")
+    parser.add_argument(
+        "--minutes", type=int, help="how long the siege lasts; the soak: of a steady load, which stays"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write everything measured to this file")
     arguments = parser.parse_args()
     found = {"machine": machine(), "workers": arguments.workers}
@@ -45,10 +47,14 @@ def main() -> int:
     if arguments.only and arguments.mode == "all":
         parser.error("--only goes with one mode")
     for mode in MODES if arguments.mode == "all" else [arguments.mode]:
-        only = [arguments.minutes] if mode == "siege" and arguments.minutes else arguments.only
+        only, long = arguments.only, {}
+        if arguments.minutes and mode == "siege":
+            only = [arguments.minutes]
+        elif arguments.minutes and mode == "soak":
+            long = {"minutes": arguments.minutes}
         if only and mode not in ("rest", "attacks"):
             only = [int(value) for value in only]
-        found[mode] = importlib.import_module(f"load.{mode}").run(arguments.quick, arguments.workers, only)
+        found[mode] = importlib.import_module(f"load.{mode}").run(arguments.quick, arguments.workers, only, **long)
         failed |= bool(found[mode].get("left behind"))
         print(flush=True)
     if arguments.json is not None:

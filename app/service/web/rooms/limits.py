@@ -21,6 +21,9 @@ SLOW, SLOW_AT_ONCE = 1.0, 8  # seconds of a slow try, and how many of one client
 ROOMS, ROOMS_EVERY = 10, 60.0
 SEATS, SEATS_EVERY = 300, 1.0
 _ALL = "all"
+TOO_MANY = (
+    "Too many wrong join codes from your address: each try takes a second for a while. A right code still joins."
+)
 
 
 class Limits:
@@ -41,7 +44,7 @@ class Limits:
             yield
             return
         if self._slow[client] >= SLOW_AT_ONCE:
-            raise too_many("Too many wrong join codes from your address.", wait)
+            raise too_many(TOO_MANY, wait)
         self._slow[client] += 1
         try:
             await asyncio.sleep(SLOW)
@@ -55,7 +58,7 @@ class Limits:
         """A code was wrong; raises 429 if there were too many."""
         wait = max(self._wrong.wait(client), self._wrong_all.wait(_ALL))
         if wait > 0.0:
-            raise too_many("Too many wrong join codes from your address.", wait)
+            raise too_many(TOO_MANY, wait)
         self._wrong.take(client)
         self._wrong_all.take(_ALL)
 

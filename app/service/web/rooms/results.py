@@ -84,7 +84,7 @@ class Results:
 
     def _room(self, token: str) -> OpenRoom:
         """The room of the teacher's cookie; raises 403."""
-        ticket = self._hub.ticket(token) if token and self._hub.in_use else None
+        ticket = self._hub.ticket(token)
         room = self._hub.rooms.find(ticket) if ticket is not None and ticket.role is Role.TEACHER else None
         if room is None:
             raise ProblemError(

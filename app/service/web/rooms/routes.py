@@ -17,6 +17,7 @@ from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError, Role, Ticket, UnknownRoomError
 from app.classroom.clock import now
 from app.classroom.tokens import LONGEST_TOKEN, read_code, show_code
+from app.classroom.views import ERASING
 from app.service.web.access import forget_guest, form_of, may_open, pass_guest
 from app.service.web.rooms.limits import Limits
 from app.service.web.rooms.page import ends_at, ends_in_words, join_address, qr_svg, room_page
@@ -25,6 +26,8 @@ from app.shared.clients import client_of
 from app.shared.security import origin_allowed, set_cookie
 from app.shared.settings import Settings
 from app.shared.store import Store
+
+ASK_ERASED = 3  # seconds until the page asks again whether an ended room is erased
 
 
 def room_routes(hub: Hub, settings: Settings, store: Store) -> list[BaseRoute]:
@@ -41,6 +44,7 @@ def room_routes(hub: Hub, settings: Settings, store: Store) -> list[BaseRoute]:
         Route("/room/results.csv", results.download, methods=["GET"]),
         Route("/room/leave", pages.leave, methods=["POST"]),
         Route("/room/end", pages.end, methods=["POST"]),
+        Route("/room/ended", pages.ended, methods=["GET"]),
     ]
 
 
@@ -115,7 +119,7 @@ class _Pages:
             async with self._limits.trying(client):
                 self._limits.sitting(client)
                 try:
-                    ticket = await run_in_threadpool(self._hub.rooms.join, code, alias, known)
+                    ticket = await run_in_threadpool(self._hub.join, code, alias, known)
                 except UnknownRoomError:
                     self._limits.wrong(client)
                     raise
@@ -151,7 +155,9 @@ class _Pages:
     async def qr(self, request: Request) -> Response:
         """The address for joining as a QR code, for who is in the room."""
         try:
-            ticket, _ = await self._ticket(request)
+            ticket, problem = await self._ticket(request)
+            if problem:
+                raise ProblemError(503, "busy", problem)
             room = None if ticket is None else await run_in_threadpool(self._hub.rooms.find, ticket)
         except ClassroomUnavailable as error:
             raise ProblemError(503, "busy", str(error)) from None
@@ -179,10 +185,21 @@ class _Pages:
             await run_in_threadpool(self._hub.rooms.end, ticket.room)
         except ClassroomUnavailable as error:
             return room_page(request, 503, message=str(error))
-        answer = room_page(
-            request, message="The room has ended. Everything in it was erased.", may_open=may_open(request.scope)
-        )
+        answer = await self.ended(request)
         self._forget(request, answer)
+        return answer
+
+    async def ended(self, request: Request) -> Response:
+        """What is true of rooms that have ended; the page asks again while something of them is left."""
+        if not self._hub.in_use:
+            return room_page(request, may_open=may_open(request.scope))
+        try:
+            words = await run_in_threadpool(lambda: self._hub.rooms.said_of_ended())
+        except ClassroomUnavailable as error:
+            return room_page(request, 503, message=str(error))
+        answer = room_page(request, message=words, may_open=may_open(request.scope))
+        if words == ERASING:
+            answer.headers["refresh"] = f"{ASK_ERASED}; url=ended"
         return answer
 
     async def _form(self, request: Request) -> dict[str, str]:

@@ -1,4 +1,7 @@
-"""Erases rooms whose time is over, also if nobody comes any more."""
+"""Erases rooms whose time is over, also if nobody comes any more.
+
+What another program keeps from being erased by reading the database is tried again until it is erased.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,14 @@ from collections.abc import AsyncIterator
 from starlette.concurrency import run_in_threadpool
 
 from app.classroom import ClassroomUnavailable, Hub
+from app.classroom.clock import steady
 
 logger = logging.getLogger("kinboard.classroom")
 
 SWEEP_EVERY = 60.0  # seconds
+ERASE_EVERY = 2.0  # seconds, while something that was deleted is not erased
+NOT_ERASED = "what was deleted is still in the database's files: another program reads them; it is tried again"
+ERASED_AT_LAST = "what was deleted is erased from the database's files"
 
 
 @contextlib.asynccontextmanager
@@ -30,12 +37,22 @@ async def sweeping(hub: Hub) -> AsyncIterator[None]:
 
 
 async def _sweep(hub: Hub) -> None:
+    swept, waits = steady(), False
+    await run_in_threadpool(hub.check)
     while True:
-        await asyncio.sleep(SWEEP_EVERY)
-        if hub.in_use:
-            try:
+        await asyncio.sleep(min(ERASE_EVERY, SWEEP_EVERY))
+        if not hub.in_use:
+            continue
+        due = steady() - swept >= SWEEP_EVERY
+        swept = steady() if due else swept
+        try:
+            if due:
                 await run_in_threadpool(lambda: hub.rooms.sweep())
-            except ClassroomUnavailable:
-                continue  # it has been logged, and is tried again
-            except Exception:
-                logger.exception("rooms whose time is over could not be erased; it is tried again")
+            erased = not hub.opened or await run_in_threadpool(lambda: hub.rooms.erase())
+            if waits == erased:
+                logger.warning(ERASED_AT_LAST if erased else NOT_ERASED)
+                waits = not erased
+        except ClassroomUnavailable:
+            continue  # it has been logged, and is tried again
+        except Exception:
+            logger.exception("rooms whose time is over could not be erased; it is tried again")

@@ -122,3 +122,21 @@ def test_processes_of_a_service_share_what_they_know_of_a_run(tmp_path):
 def test_the_process_for_rest_serves_the_scoreboard():
     assert Role.REST.serves("/scoreboard")
     assert not Role.VIEWER.serves("/scoreboard/run")
+
+
+def test_a_folder_that_was_cleaned_away_is_made_again(board, tmp_path):
+    assert board.get("/scoreboard/run").json()["state"] == "idle"
+    (tmp_path / "lock").unlink()
+    tmp_path.rmdir()
+    assert board.get("/scoreboard/run").json()["state"] == "idle"
+    assert board.post("/scoreboard/run", headers=JSON, content="{}").status_code == 202
+    assert board.delete("/scoreboard/run").status_code == 202
+
+
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_a_folder_that_cannot_be_used_is_503_in_words(board, tmp_path, method):
+    tmp_path.rmdir()
+    tmp_path.write_text("a file in its place")
+    answer = board.request(method, "/scoreboard/run", headers=JSON)
+    assert answer.status_code == 503
+    assert "cannot be used" in answer.json()["detail"]

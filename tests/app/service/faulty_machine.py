@@ -1,0 +1,417 @@
+"""A service on a machine that misbehaves: folders fill up, the clock jumps, peers are silent, slow or lying.
+
+The folders of the service are filesystems of its own (`unshare`, as root), so that they can be filled and made
+read-only while it runs. Where that is not allowed, `Machine.mounted` is False: a folder that should be full or
+read-only is replaced by a file instead, in which nothing can be written either.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import os
+import re
+import shutil
+import socketserver
+import sqlite3
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import httpx2
+import jwt
+import psutil
+from attacks import ROOT, Victim, victim
+from cryptography.hazmat.primitives.asymmetric import rsa
+from fake_browser import FakeBrowser
+from live_server import wait_for
+from websockets.exceptions import WebSocketException
+
+from app.classroom import COOKIE
+from app.classroom.lti.platforms import key_file, make_key
+from app.classroom.tables import Attempt
+from app.viewer.session.state import PageState, encode
+
+MOST = 8 << 20  # bytes of each folder
+SILENCE = 10.0  # s: KINBOARD_WORKER_TIMEOUT
+EXERCISE = "which-joint-goes-down"
+POSE = {"target": {"position": [0.045, 0.191, -0.211]}}
+CLOCK = """
+import os, time
+_true = time.time
+
+def _time():
+    with open(os.environ["FAULTY_CLOCK"]) as file:
+        return _true() + float(file.read())
+
+time.time = _time
+"""
+MOUNT = f"""
+for folder in "$FAULTY_FOLDERS"/*/ /dev/shm; do mount -t tmpfs -o size={MOST} tmpfs "$folder" || exit 1; done
+mkdir "$FAULTY_FOLDERS"/temp/in "$FAULTY_FOLDERS"/robots/in
+exec "$@"
+"""
+APART = ("unshare", "--mount", "--propagation", "private")
+
+
+@functools.cache
+def can_mount() -> bool:
+    """Whether this user may have filesystems of their own."""
+    if sys.platform != "linux" or shutil.which("unshare") is None:
+        return False
+    tried = subprocess.run([*APART, "mount", "-t", "tmpfs", "tmpfs", "/mnt"], capture_output=True, check=False)
+    return tried.returncode == 0
+
+
+@dataclass
+class Machine:
+    """A running service, and what can go wrong around it.
+
+    Attributes:
+        folders: where its folders are, as the service sees them: temp, data, robots.
+        platforms: addresses of learning platforms, by the manner in which they misbehave.
+        cookie: of a student in a room.
+        confirmed: how many of the student's answers were confirmed.
+    """
+
+    service: Victim
+    folders: Path
+    clock: Path
+    mounted: bool
+    platforms: dict[str, str]
+    cookie: str = ""
+    confirmed: int = 0
+    _undo: list[Callable[[], object]] = field(default_factory=list)
+
+    # Processes
+
+    def processes(self) -> dict[str, psutil.Process]:
+        """The processes of a worker, which are there, by their roles."""
+        found: list[psutil.Process] = []
+
+        def all_there() -> bool:
+            found[:] = psutil.Process(self.service.process.pid).children()
+            return len(found) == 2
+
+        wait_for(all_there, 30)
+        return dict(zip(("viewer", "rest"), sorted(found, key=lambda each: each.nice()), strict=True))
+
+    # Folders
+
+    def _seen(self, name: str) -> Path:
+        """A folder, as this process can reach it."""
+        place = Path("/dev/shm") if name == "shm" else self.folders / name
+        return Path(f"/proc/{self.service.process.pid}/root{place}") if self.mounted else place
+
+    def _mount(self, *arguments: str) -> None:
+        pid = str(self.service.process.pid)
+        subprocess.run(["nsenter", "--target", pid, "--mount", "mount", *arguments], check=True)
+
+    def fill(self, name: str) -> None:
+        """Leave no byte free in a folder."""
+        if not self.mounted:
+            self.replace(name)
+            return
+        junk = self._seen(name) / "junk"
+        with junk.open("wb", buffering=0) as file:
+            for size in (1 << 16, 1 << 8, 1):
+                with contextlib.suppress(OSError):
+                    while file.write(bytes(size)) == size:
+                        pass
+        self._undo.append(junk.unlink)
+
+    def protect(self, name: str) -> None:
+        """Make a folder read-only, even for files that are open."""
+        if not self.mounted:
+            self.replace(name)
+            return
+        place = "/dev/shm" if name == "shm" else str(self.folders / name)
+        # A filesystem with files open for writing cannot be made read-only, its place in the tree can.
+        self._mount("-o", "remount,bind,ro", place)
+        self._undo.append(lambda: self._mount("-o", "remount,bind,rw", place))
+
+    def remove(self, name: str) -> None:
+        """Delete everything in a folder, as programs do that clean up."""
+        for entry in self._seen(name).iterdir():
+            shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+
+    def replace(self, name: str) -> None:
+        """Put a file where a folder was."""
+        place = self._seen(name)
+        aside = place.with_name(f"{name}-aside")
+        place.rename(aside)
+        place.write_text("")
+        self._undo += [lambda: aside.rename(place), place.unlink]
+
+    # The clock
+
+    def set_clock(self, seconds: float) -> None:
+        """Let the service's clock be wrong by so much."""
+        self.clock.write_text(str(seconds))
+        self._undo.append(lambda: self.clock.write_text("0"))
+
+    def mend(self) -> None:
+        """Undo what was done."""
+        while self._undo:
+            self._undo.pop()()
+
+    # What must hold
+
+    def enter_room(self) -> None:
+        """Let a teacher open a room and a student join."""
+        options: dict[str, Any] = {"trust_env": False, "verify": False, "timeout": 20}
+        with httpx2.Client(base_url=self.service.url, **options) as teacher:
+            assert teacher.post("/room", data={"title": "Kinematics", "hours": "2"}).status_code == 303
+            found = re.search(r'class="code">([^<]+)<', teacher.get("/room").text)
+            assert found
+        with httpx2.Client(base_url=self.service.url, **options) as student:
+            joined = student.post("/room/join", data={"code": found[1], "alias": "Ada"})
+            assert joined.status_code == 303, joined.text
+            self.cookie = f"{COOKIE}={student.cookies[COOKIE]}"
+
+    def student(self) -> FakeBrowser:
+        """A page of the student, at an exercise."""
+        memory = json.dumps({"address": "http://127.0.0.1/", "state": encode(PageState(lesson="exercises"))})
+        tab = FakeBrowser(
+            self.service.port, memory=memory, additional_headers={"Cookie": self.cookie}, close_timeout=0.1
+        )
+        try:
+            tab.__enter__()
+            tab.wait(lambda: "data-exercises" in tab.html)
+            tab.say("feature", ["exercises", ["open", EXERCISE, 1], None])
+            tab.wait(lambda: f'data-exercise="{EXERCISE}"' in tab.html)
+        except BaseException:
+            tab.close()
+            raise
+        return tab
+
+    def answer(self, tab: FakeBrowser) -> None:
+        """Let the student give an answer, and wait until the page says that it is stored."""
+        before = stored(tab)
+        tab.say("feature", ["exercises", ["answer", 100 + self.confirmed], 0])
+        tab.wait(lambda: stored(tab) > before)
+        self.confirmed += 1
+
+    def kept(self) -> int:
+        """How many answers are in the database."""
+        with tempfile.TemporaryDirectory() as folder:  # SQLite opens nothing below /proc
+            copy = shutil.copytree(self._seen("data") / "in", folder, dirs_exist_ok=True)
+            (file,) = Path(copy).glob("*.db")
+            with contextlib.closing(sqlite3.connect(file)) as connection:
+                count: int = connection.execute(f"SELECT count(*) FROM {Attempt.__tablename__}").fetchone()[0]
+        return count
+
+    def visit(self, within: float) -> float:
+        """Seconds until a visitor can open a page and move a joint; fails after `within`."""
+        began = time.monotonic()
+        while True:
+            try:
+                with FakeBrowser(self.service.port, close_timeout=0.1, open_timeout=2) as tab:
+                    tab.set("1 rotating base", 12.0)
+                    tab.wait(lambda: 'data-status="hand"' in tab.html, timeout=within)
+                return time.monotonic() - began
+            except (OSError, AssertionError, WebSocketException):
+                if time.monotonic() - began > within:
+                    raise
+                time.sleep(0.1)
+
+
+def stored(tab: FakeBrowser) -> int:
+    """How many answers the page says are stored."""
+    found = re.search(r'data-class-stored="(\d+)"', tab.html)
+    return int(found[1]) if found else 0
+
+
+@contextmanager
+def running_machine(base: Path) -> Iterator[Machine]:
+    """A service with folders and a clock of its own, and a student in a room."""
+    folders, clock = base / "folders", base / "clock"
+    for name in ("temp", "data", "robots"):
+        (folders / name).mkdir(parents=True)
+    clock.write_text("0")
+    (base / "code").mkdir()
+    (base / "code" / "sitecustomize.py").write_text(CLOCK)
+    mounted = can_mount()
+    if not mounted:
+        (folders / "temp" / "in").mkdir()
+        (folders / "robots" / "in").mkdir()
+    environment = {
+        "PYTHONPATH": os.pathsep.join((str(base / "code"), str(ROOT))), "FAULTY_CLOCK": str(clock),
+        "FAULTY_FOLDERS": str(folders), "TMPDIR": str(folders / "temp" / "in"),
+        "KINBOARD_DATA": str(folders / "data" / "in"), "KINBOARD_ROBOTS": str(folders / "robots" / "in"),
+        "KINBOARD_BENCH": "1", "KINBOARD_WORKER_TIMEOUT": str(SILENCE),
+    }  # fmt: skip
+    before = (*APART, "sh", "-c", MOUNT, "sh") if mounted else ()
+    with (
+        platforms(base) as (file, addresses),
+        victim(True, before=before, KINBOARD_LTI=str(file), **environment) as service,
+    ):
+        yield Machine(service, folders, clock, mounted, addresses)
+
+
+def strain() -> float:
+    """How much longer work takes than on a machine with a free processor: at least 1."""
+    began, before = time.monotonic(), os.times()
+    subprocess.run([sys.executable, "-c", "import numpy, asyncio, email"], check=True)
+    after = os.times()
+    used = after.children_user + after.children_system - before.children_user - before.children_system
+    return max(1.0, (time.monotonic() - began) / max(used, 0.1))
+
+
+class Asking(threading.Thread):
+    """Asks REST over new connections, one request after the other, until the end of the context.
+
+    Attributes:
+        answers: seconds and status of each request; None: the connection broke.
+    """
+
+    def __init__(self, service: Victim) -> None:
+        super().__init__()
+        self._url = service.url
+        self._ended = threading.Event()
+        self.answers: list[tuple[float, int | None]] = []
+
+    def __enter__(self) -> Asking:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self.join(60)
+
+    def run(self) -> None:
+        while not self._ended.wait(0.02):
+            began = time.monotonic()
+            status: int | None = None
+            with contextlib.suppress(httpx2.TransportError):
+                status = httpx2.post(
+                    f"{self._url}/api/v1/robots/pioneer5/ik", json=POSE, trust_env=False, timeout=60, verify=False
+                ).status_code
+            self.answers.append((time.monotonic() - began, status))
+
+
+class Peer(socketserver.ThreadingTCPServer):
+    """A server that misbehaves: silent, slow (a byte a second) or lying (no HTTP)."""
+
+    allow_reuse_address = daemon_threads = True
+
+    def __init__(self, manner: str) -> None:
+        closing = threading.Event()
+
+        class Handler(socketserver.BaseRequestHandler):
+            def handle(self) -> None:
+                if manner == "lying":
+                    self.request.sendall(b"\x00\xff" * 5000)
+                for byte in b"HTTP/1.1 200 OK\r\n" * 100 if manner == "slow" else b"":
+                    with contextlib.suppress(OSError):
+                        self.request.sendall(bytes([byte]))
+                    if closing.wait(1.0):
+                        return
+                if manner == "silent":
+                    closing.wait(120)
+
+        super().__init__(("127.0.0.1", 0), Handler)
+        self.closing = closing
+        self._thread = threading.Thread(target=self.serve_forever)
+        self._thread.start()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.server_address[1]}"
+
+    def close(self) -> None:
+        self.closing.set()
+        self.shutdown()
+        self._thread.join()
+        self.server_close()
+
+
+MANNERS = ("silent", "slow", "lying")
+
+
+@contextmanager
+def platforms(folder: Path) -> Iterator[tuple[Path, dict[str, str]]]:
+    """Learning platforms, one for each manner: the file that registers them, and their addresses."""
+    with contextlib.ExitStack() as stack:
+        addresses = {}
+        for manner in MANNERS:
+            peer = Peer(manner)
+            stack.callback(peer.close)
+            addresses[manner] = peer.url
+        file = folder / "platforms.toml"
+        urls = ("login_url", "token_url", "keys_url")
+        file.write_text(
+            "\n".join(
+                f'[[platform]]\nissuer = "{url}"\nclient_id = "us"\ndeployments = ["1"]\n'
+                + "".join(f'{name} = "{url}/{name}"\n' for name in urls)
+                for url in addresses.values()
+            )
+        )
+        make_key(key_file(file, {}))
+        yield file, addresses
+
+
+def launch(service: Victim, issuer: str) -> int:
+    """Launch as a student of a platform whose key the service does not know yet: the status of the answer."""
+    options: dict[str, Any] = {"trust_env": False, "verify": False, "timeout": 60}
+    asked = {"iss": issuer, "client_id": "us", "login_hint": "7"}
+    login = httpx2.get(f"{service.url}/lti/login", params=asked, **options)
+    assert login.status_code == 303, login.text
+    query = parse_qs(urlsplit(login.headers["location"]).query)
+    claims = {"iss": issuer, "aud": "us", "sub": "7", "exp": time.time() + 60, "nonce": query["nonce"][0]}
+    token = jwt.encode(claims, rsa.generate_private_key(65537, 2048), "RS256", {"kid": "unknown"})
+    sent = {"id_token": token, "state": query["state"][0]}
+    cookie = login.headers["set-cookie"].partition(";")[0]
+    return httpx2.post(f"{service.url}/lti/launch", data=sent, headers={"Cookie": cookie}, **options).status_code
+
+
+def launches(service: Victim, issuer: str, count: int = 20) -> contextlib.ExitStack:
+    """Many students of one platform at once; at the end, each must have been refused in words."""
+    statuses: list[int] = []
+    threads = [threading.Thread(target=lambda: statuses.append(launch(service, issuer))) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+
+    def end() -> None:
+        for thread in threads:
+            thread.join(60)
+        assert len(statuses) == count
+        assert set(statuses) <= {403, 429, 503}, statuses
+
+    stack = contextlib.ExitStack()
+    stack.callback(end)
+    return stack
+
+
+def misbehave(service: Victim, manner: str, first: bytes, lie: bytes, count: int = 20) -> contextlib.ExitStack:
+    """Clients with connections of their own: silent after `first`, slow with each byte of it, or sending `lie`."""
+    stack = contextlib.ExitStack()
+    ended = threading.Event()
+
+    def act() -> None:
+        with contextlib.suppress(OSError), service.connection(receive=4096) as connection:
+            if manner == "slow":
+                for byte in first:
+                    connection.sendall(bytes([byte]))
+                    if ended.wait(0.5):
+                        return
+            else:
+                connection.sendall(first if manner == "silent" else lie)
+            ended.wait(120)
+
+    threads = [threading.Thread(target=act) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        stack.callback(thread.join, 30)
+    stack.callback(ended.set)
+    return stack
