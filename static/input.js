@@ -67,7 +67,7 @@
     // The panel, and its buttons, are built anew where a phone is turned.
     if (!text || (text === answered && buttons.every((button) => !button || button.shows === text))) return;
     answered = text;
-    const { undo, redo, reply: [to, error] } = JSON.parse(text);
+    const { undo, redo, reply: [to, error, readings] } = JSON.parse(text);
     for (const [name, label] of [["undo", undo], ["redo", redo]]) {
       const button = buttons[name === "undo" ? 0 : 1];
       if (!button) { answered = ""; continue; }
@@ -78,7 +78,8 @@
     for (const [sent, done] of waiting) {
       if (sent > to) continue;
       waiting.delete(sent);
-      done(sent === to ? error : "");
+      if (sent === to) done(error, readings);
+      else done("", []);
     }
   }
 
@@ -105,6 +106,7 @@
     for (const input of document.querySelectorAll('.kb-field input[aria-invalid="true"]')) {
       input.ariaInvalid = null;
       input.title = "";
+      input.dispatchEvent(new Event("kinboard-accept"));
     }
   }
   addEventListener("pointerdown", (event) => { if (event.target.closest?.(".mantine-Slider-root, canvas, button")) accept(); }, true);
@@ -133,11 +135,11 @@
       edited = false;
       send("field", [id, input.value], (error) => {
         input.ariaInvalid = error ? "true" : null;
-        input.title = error;
-        if (error) show(); else setTimeout(show, HOLD);
-        if (!error) accept();
+        input.title = error; // and what was typed stays
+        if (!error) { setTimeout(show, HOLD); accept(); }
       });
     };
+    input.addEventListener("kinboard-accept", show);
     new MutationObserver(() => { show(); if (!edited) input.ariaInvalid = null; }).observe(slider, { attributes: true, attributeFilter: ["aria-valuenow"] });
     input.addEventListener("focus", () => input.select());
     input.addEventListener("input", () => { edited = true; input.ariaInvalid = null; });
@@ -145,7 +147,7 @@
     input.addEventListener("keydown", (event) => {
       const undone = edited;
       if (event.key === "Enter") { ask(); input.select(); }
-      else if (event.key === "Escape") { edited = false; show(); input.select(); }
+      else if (event.key === "Escape") { edited = false; accept(); show(); input.select(); }
       else if (["ArrowUp", "ArrowDown", "PageUp", "PageDown"].includes(event.key)) { ask(); step(id, event); }
       else if (!historyKey(event) || undone) return;
       event.preventDefault();
@@ -269,17 +271,24 @@
     if (button) button.ariaExpanded = String(open);
   }
 
-  function showError(error) {
+  function showError(error, readings = []) {
     const box = form();
+    const text = box.querySelector("textarea");
     box.querySelector("[data-typed-error]").textContent = error;
-    box.querySelector("textarea").ariaInvalid = error ? "true" : null;
+    box.querySelector("[data-typed-readings]").replaceChildren(...readings.map(([label, reading]) => {
+      const button = document.createElement("button");
+      Object.assign(button, { type: "button", textContent: label });
+      button.addEventListener("click", () => { text.value = reading; sendForm(); text.focus(); });
+      return button;
+    }));
+    text.ariaInvalid = error ? "true" : null;
   }
 
   function sendForm() {
     const box = form();
     const frame = box.querySelector("[data-typed-frame]").value;
-    send("target", [box.dataset.typed, box.querySelector("textarea").value, ...(frame ? [frame] : [])], (error) => {
-      if (error) showError(error);
+    send("target", [box.dataset.typed, box.querySelector("textarea").value, ...(frame ? [frame] : [])], (error, readings) => {
+      if (error) showError(error, readings);
       else closeForm();
     });
   }

@@ -18,8 +18,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 import kin
+from app.exercises.kinds import KINDS
+from app.exports.formats import FORMATS
 from app.service.main import create_app
 from app.shared.settings import Settings
+from app.viewer.lessons import LESSONS
 from kin.ik.results import Cause
 
 ROOT = Path(__file__).parents[1]
@@ -170,6 +173,18 @@ def test_the_built_in_arms_are_named():
     }
     assert f"{words[len(robots)]} arms are built in" in PAGES["docs/robot-files.md"]
     assert f"**{words[len(robots)]} arms**" in README
+
+
+def test_every_lesson_has_its_section():
+    lessons = PAGES["docs/teaching.md"].partition("\n## Lessons\n")[2].partition("\n## ")[0]
+    assert re.findall("^### (.+)$", lessons, re.MULTILINE) == ["Worksheets", *(lesson.title for lesson in LESSONS)]
+
+
+@pytest.mark.parametrize(
+    ("page", "header", "names"), [("exercises", "`kind` | what is asked", KINDS), ("formats", "format", FORMATS)]
+)
+def test_tables_list_what_is_registered(page, header, names):
+    assert {row[0].strip("`") for row in table(PAGES[f"docs/{page}.md"], header)} == set(names)
 
 
 def test_the_two_commands_exist_and_ci_runs_the_second():

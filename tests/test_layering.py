@@ -26,6 +26,7 @@ MODEL = {
 RULES: dict[str, set[str]] = {
     "kin": {"kin", "numpy", "numba"},
     "kin/kernels": {"numpy", "numba", "llvmlite", "kin.kernels", "kin.tolerances", "kin.transforms"},
+    "kin/comparison": {"numpy", "kin.comparison", "kin.dh", *MODEL},
     "kin/files": {"numpy", "kin.collision", "kin.dh", "kin.files", "kin.fitting", "kin.frames", *MODEL},
     "kin/fitting": {"numpy", "kin.fitting", "kin.robot", "kin.transforms"},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
@@ -50,7 +51,7 @@ RULES: dict[str, set[str]] = {
     "app/classroom/courses": {"kin", "app.exercises", "app.classroom.courses"},
     "app/classroom": {"sqlalchemy", "alembic", "itsdangerous", "app.classroom", "app.shared"},
     "app/classroom/lti": {"jwt", "cryptography", "sqlalchemy", "itsdangerous", "app.classroom"},
-    "app/classroom/results": {"kin", "sqlalchemy", "app.classroom"},
+    "app/classroom/results": {"kin", "sqlalchemy", "app.classroom", "app.shared.spreadsheets"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     # A page of a recorded run needs neither the core nor other libraries.
     "app/bench/board": {"jinja2", "markupsafe", "app.bench.board"},
@@ -68,7 +69,7 @@ RULES: dict[str, set[str]] = {
         *("app.viewer", "app.classroom", "app.equations", "app.exercises", "app.exports", "app.shared"),
     },
     "app/viewer/viser_patches.py": {"msgspec", "numpy", "viser", "kin.transforms"},
-    "app/viewer/viser_outbox.py": {"msgspec", "viser", "zstandard", "app.shared.connection"},
+    "app/viewer/viser_outbox.py": {"msgspec", "viser", "zstandard", "app.shared.connection", "app.shared.notes"},
     "app/viewer/meshes": {
         *("fast_simplification", "trimesh", "numpy", "kin", "app.shared", "app.viewer.meshes", "app.viewer.scene"),
         "app.viewer.own_arm",
@@ -107,7 +108,7 @@ RULES: dict[str, set[str]] = {
         "app.shared",
     },
     "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
-    "app/cli/arguments": {"app.cli.arguments"},
+    "app/cli/arguments": {"app.cli.arguments", "app.shared.options"},
     "app/cli/bodies": {"kin", "app.viewer.meshes"},
     "app/cli/classroom": {"kin", "app.classroom", "app.cli", "app.exercises", "app.shared"},
     "app/cli/classroom/arguments.py": set(),

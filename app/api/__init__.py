@@ -8,7 +8,7 @@ request bodies in ``uploads``, and the ``classroom``.
 from starlette.routing import BaseRoute
 
 from app.api import equations, fk, ik, jacobian, motion, path
-from app.api.arms import files, robots
+from app.api.arms import compare, files, robots
 from app.api.body import UploadMemory
 from app.api.classroom import results
 from app.api.document import complete_document
@@ -29,6 +29,7 @@ __all__ = [
 _MODULES = (
     robots,
     files,
+    compare,
     fk,
     ik,
     path,

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import partial
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 from fastapi import Request, Response
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag
 from typing_extensions import TypedDict
 
 from app.api import schemas
 from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
-from app.api.options import Goal, PreciseBody, Target, single_or_list
+from app.api.options import Goal, OptionsBody, Target, single_or_list, takes
 from app.api.problems import FieldError, invalid
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
-    Number,
     example,
-    integral,
     settings_of,
 )
 from app.api.work import Deadline, computed
@@ -30,8 +27,9 @@ from app.shared.answers.document import documented
 from app.shared.answers.ik import IkAnswer, ik_answer
 from app.shared.metrics import SOLVE_SECONDS
 from app.shared.settings import Settings
-from kin import IKOptions, Robot, Task
+from kin import IKOptions, Robot
 from kin.ik import branch_names, solve
+from kin.ik.options import DEFAULTS
 from kin.transforms import Array
 
 router = versioned("kinematics")
@@ -39,12 +37,6 @@ router = versioned("kinematics")
 # Bytes of an answer without solutions, of a solution, of one joint's value and of a redundancy parameter, about.
 ANSWER, SOLUTION, JOINT, PARAMETER = 2500, 190, 25, 250
 NUMERIC = 8  # solutions that the numeric solver finds, about
-
-
-FreeValues = Annotated[
-    Annotated[Number, Tag("one")] | Annotated[dict[str, Number], Tag("many")],
-    Discriminator(lambda value: "many" if isinstance(value, dict) else "one"),
-]
 
 EXAMPLES = {
     "approach": example(
@@ -86,7 +78,8 @@ EXAMPLES = {
 }
 
 
-class IkRequest(PreciseBody):
+@takes(DEFAULTS)
+class IkRequest(OptionsBody):
     """Where the tool should go, and which solutions are returned."""
 
     present: ClassVar[str] = "q_seed"
@@ -101,42 +94,6 @@ class IkRequest(PreciseBody):
         "by the distance to it. One for all targets, or a list with one per target. "
         "By default the home configuration.",
     )
-    respect_limits: bool = Field(
-        True, strict=True, description="Whether answers outside the joint limits are left out."
-    )
-    max_solutions: Annotated[int, Field(ge=1, le=10_000, strict=True), BeforeValidator(integral)] | None = Field(
-        None, description="Most solutions per target, nearest to the seed first. By default all."
-    )
-    images: Literal["nearest", "all"] = Field(
-        "nearest",
-        description="all: every whole-turn image inside the limits. nearest: of each branch the one nearest to "
-        "the seed.",
-    )
-    prefer: Literal["nearest", "limits", "manipulability"] = Field(
-        "nearest",
-        description="How to choose redundancy parameters, and how to sort: nearest to the seed, farthest from the "
-        "joint limits, or largest manipulability.",
-    )
-    redundancy: FreeValues | None = Field(
-        None,
-        description="Values in radians of redundancy parameters by name, such as `psi` (see `redundancy` in the "
-        "answers); a bare number is the value of the first one. By default the feasible value chosen by `prefer`.",
-    )
-    solver: Literal["auto", "numeric"] = Field(
-        "auto", description="numeric: descend from many starts, even where the arm has a closed form."
-    )
-
-    def options(self, task: Task) -> IKOptions:
-        """These fields as options of the core."""
-        return replace(
-            super().options(task),
-            respect_limits=self.respect_limits,
-            images=self.images,
-            prefer=self.prefer,
-            max_solutions=self.max_solutions,
-            redundancy=self.redundancy,
-            solver=self.solver,
-        )
 
 
 @documented
@@ -181,26 +138,26 @@ def _solve(robot: Robot, body: IkRequest, settings: Settings, deadline: Deadline
         return [answer(goal, seed) for goal, seed in zip(targets[some], seeds[some], strict=True)]
 
     with SOLVE_SECONDS.labels("rest").time():
-        size = _size(robot, body, options[targets[0].task])
-        batch = Batch("target", len(targets), single, size, _advice(body))
+        first = options[targets[0].task]
+        batch = Batch("target", len(targets), single, _size(robot, first), _advice(first))
         return one_or_all(answers, batch, deadline)
 
 
-def _size(robot: Robot, body: IkRequest, options: IKOptions) -> int:
+def _size(robot: Robot, options: IKOptions) -> int:
     """Estimated bytes of the answer to one target, from the number of branches and their whole-turn images."""
     solutions = len(branch_names(robot)) or NUMERIC
-    if body.images == "all":
+    if options.images == "all":
         lower, upper, _ = options.constraints.bounds(robot)
         turns = (upper - lower)[robot.revolute] / math.tau
         solutions *= math.prod(max(1, math.ceil(turn - 1e-9)) for turn in turns if math.isfinite(turn))
-    if body.max_solutions is not None:
-        solutions = min(solutions, body.max_solutions)
+    if options.max_solutions is not None:
+        solutions = min(solutions, options.max_solutions)
     return ANSWER + solutions * (SOLUTION + JOINT * robot.n + PARAMETER * max(0, robot.n - 6))
 
 
-def _advice(body: IkRequest) -> str:
+def _advice(options: IKOptions) -> str:
     """What would make the answers smaller."""
-    return 'images "nearest" or max_solutions' if body.images == "all" else "max_solutions"
+    return 'images "nearest" or max_solutions' if options.images == "all" else "max_solutions"
 
 
 def _seeds(robot: Robot, body: IkRequest, count: int, settings: Settings) -> list[Array | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import closing
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import Request, Response
 from pydantic import Field, WithJsonSchema
@@ -126,7 +126,7 @@ class MotionRequest(AvoidingBody):
         100.0, ge=0.1, le=MOST_RATE, strict=True, allow_inf_nan=False, description="Samples per second."
     )
     samples: bool = Field(True, strict=True, description="json: whether to include samples of the motion.")
-    format: Literal["json", "csv", "ndjson", "urscript", "python"] = Field(
+    format: Annotated[str, schemas.OneOf(FORMATS)] = Field(
         "json", description="; ".join(f"{name}: {each.meaning}" for name, each in FORMATS.items()) + "."
     )
 
@@ -190,9 +190,8 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
             robot,
             program,
             q_start,
-            avoid_self_collision=body.avoid_self_collision,
-            obstacles=body.solids,
             stop=deadline.check,
+            **body.keywords,
         )
     except InputError as error:
         prefix = "" if error.field.partition("[")[0] in ("program", "q_start") else "program."

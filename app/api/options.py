@@ -2,30 +2,32 @@
 
 A target is where the tool should go, in whichever form its sender has it. A pose as this service answers it
 (``matrix`` and ``position`` and ``wxyz`` together) is a target as it stands, so an answer of ``fk`` can be sent to
-``ik`` unchanged. Options are the task, joint constraints and the branch.
+``ik`` unchanged. Options are those of `kin.IKOptions`, of which `takes` makes fields of a request.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
+from inspect import signature
 from itertools import cycle
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, TypeVar, get_type_hints
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag
+from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model
 
 from app.api import schemas
 from app.api.arms.frames import FrameName, FramesBody, WorkpiecesBody
 from app.api.problems import FieldError, from_input_error, invalid
-from app.api.schemas import Number, Vector3, Vector4, numbers
+from app.api.schemas import Number, Vector3, Vector4, integral, numbers
+from app.shared.options import declared
 from app.shared.settings import Settings
 from app.shared.threads.turns import offer
-from kin import IKOptions, InputError, JointConstraints, Obstacle, Robot, Task
+from kin import IKOptions, InputError, Robot, Task, solve_path
 from kin.collision.obstacles import LONGEST_NAME, MOST_OBSTACLES, checked_obstacles
 from kin.frames import WORLD
-from kin.ik.options import LEAST_TOLERANCE, MOST_METRES, MOST_RADIANS
+from kin.ik.options import DEFAULTS
 from kin.ik.problem import read_pose
 from kin.solvers.contract import POSE
 from kin.transforms import Array, frame_from_approach, from_position_wxyz
@@ -129,14 +131,7 @@ def single_or_list(value: object) -> str:
     return "many" if isinstance(value, list) else "one"
 
 
-Mask = Annotated[list[Annotated[bool, Field(strict=True)]], numbers(6)]
-Pair = Annotated[list[Number], numbers(2)]
 BranchName = Annotated[str, Field(max_length=200)]
-BranchNames = Annotated[
-    Annotated[BranchName, Tag("one")]
-    | Annotated[list[BranchName], Field(min_length=1, max_length=16), Tag("many")],
-    Discriminator(single_or_list),
-]
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,72 +164,88 @@ class ObstacleBody(schemas.Body):
     name: str = Field("", max_length=LONGEST_NAME, description="For people.")
 
 
+# Options that are no choice, switch or number: their types in JSON.
+_TYPES: dict[str, Any] = {
+    "mask": Annotated[list[Annotated[bool, Field(strict=True)]], numbers(6)] | None,
+    "limits": list[Annotated[list[Number], numbers(2)] | None] | None,
+    "locked": list[Number | None] | None,
+    "branch": Annotated[
+        Annotated[BranchName, Tag("one")]
+        | Annotated[list[BranchName], Field(min_length=1, max_length=16), Tag("many")],
+        Discriminator(single_or_list),
+    ]
+    | None,
+    "redundancy": Annotated[
+        Annotated[Number, Tag("one")] | Annotated[dict[str, Number], Tag("many")],
+        Discriminator(lambda value: "many" if isinstance(value, dict) else "one"),
+    ]
+    | None,
+    "max_solutions": Annotated[int, Field(ge=1, le=10_000, strict=True), BeforeValidator(integral)] | None,
+    "obstacles": Annotated[list[ObstacleBody], Field(max_length=MOST_OBSTACLES)],
+}
+
+_Body = TypeVar("_Body", bound=schemas.Body)
+
+
+def takes(names: Iterable[str]) -> Callable[[type[_Body]], type[_Body]]:
+    """Decorator: adds to a request body the fields of these options that it does not have yet.
+
+    Type, default, range and description are those of `kin.IKOptions`.
+    """
+
+    def add(model: type[_Body]) -> type[_Body]:
+        fields: dict[str, Any] = {name: _field(name) for name in names if name not in model.model_fields}
+        return create_model(
+            model.__name__, __base__=model, __doc__=model.__doc__, __module__=model.__module__, **fields
+        )
+
+    return add
+
+
+def _field(name: str) -> tuple[Any, Any]:
+    """Type of an option in JSON, and its default and description."""
+    option, default = declared()[name], DEFAULTS[name]
+    text = option.sentence.replace("none for", "null for").replace("(lower, upper)", "[lower, upper]")
+    given = Field([] if default == () else default, description=text)
+    if name in _TYPES:
+        return _TYPES[name], given
+    kind = get_type_hints(IKOptions, include_extras=True)[name]
+    if option.unit:
+        (allowed,) = kind.__metadata__
+        return Annotated[float, Field(ge=allowed.least, le=allowed.most, strict=True)] | None, given
+    return Annotated[kind, Field(strict=True)] if option.switch else kind, given
+
+
+@takes(["avoid_self_collision", "obstacles"])
 class AvoidingBody(FramesBody):
     """What the arm must not touch."""
 
-    avoid_self_collision: bool = Field(
-        False,
-        strict=True,
-        description="Whether configurations are left out in which links of the arm touch each other, judged by "
-        "the capsules of the arm.",
-    )
-    obstacles: Annotated[list[ObstacleBody], Field(max_length=MOST_OBSTACLES)] = Field(
-        [], description="Bodies in the world frame that the arm must not touch."
-    )
-
     @cached_property
-    def solids(self) -> tuple[Obstacle, ...]:
-        """The obstacles; raises 422 naming ``obstacles[i]``."""
+    def keywords(self) -> dict[str, Any]:
+        """The options in this request as keywords of the core; raises 422 naming ``obstacles[i]``."""
+        given = {name: getattr(self, name) for name in DEFAULTS if name in type(self).model_fields}
         try:
-            return checked_obstacles([each.model_dump(exclude_none=True) for each in self.obstacles])
+            given["obstacles"] = checked_obstacles(
+                [each.model_dump(exclude_none=True) for each in given["obstacles"]]
+            )
         except InputError as error:
             raise invalid(from_input_error(error)) from None
+        return given
 
 
+@takes(name for name in signature(solve_path).parameters if name in DEFAULTS)
 class OptionsBody(AvoidingBody, WorkpiecesBody):
-    """Task, joint constraints, branch, what is avoided."""
+    """Task, joint constraints, branch, errors that count as none, what is avoided."""
 
     task: Task | None = Field(
         None,
-        description="pose: the whole pose. approach: the point and the direction of the tool's z axis. "
-        "position: the point alone. By default what each target's form implies: "
+        description=f"{declared()['task'].sentence} By default what each target's form implies: "
         "`approach` given → approach, `position` alone → position, else pose.",
-    )
-    mask: Mask | None = Field(
-        None,
-        description="Instead of a task: which of the six coordinates x, y, z, rx, ry, rz of the error must "
-        "be zero; the last three are the rotation vector from the target to the tool.",
-    )
-    mask_frame: Literal["tool", "base"] = Field(
-        "tool",
-        description="Directions of the mask's coordinates: of the target (tool) or of the world frame (base).",
-    )
-    limits: list[Pair | None] | None = Field(
-        None,
-        description="Narrower joint limits, one [lower, upper] per joint in radians (metres), inside the robot's "
-        "own; null for a joint that keeps its own.",
-    )
-    locked: list[Number | None] | None = Field(
-        None,
-        description="Joint values to keep, in radians (metres), one per joint; null for a joint that may move.",
-    )
-    branch: BranchNames | None = Field(
-        None,
-        description="Only these branches: a name as in `branches` of the robot, parts of one such as "
-        "`shoulder front`, `seed` for the branch of the seed, or a list of these.",
     )
 
     def options(self, task: Task) -> IKOptions:
         """These fields as options of the core, for a task that the targets may imply."""
-        return IKOptions(
-            task=task,
-            mask=self.mask,
-            mask_frame=self.mask_frame,
-            constraints=JointConstraints(self.limits, self.locked),
-            branch=self.branch,
-            avoid_self_collision=self.avoid_self_collision,
-            obstacles=self.solids,
-        )
+        return IKOptions.of(None, **{**self.keywords, "task": task})
 
     def resolve_all(
         self, robot: Robot, target: Target | list[Target], settings: Settings, q: Sequence[Array | None] = (None,)
@@ -270,35 +281,8 @@ class OptionsBody(AvoidingBody, WorkpiecesBody):
 
         With a mask without rotations, a target may be a point alone.
         """
-        if self.mask is None:
+        mask = self.keywords["mask"]
+        if mask is None:
             return target.resolve(self.task, field)
-        _, T = target.resolve("pose" if any(self.mask[3:]) else "position", field)
+        _, T = target.resolve("pose" if any(mask[3:]) else "position", field)
         return self.task or "pose", T
-
-
-class PreciseBody(OptionsBody):
-    """The same with the errors that count as none."""
-
-    position_tolerance: float | None = Field(
-        None,
-        ge=LEAST_TOLERANCE,
-        le=MOST_METRES,
-        strict=True,
-        description="Error of the tool's point that counts as none, in metres. By default 1e-9, or what the "
-        "digits of a `matrix` allow whose rotation had to be made orthonormal.",
-    )
-    rotation_tolerance: float | None = Field(
-        None,
-        ge=LEAST_TOLERANCE,
-        le=MOST_RADIANS,
-        strict=True,
-        description="The same for the rotation error, in radians.",
-    )
-
-    def options(self, task: Task) -> IKOptions:
-        """These fields as options of the core."""
-        return replace(
-            super().options(task),
-            position_tolerance=self.position_tolerance,
-            rotation_tolerance=self.rotation_tolerance,
-        )

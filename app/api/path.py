@@ -11,7 +11,7 @@ from pydantic import Field
 from app.api import schemas
 from app.api.arms.operation import operation
 from app.api.body import versioned
-from app.api.options import PreciseBody, Target
+from app.api.options import OptionsBody, Target
 from app.api.problems import FieldError, invalid
 from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
 from app.api.work import Deadline, computed
@@ -47,7 +47,7 @@ EXAMPLES = {
 }
 
 
-class PathRequest(PreciseBody):
+class PathRequest(OptionsBody):
     """Where the tool should go, one waypoint after the other."""
 
     present: ClassVar[str] = "q_start"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Any
 
 import numpy as np
 from fastapi import Path, Request, Response
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
-from pydantic_core import to_json
+from pydantic_core import CoreSchema, core_schema, to_json
 
 from app.api.problems import FieldError, Problem, ProblemError, invalid, show
 from app.shared.settings import Settings
@@ -25,6 +26,16 @@ Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False, st
 def numbers(count: int) -> Any:
     """Field constraints of a list of exactly `count` numbers; validation stops at the first invalid item."""
     return Field(min_length=count, max_length=count, fail_fast=True)
+
+
+class OneOf:
+    """The values of a text: the names of a registry."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._names = list(names)
+
+    def __get_pydantic_core_schema__(self, source: object, handler: object) -> CoreSchema:
+        return core_schema.literal_schema(self._names)
 
 
 def integral(value: object) -> object:

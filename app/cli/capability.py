@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.cli.terminal import Notation, clean, joint_constraints, print_json, robot_of, table
+from app.cli.terminal import Notation, clean, joint_constraints, print_json, quantity, robot_of, table, units_of
 from app.exports.capability import WRITERS
 from app.exports.progress import progress_bar
 from app.shared.answers.capability import CapabilityAnswer, capability_answer
@@ -23,10 +23,11 @@ def run(arguments: Namespace) -> int:
     robot = robot_of(arguments)
     save = None if arguments.output is None else _saver(Path(arguments.output))
     constraints = joint_constraints(robot, arguments)
-    voxel = arguments.voxel
     grid = capability_grid(
         robot,
-        voxel=voxel if voxel is None or arguments.rad else voxel * 1e-3,
+        voxel=None
+        if arguments.voxel is None
+        else quantity(arguments.voxel, units_of(arguments).lengths, "--voxel"),
         resolution=arguments.resolution,
         constraints=constraints,
         directions=arguments.directions,

@@ -164,7 +164,8 @@ def _check_exercise(path: Path, robots: str | None, as_json: bool) -> int:
     try:
         exercise.verify()
     except VariantError as error:
-        raise ExerciseFileError(str(path), "answer", str(error), "an exercise that can be solved") from None
+        expected = "an exercise that can be solved"
+        raise ExerciseFileError(str(path), error.field or "answer", str(error), expected) from None
     if as_json:
         return print_json(_exercise_facts(exercise))
     facts = _exercise_facts(exercise)

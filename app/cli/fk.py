@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from app.cli.terminal import Notation, clean, configuration, frame_of, print_json, robot_of, table
+from app.cli.terminal import Notation, clean, configuration, frame_of, print_json, robot_of, table, units_of
 from app.shared.answers.fk import fk_answers
 from kin import InputError
 from kin.frames import TOOL, WORLD
@@ -13,7 +13,7 @@ from kin.frames import TOOL, WORLD
 def run(arguments: Namespace) -> int:
     """Print the pose of the tool."""
     robot = robot_of(arguments)
-    q = configuration(robot, arguments.q, "q", arguments.rad)
+    q = configuration(robot, arguments.q, "q", units_of(arguments))
     if arguments.frame == TOOL:
         raise InputError("--frame", TOOL, "world, base or a workpiece")
     T = None if arguments.frame == WORLD else frame_of(robot, arguments)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from argparse import Namespace
+from typing import Any
 
 import numpy as np
 
+from app.cli.arguments.options import flag_of
 from app.cli.terminal import (
     Notation,
     configuration,
@@ -15,61 +16,69 @@ from app.cli.terminal import (
     joint_constraints,
     obstacles_of,
     print_json,
+    quantity,
     robot_of,
     table,
+    units_of,
 )
 from app.shared.answers.ik import Blocked, IkAnswer, Solution, ik_answer
+from app.shared.options import Option, declared
 from kin import IKOptions, InputError, Task
 from kin.frames import TOOL
 from kin.ik import solve
 from kin.ik.options import MASK_NAMES
 from kin.transforms import frame_from_approach, from_position_wxyz
-from kin.units import Units
+from kin.units import PLAIN, Unit, Units
 
 
 def run(arguments: Namespace) -> int:
     """Print the solutions; 1 if there is no exact one."""
     robot = robot_of(arguments)
-    angle, length = (1.0, 1.0) if arguments.rad else (math.pi / 180, 1e-3)
-    T = from_position_wxyz([x * length for x in arguments.position], arguments.wxyz)
+    units = units_of(arguments)
+    wxyz = None if arguments.wxyz is None else _vector(arguments.wxyz, PLAIN, "--wxyz")
+    T = from_position_wxyz(_vector(arguments.position, units.lengths, "--position"), wxyz)
     if arguments.approach is not None:
-        T[:3, :3] = frame_from_approach(arguments.approach)
+        T[:3, :3] = frame_from_approach(_vector(arguments.approach, PLAIN, "--approach"))
     task = _task(arguments)
-    q_seed = None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", arguments.rad)
+    q_seed = None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", units)
     if arguments.frame == TOOL and q_seed is None:
         raise InputError("--frame", TOOL, "--seed as well, which says where the tool is")
     T = frame_of(robot, arguments, q_seed) @ T
-    options = IKOptions(
-        task=task,
-        mask=None if arguments.mask is None else [name in arguments.mask for name in MASK_NAMES],
-        mask_frame=arguments.mask_frame,
-        constraints=joint_constraints(robot, arguments),
-        respect_limits=not arguments.ignore_limits,
-        branch=arguments.branch,
-        images=arguments.images,
-        prefer=arguments.prefer,
-        redundancy=_redundancy(arguments, angle),
-        max_solutions=None if arguments.all else 1,
-        solver=arguments.solver,
-        position_tolerance=_scaled(arguments.position_tolerance, length),
-        rotation_tolerance=_scaled(arguments.rotation_tolerance, angle),
-        avoid_self_collision=arguments.avoid_self_collision,
-        obstacles=obstacles_of(arguments),
-    )
+    given = {name: _option(arguments, option, units) for name, option in declared().items()}
+    constraints = joint_constraints(robot, arguments)
+    given |= {
+        "task": task,
+        "mask": None if arguments.mask is None else [name in arguments.mask for name in MASK_NAMES],
+        "limits": constraints.limits,
+        "locked": constraints.locked,
+        "respect_limits": not arguments.ignore_limits,
+        "redundancy": _redundancy(arguments, units),
+        "max_solutions": None if arguments.all else arguments.max_solutions or 1,
+        "obstacles": obstacles_of(arguments),
+    }
+    options = IKOptions.of(None, **given)
     result = solve(robot, T, options, q_seed)
     answer = ik_answer(result)
     if arguments.json:
         print_json(answer)
     else:
-        print(result.explain(Units(not arguments.rad, "m" if arguments.rad else "mm")).text + "\n")
+        print(result.explain(units).text + "\n")
         _print(answer, Notation(robot, arguments.rad))
         if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
             print("note: --position is in millimetres; --rad makes it metres", file=sys.stderr)
     return 0 if answer["status"] == "solved" else 1
 
 
-def _scaled(value: float | None, unit: float) -> float | None:
-    return None if value is None else value * unit
+def _vector(texts: list[str], unit: Unit, field: str) -> list[float]:
+    return [quantity(text, unit, field) for text in texts]
+
+
+def _option(arguments: Namespace, option: Option, units: Units) -> Any:
+    """What was typed for an option; a number in radians or metres."""
+    value = getattr(arguments, option.name, None)
+    if not option.unit or not isinstance(value, str):
+        return value
+    return quantity(value, units.of(option.unit == "rad"), flag_of(option.name))
 
 
 def _print(answer: IkAnswer, units: Notation) -> None:
@@ -137,11 +146,13 @@ def _needs(units: Notation, blocked: list[Blocked]) -> list[list[str]]:
     ]
 
 
-def _redundancy(arguments: Namespace, angle: float) -> float | dict[str, float] | None:
+def _redundancy(arguments: Namespace, units: Units) -> float | dict[str, float] | None:
     """``--redundancy psi=20 --redundancy …`` as values by name in radians, or a single value without a name."""
-    given: list[tuple[str, float]] = arguments.redundancy or []
-    if len(given) == 1 and not given[0][0]:
-        return given[0][1] * angle
-    if any(not name for name, _ in given):
-        raise InputError("--redundancy", given, "NAME=VALUE when more than one is given")
-    return {name: value * angle for name, value in given} or None
+    field = "--redundancy"
+    given: list[tuple[str, list[str]]] = arguments.redundancy or []
+    values = {name: quantity(":".join(texts), units.angles, field) for name, texts in given}
+    if len(given) == 1 and "" in values:
+        return values[""]
+    if "" in values:
+        raise InputError(field, given, "NAME=VALUE when more than one is given")
+    return values or None

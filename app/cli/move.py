@@ -7,15 +7,26 @@ from argparse import Namespace
 from contextlib import closing
 from pathlib import Path
 
-from app.cli.terminal import Notation, clean, configuration, obstacles_of, print_json, robot_of, table
+from app.cli.terminal import (
+    Notation,
+    clean,
+    configuration,
+    obstacles_of,
+    print_json,
+    quantity,
+    robot_of,
+    table,
+    units_of,
+)
 from app.exports.motion import FORMATS, MotionFormat
 from app.exports.motion_plot import motion_plot
 from app.exports.save import opened
 from app.shared.answers.motion import motion_answer
 from kin import InputError, Motion, plan_motion
 from kin.motion import parse_program
-from kin.units import Units
+from kin.units import Unit
 
+PER_SECOND = Unit("Hz", 1.0, 2)
 LEAST_RATE, MOST_RATE = 0.1, 10_000.0
 _UNITS = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³", "tool_speed": "/s", "tool_turn": "/s"}
 
@@ -24,12 +35,13 @@ def run(arguments: Namespace) -> int:
     """Plan the motion, print what it is, and write files; 1 if the program cannot be driven."""
     robot = robot_of(arguments)
     kind = _format(arguments)
-    if not LEAST_RATE <= arguments.rate <= MOST_RATE:
-        raise InputError("--rate", arguments.rate, f"{LEAST_RATE:g} to {MOST_RATE:g} samples per second")
+    rate = quantity(arguments.rate, PER_SECOND, "--rate")
+    if not LEAST_RATE <= rate <= MOST_RATE:
+        raise InputError("--rate", rate, f"{LEAST_RATE:g} to {MOST_RATE:g} samples per second")
     if arguments.picture is not None and Path(arguments.picture).suffix.lower() != ".svg":
         raise InputError("--picture", arguments.picture, "a name that ends in .svg")
     start = arguments.start
-    q_start = None if start is None else configuration(robot, start, "--start", arguments.rad)
+    q_start = None if start is None else configuration(robot, start, "--start", units_of(arguments))
     motion = plan_motion(
         robot,
         parse_program(_text(arguments.program), robot),
@@ -40,7 +52,7 @@ def run(arguments: Namespace) -> int:
     if arguments.json:
         print_json(motion_answer(motion))
     elif arguments.output != "-":
-        print(motion.explain(Units(not arguments.rad, "m" if arguments.rad else "mm")))
+        print(motion.explain(units_of(arguments)))
         if motion.planned:
             print("\n" + _report(motion, Notation(robot, arguments.rad)))
     if not motion.planned:
@@ -48,7 +60,7 @@ def run(arguments: Namespace) -> int:
             print(motion.reason, file=sys.stderr)
         return 1
     if arguments.output is not None and kind is not None:
-        _write(arguments.output, motion, kind, arguments.rate, arguments.json)
+        _write(arguments.output, motion, kind, rate, arguments.json)
     if arguments.picture is not None:
         try:
             Path(arguments.picture).write_text(motion_plot(motion), encoding="utf-8")

@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import io
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -33,6 +34,7 @@ EPILOG = """examples:
   kinboard import arm.urdf --tip tool0 -o my-arm.toml"""
 
 Run = Callable[[argparse.Namespace], int]
+_NEGATIVE = re.compile(r"-(?:[\d.(]|π|(?:pi|inf|nan)\b)", re.IGNORECASE)
 
 
 class Command(NamedTuple):
@@ -113,12 +115,8 @@ class _Version(argparse.Action):
 
 
 def _not_an_option(word: str) -> str:
-    """Negative numbers such as -1e-3 look like options to argparse; with a leading space they do not."""
-    try:
-        float(word)
-    except ValueError:
-        return word
-    return f" {word}" if word.startswith("-") else word
+    """Negative numbers such as -1e-3 or -pi/2 look like options to argparse; with a leading space they do not."""
+    return f" {word}" if _NEGATIVE.match(word) else word
 
 
 def _load_serve() -> Run:
@@ -163,6 +161,12 @@ def _load_check() -> Run:
     from app.cli.files import run_check
 
     return run_check
+
+
+def _load_compare() -> Run:
+    from app.cli.compare import run
+
+    return run
 
 
 def _load_move() -> Run:
@@ -213,33 +217,11 @@ def _load_lti() -> Run:
     return run
 
 
-def _add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
-    return _avoiding(declare.add_ik(commands, parents))
-
-
-def _add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
-    return _avoiding(declare.add_move(commands, parents))
-
-
-def _avoiding(parser: argparse.ArgumentParser) -> argparse.ArgumentParser:
-    """The arguments that say what the arm must not touch."""
-    parser.add_argument(
-        "--avoid-self-collision",
-        action="store_true",
-        help="leave out configurations in which links of the arm touch each other",
-    )
-    parser.add_argument(
-        "--obstacles", metavar="FILE",
-        help="bodies that the arm must not touch: a TOML file of [[obstacles]], in metres and radians",
-    )  # fmt: skip
-    return parser
-
-
 COMMANDS = (
     Command(declare.add_serve, _load_serve),
     Command(declare.add_fk, _load_fk, interpreted=True),
-    Command(_add_ik, _load_ik),
-    Command(_add_move, _load_move),
+    Command(declare.add_ik, _load_ik),
+    Command(declare.add_move, _load_move),
     Command(declare.add_robots, _load_robots, interpreted=True),
     Command(declare.add_workspace, _load_workspace),
     Command(add_room, _load_room),
@@ -248,6 +230,7 @@ COMMANDS = (
     Command(add_lti, _load_lti, interpreted=True),
     Command(declare.add_bench, _load_bench),
     Command(declare.add_check, _load_check, interpreted=True),
+    Command(declare.add_compare, _load_compare, interpreted=True),
     Command(declare.add_capability, _load_capability),
     Command(declare.add_import, _load_import, interpreted=True),
     Command(declare.add_export, _load_export, interpreted=True),

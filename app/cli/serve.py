@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import sys
 from argparse import Namespace
@@ -10,7 +9,7 @@ from collections.abc import Callable
 
 from pydantic import ValidationError
 
-from app.cli.startup import hidden, no_collections, shared_metrics
+from app.cli.startup import hidden, no_collections
 from app.shared.settings import Settings
 
 FLAGS = ("host", "port", "root_path", "robots", "read_only", "workers", "pin")  # they override the environment
@@ -31,12 +30,11 @@ def run(arguments: Namespace) -> int:
             got = "a value that is not shown" if name in SECRET else repr(item["input"])
             print(f"kinboard: {where}: got {got}: {item['msg']}", file=sys.stderr)
         return 2
-    with shared_metrics() if settings.workers + settings.rest_workers > 1 else contextlib.nullcontext():
-        run_service = import_service()
-        try:
-            return run_service(settings, open_browser=arguments.open)
-        finally:
-            gc.unfreeze()
+    run_service = import_service()
+    try:
+        return run_service(settings, open_browser=arguments.open)
+    finally:
+        gc.unfreeze()
 
 
 def import_service() -> Callable[..., int]:

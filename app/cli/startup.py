@@ -5,11 +5,8 @@ from __future__ import annotations
 import gc
 import os
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-
-FOLDER_OF_COUNTS = "PROMETHEUS_MULTIPROC_DIR"  # read by prometheus_client when it is imported
 
 
 @contextmanager
@@ -35,31 +32,6 @@ def hidden(package: str) -> Iterator[None]:
         yield
     finally:
         del sys.modules[package]
-
-
-@contextmanager
-def shared_metrics() -> Iterator[None]:
-    """A folder through which the processes of a service count together: known before the metrics are imported.
-
-    Without a place to write, each process counts for itself.
-    """
-    for place in (None, "/dev/shm"):
-        try:
-            folder = tempfile.TemporaryDirectory(prefix="kinboard-", dir=place)
-        except OSError:
-            continue
-        with folder as name:
-            before = os.environ.get(FOLDER_OF_COUNTS)
-            os.environ[FOLDER_OF_COUNTS] = name
-            try:
-                yield
-            finally:  # what this process starts later must not count in a folder that is gone
-                if before is None:
-                    del os.environ[FOLDER_OF_COUNTS]
-                else:
-                    os.environ[FOLDER_OF_COUNTS] = before
-        return
-    yield
 
 
 def disable_compiler() -> None:

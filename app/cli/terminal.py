@@ -16,10 +16,24 @@ from typing import Any
 import numpy as np
 
 from app.shared.store import Store
-from kin import InputError, JointConstraints, Obstacle, Robot, frame_pose, from_xyz_rpy, load_robot, load_urdf
+from kin import (
+    InputError,
+    JointConstraints,
+    KinematicsError,
+    Obstacle,
+    Robot,
+    frame_pose,
+    from_xyz_rpy,
+    load_robot,
+    load_urdf,
+)
 from kin.collision.obstacles import checked_obstacles
 from kin.frames import FRAMES
 from kin.transforms import Array
+from kin.typed import ReadError, read, valid
+from kin.units import Unit, Units
+
+LARGEST = 1e6  # rad, m or a plain number
 
 
 def store_of(arguments: Namespace) -> Store:
@@ -30,7 +44,11 @@ def store_of(arguments: Namespace) -> Store:
 
 def robot_of(arguments: Namespace) -> Robot:
     """The robot of the argument ``ROBOT``: an id, or the path of a file."""
-    named = arguments.robot
+    return named_robot(arguments, arguments.robot)
+
+
+def named_robot(arguments: Namespace, named: str) -> Robot:
+    """A robot by its id, or by the path of a file."""
     if Path(named).suffix == ".urdf":
         return load_urdf(Path(named))
     if Path(named).suffix == ".toml":
@@ -41,37 +59,54 @@ def robot_of(arguments: Namespace) -> Robot:
 def joint_constraints(robot: Robot, arguments: Namespace) -> JointConstraints:
     """The limits and locks of ``--limit`` and ``--lock``."""
     return JointConstraints(
-        _per_joint(robot, arguments.limit, "--limit", 2, arguments.rad),
-        _per_joint(robot, arguments.lock, "--lock", 1, arguments.rad),
+        _per_joint(robot, arguments.limits, "--limit", 2, units_of(arguments)),
+        _per_joint(robot, arguments.locked, "--lock", 1, units_of(arguments)),
     )
 
 
 def _per_joint(
-    robot: Robot, given: list[tuple[str, list[float]]] | None, field: str, count: int, rad: bool
+    robot: Robot, given: list[tuple[str, list[str]]] | None, field: str, count: int, units: Units
 ) -> Any:
     """``--lock 2=30`` or ``--limit 2=0:30``, joints counted from 1, as one entry per joint in radians (metres)."""
     if given is None:
         return None
     entries: list[float | list[float] | None] = [None] * robot.n
-    for joint, values in given:
+    for joint, texts in given:
         if not joint.isdecimal() or not 1 <= int(joint) <= robot.n:
             raise InputError(field, joint, f"a joint from 1 to {robot.n} before the =")
-        if len(values) != count:
-            raise InputError(field, values, "JOINT=VALUE" if count == 1 else "JOINT=LOWER:UPPER")
+        if len(texts) != count:
+            raise InputError(field, texts, "JOINT=VALUE" if count == 1 else "JOINT=LOWER:UPPER")
         i = int(joint) - 1
-        scale = 1.0 if rad else math.pi / 180 if robot.revolute[i] else 1e-3
-        scaled = [value * scale for value in values]
-        entries[i] = scaled[0] if count == 1 else scaled
+        values = [quantity(text, units.of(bool(robot.revolute[i])), field) for text in texts]
+        entries[i] = values[0] if count == 1 else values
     return entries
 
 
-def configuration(robot: Robot, values: list[float], field: str, rad: bool) -> Array:
-    """Joint values as ``(n,)`` in radians (metres); raises `InputError` unless there are n of them."""
-    if len(values) != robot.n:
+def units_of(arguments: Namespace) -> Units:
+    """The units of numbers without one, and of printed ones."""
+    return Units(not arguments.rad, "m" if arguments.rad else "mm")
+
+
+def quantity(text: str, unit: Unit, field: str) -> float:
+    """A typed number in radians, metres or as it is; raises `KinematicsError` with the field and what is valid."""
+    try:
+        return read(text, unit, largest=LARGEST)
+    except ReadError as error:
+        hint = "" if error.readings else f"; valid: {valid(unit)}"
+        raise KinematicsError(f"{field}: {error.reason}{hint}") from None
+
+
+def configuration(robot: Robot, texts: list[str], field: str, units: Units) -> Array:
+    """Joint values as ``(n,)`` in radians (metres); raises `KinematicsError` unless there are n of them."""
+    if len(texts) != robot.n:
         joints = ", ".join(joint.name for joint in robot.joints)
-        raise InputError(field, f"{len(values)} values", f"{robot.n}, one for each of: {joints}")
-    scale = np.where(robot.revolute, math.pi / 180, 1e-3)
-    return robot.check_q(np.array(values) * (1.0 if rad else scale), field)
+        raise InputError(field, f"{len(texts)} values", f"{robot.n}, one for each of: {joints}")
+    turning = map(bool, robot.revolute)
+    named = [
+        (text, units.of(turns), f"{field}[{i}]")
+        for i, (text, turns) in enumerate(zip(texts, turning, strict=True))
+    ]
+    return robot.check_q(np.array([quantity(*each) for each in named]), field)
 
 
 def obstacles_of(arguments: Namespace) -> tuple[Obstacle, ...]:
@@ -92,12 +127,13 @@ def frame_of(robot: Robot, arguments: Namespace, q: Array | None = None) -> Arra
 
     `q`: where the arm is, for the frame of the tool.
     """
-    angle, length = (1.0, 1.0) if arguments.rad else (math.pi / 180, 1e-3)
+    units = units_of(arguments)
     workpieces: dict[str, Array] = {}
-    for name, values in arguments.workpiece:
+    for name, texts in arguments.workpiece:
         if name in workpieces or name in FRAMES:
             raise InputError("--workpiece", name, f"names other than {', '.join(FRAMES)}, each once")
-        workpieces[name] = from_xyz_rpy([v * length for v in values[:3]], [v * angle for v in values[3:]])
+        values = [quantity(text, units.of(k >= 3), f"--workpiece {name}") for k, text in enumerate(texts)]
+        workpieces[name] = from_xyz_rpy(values[:3], values[3:])
     if arguments.frame not in (*FRAMES, *workpieces):
         raise InputError("--frame", arguments.frame, "one of " + ", ".join([*FRAMES, *workpieces]))
     return frame_pose(robot, arguments.frame, workpieces, q)

@@ -18,10 +18,10 @@ from app.exercises.judging import Verdict
 from app.exercises.variant import Variant
 from kin import InputError
 from kin.transforms import Array
+from kin.typed import LONGEST
 from kin.units import Unit, Units
 
 Form = Literal["fields", "options", "order", "posture", "postures", "frame", "table", "program"]
-LONGEST = 100  # characters of a typed number
 LONGEST_PROGRAM = 4000  # characters
 
 
@@ -119,7 +119,7 @@ def texts(given: object, count: int, what: str) -> list[str]:
     """Typed texts, cut to a sensible length."""
     if not isinstance(given, list | tuple) or len(given) != count or not all(isinstance(x, str) for x in given):
         raise InputError("answer", given, f"{count} texts: {what}")
-    return [text[:LONGEST] for text in given]
+    return [text[: LONGEST + 1] for text in given]  # still too long to be valid
 
 
 def index(given: object, count: int) -> int:

@@ -23,7 +23,15 @@ _DRAWS = 500
 
 
 class VariantError(ValueError):
-    """An exercise has no valid variant for a seed; the message says why."""
+    """An exercise has no valid variant for a seed; the message says why.
+
+    Attributes:
+        field: of the file; empty if it is not known.
+    """
+
+    def __init__(self, message: str, field: str = "") -> None:
+        super().__init__(message)
+        self.field = field
 
 
 @dataclass(frozen=True)
@@ -74,6 +82,7 @@ class Exercise:
         q: the configuration that the exercise is about; the home pose if empty.
         target: the pose that it is about.
         kind: its question.
+        expressions: all of the file; each has a value in every variant.
         file: where it was read, for messages.
         builtin: whether it belongs to the package.
     """
@@ -94,6 +103,7 @@ class Exercise:
     q: tuple[Expression, ...]
     target: Target | None
     kind: Kind
+    expressions: tuple[Expression, ...] = ()
     file: str = ""
     builtin: bool = False
 
@@ -115,9 +125,10 @@ class Exercise:
             try:
                 variant = self._made(name, drawn)
                 if all(variant.number(condition) for condition in self.require):
+                    variant.vector(self.expressions)  # what has no value would fail when the question is shown
                     return variant
             except ExpressionError as error:
-                raise VariantError(str(error)) from None
+                raise VariantError(str(error), error.field) from None
         raise VariantError(f"no numbers that meet the conditions under require were drawn for seed {seed}")
 
     def _made(self, name: str, drawn: dict[str, Quantity]) -> Variant:
@@ -171,4 +182,4 @@ class Exercise:
                     variant.text(text, Units())
                 self.solution(variant, Units())
             except (ValueError, ExpressionError) as error:
-                raise VariantError(f"seed {seed}: {error}") from None
+                raise VariantError(f"seed {seed}: {error}", getattr(error, "field", "")) from None

@@ -49,7 +49,15 @@ VALID = "numbers, names, + - * / **, comparisons, and, or, not, " + ", ".join(so
 
 
 class ExpressionError(ValueError):
-    """A text is no expression, or it has no value; the message says why."""
+    """A text is no expression, or it has no value; the message says why.
+
+    Attributes:
+        field: of the file that it comes from, if any.
+    """
+
+    def __init__(self, message: str, field: str = "") -> None:
+        super().__init__(f"{field}: {message}" if field else message)
+        self.field = field
 
 
 class Expression:
@@ -57,17 +65,18 @@ class Expression:
 
     Attributes:
         text: as written.
+        field: where in a file, for messages.
         names: the names and functions in it that are not built in.
     """
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, field: str = "") -> None:
         if len(text) > LONGEST:
             raise ExpressionError(f"longer than {LONGEST} characters")
         try:
             self._body = ast.parse(text.strip(), mode="eval").body
         except (SyntaxError, ValueError, MemoryError, RecursionError):
             raise ExpressionError("not an expression") from None
-        self.text = text
+        self.text, self.field = text, field
         self.names: frozenset[str] = frozenset()
         self._check(self._body)
 
@@ -97,11 +106,11 @@ class Expression:
         try:
             found = float(_value(self._body, scope))
         except KeyError as error:
-            raise ExpressionError(f"unknown name {error.args[0]}") from None
+            raise ExpressionError(f"unknown name {error.args[0]}", self.field) from None
         except (ArithmeticError, ValueError, TypeError, IndexError, RecursionError) as error:
-            raise ExpressionError(f"{self.text}: {error}") from None
+            raise ExpressionError(f"{self.text}: {error}", self.field) from None
         if not math.isfinite(found):
-            raise ExpressionError(f"{self.text} is not finite")
+            raise ExpressionError(f"{self.text} is not finite", self.field)
         return found
 
 

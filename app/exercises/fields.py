@@ -29,10 +29,15 @@ class Fields:
 
     Args:
         names: the names that texts may contain in braces.
+        found: the expressions read so far; tables of one file share it.
     """
 
-    def __init__(self, file: str, table: object, prefix: str = "", names: frozenset[str] = frozenset()) -> None:
+    def __init__(
+        self, file: str, table: object, prefix: str = "", names: frozenset[str] = frozenset(),
+        found: list[Expression] | None = None,
+    ) -> None:  # fmt: skip
         self.file, self.prefix, self.names = file, prefix, names
+        self.found = [] if found is None else found
         self._read: list[str] = []
         if not isinstance(table, dict):
             raise ExerciseFileError(file, prefix.rstrip(".") or "file", table, "a table")
@@ -96,14 +101,16 @@ class Fields:
     def tables(self, field: str, least: int = 0) -> list[Fields]:
         """A list of tables."""
         return [
-            type(self)(self.file, item, f"{self.prefix}{field}[{i}].", self.names)
+            type(self)(self.file, item, f"{self.prefix}{field}[{i}].", self.names, self.found)
             for i, item in enumerate(self.items(field, least))
         ]
 
     def sub(self, field: str) -> Fields:
         """A table inside this one; an empty one if it is missing."""
         value = self.get(field)
-        return type(self)(self.file, {} if value is None else value, f"{self.prefix}{field}.", self.names)
+        return type(self)(
+            self.file, {} if value is None else value, f"{self.prefix}{field}.", self.names, self.found
+        )
 
     def choice(self, field: str, choices: Iterable[str], default: str | None = None) -> str:
         """One of these texts."""
@@ -159,6 +166,10 @@ class Fields:
         if not isinstance(value, str):
             raise self.refuse(field, value, "a number, or an expression as text")
         try:
-            return Expression(value)
+            expression = Expression(value, self.prefix + field)
+            if not expression.names:
+                expression.value({})
         except ExpressionError as error:
             raise self.refuse(field, value, f"an expression of {VALID} ({error})") from None
+        self.found.append(expression)
+        return expression

@@ -13,14 +13,12 @@ from app.exercises.exercise import TOPICS, Drawn, Exercise, Target
 from app.exercises.expressions import Expression
 from app.exercises.fields import ExerciseFileError, Fields
 from app.exercises.kinds import KINDS
+from app.exercises.lessons import LESSONS
+from app.exercises.variant import Facts
 from kin import KinematicsError, Robot, get_robot
 
 BUILTIN = Path(__file__).parent / "library"
 UNITS = {"deg": (math.pi / 180, "angle"), "rad": (1.0, "angle"), "mm": (1e-3, "length"), "m": (1.0, "length")}
-LESSONS = (
-    "rotations", "dh", "screws", "equations", "inverse", "postures", "numeric", "redundancy", "velocity",
-    "trajectories",
-)  # fmt: skip
 MOST_HINTS = 5
 LAST = 999  # place of an exercise without one
 _ID = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")
@@ -40,9 +38,10 @@ def parse_exercise(text: str, file: str = "exercise", find: Find = get_robot, bu
     except (ValueError, RecursionError) as error:
         raise ExerciseFileError(file, "file", str(error), "valid TOML") from None
     vary = _vary(Fields(file, data.get("vary", {}), "vary."))
-    let = _let(Fields(file, data.get("let", {}), "let."), frozenset(vary))
+    computed = Fields(file, data.get("let", {}), "let.")
+    let = _let(computed, frozenset(vary))
     names = frozenset((*vary, *let))
-    fields = Fields(file, data, names=names)
+    fields = Fields(file, data, names=names, found=computed.found)
     for table in ("vary", "let"):
         fields.get(table)
     robot = _robot(fields, find)
@@ -59,6 +58,12 @@ def parse_exercise(text: str, file: str = "exercise", find: Find = get_robot, bu
     answer = fields.sub("answer")
     question = kind.read(answer)
     answer.done()
+    require, target = fields.expressions("require"), _target(fields, robot)
+    known = names | frozenset(Facts(robot, robot.q_home))
+    for expression in fields.found:
+        if unknown := sorted(expression.names - known):
+            valid = f"a name from [vary] or [let], or of the arm: {', '.join(sorted(known))}"
+            raise ExerciseFileError(file, expression.field, unknown[0], valid)
     exercise = Exercise(
         exercise_id,
         fields.text("title"),
@@ -72,10 +77,11 @@ def parse_exercise(text: str, file: str = "exercise", find: Find = get_robot, bu
         fields.text("shown", ""),
         vary,
         let,
-        fields.expressions("require"),
+        require,
         q,
-        _target(fields, robot),
+        target,
         question,
+        tuple(fields.found),
         file,
         builtin,
     )

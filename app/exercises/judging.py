@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from app.exercises.questions import PLAIN, WHOLE, Choice, Number, Question
+from app.exercises.questions import WHOLE, Choice, Number, Question
 from app.exercises.typed import read_number
+from kin.units import PLAIN
 
 
 @dataclass(frozen=True)

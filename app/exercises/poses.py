@@ -13,7 +13,7 @@ from app.exercises.fields import Fields
 from app.exercises.variant import Variant
 from kin import wxyz_from_rotation
 from kin.transforms import Array, rotation_angle
-from kin.units import Units
+from kin.units import Units, fixed
 
 AXES = ("x", "y", "z")
 
@@ -87,8 +87,7 @@ def point_text(point: Array, units: Units) -> str:
 def pose_text(T: Array, units: Units) -> str:
     """Where a frame is, and where its axes point."""
     columns = ", ".join(
-        f"{axis} = ({', '.join(f'{v:.2f}'.replace('-0.00', '0.00').replace('-', '−') for v in T[:3, j])})"
-        for j, axis in enumerate(AXES)
+        f"{axis} = ({', '.join(fixed(float(v), 2) for v in T[:3, j])})" for j, axis in enumerate(AXES)
     )
     return f"{point_text(T[:3, 3], units)}; its axes: {columns}"
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from kin.units import Unit
+from kin.units import PLAIN, Unit
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,6 @@ class Number:
     ordered: bool = True
 
 
-PLAIN = Unit("", 1.0, 2)  # of counts and ratios
 WHOLE = 0.1  # accepted error of a count
 
 

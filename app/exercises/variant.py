@@ -15,7 +15,7 @@ from app.exercises.expressions import Expression, Function
 from kin import Robot
 from kin.singularity import task_jacobian
 from kin.transforms import Array
-from kin.units import Unit, Units
+from kin.units import Unit, Units, general
 
 
 class Facts(Mapping[str, "float | Function"]):
@@ -93,9 +93,8 @@ class Quantity:
         """In the reader's units, to a tenth of a degree or of a millimetre."""
         unit = unit_of(self.measure, units)
         if unit is None:
-            return f"{self.value:.6g}".replace("-", "−")
-        shown = unit.number(self.value)
-        return (shown.rstrip("0").rstrip(".") if "." in shown else shown) + unit.suffix
+            return general(self.value)
+        return unit.short(self.value) + unit.suffix
 
 
 def unit_of(measure: str, units: Units) -> Unit | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 
-LOG_EVERY = 10.0  # seconds between two lines of the same kind
+LOG_EVERY = 60.0  # seconds between two lines of the same kind
 
 
 class Notes:
@@ -15,12 +15,12 @@ class Notes:
         self._logger = logger
         self._latest: dict[str, tuple[str, int]] = {}  # by kind: the line, and how often since it was logged
 
-    def note(self, kind: str, line: str) -> None:
-        """Log or count a line."""
+    def note(self, kind: str, line: str, error: Exception | None = None) -> None:
+        """Log a line, with the traceback of the error if there is one, or count it."""
         if kind in self._latest:
             self._latest[kind] = line, self._latest[kind][1] + 1
         else:
-            self._logger.warning("%s", line)
+            self._logger.warning("%s", line, exc_info=error)
             self._begin(kind, line)
 
     def _begin(self, kind: str, line: str) -> None:

@@ -33,9 +33,6 @@ CAMERA = "ViewerCameraMessage"
 MEMORY = "LocalStorageGetItemResponseMessage"
 
 _COMPUTING = re.compile(r"/(workspace|capability)\b")
-_LOOKING_LESSONS = frozenset(
-    {"dh", "equations", "velocity"}
-)  # others solve the pose, or have a scene of their own
 
 
 class Rights(Enum):
@@ -62,10 +59,6 @@ class Rights(Enum):
     def compute(self) -> bool:
         """Whether a link may start work: inverse kinematics, clouds, sections, sizes, maps."""
         return self is Rights.FULL
-
-    def allow_lesson(self, key: str) -> bool:
-        """Whether a link may open a lesson."""
-        return self is Rights.FULL or key in _LOOKING_LESSONS
 
 
 # Swagger UI sets inline styles and data: images; scripts come from our own files only.

@@ -18,6 +18,7 @@ from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
 from app.shared.summaries import Summaries
+from app.viewer.activity.activity import Activity
 from app.viewer.frames import Frames
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.meshes.reader import ClientMeshes
@@ -39,6 +40,7 @@ class Stage(Protocol):
     meshes: ClientMeshes
     bodies: Bodies
     frames: Frames  # the workpieces, and the frame in which poses are shown
+    activity: Activity  # what is open, and what is withheld
 
     @property
     def client(self) -> viser.ClientHandle:
@@ -81,13 +83,6 @@ class Stage(Protocol):
         """The units in which angles and lengths are shown."""
 
     @property
-    def withheld(self) -> str:
-        """What no tab shows now, because an open exercise asks for it: "table", or nothing."""
-
-    def withhold(self, what: str) -> None:
-        """Show this in no tab from now on; empty: everything is shown again."""
-
-    @property
     def dark(self) -> bool:
         """Whether the page is dark."""
 
@@ -106,6 +101,9 @@ class Stage(Protocol):
     @property
     def avoid(self) -> bool:
         """Whether the arm is to touch neither itself nor an obstacle."""
+
+    def link_to(self, features: dict[str, dict[str, object]], lesson: str) -> str:
+        """A link to a page with nothing but these states of features, at this lesson."""
 
     def contacts_at(self, q: Array) -> tuple[Contact, ...]:
         """What the arm touches at a configuration ``(n,)``, the deepest first."""
@@ -196,6 +194,9 @@ class Feature:
         kernels: names of the parts of the core (`kin.warmup.parts`) that it needs, beside what moves the robot. On
             a new machine the visitor waits for them. `ALL`: what else arms of the robot's family do.
         messages: the events that the page's own script may send, by the first part of their key.
+        acts: whether they change what the visitor sees of the arm and the lessons, which a class that is led or
+            frozen does not leave to its students.
+        shared: whether the pages that a class follows show its state, as they do that of the open lesson.
         due: the worker sleeps at most this many seconds and then calls `tick`; it also does so after every other
             event. None: no ticks.
     """
@@ -205,6 +206,8 @@ class Feature:
     about: ClassVar[str] = ""
     kernels: ClassVar[tuple[str, ...]] = ()
     messages: ClassVar[frozenset[str]] = frozenset()
+    acts: ClassVar[bool] = True
+    shared: ClassVar[bool] = False
 
     def __init__(self, stage: Stage) -> None:
         self.stage = stage
@@ -246,7 +249,10 @@ class Feature:
         """What the arm touches has changed; the deepest contact first."""
 
     def on_style(self) -> None:
-        """The units, the colours of the page, or what is withheld, changed."""
+        """The units or the colours of the page changed."""
+
+    def on_activity(self) -> None:
+        """Something else is open or withheld, or an answer was judged: see `Stage.activity`."""
 
     def tick(self, now: float) -> None:
         """Continue long work, for at most ten milliseconds: frames wait. `now` is `time.perf_counter`'s."""

@@ -68,7 +68,7 @@ class ViewerServer:
         caches = clouds, maps or Maps(), summaries or Summaries()
         readers = meshes, Library(meshes)
         kernels = preparation or Preparation()
-        self._services = Services(store, *caches, *readers, Pace(), exercises, courses, hub, kernels)
+        self._services = Services(store, *caches, *readers, Pace(), courses, hub, kernels)
         self._owns_maps = maps is None
         self._owns_summaries = summaries is None
         self._owns_classroom = classroom is None

@@ -16,6 +16,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
+import logging
+import math
 import threading
 import time
 from collections import deque
@@ -30,7 +32,9 @@ from viser.infra import Message, _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.shared.connection import Connection
+from app.shared.notes import Notes
 
+logger = logging.getLogger("kinboard.viewer")
 _encode = msgspec.msgpack.Encoder().encode
 
 
@@ -178,18 +182,22 @@ class Packer:
     """Messages as bytes on the wire, as viser's producer makes them. Only the event loop's thread uses it."""
 
     def __init__(self) -> None:
+        self._notes = Notes(logger)
         self._compress = zstandard.ZstdCompressor(level=1).compress  # half a megabyte of memory
 
     def pack(self, window: Sequence[Message]) -> bytes:
         """One frame; viser's `_message_producer` describes its layout."""
         binary: list[memoryview] = []
-        inner = _encode(
-            {
-                "messages": [fields_of(message, binary) for message in window],
-                "timestampSec": time.perf_counter(),
-                "binaryBufferLengths": [buffer.nbytes for buffer in binary],
-            }
-        )
+        whole = {
+            "messages": [fields_of(message, binary) for message in window],
+            "timestampSec": time.perf_counter(),
+            "binaryBufferLengths": [buffer.nbytes for buffer in binary],
+        }
+        try:
+            inner = _encode(whole)
+        except (ValueError, OverflowError, TypeError) as error:
+            self._notes.note("unencodable", f"a message for a page cannot be sent as it is: {error}")
+            inner = _encode(whole | {"messages": _encodable(whole["messages"])})
         packed = self._compress(inner)
         parts: list[bytes | memoryview] = [
             len(inner).to_bytes(8, "little"),
@@ -198,6 +206,24 @@ class Packer:
         ]
         _infra._append_aligned_buffers(parts, binary, 16 + len(packed))
         return b"".join(parts)
+
+
+def _encodable(value: Any) -> Any:
+    """A value as the page can read it: U+FFFD for half a letter, infinity for a number of more than 64 bits.
+
+    `app.viewer.panel.script.read_json` refuses half letters in links and from pages. This is for what comes in
+    another way: a page whose first message cannot be sent would connect again and again.
+    """
+    match value:
+        case str():
+            return value.encode("utf-8", "replace").decode()
+        case int() if not -(1 << 63) <= value < 1 << 64:
+            return math.inf if value > 0 else -math.inf
+        case dict():
+            return {_encodable(key): _encodable(item) for key, item in value.items()}
+        case list() | tuple():
+            return [_encodable(item) for item in value]
+    return value
 
 
 def fields_of(message: Message, binary: list[memoryview]) -> dict[str, Any]:

@@ -111,10 +111,14 @@ def test_branches_and_the_arm_angle_move_the_arm_and_not_the_tool(tab: Tab) -> N
     tab.mark_is_under_thumb("Arm angle ψ", 60)
     tab.screenshot("posture-light")
     tab.type_number("Arm angle ψ", "150")
-    expect(tab.status).to_contain_text("111.7")
+    expect(tab.status).to_contain_text("−111.7° … 111.7°")
     tab.rest()
     tab.wait_for_tool(home, within=0.06)
-    assert tab.number("Arm angle ψ") == 60, "a refused value changes nothing"
+    expect(tab.row("Arm angle ψ").locator("input:visible").last).to_have_attribute("aria-invalid", "true")
+    assert tab.number("Arm angle ψ") == 150, "what was refused can be corrected"
+    tab.mark_is_under_thumb("Arm angle ψ", 60)
+    kept = np.radians([tab.number(f"Joint {i + 1}") for i in range(SRS.n)])
+    assert np.abs(kept - q).max() < 1e-6, "the arm stays"
 
 
 def test_five_joints_name_the_roll_error(tab: Tab) -> None:

@@ -179,17 +179,17 @@ class RobotDescription(RootModel[dict[str, Any]]):
 
     model_config = ConfigDict(frozen=True, json_schema_extra=lambda schema: schema.update(_SCHEMA))
 
-    def robot(self) -> Robot:
-        """The arm; raises 422 naming the field."""
+    def robot(self, field: str = "robot") -> Robot:
+        """The arm; raises 422 naming the field, which is a part of this one."""
         try:
             return robot_from_dict({**DEFAULTS, **self.root}, "robot")
         except RobotFileError as error:
-            raise invalid_file(error, "robot") from None
+            raise invalid_file(error, field) from None
 
 
 def invalid_file(error: RobotFileError, prefix: str) -> ProblemError:
     """422 for an error in a description or file that was sent."""
-    field = prefix if error.field in ("file", prefix) else f"{prefix}.{error.field}"
+    field = prefix if error.field in ("file", "robot", prefix) else f"{prefix}.{error.field}"
     hint = "docs/robot-files.md lists the fields of a robot."
     return invalid(FieldError(field=field, value=error.value, expected=error.expected), hint=hint)
 

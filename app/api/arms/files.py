@@ -116,7 +116,7 @@ def _read(body: ImportRequest) -> UrdfRobot:
 class ExportQuery(schemas.Body):
     """The format of the file."""
 
-    format: Literal["toml", "urdf", "dh", "mdh"] = Field(
+    format: Annotated[str, schemas.OneOf(FORMATS)] = Field(
         "toml", description="; ".join(f"{name}: {each.meaning}" for name, each in FORMATS.items()) + "."
     )
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any
 
 from fastapi import Request, Response
 from pydantic import Field
 
 from app.api.arms.operation import operation
 from app.api.body import versioned
-from app.api.schemas import refusals, settings_of
+from app.api.schemas import OneOf, refusals, settings_of
 from app.api.workspace.query import CloudQuery
 from app.api.workspace.streaming import ComputedResponse
 from app.exports.formats import FORMATS, encode, table_of
@@ -31,7 +31,7 @@ _HEADERS: dict[str, Any] = {
 class DownloadQuery(CloudQuery):
     """Parameters of a cloud, and its format."""
 
-    format: Literal["ndjson", "csv", "bin", "ply", "npz"] = Field(
+    format: Annotated[str, OneOf(FORMATS)] = Field(
         "ndjson", description="; ".join(f"{each.name}: {each.meaning}" for each in FORMATS.values()) + "."
     )
 

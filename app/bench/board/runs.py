@@ -165,6 +165,7 @@ def _free(folder: Path) -> Iterator[int | None]:
         raise OSError("runs cannot be started on Windows")
     import fcntl
 
+    folder.mkdir(mode=0o700, exist_ok=True)  # programs that clean up temporary files remove it after some days
     file = os.open(folder / "lock", os.O_RDWR | os.O_CREAT, 0o600)
     try:
         try:

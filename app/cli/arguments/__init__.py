@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from app.cli.arguments.shared import UNITS_NOTE, Parents
-from app.cli.arguments.values import count, named_number, number, whole_number
+from app.cli.arguments.options import UNITS_NOTE, add_options
+from app.cli.arguments.shared import Parents
+from app.cli.arguments.values import count, whole_number
+from app.shared.options import declared
 
 ROBOT_HELP = "id of the robot (`kinboard robots` lists them), or a robot file (*.toml, *.urdf)"
 XYZ = ("X", "Y", "Z")
@@ -61,7 +63,7 @@ def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         parents.output,
         parents.frames,
     )
-    parser.add_argument("q", type=number, nargs="+", metavar="Q", help=f"joint values, {UNITS_NOTE}")
+    parser.add_argument("q", nargs="+", metavar="Q", help=f"joint values, {UNITS_NOTE}")
     parser.add_argument("--frames", action="store_true", help="also print the frame after every DH row")
     parser.add_argument(
         "--frame", default="world", metavar="NAME",
@@ -84,68 +86,28 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     )
     _add_target(parser)
     parser.add_argument(
-        "--seed", type=number, nargs="+", metavar="Q",
+        "--seed", nargs="+", metavar="Q",
         help=f"prefer solutions near this configuration; {UNITS_NOTE}",
     )  # fmt: skip
-    parser.add_argument(
-        "--redundancy", type=named_number, action="append", metavar="[NAME=]VALUE",
-        help="value of a redundancy parameter of the arm, an angle; may be repeated",
-    )  # fmt: skip
-    parser.add_argument(
-        "--branch", action="append", metavar="NAME",
-        help="only this branch: 'elbow up', 'shoulder front · wrist flip', 'seed'; may be repeated",
-    )  # fmt: skip
-    parser.add_argument(
-        "--prefer", choices=("nearest", "limits", "manipulability"), default="nearest",
-        help="how to choose and sort solutions: nearest to the seed (default), farthest from the joint limits, "
-        "largest manipulability",
-    )  # fmt: skip
-    parser.add_argument(
-        "--solver", choices=("auto", "numeric"), default="auto",
-        help="numeric: search from many starts, even if the arm has a closed form",
-    )  # fmt: skip
-    parser.add_argument(
-        "--position-tolerance", type=number, metavar="X",
-        help="error of the point that counts as none, in millimetres (--rad: metres); default 1e-9 m",
-    )  # fmt: skip
-    parser.add_argument(
-        "--rotation-tolerance", type=number, metavar="A",
-        help="rotation error that counts as none, in degrees (--rad: radians); default 1e-9 rad",
-    )  # fmt: skip
+    shown = {"task", "mask", "mask_frame", "limits", "locked", "respect_limits"}  # above, or with another meaning
+    add_options(parser, [name for name in declared() if name not in shown])
     parser.add_argument("--all", action="store_true", help="print all solutions, not only the best")
-    parser.add_argument(
-        "--images", choices=("nearest", "all"), default="nearest",
-        help="with --all: also solutions that differ by whole turns of a joint, inside the limits",
-    )  # fmt: skip
     parser.add_argument("--ignore-limits", action="store_true", help="also solutions outside the joint limits")
     return parser
 
 
 def _add_target(parser: argparse.ArgumentParser) -> None:
     """The arguments of ``ik`` that say what the tool has to match."""
-    parser.add_argument(
-        "--position", type=number, nargs=3, required=True, metavar=XYZ, help="millimetres (--rad: metres)"
-    )
+    parser.add_argument("--position", nargs=3, required=True, metavar=XYZ, help="millimetres (--rad: metres)")
     turn = parser.add_mutually_exclusive_group()
-    turn.add_argument("--wxyz", type=number, nargs=4, metavar=("W", *XYZ), help="orientation as a quaternion")
-    turn.add_argument("--approach", type=number, nargs=3, metavar=XYZ, help="direction of the tool's z axis")
+    turn.add_argument("--wxyz", nargs=4, metavar=("W", *XYZ), help="orientation as a quaternion")
+    turn.add_argument("--approach", nargs=3, metavar=XYZ, help="direction of the tool's z axis")
     parser.add_argument(
         "--frame", default="world", metavar="NAME",
         help="frame in which the target is: world (default), base (of the first DH row), tool (where the tool is "
         "at --seed), or a workpiece",
     )  # fmt: skip
-    parser.add_argument(
-        "--task", choices=("pose", "approach", "position"),
-        help="what the tool must match (default: everything that is given)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--mask", nargs="+", choices=("x", "y", "z", "rx", "ry", "rz"), metavar="COORDINATE",
-        help="instead of a task: which of x y z rx ry rz must match",
-    )  # fmt: skip
-    parser.add_argument(
-        "--mask-frame", choices=("tool", "base"), default="tool",
-        help="frame of the mask's coordinates: the target's own (default) or the base frame",
-    )  # fmt: skip
+    add_options(parser, ["task", "mask", "mask_frame"], task=None)
 
 
 def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
@@ -161,7 +123,7 @@ def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "program", metavar="PROGRAM", help="program (TOML), with its own units; - is standard input"
     )
     parser.add_argument(
-        "--start", type=number, nargs="+", metavar="Q",
+        "--start", nargs="+", metavar="Q",
         help=f"where the arm is (default: its home configuration); {UNITS_NOTE}",
     )  # fmt: skip
     parser.add_argument(
@@ -171,8 +133,9 @@ def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "--format", choices=("csv", "json", "ndjson", "urscript", "python"),
         help="format of the file (default: by the ending of its name)",
     )  # fmt: skip
-    parser.add_argument("--rate", type=number, default=100.0, help="samples per second (default 100)")
+    parser.add_argument("--rate", default="100", help="samples per second (default 100)")
     parser.add_argument("--picture", metavar="FILE", help="draw joint values and speeds over time (SVG)")
+    add_options(parser, ["avoid_self_collision", "obstacles"])
     return parser
 
 
@@ -182,6 +145,28 @@ def add_robots(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         commands, "robots", "list the robots, or describe one", parents.robots, parents.output, takes_robot=False
     )
     parser.add_argument("robot", nargs="?", metavar="ROBOT", help="id of the robot to describe")
+    return parser
+
+
+def add_compare(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard compare``."""
+    parser = _command(
+        commands,
+        "compare",
+        "compare two arms: are they the same, and what was mistyped if not?",
+        parents.robots,
+        parents.output,
+        takes_robot=False,
+    )
+    for name, about in (("reference", "the arm that is right"), ("other", "the table in question")):
+        parser.add_argument(name, metavar=name.upper(), help=f"{about}: an id, or a file (*.toml or *.urdf)")
+    parser.add_argument(
+        "--free", action="store_true", help="base, tool and zeros of joints may differ: they are no mistakes"
+    )
+    parser.add_argument(
+        "--tolerance", nargs=2, metavar=("LENGTH", "ANGLE"),
+        help=f"largest difference of the poses of arms that count as close; {UNITS_NOTE}",
+    )  # fmt: skip
     return parser
 
 
@@ -298,7 +283,7 @@ def add_capability(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         parents.robots, parents.output, parents.joints,
     )  # fmt: skip
     size = parser.add_mutually_exclusive_group()
-    size.add_argument("--voxel", type=number, metavar="SIDE", help="side of a voxel, millimetres (--rad: metres)")
+    size.add_argument("--voxel", metavar="SIDE", help="side of a voxel, millimetres (--rad: metres)")
     size.add_argument(
         "--resolution", type=int, default=25, metavar="N", help="voxels along the longest side (default 25)"
     )

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from app.cli.arguments.values import named_numbers, workpiece
-
-UNITS_NOTE = "degrees and millimetres, or radians and metres with --rad"
+from app.cli.arguments.options import UNITS_NOTE, add_options
+from app.cli.arguments.values import workpiece
 
 
 class Parents:
@@ -35,14 +34,7 @@ class Parents:
             help="read and print radians and metres",
         )  # fmt: skip
         self.joints = argparse.ArgumentParser(add_help=False)
-        self.joints.add_argument(
-            "--lock", type=named_numbers, action="append", metavar="JOINT=VALUE",
-            help=f"lock a joint (counted from 1) at a value; {UNITS_NOTE}; may be repeated",
-        )  # fmt: skip
-        self.joints.add_argument(
-            "--limit", type=named_numbers, action="append", metavar="JOINT=LOWER:UPPER",
-            help=f"narrow the limits of a joint (counted from 1); {UNITS_NOTE}; may be repeated",
-        )  # fmt: skip
+        add_options(self.joints, ["limits", "locked"])
         self.frames = argparse.ArgumentParser(add_help=False)
         self.frames.add_argument(
             "--workpiece", type=workpiece, action="append", metavar="NAME=X:Y:Z[:ROLL:PITCH:YAW]", default=[],

@@ -1,16 +1,11 @@
-"""Numbers and names as they are typed on the command line."""
+"""Names and whole numbers as they are typed on the command line.
+
+Other numbers stay texts here: their units depend on the arm, and `app.cli.terminal` reads them.
+"""
 
 from __future__ import annotations
 
 import argparse
-
-
-def number(text: str) -> float:
-    """A finite number; the minus sign may be the typographic one."""
-    value = float(text.replace("−", "-"))
-    if not abs(value) <= 1e6:
-        raise argparse.ArgumentTypeError(f"{text.strip()!r} is not a number between -1e6 and 1e6")
-    return value
 
 
 def whole_number(text: str) -> int:
@@ -26,26 +21,19 @@ def count(text: str) -> int:
     return int(value)
 
 
-def named_number(text: str) -> tuple[str, float]:
-    """``NAME=VALUE``, or a bare value with an empty name."""
-    name, _, value = text.rpartition("=")
-    return name.strip(), number(value)
-
-
-def named_numbers(text: str) -> tuple[str, list[float]]:
-    """``NAME=VALUE:VALUE…``."""
+def named(text: str) -> tuple[str, list[str]]:
+    """``NAME=VALUE:VALUE…``; the name is empty if there is none."""
     name, _, values = text.rpartition("=")
-    return name.strip(), [number(value) for value in values.split(":")]
+    return name.strip(), values.split(":")
 
 
-def workpiece(text: str) -> tuple[str, list[float]]:
+def workpiece(text: str) -> tuple[str, list[str]]:
     """``NAME=X:Y:Z`` or ``NAME=X:Y:Z:ROLL:PITCH:YAW``."""
-    name, values = named_numbers(text)
+    name, values = named(text)
     if not name or len(values) not in (3, 6):
         raise argparse.ArgumentTypeError(f"{text!r} is not NAME=X:Y:Z or NAME=X:Y:Z:ROLL:PITCH:YAW")
-    return name, [*values, 0.0, 0.0, 0.0][:6]
+    return name, [*values, "0", "0", "0"][:6]
 
 
 # argparse reports "invalid <name> value".
 whole_number.__name__ = count.__name__ = "whole number"
-named_number.__name__ = named_numbers.__name__ = "value"

@@ -69,5 +69,5 @@ def _end(hub: Hub, code: str) -> int:
         print(f"kinboard: no room has the code {code!r}; `kinboard room list` shows them", file=sys.stderr)
         return 2
     hub.rooms.end(room.id)
-    print(f"{room.title}: ended, everything in it was erased.")
+    print(f"{room.title}: {hub.rooms.said_of_ended()}")
     return 0

@@ -10,7 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 import kin
-from app.exercises.contract import LONGEST, Asked, Kind, typed
+from app.exercises.contract import Asked, Kind, typed
 from app.exercises.fields import Fields
 from app.exercises.judging import Verdict
 from app.exercises.rows import FACTORS, Accepted, Line, Row, angle_between, turns
@@ -19,6 +19,7 @@ from app.exercises.variant import Variant
 from kin import InputError, Robot
 from kin.robot import CONVENTIONS, Convention
 from kin.transforms import Array
+from kin.typed import LONGEST
 from kin.units import DEGREES, Units
 
 NAMES = ("θ", "d", "a", "α")
@@ -166,7 +167,7 @@ def _read(given: object, count: int, first: int, units: Units) -> list[Row]:
         values = []
         for text, name, angular in zip(row, NAMES, ANGULAR, strict=True):
             try:
-                values.append(read_number(text[:LONGEST], units.of(angular)))
+                values.append(read_number(text[: LONGEST + 1], units.of(angular)))
             except EntryError as error:
                 raise EntryError(f"{name} of row {first + i + 1} was not read", error.detail) from None
         rows.append(Row(*values))

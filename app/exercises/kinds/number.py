@@ -10,9 +10,9 @@ from app.exercises.contract import Asked, Kind, texts, typed
 from app.exercises.expressions import Expression
 from app.exercises.fields import Fields
 from app.exercises.judging import Verdict, judge, read, tolerance_text, value_text
-from app.exercises.questions import PLAIN, WHOLE, Mistake, Number
+from app.exercises.questions import WHOLE, Mistake, Number
 from app.exercises.variant import Variant
-from kin.units import DEGREES, RADIANS, Unit, Units
+from kin.units import DEGREES, PLAIN, RADIANS, Unit, Units
 
 # Units of a file, and what one of them is in radians, metres or SI.
 SCALES = {"deg": math.pi / 180, "rad": 1.0, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "": 1.0, "count": 1.0, "joint": 1.0}

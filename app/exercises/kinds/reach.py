@@ -17,7 +17,7 @@ from app.exercises.variant import Variant
 from kin import IKOptions, JointConstraints, Robot, Task
 from kin.ik.options import TASKS
 from kin.transforms import Array, rotation_angle, vector_angle
-from kin.units import Units
+from kin.units import Units, general
 
 FAR = 3.0  # position tolerances that a negated joint must have moved the tool by
 LOCKED = (math.radians(0.5), 5e-4)  # rad, m: a locked joint may be off by this
@@ -68,7 +68,7 @@ class ReachKind(Kind):
         if self.margin:
             conditions.append(f"every joint {self.margin:g} % of its range away from its limits")
         if (least := variant.number(self.manipulability)) > 0.0:
-            conditions.append(f"manipulability at least {least:.3g}")
+            conditions.append(f"manipulability at least {general(least, 3)}")
         return Asked("posture", note=f"Required: {listed(conditions)}.", goal=variant.pose)
 
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
@@ -93,9 +93,8 @@ class ReachKind(Kind):
             parts.append(self._in_margin(robot, q, units))
         if (least := variant.number(self.manipulability)) > 0.0:
             w = float(kin.manipulability(robot, q))
-            parts.append(
-                (w >= least, f"The manipulability is {w:.3g}{'' if w >= least else f', below {least:.3g}'}.")
-            )
+            below = "" if w >= least else f", below {general(least, 3)}"
+            parts.append((w >= least, f"The manipulability is {general(w, 3)}{below}."))
         return Verdict.of(parts, " ".join(reason for _, reason in parts))
 
     def _at_target(self, variant: Variant, q: Array, units: Units) -> tuple[bool, str]:

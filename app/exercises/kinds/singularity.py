@@ -12,13 +12,13 @@ import kin
 from app.exercises.contract import Asked, Kind, index, texts
 from app.exercises.fields import Fields
 from app.exercises.judging import Verdict
-from app.exercises.questions import PLAIN, Number
+from app.exercises.questions import Number
 from app.exercises.typed import EntryError, read_number
 from app.exercises.variant import Variant
 from kin import Singularity
 from kin.ik.messages.singularity import CONDITIONS, LOSSES, short
 from kin.transforms import Array
-from kin.units import Units
+from kin.units import PLAIN, Units, fixed
 
 AT = 1e-6  # rad, m or SI: closer than this is at the singularity
 _LOST = 1e-6  # singular value of a lost direction
@@ -105,7 +105,7 @@ class SingularityKind(Kind):
 
     def solution(self, variant: Variant, units: Units) -> str:
         if self.direction:
-            shown = ", ".join(f"{value + 0.0:.3f}".replace("-", "−") for value in self._lost(variant))
+            shown = ", ".join(fixed(float(value)) for value in self._lost(variant))
             return f"({shown}), or the opposite."
         at = [each for each in self._known(variant) if each.distance <= AT]
         return " ".join(f"{short(each, units).capitalize()}: {LOSSES[each.lost]}." for each in at)

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 import kin
-from app.exercises.contract import LONGEST, Asked, Kind, typed
+from app.exercises.contract import Asked, Kind, typed
 from app.exercises.fields import Fields
 from app.exercises.judging import Verdict
 from app.exercises.poses import errors
@@ -18,6 +18,7 @@ from app.exercises.variant import Variant
 from kin import IKOptions, InputError, Task
 from kin.ik.options import TASKS
 from kin.transforms import Array, vector_angle
+from kin.typed import LONGEST
 from kin.units import Units
 
 MOST_ROWS = 16
@@ -100,7 +101,7 @@ class SolutionsKind(Kind):
         for number, row in enumerate(given, 1):
             if not isinstance(row, list | tuple) or len(row) != n or not all(isinstance(x, str) for x in row):
                 raise InputError(f"answer[{number - 1}]", row, f"{n} texts, one per joint")
-            cells = [text[:LONGEST].strip() for text in row]
+            cells = [text[: LONGEST + 1].strip() for text in row]
             if not any(cells):
                 continue
             try:

@@ -12,7 +12,7 @@ from app.exercises.expressions import Expression
 from app.exercises.fields import Fields
 from app.exercises.judging import Verdict
 from app.exercises.variant import Variant
-from kin.units import Units
+from kin.units import Units, general
 
 _CLOSE, _APART = 1e-9, 1e-3
 _SAMPLES = 6
@@ -71,8 +71,8 @@ class TermKind(Kind):
         value = variant.number(self.terms[chosen][0])
         return Verdict(
             False,
-            f"This term is right: in the posture of this exercise it is {value:.4g}, as it has to be. "
-            "Choose a posture in which the other terms vanish, and compare.".replace("-", "−"),
+            f"This term is right: in the posture of this exercise it is {general(value, 4)}, as it has to be. "
+            "Choose a posture in which the other terms vanish, and compare.",
         )
 
     def answer(self, variant: Variant) -> object:

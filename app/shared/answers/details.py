@@ -131,6 +131,16 @@ class ContactAnswer(TypedDict):
 
 
 @documented
+class CurveAnswer(TypedDict):
+    """A curve of configurations that meet the target."""
+
+    q: list[float]
+    """The solution that stands for it, in radians (metres)."""
+    direction: list[float]
+    """Unit vector of joint motion along the curve there."""
+
+
+@documented
 class IkDetails(TypedDict, total=False):
     """The numbers behind `cause`; which fields there are depends on it. Metres and radians."""
 
@@ -143,8 +153,11 @@ class IkDetails(TypedDict, total=False):
     complete: bool
     """Cause "" (solved): whether these are all configurations, as in the answer's own `complete`."""
     infinite: bool
-    """Cause "" (solved): whether the task leaves the joints a motion, so that there are infinitely many
-    configurations."""
+    """Cause "" (solved): whether there are infinitely many configurations, since the task leaves the joints a
+    motion or the target is met on a curve."""
+    curves: list[CurveAnswer]
+    """Cause "" (solved): the curves of configurations at a singular target, such as joints 4 and 6 in line, one of
+    the solutions for each; absent if there are none."""
     postures: int
     """Cause "" (solved): on how many branches the configurations are."""
     free: list[str]
@@ -235,6 +248,9 @@ def details_answer(details: Details) -> IkDetails:
             fields["free"], fields["fixed"] = list(details.free), list(details.fixed)
             if not details.touching:
                 del fields["touching"]
+            fields["curves"] = [curve._asdict() for curve in details.curves]
+            if not details.curves:
+                del fields["curves"]
         case Touching():
             fields["contact"], fields["searched"] = contact_answer(details.contact), list(details.searched)
         case OrientationNotMet():

@@ -22,6 +22,7 @@ from kin import BlockedBranch, IKResult, IKSolution, PathResult, Status
 from kin.ik.details import Solved
 from kin.ik.messages import explain
 from kin.ik.results import Cause
+from kin.solvers.contract import Completeness
 from kin.tolerances import TOLERANCES
 from kin.units import DEFAULT_UNITS
 
@@ -97,8 +98,12 @@ class IkAnswer(TypedDict):
     task: TaskName
     """The task that was solved for."""
     complete: bool
-    """Whether a closed form gave every posture, so that no further one exists on the requested branches; false
-    after a numeric search, which may miss some. Values of redundancy parameters and whole turns do not count."""
+    """Whether no further posture exists on the requested branches, proved or agreed. Values of redundancy
+    parameters and whole turns do not count."""
+    completeness: Completeness
+    """How that is known. "proved": by the derivation of a closed form, or by a certificate that was checked for
+    this target. "agreed": independent ways found the same postures. "unknown": some may be missing, as after a
+    numeric search."""
     solver: str
     """Name of the method that answered."""
     solver_reason: str
@@ -139,6 +144,7 @@ def ik_answer(result: IKResult) -> IkAnswer:
         "reason": reason,
         "task": cast(TaskName, result.task),
         "complete": result.complete,
+        "completeness": result.completeness,
         "solver": result.solver,
         "solver_reason": result.solver_reason,
         "solutions": [_solution(solution) for solution in result.solutions],

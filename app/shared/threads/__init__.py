@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import multiprocessing.util
 import os
 import random
 import sys
 import threading
+import weakref
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from queue import SimpleQueue
@@ -63,12 +65,25 @@ def end_process(code: int) -> NoReturn:
 
     The usual end of a Python process destroys LLVM while a thread compiles a kernel, which aborts the process; and
     it waits for the threads of executors. Functions registered with `atexit` are called, and output is flushed.
+    A forked process must have called `forget_exit_handlers`.
     """
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):  # closed, or nobody reads it
             stream.flush()
     os._exit(code)
+
+
+def forget_exit_handlers() -> None:
+    """Let this process, a copy, end without what its parent does at its end, such as deleting temporary folders.
+
+    What it registers from now on is done at its own end: by `atexit`, `weakref.finalize` and `multiprocessing`.
+    """
+    atexit._clear()
+    for inherited in tuple(weakref.finalize._registry):  # type: ignore[attr-defined]
+        inherited.atexit = False
+    weakref.finalize._registered_with_atexit = False  # type: ignore[attr-defined]
+    atexit.register(multiprocessing.util._exit_function)  # type: ignore[attr-defined] # its list is cleared by the fork
 
 
 def processors() -> int:

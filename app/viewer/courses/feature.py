@@ -4,38 +4,31 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Hashable
-from contextlib import suppress
+from collections.abc import Hashable
 from dataclasses import replace
 
 import viser
 
-from app.classroom.courses import Course, Courses, Item, course_of, parse_course, parse_item, to_data, to_toml
+from app.classroom.courses import Course, Item, course_of, parse_course, parse_item, to_data, to_toml
 from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import read_code
 from app.classroom.results.codes import clean_alias
 from app.exercises import ExerciseFileError
+from app.viewer.activity.activity import EXERCISES
 from app.viewer.courses import views
-from app.viewer.courses.progress import Progress
 from app.viewer.courses.views import Desk
-from app.viewer.exercises.practice import Practice
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons import LESSONS
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from kin import InputError, KinematicsError
 
-LinkOf = Callable[[dict[str, dict[str, object]], str], str]  # states of features, open lesson → an address
-
 
 class CourseFeature(Feature):
     """The courses of the service, or the open one: followed or edited.
 
     Its bar is above whatever the tab Learn shows; `show` and `hide` build and remove the rest.
-
-    Attributes:
-        link_of: makes a link to a page with these states of features.
     """
 
     key = "course"
@@ -46,16 +39,12 @@ class CourseFeature(Feature):
          "back", "list", "download", "link", "fields"}
     )  # fmt: skip
 
-    def __init__(self, stage: Stage, courses: Courses, practice: Practice, key: Callable[[], bytes]) -> None:
+    def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
-        self._courses, self._practice, self._secret = courses, practice, key
-        self._progress = Progress(courses, practice)
+        self._courses, self._progress = stage.activity.courses, stage.activity.progress
         self._desk = Desk()
         self._bar = stage.client.gui.add_html("")
         self._page: viser.GuiHtmlHandle | None = None
-        self._sent: Course | None = None  # by the teacher of the room
-        self.link_of: LinkOf = lambda states, lesson: ""
-        self.entered: Callable[[], None] = lambda: None  # called when exercises may have other numbers
 
     def show(self) -> None:
         """Build the HTML in the container that is open."""
@@ -74,23 +63,7 @@ class CourseFeature(Feature):
         """Whether the HTML is built."""
         return self._page is not None
 
-    def reveals(self, exercise_id: str) -> bool:
-        """Whether the answer of an exercise may be shown to who has not found it."""
-        courses = filter(None, (self._progress.course, self._sent))
-        return all(course.answers or exercise_id not in course.exercises for course in courses)
-
-    def leads(self, exercise_id: str) -> bool:
-        """Whether the course says what comes after an exercise."""
-        item = self._progress.item
-        return item is not None and item.kind == "exercise" and item.key == exercise_id
-
     # In a room
-
-    @property
-    def offered(self) -> tuple[Course, ...]:
-        """What a teacher may send: the open course, and those of the service."""
-        mine = self._progress.course
-        return tuple(dict.fromkeys(([mine] if mine is not None and mine.items else []) + [*self._courses.all]))
 
     def receive(self, packed: str) -> bool:
         """Open a course that was sent, as JSON; returns whether it was not open already.
@@ -98,20 +71,15 @@ class CourseFeature(Feature):
         An empty text: the course of the room is over, and stays open.
         """
         if not packed:
-            self._sent = None
+            self.stage.activity.sent = None
             return False
         course = course_of(json.loads(packed), self._courses.exercises, "course", self._courses.find)
-        self._sent = course
+        self.stage.activity.sent = course
         if course == self._progress.course:
             return False
         self._open(course)
         self._update()
         return True
-
-    def step_aside(self) -> None:
-        """Something else is opened above which the bar must not stand; the course stays open."""
-        self._progress.at = None
-        self._update()
 
     # Events
 
@@ -143,7 +111,7 @@ class CourseFeature(Feature):
             case "close", _:
                 self._desk = Desk()
                 progress.course = progress.at = None
-                self._enter()
+                self.stage.activity.enter_course()
             case "upload", [str(file), str(text)]:
                 if not text or len(text) > MOST_IN_FILE:
                     raise InputError("file", file, f"a text file of 1 to {MOST_IN_FILE} bytes")
@@ -166,19 +134,7 @@ class CourseFeature(Feature):
     def _open(self, course: Course) -> None:
         self._desk = Desk()
         self._progress.open(course)
-        self._enter()
-
-    def _enter(self) -> None:
-        """Exercises of a course have numbers and marks of their own, with a secret of this service.
-
-        Where there is no place for the secret, they are as without a course; a request for a result code then gets
-        the reason.
-        """
-        place = None
-        with suppress(KinematicsError):
-            place = self._progress.place(self._secret)
-        self._practice.enter(place)
-        self.entered()
+        self.stage.activity.enter_course()
 
     def _walk(self, name: object) -> None:
         progress = self._progress
@@ -199,7 +155,7 @@ class CourseFeature(Feature):
         stage = self.stage
         if item.kind == "exercise":
             stage.post("lesson", "Exercises")
-            stage.post(("feature", "exercises", ("open", item.key, 0)), None)
+            stage.post(("feature", EXERCISES, ("open", item.key, 0)), None)
             return
         if item.robot and stage.robot.id != item.robot:
             stage.change_robot(self._courses.find(item.robot))
@@ -212,10 +168,10 @@ class CourseFeature(Feature):
         if field == "alias":
             desk.code = ""
             self._progress.alias = clean_alias(text)
-            desk.code = self._progress.code(self._secret)
+            desk.code = self._progress.code(self.stage.activity.secret)
         else:
             desk.checked, desk.typed = None, text[:500]
-            desk.checked = read_code(text, self._secret())
+            desk.checked = read_code(text, self.stage.activity.secret())
 
     def _change(self, name: str, rest: list[object], value: object) -> None:
         course = self._progress.course
@@ -235,7 +191,7 @@ class CourseFeature(Feature):
                 raise InputError("course", name, "a control of the editor")
         data = to_data(changed)  # the same limits as a file's
         self._progress.edit(course_of(data, self._courses.exercises, "course", self._courses.find))
-        self._enter()
+        self.stage.activity.enter_course()
         self._desk.link = ""
 
     def _set(self, course: Course, what: str, text: str) -> Course:
@@ -268,7 +224,9 @@ class CourseFeature(Feature):
 
     def _link(self) -> str:
         course = self._progress.course
-        return "" if course is None else self.link_of({self.key: {"course": to_data(course)}}, self.key)
+        if course is None:
+            return ""
+        return self.stage.link_to({self.key: {"course": to_data(course)}}, self.key)
 
     # The page
 
@@ -283,14 +241,13 @@ class CourseFeature(Feature):
             self._progress.restore(state)
         except ExerciseFileError as error:
             self.stage.notify(Notice("error", "The course cannot be used", str(error)))
-        self._enter()
+        self.stage.activity.enter_course()
         if self.shown:
             self._progress.at = None
         self._update()
 
-    def refresh(self) -> None:
-        """The exercises have changed their marks."""
-        self._update()
+    def on_activity(self) -> None:
+        update_html(self._bar, views.bar_html(self._progress))
 
     def _update(self) -> None:
         update_html(self._bar, views.bar_html(self._progress))

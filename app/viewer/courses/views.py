@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from app.classroom.courses import Courses
+from app.classroom.courses import Courses, Item
 from app.classroom.courses.course import LONGEST, MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import Outcome
-from app.viewer.courses.progress import Progress
+from app.viewer.activity.progress import Progress
 from app.viewer.exercises.views import MARKS
 from app.viewer.lessons import LESSONS
 from app.viewer.panel.share import box_html
@@ -46,7 +46,7 @@ def bar_html(progress: Progress) -> str:
     if course is None or at is None or item is None:
         return ""
     return render(
-        "course/bar", course=course, number=at + 1, count=len(course.items), title=progress.title(item),
+        "course/bar", course=course, number=at + 1, count=len(course.items), title=_title(progress, item),
         note=item.note, marks=_marks(progress), at=at,
     )  # fmt: skip
 
@@ -63,7 +63,7 @@ def course_html(progress: Progress, desk: Desk) -> str:
     course = progress.course
     assert course is not None
     rows = [
-        {"index": i, "kind": item.kind, "title": progress.title(item), "own": item.title, "note": item.note,
+        {"index": i, "kind": item.kind, "title": _title(progress, item), "own": item.title, "note": item.note,
          "mark": mark, "name": course.items[i].key}
         for i, (item, mark) in enumerate(zip(course.items, _marks(progress), strict=True))
     ]  # fmt: skip
@@ -95,6 +95,16 @@ def said(outcome: Outcome | None, courses: Courses) -> str:
         f"{outcome.alias} · {title}: {outcome.score} %, {outcome.solved} of {outcome.count} exercises solved with "
         f"{tries}, {outcome.day:%Y-%m-%d}."
     )
+
+
+def _title(progress: Progress, item: Item) -> str:
+    """What an item is called."""
+    if item.title:
+        return item.title
+    if item.kind == "lesson":
+        return next((lesson.title for lesson in LESSONS if lesson.key == item.key), item.key)
+    exercise = progress.exercises.get(item.key)
+    return item.key if exercise is None else exercise.title
 
 
 def _marks(progress: Progress) -> list[dict[str, str]]:

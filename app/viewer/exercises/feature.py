@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 
 import numpy as np
 import viser
 
 import kin
-from app.exercises import Asked, Exercise, Exercises, Variant, VariantError
+from app.exercises import Asked, Exercise, Variant, VariantError
 from app.exercises.typed import EntryError
+from app.viewer.activity.activity import EXERCISES
 from app.viewer.exercises import views
 from app.viewer.exercises.drawing import GHOST, SIZE, Drawing
-from app.viewer.exercises.practice import Practice
-from app.viewer.exercises.reports import GivenUp, Judged, Lead
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.panel import update_html
@@ -28,31 +27,23 @@ class Practising(Feature):
     """A list by topic, or one exercise.
 
     It lives as long as the page; `show` and `hide` build and remove its HTML.
-
-    Attributes:
-        practice: what the student has done.
-        course: the course of the page.
-        judged: called with each answer that was judged while the right one was not on show.
-        giving_up: called before the answer is shown to who has not found it; False: it is not shown now.
     """
 
-    key = "exercises"
+    key = EXERCISES
     title = "Exercises"
     about = "Questions with your own numbers, hints and reasons."
     messages = frozenset(
         {"open", "list", "answer", "fields", "posture", "place", "pick", "hint", "reveal", "again", "scene"}
     )
 
-    def __init__(self, stage: Stage, exercises: Exercises) -> None:
+    def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
-        self._exercises = exercises
-        self.practice = Practice(exercises)
-        self.course: Lead | None = None
+        self._practice = stage.activity.practice
         self._sheet = Sheet()
         self._variant: Variant | None = None
+        self._seed = 0  # of the numbers on show
+        self._note = ""  # on show
         self._since = 0.0
-        self.judged: Callable[[Judged], None] | None = None
-        self.giving_up: Callable[[GivenUp], bool] | None = None
         self._box: viser.GuiFolderHandle | None = None
         self._blocks: list[viser.GuiHtmlHandle] = []
         self._container: viser.GuiFolderHandle
@@ -68,8 +59,8 @@ class Practising(Feature):
             with gui.add_folder(None) as self._container:
                 pass
             self._blocks.append(gui.add_html(""))
-        if self.practice.at is not None:
-            self._begin(self.practice.at)
+        if self._practice.at is not None:
+            self._begin(self._practice.at)
         self._update()
 
     def hide(self) -> None:
@@ -80,39 +71,18 @@ class Practising(Feature):
         self._show_joints(False)
         self._box.remove()
         self._box, self._blocks = None, []
-        self.stage.withhold("")
 
     @property
     def shown(self) -> bool:
         """Whether the HTML is built."""
         return self._box is not None
 
-    @property
-    def at(self) -> Exercise | None:
-        """The exercise on show."""
-        return self.practice.at if self.shown else None
-
-    def is_closed(self, exercise: Exercise) -> bool:
-        """Whether the right answer of an exercise is known."""
-        return self.practice.record(exercise).closed
-
     def open(self, exercise_id: object) -> None:
         """Show an exercise; raises `kin.InputError` for one that does not exist."""
-        self.practice.open(exercise_id)
+        self._practice.open(exercise_id)
         if self.shown:
             self._begin(self._now)
             self._update()
-
-    def begin_anew(self) -> None:
-        """The numbers have changed, because another place was entered."""
-        if self.shown and self.practice.at is not None:
-            self._begin(self.practice.at, move=False)
-            self._update()
-
-    def note(self, text: str) -> None:
-        """Write a sentence below the verdict."""
-        self._sheet.note = text
-        self._update()
 
     # Events
 
@@ -124,27 +94,26 @@ class Practising(Feature):
             return
         match key:
             case ("list", int()):
-                self.practice.at = None
+                self._practice.at = None
                 self._undraw()
             case ("open", str(exercise_id), int()):
                 self.open(exercise_id)
-            case _ if self.practice.at is not None:
+            case _ if self._practice.at is not None:
                 self._act(key, value)
         self._update()
 
     def _act(self, key: Hashable, value: object) -> None:
         """An event of the exercise on show."""
-        exercise, record = self._now, self.practice.record(self._now)
+        exercise, record = self._now, self._practice.record(self._now)
         match key:
             case ("hint", int()):
                 record.hints = min(record.hints + 1, len(exercise.hints))
             case ("reveal", int()):
-                if not record.closed and self._reveals(exercise) and self._may_give_up(exercise):
-                    self.practice.give_up(exercise)
+                if not record.closed and self.stage.activity.give_up(exercise, time.perf_counter() - self._since):
                     self._sheet.verdict, self._sheet.error = None, ""
                     self._show_answer()
             case ("again", int()):
-                self.practice.again(exercise)
+                self._practice.again(exercise)
                 self._begin(exercise)
             case ("scene", int()):
                 self._set_scene(exercise)
@@ -157,17 +126,6 @@ class Practising(Feature):
             case _:
                 raise InputError("exercise", key, "a control of the exercise")
 
-    def _reveals(self, exercise: Exercise) -> bool:
-        """Whether who has not found the answer may see it."""
-        return self.course is None or self.course.reveals(exercise.id)
-
-    def _may_give_up(self, exercise: Exercise) -> bool:
-        """Whether the answer may be shown now: in a room, only when it is stored that it was."""
-        if self.giving_up is None:
-            return True
-        seconds = time.perf_counter() - self._since
-        return self.giving_up(GivenUp(exercise, self.practice.seed_of(exercise), seconds))
-
     def step_name(self, key: Hashable) -> str:
         names = {"open": "Exercise", "list": "List of exercises", "hint": "Hint", "again": "New numbers"}
         return names.get(str(key[0]), "Answer") if isinstance(key, tuple) else "Ghost"
@@ -178,17 +136,27 @@ class Practising(Feature):
     def on_style(self) -> None:
         self._update()
 
+    def on_activity(self) -> None:
+        exercise = self.stage.activity.exercise
+        if not self.shown or exercise is None:
+            return
+        if self._practice.seed_of(exercise) != self._seed:  # another place was entered
+            self._begin(exercise, move=False)
+            self._update()
+        elif self.stage.activity.note != self._note:
+            self._update()
+
     def state(self) -> dict[str, object]:
-        return self.practice.state()
+        return self._practice.state()
 
     def restore(self, state: dict[str, object]) -> None:
-        self.practice.restore(state)
+        self._practice.restore(state)
         if not self.shown:
             return
-        if self.practice.at is None:
+        if self._practice.at is None:
             self._undraw()
         else:
-            self._begin(self.practice.at, move=False)
+            self._begin(self._practice.at, move=False)
         self._update()
 
     def remove(self) -> None:
@@ -198,17 +166,18 @@ class Practising(Feature):
 
     @property
     def _now(self) -> Exercise:
-        if self.practice.at is None:
+        if self._practice.at is None:
             raise InputError("exercise", None, "an open exercise")
-        return self.practice.at
+        return self._practice.at
 
     def _begin(self, exercise: Exercise, move: bool = True) -> None:
         """Draw the numbers, and set the scene for an exercise."""
         self._sheet, self._since = Sheet(), time.perf_counter()
+        self._seed, self.stage.activity.note = self._practice.seed_of(exercise), ""
         try:
-            self._variant = self.practice.variant(exercise)
+            self._variant = self._practice.variant(exercise)
         except VariantError as error:  # of an operator's file that was not checked
-            self.practice.at, self._variant = None, None
+            self._practice.at, self._variant = None, None
             self.stage.notify(Notice("error", f"{exercise.title} cannot be used", str(error)))
             return
         if move:
@@ -221,7 +190,7 @@ class Practising(Feature):
         assert variant is not None
         if stage.robot != exercise.robot:
             stage.change_robot(exercise.robot)
-        shows = exercise.kind.shows_posture or self.practice.record(exercise).closed
+        shows = exercise.kind.shows_posture or self._practice.record(exercise).closed
         q = variant.q if shows else exercise.robot.q_home
         stage.move_to(q, Notice("hand", exercise.title, "The arm is ready for the exercise."))
         self._draw(exercise)
@@ -233,7 +202,7 @@ class Practising(Feature):
         assert variant is not None
         reach, shown = exercise.robot.reach, []
         goal = asked.goal if asked.goal is not None else variant.target
-        closed = self.practice.record(exercise).closed
+        closed = self._practice.record(exercise).closed
         if goal is not None:
             shown.append(goal)
             self._drawing.goal(goal, reach, "target")
@@ -284,9 +253,7 @@ class Practising(Feature):
             return
         sheet.verdict = verdict
         seconds, self._since = time.perf_counter() - self._since, time.perf_counter()
-        self.practice.take(exercise, verdict, seconds)
-        if self.judged is not None:
-            self.judged(Judged(exercise, self.practice.seed_of(exercise), given, verdict, seconds))
+        self.stage.activity.answer(exercise, given, verdict, seconds)
         if verdict.right:
             self._show_answer()
 
@@ -295,7 +262,7 @@ class Practising(Feature):
         exercise, variant = self._now, self._variant
         assert variant is not None
         notice = Notice("hand", exercise.title, "The arm shows the answer.")
-        if self._asked.form == "posture" and self.practice.record(exercise).mark == "shown":
+        if self._asked.form == "posture" and self._practice.record(exercise).mark == "shown":
             self.stage.move_to(np.array(exercise.kind.answer(variant)), notice)
         elif exercise.q and not exercise.kind.shows_posture and self.stage.robot == exercise.robot:
             self.stage.move_to(variant.q, notice)
@@ -317,26 +284,22 @@ class Practising(Feature):
     def _update(self) -> None:
         if not self.shown:
             return
-        exercise, practice, units = self.practice.at, self.practice, self.stage.units
+        exercise, practice, units = self._practice.at, self._practice, self.stage.units
+        activity, self._note = self.stage.activity, self.stage.activity.note
         if exercise is None or self._variant is None:
-            contents = [views.list_html(self._exercises, practice), "", ""]
+            contents = [views.list_html(activity.exercises, practice), "", ""]
         else:
-            variant, record, course = self._variant, practice.record(exercise), self.course
-            following = None if course is not None and course.leads(exercise.id) else practice.after(exercise)
-            may_reveal = self._reveals(exercise)
+            variant, closed = self._variant, practice.record(exercise).closed
             contents = [
                 views.task_html(exercise, variant, units, self.stage.robot == exercise.robot),
-                views.question_html(self._asked, self._sheet, record.closed),
-                views.foot_html(exercise, variant, units, record, self._sheet, following, may_reveal),
+                views.question_html(self._asked, self._sheet, closed),
+                views.foot_html(exercise, variant, units, self._sheet, activity),
             ]
         posture = exercise is not None and self._asked.form == "posture"
         self._show_joints(posture and exercise is not None and not practice.record(exercise).closed)
         for block, content in zip(self._blocks, contents, strict=True):
             update_html(block, content)
-        is_open = exercise is not None and not practice.record(exercise).closed
-        self.stage.withhold(exercise.kind.withholds if exercise is not None and is_open else "")
-        if self.course is not None:
-            self.course.refresh()
+        activity.changed()
 
 
 def _pose(numbers: object) -> Array:

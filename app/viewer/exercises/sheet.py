@@ -14,11 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from app.exercises import Verdict
-from app.exercises.contract import LONGEST, LONGEST_PROGRAM
+from app.exercises.contract import LONGEST_PROGRAM
 from app.viewer.panel.entry import read_pose
 from app.viewer.panel.readout import roll_pitch_yaw
 from kin import InputError
 from kin.transforms import Array, wxyz_from_rotation
+from kin.typed import LONGEST
 from kin.units import Units
 
 ROWS = 20  # of typed cells at most
@@ -35,7 +36,6 @@ class Sheet:
         ghost: the pose (4, 4) of the frame that is placed, in metres.
         verdict: on the last answer.
         error: why it could not be read.
-        note: a sentence below the verdict.
     """
 
     cells: list[list[str]] = field(default_factory=list)
@@ -44,7 +44,6 @@ class Sheet:
     ghost: Array = field(default_factory=lambda: np.eye(4))
     verdict: Verdict | None = None
     error: str = ""
-    note: str = ""
 
     def fill(self, value: object) -> None:
         """Take typed cells, cut to what an answer can need.
@@ -56,7 +55,7 @@ class Sheet:
         if not all(isinstance(row, list) and all(isinstance(text, str) for text in row) for row in rows[:ROWS]):
             raise InputError("cells", value, "rows of texts")
         self.cells = [
-            [text[: LONGEST_PROGRAM + 1 if len(row) == 1 else LONGEST] for text in row[:ROWS]]
+            [text[: 1 + (LONGEST_PROGRAM if len(row) == 1 else LONGEST)] for text in row[:ROWS]]
             for row in rows[:ROWS]
         ]
 
@@ -80,7 +79,7 @@ class Sheet:
     def given(self, form: str, value: object, units: Units) -> object:
         """The answer in the form that the kind takes; `value` is what a pressed option sends.
 
-        Raises `app.exercises.typed.EntryError` for a pose that cannot be read.
+        Raises `EntryError` for a pose that cannot be read.
         """
         first = self.cells[0] if self.cells else []
         match form:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from app.exercises import Asked, Exercise, Exercises, Variant
-from app.viewer.exercises.practice import Mark, Practice, Record
+from app.viewer.activity.activity import Activity
+from app.viewer.activity.practice import Mark, Practice, Record
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.views.templates import render
 from kin.units import Units
@@ -65,12 +66,12 @@ def foot_html(
     exercise: Exercise,
     variant: Variant,
     units: Units,
-    record: Record,
     sheet: Sheet,
-    following: Exercise | None,
-    may_reveal: bool = True,
+    activity: Activity,
 ) -> str:
     """Verdict, hints, solution and what can be done next."""
+    record = activity.practice.record(exercise)
+    following = None if activity.leads(exercise) else activity.practice.after(exercise)
     hints = [variant.text(hint, units) for hint in exercise.hints[: record.hints]]
     verdict = sheet.verdict
     title, color, detail = "", "", ""
@@ -88,7 +89,7 @@ def foot_html(
         credit=0 if verdict is None or verdict.right else round(100 * verdict.credit),
         more_hints=len(exercise.hints) - record.hints, record=record, time=_time(record.seconds),
         solution=exercise.solution(variant, units) if record.closed else "", following=following,
-        varies=bool(exercise.vary), may_reveal=may_reveal, note=sheet.note,
+        varies=bool(exercise.vary), may_reveal=activity.reveals(exercise), note=activity.note,
     )  # fmt: skip
 
 

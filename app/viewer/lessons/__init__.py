@@ -1,33 +1,23 @@
 """Lessons: one idea each, one on show at a time.
 
-Adding a lesson is one module with a :class:`~app.viewer.lessons.guide.lesson.Lesson`, which says what it teaches
-and asks, and one row here.
+Adding a lesson is a folder here with a :class:`~app.viewer.lessons.guide.lesson.Lesson` in it, which says what it
+teaches and asks, and a row in `app/exercises/lessons.py`.
 """
 
 from __future__ import annotations
 
-from app.viewer.lessons.dh import DHLesson
-from app.viewer.lessons.equations import EquationsLesson
+from importlib import import_module
+
+from app.exercises.lessons import LESSONS as KEYS
 from app.viewer.lessons.guide.lesson import Lesson
-from app.viewer.lessons.inverse import InverseLesson
-from app.viewer.lessons.numeric import NumericLesson
-from app.viewer.lessons.postures import Postures
-from app.viewer.lessons.redundancy import RedundancyLesson
-from app.viewer.lessons.rotations import RotationsLesson
-from app.viewer.lessons.screws import ScrewsLesson
-from app.viewer.lessons.trajectories import TrajectoriesLesson
-from app.viewer.lessons.velocity import VelocityLesson
+
+
+def _lesson(key: str) -> type[Lesson]:
+    """The lesson with this key, in the folder of this name."""
+    found = vars(import_module(f"{__name__}.{key}")).values()
+    lessons = [each for each in found if isinstance(each, type) and issubclass(each, Lesson)]
+    return next(each for each in lessons if getattr(each, "key", "") == key)
+
 
 # In the order of a course.
-LESSONS: tuple[type[Lesson], ...] = (
-    RotationsLesson,
-    DHLesson,
-    ScrewsLesson,
-    EquationsLesson,
-    InverseLesson,
-    Postures,
-    NumericLesson,
-    RedundancyLesson,
-    VelocityLesson,
-    TrajectoriesLesson,
-)
+LESSONS: tuple[type[Lesson], ...] = tuple(map(_lesson, KEYS))

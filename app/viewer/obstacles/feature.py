@@ -13,15 +13,16 @@ from app.viewer.obstacles import placed
 from app.viewer.obstacles.nodes import ObstacleNodes
 from app.viewer.obstacles.placed import PLACE, SIZES, TURN
 from app.viewer.panel import update_html
+from app.viewer.panel.entry import read_cell
 from app.viewer.panel.status import Notice
 from app.viewer.scene.gizmo import Pull
 from app.viewer.scene.meshes import body
-from app.viewer.tabs.robot.expression import ExpressionError, cut, read
 from app.viewer.tabs.robot.views import text_of
 from app.viewer.views.templates import render
 from kin import Contact, InputError, Obstacle
 from kin.collision.obstacles import MOST_OBSTACLES, Shape
 from kin.transforms import from_position_wxyz
+from kin.typed import ReadError, cut
 
 _ORDER: tuple[Shape, ...] = ("table", "box", "sphere", "cylinder")
 
@@ -139,11 +140,10 @@ class ObstaclesFeature(Feature):
     def _type(self, field: str, text: str) -> None:
         if self._chosen is None:
             return
-        unit = self.stage.units.of(field in TURN)
         try:
-            value = read(text, unit, field in TURN)
+            value = read_cell(text, self.stage.units.of(field in TURN))
             items = placed.changed(self.stage.obstacles, self._chosen, field, value)
-        except ExpressionError as error:
+        except ReadError as error:
             self._refuse(field, text, str(error))
         except InputError as error:
             if error.field == "field":

@@ -1,27 +1,32 @@
-"""Reads what visitors type: joint values and target poses. Wrong input is named, with what would be valid.
+"""Reads what visitors type: joint values, cells of tables and target poses.
 
-Numbers are in the units on screen unless a unit follows them. The entries of a matrix are in metres, as in code.
+An error names what is wrong and what is valid. Numbers are in the units on screen unless a unit follows them;
+`kin.typed` reads each.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-import re
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
-from app.exercises.typed import ANGLE_UNITS, LENGTH_UNITS, NUMBER, EntryError, clean, cut, number_and_unit
+from app.exercises.typed import EntryError
 from app.viewer.panel.readout import ANGLES
 from kin import InputError, KinematicsError, Task
 from kin.transforms import Array, as_transform, frame_from_approach, rotation_from_wxyz
-from kin.units import Unit, Units
+from kin.typed import ReadError, cut, elements, example, interpret, read, read_element, unit_at_end
+from kin.units import LENGTH_UNITS, PLAIN, Unit, Units, general
 
 PoseKind = Literal["position", "angles", "quaternion", "pose"]
 ALONG = "along"  # between a point and a direction
 SHORTEST = 1e-9  # of a direction
 OPPOSITE = -0.999  # cosine of an angle near a half turn
 FARTHEST = 1000.0  # m: the largest coordinate of a target or a camera
+LARGEST = 1e6  # rad or m: a value in a table, as in robot files
+LIKE_METRES = 5.0  # the coordinates of a matrix on a screen in mm or cm look like metres below this
 LIMIT_DIGITS = 2  # decimals of a degree or a millimetre in which limits are shown
 # A quaternion typed with three decimals is normalised; one that is further off was mistyped.
 _NORM_SLACK = 0.01
@@ -29,7 +34,7 @@ _NORM_SLACK = 0.01
 _MATRIX_SLACK = 2e-3
 
 
-def read_value(text: str, name: str, unit: Unit, is_angle: bool, limits: tuple[float, float]) -> float:
+def read_value(text: str, name: str, unit: Unit, limits: tuple[float, float]) -> float:
     """A typed joint value in radians or metres.
 
     Args:
@@ -42,18 +47,26 @@ def read_value(text: str, name: str, unit: Unit, is_angle: bool, limits: tuple[f
     """
     low, high = (unit.shown(limit, LIMIT_DIGITS) for limit in limits)
     title = f"{name} was not changed"
-    valid = f"Valid: {_brief(low)} … {_brief(high)}{unit.suffix}."
-    number, suffix = number_and_unit(text, title, valid)
-    scales = ANGLE_UNITS if is_angle else LENGTH_UNITS
-    if suffix and suffix not in scales:
-        raise EntryError(title, f"“{cut(suffix)}” is not a unit of this joint. Valid: {', '.join(scales)}.")
-    value = number * scales[suffix] if suffix else unit.read(number)
-    shown = value * unit.scale
+    valid = f"Valid: {general(low, 10)} … {general(high, 10)}{unit.suffix}."
     slack = 1e-9 * max(1.0, abs(low), abs(high))
-    if not low - slack <= shown <= high + slack:
+    try:
+        value = read(text, unit, (unit.read(low - slack), unit.read(high + slack)))
+    except ReadError as error:
+        raise EntryError(title, f"{error.sentence} {valid}", error.readings) from None
+    if not low - slack <= value * unit.scale <= high + slack:
         raise EntryError(title, f"“{cut(text)}” is outside the limits of this joint. {valid}")
     # The shown limit may be rounded outwards.
     return min(max(value, limits[0]), limits[1])
+
+
+def read_cell(text: str, unit: Unit) -> float:
+    """A cell of a table in radians or metres; raises `ReadError`, whose reason says what is valid."""
+    try:
+        return read(text, unit, largest=LARGEST)
+    except ReadError as error:
+        raise ReadError(
+            error.reason if error.readings else f"{error.reason}; try {example(unit)}", error.readings
+        ) from None
 
 
 def read_pose(kind: PoseKind, text: str, units: Units, T: Array) -> tuple[Array, Task]:
@@ -71,23 +84,87 @@ def read_pose(kind: PoseKind, text: str, units: Units, T: Array) -> tuple[Array,
     Raises:
         EntryError: with what is wrong.
     """
-    pose = T.copy()
+    try:
+        return interpret(text, lambda way: _pose(kind, way, units, T.copy()), _same)
+    except EntryError:
+        raise
+    except ReadError as error:
+        detail = error.sentence if error.readings else f"{error.sentence} Valid: {_valid(kind, units)}."
+        raise EntryError("The target was not changed", detail, error.readings) from None
+
+
+def _valid(kind: PoseKind, units: Units) -> str:
+    """What is valid for this kind of target."""
+    return {
+        "position": f"x y z in {units.lengths.name}",
+        "angles": f"roll pitch yaw in {units.angles.name}, with {ANGLES}",
+        "quaternion": "a quaternion w x y z, scalar first",
+        "pose": "3 numbers (x y z, point only), 6 (x y z roll pitch yaw), 7 (x y z and a quaternion w x y z), "
+        "12 or 16 (a 3×4 or 4×4 matrix), or x y z along x y z (a point and the direction of the tool)",
+    }[kind]
+
+
+def _same(one: tuple[Array, Task], other: tuple[Array, Task]) -> bool:
+    return one[1] == other[1] and np.allclose(one[0], other[0], rtol=0.0, atol=1e-12)
+
+
+def _pose(kind: PoseKind, text: str, units: Units, pose: Array) -> tuple[Array, Task]:
+    """`read_pose` of a text in which a comma only separates; raises `ReadError`."""
+    lengths, angles = [units.lengths] * 3, [units.angles] * 3
     point, along, direction = text.partition(ALONG)
     if kind == "pose" and along:
-        return _approach(_numbers(point), _numbers(direction), units, pose), "approach"
-    numbers = _numbers(text)
-    if kind == "pose":
-        return _whole_pose(numbers, units, pose)
-    if kind == "position":
-        _expect(numbers, 3, f"x y z in {units.lengths.name}")
-        pose[:3, 3] = _position(numbers, units)
-    elif kind == "angles":
-        _expect(numbers, 3, f"roll pitch yaw in {units.angles.name}, with {ANGLES}")
-        pose[:3, :3] = rotation_from_angles(*(units.angles.read(v) for v in numbers))
-    else:
-        _expect(numbers, 4, "a quaternion w x y z, scalar first")
-        pose[:3, :3] = _rotation(numbers)
+        return _approach(elements(point), elements(direction), lengths, pose), "approach"
+    if kind == "pose" and (read_matrix := _matrix_text(text)) is not None:
+        return _matrix(text, *read_matrix, units), "pose"
+    words = elements(text)
+    count = {"position": 3, "angles": 3, "quaternion": 4}.get(kind, len(words))
+    if len(words) != count:
+        raise EntryError(f"{count} numbers are needed here", f"Found {len(words)}. Valid: {_valid(kind, units)}.")
+    if kind == "angles":
+        pose[:3, :3] = rotation_from_angles(*_values(words, angles))
+        return pose, "pose"
+    if kind == "quaternion":
+        pose[:3, :3] = _rotation(_values(words, [PLAIN] * 4))
+        return pose, "pose"
+    match len(words):
+        case 3:
+            pose[:3, 3] = _position(_values(words, lengths))
+            return pose, "position" if kind == "pose" else "pose"
+        case 6:
+            values = _values(words, lengths + angles)
+            pose[:3, :3] = rotation_from_angles(*values[3:])
+        case 7:
+            values = _values(words, [*lengths, *[PLAIN] * 4])
+            pose[:3, :3] = _rotation(values[3:])
+        case found:
+            detail = f"Found {found}. Valid: {_valid(kind, units)}."
+            raise EntryError("The target needs another count of numbers", detail)
+    pose[:3, 3] = _position(values[:3])
     return pose, "pose"
+
+
+def _values(words: Sequence[str], units: Sequence[Unit]) -> list[float]:
+    """The numbers of a list in radians, metres or as they are.
+
+    Raises:
+        ReadError: a wrong number; or a unit follows only the last of several lengths or angles, which may hold for
+            that one or for all of them.
+    """
+    values = [read_element(word, unit) for word, unit in zip(words, units, strict=True)]
+    at = 0
+    for unit, group in itertools.groupby(units):
+        first, at = at, at + len(list(group))
+        *rest, last = words[first:at]
+        name = unit_at_end(last)
+        if not name or name == unit.name or any(map(unit_at_end, rest)):
+            continue
+        shared = [read_element(f"{word} {name}", unit) for word in rest]
+        if not np.allclose(shared, values[first : at - 1], rtol=1e-9, atol=0.0):
+            ways = [[*(f"{word} {each}" for word in rest), last] for each in (name, unit.name)]
+            readings = tuple(" ".join([*words[:first], *way, *words[at:]]) for way in ways)
+            shown = " or ".join(f"“{reading}”" for reading in readings)
+            raise ReadError(f"“{name}” after the last number may hold for all; type {shown}", readings)
+    return values
 
 
 def rotation_from_angles(roll: float, pitch: float, yaw: float) -> Array:
@@ -102,12 +179,13 @@ def rotation_from_angles(roll: float, pitch: float, yaw: float) -> Array:
     )
 
 
-def _approach(point: list[float], direction: list[float], units: Units, pose: Array) -> Array:
+def _approach(point: list[str], along: list[str], lengths: list[Unit], pose: Array) -> Array:
     """The pose at a point with the tool along a direction, turned no more than it takes."""
-    if len(point) != 3 or len(direction) != 3:
-        detail = f"Found {len(point)} before and {len(direction)} after “{ALONG}”. Valid: x y z along x y z."
+    if len(point) != 3 or len(along) != 3:
+        detail = f"Found {len(point)} before and {len(along)} after “{ALONG}”. Valid: x y z along x y z."
         raise EntryError("A point and a direction are needed", detail)
-    pose[:3, 3] = _position(point, units)
+    pose[:3, 3] = _position(_values(point, lengths))
+    direction = _values(along, [PLAIN] * 3)
     length = math.hypot(*direction)
     if length < SHORTEST:
         raise EntryError("The direction has no length", f"“{ALONG}” needs three numbers that are not all zero.")
@@ -127,51 +205,8 @@ def turned_to(R: Array, z: Array) -> Array:
     return turned
 
 
-def _whole_pose(numbers: list[float], units: Units, pose: Array) -> tuple[Array, Task]:
-    match len(numbers):
-        case 3:
-            pose[:3, 3] = _position(numbers, units)
-            return pose, "position"
-        case 6:
-            pose[:3, 3] = _position(numbers[:3], units)
-            pose[:3, :3] = rotation_from_angles(*(units.angles.read(v) for v in numbers[3:]))
-        case 7:
-            pose[:3, 3] = _position(numbers[:3], units)
-            pose[:3, :3] = _rotation(numbers[3:])
-        case 12 | 16:
-            pose = _matrix(numbers)
-        case count:
-            detail = (
-                f"Found {count}. Valid: 3 numbers (x y z, point only), 6 (x y z roll pitch yaw), "
-                "7 (x y z and a quaternion w x y z), 12 or 16 (a 3×4 or 4×4 matrix in metres), "
-                "or x y z along x y z (a point and the direction of the tool)."
-            )
-            raise EntryError("The target needs another count of numbers", detail)
-    return pose, "pose"
-
-
-def _numbers(text: str) -> list[float]:
-    """All numbers in a text; brackets, commas, semicolons and line breaks separate them."""
-    words = re.split(r"[\s,;|\[\](){}]+", clean(text))
-    found = []
-    for word in filter(None, words):
-        if NUMBER.fullmatch(word) is None:
-            if word in ("array", "np.array"):
-                continue
-            raise EntryError("The target was not changed", f"“{cut(word)}” is not a number.")
-        found.append(float(word))
-    if not np.isfinite(found).all():
-        raise EntryError("The target was not changed", "A number is too large.")
-    return found
-
-
-def _expect(numbers: list[float], count: int, meaning: str) -> None:
-    if len(numbers) != count:
-        raise EntryError(f"{count} numbers are needed here", f"Found {len(numbers)}. Valid: {meaning}.")
-
-
-def _position(numbers: list[float], units: Units) -> Array:
-    position = np.array([units.lengths.read(v) for v in numbers])
+def _position(values: list[float]) -> Array:
+    position = np.array(values)
     _check_distance(position)
     return position
 
@@ -188,7 +223,18 @@ def _rotation(wxyz: list[float]) -> Array:
     return rotation_from_wxyz(np.array(wxyz))
 
 
-def _matrix(numbers: list[float]) -> Array:
+def _matrix_text(text: str) -> tuple[list[str], str] | None:
+    """The numbers of a matrix and the unit after them, if any; None if the text has another count of numbers."""
+    name = unit_at_end(text) if unit_at_end(text) in LENGTH_UNITS else ""
+    words = elements(text.removesuffix(name))
+    return (words, name) if len(words) in (12, 16) else None
+
+
+def _matrix(text: str, words: list[str], name: str, units: Units) -> Array:
+    """The pose of a matrix. Its lengths are in the unit on screen unless they, or the whole, have another one."""
+    unit = LENGTH_UNITS[name] if name else units.lengths
+    layout = [PLAIN, PLAIN, PLAIN, unit] * 3 + [PLAIN] * (len(words) - 12)
+    numbers = [read_element(word, each) for word, each in zip(words, layout, strict=True)]
     T = np.array([*numbers, 0.0, 0.0, 0.0, 1.0][:16]).reshape(4, 4)
     R = T[:3, :3]
     off = float(np.abs(R.T @ R - np.eye(3)).max())
@@ -201,9 +247,13 @@ def _matrix(numbers: list[float]) -> Array:
         T = as_transform(T, "matrix")
     except (InputError, KinematicsError) as error:
         raise EntryError("Not the matrix of a pose", str(error)) from None
+    lengths = words[3:12:4]
+    like_metres = 0.0 < unit.scale * np.abs(T[:3, 3]).max() < LIKE_METRES
+    if like_metres and not name and unit.name != "m" and not any(map(unit_at_end, lengths)):
+        raise ReadError(
+            f"the lengths {', '.join(lengths)} of the matrix look like metres; the unit on screen is "
+            f"{unit.name}. Type m or {unit.name} after the matrix",
+            (f"{text} m", f"{text} {unit.name}"),
+        )
     _check_distance(T[:3, 3])
     return T
-
-
-def _brief(value: float) -> str:
-    return f"{value:.10g}".replace("-", "−")

@@ -13,7 +13,7 @@ import viser
 
 from app.viewer.views.templates import render
 from app.viewer.viser_patches import uuid_of
-from kin.units import Unit
+from kin.units import Unit, general
 
 PRECISION = 9  # decimals that a field can show
 _MARKED = 3  # decimals of the limits below a slider
@@ -36,7 +36,7 @@ def shown(value: float, unit: Unit, digits: int) -> float:
 
 def limit_marks(low: float, high: float) -> tuple[tuple[float, str], ...]:
     """The marks at the ends of a slider: its limits, in screen units, with a true minus sign."""
-    return tuple((end, f"{round(end, _MARKED):g}".replace("-", "−")) for end in (low, high))
+    return tuple((end, general(round(end, _MARKED))) for end in (low, high))
 
 
 def field(slider: viser.GuiSliderHandle[float], unit: Unit) -> tuple[str, dict[str, Any]]:

@@ -18,7 +18,7 @@ from app.viewer.panel.fields import field, fields_html, limit_marks, shown
 from app.viewer.panel.status import Notice
 from kin import InputError, Robot
 from kin.transforms import Array
-from kin.units import Unit, Units
+from kin.units import Unit, Units, general
 
 DIGITS = 2
 # Marks the label of a locked joint; invisible. static/input.js presses such a button, on which viewer.css draws a
@@ -95,7 +95,7 @@ class JointSliders:
         joint, unit = self.robot.joints[i], self._unit(i)
         low, high = joint.limits or (-math.pi, math.pi)
         bounds = (unit.shown(low, DIGITS), unit.shown(high, DIGITS))
-        limits = f"{bounds[0]:g} … {bounds[1]:g}{unit.suffix}".replace("-", "−")
+        limits = f"{general(bounds[0])} … {general(bounds[1])}{unit.suffix}"
         slider = gui.add_slider(
             label(self.robot, i),
             min=bounds[0],
@@ -115,9 +115,8 @@ class JointSliders:
 
     def read_text(self, index: int, text: str) -> float:
         """A typed value in radians or metres; raises `EntryError` unless it is within the limits."""
-        unit, is_angle = self._unit(index), self.robot.joints[index].kind == "revolute"
         limits = self.robot.joints[index].limits or (-math.pi, math.pi)
-        return read_value(text, f"Joint {index + 1}", unit, is_angle, limits)
+        return read_value(text, f"Joint {index + 1}", self._unit(index), limits)
 
     def read(self, index: int, value: object, place: int = 0) -> float:
         """A slider's value in radians or metres, within the limits; raises `InputError` for anything else.

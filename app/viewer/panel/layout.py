@@ -30,7 +30,6 @@ class Panel:
     Args:
         own: the visitor's own arm.
         system_dark: whether the visitor's system is dark.
-        learn: whether there is a tab for lessons.
         tabs: titles of the features' tabs.
         detailed: the robots that have a detailed body.
 
@@ -55,7 +54,6 @@ class Panel:
         view: ViewState,
         system_dark: bool,
         welcome: Notice,
-        learn: bool,
         tabs: Sequence[str],
         detailed: Sequence[Robot],
         post: Post,
@@ -76,7 +74,7 @@ class Panel:
         self.legend = gui.add_html("")
         self.hints = gui.add_html("")
         self.sheet = gui.add_html("")
-        self.learn = group.add_tab("Learn") if learn else None
+        self.learn = group.add_tab("Learn")
         self.tabs = [group.add_tab(title) for title in tabs]
         with group.add_tab("View"):
             self.units = UnitChoice(gui, units, post)

@@ -140,7 +140,7 @@ class RedundancySliders:
         """A typed value in screen units; raises `EntryError` unless the slider has it."""
         slider = self._sliders[name]
         limits = (self._unit.read(float(slider.min)), self._unit.read(float(slider.max)))
-        return self._unit.scale * read_value(text, slider.label, self._unit, True, limits)
+        return self._unit.scale * read_value(text, slider.label, self._unit, limits)
 
     def read(self, name: str, value: object) -> float:
         """A slider's value in radians; raises `InputError` for anything but a finite number."""

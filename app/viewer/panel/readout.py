@@ -13,7 +13,7 @@ from app.viewer.views.templates import render
 from app.viewer.viser_patches import show_content
 from kin.frames import WORLD
 from kin.transforms import Array, wxyz_from_rotation
-from kin.units import Units
+from kin.units import Units, fixed
 
 ANGLES = "R = Rz(yaw)·Ry(pitch)·Rx(roll)"
 
@@ -63,9 +63,7 @@ def _half_turn_positive(angle: float) -> float:
 
 
 def _numbers(values: Sequence[float], decimals: int) -> list[str]:
-    texts = (f"{value:.{decimals}f}" for value in values)
-    # A zero may have either sign and must not flicker.
-    return [(t.lstrip("-") if float(t) == 0.0 else t).replace("-", "−") for t in texts]
+    return [fixed(value, decimals) for value in values]
 
 
 class PoseReadout:

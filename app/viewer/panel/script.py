@@ -21,15 +21,35 @@ AT_ONCE = 32  # messages in the field; more are ignored
 MAX_NUMBER = 2**53
 
 
+def read_json(text: str, **options: Any) -> Any:
+    """The value of a JSON text from a page or a link; raises `ValueError` for what is none or no page could show.
+
+    JSON can escape half a letter (``"\\ud800"``), which UTF-8 cannot hold.
+    """
+    try:
+        value = json.loads(text, **options)
+        json.dumps(value, ensure_ascii=False).encode()
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    return value
+
+
 def _refuse(number: str) -> object:
     raise ValueError(f"{number} is no number of JSON")
 
 
 class Reply(NamedTuple):
-    """The answer to a message: its number, and what is wrong with it (empty: nothing)."""
+    """The answer to a message.
+
+    Attributes:
+        number: of the message.
+        error: what is wrong with it; "" if nothing is.
+        readings: labels and texts that may have been meant by a typed one; the page offers them.
+    """
 
     number: int
     error: str
+    readings: tuple[tuple[str, str], ...] = ()
 
 
 class PageScript:
@@ -40,7 +60,7 @@ class PageScript:
 
     def __init__(self, gui: viser.GuiApi, post: Post) -> None:
         self._last = 0
-        self._answers: dict[str, object] = {"undo": "", "redo": "", "start": "", "reply": [0, ""]}
+        self._answers: dict[str, object] = {"undo": "", "redo": "", "start": "", "reply": Reply(0, "")}
         self._shown = gui.add_html(self._html())
         field = gui.add_text(LABEL, "")
 
@@ -54,9 +74,8 @@ class PageScript:
     def read(self, text: str) -> list[tuple[int, str, object]]:
         """The messages in `text` that have not been read yet, as number, name and argument, in order."""
         try:
-            items = json.loads(text, parse_constant=_refuse)
-            json.dumps(items, ensure_ascii=False).encode()  # half a letter could be shown and stored nowhere
-        except (ValueError, RecursionError):
+            items = read_json(text, parse_constant=_refuse)
+        except ValueError:
             return []
         found = []
         for item in items[-AT_ONCE:] if isinstance(items, list) else []:
@@ -78,7 +97,7 @@ class PageScript:
 
     def reply(self, reply: Reply) -> None:
         """Answer a message that the script waits for."""
-        self._answers["reply"] = list(reply)
+        self._answers["reply"] = reply
         update_html(self._shown, self._html())
 
     def _html(self) -> str:

@@ -14,12 +14,11 @@ from app.viewer.views.templates import render
 from app.viewer.viser_patches import show_content
 from kin import IKResult, IKSolution, Robot
 from kin.ik.details import OrientationNotMet, OutOfReach, OutsideLimits, RollError, RotationError, Solved, Touching
-from kin.units import Units
+from kin.units import Units, typeset
 
 Kind = Literal[
     "reached", "compromise", "limits", "orientation", "unreachable", "hand", "advice", "error", "collision"
 ]
-_MINUS = re.compile(r"(?<![\w.)])-(?=\d)")
 # s: news such as "Undone: Home" are shown this long, then again what is true now.
 NEWS = 10.0
 UNSEEN = 1.0  # s: news are shown at least this long, whatever else happens
@@ -142,15 +141,10 @@ def html(shown: Notice, warning: str = "", waiting: str = "") -> str:
         if shown.title == READY.title:
             shown = replace(shown, title=READY_IN_CONTACT)
     if shown.kind != "error":  # which says what was typed
-        shown = replace(shown, title=_signed(shown.title), detail=_signed(shown.detail))
+        shown = replace(shown, title=typeset(shown.title), detail=typeset(shown.detail))
     return render(
-        "panel/status", notice=shown, warning=_signed(warning), waiting=waiting, symbol=symbol, color=color
+        "panel/status", notice=shown, warning=typeset(warning), waiting=waiting, symbol=symbol, color=color
     )
-
-
-def _signed(text: str) -> str:
-    """With true minus signs, as all numbers of the page have; sentences of the core have those of ASCII."""
-    return _MINUS.sub("−", text)
 
 
 class StatusLine:

@@ -6,35 +6,23 @@ which costs this page as much as a drag of its own without the solving. The rest
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 
+from app.viewer.activity.activity import EXERCISES
+from app.viewer.feature import Feature
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.status import READY
-from app.viewer.session.actions.page import ActionsPage
+from app.viewer.room.member_page import MemberPage
 from app.viewer.session.history import without_results
 from app.viewer.session.state import PageState, decode
 from kin import Obstacle, Robot
 from kin.transforms import Array
 
-# The features whose states are shown with the open lesson. Exercises are everybody's own.
-SHARED = ("guide", "program", "workspace")
-OWN_LESSON = "exercises"
 SAME_VIEW = 1e-3  # tolerance of viewpoints, metres
-
-
-class LedPage(ActionsPage, Protocol):
-    """What following may use of a page."""
-
-    def adopt(self, state: PageState) -> None:
-        """Show robot, requests and configuration of another state."""
-
-    def guard(self, action: Callable[[], None]) -> None:
-        """Run an action; an error is logged and shown."""
 
 
 @lru_cache(maxsize=128)
@@ -48,9 +36,9 @@ def decoded(text: str, robots: Sequence[Robot]) -> PageState:
     return _decoded(text, tuple(robots))
 
 
-def shared(state: PageState, lesson: str | None) -> PageState:
-    """What followers see of the leader's page."""
-    names = (lesson, *SHARED)
+def shared(state: PageState, features: Iterable[Feature]) -> PageState:
+    """What followers see of the leader's page, which has these features."""
+    names = {feature.key for feature in features if feature.shared or feature.key == state.lesson}
     return replace(state, features={key: value for key, value in state.features.items() if key in names})
 
 
@@ -65,7 +53,7 @@ class Follower:
         turned: whether the visitor has moved the camera since; then the other's viewpoint is not shown.
     """
 
-    def __init__(self, page: LedPage, compute: bool) -> None:
+    def __init__(self, page: MemberPage, compute: bool) -> None:
         self._page = page
         self._compute = compute
         self._text = ""
@@ -128,15 +116,14 @@ class Follower:
             page.use_frames(state.frames)
 
     def _show_lesson(self, last: PageState | None, state: PageState) -> None:
-        """Open the leader's lesson, and show the states of what the leader sees."""
+        """Open the leader's lesson, and show the states of what the leader sees. Exercises are everybody's own."""
         page = self._page
-        lesson = None if state.lesson == OWN_LESSON else state.lesson
-        before = None if last is None or last.lesson == OWN_LESSON else last.lesson
-        lessons = page.lessons
-        if lessons is not None and lesson != before:
-            page.guard(lambda: lessons.open(lesson))
+        lesson = None if state.lesson == EXERCISES else state.lesson
+        before = None if last is None or last.lesson == EXERCISES else last.lesson
+        if lesson != before:
+            page.guard(lambda: page.lessons.open(lesson))
         for feature in page.features:
-            if feature.key != lesson and feature.key not in SHARED:
+            if feature.key != lesson and not feature.shared:
                 continue
             wanted = without_results(state.features.get(feature.key, {}))
             had = {} if last is None else without_results(last.features.get(feature.key, {}))

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import time
 from abc import abstractmethod
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
-from typing import Protocol, cast
+from typing import cast
 
 import viser
 
-from app.classroom.attendance import Attendance
 from app.classroom.views import ClassroomUnavailable, RefusedError, RoomView
-from app.exercises import Exercises
 from app.viewer.feature import Feature, Stage
 from app.viewer.panel import update_html
 from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice
-from app.viewer.room.following import Follower, LedPage
+from app.viewer.room.following import Follower
+from app.viewer.room.member_page import MemberPage
 from app.viewer.room.sharing import Sharing
-from app.viewer.session.numbers import Numbers
+from app.viewer.session.events import RULES, name_of
 from app.viewer.session.state import PageState
 
 NEWS: Hashable = "room"
@@ -29,14 +28,6 @@ AGAIN = 6.0  # s within which a button that needs two presses must be pressed ag
 SURE = 0.5  # s from the first press to the second; earlier ones are of a double click
 SETTLED = 0.5  # s without news of who leads after which the target is solved in this page too
 GRACE = 0.8  # s after the beginning of a lead in which a drag that is under way does not end it
-# Events by which a visitor moves the arm or opens something else.
-ACTS = frozenset(
-    {
-        *("gizmo", "grab", "joint", "redundancy", "lock", "branch", "lesson", "robot", "task", "home", "random"),
-        *("recall", "undo", "redo", "travel", "nudge", "field", "target", "feature"),
-    }
-)
-EXEMPT = ("class", "sheets")  # features whose controls are not acts in this sense
 
 
 def _any(text: str) -> str:
@@ -44,45 +35,22 @@ def _any(text: str) -> str:
     return "…" if text else ""
 
 
-class MemberPage(LedPage, Protocol):
-    """What the tab may use of its page."""
-
-    attendance: Attendance
-    exercises: Exercises
-    numbers: Numbers
-    guest: bool  # whether only the seat lets this page use the service
-
-    def snapshot(self) -> PageState:
-        """The present state."""
-
-    def record(self, label: str, before: PageState) -> None:
-        """Let undo lead back to the state `before`."""
-
-    def put_back(self) -> None:
-        """Show in all controls of the arm what is true."""
-
-    def be_led(self, led: bool) -> None:
-        """Another page leads this one, or none does."""
-
-    @property
-    def may_compute(self) -> bool:
-        """Whether the visitor may cause work."""
-
-
 def wanted(value: object, now: bool) -> bool:
     """The state that a button brings about, which it names: the second click of a double click changes nothing."""
     return bool(value) if type(value) is int else not now
 
 
-def act_of(key: Hashable, value: object) -> str:
+def act_of(key: Hashable, value: object, features: Iterable[Feature | type[Feature]]) -> str:
     """The name of a visitor's act that changes the page; empty for other events."""
-    parts = key if isinstance(key, tuple) else (key,)
-    name = parts[1] if parts[0] == "message" and len(parts) > 1 else parts[0]
+    name = name_of(key)
+    if name not in RULES or not RULES[name].act:
+        return ""
     if name == "feature":
-        # Only what is pressed in our own HTML: features also post what they have computed.
-        pressed = parts[0] == "message" and isinstance(value, list) and value and value[0] not in EXEMPT
-        return "feature" if pressed else ""
-    return str(name) if name in ACTS else ""
+        match key, value:
+            case ("message", *_), [pressed, *_]:
+                return name if all(feature.acts for feature in features if feature.key == pressed) else ""
+        return ""
+    return name
 
 
 class Member(Feature):
@@ -90,10 +58,12 @@ class Member(Feature):
 
     key = "class"
     title = "Class"
+    acts = False
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
         self.page = cast(MemberPage, stage)
+        assert self.page.attendance is not None  # taken before the page is built
         self.attendance = self.page.attendance
         self.room: RoomView = self.attendance.room
         self.follower = Follower(self.page, self.page.may_compute)
@@ -210,7 +180,7 @@ class Member(Feature):
 
     def admit(self, key: Hashable, value: object) -> bool:
         """Whether an event may act on the page."""
-        act = act_of(key, value)
+        act = act_of(key, value, self.page.features)
         if not act:
             return True
         fresh = self.leader and time.perf_counter() - self._began < GRACE

@@ -3,78 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from typing import Any
 
-import viser
-
-from app.classroom.attendance import Attendance
 from app.classroom.views import Role, Ticket
 from app.viewer.room.member import NEWS, Member
+from app.viewer.room.member_page import MemberPage
 from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
-from app.viewer.session.page import VisitorPage
 from app.viewer.session.persistence import SAVE_AFTER
-from app.viewer.session.services import Services
-from app.viewer.session.state import PageState
 
 
-class ClassroomPage(VisitorPage):
-    """A page in a room; arguments as for `VisitorPage`, which a page without a room uses.
+class ClassroomPage(MemberPage):
+    """The page of a teacher or a student, with the tab of that role."""
 
-    Args:
-        ticket: whose seat it is.
-    """
-
-    attendance: Attendance
-
-    def __init__(
-        self,
-        client: viser.ClientHandle,
-        services: Services,
-        token: bool = False,
-        *arguments: Any,
-        ticket: Ticket,
-        **options: Any,
-    ) -> None:
-        super().__init__(client, services, token, *arguments, **options)
-        self.exercises, self.guest = services.exercises, token
-        self._hub, self._ticket = services.classroom, ticket
+    def __init__(self, *arguments: Any, ticket: Ticket, **options: Any) -> None:
+        super().__init__(*arguments, ticket=ticket, **options)
         self.offered = (*self.offered, Teacher if ticket.role is Role.TEACHER else Student)
         self._member: Member | None = None
-
-    # What the tab may use
-
-    def adopt(self, state: PageState) -> None:
-        """Show robot, requests and configuration of another state."""
-        self._actions.adopt(state)
-
-    def guard(self, action: Callable[[], None]) -> None:
-        """Run an action; an error is logged and shown."""
-        self._guard(action)
-
-    def record(self, label: str, before: PageState) -> None:
-        """Let undo lead back to the state `before`."""
-        self._actions.record(label, before)
-
-    def put_back(self) -> None:
-        """Show in all controls of the arm what is true."""
-        self.numbers.use_goal(None)
-        self.sliders.show_locks(self.arm.locks)
-        self.panel.robots.show(self.robot, self.own)
-        self.panel.target.show(self.task)
-        self.posture.choose(self.branch)
-
-    def be_led(self, led: bool) -> None:
-        """Another page leads this one, or none does."""
-        self._persistence.led = led
-        if led:
-            self.arm.dragging = False
-
-    @property
-    def may_compute(self) -> bool:
-        """Whether the visitor may cause work."""
-        return not self._looking
 
     # Worker
 
@@ -108,5 +54,5 @@ class ClassroomPage(VisitorPage):
 
     def _leave(self) -> None:
         super()._leave()
-        if hasattr(self, "attendance"):
+        if self.attendance is not None:
             self.attendance.leave()

@@ -8,8 +8,8 @@ from typing import NamedTuple
 from app.classroom.clock import now
 from app.classroom.views import NewAttempt
 from app.exercises import Exercise
-from app.viewer.exercises.places import Place
-from app.viewer.exercises.reports import GivenUp, Judged
+from app.viewer.activity.activity import EXERCISES, GivenUp, Judged
+from app.viewer.activity.places import Place
 from app.viewer.feature import Stage
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
@@ -39,13 +39,13 @@ class Student(Member):
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
+        self.activity = stage.activity
         gui = stage.client.gui
         self._head = gui.add_html("")
         self._question = gui.add_html("")
         self._stored = gui.add_html("")
         self._gone = False  # whether the student has stopped following
         self._leader_before = ""
-        self._task: Exercise | None = None
         self._task_at: float | None = None
         self._over = False  # it was said that this page is no longer in the room
         self._first = True
@@ -53,19 +53,16 @@ class Student(Member):
         self._open_tab = 0
         self._answered: tuple[str, int] | None = None  # exercise and seed of the last answer
         self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, STORED)))
-        if self.page.lessons is not None:  # before what is stored of them in the browser is restored
-            exercises, ticket = self.page.lessons.exercises, self.attendance.ticket
-            exercises.practice.enter(
-                Place(f"seat {ticket.room} {ticket.seat}", self.attendance.secret(), seat=True)
-            )
-            exercises.judged, exercises.giving_up = self._submit, self._give_up
+        ticket = self.attendance.ticket
+        place = Place(f"seat {ticket.room} {ticket.seat}", self.attendance.secret(), seat=True)
+        self.activity.take_seat(place, self)  # before what is stored of exercises in the browser is restored
 
     def take_news(self) -> None:
         if self.room.closed:
             self._end()
             return
-        task = self._task
-        self._task = None if self.room.task is None else self.page.exercises.get(self.room.task.exercise)
+        task, activity = self.activity.task, self.activity
+        activity.task = None if self.room.task is None else activity.exercises.get(self.room.task.exercise)
         self._set_course(task if self.room.task is None else None)
         self._set_task()
         lead = self._lead
@@ -107,15 +104,15 @@ class Student(Member):
 
     def _set_task(self) -> None:
         """Open a task that is new."""
-        task, exercise, lessons = self.room.task, self._task, self.page.lessons
+        task, exercise, activity = self.room.task, self.activity.task, self.activity
         at = None if task is None else task.at
         first, self._first = self._first, False
-        if at == self._task_at or lessons is None:
+        if at == self._task_at:
             return
         self._task_at = at
-        if exercise is None or (
-            first and (lessons.exercises.is_closed(exercise) or lessons.exercises.at == exercise)
-        ):
+        if exercise is None:
+            return
+        if first and (activity.practice.record(exercise).closed or activity.exercise == exercise):
             return
         self.free()
         self._gone = True
@@ -130,7 +127,7 @@ class Student(Member):
         """
         packed, lessons, first = self.room.course, self.page.lessons, self._course is None
         course = packed, self.room.course_at
-        if course == self._course or lessons is None:
+        if course == self._course:
             return
         self._course = course
         fresh = lessons.courses.receive(packed)
@@ -145,18 +142,17 @@ class Student(Member):
 
     def _open_task(self) -> None:
         task, lessons = self.room.task, self.page.lessons
-        if task is not None and lessons is not None:
-            if lessons.key != lessons.exercises.key:
-                lessons.open(lessons.exercises.key)
-            lessons.courses.step_aside()
+        if task is not None:
+            if self.activity.lesson != EXERCISES:
+                lessons.open(EXERCISES)
+            self.activity.leave_item()
             before = self.page.robot.id, self.page.goal.tobytes()
             lessons.exercises.open(task.exercise)
             if (self.page.robot.id, self.page.goal.tobytes()) != before:
                 self.follower.drop_obstacles()
             self._open_tab += 1
 
-    def _submit(self, judged: Judged) -> None:
-        """Send an answer to the teacher."""
+    def submit(self, judged: Judged) -> None:
         verdict = judged.verdict
         self._answered = judged.exercise.id, judged.seed
         self._submissions.add(
@@ -165,11 +161,9 @@ class Student(Member):
                 score=1.0 if verdict.right else min(max(verdict.credit, 0.0), 1.0), started=now() - judged.seconds,
             )
         )  # fmt: skip
-        if self.page.lessons is not None:
-            self.page.lessons.exercises.note("Storing the answer …")
+        self.activity.say("Storing the answer …")
 
-    def _give_up(self, one: GivenUp) -> bool:
-        """Store that an answer is to be shown: from now on no other page of this seat can give it."""
+    def give_up(self, one: GivenUp) -> bool:
         if self.room.closed:
             return True
         attempt = NewAttempt.given_up(one.exercise.id, one.seed, now() - one.seconds)
@@ -177,8 +171,8 @@ class Student(Member):
 
     def _note(self) -> None:
         """Say below the verdict whether the answers are stored; of another exercise only what is not."""
-        lessons, sent = self.page.lessons, self._submissions
-        if lessons is None or not (sent.stored or sent.waiting or sent.problem):
+        activity, sent = self.activity, self._submissions
+        if not (sent.stored or sent.waiting or sent.problem):
             return
         if sent.problem:
             text = (
@@ -189,10 +183,10 @@ class Student(Member):
         elif sent.waiting:
             text = "Storing the answer …"
         else:
-            at, practice = lessons.exercises.at, lessons.exercises.practice
-            here = at is not None and (at.id, practice.seed_of(at)) == self._answered
+            at = activity.exercise
+            here = at is not None and (at.id, activity.practice.seed_of(at)) == self._answered
             text = "✓ Stored for your teacher." if here else ""
-        lessons.exercises.note(text)
+        activity.say(text)
 
     # Member
 
@@ -203,8 +197,7 @@ class Student(Member):
     def shared_state(self) -> PageState | None:
         if self.room.closed:
             return None
-        exercises = None if self.page.lessons is None else self.page.lessons.exercises
-        at = None if exercises is None else exercises.at
+        at = self.activity.exercise
         self.attendance.tell_task("" if at is None else at.id)
         state = self.page.snapshot()
         return PageState(
@@ -250,14 +243,15 @@ class Student(Member):
 
     def refresh(self) -> None:
         guest = self.page.guest
-        update_html(self._head, views.student_html(self.room, self.mode, self._task, self._submissions, guest))
+        update_html(
+            self._head, views.student_html(self.room, self.mode, self.activity.task, self._submissions, guest)
+        )
         update_html(self._question, views.poll_html(self.room.poll, teacher=False))
         update_html(self._stored, views.stored_html(self.room, now()))
         self._note()
 
     def bar(self) -> str:
-        lessons = self.page.lessons
-        away = self._task is not None and lessons is not None and lessons.exercises.at != self._task
+        away = self.activity.task is not None and self.activity.exercise != self.activity.task
         return views.student_bar(self.room, self.mode, self._open_tab, away)
 
     @property

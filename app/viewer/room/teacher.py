@@ -142,7 +142,7 @@ class Teacher(Member):
 
     def _send_task(self, texts: list[str]) -> None:
         """Let all work on an exercise by themselves."""
-        exercise = self.page.exercises.get(texts[0])
+        exercise = self.page.activity.exercises.get(texts[0])
         if exercise is None:
             raise InputError("task", texts[0], "the id of an exercise")
         self.attendance.send_task(exercise.id)
@@ -159,7 +159,7 @@ class Teacher(Member):
 
     @property
     def _offered(self) -> tuple[Course, ...]:
-        return () if self.page.lessons is None else self.page.lessons.courses.offered
+        return self.page.activity.offered
 
     # A student's arm instead of the own one
 
@@ -258,11 +258,7 @@ class Teacher(Member):
         if self.room.closed or self.leader or self._before is not None:
             return None
         self.page.camera.look()
-        return shared(replace(self.page.snapshot(), own=self._shown_own()), self._lesson)
-
-    @property
-    def _lesson(self) -> str | None:
-        return None if self.page.lessons is None else self.page.lessons.key
+        return shared(replace(self.page.snapshot(), own=self._shown_own()), self.page.features)
 
     def _shown_own(self) -> OwnArm | None:
         own = self.page.own
@@ -277,7 +273,7 @@ class Teacher(Member):
 
     def refresh(self) -> None:
         room = self.room
-        exercises = self.page.exercises
+        exercises = self.page.activity.exercises
         task = None if room.task is None else exercises.get(room.task.exercise)
         update_html(self._head, views.lead_html(room))
         if room.closed:

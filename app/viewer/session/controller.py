@@ -93,9 +93,10 @@ class ArmController:
     def use(
         self, robot: Robot, q: Array | None, dark: bool, base_axes: bool, drawn: Drawing | None = None
     ) -> None:
-        """Show another robot with this body, at its home configuration or at `q` ``(n,)``."""
-        if hasattr(self, "scene"):
-            self.scene.remove()
+        """Show a robot with this body, at its home configuration or at `q` ``(n,)``.
+
+        The nodes of the one before are not removed: they are those of `scene`.
+        """
         self.robot = robot
         self.task = DEFAULT_TASK
         self.branch = None
@@ -123,7 +124,7 @@ class ArmController:
     @property
     def moving(self) -> bool:
         """Whether the shown configuration is still on its way to the goal."""
-        return hasattr(self, "_motion") and self._motion.moving
+        return self._motion.moving
 
     @property
     def options(self) -> IKOptions:

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 from app.viewer.session.state import KEY, KEY_REPLACE, KEY_RETURN, PageState, encode
 
 LIMIT = 100  # steps; older ones are forgotten
-# s: further changes by the same control within this time belong to the same step. The page reports when a slider
-# is released or a cell is left; the longer time is for a report that was lost.
-SHORT_PAUSE, LONG_PAUSE = 1.0, 20.0
-# Controls that send many values on the way to the one the visitor means: how long (s) a step may pause.
-GRADUAL = {"gizmo": math.inf, "joint": LONG_PAUSE, "redundancy": LONG_PAUSE, "nudge": SHORT_PAUSE}
 # The part of a feature's state that is a result and not a setting: undo neither repeats nor clears it.
 RESULT = "drawn"
 
@@ -99,25 +93,6 @@ def same(a: PageState, b: PageState) -> bool:
 def _settings(state: PageState) -> PageState:
     features = {key: without_results(values) for key, values in state.features.items()}
     return replace(state, camera=None, features=features)
-
-
-def pause_within(key: object, value: object) -> float:
-    """Seconds that may pass between two events of a feature's control that belong to one step.
-
-    Drags and typing are one step each; a choice or a button is always one of its own. Typing into a cell ends when
-    the visitor leaves the cell, which the page reports. A drag of a gizmo goes on, however long it rests, until
-    something is grabbed again.
-    """
-    if key == "gizmo":
-        return math.inf
-    if isinstance(key, tuple) and key and key[0] == "cell":
-        return LONG_PAUSE if key[-1] != "kind" else 0.0
-    return SHORT_PAUSE if isinstance(value, int | float | tuple) and not isinstance(value, bool) else 0.0
-
-
-def belongs_before(key: object) -> bool:
-    """Whether an event of a feature only completes what an earlier one began, as meshes that were read do."""
-    return isinstance(key, tuple) and key[:1] == ("meshes",)
 
 
 def without_results(values: dict[str, object]) -> dict[str, object]:

@@ -1,15 +1,12 @@
 """The choice of a lesson: a dropdown, and below it the steps and questions of the lesson and its own controls.
 
-The exercises and the courses are two of the choices.
+The exercises and the courses are two of the choices. What is open, `Activity` knows.
 """
 
 from __future__ import annotations
 
-from functools import partial
-
 import viser
 
-from app.classroom.results.keys import result_key
 from app.viewer.courses.feature import CourseFeature
 from app.viewer.exercises.feature import Practising
 from app.viewer.feature import Feature, Stage
@@ -17,7 +14,6 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import Post, assign, listen
-from app.viewer.session.services import Services
 from app.viewer.views.templates import render
 from app.viewer.worksheet import Worksheets
 from kin import InputError
@@ -47,20 +43,15 @@ class LessonChoice:
         page: viser.GuiHtmlHandle,
         stage: Stage,
         post: Post,
-        services: Services,
     ) -> None:
         self._gui = gui
         self._page = page
         self._parent = parent
         self._stage = stage
-        self._titles = (NONE, *(lesson.title for lesson in LESSONS), Practising.title, CourseFeature.title)
-        self.exercises = Practising(stage, services.exercises)
+        self._titles = (NONE, *(each.title for each in choices()))
+        self.exercises = Practising(stage)
         with parent:
-            self.courses = CourseFeature(
-                stage, services.courses, self.exercises.practice, partial(result_key, services.classroom)
-            )
-            self.exercises.course = self.courses
-            self.courses.entered = self.exercises.begin_anew
+            self.courses = CourseFeature(stage)
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
             self._overview: viser.GuiHtmlHandle | None = gui.add_html(_overview())
             self.sheets: Worksheets | None = Worksheets(stage, None, page)
@@ -77,28 +68,31 @@ class LessonChoice:
             raise InputError("lesson", title, "one of " + ", ".join(self._titles))
         assign(self._choice, title)
         self.remove()
-        for each in (self.exercises, self.courses):
-            if title == each.title:
-                with self._parent:
-                    each.show()
-                    self.sheets = Worksheets(self._stage, None, self._page, folder=False)
-                return
-        chosen = lesson_titled(title)
-        if chosen is None:
+        try:
             with self._parent:
-                self._overview = self._gui.add_html(_overview())
-                self.sheets = Worksheets(self._stage, None, self._page)
-            return
-        with self._parent:
+                self._show(next((each for each in choices() if each.title == title), None))
+        finally:
+            self._stage.activity.changed()
+
+    def _show(self, chosen: type[Feature] | None) -> None:
+        """Build what was chosen, in the container that is open; None: the overview."""
+        activity, always = self._stage.activity, (self.exercises, self.courses)
+        if chosen is None:
+            self._overview = self._gui.add_html(_overview())
+        elif issubclass(chosen, Lesson):
             self._box = self._gui.add_folder(None)
-        with self._box:
-            self.guide = Guide(self._stage, chosen)
-            if (left := self._left.get((chosen.key, self._stage.robot.id))) is not None:
-                self.guide.restore(left)
-            self.shown = chosen(self._stage)
-            self.guide.attach(self.shown)
-        with self._parent:
-            self.sheets = Worksheets(self._stage, self.shown, self._page)
+            with self._box:
+                self.guide = Guide(self._stage, chosen)
+                if (left := self._left.get((chosen.key, self._stage.robot.id))) is not None:
+                    self.guide.restore(left)
+                self.shown = chosen(self._stage)
+                self.guide.attach(self.shown)
+            activity.lesson = chosen.key
+        else:
+            activity.lesson = chosen.key
+            next(each for each in always if isinstance(each, chosen)).show()
+        buttons = chosen is None or self.shown is not None
+        self.sheets = Worksheets(self._stage, self.shown, self._page, folder=buttons)
 
     @property
     def features(self) -> list[Feature]:
@@ -107,29 +101,18 @@ class LessonChoice:
         return [feature for feature in every if feature is not None]
 
     @property
-    def key(self) -> str | None:
-        """Of the open lesson, or of the exercises or courses if they are open."""
-        for each in (self.exercises, self.courses):
-            if each.shown:
-                return each.key
-        return None if self.shown is None else self.shown.key
-
-    @property
     def _title(self) -> str:
-        for each in (self.exercises, self.courses):
-            if each.shown:
-                return each.title
-        return NONE if self.shown is None else self.shown.title
+        return next((each.title for each in choices() if each.key == self._stage.activity.lesson), NONE)
 
     def open(self, key: str | None) -> None:
         """Open the lesson with this key, if there is one; None: close the open one."""
-        choices: tuple[type[Feature], ...] = (*LESSONS, Practising, CourseFeature)
-        chosen = next((each for each in choices if each.key == key), None)
+        chosen = next((each for each in choices() if each.key == key), None)
         if key is None or chosen is not None:
             self.choose(NONE if chosen is None else chosen.title)
 
     def remove(self) -> None:
         """Remove the open lesson or the exercises, or the overview if none is open."""
+        self._stage.activity.lesson = None
         if self.sheets is not None:
             self.sheets.remove()
             self.sheets = None
@@ -155,6 +138,11 @@ class LessonChoice:
         self._left[key] = progress
         while len(self._left) > KEPT:
             del self._left[next(iter(self._left))]
+
+
+def choices() -> tuple[type[Feature], ...]:
+    """What the tab offers. The exercises and the courses live as long as the page."""
+    return (*LESSONS, Practising, CourseFeature)
 
 
 def lesson_titled(title: object) -> type[Lesson] | None:

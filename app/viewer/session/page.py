@@ -10,16 +10,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable, Sequence
+from functools import partial
 
 import viser
 
 import kin
+from app.classroom.results.keys import result_key
 from app.exports.snippets import Service
 from app.shared.security import Rights
+from app.viewer.activity.activity import Activity
 from app.viewer.feature import Feature
 from app.viewer.frames import Frames
 from app.viewer.labels import size_labels, text_factor
-from app.viewer.lessons import LESSONS
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.obstacles.feature import ObstaclesFeature
 from app.viewer.own_arm import OwnArm
@@ -32,12 +34,13 @@ from app.viewer.scene.camera import Sphere, VisitorCamera
 from app.viewer.session.actions import Actions
 from app.viewer.session.actions.typed import BY_HAND
 from app.viewer.session.controller import ArmController
+from app.viewer.session.events import LINK
 from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.looks import Looks
 from app.viewer.session.numbers import Numbers
 from app.viewer.session.persistence import Persistence
 from app.viewer.session.posture import PosturePanel
-from app.viewer.session.preparing import LINK, Preparing
+from app.viewer.session.preparing import Preparing
 from app.viewer.session.robots import ShownArm, discard_own, edit, robot_of
 from app.viewer.session.services import Services
 from app.viewer.session.state import PageState, without_arm
@@ -54,9 +57,8 @@ class VisitorPage(ShownArm, Worker):
     """The page of one visitor; `offered` are its tabs between the arm's controls and the view's.
 
     The methods that `Worker` calls thread-safe may be called by any thread; everything else belongs to the worker.
-    The page is the :class:`~app.viewer.feature.Stage` of its features, the listener of its arm's controller, the
-    :class:`~app.viewer.session.persistence.SavedPage` of its persistence, and the
-    :class:`~app.viewer.session.actions.page.ActionsPage` of the visitor's actions.
+    The page is the :class:`~app.viewer.feature.Stage` of its features, the listener of its arm's controller, and
+    the :class:`~app.viewer.session.parts.Page` of its own parts.
 
     Args:
         token: whether programs must send an access token.
@@ -85,7 +87,6 @@ class VisitorPage(ShownArm, Worker):
         self.frames = Frames()
         self.arm = ArmController(client, services.pace, self.post, self)
         self.view, self.units, self.system_dark = ViewState(), DEFAULT_UNITS, False
-        self.lessons: LessonChoice | None = None
         self.client, self._pace = client, services.pace
         self._welcome, self._looking = welcome, rights is Rights.LOOK
         self._persistence = Persistence(self, token, self._guard, rights)
@@ -100,6 +101,12 @@ class VisitorPage(ShownArm, Worker):
         self.sliders: JointSliders
         self._more_joints: viser.GuiFolderHandle | None = None
         self.numbers: Numbers
+        self.lessons: LessonChoice
+        self.activity = Activity(
+            services.courses,
+            partial(result_key, services.classroom),
+            lambda: self.for_features(lambda feature: feature.on_activity()),
+        )
         self.looks = Looks(self)
         self._actions = Actions(self)
         self._preparing = Preparing(self, services.preparation)
@@ -160,12 +167,15 @@ class VisitorPage(ShownArm, Worker):
     def service(self) -> Service:
         return self._persistence.service
 
-    # SavedPage: what persistence may use besides
+    def link_to(self, features: dict[str, dict[str, object]], lesson: str) -> str:
+        return self._persistence.link_to(features, lesson)
+
+    # Page: what its parts may use besides
 
     @property
     def features(self) -> list[Feature]:
         """The tabs, and the open lesson with its steps."""
-        return self._tabs if self.lessons is None else [*self._tabs, *self.lessons.features]
+        return [*self._tabs, *self.lessons.features] if self._tabs else []
 
     def set_locks(self, locks: Sequence[bool]) -> None:
         """Lock exactly these joints ``(n,)``."""
@@ -177,12 +187,11 @@ class VisitorPage(ShownArm, Worker):
         self.arm.branch = branch
         self.posture.choose(branch)
 
-    # ActionsPage
-
     def change_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:
         """Replace the robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
         self.sliders.remove()
         self.posture.remove()
+        self.arm.scene.remove()
         self.panel.robots.show(robot, self.own)
         self._use_robot(robot, q, glide)
         self.for_features(lambda feature: feature.on_robot())
@@ -243,13 +252,13 @@ class VisitorPage(ShownArm, Worker):
         times = [feature.due for feature in self.features if feature.due is not None]
         if self._preparing.due is not None:
             times.append(self._preparing.due)
-        if self.arm.moving or (hasattr(self, "camera") and self.camera.gliding):
+        if self.arm.moving or self.camera.gliding:
             times.append(self._pace.interval)
         elif self._persistence.due is not None and not self.arm.dragging:
             times.append(max(0.0, self._persistence.due - time.perf_counter()))
-        if hasattr(self, "status") and (left := self.status.due(time.perf_counter())) is not None:
+        if (left := self.status.due(time.perf_counter())) is not None:
             times.append(left)
-        if hasattr(self, "numbers") and (left := self.numbers.waiting) is not None:
+        if (left := self.numbers.waiting) is not None:
             times.append(left)
         return min(times, default=None)
 
@@ -327,7 +336,7 @@ class VisitorPage(ShownArm, Worker):
             gui.main_panel.dock_right()
             self.panel = Panel(
                 gui, self.store.robots, self.own, robot, self.units, self.view, self.system_dark, self._welcome,
-                bool(LESSONS), [tab.title for tab in self.offered],
+                [tab.title for tab in self.offered],
                 self._library.offered(self.store.robots), self.post,
             )  # fmt: skip
             self.panel.fit(gui.main_panel, self._persistence.embedded)
@@ -335,10 +344,7 @@ class VisitorPage(ShownArm, Worker):
             self.status = self.panel.status
             self.posture = PosturePanel(self, self.panel.posture, self.post)
             self._use_robot(robot, saved.q)
-            if self.panel.learn is not None:
-                self.lessons = LessonChoice(
-                    gui, self.panel.learn, self.panel.sheet, self, self.post, self._services
-                )
+            self.lessons = LessonChoice(gui, self.panel.learn, self.panel.sheet, self, self.post)
             containers: list[viser.GuiFolderHandle | viser.GuiTabHandle] = [self.panel.obstacles, *self.panel.tabs]
             features: tuple[type[Feature], ...] = (ObstaclesFeature, *self.offered)
             for tab, container in zip(features, containers, strict=True):

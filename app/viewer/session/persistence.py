@@ -8,21 +8,17 @@ stored state; from then on it stores every state in which the visitor pauses. Wh
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
 
 import kin
 from app.exports.snippets import LOCAL, Moment, Service
 from app.shared.security import Rights
-from app.viewer.feature import Feature, Stage
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice
-from app.viewer.panel.view import ViewState
-from app.viewer.scene.camera import VisitorCamera
-from app.viewer.session.controller import ArmController
 from app.viewer.session.history import same
-from app.viewer.session.lessons import LessonChoice
+from app.viewer.session.lessons import lesson_with_key
+from app.viewer.session.parts import Page
 from app.viewer.session.state import (
     KEY,
     KEY_REPLACE,
@@ -39,25 +35,6 @@ log = logging.getLogger(__name__)
 
 SAVE_AFTER = 0.5  # seconds of rest before the state is saved
 ANSWER_WITHIN = 10.0  # seconds for the page to send its stored state; it may still be starting
-
-
-class SavedPage(Stage, Protocol):
-    """What is saved of a page, in addition to what features see."""
-
-    arm: ArmController
-    camera: VisitorCamera
-    view: ViewState
-    lessons: LessonChoice | None
-
-    @property
-    def features(self) -> list[Feature]:
-        """The tabs, and the open lesson."""
-
-    def set_locks(self, locks: Sequence[bool]) -> None:
-        """Lock exactly these joints ``(n,)``."""
-
-    def set_branch(self, branch: str) -> None:
-        """Request a branch from the next target on."""
 
 
 class Persistence:
@@ -78,7 +55,7 @@ class Persistence:
     """
 
     def __init__(
-        self, page: SavedPage, token: bool, guard: Callable[[Callable[[], None]], None], rights: Rights
+        self, page: Page, token: bool, guard: Callable[[Callable[[], None]], None], rights: Rights
     ) -> None:
         self._page = page
         self._token = token
@@ -116,8 +93,9 @@ class Persistence:
         if self._rights.compute:
             self.stored = saved
             return
-        lesson = saved.lesson if saved.lesson is not None and self._rights.allow_lesson(saved.lesson) else None
-        self.stored = replace(saved, target=None, lesson=lesson, features={})
+        lesson = lesson_with_key(saved.lesson)
+        shown = None if lesson is None or lesson.computes else lesson.key
+        self.stored = replace(saved, target=None, lesson=shown, features={})
 
     def restore(self, saved: PageState) -> None:
         """Apply the rest of a state to a page that shows its robot; what cannot be applied is reported."""
@@ -129,11 +107,11 @@ class Persistence:
             page.set_task(saved.task)
         if saved.branch is not None:
             page.set_branch(saved.branch)
-        target, lessons, lesson, camera = saved.target, page.lessons, saved.lesson, saved.camera
+        target, lesson, camera = saved.target, saved.lesson, saved.camera
         if target is not None:
             self._guard(lambda: page.arm.restore_target(target, saved.q))
-        if lessons is not None and lesson is not None:
-            self._guard(lambda: lessons.open(lesson))
+        if lesson is not None:
+            self._guard(lambda: page.lessons.open(lesson))
         for feature in page.features:
             if feature.key in saved.features:
                 state = saved.features[feature.key]
@@ -147,8 +125,6 @@ class Persistence:
     def begin(self, share: SharePanel) -> str:
         """Take the present state as saved, and return it; from now on `share` offers the saved state."""
         self._share = share
-        if self._page.lessons is not None:
-            self._page.lessons.courses.link_of = self._link_of
         self._state = self.snapshot()
         self._saved = encode(self._state)
         self._update_share()
@@ -195,7 +171,7 @@ class Persistence:
             target=page.arm.open_target,
             task=page.task,
             branch=page.branch,
-            lesson=None if page.lessons is None else page.lessons.key,
+            lesson=page.activity.lesson,
             units=page.units,
             view=replace(page.view),
             features={key: state for key, state in states.items() if state},
@@ -203,7 +179,7 @@ class Persistence:
             camera=page.camera.chosen,
         )
 
-    def _link_of(self, features: dict[str, dict[str, object]], lesson: str) -> str:
+    def link_to(self, features: dict[str, dict[str, object]], lesson: str) -> str:
         """A link to a page with nothing but these states of features, at this lesson."""
         return f"{self._address}viewer/#s={encode(PageState(lesson=lesson, features=features))}"
 
@@ -215,7 +191,7 @@ class Persistence:
         moment = Moment(
             page.robot, page.goal, target, page.task, self._address, self._token, own, page.obstacles, avoid
         )
-        self._share.show(f"{self._address}viewer/#s={self._saved}", moment, page.withheld == "table")
+        self._share.show(f"{self._address}viewer/#s={self._saved}", moment, page.activity.withheld == "table")
 
 
 def link_notice(saved: PageState) -> Notice | None:

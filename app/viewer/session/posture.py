@@ -17,6 +17,7 @@ from kin import IKResult, Redundancy
 from kin.ik import solve
 from kin.ik.messages.values import listed, need, ranges
 from kin.transforms import Array
+from kin.units import typeset
 
 
 class PosturePanel:
@@ -100,7 +101,7 @@ class PosturePanel:
             return shown
         title = f"{self._sliders.label_of(name)} was not changed"
         valid = f"{units.angles.text(value)} is outside the feasible range"
-        raise EntryError(title, f"{valid}. Feasible here: {ranges(found.intervals, units)}.")
+        raise EntryError(title, f"{valid}. Feasible here: {typeset(ranges(found.intervals, units))}.")
 
     def move(self, name: str, value: object, held: bool = True) -> tuple[Array | None, IKResult]:
         """Set a redundancy parameter while the tool stays.

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 from app.viewer.feature import Feature, message_of
-from app.viewer.panel.layout import Panel
-from app.viewer.panel.status import StatusLine
-from app.viewer.session.lessons import LessonChoice, lesson_titled, lesson_with_key
+from app.viewer.session.events import LINK, RULES, name_of
+from app.viewer.session.lessons import lesson_titled, lesson_with_key
+from app.viewer.session.parts import Page
 from app.viewer.session.state import PageState
 from kin import InputError, Robot
 from kin.warmup import ALL, COLLISIONS, all_of, family_of
@@ -21,28 +21,6 @@ from kin.warmup.preparation import Preparation
 
 LOOK_AGAIN: Final = 0.2  # s
 HELD: Final = 64  # events of one page; the oldest are dropped
-LINK: Final = "link"  # event of a stored state that waits
-# Events after which nobody waits for another robot, or for a stored state.
-_REPLACING: Final = frozenset({"robot", "undo", "redo", "travel", LINK})
-
-
-class WaitingPage(Protocol):
-    """What may be used of a page."""
-
-    panel: Panel
-    status: StatusLine
-    lessons: LessonChoice | None
-
-    @property
-    def robot(self) -> Robot:
-        """The selected robot."""
-
-    @property
-    def features(self) -> list[Feature]:
-        """The tabs, and the open lesson with its steps."""
-
-    def post(self, key: Hashable, value: object = None) -> None:
-        """Queue an event."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +34,7 @@ class _Held:
 class Preparing:
     """Holds the events of one page. Not thread-safe: the visitor's worker calls it."""
 
-    def __init__(self, page: WaitingPage, preparation: Preparation) -> None:
+    def __init__(self, page: Page, preparation: Preparation) -> None:
         self._page = page
         self._preparation = preparation
         self._held: dict[Hashable, _Held] = {}
@@ -71,9 +49,8 @@ class Preparing:
         if self._preparation.complete and not self._held:
             return True
         event = key[1] if isinstance(key, tuple) and key[0] == "message" else key
-        if event in _REPLACING:
-            for name in _REPLACING:
-                self._held.pop(name, None)
+        if (rule := RULES.get(name_of(key))) is not None and rule.replaces:
+            self._held = {name: held for name, held in self._held.items() if not RULES[name_of(name)].replaces}
         try:
             parts, what = self._needs(event, value)
         except InputError:  # who handles it says what is wrong
@@ -126,8 +103,7 @@ class Preparing:
         match event:
             case "robot":
                 robot = page.panel.robots.read(value)
-                lesson = None if page.lessons is None else page.lessons.shown
-                return (_parts(robot, lesson) if robot != page.robot else ()), f"the {robot.name}"
+                return (_parts(robot, page.lessons.shown) if robot != page.robot else ()), f"the {robot.name}"
             case "lesson":
                 chosen = lesson_titled(value)
                 if chosen is None:

@@ -2,26 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Protocol
-
-from app.viewer.feature import Feature
-from app.viewer.meshes.bodies import Bodies
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.status import StatusLine
 from app.viewer.session.controller import ArmController
-from app.viewer.session.persistence import SavedPage
+from app.viewer.session.parts import Page
 from kin import Contact, IKOptions, Obstacle, Robot, Task
 from kin.transforms import Array
-
-
-class Withholding(Protocol):
-    """A page with features that may withhold something."""
-
-    withheld: str
-
-    def for_features(self, action: Callable[[Feature], None]) -> None:
-        """Call every feature."""
 
 
 class ShownArm:
@@ -29,12 +15,6 @@ class ShownArm:
 
     arm: ArmController
     status: StatusLine
-    withheld = ""
-
-    def withhold(self: Withholding, what: str) -> None:
-        if what != self.withheld:
-            self.withheld = what
-            self.for_features(lambda feature: feature.on_style())
 
     @property
     def robot(self) -> Robot:
@@ -94,24 +74,14 @@ class ShownArm:
         self.arm.solve_again(self.status.shows_result)
 
 
-class RobotPage(SavedPage, Protocol):
-    """What a change of the robot may use of a page."""
-
-    own: OwnArm | None
-    bodies: Bodies
-
-    def change_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:
-        """Replace the robot, at its home configuration or at `q` ``(n,)``, in a fitting view."""
-
-
-def robot_of(page: RobotPage, robot_id: str | None) -> Robot:
+def robot_of(page: Page, robot_id: str | None) -> Robot:
     """The robot with this id, which may be that of the visitor's own; None: the first one of the service."""
     if page.own is not None and page.own.robot.id == robot_id:
         return page.own.robot
     return page.store.robots[0] if robot_id is None else page.store.get(robot_id)
 
 
-def discard_own(page: RobotPage) -> OwnArm | None:
+def discard_own(page: Page) -> OwnArm | None:
     """Delete the visitor's own arm, and show the robot it was made from; returns it."""
     own, page.own = page.own, None
     if own is not None:
@@ -119,7 +89,7 @@ def discard_own(page: RobotPage) -> OwnArm | None:
     return own
 
 
-def edit(page: RobotPage, own: OwnArm) -> None:
+def edit(page: Page, own: OwnArm) -> None:
     """Show a changed version of the arm on show.
 
     Viewpoint, task and a target that is not reached stay; configuration and locks do if it has as many joints of

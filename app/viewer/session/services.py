@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from app.classroom import Hub
 from app.classroom.courses import Courses
-from app.exercises import Exercises
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
@@ -19,8 +18,8 @@ from kin.warmup.preparation import Preparation
 
 @dataclass(frozen=True)
 class Services:
-    """The robots, the caches of expensive results, the readers of meshes, the frame rate, exercises, courses,
-    the live state of classrooms, and which kernels are compiled."""
+    """The robots, the caches of expensive results, the readers of meshes, the frame rate, courses with their
+    exercises, the live state of classrooms, and which kernels are compiled."""
 
     store: Store
     clouds: Clouds
@@ -29,7 +28,6 @@ class Services:
     meshes: MeshReader
     library: Library
     pace: Pace
-    exercises: Exercises
     courses: Courses
     classroom: Hub
     preparation: Preparation

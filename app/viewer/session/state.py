@@ -28,6 +28,7 @@ from app.viewer.obstacles import placed
 from app.viewer.obstacles.placed import Obstacles
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.entry import FARTHEST
+from app.viewer.panel.script import read_json
 from app.viewer.panel.view import LOOKS, ViewState
 from app.viewer.scene.viewpoints import UP
 from kin import KinematicsError, Robot, Task, branch_names
@@ -245,8 +246,8 @@ def _unpack(text: str) -> dict[str, Any]:
 
 def _parse(text: str) -> dict[str, Any]:
     try:
-        data = json.loads(text)
-    except (ValueError, RecursionError):
+        data = read_json(text)
+    except ValueError:
         return {}
     return data if isinstance(data, dict) else {}
 

@@ -27,7 +27,6 @@ FILES: dict[str, tuple[str, Callable[[Sheet], str]]] = {
     "csv": ("csv", csv_text),
     "svg": ("svg", lambda sheet: draw(sheet).svg()),
 }
-TO_FILL = frozenset({"dh"})  # lessons of which students fill in the table and the matrices
 
 
 class Worksheets(Feature):
@@ -41,6 +40,7 @@ class Worksheets(Feature):
 
     key = "sheet"
     title = "Worksheet"
+    acts = False
     messages = frozenset({"page", *FILES})
 
     def __init__(
@@ -74,7 +74,7 @@ class Worksheets(Feature):
 
     @property
     def _withheld(self) -> bool:
-        return self.stage.withheld == "table"
+        return self.stage.activity.withheld == "table"
 
     def sheet(self) -> Sheet:
         """The worksheet for the arm as it is."""
@@ -84,7 +84,7 @@ class Worksheets(Feature):
         found = type(lesson).outline(stage.robot, stage.units)
         return Sheet(
             type(lesson).title, stage.robot, stage.goal, stage.units, found.goal, parts_of(found),
-            lesson.formulas(), type(lesson).key in TO_FILL,
+            lesson.formulas(), lesson.to_fill,
         )  # fmt: skip
 
     def remove(self) -> None:

@@ -83,7 +83,7 @@ def test_the_estimate_of_an_answer_is_close(client, robot_id, images):
     body = {"target": targets, "images": images, "task": "pose" if robot.n > 5 else "approach"}
     size = len(client.post(f"{API}/{robot_id}/ik", json=body).content) / len(targets)
     request = ik.IkRequest.model_validate(body)
-    estimate = ik._size(robot, request, request.options("pose"))
+    estimate = ik._size(robot, request.options("pose"))
     assert 0.5 * size < estimate < max(5.0 * size, 12_000)
 
 
@@ -91,7 +91,7 @@ def test_the_largest_lists_of_the_default_settings_are_allowed():
     settings = Settings()
     for robot in kin.builtin_robots().values():
         request = ik.IkRequest.model_validate({"target": [POSE]})
-        assert ik._size(robot, request, request.options("pose")) * settings.max_batch < settings.max_answer
+        assert ik._size(robot, request.options("pose")) * settings.max_batch < settings.max_answer
 
 
 def test_answers_that_nobody_reads_are_bounded_together_and_freed_when_the_client_leaves(application):

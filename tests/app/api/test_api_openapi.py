@@ -37,7 +37,7 @@ def test_every_operation_has_summary_description_and_documented_refusals(documen
                 assert list(response["content"]) == ["application/problem+json"]
                 schema = response["content"]["application/problem+json"]["schema"]
                 assert schema == {"$ref": "#/components/schemas/Problem"}
-    assert seen == 32
+    assert seen == 34
 
 
 def test_every_parameter_is_described_and_a_cloud_has_all_its_formats(document):

@@ -98,7 +98,15 @@ def test_fk_in_radians(capsys):
     assert got["pose"]["matrix"] == kin.fk(PIONEER, [1.5, 0.5, 1, 0.5, 0.5]).tolist()
 
 
-@pytest.mark.parametrize("words", [("-90", "-.5", "-1e-3", "−10", "+5"), ("-90.", "-0.5", "-1E-3", "-1e1", "5")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("-90", "-.5", "-1e-3", "−10", "+5"),
+        ("-90.", "-0.5", "-1E-3", "-1e1", "5"),
+        ("-pi/2", "-0,5", "-1/1000", "-(5+5)", "5deg"),
+        ("-π/2 rad", "-0.5°", "-1e-3 deg", "-20/2", "5"),
+    ],
+)
 def test_negative_numbers_are_numbers(capsys, words):
     q = np.radians([-90, -0.5, -0.001, -10, 5])
     assert np.allclose(answer(capsys, "fk", "pioneer5", *words)["pose"]["matrix"], kin.fk(PIONEER, q), atol=1e-15)
@@ -252,10 +260,15 @@ def test_robots_lists_all_and_describes_one(capsys, client):
     [
         (("fk", "puma", 1), "expected one of pioneer5"),
         (("fk", "pioneer5", 1, 2), "one for each of: rotating base"),
-        (("fk", "pioneer5", 1, 2, 3, 4, "x"), "invalid number value: 'x'"),
-        (("fk", "pioneer5", 1, 2, 3, 4, "nan"), "'nan' is not a number"),
-        (("fk", "pioneer5", 1, 2, 3, 4, "-inf"), "'-inf' is not a number"),
-        (("fk", "pioneer5", 1, 2, 3, 4, "1e308"), "between -1e6 and 1e6"),
+        (
+            ("fk", "pioneer5", 1, 2, 3, 4, "x"),
+            "q[4]: “x” is not a number (unknown: x); valid: a number such as -90 or pi/2; units: °, deg, rad",
+        ),
+        (("fk", "pioneer5", 1, 2, 3, 4, "nan"), "“nan” is not a number"),
+        (("fk", "pioneer5", 1, 2, 3, 4, "-inf"), "“-inf” is not a number"),
+        (("fk", "pioneer5", 1, 2, 3, 4, "1e308"), "too large"),
+        (("fk", "pioneer5", 1, 2, 3, 4, "5mm"), "is not a unit of an angle"),
+        (("ik", "pioneer5", "--position", "1,300", 2, 3), "--position: “1,300” may be written with thousands"),
         (("fk", "pioneer5"), "required"),
         (("ik", "pioneer5"), "--position"),
         (("ik", "pioneer5", "--position", 1, 2), "expected 3 arguments"),
@@ -267,7 +280,7 @@ def test_robots_lists_all_and_describes_one(capsys, client):
         (("ik", "pioneer5", "--position", 1, 2, 3, "--lock", "9=1"), "a joint from 1 to 5"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--lock", "1=1:2"), "JOINT=VALUE"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--limit", "1=5"), "JOINT=LOWER:UPPER"),
-        (("ik", "pioneer5", "--position", 1, 2, 3, "--limit", "1=5:x"), "invalid value"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--limit", "1=5:x"), "--limit: “x” is not a number"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--branch", "sideways"), "elbow positive"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--mask", "rx"), "--wxyz"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--mask", "x", "--task", "pose"), "no --task together"),

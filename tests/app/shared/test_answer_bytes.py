@@ -70,6 +70,7 @@ def plain(result: kin.IKResult) -> dict[str, Any]:
         "reason": result.reason,
         "task": result.task,
         "complete": result.complete,
+        "completeness": result.completeness,
         "solver": result.solver,
         "solver_reason": result.solver_reason,
         "solutions": [solution(each) for each in tuple(result.solutions)],

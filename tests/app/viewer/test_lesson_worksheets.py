@@ -77,7 +77,7 @@ def test_equations_are_on_the_sheet_with_their_corrections_among_the_solutions()
 @pytest.fixture
 def worksheets():
     stage = MagicMock(robot=PIONEER, goal=PIONEER.q_home, units=DEFAULT_UNITS)
-    lesson = SimpleNamespace(key="dh", formulas=tuple)
+    lesson = SimpleNamespace(key="dh", formulas=tuple, to_fill=True)
     made = Worksheets(stage, lesson, MagicMock())
     made.sheet = lambda: Sheet("An arm", PIONEER, np.array(PIONEER.q_home), DEFAULT_UNITS)
     return made

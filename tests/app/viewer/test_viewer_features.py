@@ -93,7 +93,6 @@ class Pupil(Witness, Lesson):
 @pytest.fixture
 def tab(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBrowser]:
     monkeypatch.setattr(page, "TABS", (Witness,))
-    monkeypatch.setattr(page, "LESSONS", (Pupil,))
     monkeypatch.setattr(choice, "LESSONS", (Pupil,))
     Witness.calls.clear()
     Witness.threads.clear()

@@ -92,7 +92,7 @@ def test_typed_targets_are_in_the_frame_of_the_read_out_or_of_the_tool(port: int
         assert near(shown(tab), np.linalg.solve(T_table, home))
         goal = kin.fk(UR5, UR5.q_home + 0.1)
         matrix = np.linalg.solve(T_table, goal)
-        tab.say("target", ["pose", " ".join(f"{v:.12f}" for v in matrix[:3].ravel())])
+        tab.say("target", ["pose", " ".join(f"{v:.12f}" for v in matrix[:3].ravel()) + " m"])
         tab.wait(lambda: np.allclose(tab.tool_pose(), goal, atol=1e-6))
         tab.say("target", ["position", "0 0 -20", "tool"])
         ahead = goal @ kin.from_xyz_rpy([0.0, 0.0, -0.02])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -13,6 +14,8 @@ import msgspec
 import numpy as np
 import pytest
 import zstandard
+from hypothesis import example, given
+from hypothesis import strategies as st
 from viser import _messages as messages
 from viser.infra import Message, _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
@@ -292,3 +295,53 @@ def test_a_version_of_viser_that_lacks_something_is_found(monkeypatch: pytest.Mo
     monkeypatch.delattr(_infra, "_append_aligned_buffers")
     monkeypatch.delattr(AsyncMessageBuffer, "pop_message_locked")
     assert missing_names() == ["AsyncMessageBuffer.pop_message_locked", "_infra._append_aligned_buffers"]
+
+
+TEXTS = st.text(st.characters(codec=None))  # half letters too
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers(-(10**30), 10**30) | st.floats() | TEXTS,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXTS, inner, max_size=3),
+    max_leaves=8,
+)
+
+
+@given(JSON)
+@example("\ud800")
+@example({"a\udfff": [2**64, -(2**63) - 1, 10**400, math.nan, "\x00"]})
+def test_what_no_page_can_read_is_sent_as_it_can(value):
+    async def packed() -> bytes:
+        message = messages.GuiUpdateMessage("uuid", {"value": value})
+        return Packer().pack([message, turn("/after")])
+
+    first, second = content(asyncio.run(packed()))["messages"]
+    assert second["name"] == "/after"
+    _same(first["updates"]["value"], value)
+
+
+def _same(sent: Any, value: Any) -> None:
+    """Texts and numbers have arrived as they are wherever a message can hold them."""
+    match value:
+        case str():
+            assert sent == value.encode("utf-8", "replace").decode()
+        case bool() | None:
+            assert sent is value
+        case int():
+            assert sent == value if -(2**63) <= value < 2**64 else math.isinf(sent) and (sent > 0) == (value > 0)
+        case float():
+            assert sent == value or (math.isnan(sent) and math.isnan(value))
+        case list():
+            for a, b in zip(sent, value, strict=True):
+                _same(a, b)
+        case dict():
+            assert set(sent) == {key.encode("utf-8", "replace").decode() for key in value}
+
+
+def test_what_no_page_can_read_is_logged_once(caplog):
+    async def pack() -> None:
+        packer = Packer()
+        for _ in range(5):
+            packer.pack([messages.GuiUpdateMessage("uuid", {"value": "\ud800"})])
+
+    asyncio.run(pack())
+    (line,) = caplog.messages
+    assert "surrogates not allowed" in line

@@ -45,6 +45,8 @@ class DHLesson(Lesson):
 
     key = "dh"
     title = "DH table step by step"
+    computes = False
+    to_fill = True
     about = "How four motions per row lead from the base to the tool, one after another."
     messages = Assigning.messages
     outline = staticmethod(outline)

@@ -19,9 +19,9 @@ from app.viewer.lessons.dh.choices import PARTS, Choice, Part
 from app.viewer.lessons.dh.steps import MOVED, ORDERS, low
 from kin import InputError, Robot
 from kin.transforms import Array, as_transform
+from kin.typed import LONGEST
 from kin.units import Units
 
-LONGEST = 40  # characters of a typed value
 _DIGITS = 9  # of metres and radians in a link
 SAMPLES = 64
 
@@ -100,7 +100,7 @@ class Attempt:
         """Judge typed values at a configuration ``(n,)``; raises `kin.InputError` unless a row is to be typed."""
         if self.part is not None or self.work.complete or not isinstance(texts, dict):
             raise InputError("row", texts, "the four values of a row, when its frame has been chosen")
-        self.typed = {factor: str(texts.get(factor, ""))[:LONGEST] for factor in FACTORS}
+        self.typed = {factor: str(texts.get(factor, ""))[: LONGEST + 1] for factor in FACTORS}
         values: dict[Factor, float] = {}
         for factor in FACTORS:
             try:

@@ -39,6 +39,7 @@ class EquationsLesson(Lesson):
 
     key = "equations"
     title = "Equations"
+    computes = False
     about = "The arm’s equations. For the book’s arms, also its misprints."
     outline = staticmethod(outline)
 

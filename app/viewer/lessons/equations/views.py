@@ -17,7 +17,7 @@ from app.viewer.views import mathml
 from app.viewer.views.mathml import MathML
 from app.viewer.views.templates import render
 from kin.transforms import Array
-from kin.units import Units, fixed
+from kin.units import Units, fixed, general
 
 # Mark, words and CSS class of each verdict.
 LOOKS = {
@@ -118,8 +118,8 @@ def meaning(symbol: Symbol, units: Units) -> str:
     if not symbol.fixed or symbol.kind in ("cos", "sin"):
         return symbol.meaning
     if symbol.kind == "number":
-        return f"{symbol.constant:.6g}, {symbol.meaning}".replace("-", "−")
-    return f"{symbol.constant * units.lengths.scale:.6g}{units.lengths.suffix}, {symbol.meaning}".replace("-", "−")
+        return f"{general(symbol.constant)}, {symbol.meaning}"
+    return f"{general(symbol.constant * units.lengths.scale)}{units.lengths.suffix}, {symbol.meaning}"
 
 
 def values_html(equation: Equation, values: Values, units: Units, largest: float) -> str:

@@ -21,9 +21,9 @@ from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.status import Notice
 from kin import InputError
+from kin.typed import LONGEST
 
 JOINTS_HINT = "The sliders of the tab Move, here as well. A target is typed with Type a target, above the tabs."
-LONGEST = 100  # characters of an answer
 
 
 class Guide(Feature):
@@ -31,6 +31,7 @@ class Guide(Feature):
 
     key = "guide"
     title = "Lesson"
+    shared = True
     messages = frozenset({"go", "answer", "type", "reveal", "pose", "restart"})
 
     def __init__(self, stage: Stage, lesson: type[Lesson]) -> None:
@@ -53,7 +54,6 @@ class Guide(Feature):
     def attach(self, lesson: Lesson) -> None:
         """Let the lesson below the steps follow them."""
         self._shown = lesson
-        lesson.show_steps = self._show
         self._show()
 
     def handle(self, key: Hashable, value: object) -> None:
@@ -97,6 +97,9 @@ class Guide(Feature):
         self._progress.use(self._outline())
         self._show()
 
+    def on_activity(self) -> None:
+        self._show()
+
     def state(self) -> dict[str, object]:
         return {**self._progress.state(), "joints": self._joints is not None}
 
@@ -119,9 +122,9 @@ class Guide(Feature):
         if not isinstance(question, Number) or not isinstance(text, str):
             raise InputError("answer", text, "a text, for a question with a field")
         try:
-            given = read(question, text[:LONGEST])
+            given = read(question, text[: LONGEST + 1])
         except EntryError as error:
-            self._errors[key] = (text[:LONGEST], error.detail)
+            self._errors[key] = (text[: LONGEST + 1], error.detail)
         else:
             self._settle(key, given)
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from typing import ClassVar
 
 from app.exports.worksheet import Formula
-from app.viewer.feature import Feature, Stage
+from app.viewer.feature import Feature
 from app.viewer.lessons.guide.outline import Outline
 from app.viewer.lessons.guide.progress import Progress
 from kin import Robot
@@ -16,13 +16,16 @@ from kin.units import Units
 class Lesson(Feature, ABC):
     """A feature of the tab *Learn*. The page shows its outline above its controls.
 
+    After a change that concerns `on_steps`, call ``stage.activity.changed()``: the outline is shown again.
+
     Attributes:
-        show_steps: shows the outline again, after a change that concerns `on_steps`.
+        computes: whether it solves the pose, or has a scene of its own. Links do not open it for visitors who may
+            only look.
+        to_fill: whether students fill in the table and the matrices of its worksheet.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        super().__init__(stage)
-        self.show_steps: Callable[[], None] = _nothing
+    computes: ClassVar[bool] = True
+    to_fill: ClassVar[bool] = False
 
     def on_steps(self, progress: Progress) -> Outline | None:
         """The steps are about to be shown, after an answer for example; returns another outline to go on with."""
@@ -40,7 +43,3 @@ class Lesson(Feature, ABC):
     def formulas(self) -> tuple[Formula, ...]:
         """The equations of its worksheet."""
         return ()
-
-
-def _nothing() -> None:
-    """What a lesson calls that has no steps on show."""

@@ -13,7 +13,6 @@ from markupsafe import Markup
 
 from app.exercises.questions import (
     LEAST,
-    PLAIN,
     WHOLE,
     Choice,
     Mistake,
@@ -26,6 +25,7 @@ from app.exercises.questions import (
     one_right,
     two_percent,
 )
+from kin.units import PLAIN
 
 __all__ = [
     "LEAST",

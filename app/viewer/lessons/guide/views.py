@@ -6,6 +6,7 @@ from app.exercises.judging import solution_text, tolerance_text, value_text
 from app.viewer.lessons.guide.outline import Choice, Number, Question
 from app.viewer.lessons.guide.progress import Mark, Progress
 from app.viewer.views.templates import render
+from kin.units import general
 
 # Symbol, words and colour of what has become of a question.
 MARKS: dict[Mark, tuple[str, str, str]] = {
@@ -86,7 +87,7 @@ def _question(
 
 def _field(progress: Progress, key: str, question: Number, typed: str, invalid: bool) -> dict[str, object]:
     given = progress.given.get(key)
-    shown = "" if given is None else f"{given * question.unit.scale:.6g}".replace("-", "−")
+    shown = "" if given is None else general(given * question.unit.scale)
     value = typed or (
         value_text(question).removesuffix(question.unit.suffix) if key in progress.revealed else shown
     )

@@ -124,7 +124,7 @@ class InverseLesson(Lesson):
     def on_robot(self) -> None:
         self._clear()
         self._begin()
-        self.show_steps()
+        self.stage.activity.changed()
 
     def on_pose(self, T_base_tool: Array) -> None:
         self._wake()
@@ -164,7 +164,7 @@ class InverseLesson(Lesson):
             followed = tuple(1 if sign > 0 else -1 for sign in signs)
             self._exercise = exercise(arm, np.array(q, float), followed)
         self._build()
-        self.show_steps()
+        self.stage.activity.changed()
 
     def remove(self) -> None:
         self._clear()
@@ -207,7 +207,7 @@ class InverseLesson(Lesson):
         if given is None or not 1 <= number <= len(given.branches):
             raise InputError("branch", number, "the number of a branch in the tree")
         self._set_signs(given.branches[number - 1].derivation.signs)
-        self.show_steps()
+        self.stage.activity.changed()
 
     def _ask(self) -> None:
         """Ask about the pose that the arm has now."""
@@ -216,7 +216,7 @@ class InverseLesson(Lesson):
             return
         q = self.stage.goal.copy()
         self._exercise, self._restart = exercise(arm, q, signs_of(arm, q)), True
-        self.show_steps()
+        self.stage.activity.changed()
         self.stage.notify(Notice("hand", "New questions", "They are about the pose that the arm has now."))
 
     def _take_posture(self) -> None:

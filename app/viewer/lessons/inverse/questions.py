@@ -24,7 +24,7 @@ from app.viewer.lessons.inverse.arm import Arm, arm_of
 from app.viewer.lessons.inverse.exercise import Exercise, example, exercise, part_of
 from app.viewer.lessons.inverse.sheet import DerivedStep, StepKey
 from kin import Robot
-from kin.units import Units
+from kin.units import Units, fixed
 
 GOAL = (
     "You can solve the inverse kinematics of an arm by hand, step by step, and say where each solution comes from "
@@ -99,7 +99,7 @@ def _target(given: Exercise, units: Units) -> str:
         return f"{text}, and the tool points along φ = {units.angles.text(math.atan2(v('x_y'), v('x_x')))}."
     if given.arm.family == "planar":
         return f"{text}."
-    direction = ", ".join(f"{v(f'a_{axis}'):.3f}" for axis in axes).replace("-", "−")
+    direction = ", ".join(fixed(v(f"a_{axis}")) for axis in axes)
     return f"{text}, a = ({direction})."
 
 

@@ -7,7 +7,7 @@ import math
 from app.viewer.lessons.inverse.arm import Arm, Family
 from app.viewer.lessons.inverse.sheet import DerivedStep, StepKey
 from kin.axes import is_zero
-from kin.units import Units
+from kin.units import Units, fixed
 
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 TITLES: dict[StepKey, str] = {
@@ -149,7 +149,7 @@ def failure_text(step: DerivedStep, units: Units) -> str:
         else "below −1: the links cannot fold so far"
     )
     gap_text = f"The wrist centre is {gap} {step.failure}."
-    return f"No solution: the cosine would be {cosine:.3f}, {word}. {gap_text}".replace("-", "−")
+    return f"No solution: the cosine would be {fixed(cosine)}, {word}. {gap_text}"
 
 
 def special_text(arm: Arm, step: DerivedStep) -> str:

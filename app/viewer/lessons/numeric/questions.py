@@ -23,11 +23,11 @@ from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.numeric import methods
 from app.viewer.lessons.numeric.example import Example, example
 from app.viewer.lessons.numeric.methods import Method, Problem, Settings
-from app.viewer.lessons.numeric.views import NAMES, amount, error_chart, power
+from app.viewer.lessons.numeric.views import NAMES, amount, error_chart
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from kin import Robot, fk, get_robot
 from kin.transforms import Array
-from kin.units import Unit, Units
+from kin.units import Unit, Units, power
 
 GOAL = (
     "You can write down one step of Newton, of the Jacobian transpose and of damped least squares, and say when "

@@ -15,7 +15,7 @@ from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from app.viewer.views.templates import render
 from kin import Robot
 from kin.transforms import Array
-from kin.units import Unit, Units
+from kin.units import Unit, Units, power
 
 NAMES: dict[Method, str] = {
     "newton": "Newton",
@@ -40,15 +40,6 @@ _STYLE = AxisStyle(
     length=4.0,
     across=33.0,
 )
-
-
-def power(value: float) -> str:
-    """A number in powers of ten, as ``3.2·10⁻⁸``."""
-    if value == 0.0:
-        return "0"
-    digits, exponent = f"{value:.1e}".split("e")
-    raised = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"{digits}·10{raised}"
 
 
 def amount(unit: Unit, value: float) -> str:

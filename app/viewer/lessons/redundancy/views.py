@@ -14,7 +14,7 @@ from app.viewer.self_motion import End
 from app.viewer.views.templates import render
 from kin import Redundancy, Robot, Task
 from kin.transforms import Array, rotation_angle, vector_angle
-from kin.units import Unit, Units
+from kin.units import Unit, Units, power
 
 DIMENSIONS: dict[Task, int] = {"pose": 6, "approach": 5, "position": 3}
 MATCHED: dict[Task, str] = {"pose": "the full pose", "approach": "point and approach", "position": "the point"}
@@ -98,15 +98,12 @@ def residual(T: Array, T_held: Array, task: Task) -> tuple[float, float | None]:
     return position, rotation_angle(T[:3, :3], T_held[:3, :3])
 
 
-def small(value: float, unit: Unit) -> Markup:
+def small(value: float, unit: Unit) -> str:
     """A residual with its unit: with fixed decimals if they show it, else with a power of ten."""
     shown = value * unit.scale
     if shown == 0.0:
-        return Markup("0{}").format(unit.suffix)
-    if shown >= unit.step(2):
-        return Markup("{}").format(unit.text(value, 2))
-    mantissa, exponent = f"{shown:.0e}".split("e")
-    return Markup("{}·10<sup>{}</sup>{}").format(mantissa, str(int(exponent)).replace("-", "−"), unit.suffix)
+        return f"0{unit.suffix}"
+    return unit.text(value, 2) if shown >= unit.step(2) else power(shown, 1) + unit.suffix
 
 
 def residual_html(position: float, rotation: float | None, elbow: float | None, units: Units) -> str:

@@ -151,7 +151,7 @@ class RotationsLesson(Lesson):
                     angle = units.angles.read(_number("angle", value, math.inf))
                     self._angles = tuple(angle if i == k else v for i, v in enumerate(self._angles))  # type: ignore[assignment]
             case "typed":
-                self._typed = str(value)[:LONGEST]
+                self._typed = str(value)[: LONGEST + 1]
                 return
             case ("act", str(name)):
                 self._act(name)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from markupsafe import Markup
 
@@ -16,7 +14,7 @@ from app.viewer.views import mathml as m
 from app.viewer.views.templates import render
 from kin import Robot, Screws, exp_screw, fk
 from kin.transforms import Array
-from kin.units import Units, fixed
+from kin.units import Units, fixed, power
 
 MATRIX = 0.74  # em, as in the lesson on DH tables
 DIGITS = 5  # of the two products
@@ -100,7 +98,7 @@ def product_html(robot: Robot, zero: Screws, q: Array, factors: int, form: Form)
             ("Product of exponentials, lengths in m", "screws", m.math(_matrix(by_screws, DIGITS), size=MATRIX)),
             ("Product of the DH matrices", "table", m.math(_matrix(by_table, DIGITS), size=MATRIX)),
         ),
-        difference=_power(float(np.abs(by_screws - by_table).max())),
+        difference=power(float(np.abs(by_screws - by_table).max()), 1),
     )
 
 
@@ -158,11 +156,3 @@ def _matrix(T: Array, digits: int) -> m.MathML:
     """A pose ``(4, 4)``, lengths in metres."""
     rows = [[m.number(v, digits) for v in line] for line in T[:3].tolist()]
     return m.matrix([*rows, [m.short(v) for v in T[3].tolist()]], width=2.4 + 0.55 * digits)
-
-
-def _power(value: float) -> Markup:
-    """A small number as a power of ten."""
-    if value == 0.0:
-        return Markup("0")
-    exponent = math.floor(math.log10(value))
-    return Markup("{}·10<sup>{}</sup>").format(round(value / 10.0**exponent), str(exponent).replace("-", "−"))

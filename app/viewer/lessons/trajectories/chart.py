@@ -11,11 +11,11 @@ from markupsafe import Markup, escape
 
 from app.exports.svg import few, joint_colour, tick_labels
 from kin.transforms import Array
+from kin.units import general, raised
 
 WIDTH, LEFT, RIGHT, HIGH, GAP, TOP, BOTTOM = 320.0, 44.0, 8.0, 62.0, 22.0, 16.0, 18.0
 _HALF = 3.1  # half of the width of a character
 FEW = 4  # numbers on an axis
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Curve(NamedTuple):
@@ -120,5 +120,5 @@ def _powers(low: float, high: float) -> list[tuple[float, str]]:
     """The powers of ten between two logarithms; the ends themselves if there are fewer than two."""
     whole = range(math.ceil(low), math.floor(high) + 1)
     if len(whole) < 2:
-        return [(value, f"{10.0**value:.2g}") for value in (low, high)]
-    return [(float(power), "10" + str(power).translate(_RAISED)) for power in whole]
+        return [(value, general(10.0**value, 2)) for value in (low, high)]
+    return [(float(power), "10" + raised(power)) for power in whole]

@@ -69,6 +69,7 @@ class VelocityLesson(Lesson):
 
     key = "velocity"
     title = "Velocity"
+    computes = False
     about = "The velocities and forces of the tool: Jacobian, ellipsoids, singularities."
     outline = staticmethod(outline)
 

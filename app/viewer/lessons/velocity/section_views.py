@@ -12,7 +12,7 @@ from app.viewer.panel.joints import label
 from app.viewer.views.templates import render
 from kin import Robot, Task
 from kin.transforms import Array
-from kin.units import Units, fixed
+from kin.units import Units, fixed, power
 
 FORCE = (230, 159, 0)  # as the ellipsoid of forces
 FREE = 1e-6  # m; a direction whose force needs less torque per newton needs none
@@ -60,7 +60,7 @@ def null_html(robot: Robot, task: Task, space: NullSpace, speeds: tuple[Array, A
         rank=space.rank,
         dimension=dimension,
         rows=rows,
-        residual=power(moved),
+        residual=power(moved, 1),
         w=fixed(w, 4),
     )
 
@@ -89,14 +89,6 @@ def line_html(robot: Robot, found: Along, units: Units) -> str:
     words += f"κ there {found.kappa[at]:.3g}. {found.end}"
     axis = unit.name if by_length else "%"
     return render("velocity/line", chart=chart(rows, (curve,), "along the line", axis), words=words)
-
-
-def power(value: float) -> str:
-    """A small number as a power of ten."""
-    if value < 1e-99:
-        return "0"
-    mantissa, exponent = f"{value:.0e}".split("e")
-    return f"{mantissa}·10" + str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def note_html(text: str) -> str:

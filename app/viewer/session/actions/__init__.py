@@ -17,53 +17,19 @@ from app.viewer.panel.status import Notice
 from app.viewer.scene.gizmo import Pull
 from app.viewer.session.actions.arm import ArmControls
 from app.viewer.session.actions.looks import LookControls
-from app.viewer.session.actions.page import ActionsPage
 from app.viewer.session.actions.typed import TypedInput
-from app.viewer.session.history import GRADUAL, History, Step, belongs_before, pause_within, same, without_results
+from app.viewer.session.events import MESSAGES, RULES, belongs_before, pause_within
+from app.viewer.session.history import History, Step, same, without_results
+from app.viewer.session.parts import Page
 from app.viewer.session.persistence import link_notice
 from app.viewer.session.state import PageState, decode
 from kin.units import Units
-
-# Events that change nothing that undo restores.
-NO_STEP = frozenset(
-    {
-        *("camera", "fit-arm", "look-from", "looked", "resized", "system-dark", "grab", "copy-as"),
-        *("undo", "redo", "travel", "released", "snap", "text-size", "body", "shown", "news"),
-    }
-)
-MESSAGES = (
-    "undo", "redo", "travel", "released", "snap", "nudge", "axes", "field", "target", "fit-arm", "look-from",
-    "lesson", "feature", "text-size", "frame",
-)  # fmt: skip
-ANSWERED = frozenset({"field", "target"})  # messages whose handlers reply
-LABELS = {
-    "gizmo": "Drag of the target",
-    "redundancy": "Redundancy",
-    "lock": "Lock",
-    "branch": "Posture",
-    "lesson": "Lesson",
-    "robot": "Robot",
-    "task": "Target must match",
-    "radians": "Unit of angles",
-    "lengths": "Unit of lengths",
-    "home": "Home",
-    "random": "Random",
-    "recall": "Move target to tool",
-    "view": "View",
-    "look": "Show arm as",
-    "colours": "Page colours",
-    "axes": "Arrows along",
-    "nudge": "Target moved by keys",
-    "frame": "Frame of the read-out",
-    "field": "Typed value",
-    "target": "Typed target",
-}
 
 
 class Actions:
     """Handles the events of one page, and keeps its `history`."""
 
-    def __init__(self, page: ActionsPage) -> None:
+    def __init__(self, page: Page) -> None:
         self._page = page
         self.history = History()
         self._gesture: tuple[object, ...] | None = None  # the control of the last step, while it may go on
@@ -77,7 +43,7 @@ class Actions:
             "grab": self._on_grab,
             "feature": self._on_feature,
             "news": self._on_feature,
-            "lesson": lambda title: page.lessons.choose(title) if page.lessons is not None else None,
+            "lesson": lambda title: page.lessons.choose(title),
             "axes": typed.use_axes,
             # Messages of the page's own script
             "undo": self._undo,
@@ -101,7 +67,7 @@ class Actions:
             name, number = arguments
             if name not in MESSAGES:
                 raise kin.InputError("message", name, "one of " + ", ".join(MESSAGES))
-            arguments = [number] if name in ANSWERED else []
+            arguments = [number] if RULES[name].answered else []
             if name == "feature":
                 try:
                     *arguments, value = message_of(self._page.features, value)
@@ -113,7 +79,7 @@ class Actions:
 
     def _act(self, name: str, arguments: list[Any], value: object) -> None:
         action = self._handlers[name]
-        if name in NO_STEP:
+        if not RULES[name].step:
             action(*arguments, value)
             return
         shown = self._page.status.count
@@ -135,12 +101,11 @@ class Actions:
 
     def _continues(self, gesture: tuple[object, ...], value: object, now: float) -> bool:
         """Whether an event belongs to the same step as the one before."""
-        name = str(gesture[0])
-        if name == "feature" and belongs_before(gesture[2]):
+        if belongs_before(gesture):
             self.history.proceed()
             return True
-        longest = pause_within(gesture[2], value) if name == "feature" else GRADUAL.get(name, 0.0)
-        if name == "feature" and gesture[2] == "grab":
+        longest = pause_within(gesture, value)
+        if gesture[0] == "feature" and gesture[2] == "grab":
             self._gesture = None
         if gesture != self._gesture or longest == 0.0 or now - self._changed_at > longest:
             return False
@@ -194,7 +159,7 @@ class Actions:
         if state.view != page.view:
             page.looks.use_view(replace(state.view))
         self.adopt(state)
-        if page.lessons is not None and state.lesson != page.lessons.key:
+        if state.lesson != page.activity.lesson:
             page.lessons.open(state.lesson)
         for feature in page.features:
             wanted = without_results(state.features.get(feature.key, {}))
@@ -228,4 +193,4 @@ def _label(gesture: tuple[object, ...], features: Sequence[Feature]) -> str:
             return f"Joint {index + 1}"
         case ("feature", name, key, *_):
             return next((feature.step_name(key) for feature in features if feature.key == name), "Lesson")
-    return LABELS[str(gesture[0])]
+    return RULES[str(gesture[0])].label

@@ -9,8 +9,8 @@ from typing import Any
 import kin
 from app.viewer.panel.status import introduction
 from app.viewer.panel.target import DEFAULT_TASK, TASKS
-from app.viewer.session.actions.page import ActionsPage
 from app.viewer.session.actions.typed import BY_HAND, TypedInput
+from app.viewer.session.parts import Page
 from app.viewer.session.robots import robot_of
 from app.viewer.session.state import PageState
 from kin import Task
@@ -24,7 +24,7 @@ class ArmControls:
         handlers: by the first part of an event's key; each takes the other parts, and the value.
     """
 
-    def __init__(self, page: ActionsPage, typed: TypedInput) -> None:
+    def __init__(self, page: Page, typed: TypedInput) -> None:
         self._page = page
         self._typed = typed
         self._left: dict[str, PageState] = {}  # the state in which each robot was left

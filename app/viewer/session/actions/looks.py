@@ -9,7 +9,7 @@ from typing import Any
 import kin
 from app.viewer.labels import size_labels, text_factor
 from app.viewer.panel.view import SIDES
-from app.viewer.session.actions.page import ActionsPage
+from app.viewer.session.parts import Page
 from kin.transforms import Array
 
 
@@ -20,7 +20,7 @@ class LookControls:
         handlers: by the first part of an event's key; each takes the other parts, and the value.
     """
 
-    def __init__(self, page: ActionsPage) -> None:
+    def __init__(self, page: Page) -> None:
         self._page = page
         arm, looks = page.arm, page.looks
         self.handlers: dict[str, Callable[..., Any]] = {

@@ -3,37 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 import kin
 from app.exercises.typed import EntryError
 from app.viewer.panel.entry import PoseKind, read_pose
-from app.viewer.panel.joints import JointSliders
-from app.viewer.panel.layout import Panel
 from app.viewer.panel.script import Reply
-from app.viewer.panel.status import Notice, StatusLine
+from app.viewer.panel.status import Notice
 from app.viewer.panel.view import AXES
 from app.viewer.scene.gizmo import FINE_STEP, FINE_TURN, STEP, TURN
-from app.viewer.session.persistence import SavedPage
-from app.viewer.session.posture import PosturePanel
+from app.viewer.session.parts import Page
 from kin.axes import inverse
 
 BY_HAND = Notice("hand", "Joints moved by hand", "The target follows the tool.")
 
 
-class TypedPage(SavedPage, Protocol):
-    """What typed input may use of a page, in addition to what is saved of it."""
+LONGEST_LABEL = 40  # characters
 
-    panel: Panel
-    sliders: JointSliders
-    posture: PosturePanel
-    status: StatusLine
+
+def _label(reading: str) -> str:
+    """What a button says that takes a reading. A long one is a matrix, and its last word the unit."""
+    return reading if len(reading) <= LONGEST_LABEL else f"Lengths in {reading.split()[-1]}"
 
 
 class TypedInput:
     """Handles what was typed. Invalid text changes nothing; the status line and the page name it."""
 
-    def __init__(self, page: TypedPage) -> None:
+    def __init__(self, page: Page) -> None:
         self._page = page
 
     def set_field(self, number: int, value: object) -> None:
@@ -85,7 +80,8 @@ class TypedInput:
             action()
         except EntryError as error:
             self._page.status.show(Notice("error", error.title, error.detail))
-            self._page.panel.script.reply(Reply(number, f"{error.title}. {error.detail}"))
+            readings = tuple((_label(text), text) for text in error.readings)
+            self._page.panel.script.reply(Reply(number, f"{error.title}. {error.detail}", readings))
         else:
             self._page.panel.script.reply(Reply(number, ""))
 

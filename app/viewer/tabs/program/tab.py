@@ -49,6 +49,7 @@ class ProgramTab(Feature):
 
     key = "program"
     title = "Program"
+    shared = True
     kernels = (MOTIONS,)
 
     def __init__(self, stage: Stage) -> None:

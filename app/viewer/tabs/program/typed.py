@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -19,9 +18,11 @@ from kin import InputError, Robot, Task
 from kin.axes import inverse
 from kin.motion.program import LONGEST_DWELL
 from kin.transforms import Array
-from kin.units import Units
+from kin.typed import ReadError, cut, read
+from kin.units import Unit, Units, general
 
 FARTHEST, FASTEST = 1000.0, 1000.0  # m; m/s or rad/s
+SECONDS, PERCENT = Unit("s", 1.0, 3), Unit("%", 1.0, 0)
 EXACT = 12  # digits of a typed joint value
 
 
@@ -60,7 +61,7 @@ class Fields:
 
     def size(self, value: float | None, is_angle: bool = False) -> str:
         """A zone or a limit of the tool; empty if there is none."""
-        return "" if not value else f"{value * self.units.of(is_angle).scale:.6g}"
+        return "" if not value else general(value * self.units.of(is_angle).scale)
 
     def read(self, field: str, text: object, item: Item) -> Mapping[str, Any]:
         """The values of an item that a typed text changes.
@@ -75,9 +76,9 @@ class Fields:
             case "name":
                 return {"name": clean(text, NAME)}
             case "speed" | "acceleration":
-                return {field: _number(text.replace("%", ""), 1.0, 100.0, "percent") / 100.0}
+                return {field: _number(text, PERCENT, 1.0, 100.0) / 100.0}
             case "seconds":
-                return {"seconds": _number(text.removesuffix("s"), 0.0, LONGEST_DWELL, "seconds")}
+                return {"seconds": _number(text, SECONDS, 0.0, LONGEST_DWELL)}
             case "blend":
                 return {"blend": self._size(text, "Zone", False, FARTHEST) or 0.0}
             case "tool_speed" | "tool_turn":
@@ -90,7 +91,7 @@ class Fields:
         """A typed size; None for an empty text and for 0."""
         unit = self.units.of(is_angle)
         cleaned = text.replace("/s", "").strip()
-        return read_value(cleaned, name, unit, is_angle, (0.0, most)) or None if cleaned else None
+        return read_value(cleaned, name, unit, (0.0, most)) or None if cleaned else None
 
     def _pose(self, field: str, text: str, item: Item) -> Mapping[str, Any]:
         robot, kind = self.robot, field.rstrip("0123456789")
@@ -98,7 +99,7 @@ class Fields:
             joint = int(field[1:])
             turning = bool(robot.revolute[joint])
             limits = float(robot.lower[joint]), float(robot.upper[joint])
-            value = read_value(text, f"Joint {joint + 1}", self.units.of(turning), turning, limits)
+            value = read_value(text, f"Joint {joint + 1}", self.units.of(turning), limits)
             return {"q": (*item.q[:joint], round(value, EXACT), *item.q[joint + 1 :])}
         present = inverse(self.frame) @ kin.fk(robot, np.array(item.q))
         if field == "via":
@@ -119,12 +120,13 @@ class Fields:
         return configuration(found.solutions[0].q, EXACT)
 
 
-def _number(text: str, low: float, high: float, unit: str) -> float:
+def _number(text: str, unit: Unit, low: float, high: float) -> float:
+    title = "The field stays as it was"
+    valid = f"Valid: {low:g} to {high:g} {unit.name}."
     try:
-        value = float(text.strip().replace(",", "."))
-    except ValueError:
-        value = math.nan
+        value = read(text, unit, (low, high))
+    except ReadError as error:
+        raise EntryError(title, f"{error.sentence} {valid}", error.readings) from None
     if not low <= value <= high:
-        title = "The field stays as it was"
-        raise EntryError(title, f"“{text.strip()[:24]}” is not valid: {low:g} to {high:g} {unit}.")
+        raise EntryError(title, f"“{cut(text)}” is not valid. {valid}")
     return round(value, 3)

@@ -13,10 +13,11 @@ from typing import Any
 import kin
 from app.viewer.meshes.links import capsules_for
 from app.viewer.own_arm import NAME, OwnArm, own_arm
+from app.viewer.panel.entry import read_cell
 from app.viewer.panel.readout import roll_pitch_yaw
-from app.viewer.tabs.robot.expression import ExpressionError, cut, read
 from kin import InputError, KinematicsError, Robot, RobotFileError
 from kin.robot import PEAK_FIELDS
+from kin.typed import ReadError, cut
 from kin.units import Units
 
 # A cell: of a row, ``(index, column)``; of a frame, ``("tool", "x")``; ``("arm", "name")``.
@@ -78,7 +79,7 @@ def typed(robot: Robot, own: OwnArm | None, texts: Mapping[Cell, str], units: Un
                 data["name"] = text
             else:
                 _type_frame(data, robot, where, column, text, units)
-        except ExpressionError as error:
+        except ReadError as error:
             raise EditError(cell, str(error)) from None
     limits = [(i, column) for i, column in texts if isinstance(i, int) and column in ("low", "high")]
     for i in {i for i, _ in limits}:
@@ -175,7 +176,7 @@ def _type_row(data: Fields, robot: Robot, index: int, column: str, text: str, un
         data.pop("home", None)
     elif column in ("low", "high"):
         if joint.kind == "fixed":
-            raise ExpressionError("a fixed row has no limits")
+            raise ReadError("a fixed row has no limits")
         is_angle = joint.kind == "revolute"
         if not isinstance(row.get("limits"), list):
             row["limits"] = [None, None]
@@ -195,7 +196,7 @@ def _type_frame(data: Fields, robot: Robot, frame: str, axis: str, text: str, un
 
 def quantity(text: str, units: Units, is_angle: bool) -> str:
     """A typed number with its unit, as robot files take it."""
-    return f"{read(text, units.of(is_angle), is_angle)!r} {'rad' if is_angle else 'm'}"
+    return f"{read_cell(text, units.of(is_angle))!r} {'rad' if is_angle else 'm'}"
 
 
 def _cell_of(field: str, texts: Mapping[Cell, str]) -> Cell | None:

@@ -14,10 +14,11 @@ from app.shared.memory.answers import AnswerMemory, MemoryFullError, Reservation
 from app.viewer.meshes.archive import MB, MOST_BYTES, MOST_OF_URDF, Archive, MeshError
 from app.viewer.meshes.reader import full
 from app.viewer.own_arm import OwnArm, own_arm
-from app.viewer.tabs.robot.expression import cut
 from kin import InputError, Robot, RobotFileError
 from kin.files.urdf.collisions import Fitted, LinkPieces, collisions_of, said, with_bodies
 from kin.files.urdf.tree import Tip, read_tree
+from kin.typed import cut
+from kin.units import general
 
 MOST = 300_000  # characters of a file that is text
 
@@ -191,7 +192,9 @@ def arm_of(name: str, text: str, tip: str | None = None, reading: bool = False) 
     words = [f"From link {report.base} to {report.tip}.", *report.notes]
     if report.tilts:
         words.append(f"Almost parallel axes are kept exactly by fixed rows: {', '.join(report.tilts)}.")
-    words.append(f"The table and the URDF differ by at most {report.difference:.1g} m in {report.samples} poses.")
+    words.append(
+        f"The table and the URDF differ by at most {general(report.difference, 1)} m in {report.samples} poses."
+    )
     if not reading:
         words.append(f"Collisions: {report.about_bodies}")
     return own_arm(kin.robot_to_dict(robot, length="mm")), " ".join(words)

@@ -20,13 +20,13 @@ from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits, views, workpieces
 from app.viewer.tabs.robot.beginnings import Beginnings
 from app.viewer.tabs.robot.edits import Cell, EditError
-from app.viewer.tabs.robot.expression import LONGEST, cut
 from app.viewer.tabs.robot.files import text_of
 from app.viewer.tabs.robot.texts import Texts
 from app.viewer.tabs.robot.uploads import Uploads
 from kin import InputError, RobotFileError
 from kin.files.read import MAX_ROWS
 from kin.robot import Convention
+from kin.typed import LONGEST, cut
 
 PARTS = ("start", "table", "wrong", "about", "frames", "wrong-frames", "convert", "files")
 OTHER: dict[Convention, Convention] = {"standard": "modified", "modified": "standard"}
@@ -132,11 +132,16 @@ class RobotTab(Feature):
     def on_style(self) -> None:
         self._refresh()
 
+    def on_activity(self) -> None:
+        if self.stage.activity.withheld != self._withheld:
+            self._refresh()
+
     # Drawing
 
     def _refresh(self) -> None:
         """Show the arm as it is, but not in the part in which the visitor types."""
         robot, units = self.stage.robot, self.stage.units
+        self._withheld = self.stage.activity.withheld
         self._wrong = {cell: why for cell, why in self._wrong.items() if edits.part_of(cell) == self._editing}
         if self._editing != "table":
             self._revision += 1
@@ -154,7 +159,7 @@ class RobotTab(Feature):
         self._show_wrong()
 
     def _table(self) -> str:
-        if self.stage.withheld == "table":
+        if self.stage.activity.withheld == "table":
             return views.withheld()
         return views.table(self.stage.robot, self.stage.units, self._revision, self._texts)
 
@@ -168,7 +173,7 @@ class RobotTab(Feature):
 
     def _show_conversion(self) -> None:
         robot = self.stage.robot
-        if self.stage.withheld == "table":
+        if self.stage.activity.withheld == "table":
             self._show("convert", "")
             return
         other = kin.convert(robot, OTHER[robot.convention]) if self._converting else None
@@ -329,7 +334,7 @@ class RobotTab(Feature):
     # Files
 
     def _download(self, kind: object) -> None:
-        if self.stage.withheld == "table":
+        if self.stage.activity.withheld == "table":
             words = "The file would contain the table that the open exercise asks for."
             self.stage.notify(Notice("advice", "Not now", words))
             return

@@ -6,7 +6,7 @@ import math
 import re
 
 from app.viewer.tabs.robot.edits import Cell
-from app.viewer.tabs.robot.expression import LONGEST, ExpressionError, read
+from kin.typed import LONGEST, ReadError, read
 from kin.units import Unit
 
 MOST = 64  # texts that are kept
@@ -29,14 +29,14 @@ class Texts:
         while len(self._texts) > MOST:
             del self._texts[next(iter(self._texts))]
 
-    def shown(self, cell: Cell, value: float, unit: Unit, is_angle: bool) -> str | None:
+    def shown(self, cell: Cell, value: float, unit: Unit) -> str | None:
         """What was typed, if that is the value (rad or m) of the cell; None: it is not, or nothing was typed."""
         text = self._texts.get(cell)
         if text is None:
             return None
         try:
-            same = math.isclose(read(text, unit, is_angle), value, rel_tol=1e-12, abs_tol=1e-12)
-        except ExpressionError:
+            same = math.isclose(read(text, unit), value, rel_tol=1e-12, abs_tol=1e-12)
+        except ReadError:
             return None
         return text if same else None
 

@@ -17,7 +17,7 @@ from app.viewer.tabs.robot.texts import Texts
 from app.viewer.views.templates import render
 from kin import Joint, Robot
 from kin.dh import SAMPLES, largest_difference
-from kin.units import Unit, Units
+from kin.units import Unit, Units, power
 
 FILE, LINK = "your own file", "a link"  # what an arm was made from, besides examples and robots
 MOST_TIPS = 50  # links of a URDF to choose from
@@ -43,8 +43,7 @@ _MOTIONS = {
 
 def text_of(value: float, unit: Unit) -> str:
     """A value (rad or m) as short as possible."""
-    shown = f"{value * unit.scale:.{unit.decimals(DECIMALS)}f}".rstrip("0").rstrip(".")
-    return "0" if shown in ("-0", "") else shown.replace("-", "−")
+    return unit.short(value, DECIMALS)
 
 
 def start(robot: Robot, chosen: str, mine: bool, robots: Sequence[Robot]) -> str:
@@ -96,7 +95,7 @@ def _cell(index: int, row: Joint, column: str, units: Units, texts: Texts) -> di
 def _text(cell: Cell, value: float, units: Units, is_angle: bool, texts: Texts) -> str:
     """What was typed into a cell, or its value (rad or m) as a number."""
     unit = units.of(is_angle)
-    typed = texts.shown(cell, value, unit, is_angle)
+    typed = texts.shown(cell, value, unit)
     return text_of(value, unit) if typed is None else typed
 
 
@@ -284,7 +283,7 @@ def conversion(robot: Robot, other: Robot | None, units: Units) -> str:
         rows.append([{"value": new, "before": old, "changed": new != old} for new, old in pairs])
     frames = [(frame.capitalize(), _frame_words(other, robot, frame, units)) for frame in FRAMES]
     difference, samples = largest_difference(robot, other), SAMPLES
-    differ = f"differ by at most {difference:.0e} m" if difference else "are equal, digit by digit,"
+    differ = f"differ by at most {power(difference, 1)} m" if difference else "are equal, digit by digit,"
     proof = f"the tool poses of both tables {differ} in {samples} random configurations."
     return render("robot/convert", convention=convention, heads=heads, rows=rows, frames=frames, proof=proof)
 

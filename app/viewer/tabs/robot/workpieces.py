@@ -10,9 +10,10 @@ import re
 import kin
 from app.viewer.feature import Stage
 from app.viewer.frames import MOST, Frames
+from app.viewer.panel.entry import read_cell
 from app.viewer.tabs.robot.edits import AXES, Cell, EditError
-from app.viewer.tabs.robot.expression import ExpressionError, cut, read
 from kin import InputError
+from kin.typed import ReadError, cut
 from kin.units import Units
 
 COLUMNS = (*AXES, "name")
@@ -34,8 +35,8 @@ def typed(frames: Frames, cell: Cell, text: str, units: Units) -> Frames:
         if column == "name":
             return frames.rename(index, text)
         axis = AXES.index(column)
-        return frames.move(index, axis, read(text, units.of(axis >= 3), axis >= 3))
-    except ExpressionError as error:
+        return frames.move(index, axis, read_cell(text, units.of(axis >= 3)))
+    except ReadError as error:
         raise EditError(cell, str(error)) from None
     except InputError as error:
         raise EditError(cell, f"“{cut(text)}” is not valid: expected {error.expected}") from None

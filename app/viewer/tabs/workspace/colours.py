@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from app.viewer.views.templates import render
 from kin import Robot, WorkspaceChunk, workspace_slice
 from kin.transforms import Array
-from kin.units import Units
+from kin.units import Units, general
 from kin.workspace import Measure
 from kin.workspace.region import Region
 from kin.workspace.search.extremes import base_axis
@@ -146,4 +146,4 @@ def value_text(by: By, value: float, units: Units) -> str:
     """A quantity as text, with its unit."""
     if by in ("radius", "height"):
         return units.lengths.text(value, 0)
-    return f"{100.0 * value:.0f} %" if by == "limit_margin" else f"{value:.3g}"
+    return f"{100.0 * value:.0f} %" if by == "limit_margin" else general(value, 3)

@@ -11,10 +11,9 @@ from app.viewer.panel import Post, assign, listen, listen_click, update_html
 from app.viewer.tabs.workspace.colours import BY, MAPS
 from app.viewer.tabs.workspace.cut import AXES, KEEP, Cut
 from app.viewer.tabs.workspace.settings import MAX_POINTS, MAX_SIZE, MIN_SIZE, WorkspaceSettings
-from app.viewer.tabs.workspace.views import grouped
 from app.viewer.views.templates import render
 from kin import InputError, Robot
-from kin.units import Units
+from kin.units import Units, grouped
 from kin.workspace import Strategy
 
 STRATEGIES: dict[str, Strategy] = {
@@ -161,7 +160,7 @@ class Controls:
 
     def _build_cloud(self, settings: WorkspaceSettings) -> None:
         gui = self._gui
-        hint = f"1 to {MAX_POINTS:,} points"
+        hint = f"1 to {grouped(MAX_POINTS)} points"
         self._add("n", gui.add_number("Points", settings.n, min=1, max=MAX_POINTS, step=1, hint=hint))
         presets = gui.add_button_group(" ", tuple(PRESETS), hint="Common numbers of points")
         for label, number in PRESETS.items():

@@ -27,6 +27,7 @@ from app.viewer.tabs.workspace.cloud_nodes import CloudNodes
 from app.viewer.tabs.workspace.controls import Controls
 from kin import InputError
 from kin.transforms import Array, finite_array
+from kin.units import grouped
 
 MARK_COLOUR = (213, 94, 0)
 PIXEL = math.radians(0.06)  # with a field of view of 38°
@@ -137,7 +138,7 @@ class PointPicker:
         )
         self._picked = (cloud, found.index, q, point)
         self.refresh()
-        title = f"Moved to point {views.grouped(found.index)}"
+        title = f"Moved to point {grouped(found.index)}"
         self._stage.move_to(q, Notice("hand", title, "The configuration that produced this point."))
 
     def refresh(self) -> None:

@@ -38,6 +38,7 @@ class Workspace(Feature):
 
     key: ClassVar[str] = "workspace"
     title: ClassVar[str] = "Workspace"
+    shared: ClassVar[bool] = True
     kernels = (CLOUDS,)
 
     def __init__(self, stage: Stage) -> None:

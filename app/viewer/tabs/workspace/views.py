@@ -12,7 +12,7 @@ from app.viewer.views.templates import render
 from kin import JointConstraints, Robot
 from kin.ik.options import Locks
 from kin.transforms import Array
-from kin.units import Units
+from kin.units import Units, grouped
 from kin.workspace.clouds.measures import measured
 from kin.workspace.region import Region
 
@@ -30,11 +30,6 @@ SYMBOLS: dict[State, str] = {
 
 
 GAP = Markup(" &nbsp; ")  # between coordinates
-
-
-def grouped(number: int) -> str:
-    """A whole number in groups of three digits."""
-    return f"{number:,}".replace(",", "\u202f")
 
 
 def rate(points_per_second: float) -> str:

@@ -20,8 +20,8 @@ from app.exercises import Exercises, Verdict
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.exercises.places import Place
-from app.viewer.exercises.practice import Practice
+from app.viewer.activity.places import Place
+from app.viewer.activity.practice import Practice
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
 from kin import builtin_robots, get_robot

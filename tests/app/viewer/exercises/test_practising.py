@@ -15,13 +15,11 @@ from live_server import serve_viewer
 
 import kin
 from app.exercises import Exercise, Exercises, Variant, Verdict
-from app.exercises.files import LESSONS as KEYS
 from app.exports.snippets import SNIPPETS
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.exercises.practice import Practice, Record
-from app.viewer.lessons import LESSONS
+from app.viewer.activity.practice import Practice, Record
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
 from app.viewer.worksheet import FILES
@@ -43,10 +41,6 @@ def exercise(exercise_id: str) -> Exercise:
 
 
 # Without a page
-
-
-def test_exercises_name_lessons_that_exist() -> None:
-    assert set(KEYS) <= {lesson.key for lesson in LESSONS}
 
 
 def test_marks_attempts_and_time_are_kept() -> None:

@@ -108,7 +108,7 @@ def test_a_wrong_screw_shows_in_the_product() -> None:
     wrong = zero._replace(S=np.where(np.arange(6)[:, None] == 3, zero.S + 1e-4, zero.S))
     html = views.product_html(robot, wrong, robot.q_home, robot.n, "space")
     assert matrix(html, "screws") != matrix(html, "table")
-    assert "10<sup>−4</sup>" in html or "10<sup>−5</sup>" in html
+    assert "10⁻⁴" in html or "10⁻⁵" in html
 
 
 def test_one_screw_in_numbers() -> None:

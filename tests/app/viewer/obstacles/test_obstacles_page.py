@@ -17,7 +17,7 @@ from app.viewer.panel.joints import label
 from app.viewer.panel.view import ViewState
 from app.viewer.scene.bodies.nodes import TOUCHING
 from app.viewer.scene.meshes import body
-from app.viewer.session import history
+from app.viewer.session import events
 from app.viewer.session.state import PageState, decode, encode
 from kin.units import DEFAULT_UNITS
 
@@ -158,7 +158,7 @@ def test_a_drag_of_an_obstacle_is_one_step_however_long_it_rests(
     port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A pause of the usual length has passed as soon as the next event comes."""
-    monkeypatch.setattr(history, "SHORT_PAUSE", 1e-6)
+    monkeypatch.setattr(events, "SHORT_PAUSE", 1e-6)
     places = [(0.1, 0.9, 0.5), (0.2, 0.9, 0.5), (0.3, 0.9, 0.5), (0.4, 0.9, 0.5)]
     with FakeBrowser(port, memory=opened(PageState("ur5", obstacles=(WALL,)))) as tab:
         gizmo, owner = gizmo_of_the_obstacle(tab)

@@ -25,7 +25,7 @@ START = kin.fk(UR5, UR5.q_home)
 
 
 def angle(text: str, units: Units = DEGREES) -> float:
-    return read_value(text, "Joint 2", units.angles, True, LIMITS)
+    return read_value(text, "Joint 2", units.angles, LIMITS)
 
 
 @pytest.mark.parametrize(
@@ -42,9 +42,9 @@ def test_a_number_is_read_with_its_own_precision_and_unit(text: str, degrees: fl
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        *(("abc", "“abc” is not a number"), ("NaN", "“NaN” is not a number"), ("   ", "was empty")),
-        *(("200", "outside the limits"), ("-5.1", "outside the limits"), ("1e999", "outside the limits")),
-        *(("inf", "is not a number"), ("1.2.3", "is not a"), ("5 mm", "not a unit of this joint")),
+        *(("abc", "“abc” is not a number"), ("NaN", "“NaN” is not a number"), ("   ", "field is empty")),
+        *(("200", "outside the limits"), ("-5.1", "outside the limits"), ("1e999", "too large")),
+        *(("inf", "is not a number"), ("1.2.3", "is not a"), ("5 mm", "not a unit of an angle")),
         ("9" * 3000, "too long"),
     ],
 )
@@ -57,7 +57,7 @@ def test_an_invalid_value_is_named_with_the_range(text: str, reason: str) -> Non
 
 def test_a_length_is_read_in_its_unit() -> None:
     for text, units in (("100", DEGREES), ("0.1", RADIANS), ("10 cm", DEGREES), ("100 mm", RADIANS)):
-        assert read_value(text, "Joint 3", units.lengths, False, (0.0, 0.3)) == pytest.approx(0.1)
+        assert read_value(text, "Joint 3", units.lengths, (0.0, 0.3)) == pytest.approx(0.1)
 
 
 @given(st.integers(-15_000_000, 15_000_000), st.integers(0, 6))
@@ -86,17 +86,19 @@ def test_every_way_to_type_a_pose_gives_that_pose(seed: int) -> None:
     T = kin.fk(UR5, UR5.random_q(np.random.default_rng(seed)))
     xyz, R = 1000 * T[:3, 3], T[:3, :3]
     turned = np.degrees(roll_pitch_yaw(R))
+    on_screen = T.copy()
+    on_screen[:3, 3] = xyz
     for kind, numbers in (
         ("pose", [*xyz, *turned]),
         ("pose", [*xyz, *wxyz_from_rotation(R)]),
-        ("pose", T.ravel()),
-        ("pose", T[:3].ravel()),
+        ("pose", on_screen.ravel()),
+        ("pose", on_screen[:3].ravel()),
     ):
         text = ", ".join(f"{v:.12f}" for v in numbers)
         read, given = read_pose(kind, text, DEGREES, START)  # type: ignore[arg-type]
         assert given == "pose"
         assert np.abs(read - T).max() < 1e-9
-    read, given = read_pose("pose", np.array2string(T, precision=10), DEGREES, START)
+    read, given = read_pose("pose", np.array2string(T, precision=10) + " m", DEGREES, START)
     assert given == "pose"
     assert np.abs(read - T).max() < 1e-9
 
@@ -127,7 +129,7 @@ def test_a_point_and_a_direction_turn_the_tool_by_no_more_than_it_takes(seed: in
     assert given == "approach"
     assert read[:3, 3].tolist() == [0.1, 0.2, 0.3]
     assert np.abs(read[:3, 2] - z).max() < 1e-12
-    assert np.abs(read[:3, :3].T @ read[:3, :3] - np.eye(3)).max() < 1e-12
+    assert np.abs(read[:3, :3].T @ read[:3, :3] - np.eye(3)).max() < 1e-11  # near a half turn 1 + cos is 1e-3
     turn = np.arccos(np.clip((np.trace(read[:3, :3] @ T[:3, :3].T) - 1.0) / 2.0, -1.0, 1.0))
     least = np.arctan2(np.linalg.norm(np.cross(T[:3, 2], z)), T[:3, 2] @ z)
     assert turn == pytest.approx(least, abs=1e-6) or least > np.radians(177.0)

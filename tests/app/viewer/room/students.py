@@ -9,7 +9,7 @@ from fake_browser import FakeBrowser
 from app.classroom import COOKIE, Hub, Ticket
 from app.classroom.results.store import attempts_of
 from app.exercises import Exercise, Exercises, Variant
-from app.viewer.exercises.places import Place
+from app.viewer.activity.places import Place
 from app.viewer.session.state import PageState, encode
 from kin.units import Units
 

@@ -207,6 +207,8 @@ def test_who_is_frozen_cannot_move(room: Class) -> None:
     number = student.say("field", ["nothing", "1"])
     student.wait(lambda: student.script["reply"][0] >= number)
     assert "frozen" in student.script["reply"][1]
+    number = student.say("feature", ["sheet", ["page", 1], None])  # printing a worksheet moves nothing
+    student.wait(lambda: student.script["reply"] == [number, "", []])
     press(student, "go")
     press(teacher, "freeze")
     student.wait(lambda: "data-class-frozen" not in student.html)

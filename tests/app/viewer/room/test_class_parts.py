@@ -10,13 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.classroom import ClassroomUnavailable, Confirmed, NewAttempt, RefusedError, RoomView, SeatView, Task
+from app.viewer.exercises.feature import Practising
 from app.viewer.room import submissions, views
 from app.viewer.room.member import act_of
 from app.viewer.room.sharing import REST, Sharing
+from app.viewer.room.student import Student
 from app.viewer.room.submissions import Submissions
 from app.viewer.room.wall import MOST, cells, columns_of
 from app.viewer.scene.camera import DIRECTION
 from app.viewer.session.state import PageState
+from app.viewer.worksheet import Worksheets
 
 ATTEMPT = NewAttempt("swing", 1, [1], "Yes.", 1.0, 0.0)
 
@@ -85,13 +88,16 @@ def test_an_answer_is_stored_or_it_is_said_why_not(
         (("message", "nudge", 7), None, "nudge"),
         (("message", "feature", 7), ["exercises", ["answer", 1], 0], "feature"),
         (("message", "feature", 7), ["class", ["hand", 1], None], ""),
+        (("message", "feature", 7), ["sheet", ["page", 1], None], ""),
+        (("message", "feature", 7), [], ""),
+        (("message", "unknown", 7), None, ""),
         (("feature", "workspace", "chunk"), None, ""),
         (("view", "labels"), True, ""),
         ("looked", None, ""),
     ],
 )
 def test_acts_are_what_a_visitor_does_to_the_arm(key: object, value: object, act: str) -> None:
-    assert act_of(key, value) == act  # type: ignore[arg-type]
+    assert act_of(key, value, (Practising, Student, Worksheets)) == act  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

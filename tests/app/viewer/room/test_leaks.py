@@ -20,8 +20,8 @@ from students import ALL, UNITS, Room, begin, exercise, press, text_of
 
 from app.exercises import Asked, Exercise, Variant
 from app.exercises.kinds.number import NumberKind
+from app.viewer.activity.places import Place
 from app.viewer.exercises import views
-from app.viewer.exercises.places import Place
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 

@@ -3,25 +3,34 @@
 from __future__ import annotations
 
 import base64
+import copy
 import json
 import math
 from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
 from live_server import serve_viewer
 
 import kin
 from app.shared.clouds import Clouds
+from app.shared.security import Rights
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.feature import Feature
+from app.viewer.lessons import LESSONS
+from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import listen
 from app.viewer.panel.joints import UNLOCK_ALL, label, lock_buttons
 from app.viewer.panel.view import ViewState
 from app.viewer.server import ViewerServer
 from app.viewer.session import page
+from app.viewer.session.persistence import Persistence
 from app.viewer.session.state import MAX_TEXT, PageState, decode, encode, read_stored_page
 from kin.units import DEFAULT_UNITS, Units
 
@@ -224,6 +233,58 @@ def test_an_invalid_message_of_the_page_restores_nothing(text):
     assert read_stored_page(text).state == ""
 
 
+TEXTS = st.text(st.characters(codec=None), max_size=20)  # half letters too
+ANYTHING = st.recursive(
+    st.none() | st.booleans() | st.integers(-(10**30), 10**30) | st.floats() | TEXTS,
+    lambda inner: st.lists(inner, max_size=9) | st.dictionaries(TEXTS, inner, max_size=3),
+    max_leaves=12,
+)
+OWN = {"n": "my <b>", "r": [[0, 100, 50, 90, [-90, 90], "", "one"], [0, 0, 80, 0, [-90, 90], "", "two"]]}
+
+
+@st.composite
+def hostile_states(draw: st.DrawFn) -> str:
+    """A link with valid entries, one of which, or a part of one, is replaced by anything."""
+    said: dict[str, Any] = {
+        "v": 1, "robot": draw(st.sampled_from(["own", "puma560", "pioneer5"])), "own": copy.deepcopy(OWN),
+        "q": [0.0, 0.0], "features": {"counter": {"count": 3}}, "lesson": "dh", "task": "pose", "length": "cm",
+        "obstacles": [["b", "crate", 0.3, 0, 0.2, 0, 0, 0, 0.1, 0.1, 0.1]],
+        "frames": ["world", ["w", 0, 0, 0, 0, 0, 0]], "view": {},
+        "camera": [1, 1, 1, 0, 0, 0], "locks": [1],
+    }  # fmt: skip
+    place, key = said, draw(st.sampled_from(sorted(said)))
+    while isinstance(place[key], dict | list) and place[key] and draw(st.booleans()):
+        place = place[key]
+        key = draw(st.sampled_from(sorted(place) if isinstance(place, dict) else range(len(place))))
+    place[key] = draw(ANYTHING)
+    return packed(said)
+
+
+def texts_of(value: object) -> Iterator[str]:
+    match value:
+        case str():
+            yield value
+        case dict():
+            for key, item in value.items():
+                yield from (*texts_of(key), *texts_of(item))
+        case list() | tuple():
+            for item in value:
+                yield from texts_of(item)
+
+
+@given(hostile_states())
+@example(packed({"v": 1, "robot": "\ud800"}))
+@example(packed({"v": 1, "robot": "own", "own": {**OWN, "n": "\ud83d"}}))
+@example(packed({"v": 1, "features": {"\udfff": {"a": 10**400}}}))
+def test_every_text_of_a_state_can_be_sent_to_a_page(text):
+    state = decode(text, ROBOTS)
+    names = [] if state.own is None else [state.own.start, *vars(state.own.robot).values()]
+    shown = [state.robot, state.missing, state.refused, state.ignored, state.features, state.obstacles, names]
+    for said in texts_of(shown):
+        said.encode()
+    encode(state)
+
+
 # In a session
 
 
@@ -259,6 +320,22 @@ def port() -> Iterator[int]:
 
 def remembering(state: str, address: str = "https://arms.example/kin/") -> str:
     return json.dumps({"address": address, "state": state})
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+def test_a_link_opens_for_visitors_who_may_only_look_what_computes_nothing(lesson: type[Lesson]) -> None:
+    text = remembering(encode(PageState("pioneer5", lesson=lesson.key)))
+    client = SimpleNamespace(local_storage=SimpleNamespace(get_item=lambda key, timeout: text))
+    for rights, shown in ((Rights.FULL, True), (Rights.LOOK, not lesson.computes)):
+        page_ = SimpleNamespace(client=client, store=STORE)
+        persistence = Persistence(page_, False, lambda action: action(), rights)  # type: ignore[arg-type]
+        persistence.load()
+        assert persistence.stored.lesson == (lesson.key if shown else None)
+
+
+def test_some_lessons_are_for_visitors_who_may_only_look() -> None:
+    computing = {lesson.key: lesson.computes for lesson in LESSONS}
+    assert (computing["dh"], computing["numeric"]) == (False, True)
 
 
 def kept(tab: FakeBrowser) -> PageState:
@@ -353,6 +430,20 @@ def test_a_hostile_stored_state_gives_a_fresh_page_that_says_so(port, memory, no
         assert tab.value("Robot") == PIONEER.name
         assert np.abs(tab.tool_pose() - kin.fk(PIONEER, PIONEER.q_home)).max() < 1e-9
         assert notice in tab.html
+
+
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
+@given(hostile_states())
+@example(packed({"v": 1, "robot": "\ud800"}))
+@example(packed({"v": 1, "robot": "a\x00\u202e<script>"}))
+@example(packed({"v": 1, "robot": "own", "own": {**OWN, "n": "\ud83d \x00 \u202e </script><svg onload=1>"}}))
+def test_a_hostile_state_reaches_its_page(port, caplog, text):
+    caplog.clear()
+    with FakeBrowser(port, memory=remembering(text)) as tab:
+        tab.settle()
+        assert tab.value("Robot")
+    assert "cannot be sent" not in caplog.text
+    assert "Traceback" not in caplog.text
 
 
 def test_a_feature_that_fails_to_restore_does_not_affect_the_rest(port, caplog):

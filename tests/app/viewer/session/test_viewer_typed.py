@@ -53,7 +53,7 @@ def test_a_typed_joint_value_keeps_its_digits(port: int) -> None:
         tab.set(label(PIONEER, 0), 12)
         tab.settle()
         assert tab.value(elbow) == 45.678, "another joint's motion does not round it"
-        assert tab.script["reply"] == [1, ""]
+        assert tab.script["reply"] == [1, "", []]
 
 
 @pytest.mark.parametrize("text", ["abc", "NaN", "  ", "200", "-5", "1e999"])
@@ -108,7 +108,7 @@ def test_a_typed_target_is_solved_like_a_dragged_one(port: int) -> None:
         arrives(tab, T)
         assert 'data-status="reached"' in tab.html
         T[:3, :3] = rotation_about(np.array([0.0, 0.0, 1.0]), 0.2) @ T[:3, :3]
-        tab.say("target", ["pose", str(np.round(T, 9).tolist())])
+        tab.say("target", ["pose", str(np.round(T, 9).tolist()) + " m"])
         arrives(tab, T)
         number = tab.say("target", ["pose", "1 2 3 4"])
         tab.wait(lambda: tab.script["reply"][0] == number)
@@ -130,7 +130,7 @@ def test_a_point_alone_sets_the_task_and_a_pose_sets_it_back(port: int) -> None:
         tab.wait(lambda: np.allclose(1000 * tab.tool_pose()[:3, 3], (x, y, z + 5), atol=1e-3))
         assert tab.value("Target must match") == "Point only"
         tab.settle()
-        tab.say("target", ["pose", str(HOME.tolist())])
+        tab.say("target", ["pose", str(HOME.tolist()) + " m"])
         arrives(tab, HOME)
         assert tab.value("Target must match") == "Full pose"
 

@@ -32,7 +32,7 @@ from app.viewer.tabs.workspace.section import plot
 from app.viewer.tabs.workspace.section.panel import SectionPanel, subscribe_section
 from app.viewer.tabs.workspace.settings import MAX_POINTS, WorkspaceSettings, default_size
 from kin.robot import Joint
-from kin.units import DEFAULT_UNITS, Units
+from kin.units import DEFAULT_UNITS, Units, grouped
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -582,7 +582,7 @@ def test_a_click_moves_the_arm_to_the_configuration_of_the_point(tab):
     points = whole(PIONEER, N, 17).points
     index = int(np.argmax(points @ np.array([1.0, 1.0, 0.3])))  # on the outside, towards the eye
     tab.send("ScenePointerMessage", **ray_to(points[index].astype(float), np.array([2.0, 2.0, 0.6])))
-    tab.wait(lambda: f"Moved to point {views.grouped(index)}" in tab.html)
+    tab.wait(lambda: f"Moved to point {grouped(index)}" in tab.html)
     q = kin.configuration_at(PIONEER, index, seed=17)
     tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, q), atol=1e-9))
     tab.settle()
@@ -635,7 +635,7 @@ def test_the_cloud_respects_locked_joints(tab):
     assert np.abs(tab.points() - chunk.points).max() < HALF
     index = int(np.argmax(chunk.points @ np.array([1.0, 1.0, 0.3])))
     tab.send("ScenePointerMessage", **ray_to(chunk.points[index].astype(float), np.array([2.0, 2.0, 0.6])))
-    tab.wait(lambda: f"Moved to point {views.grouped(index)}" in tab.html)
+    tab.wait(lambda: f"Moved to point {grouped(index)}" in tab.html)
     q = kin.configuration_at(PIONEER, index, seed=30, locked=locked)
     tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, q), atol=1e-9))
     tab.set("Compare with", PUMA.name)

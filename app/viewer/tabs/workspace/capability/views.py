@@ -11,11 +11,11 @@ from markupsafe import Markup
 from app.viewer.tabs.workspace import colours
 from app.viewer.tabs.workspace.capability.settings import By
 from app.viewer.tabs.workspace.capability.voxels import LEVELS, first_level, largest, levels, values_of
-from app.viewer.tabs.workspace.views import GAP, grouped, locks
+from app.viewer.tabs.workspace.views import GAP, locks
 from app.viewer.views.templates import render
 from kin import CapabilityMap
 from kin.ik.options import Locks
-from kin.units import Units
+from kin.units import Units, general, grouped
 from kin.workspace.capability.evaluation import ROLLS, STARTS, Method
 
 State = Literal["ready", "waiting", "computing", "stopped", "out of time", "done", "failed"]
@@ -64,7 +64,7 @@ def apart(directions: int) -> float:
 
 def value_text(by: By, value: float) -> str:
     """A value as text."""
-    return f"{100.0 * value:.3g} %" if by == "share" else f"{value:.3g}"
+    return f"{100.0 * value:.3g} %" if by == "share" else general(value, 3)
 
 
 def legend(found: CapabilityMap, by: By, name: str, least: float) -> str:
@@ -91,10 +91,10 @@ def facts(found: CapabilityMap, locked: Locks | None, complete: bool, units: Uni
         ("voxel", units.lengths.number(found.grid.voxel), units.lengths.name),
         ("directions", f"{found.grid.count}, about {units.angle(apart(found.grid.count))} apart", ""),
         ("reachable", grouped(count), ""),
-        ("their volume", f"{found.volume:.4g}", "m³"),
+        ("their volume", general(found.volume, 4), "m³"),
         ("mean share", f"{100.0 * mean:.3g}", "%"),
         ("best share", f"{100.0 * float(share.max(initial=0.0)):.3g}", "%"),
-        ("best manipulability (pose)", f"{best:.3g}", ""),
+        ("best manipulability (pose)", general(best, 3), ""),
     )
     note = CERTAINTY[found.grid.method] if complete else "Of the part computed so far."
     if locked is not None:
@@ -110,7 +110,7 @@ def picked(found: CapabilityMap, row: int, units: Units) -> str:
         ("centre x y z", centre, units.lengths.name),
         ("approached from", f"{possible} of {count} directions", ""),
         ("share", f"{100.0 * possible / count:.3g}", "%"),
-        ("best manipulability (pose)", f"{float(found.manipulability[row]):.3g}", ""),
+        ("best manipulability (pose)", general(float(found.manipulability[row]), 3), ""),
     )
     note = "" if possible else "Reachable, but not along any of these directions."
     return render("panel/facts", label="picked voxel", rows=rows, note=note)

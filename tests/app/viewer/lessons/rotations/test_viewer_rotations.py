@@ -303,7 +303,7 @@ def test_a_visitor_turns_a_frame_and_builds_a_chain(server: int) -> None:
         tab.wait(lambda: np.allclose(turned(tab), half, atol=1e-3))
         tab.set("Rotation", "nonsense")
         tab.set("Use", "Set")
-        tab.wait(lambda: "Found 1. Valid: 3 angles" in tab.html)
+        tab.wait(lambda: "“nonsense” is not a number. Valid: 3 angles" in tab.html)
         tab.set("Show", "Chain of frames")
         tab.set("Chain", "Add")
         tab.wait(lambda: "turn by 90.0° about the own z" in tab.html)

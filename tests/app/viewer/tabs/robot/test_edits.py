@@ -75,11 +75,11 @@ def test_another_kind_takes_its_default_limits_and_a_new_home():
     ("cell", "text", "words"),
     [
         ((2, "alpha"), "9o", "“9o” is not a number"),
-        ((2, "a"), "", "the cell is empty"),
+        ((2, "a"), "", "the field is empty"),
         ((2, "a"), "99999999999", "too large"),
         ((2, "a"), "999 m + 9*1e5", "expected lengths"),
         ((1, "name"), "joint 1", "a different name"),
-        (("tool", "x"), "1 rad", "is not a number"),
+        (("tool", "x"), "1 rad", "is not a unit of a length"),
         (("base", "z"), "1001 m", "at most 1000 m"),
     ],
 )

@@ -17,7 +17,7 @@ import kin
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
 from app.viewer.own_arm import own_arm, pack
-from app.viewer.session.history import SHORT_PAUSE
+from app.viewer.session.events import SHORT_PAUSE
 from app.viewer.session.state import PageState, decode, encode
 from app.viewer.tabs.robot import files
 from app.viewer.tabs.robot.files import MOST
@@ -560,11 +560,11 @@ def test_expressions_stay_in_their_cells_and_in_the_link(port: int) -> None:
 def test_texts_of_a_link_are_checked() -> None:
     texts = Texts()
     texts.restore(
-        {"0 a": "2*175", "0 name": "x*y", "99 b1": "1+1", "1 a": "9" * 99, "tool x": 5, "arm name": "pi"}
+        {"0 a": "2*175", "0 name": "x*y", "99 b1": "1+1", "1 a": "9" * 101, "tool x": 5, "arm name": "pi"}
     )
     assert texts.state() == {"0 a": "2*175"}
-    assert texts.shown((0, "a"), 0.35, DEFAULT_UNITS.lengths, False) == "2*175"
-    assert texts.shown((0, "a"), 0.36, DEFAULT_UNITS.lengths, False) is None
+    assert texts.shown((0, "a"), 0.35, DEFAULT_UNITS.lengths) == "2*175"
+    assert texts.shown((0, "a"), 0.36, DEFAULT_UNITS.lengths) is None
     for k in range(3 * MOST_TEXTS):
         texts.remember((k % 30, "a" if k % 2 else "d"), f"{k}+1")
     assert len(texts.state()) <= MOST_TEXTS

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
 from app.exercises import Exercise, Exercises, Variant, Verdict
-from app.viewer.exercises.places import LABEL, Place
+from app.viewer.activity.places import LABEL, Place
 from kin import InputError
 
 Mark = Literal["open", "wrong", "right", "shown"]

@@ -9,9 +9,8 @@ from app.classroom.courses import Course, Courses, Item, course_of, to_data
 from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.results import Outcome, write_code
 from app.exercises import Exercises
-from app.viewer.exercises.places import Place
-from app.viewer.exercises.practice import Mark, Practice
-from app.viewer.lessons import LESSONS
+from app.viewer.activity.places import Place
+from app.viewer.activity.practice import Mark, Practice
 from kin import InputError
 
 
@@ -70,15 +69,6 @@ class Progress:
             self.at = None
             return None
         return self.go(self.at + 1)
-
-    def title(self, item: Item) -> str:
-        """What an item is called."""
-        if item.title:
-            return item.title
-        if item.kind == "lesson":
-            return next((lesson.title for lesson in LESSONS if lesson.key == item.key), item.key)
-        exercise = self._courses.exercises.get(item.key)
-        return item.key if exercise is None else exercise.title
 
     def mark(self, index: int) -> Mark:
         """What has become of an item."""

@@ -1,0 +1,192 @@
+"""Whether two arms are the same, and what was mistyped if not."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from typing_extensions import TypedDict
+
+from app.shared.answers.document import documented
+from kin import Comparison, Robot, robot_to_dict
+from kin.comparison import Change, Difference, Explanation, Mapping, messages
+from kin.comparison.mistakes import Mistake
+from kin.comparison.results import Quantity, Verdict
+
+
+@documented
+class MappingAnswer(TypedDict):
+    """How b maps to a: ``T_a(q) = base · T_b(signs∘q + offsets) · tool``."""
+
+    base: list[list[float]]
+    """4×4 homogeneous transform, row by row, in metres."""
+    tool: list[list[float]]
+    """The same after the last joint."""
+    signs: list[int]
+    """1, or −1 where a joint of b counts the other way."""
+    offsets: list[float]
+    """What a joint of b shows where that of a is at zero, in radians or metres."""
+
+
+@documented
+class DifferenceAnswer(TypedDict):
+    """A quantity of the joint axes that differs."""
+
+    joints: list[int]
+    """Indices of the joints that it relates; empty for the number of joints."""
+    quantity: Quantity
+    """Number of joints, kind of a joint, angle or distance of two neighbouring axes, offset along an axis between
+    its two common normals; `direction` where an axis lies otherwise to those before it."""
+    in_a: float | str | None
+    """Its value in the reference: radians, metres, a number or a kind."""
+    in_b: float | str | None
+    """Its value in the other arm."""
+    text: str
+    """The same in words."""
+
+
+@documented
+class ChangeAnswer(TypedDict):
+    """One change of the other table."""
+
+    mistake: Mistake
+    """What it undoes."""
+    rows: list[int]
+    """Indices of the rows; empty if it concerns the whole table."""
+    columns: list[str]
+    """theta, d, a, alpha; empty if it concerns whole rows."""
+    was: float | None
+    """A single number before the change, in radians or metres; null if there is none."""
+    now: float | None
+    """The same after the change."""
+
+
+@documented
+class ExplanationAnswer(TypedDict):
+    """One or two changes that make the other table the reference."""
+
+    text: str
+    """The mistakes in words, and what is left when they are undone."""
+    changes: list[ChangeAnswer]
+    """The changes, in the order in which they are made."""
+    mapping: MappingAnswer
+    """What is left then."""
+    robot: dict[str, Any]
+    """The changed table as the fields of a robot file, as other requests take it."""
+    cost: float
+    """How unlikely this is; the smallest comes first."""
+    position: float
+    """Largest distance between the poses then, as found, in metres."""
+    rotation: float
+    """Largest angle between them, in radians."""
+
+
+@documented
+class LimitDifferenceAnswer(TypedDict):
+    """Limits of a joint that differ although the arms are the same."""
+
+    joint: int
+    """Index of the joint."""
+    in_a: list[float] | None
+    """Limits in the reference, null if there are none."""
+    in_b: list[float] | None
+    """Those of the other arm, as joint values of the reference."""
+
+
+@documented
+class ComparisonAnswer(TypedDict):
+    """Whether two tables describe one arm."""
+
+    verdict: Verdict
+    """`identical`: equal joint values give equal poses. `same`: one arm, but base, tool, or a joint's sense or
+    zero differ. `close`: one arm within `tolerance`. `different`."""
+    text: str
+    """The same in words."""
+    mapping: MappingAnswer | None
+    """The plainest mapping; of different arms the best one, where they are nearly the same, else null."""
+    sign_choices: int
+    """With how many vectors of signs there is a mapping."""
+    free_offsets: list[list[int]]
+    """Joints whose offset poses cannot tell from that of base, tool or the other joints of the group."""
+    position: float | None
+    """Largest distance between the poses under `mapping`, as found, in metres."""
+    rotation: float | None
+    """Largest angle between them, in radians."""
+    worst_q: list[float] | None
+    """Configuration of the reference where they differ most."""
+    differences: list[DifferenceAnswer]
+    """What differs in the axes, from the base on."""
+    limits: list[LimitDifferenceAnswer]
+    """Joints with other limits, of arms that are the same."""
+    rounded: bool
+    """Whether each number of the other table is that of the reference with fewer digits."""
+    explanations: list[ExplanationAnswer]
+    """Likely mistakes in the other table, the likeliest first."""
+    complete: bool
+    """False if the time ran out before all pairs of mistakes were tried."""
+
+
+def comparison_answer(found: Comparison, a: Robot, b: Robot) -> ComparisonAnswer:
+    """The comparison of arm b with the reference a."""
+    return {
+        "verdict": found.verdict,
+        "text": messages.verdict(found, a, b),
+        "mapping": None if found.mapping is None else _mapping(found.mapping),
+        "sign_choices": found.sign_choices,
+        "free_offsets": [list(group) for group in found.free_offsets],
+        "position": found.position,
+        "rotation": found.rotation,
+        "worst_q": None if found.worst_q is None else found.worst_q.tolist(),
+        "differences": [_difference(each, a, b) for each in found.differences],
+        "limits": [
+            {"joint": each.joint, "in_a": _pair(each.in_a), "in_b": _pair(each.in_b)} for each in found.limits
+        ],
+        "rounded": found.rounded,
+        "explanations": [_explanation(each, a, b) for each in found.explanations],
+        "complete": found.complete,
+    }
+
+
+def _mapping(mapping: Mapping) -> MappingAnswer:
+    signs: list[Literal[1, -1]] = [1 if sign > 0.0 else -1 for sign in mapping.signs.tolist()]
+    return {
+        "base": mapping.base.tolist(),
+        "tool": mapping.tool.tolist(),
+        "signs": list(signs),
+        "offsets": mapping.offsets.tolist(),
+    }
+
+
+def _difference(found: Difference, a: Robot, b: Robot) -> DifferenceAnswer:
+    return {
+        "joints": list(found.joints),
+        "quantity": found.quantity,
+        "in_a": found.in_a,
+        "in_b": found.in_b,
+        "text": messages.difference(found, a, b),
+    }
+
+
+def _explanation(found: Explanation, a: Robot, b: Robot) -> ExplanationAnswer:
+    return {
+        "text": messages.explanation(found, a, b),
+        "changes": [_change(each) for each in found.changes],
+        "mapping": _mapping(found.mapping),
+        "robot": robot_to_dict(found.robot),
+        "cost": found.cost,
+        "position": found.position,
+        "rotation": found.rotation,
+    }
+
+
+def _change(found: Change) -> ChangeAnswer:
+    return {
+        "mistake": found.mistake,
+        "rows": list(found.rows),
+        "columns": list(found.columns),
+        "was": found.was,
+        "now": found.now,
+    }
+
+
+def _pair(limits: tuple[float, float] | None) -> list[float] | None:
+    return None if limits is None else list(limits)

@@ -1,0 +1,152 @@
+"""The owner of what is open in one page.
+
+Lessons, exercises, courses and the tab of a room do not know each other. Each says here what it opens and judges,
+and asks here what the others have open; `Feature.on_activity` reports every change to all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Final, NamedTuple, Protocol
+
+from app.classroom.courses import Course, Courses
+from app.exercises import Exercise, Verdict
+from app.viewer.activity.places import Place
+from app.viewer.activity.practice import Practice
+from app.viewer.activity.progress import Progress
+from kin import KinematicsError
+
+EXERCISES: Final = "exercises"  # the key under which the exercises are opened
+
+
+class Judged(NamedTuple):
+    """An answer that was judged: the seed of its numbers, the answer as plain data, and how long (s) it took."""
+
+    exercise: Exercise
+    seed: int
+    answer: object
+    verdict: Verdict
+    seconds: float
+
+
+class GivenUp(NamedTuple):
+    """The answer of an exercise is to be shown: the seed of its numbers, and after how long (s)."""
+
+    exercise: Exercise
+    seed: int
+    seconds: float
+
+
+class Seat(Protocol):
+    """A student's seat in a room, where answers are stored."""
+
+    def submit(self, judged: Judged) -> None:
+        """Store an answer that was judged while the right one was not on show."""
+
+    def give_up(self, one: GivenUp) -> bool:
+        """Store that the answer is shown to a student who has not found it; False: it must not be shown now."""
+
+
+class Activity:
+    """What one page works on. Not thread-safe: the visitor's worker calls it.
+
+    Args:
+        courses: those of the service, with its exercises.
+        secret: the service's, for numbers and result codes of courses; raises `KinematicsError` if it has none.
+        changed: called after every change.
+
+    Attributes:
+        lesson: the key of what the tab *Learn* shows: a lesson, the exercises or the courses; None: the overview.
+        practice: what has been done of the exercises, and which one is open.
+        progress: the open course and its item on show.
+        sent: the course that the teacher of the room sent.
+        task: the exercise that the teacher of the room sent.
+        note: a sentence below the verdict: whether the answer is stored.
+    """
+
+    def __init__(self, courses: Courses, secret: Callable[[], bytes], changed: Callable[[], None]) -> None:
+        self.courses, self.exercises = courses, courses.exercises
+        self.secret, self.changed = secret, changed
+        self.practice = Practice(courses.exercises)
+        self.progress = Progress(courses, self.practice)
+        self.lesson: str | None = None
+        self.sent: Course | None = None
+        self.task: Exercise | None = None
+        self.note = ""
+        self._seat: Seat | None = None
+
+    # What is open
+
+    @property
+    def exercise(self) -> Exercise | None:
+        """The exercise on show."""
+        return self.practice.at if self.lesson == EXERCISES else None
+
+    @property
+    def withheld(self) -> str:
+        """What no tab shows now, because the open exercise asks for it: "table", or nothing."""
+        exercise = self.exercise
+        return "" if exercise is None or self.practice.record(exercise).closed else exercise.kind.withholds
+
+    @property
+    def offered(self) -> tuple[Course, ...]:
+        """What a teacher may send: the open course, and those of the service."""
+        mine = self.progress.course
+        return tuple(dict.fromkeys(([mine] if mine is not None and mine.items else []) + [*self.courses.all]))
+
+    def reveals(self, exercise: Exercise) -> bool:
+        """Whether the answer of an exercise may be shown to a student who has not found it."""
+        courses = filter(None, (self.progress.course, self.sent))
+        return all(course.answers or exercise.id not in course.exercises for course in courses)
+
+    def leads(self, exercise: Exercise) -> bool:
+        """Whether the course says what comes after an exercise."""
+        item = self.progress.item
+        return item is not None and item.kind == "exercise" and item.key == exercise.id
+
+    def leave_item(self) -> None:
+        """Something else is opened above which the bar of the course must not stand; the course stays open."""
+        self.progress.at = None
+        self.changed()
+
+    # Where exercises are done
+
+    def enter_course(self) -> None:
+        """Exercises of a course have numbers and marks of their own, with a secret of this service.
+
+        Where there is no place for the secret, they are as without a course; a request for a result code then gets
+        the reason.
+        """
+        place = None
+        with suppress(KinematicsError):
+            place = self.progress.place(self.secret)
+        self.practice.enter(place)
+        self.changed()
+
+    def take_seat(self, place: Place, seat: Seat) -> None:
+        """This is a student's page in a room from now on."""
+        self._seat = seat
+        self.practice.enter(place)
+
+    # Answers
+
+    def answer(self, exercise: Exercise, given: object, verdict: Verdict, seconds: float) -> None:
+        """An answer was judged while the right one was not on show."""
+        self.practice.take(exercise, verdict, seconds)
+        if self._seat is not None:
+            self._seat.submit(Judged(exercise, self.practice.seed_of(exercise), given, verdict, seconds))
+
+    def give_up(self, exercise: Exercise, seconds: float) -> bool:
+        """The answer is to be shown; False: in a room, only when it is stored that it was."""
+        given_up = GivenUp(exercise, self.practice.seed_of(exercise), seconds)
+        if not self.reveals(exercise) or (self._seat is not None and not self._seat.give_up(given_up)):
+            return False
+        self.practice.give_up(exercise)
+        return True
+
+    def say(self, note: str) -> None:
+        """Write a sentence below the verdict."""
+        if note != self.note:
+            self.note = note
+            self.changed()
