@@ -14,7 +14,7 @@ import kin
 from app.shared.store import Store
 from app.viewer.panel.joints import label
 from app.viewer.panel.posture import feasible_html, meanings, on_side_of, short
-from kin.units import DEGREES
+from kin.units import DEGREES, fixed
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -113,7 +113,7 @@ def test_a_value_outside_the_feasible_range_is_refused_by_name(port: int) -> Non
         number = tab.say("field", [tab.element("Arm angle ψ"), "150"])
         tab.wait(lambda: tab.script["reply"][0] == number)
         assert "Arm angle ψ was not changed. 150.0° is outside the feasible range" in tab.script["reply"][1]
-        assert f"Feasible here: {low:.1f}° … {high:.1f}°" in tab.script["reply"][1]
+        assert f"Feasible here: {fixed(low, 1)}° … {fixed(high, 1)}°" in tab.script["reply"][1]
         tab.settle()
         assert tab.value("Arm angle ψ") == shown
         assert np.array_equal(q_of(tab, SRS), q)
