@@ -35,6 +35,7 @@ if [ $# -gt 0 ]; then
   wait $programs
   ruff check .
   ruff format --check .
+  sh scripts/lint.sh
   mypy
   exec pytest "$@"
 fi
@@ -48,6 +49,7 @@ backwards=$!
 install_kinboard "[test]"
 ruff check .
 ruff format --check .
+sh scripts/lint.sh
 mypy
 wait $programs
 # If the second installation replaced a library in use, a compiling process may have failed: once more then.

@@ -6,14 +6,7 @@
   function follow() {
     const bar = document.querySelector("[data-class-open]");
     if (bar && bar.dataset.classSerial !== opened) {
-      const tab = [...document.querySelectorAll('[role="tab"]')].find((node) => node.textContent.trim() === bar.dataset.classOpen);
-      if (tab) {
-        opened = bar.dataset.classSerial;
-        if (tab.ariaSelected !== "true") {
-          tab.click();
-          tab.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true })); // a docked panel ignores clicks
-        }
-      }
+      if (viserPage.openTab(bar.dataset.classOpen)) opened = bar.dataset.classSerial;
     }
     const address = document.querySelector("[data-class-address]");
     const room = new URL("../room", location.href).href.replace(/^https?:\/\//, "");
@@ -26,7 +19,5 @@
   }, true);
   // A new connection counts from the beginning.
   addEventListener("kinboard-connect", () => { opened = ""; });
-  addEventListener("DOMContentLoaded", () => {
-    new MutationObserver(follow).observe(document.body, { subtree: true, childList: true });
-  });
+  viserPage.watch(follow);
 })();

@@ -17,11 +17,11 @@
   if (!open.size) return;
 
   const visible = (box) => box && box.width > 0 && box.top >= 0 && box.bottom <= innerHeight && box.left < innerWidth;
-  const panel = () => document.querySelector('[role="tab"]')?.closest(".mantine-ScrollArea-viewport")?.getBoundingClientRect();
+  const panel = () => viserPage.panel()?.getBoundingClientRect();
 
   function tool() {
     const place = document.querySelector("[data-hints]")?.dataset.hints.split(" ").map(Number);
-    const area = document.querySelector("canvas[data-engine]")?.getBoundingClientRect();
+    const area = viserPage.scene()?.getBoundingClientRect();
     if (!place || !area) return null;
     const unit = Math.min(area.width, area.height) / 2;
     const arrows = place[2] * unit;
@@ -33,16 +33,12 @@
 
   /** A slider of a joint; lessons and other tabs have sliders for other things. */
   function slider() {
-    const move = [...document.querySelectorAll('[role="tab"][aria-selected="true"]')].some((tab) => tab.textContent.trim() === "Move");
-    const thumbs = (move ? [...document.querySelectorAll('[role="slider"]')] : []).map((node) => node.getBoundingClientRect());
+    const thumbs = (viserPage.openTitles().includes("Move") ? viserPage.thumbs() : []).map((node) => node.getBoundingClientRect());
     const seen = thumbs.filter(visible);
     return innerWidth < NARROW ? seen[0] : seen[Math.min(2, seen.length - 1)];
   }
 
-  function lessons() {
-    const tab = [...document.querySelectorAll('[role="tab"]')].find((node) => node.textContent.trim() === "Learn");
-    return tab?.getBoundingClientRect();
-  }
+  function lessons() { return viserPage.tab("Learn")?.getBoundingClientRect(); }
 
   function close(key) {
     if (!open.delete(key)) return;
@@ -77,7 +73,7 @@
     let x = (key === "drag" ? box.left : side?.left ?? 0) - width - (key === "drag" ? 6 : 18);
     let y = box.top + box.height / 2 - height / 2;
     if (above || x < 8) {
-      const scene = document.querySelector("canvas[data-engine]").getBoundingClientRect();
+      const scene = viserPage.scene().getBoundingClientRect();
       x = box.left + box.width / 2 - width / 2;
       if (key !== "drag") y = box.top - height - 14;
       else y = box.bottom + height + 8 < scene.bottom ? box.bottom + 4 : scene.top + 6; // clear of the arm
@@ -119,7 +115,7 @@
   addEventListener("pointerdown", (event) => {
     if (!(event.target instanceof Element)) return;
     if (event.target.matches("canvas")) close("drag");
-    else if (event.target.closest(".mantine-Slider-root")) close("joint");
-    else if (event.target.closest('[role="tab"]')?.textContent.trim() === "Learn") close("learn");
+    else if (viserPage.isSlider(event.target)) close("joint");
+    else if (viserPage.titleAt(event.target) === "Learn") close("learn");
   }, true);
 })();

@@ -1,64 +1,14 @@
 "use strict";
-// Runs in viser's page, before viser's own script: keys, typed values, and buttons of our own HTML. It sends messages to
-// the server, which decides what they mean; app/viewer/panel/script.py describes how.
+// Runs in viser's page, before viser's own script: keys, typed values, and buttons of our own HTML. The server
+// decides what they mean; app/viewer/panel/script.py describes how.
 (() => {
-  const KEPT = 20; // messages in the field at once
-  const LONGEST = 56000; // bytes in the field; the service closes a connection that sends more than 64 KiB at once
   const HOLD = 600; // ms without a key until the next press counts as another step of the history
   const DECIMALS = 1e9;
   // Letters that move the target: axis and direction. The same places on QWERTY, QWERTZ and AZERTY keyboards.
   const MOVES = { KeyL: [0, 1], KeyJ: [0, -1], KeyI: [1, 1], KeyK: [1, -1], KeyO: [2, 1], KeyU: [2, -1] };
-  const CONTROLS = 'input, textarea, select, button, a, summary, [contenteditable], [role="slider"], [role="tab"], [role="option"]';
-  const setValue = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+  const { send, type, thumbOf: thumb } = viserPage;
 
-  /** Type into one of viser's fields, as if the visitor did. */
-  function type(input, text) {
-    setValue.call(input, text);
-    input.dispatchEvent(new Event("input", { bubbles: true }));
-  }
-
-  // Messages
-
-  let number = Date.now();
-  let messages = [];
-  const waiting = new Map(); // number of a message → what to do with its reply
-  // A new connection has a new page on the server, which must not act on old messages.
-  addEventListener("kinboard-connect", () => { messages = []; waiting.clear(); link = null; });
-
-  // viser's connection is in a worker, and a field sends one change per 50 ms. Parts of files go to the worker directly,
-  // as changes of the same field; `link` is the worker and the field's name, known from the first message.
-  let link = null;
-  let filled = ""; // the field, as it was filled last
-  const { postMessage } = Worker.prototype;
-  Worker.prototype.postMessage = function (data, ...rest) {
-    const change = data?.type === "send" && data.message?.type === "GuiUpdateMessage" ? data.message : null;
-    if (filled && change?.updates?.value === filled) link = { worker: this, uuid: change.uuid };
-    return postMessage.call(this, data, ...rest);
-  };
-  function sendDirectly(message) {
-    const before = messages.slice(-4); // the field may not have sent them yet; what was read already is ignored
-    const value = JSON.stringify(bytes([...before, message]) < LONGEST ? [...before, message] : [message]);
-    postMessage.call(link.worker, { type: "send", message: { type: "GuiUpdateMessage", uuid: link.uuid, updates: { value } } });
-  }
-
-  const bytes = (value) => new TextEncoder().encode(JSON.stringify(value)).length;
-
-  /** Returns whether the message was sent directly; `direct`: it may be. */
-  function send(name, argument = null, done = null, direct = false) {
-    const field = document.querySelector("[data-answers]")?.parentElement.nextElementSibling?.querySelector("input");
-    if (!field) return false;
-    const message = [++number, name, argument];
-    if (bytes([message]) > LONGEST) { done?.("This text is too long."); return false; }
-    if (done) waiting.set(number, done);
-    if (direct && link) { sendDirectly(message); return true; }
-    messages = [...messages.slice(1 - KEPT), message];
-    while (bytes(messages) > LONGEST) messages.shift();
-    type(field, filled = JSON.stringify(messages));
-    return false;
-  }
-
-  // From our other scripts; one whose message may go directly learns from `direct` whether it did.
-  addEventListener("kinboard-send", (event) => { event.direct = send(...event.detail); });
+  // Answers
 
   let answered = "";
   function readAnswers() {
@@ -75,18 +25,12 @@
       button.ariaDisabled = String(!label);
       button.title = label ? `${name[0].toUpperCase() + name.slice(1)}: ${label} (${button.dataset.keys})` : `Nothing to ${name}`;
     }
-    for (const [sent, done] of waiting) {
-      if (sent > to) continue;
-      waiting.delete(sent);
-      if (sent === to) done(error, readings);
-      else done("", []);
-    }
+    viserPage.answer(to, error, readings);
   }
 
   // Number fields beside sliders
 
   const fields = new Map(); // id of a slider → { unit, step, fine, page }
-  const thumb = (id) => document.getElementById(id)?.querySelector('[role="slider"]');
   const valueOf = (node, name = "now") => Number(node.getAttribute(`aria-value${name}`));
 
   function readFields() {
@@ -109,7 +53,7 @@
       input.dispatchEvent(new Event("kinboard-accept"));
     }
   }
-  addEventListener("pointerdown", (event) => { if (event.target.closest?.(".mantine-Slider-root, canvas, button")) accept(); }, true);
+  addEventListener("pointerdown", (event) => { if (viserPage.isSlider(event.target) || event.target.closest?.("canvas, button")) accept(); }, true);
 
   function addField(id, field, line) {
     const box = document.createElement("span");
@@ -124,10 +68,9 @@
     box.append(input, unit);
     line.append(box);
     line.dataset.kbLine = "";
-    const label = line.closest(":has(label)")?.querySelector("label")?.textContent.trim() ?? "";
-    input.setAttribute("aria-label", `${label} (${field.unit})`);
-
     const slider = thumb(id);
+    input.setAttribute("aria-label", `${viserPage.labelOf(slider)} (${field.unit})`);
+
     let edited = false;
     const show = () => { if (!edited) input.value = String(valueOf(slider)).replace("-", "−"); };
     const ask = () => {
@@ -140,16 +83,24 @@
       });
     };
     input.addEventListener("kinboard-accept", show);
-    new MutationObserver(() => { show(); if (!edited) input.ariaInvalid = null; }).observe(slider, { attributes: true, attributeFilter: ["aria-valuenow"] });
+    viserPage.watchValue(slider, () => { show(); if (!edited) input.ariaInvalid = null; });
     input.addEventListener("focus", () => input.select());
     input.addEventListener("input", () => { edited = true; input.ariaInvalid = null; });
     input.addEventListener("blur", ask);
     input.addEventListener("keydown", (event) => {
       const undone = edited;
-      if (event.key === "Enter") { ask(); input.select(); }
-      else if (event.key === "Escape") { edited = false; accept(); show(); input.select(); }
-      else if (["ArrowUp", "ArrowDown", "PageUp", "PageDown"].includes(event.key)) { ask(); step(id, event); }
-      else if (!historyKey(event) || undone) return;
+      if (event.key === "Enter") {
+        ask();
+        input.select();
+      } else if (event.key === "Escape") {
+        edited = false;
+        accept();
+        show();
+        input.select();
+      } else if (["ArrowUp", "ArrowDown", "PageUp", "PageDown"].includes(event.key)) {
+        ask();
+        step(id, event);
+      } else if (!historyKey(event) || undone) return;
       event.preventDefault();
     });
     show();
@@ -159,7 +110,7 @@
 
   const LOCKED = "\u2060"; // see app/viewer/panel/joints.py
   function pressLocks() {
-    for (const button of document.querySelectorAll("button.mantine-Button-root")) {
+    for (const button of viserPage.buttons()) {
       const number = button.textContent.replace(LOCKED, "");
       const pressed = /^\d$/.test(number) ? String(button.textContent.startsWith(LOCKED)) : null;
       if (button.ariaPressed !== pressed) button.ariaPressed = pressed;
@@ -171,8 +122,8 @@
   const resized = new ResizeObserver(() => requestAnimationFrame(alignTracks));
   function alignTracks() {
     let track = null;
-    for (const node of document.querySelectorAll(".mantine-Slider-track, .kb-track")) {
-      if (node.matches(".mantine-Slider-track")) { track = node; continue; }
+    for (const node of viserPage.tracksAnd(".kb-track")) {
+      if (viserPage.isTrack(node)) { track = node; continue; }
       if (!track) continue;
       if (!track.sized) {
         track.sized = true;
@@ -204,7 +155,7 @@
     if (to === undefined) return false;
     const value = Math.round(Math.min(Math.max(to, least), most) * DECIMALS) / DECIMALS;
     last = { id, value, at: now };
-    const input = document.getElementById(id).nextElementSibling?.querySelector("input");
+    const input = viserPage.fieldOf(id);
     if (input) type(input, String(value));
     clearTimeout(release);
     release = setTimeout(send, HOLD, "released");
@@ -212,14 +163,14 @@
   }
 
   function sliderKey(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey || !event.target.matches?.('[role="slider"]')) return false;
-    const id = [...fields.keys()].find((id) => document.getElementById(id)?.contains(event.target));
+    if (event.ctrlKey || event.metaKey || event.altKey || !viserPage.isThumb(event.target)) return false;
+    const id = [...fields.keys()].find((key) => document.getElementById(key)?.contains(event.target));
     return id !== undefined && step(id, event);
   }
 
   // A drag is one step of the history. viser drops a control's change if another one follows within 50 ms: wait longer.
   addEventListener("pointerup", (event) => {
-    if (event.target.closest?.(".mantine-Slider-root") || document.querySelector("[data-dragging]")) setTimeout(send, 150, "released");
+    if (viserPage.isSlider(event.target) || document.querySelector("[data-dragging]")) setTimeout(send, 150, "released");
   }, true);
 
   // History
@@ -324,7 +275,7 @@
 
   /** A key pressed while no control has the focus. */
   function sceneKey(event) {
-    if (event.ctrlKey || event.metaKey || event.target.closest?.(CONTROLS)) return false;
+    if (event.ctrlKey || event.metaKey || viserPage.isControl(event.target)) return false;
     const move = MOVES[event.code];
     if (move) send("nudge", [move[0], event.altKey, move[1], event.shiftKey]);
     else if (event.altKey || event.shiftKey || event.repeat) return false;
@@ -367,7 +318,11 @@
     addEventListener(kind, (event) => { if (pulling && event.key === "Shift") snap(kind === "keydown"); }, true);
   }
 
-  addEventListener("DOMContentLoaded", () => {
-    new MutationObserver(() => { readAnswers(); readFields(); pressLocks(); alignTracks(); }).observe(document.body, { subtree: true, childList: true, characterData: true });
-  });
+  function follow() {
+    readAnswers();
+    readFields();
+    pressLocks();
+    alignTracks();
+  }
+  viserPage.watch(follow, { on: ["childList", "characterData"] });
 })();

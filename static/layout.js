@@ -116,29 +116,21 @@
   // Where a phone is turned, viser builds the panel anew and opens its first tab: open the one that was open.
   const SETTLED = 2000; // ms until the new panel stays as it is
   let opened = "";
-  const titleOf = (tab) => tab.textContent.trim();
-  function reopen() {
-    const wanted = [...document.querySelectorAll('[role="tab"]')].find((tab) => titleOf(tab) === opened);
-    if (!wanted || wanted.ariaSelected === "true") return;
-    wanted.click();
-    wanted.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true })); // a docked panel ignores clicks
-  }
+  const reopen = () => viserPage.openTab(opened);
   NARROW.addEventListener("change", () => {
     const timer = setInterval(reopen, 100);
     setTimeout(clearInterval, SETTLED, timer);
   });
   addEventListener("click", (event) => {
-    const tab = event.target instanceof Element && event.target.closest('[role="tab"]');
-    if (tab) opened = titleOf(tab);
+    opened = viserPage.titleAt(event.target) || opened;
   }, true);
 
   /** Mark the parts of viser's sheet for the styles. */
   function mark() {
-    const sheet = card()?.closest(".mantine-Paper-root");
-    if (!sheet || sheet.style.position !== "fixed" || sheet.hasAttribute("data-kb-panel")) return;
-    sheet.setAttribute("data-kb-panel", "");
-    const box = sheet.querySelector(".mantine-ScrollArea-viewport > div > div");
-    box?.firstElementChild?.setAttribute("data-kb-head", "");
+    const found = viserPage.sheetOf(card());
+    if (!found || found.sheet.hasAttribute("data-kb-panel")) return;
+    found.sheet.setAttribute("data-kb-panel", "");
+    found.head?.setAttribute("data-kb-head", "");
   }
 
   // The width of the panel on a desk: moved at its edge, by mouse or arrow keys, and kept for the next visit.
@@ -151,25 +143,11 @@
 
   let fresh = !(wished >= LEAST); // the first visit of this browser
 
-  const region = () => document.querySelector("[data-dock-region]");
-
-  /** Make the panel wider, as a pointer that moves its edge would. */
-  function widen(pixels) {
-    const edge = document.querySelector("[data-dock-region-resize]");
-    if (!edge) return;
-    const start = edge.getBoundingClientRect().left;
-    const end = edge.dataset.dockRegionResize === "left" ? start + pixels : start - pixels;
-    const at = (x) => ({ bubbles: true, pointerId: 1, isPrimary: true, button: 0, clientX: x });
-    edge.firstElementChild.dispatchEvent(new PointerEvent("pointerdown", at(start)));
-    dispatchEvent(new PointerEvent("pointermove", at(end)));
-    dispatchEvent(new PointerEvent("pointerup", at(end)));
-  }
-
   function keepWidth() {
-    const width = region()?.offsetWidth ?? 0;
-    const edge = document.querySelector("[data-dock-region-resize]");
-    if (width < LEAST || !edge) return;
-    Object.assign(edge, { ariaValueMin: String(LEAST), ariaValueMax: String(innerWidth), ariaValueNow: String(width) });
+    const docked = viserPage.region();
+    const width = docked?.node.offsetWidth ?? 0;
+    if (width < LEAST) return;
+    Object.assign(docked.edge, { ariaValueMin: String(LEAST), ariaValueMax: String(innerWidth), ariaValueNow: String(width) });
     if (fresh) {
       fresh = false;
       if (size !== "Normal" && !NARROW.matches) wished = SIZES[size] * width;
@@ -177,7 +155,7 @@
     if (wished >= LEAST) {
       const change = Math.min(wished, innerWidth / 2) - width;
       wished = NaN;
-      if (Math.abs(change) > 1) requestAnimationFrame(() => widen(change));
+      if (Math.abs(change) > 1) requestAnimationFrame(() => viserPage.widen(change));
       return;
     }
     try { localStorage.setItem(WIDTH, String(width)); } catch { /* see above */ }
@@ -186,23 +164,23 @@
   // The size of the text. All lengths of the panel follow the page's font size, and so does its width.
 
   function chooseSize(name) {
-    const width = region()?.offsetWidth ?? 0;
+    const width = viserPage.region()?.node.offsetWidth ?? 0;
     const factor = SIZES[name] / SIZES[size];
     size = name;
     try { localStorage.setItem(TEXT, size); } catch { /* see above */ }
     place();
     markSize();
-    if (width >= LEAST && factor !== 1) widen(Math.min(factor * width, innerWidth / 2) - width);
+    if (width >= LEAST && factor !== 1) viserPage.widen(Math.min(factor * width, innerWidth / 2) - width);
   }
 
   /** Labels in the scene have the size of the text too: the server draws them. A new panel has not heard of it. */
   let told = { field: null, size: "" };
   function tellSize() {
-    const field = document.querySelector("[data-answers]")?.parentElement.nextElementSibling?.querySelector("input");
+    const field = viserPage.messageField();
     const now = root.dataset.kbText;
     if (!field || (told.field === field && told.size === now)) return;
     told = { field, size: now };
-    dispatchEvent(new CustomEvent("kinboard-send", { detail: ["text-size", now] }));
+    viserPage.send("text-size", now);
   }
 
   function markSize() {
@@ -223,19 +201,18 @@
 
   /** Make the panel's edge a control for the keyboard too. */
   function markEdge() {
-    const edge = document.querySelector("[data-dock-region-resize]:not([role])");
-    const box = region();
-    if (!edge || !box) return;
+    const docked = viserPage.region();
+    if (!docked || docked.edge.role) return;
+    const { node, edge, outwards } = docked;
     Object.assign(edge, { tabIndex: 0, role: "separator", ariaOrientation: "vertical", ariaLabel: "Width of the panel" });
     edge.addEventListener("keydown", (event) => {
       const way = ["ArrowRight", "ArrowLeft"].indexOf(event.key);
       if (way < 0) return;
       event.preventDefault();
       event.stopPropagation();
-      const outwards = edge.dataset.dockRegionResize === "left" ? 1 : -1;
-      widen((way === 0 ? outwards : -outwards) * STRIDE);
+      viserPage.widen((way === 0 ? outwards : -outwards) * STRIDE);
     });
-    new ResizeObserver(keepWidth).observe(box);
+    new ResizeObserver(keepWidth).observe(node);
   }
 
   /** Where the scene is in the window: the status card lies at its top. */
@@ -247,7 +224,7 @@
     root.dataset.kbDocked = NARROW.matches ? "below" : innerWidth - right > LEAST ? "right" : left > LEAST ? "left" : "";
   });
   function watch() {
-    const canvas = document.querySelector("canvas[data-engine]");
+    const canvas = viserPage.scene();
     if (!canvas || canvas === watched) return;
     edges.disconnect();
     watched = canvas;
@@ -255,7 +232,7 @@
   }
 
   // A press hides the hint of a control until the pointer comes to another control.
-  const lineOf = (node) => (node instanceof Element && (node.closest(".mantine-Flex-root") ?? node.closest("button, input"))) || null;
+  const lineOf = (node) => viserPage.lineAt(node) ?? (node instanceof Element ? node.closest("button, input") : null);
   let pressed = null;
   function press(line) {
     pressed = line;
@@ -270,10 +247,15 @@
     grip.type = "button";
     document.body.append(grip);
     place();
-    let waiting = 0;
-    const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; mark(); markEdge(); markSize(); tellSize(); watch(); }, 50); });
-    changes.observe(document.body, { subtree: true, childList: true });
   });
+  function follow() {
+    mark();
+    markEdge();
+    markSize();
+    tellSize();
+    watch();
+  }
+  viserPage.watch(follow, { delay: 50 });
   addEventListener("resize", place);
   NARROW.addEventListener("change", place);
 })();

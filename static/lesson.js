@@ -4,9 +4,9 @@
 (() => {
   let serial = 0; // each press is a step of its own in the history
   // A block with data-feature belongs to that lesson, others to the block that all lessons have.
-  const send = (node, kind, value, ...rest) => dispatchEvent(new CustomEvent("kinboard-send", {
-    detail: ["feature", [node.closest("[data-feature]")?.dataset.feature ?? "guide", [kind, ...rest, ++serial], value]],
-  }));
+  const send = (node, kind, value, ...rest) => viserPage.send(
+    "feature", [node.closest("[data-feature]")?.dataset.feature ?? "guide", [kind, ...rest, ++serial], value],
+  );
 
   function press(button) {
     if (button.ariaDisabled === "true") return;
@@ -93,8 +93,6 @@
     open = now;
     if (head && !first && head.getBoundingClientRect().height) requestAnimationFrame(() => head.scrollIntoView({ block: "start" }));
   }
-  addEventListener("DOMContentLoaded", () => {
-    new MutationObserver(reveal).observe(document.body, { subtree: true, childList: true });
-    new MutationObserver(restore).observe(document.body, { subtree: true, childList: true });
-  });
+  viserPage.watch(reveal);
+  viserPage.watch(restore);
 })();

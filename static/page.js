@@ -1,5 +1,5 @@
 "use strict";
-// Runs in viser's page, before viser's own script: the page's colours, a picture of the scene, hints on labels.
+// Runs in viser's page, before viser's own script: the page's colours, a picture of the scene.
 (() => {
   const root = document.documentElement;
   const DARK = matchMedia("(prefers-color-scheme: dark)");
@@ -34,18 +34,16 @@
 
   /** Tell the service whether the system is dark, with the hidden check box. */
   function tell() {
-    const label = [...document.querySelectorAll("label")].find((node) => node.textContent === SYSTEM_IS_DARK);
-    const line = label?.closest(".mantine-Flex-root")?.parentElement;
-    const box = line?.querySelector("input[type=checkbox]");
-    if (!box) return;
-    line.hidden = true;
-    if (box.checked !== DARK.matches) box.click();
+    const found = viserPage.checkBox(SYSTEM_IS_DARK);
+    if (!found) return;
+    found.line.hidden = true;
+    if (found.box.checked !== DARK.matches) found.box.click();
   }
   DARK.addEventListener("change", tell);
 
   /** Whether the page has its own colours; they are kept for the cover of a reload. */
   function coloured() {
-    const scheme = root.dataset.mantineColorScheme;
+    const scheme = viserPage.colours();
     if (!scheme || !document.querySelector("[data-status]")) return false;
     keep(scheme);
     return true;
@@ -59,7 +57,7 @@
 
   /** Save what the scene shows as a PNG file. */
   function savePicture() {
-    const scene = document.querySelector("canvas[data-engine]");
+    const scene = viserPage.scene();
     if (!scene) return;
     const picture = document.createElement("canvas");
     [picture.width, picture.height] = [scene.width, scene.height];
@@ -84,13 +82,6 @@
     });
   }
 
-  // viser leaves captured pointers to the handles of the scene, and browsers capture every touch: without this, a tap on
-  // a point or a posture of the scene does nothing.
-  addEventListener("pointerdown", (event) => {
-    const { target, pointerId, pointerType } = event;
-    if (pointerType === "touch" && target instanceof HTMLCanvasElement) target.releasePointerCapture(pointerId);
-  }, true);
-
   // In another page, the wheel scrolls that page, and zooms only with Ctrl or after a press on the scene.
   if (window !== window.top) {
     let engaged = false;
@@ -99,15 +90,6 @@
     addEventListener("wheel", (event) => {
       if (!engaged && !event.ctrlKey && event.target instanceof HTMLCanvasElement) event.stopImmediatePropagation();
     }, { capture: true, passive: true });
-  }
-
-  // viser shows a control's hint while the mouse is on the control; here its label shows it as well.
-  const hinted = (event) => {
-    const label = event.target instanceof Element ? event.target.closest("label[for]") : null;
-    return label?.closest(".mantine-Flex-root")?.lastElementChild?.firstElementChild;
-  };
-  for (const [heard, sent] of [["mouseover", "mouseenter"], ["mouseout", "mouseleave"]]) {
-    addEventListener(heard, (event) => hinted(event)?.dispatchEvent(new MouseEvent(sent)));
   }
 
   addEventListener("DOMContentLoaded", () => {
@@ -125,8 +107,6 @@
       tools.append(button);
     }
     document.body.append(tools);
-    let waiting = 0;
-    const changes = new MutationObserver(() => { waiting ||= setTimeout(() => { waiting = 0; follow(); }, 30); });
-    changes.observe(root, { subtree: true, childList: true, attributes: true, attributeFilter: ["data-mantine-color-scheme"] });
   });
+  viserPage.watch(follow, { on: ["childList", viserPage.COLOURS], delay: 30 });
 })();

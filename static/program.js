@@ -6,7 +6,7 @@
 
   const part = (name) => document.querySelector(`[data-program="${name}"]`);
   const all = (selector) => [...document.querySelectorAll(`[data-program] ${selector}`)];
-  const send = (key, value, done) => dispatchEvent(new CustomEvent("kinboard-send", { detail: ["feature", ["program", key, value], done] }));
+  const send = (key, value, done) => viserPage.send("feature", ["program", key, value], done);
   let serial = 0; // each press is a step of its own in the history
   const act = (name, value, ...rest) => send([name, ...rest, ++serial], value);
   const setText = (node, text) => { if (node && node.textContent !== text) node.textContent = text; };
@@ -24,7 +24,12 @@
     const time = wanted;
     wanted = null;
     busy = true;
-    const next = () => { clearTimeout(late); if (busy) { busy = false; push(); } };
+    const next = () => {
+      clearTimeout(late);
+      if (!busy) return;
+      busy = false;
+      push();
+    };
     const late = setTimeout(next, 3000);
     send(["scrub"], time, next);
   }
@@ -153,7 +158,11 @@
     act("upload", [file.name.slice(0, 100), text]);
   });
 
-  addEventListener("DOMContentLoaded", () => {
-    new MutationObserver(() => { if (part("clock")) { restore(); reopen(); showClock(); } }).observe(document.body, { subtree: true, childList: true, attributes: true, attributeFilter: ["data-time", "data-playing", "data-at", "data-duration"] });
-  });
+  function follow() {
+    if (!part("clock")) return;
+    restore();
+    reopen();
+    showClock();
+  }
+  viserPage.watch(follow, { on: ["childList", "data-time", "data-playing", "data-at", "data-duration"] });
 })();

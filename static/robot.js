@@ -11,7 +11,7 @@
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
   const cells = () => [...document.querySelectorAll("[data-arm] input[data-cell]")];
   const revision = () => Number(part("table")?.dataset.revision ?? 0);
-  const send = (key, value, done) => dispatchEvent(new CustomEvent("kinboard-send", { detail: ["feature", ["robot", key, value], done] }));
+  const send = (key, value, done) => viserPage.send("feature", ["robot", key, value], done);
 
   // Typed cells
 
@@ -103,7 +103,7 @@
     clearTimeout(left);
     gone = false;
     if (cell?.matches("input") && name !== focus) cell.select();
-    if (focus && name !== focus) { flush(); dispatchEvent(new CustomEvent("kinboard-send", { detail: ["released"] })); }
+    if (focus && name !== focus) { flush(); viserPage.send("released"); }
     if (focus && !cell) left = setTimeout(leave, LEFT);
     focus = name;
   });
@@ -169,12 +169,14 @@
     if (undo === "z" || undo === "y") {
       flush();
       if (wrong?.any) send(["discard"], null);
-      else dispatchEvent(new CustomEvent("kinboard-send", { detail: [undo === "y" || event.shiftKey ? "redo" : "undo"] }));
+      else viserPage.send(undo === "y" || event.shiftKey ? "redo" : "undo");
     } else if (event.altKey && inTable && ["ArrowUp", "ArrowDown", "Enter"].includes(event.key)) {
       const action = { ArrowUp: "up", ArrowDown: "down", Enter: "add" }[event.key];
       if (part("table").querySelector(`[data-arm-do="${action}"]`).ariaDisabled !== "true") change(action);
-    } else if (event.key === "Escape" && wrong?.any) { flush(); send(["discard"], null); }
-    else if (!cell.matches("input") || event.ctrlKey || event.metaKey || event.altKey) return;
+    } else if (event.key === "Escape" && wrong?.any) {
+      flush();
+      send(["discard"], null);
+    } else if (!cell.matches("input") || event.ctrlKey || event.metaKey || event.altKey) return;
     else if (event.key === "Enter" && !cell.closest("tr")) cell.blur();
     else if (event.key === "Enter") to = neighbour(cell, 0, event.shiftKey ? -1 : 1) ?? neighbour(cell, event.shiftKey ? -1 : 1, 0) ?? cell;
     else if (event.key === "ArrowDown") to = neighbour(cell, 1, 0);
@@ -228,8 +230,13 @@
     asked = choice !== null;
   }
 
-  addEventListener("DOMContentLoaded", () => {
-    new MutationObserver(showChoice).observe(document.body, { subtree: true, childList: true });
-    new MutationObserver(() => { if (part("table")) { restore(); mark(); markWrong(); resized.observe(scroller()); showMore(); } }).observe(document.body, { subtree: true, childList: true });
+  viserPage.watch(showChoice);
+  viserPage.watch(() => {
+    if (!part("table")) return;
+    restore();
+    mark();
+    markWrong();
+    resized.observe(scroller());
+    showMore();
   });
 })();

@@ -4,7 +4,7 @@
 (() => {
   let serial = 0;
   let opened = null; // the window of the last page, with the number of its request
-  const send = (kind) => dispatchEvent(new CustomEvent("kinboard-send", { detail: ["feature", ["sheet", [kind, ++serial], null]] }));
+  const send = (kind) => viserPage.send("feature", ["sheet", [kind, ++serial], null]);
 
   function hand() {
     if (!opened?.ready) return;
@@ -31,7 +31,5 @@
     opened.ready = true;
     hand();
   });
-  addEventListener("DOMContentLoaded", () => {
-    new MutationObserver(hand).observe(document.body, { subtree: true, childList: true });
-  });
+  viserPage.watch(hand);
 })();

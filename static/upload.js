@@ -11,11 +11,7 @@
 
   const block = () => document.querySelector('[data-arm="files"]');
   const limit = (name) => Number(block().querySelector("[data-arm-file]").dataset[name]);
-  function send(value, done, direct = false) {
-    const event = new CustomEvent("kinboard-send", { detail: ["feature", ["robot", ["upload"], value], done, direct] });
-    dispatchEvent(event);
-    return event.direct;
-  }
+  const send = (value, done, direct = false) => viserPage.send("feature", ["robot", ["upload"], value], done, direct);
 
   // Choosing and dropping
 

@@ -180,7 +180,22 @@ def imported_paths(source: str, sources: Sources) -> Iterator[str]:
             yield from [path for path in candidates if path in sources][:1]
 
 
+# What viser's page consists of, and the browser's functions that are replaced in it.
+VISER = re.compile(
+    r"\bmantine-|\btabler-|\bdata-dock|\bdata-engine|role=\\?[\"'](?:tab|slider|progressbar|option)|\bGuiUpdate"
+    r"|\bMutationObserver\b|\.prototype\b|\bhistory\.replaceState\b"
+)
+
+
+def viser_elsewhere(sources: Sources) -> Iterator[str]:
+    """Scripts that know viser's page or replace the browser's functions: only ``static/viser_page.js`` does."""
+    for path, source in sources.items():
+        if path != "static/viser_page.js":
+            yield from (f"{path}: {match}" for match in sorted(set(VISER.findall(source))))
+
+
 Rule = Callable[[Sources], Iterator[str]]
+SCRIPTS = {f"static/{path.name}": path.read_text(encoding="utf-8") for path in (ROOT / "static").glob("*.js")}
 CODE = read_sources("kin", "app")
 EVERYTHING = CODE | read_sources("tests")
 RULES: dict[Rule, Sources] = {
@@ -193,6 +208,7 @@ RULES: dict[Rule, Sources] = {
     context_variables: CODE,
     banned_words: EVERYTHING,
     import_circles: CODE,
+    viser_elsewhere: SCRIPTS,
 }
 
 KNOWN: dict[Rule, set[str]] = {}
@@ -226,6 +242,10 @@ BREACHES: list[tuple[Rule, Sources, str]] = [
     (banned_words, {"kin/new.py": "# What is told of it."}, "kin/new.py: told"),
     (banned_words, {"kin/new.py": "def ik_wishes(): ..."}, "kin/new.py: wishes"),
     (banned_words, {"kin/new.py": "class DearAnswers: ..."}, "kin/new.py: dear"),
+    (viser_elsewhere, {"static/new.js": 'find(".mantine-Slider-root")'}, "static/new.js: mantine-"),
+    (viser_elsewhere, {"static/new.js": "find('[role=\"tab\"]')"}, 'static/new.js: role="tab'),
+    (viser_elsewhere, {"static/new.js": "Worker.prototype.postMessage = f"}, "static/new.js: .prototype"),
+    (viser_elsewhere, {"static/new.js": "new MutationObserver(f)"}, "static/new.js: MutationObserver"),
     (banned_words, {"kin/new.py": '"""Two axes square\nto each other."""'}, "kin/new.py: square to"),
 ]
 CIRCLES: list[tuple[Sources, set[str]]] = [
@@ -269,6 +289,8 @@ def test_every_rule_is_shown_to_have_teeth():
         (long_signatures, {"kin/new.py": f"def f({TEN}): ..."}),
         (untyped_solvers, {"app/new.py": "x: Any = getattr(y, 'z')"}),
         (cut_sentences, {"app/new.py": "def f(text):\n    return text.partition('=')[0]"}),
+        (viser_elsewhere, {"static/viser_page.js": "new MutationObserver(f); find('.mantine-Slider-root')"}),
+        (viser_elsewhere, {"static/new.js": "viserPage.watch(f); viserPage.replaceState(state)"}),
         (banned_words, {"app/new.py": "text = 'as I told you'; retold = calmness = 1"}),
         (
             import_circles,

@@ -124,7 +124,7 @@ class Tab:
 
     def close(self) -> None:
         self.page.close()
-        assert self.errors == []
+        assert self.errors == [], self.errors
 
     @property
     def status(self) -> Locator:

@@ -18,11 +18,14 @@ pytestmark = pytest.mark.browser
 
 TYPE_SLOWLY = """texts => new Promise(done => {
     const sent = [], cell = document.querySelector('[data-arm] input[data-cell="tool z"]');
-    addEventListener("kinboard-send", ({ detail: [, message] }) => {
-        if (message?.[1]?.[0] !== "cell") return;
-        sent.push(message[2][1]);
-        setTimeout(done, 500, sent);
-    });
+    const { send } = viserPage;
+    viserPage.send = (...message) => {
+        if (message[1]?.[1]?.[0] === "cell") {
+            sent.push(message[1][2][1]);
+            setTimeout(() => { viserPage.send = send; done(sent); }, 500);
+        }
+        return send(...message);
+    };
     texts.forEach((text, i) => setTimeout(() => {
         cell.value = text;
         cell.dispatchEvent(new Event("input", { bubbles: true }));

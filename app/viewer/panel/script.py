@@ -1,7 +1,7 @@
-"""The connection to the page's own script, ``static/input.js``.
+"""The connection to the page's own scripts: ``static/viser_page.js`` sends, ``static/input.js`` reads the answers.
 
 viser reports changes of its own controls only. Keys, typed fields, the buttons of our own HTML and the browser's
-*Back* button are handled by our script, which writes messages into a hidden text field of viser's. Each message
+*Back* button are handled by our scripts, which write messages into a hidden text field of viser's. Each message
 has a number, and the field always holds the last few: viser sends at most one change of a control per 50 ms and
 drops older ones. The answers are in a hidden HTML element, as JSON.
 """

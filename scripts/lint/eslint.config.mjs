@@ -1,0 +1,49 @@
+// Rules for the scripts of the pages (static/*.js): mistakes, and one way of formatting. `sh scripts/lint.sh` checks,
+// `sh scripts/lint.sh --fix` also formats. Nothing of this is shipped.
+import js from "@eslint/js";
+import stylistic from "@stylistic/eslint-plugin";
+import globals from "globals";
+
+// Scripts alone on their page. Those of viser's page share it with others: they keep their names to themselves.
+const ALONE = ["landing", "docs", "scoreboard"].map((name) => `static/${name}.js`);
+
+export default [
+  { ignores: ["static/vendor/**"] },
+  js.configs.recommended,
+  stylistic.configs.customize({ quotes: "double", semi: true, braceStyle: "1tbs", arrowParens: true, quoteProps: "as-needed" }),
+  {
+    files: ["static/*.js"],
+    languageOptions: {
+      ecmaVersion: 2023,
+      sourceType: "script",
+      // static/viser_page.js comes first in viser's page, and docs.js after the library of docs.html.
+      globals: { ...globals.browser, viserPage: "readonly", SwaggerUIBundle: "readonly" },
+    },
+    linterOptions: { reportUnusedDisableDirectives: "error" },
+    rules: {
+      eqeqeq: "error",
+      "no-implicit-globals": ["error", { lexicalBindings: true }],
+      "no-shadow": "error",
+      "no-unused-vars": ["error", { varsIgnorePattern: "^viserPage$" }],
+      "no-use-before-define": ["error", { functions: false, variables: false }],
+      "no-var": "error",
+      "object-shorthand": "error",
+      "prefer-const": "error",
+      "@stylistic/max-len": ["error", { code: 140, ignoreTemplateLiterals: true, ignoreStrings: true }],
+      "@stylistic/quotes": ["error", "double", { avoidEscape: true, allowTemplateLiterals: "always" }],
+      // Short statements stand in one line.
+      "@stylistic/brace-style": ["error", "1tbs", { allowSingleLine: true }],
+      "@stylistic/max-statements-per-line": ["error", { max: 4 }],
+      "@stylistic/multiline-ternary": "off",
+      "@stylistic/no-mixed-operators": "off",
+      "@stylistic/operator-linebreak": ["error", "before", { overrides: { "=": "after" } }],
+    },
+  },
+  { files: ALONE, rules: { "no-implicit-globals": "off" } },
+  // Its one constant is what the other scripts call.
+  {
+    files: ["static/viser_page.js"],
+    languageOptions: { globals: { viserPage: "off" } },
+    rules: { "no-implicit-globals": "off" },
+  },
+];

@@ -1,0 +1,356 @@
+"use strict";
+// The only script that knows viser's page: how its parts are found (PARTS), what viser calls in the browser (HOOKS), and
+// what is mended in its controls. It is loaded first, before viser's own script; the other scripts ask `viserPage`, whose
+// functions are described at its end. static/viser_page.css has the styles of viser's parts.
+//
+// tests/e2e/test_viser_page.py fails with the name of each part and hook that viser's page no longer has.
+const viserPage = (() => {
+  // Selectors of viser's parts. Words of ours are in them only where viser gives a part no name.
+  const PARTS = {
+    tab: '[role="tab"]',
+    openTab: '[role="tab"][aria-selected="true"]',
+    scene: "canvas[data-engine]",
+    scrollArea: ".mantine-ScrollArea-viewport", // the scrolling part of the panel
+    contents: ".mantine-ScrollArea-viewport > div > div", // what it scrolls
+    paper: ".mantine-Paper-root", // boxes: a phone's sheet, a folder
+    folderHead: ".mantine-Paper-root > .mantine-Paper-root:has(> .tabler-icon-chevron-up, > .tabler-icon-chevron-down)",
+    region: "[data-dock-region]", // the docked panel
+    regionEdge: "[data-dock-region-resize]",
+    regionHandle: "[data-dock-region-resize] > :first-child", // takes the pointer
+    line: ".mantine-Flex-root", // a control with its label
+    label: "label[for]",
+    button: "button.mantine-Button-root",
+    slider: ".mantine-Slider-root",
+    thumb: '[role="slider"]',
+    track: ".mantine-Slider-track",
+    progress: '[role="progressbar"]',
+    settings: "button .tabler-icon-adjustments", // viser's own settings
+    messages: "div:has(> [data-answers]) + div input", // the hidden field behind our hidden HTML
+  };
+  // What viser calls, and how often it has since this page was loaded.
+  const HOOKS = { readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0 };
+
+  const all = (selector, root = document) => [...root.querySelectorAll(selector)];
+  const closest = (node, selector) => (node instanceof Element ? node.closest(selector) : null);
+  const textOf = (node) => node.textContent.trim();
+
+  // Changes of the page: one observer for all scripts.
+
+  const VALUE = "aria-valuenow"; // of a slider's thumb
+  const COLOURS = "data-mantine-color-scheme"; // of the page
+  const ATTRIBUTES = [VALUE, COLOURS, "aria-hidden", "data-time", "data-playing", "data-at", "data-duration"];
+  const watchers = [];
+  const valueWatchers = new WeakMap(); // thumb → what to call
+
+  function watch(act, { on = ["childList"], delay = 0 } = {}) {
+    const unknown = on.filter((kind) => !["childList", "characterData", ...ATTRIBUTES].includes(kind));
+    if (unknown.length) throw new TypeError(`viserPage.watch: ${unknown} is not observed`);
+    let waiting = 0;
+    const later = () => { waiting ||= setTimeout(() => { waiting = 0; act(); }, delay); };
+    watchers.push({ on, act: delay ? later : act });
+  }
+
+  function dispatch(records) {
+    const kinds = new Set();
+    const acts = new Set();
+    for (const { type: kind, attributeName, target } of records) {
+      kinds.add(attributeName ?? kind);
+      const act = attributeName === VALUE && valueWatchers.get(target);
+      if (act) acts.add(act);
+    }
+    for (const { on, act } of watchers) if (on.some((kind) => kinds.has(kind))) acts.add(act);
+    for (const act of acts) {
+      try { act(); } catch (error) { reportError(error); } // the others are called all the same
+    }
+  }
+  addEventListener("DOMContentLoaded", () => {
+    const what = { subtree: true, childList: true, characterData: true, attributeFilter: ATTRIBUTES };
+    new MutationObserver(dispatch).observe(document.documentElement, what);
+  });
+
+  // Storage: viser's calls that read and write a browser's localStorage also reach the items of `serveItems`.
+
+  const { getItem, setItem } = Storage.prototype;
+  let readable = {}; // name of an item → function that returns its text
+  let writable = {}; // name of an item → function that gets its text
+
+  // A browser may forbid storage, most often to a page in a frame of another site: then items live as long as the page.
+  for (const name of ["localStorage", "sessionStorage"]) {
+    try { void window[name]; } catch {
+      const items = new Map();
+      const memory = Object.create(Storage.prototype, {
+        kept: { value: { getItem: (key) => items.get(key) ?? null, setItem: (key, value) => { items.set(key, String(value)); } } },
+        removeItem: { value: (key) => { items.delete(key); } },
+      });
+      Object.defineProperty(window, name, { value: memory });
+    }
+  }
+  Storage.prototype.getItem = function (name) {
+    if (!Object.hasOwn(readable, name)) return this.kept ? this.kept.getItem(name) : getItem.call(this, name);
+    HOOKS.readItem++;
+    return readable[name]();
+  };
+  Storage.prototype.setItem = function (name, value) {
+    if (!Object.hasOwn(writable, name)) return this.kept ? this.kept.setItem(name, value) : setItem.call(this, name, value);
+    HOOKS.writeItem++;
+    return writable[name](value);
+  };
+
+  // The address: viser would write that of its websocket into it, and a shared link would contain it.
+
+  const replaceState = history.replaceState.bind(history);
+  let restoreAddress = () => {};
+  history.replaceState = () => { HOOKS.replaceAddress++; restoreAddress(); };
+
+  // Messages to the server travel in a hidden field of viser's; app/viewer/panel/script.py describes them.
+
+  const KEPT = 20; // messages in the field at once
+  const LONGEST = 56000; // bytes in the field; the service closes a connection that sends more than 64 KiB at once
+  let number = Date.now();
+  let messages = [];
+  const waiting = new Map(); // number of a message → what to do with its reply
+  let field = null;
+  function messageField() {
+    if (!field?.isConnected) field = document.querySelector(PARTS.messages);
+    return field;
+  }
+  const bytes = (value) => new TextEncoder().encode(JSON.stringify(value)).length;
+
+  // A new connection has a new page on the server, which must not act on old messages.
+  addEventListener("kinboard-connect", () => { messages = []; waiting.clear(); link = null; });
+
+  const setValue = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+  function type(input, text) {
+    setValue.call(input, text);
+    input.dispatchEvent(new Event("input", { bubbles: true }));
+  }
+
+  // viser's connection is in a worker, and a field sends one change per 50 ms. Parts of files go to the worker directly,
+  // as changes of the same field; `link` is the worker and the field's name, known from the first message.
+  let link = null;
+  let filled = ""; // the field, as it was filled last
+  const { postMessage } = Worker.prototype;
+  Worker.prototype.postMessage = function (data, ...rest) {
+    const change = data?.type === "send" && data.message?.type === "GuiUpdateMessage" ? data.message : null;
+    if (filled && change?.updates?.value === filled) {
+      HOOKS.sendToWorker++;
+      link = { worker: this, uuid: change.uuid };
+    }
+    return postMessage.call(this, data, ...rest);
+  };
+  function sendDirectly(message) {
+    const before = messages.slice(-4); // the field may not have sent them yet; what was read already is ignored
+    const value = JSON.stringify(bytes([...before, message]) < LONGEST ? [...before, message] : [message]);
+    postMessage.call(link.worker, { type: "send", message: { type: "GuiUpdateMessage", uuid: link.uuid, updates: { value } } });
+  }
+
+  function send(name, argument = null, done = null, direct = false) {
+    if (!messageField()) return false;
+    const message = [++number, name, argument];
+    if (bytes([message]) > LONGEST) { done?.("This text is too long."); return false; }
+    if (done) waiting.set(number, done);
+    if (direct && link) { sendDirectly(message); return true; }
+    messages = [...messages.slice(1 - KEPT), message];
+    while (bytes(messages) > LONGEST) messages.shift();
+    type(field, filled = JSON.stringify(messages));
+    return false;
+  }
+
+  function answer(to, error, readings) {
+    for (const [sent, done] of waiting) {
+      if (sent > to) continue;
+      waiting.delete(sent);
+      if (sent === to) done(error, readings);
+      else done("", []);
+    }
+  }
+
+  // Tabs
+
+  const tabs = () => all(PARTS.tab);
+  function openTab(title) {
+    const tab = tabs().find((node) => textOf(node) === title);
+    if (tab && tab.ariaSelected !== "true") {
+      // A docked panel's own tabs listen to the keyboard and to dragging, those of a phone's sheet to clicks.
+      tab.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true, cancelable: true }));
+      tab.click();
+    }
+    return Boolean(tab);
+  }
+  function titleAt(node) {
+    const tab = closest(node, PARTS.tab);
+    return tab ? textOf(tab) : "";
+  }
+
+  // The panel: docked on a desk, a sheet on a phone.
+
+  function sheetOf(node) {
+    const sheet = closest(node, PARTS.paper);
+    if (sheet?.style.position !== "fixed") return null;
+    return { sheet, head: sheet.querySelector(PARTS.contents)?.firstElementChild };
+  }
+  function region() {
+    const node = document.querySelector(PARTS.region);
+    const edge = document.querySelector(PARTS.regionEdge);
+    return node && edge ? { node, edge, outwards: edge.dataset.dockRegionResize === "left" ? 1 : -1 } : null;
+  }
+  /** As a pointer that moves the panel's edge would. */
+  function widen(pixels) {
+    const docked = region();
+    if (!docked) return;
+    const start = docked.edge.getBoundingClientRect().left;
+    const end = start + docked.outwards * pixels;
+    const at = (x) => ({ bubbles: true, pointerId: 1, isPrimary: true, button: 0, clientX: x });
+    document.querySelector(PARTS.regionHandle).dispatchEvent(new PointerEvent("pointerdown", at(start)));
+    dispatchEvent(new PointerEvent("pointermove", at(end)));
+    dispatchEvent(new PointerEvent("pointerup", at(end)));
+  }
+
+  // Controls
+
+  const lineAt = (node) => closest(node, PARTS.line);
+  const thumbOf = (id) => document.getElementById(id)?.querySelector(PARTS.thumb);
+  function fieldOf(id) {
+    return document.getElementById(id).nextElementSibling?.querySelector("input");
+  }
+  function checkBox(text) {
+    const label = all("label").find((node) => node.textContent === text);
+    const line = lineAt(label)?.parentElement;
+    const box = line?.querySelector("input[type=checkbox]");
+    return box ? { box, line } : null;
+  }
+  /** The element that shows a control's hint while the mouse is on it, from the control's label. */
+  const hintedAt = (node) => lineAt(closest(node, PARTS.label))?.lastElementChild?.firstElementChild;
+  /** The label of a control's line: the nearest box around the control with exactly one label. */
+  function labelOf(node) {
+    for (let box = node.parentElement; box; box = box.parentElement) {
+      const labels = box.querySelectorAll("label");
+      if (labels.length) return labels.length === 1 ? textOf(labels[0]) : "";
+    }
+    return "";
+  }
+
+  // Accessibility: names and keyboard access that viser does not provide.
+
+  const NAMELESS = `${PARTS.thumb}[aria-label=""], ${PARTS.progress}:not([aria-label]), input:not([type="hidden"]):not([aria-label])`;
+  const name = (node, text) => { if (text) node.setAttribute("aria-label", text); };
+
+  function complete() {
+    for (const node of all(NAMELESS)) {
+      if (!node.labels?.length) name(node, labelOf(node) || (node.matches(PARTS.progress) ? "Progress" : ""));
+    }
+    for (const label of all(PARTS.label)) {
+      const buttons = lineAt(label)?.querySelector("button:not([role])")?.parentElement;
+      if (!buttons || buttons.role === "group" || document.getElementById(label.htmlFor)) continue;
+      buttons.role = "group";
+      name(buttons, textOf(label) || "Choices");
+    }
+    for (const icon of all(PARTS.settings)) {
+      const button = icon.closest("button");
+      if (!button.ariaLabel) name(button, "Settings of the page");
+    }
+    for (const head of all(PARTS.folderHead)) {
+      head.role = "button";
+      head.tabIndex = 0;
+      head.ariaExpanded = String(head.nextElementSibling?.getAttribute("aria-hidden") !== "true");
+    }
+  }
+  watch(complete, { on: ["childList", "aria-hidden"], delay: 150 });
+
+  addEventListener("keydown", (event) => {
+    if (!["Enter", " "].includes(event.key) || !(event.target instanceof Element) || !event.target.matches(PARTS.folderHead)) return;
+    event.preventDefault();
+    event.target.click();
+  });
+  addEventListener("DOMContentLoaded", () => {
+    // Arrow keys on a control must not rotate the view as well.
+    for (const kind of ["keydown", "keyup"]) {
+      document.body.addEventListener(kind, (event) => {
+        if (event.key.startsWith("Arrow") && event.target.matches("input, textarea, [role]")) event.stopPropagation();
+      });
+    }
+  });
+
+  // viser leaves captured pointers to the handles of the scene, and browsers capture every touch: without this, a tap on
+  // a point or a posture of the scene does nothing.
+  addEventListener("pointerdown", (event) => {
+    const { target, pointerId, pointerType } = event;
+    if (pointerType === "touch" && target instanceof HTMLCanvasElement) target.releasePointerCapture(pointerId);
+  }, true);
+
+  // viser shows a control's hint while the mouse is on the control; here its label shows it as well.
+  for (const [heard, sent] of [["mouseover", "mouseenter"], ["mouseout", "mouseleave"]]) {
+    addEventListener(heard, (event) => hintedAt(event.target)?.dispatchEvent(new MouseEvent(sent)));
+  }
+
+  return {
+    parts: PARTS,
+    hooks: HOOKS,
+    COLOURS,
+    /** Call `act` after changes of the page of the kinds `on`: childList, characterData or an attribute of ATTRIBUTES.
+     *  With a delay in ms, changes until then are one. */
+    watch,
+    /** Call `act` when the value of a slider changes; `thumb` is what `thumbOf` returns. */
+    watchValue: (thumb, act) => { valueWatchers.set(thumb, act); },
+
+    /** Serve items of the storage: name → () => text, and name → (text) => …, for viser's calls alone. */
+    serveItems: (reading, writing) => { readable = reading; writable = writing; },
+    /** Call `restore` where viser would change the address. */
+    keepAddress: (restore) => { restoreAddress = restore; },
+    /** What `history.replaceState` does, which viser's calls no longer do. */
+    replaceState,
+
+    /** Send a message to the server. done(error, readings) gets its answer. `direct`: it may pass others in the field.
+     *  Returns whether it did. */
+    send,
+    /** Hand on the server's answer to message `to`; earlier ones without an answer are done too. */
+    answer,
+    /** Whether messages can be sent, and another value for each new panel. */
+    messageField,
+
+    /** Type into one of viser's fields, as if the visitor did. */
+    type,
+    /** Open the tab of the panel with this title; returns whether there is one. */
+    openTab,
+    /** The element of a tab by its title. */
+    tab: (title) => tabs().find((node) => textOf(node) === title),
+    /** The title of the tab at an element, or "". */
+    titleAt,
+    /** The titles of the open tabs; docked panels have one each. */
+    openTitles: () => all(PARTS.openTab).map(textOf),
+    /** The strip of tabs around an element of one of them, or undefined; the title of its open tab, or "". */
+    stripAt: (node) => closest(node, PARTS.tab)?.parentElement,
+    openTitleIn: (strip) => all(PARTS.openTab, strip).map(textOf)[0] ?? "",
+
+    /** The canvas of the scene. */
+    scene: () => document.querySelector(PARTS.scene),
+    /** The scrolling part of the panel, or null. */
+    panel: () => closest(document.querySelector(PARTS.tab), PARTS.scrollArea),
+    /** The phone's sheet around an element and its head: { sheet, head }, or null. */
+    sheetOf,
+    /** The docked panel: { node, edge, outwards }, or null. outwards: 1 where the panel grows to the right, else −1. */
+    region,
+    widen,
+    /** The page's colour scheme: "dark", "light", or undefined until it has one. */
+    colours: () => document.documentElement.dataset.mantineColorScheme,
+
+    /** The line of the panel around an element, or null. */
+    lineAt,
+    labelOf,
+    /** The thumb of the slider with this id, and its number field. */
+    thumbOf,
+    fieldOf,
+    /** All thumbs of sliders. */
+    thumbs: () => all(PARTS.thumb),
+    isThumb: (node) => node instanceof Element && node.matches(PARTS.thumb),
+    isSlider: (node) => closest(node, PARTS.slider) !== null,
+    isControl: (node) => closest(node, `input, textarea, select, button, a, summary, [contenteditable], ${PARTS.thumb}, ${PARTS.tab}, [role="option"]`) !== null,
+    /** The tracks of sliders and the elements of ours that match a selector, in the order of the page. */
+    tracksAnd: (selector) => all(`${PARTS.track}, ${selector}`),
+    isTrack: (node) => node.matches(PARTS.track),
+    /** The check box with this label and its line: { box, line }, or null. */
+    checkBox,
+    /** All buttons of viser's. */
+    buttons: () => all(PARTS.button),
+  };
+})();

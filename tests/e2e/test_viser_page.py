@@ -1,0 +1,94 @@
+"""What static/viser_page.js knows of viser's page is true. A new version of viser fails here, name by name."""
+
+from __future__ import annotations
+
+import pytest
+from page import Tab
+from playwright.sync_api import expect
+
+from app.viewer.panel.view import SYSTEM_IS_DARK
+
+pytestmark = pytest.mark.browser
+
+TITLES = ["Learn", "Robot", "Workspace", "Program", "View", "Move"]
+# Looks for parts, name → selector, after each change of the page, and returns the names that were never found.
+WALK = """async ([parts, titles]) => {
+  const missing = new Map(Object.entries(parts)), pause = (ms) => new Promise((done) => setTimeout(done, ms));
+  const look = () => {
+    for (const [name, selector] of missing) if (document.querySelector(selector)) missing.delete(name);
+  };
+  for (const title of titles) {
+    if (!viserPage.openTab(title)) throw new Error(`viser's page has no tab ${title}`);
+    for (let k = 0; k < 100 && !viserPage.openTitles().includes(title); k++) await pause(50);
+    if (!viserPage.openTitles().includes(title)) throw new Error(`openTab("${title}") opens no tab`);
+    for (let k = 0; k < 10 && missing.size; k++) { look(); await pause(50); }
+  }
+  return [...missing.keys()];
+}"""
+
+
+def missing(tab: Tab, parts: dict[str, str]) -> dict[str, str]:
+    """The parts that are in none of the tabs of the panel: name → selector."""
+    return {name: parts[name] for name in tab.page.evaluate(WALK, [parts, TITLES])}
+
+
+def test_viser_has_every_part_of_the_table(desktop: Tab, phone: Tab) -> None:
+    parts: dict[str, str] = desktop.page.evaluate("viserPage.parts")
+    assert len(parts) > 15
+    nowhere = missing(desktop, parts)
+    assert nowhere == {}, "viser's page no longer has these parts of static/viser_page.js"
+    docked = {name for name in parts if name.startswith("region")}
+    on_phone = missing(phone, parts)
+    assert set(on_phone) == docked, "a phone's page lacks the docked panel, and nothing else"
+
+
+def test_a_part_that_viser_lacks_is_named(desktop: Tab) -> None:
+    parts = {"tab": '[role="tab"]', "track": ".mantine-Slider-rail"}
+    assert missing(desktop, parts) == {"track": ".mantine-Slider-rail"}
+
+
+def test_viser_calls_every_hook(tab: Tab) -> None:
+    tab.type_number("1 rotating base", "12.5")
+    tab.page.wait_for_function("Object.values(viserPage.hooks).every((count) => count > 0)", timeout=10_000)
+
+
+def test_the_functions_find_and_move_viser_s_controls(tab: Tab, phone: Tab) -> None:
+    page = tab.page
+    assert page.evaluate("label => viserPage.checkBox(label)?.box.type", SYSTEM_IS_DARK) == "checkbox"
+    lines = """[...document.querySelectorAll("[data-kb-line] > [id]")].map(({ id }) => {
+        const thumb = viserPage.thumbOf(id);
+        return [thumb?.role, viserPage.fieldOf(id)?.tagName, viserPage.labelOf(thumb) !== ""];
+    })"""
+    found = page.evaluate(lines)
+    assert len(found) > 4
+    assert all(line == ["slider", "INPUT", True] for line in found)
+    width = page.evaluate("viserPage.region().node.offsetWidth")
+    page.evaluate("viserPage.widen(40)")
+    page.wait_for_function(f"Math.abs(viserPage.region().node.offsetWidth - {width + 40}) < 2")
+    page.evaluate("viserPage.widen(-40)")
+    assert phone.page.evaluate("viserPage.sheetOf(document.querySelector('[data-status]')).head.tagName") == "DIV"
+    expect(phone.page.locator("[data-kb-head]")).to_have_count(1)
+
+
+def test_scripts_share_one_observer_whose_watchers_do_not_stop_each_other(desktop: Tab) -> None:
+    seen = desktop.page.evaluate(
+        """async () => {
+          const seen = [], kept = window.reportError;
+          let over = false; // watchers stay: after the test these do nothing
+          window.reportError = (error) => seen.push(error.message);
+          viserPage.watch(() => { if (!over) throw new Error("first"); });
+          viserPage.watch(() => { if (!over) seen.push("second"); });
+          viserPage.watch(() => { if (!over) seen.push("late"); }, { delay: 20 });
+          viserPage.watch(() => { if (!over) seen.push("text"); }, { on: ["characterData"] });
+          const node = document.createElement("i");
+          document.body.append(node);
+          node.remove();
+          await new Promise((done) => setTimeout(done, 200));
+          over = true;
+          window.reportError = kept;
+          return seen;
+        }"""
+    )
+    assert seen.index("first") < seen.index("second") < seen.index("late")
+    with pytest.raises(Exception, match="data-other is not observed"):
+        desktop.page.evaluate("viserPage.watch(() => {}, { on: ['data-other'] })")
