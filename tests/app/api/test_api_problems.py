@@ -118,7 +118,7 @@ def test_malformed_json_says_where(client, text):
 
 @pytest.mark.parametrize("opening", ["[", '{"q":', '{"q":[0,'])
 def test_bottomless_json(client, opening):
-    assert "recursion" in problem(send(client, "fk", opening * 100_000), 400, "malformed-json")["detail"]
+    assert "recursion" in problem(send(client, "fk", opening * 40_000), 400, "malformed-json")["detail"]
 
 
 def test_deep_but_legal_json_is_refused_by_its_shape(client):
@@ -154,16 +154,16 @@ def test_a_body_announced_too_large_is_refused_unread(client):
     assert response.headers["connection"] == "close"
 
 
-def test_a_body_that_never_ends_is_not_read_to_its_end(app):
-    """In chunks and with no length announced: after a megabyte nothing more is taken in."""
+def refused_after(app, chunk):
+    """The bytes that are taken of an endless body of equal chunks until it is refused as too large; the detail."""
     taken = 0
     sent = []
 
     async def receive():
         nonlocal taken
-        taken += 100_000
+        taken += len(chunk)
         assert taken < 10_000_000, "still reading"
-        return {"type": "http.request", "body": b" " * 100_000, "more_body": True}
+        return {"type": "http.request", "body": chunk, "more_body": True}
 
     async def send(message):
         sent.append(message)
@@ -177,8 +177,42 @@ def test_a_body_that_never_ends_is_not_read_to_its_end(app):
     scope |= {"path": f"{ARM}/fk", "raw_path": f"{ARM}/fk".encode(), "query_string": b"", "root_path": ""}
     asyncio.run(app(scope | {"headers": headers}, receive, send))
     assert sent[0]["status"] == 413
-    assert json.loads(sent[1]["body"])["type"] == "urn:kinboard:problem:body-too-large"
+    assert (b"connection", b"close") in sent[0]["headers"]
+    document = json.loads(sent[1]["body"])
+    assert document["type"] == "urn:kinboard:problem:body-too-large"
+    return taken, document["detail"]
+
+
+def test_a_body_that_never_ends_is_not_read_to_its_end(app):
+    """In chunks and with no length announced: after a megabyte nothing more is taken in."""
+    taken, detail = refused_after(app, b" " * 100_000)
     assert taken == 1_100_000
+    assert "1000000 bytes" in detail
+
+
+@pytest.mark.parametrize(
+    "item", ["1,", "[],", "{},", "[0.1,0.2,0.3,0.4,0.5],", '{"position":[1,2,3]},', '"k":1,', "["]
+)
+def test_a_body_with_too_many_values_is_refused_while_it_arrives_and_never_parsed(monkeypatch, item):
+    """What parses it holds the interpreter in one step, so its values bound how long visitors wait."""
+    monkeypatch.setattr(body_module, "from_json", lambda _: pytest.fail("parsed"))
+    chunk = item.encode() * 3000
+    marks = sum(chunk.count(mark) for mark in body_module.MARKS)
+    taken, detail = refused_after(create_app(Settings()), chunk)
+    assert (taken / len(chunk) - 1) * marks <= body_module.MOST_VALUES < taken / len(chunk) * marks
+    assert f"{body_module.MOST_VALUES} values" in detail
+
+
+@pytest.mark.parametrize(
+    ("marks", "allowed"), [(body_module.MOST_VALUES, True), (body_module.MOST_VALUES + 1, False)]
+)
+def test_the_number_of_values_is_exact_and_grows_with_the_batch(marks, allowed):
+    text = '{"q":[' + "1," * (marks - 3) + "1]}"
+    client = TestClient(create_app(Settings()))
+    if not allowed:
+        problem(send(client, "fk", text), 413, "body-too-large")
+        client = TestClient(create_app(Settings(max_batch=10_001)))
+    problem(send(client, "fk", text), 422, "invalid-input")
 
 
 def test_a_batch_too_large_names_the_limit(client):

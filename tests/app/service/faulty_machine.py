@@ -112,9 +112,10 @@ class Machine:
         place = Path("/dev/shm") if name == "shm" else self.folders / name
         return Path(f"/proc/{self.service.process.pid}/root{place}") if self.mounted else place
 
-    def _mount(self, *arguments: str) -> None:
+    def _enter(self, *command: str) -> None:
+        """Run a command where the service's folders are."""
         pid = str(self.service.process.pid)
-        subprocess.run(["nsenter", "--target", pid, "--mount", "mount", *arguments], check=True)
+        subprocess.run(["nsenter", "--target", pid, "--mount", *command], check=True)
 
     def fill(self, name: str) -> None:
         """Leave no byte free in a folder."""
@@ -130,14 +131,15 @@ class Machine:
         self._undo.append(junk.unlink)
 
     def protect(self, name: str) -> None:
-        """Make a folder read-only, even for files that are open."""
+        """Make a folder read-only for all files that are opened in it from now on."""
         if not self.mounted:
             self.replace(name)
             return
         place = "/dev/shm" if name == "shm" else str(self.folders / name)
-        # A filesystem with files open for writing cannot be made read-only, its place in the tree can.
-        self._mount("-o", "remount,bind,ro", place)
-        self._undo.append(lambda: self._mount("-o", "remount,bind,rw", place))
+        # What has files open for writing cannot be made read-only, a second mount on top of it can.
+        self._enter("mount", "--bind", place, place)
+        self._undo.append(lambda: self._enter("umount", "--lazy", place))
+        self._enter("mount", "-o", "remount,bind,ro", place)
 
     def remove(self, name: str) -> None:
         """Delete everything in a folder, as programs do that clean up."""

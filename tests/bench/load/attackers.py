@@ -8,6 +8,7 @@ with the lowest priority: they share the machine with the service and with those
 from __future__ import annotations
 
 import asyncio
+import functools
 import json
 import os
 import random
@@ -144,6 +145,38 @@ async def _stalled_upload(attacker: Attacker) -> None:
         await attacker.read(connection)
 
 
+_ROW = [0.123456789] * 5
+
+
+@functools.cache
+def _bodies() -> dict[str, list[tuple[str, bytes]]]:
+    """Bodies of up to 8 MB and their routes: some have too many values, others are parsed and then refused."""
+    found: dict[str, list[tuple[str, object]]] = {
+        "many values": [
+            ("fk", {"q": [_ROW] * 110_000}),
+            ("fk", {"q": [[]] * 1_900_000}),
+            ("ik", {"target": [FAR] * 90_000}),
+            ("fk", {f"a name as long as this {k}": 1 for k in range(220_000)}),
+        ],
+        "fewer": [
+            ("fk", {"q": "x" * 8_000_000}),
+            ("fk", {"q": [_ROW] * 32_000}),
+            ("fk", {f"a name as long as this {k}": "y" * 50 for k in range(90_000)}),
+            ("ik", {"target": [FAR] * 14_000}),
+        ],
+    }
+    return {kind: [(path, json.dumps(body).encode()) for path, body in bodies] for kind, bodies in found.items()}
+
+
+def _large_body(kind: str) -> Round:
+    async def send(attacker: Attacker) -> None:
+        path, body = _bodies()[kind][attacker.rounds % 4]
+        async with attacker.line(request("POST", f"{API}/pioneer5/{path}", body, attacker.token)) as connection:
+            await attacker.read(connection, until_closed=False)
+
+    return send
+
+
 async def _wrong_token(attacker: Attacker) -> None:
     async with attacker.line(request("GET", API, token=f"wrong-{random.random()}")) as connection:
         await attacker.read(connection, until_closed=False)
@@ -271,6 +304,8 @@ ATTACKS = (
     Attack("requests sent ahead", _pipeline, 4, 0.1),
     Attack("half-sent heads", _half_a_head, 100, 0.1),
     Attack("stalled uploads", _stalled_upload, 20, 10.0),
+    Attack("bodies of too many values", _large_body("many values"), 3, 0.1),
+    Attack("large bodies", _large_body("fewer"), 3, 0.1),
     Attack("wrong tokens", _wrong_token, 4, 0.05),
     Attack("no HTTP", _nonsense, 2, 0.05),
     Attack("huge batches", _huge_batch, 4, 5.0),
