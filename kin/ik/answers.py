@@ -71,9 +71,9 @@ def _solved(problem: IKProblem, branches: Branches, good: Flags) -> IKResult:
     if problem.options.avoids:
         if problem.options.prefer != "nearest":
             preferences.improve(problem, branches, good)
+        searched = avoidance.searchable(problem, branches, good)
         free = avoidance.free_rows(problem, branches, good)
         if not free.any():
-            searched = bool(branches.redundancies)
             refused = avoidance.all_touch(problem, branches.q[good], np.flatnonzero(good), searched)
             refused.completeness = "unknown" if searched else branches.completeness
             return refused
@@ -166,7 +166,7 @@ def _by_descents(problem: IKProblem) -> IKResult | None:
             else:
                 touching.append(i)
     if touching and not best:
-        return avoidance.all_touch(problem, q[touching], None, leaves_motion(problem))
+        return avoidance.all_touch(problem, q[touching], None)
     if not best:
         details = NotOnBranch(len({problem.branch_of(row) for row in q}), 0)
         closest = nearest.closest(problem, None)

@@ -11,7 +11,7 @@ import numpy as np
 from kin.errors import InputError
 from kin.fk import jacobian
 from kin.ik import preferences
-from kin.ik.branches import Branches, Flags, measure, redundancy_of, solution
+from kin.ik.branches import Branches, Flags, measure, redundancy_of, solution, with_further
 from kin.ik.candidates import select
 from kin.ik.details import Details, Redundancy, SolutionCurve, Solved
 from kin.ik.options import Frame
@@ -44,11 +44,12 @@ class Found:
         every: ``(k,)`` the rows whose intervals together are those of the best solution's redundancy.
     """
 
-    __slots__ = ("_branches", "_curves", "_every", "_given", "_problem", "_redundancies")
+    __slots__ = ("_branches", "_curves", "_every", "_given", "_problem", "_redundancies", "_together")
 
     def __init__(self, problem: IKProblem, branches: Branches, order: list[int], every: Flags) -> None:
         self._problem, self._branches, self._given, self._every = problem, branches, order, every
         self._redundancies: Parameters | None = None
+        self._together: tuple[Redundancy, ...] | None = None
         self._curves: tuple[tuple[SolutionCurve, ...], list[int]] | None = None
 
     def result(self) -> IKResult:
@@ -108,21 +109,23 @@ class Found:
         return tuple(solutions)
 
     def redundancies(self) -> Parameters:
-        """Of each solution, and of the best one with the intervals of all branches."""
+        """Of each solution, and of the best one with the intervals of all branches that have a solution."""
         if self._redundancies is None:
             self._redundancies = redundancy_of(self._problem, self._branches, self._order, self._every)
         return self._redundancies
 
     @property
     def redundancy(self) -> tuple[Redundancy, ...]:
-        """The parameters of the best solution."""
-        return self.redundancies()[1]
+        """The parameters of the best solution, with the intervals of all branches."""
+        if self._together is None:
+            self._together = with_further(self._branches, self.redundancies()[1])
+        return self._together
 
     @property
     def details(self) -> Solved:
         """How many solutions there are, and what the task leaves free."""
         problem, names = self._problem, form_of(self._problem).branches
-        redundancy, complete = self.redundancy, self.completeness != "unknown"
+        redundancy, complete = self.redundancies()[1], self.completeness != "unknown"
         postures = len({names[row] for row in self._order})
         if not redundancy and problem.options.redundancy is None:
             return Solved(
@@ -136,6 +139,8 @@ class Found:
             )
         fixed = tuple([parameter.label for parameter in problem.requested])
         free = tuple([r.label for r in redundancy if r.label not in fixed and _has_width(r)])
+        if redundancy and not free and not fixed and self._branches.further is not None:
+            free = tuple([r.label for r in self.redundancy if _has_width(r)])
         movable = redundancy and {
             p.name for p in problem.redundancies if p.joint < 0 or not problem.locked[p.joint]
         }

@@ -68,7 +68,7 @@ def checked(problem: IKProblem, result: IKResult, most: int | None) -> IKResult:
         return result
     kept = tuple(each for each, clear in zip(found, free.tolist(), strict=True) if clear)
     if not kept:
-        return all_touch(problem, np.array([each.q for each in found]), None, False)
+        return all_touch(problem, np.array([each.q for each in found]), None)
     details = result.details
     if isinstance(details, Solved):
         details = details._replace(configurations=len(kept), touching=details.touching + len(found) - len(kept))
@@ -78,30 +78,46 @@ def checked(problem: IKProblem, result: IKResult, most: int | None) -> IKResult:
     return replace(result, solutions=kept[:most], details=details, singularities=singular)
 
 
-def all_touch(problem: IKProblem, q: Array, rows: NDArray[np.intp] | None, searched: bool) -> IKResult:
+def all_touch(
+    problem: IKProblem, q: Array, rows: NDArray[np.intp] | None, searched: tuple[str, ...] = ()
+) -> IKResult:
     """The answer if all configurations ``(k, n)`` that meet the target touch something.
+
+    The one with the fewest contacts is shown; of several, the one whose deepest contact is the least deep. The
+    depth alone does not tell: where the axes of two capsules meet, it is the sum of their radii, however far they
+    overlap.
 
     Args:
         rows: their branches, None if these are not known.
-        searched: whether redundancy parameters were searched.
+        searched: labels of the redundancy parameters that were searched.
     """
     near = around(problem)
-    distance, which = near.distances(q)
-    best = int(distance.argmax())
-    contact = near.contact(float(distance[best]), int(which[best]))
-    assert contact is not None
+    touching = [near.touches(each) for each in q]
+    best = min(range(len(q)), key=lambda i: (len(touching[i]), -touching[i][0].distance))
+    contact = touching[best][0]
     q, stats = measure(problem, q)
     branches = [problem.branch_of(row) for row in q] if rows is None else rows.tolist()
     names = [problem.branch_name(branch) for branch in branches]
-    labels = tuple(
-        parameter.label
-        for parameter, value in zip(problem.redundancies, problem.values, strict=True)
-        if searched and math.isnan(value)
-    )
-    details = Touching(names[best], contact, len(set(names)), labels)
+    details = Touching(names[best], contact, len(set(names)), searched, len(touching[best]))
     cause: Cause = "self-collision" if contact.obstacle is None else "obstacle"
     closest = solution(problem, q[best], stats[best], branches[best])
     return make_result(problem, Status.COLLISION, cause, details, closest=closest)
+
+
+def searchable(problem: IKProblem, branches: Branches, good: Flags) -> tuple[str, ...]:
+    """Labels of the redundancy parameters that may have another value on one of the good rows ``(k,)``.
+
+    Not one whose value was requested or whose joint is locked, nor one that only singular targets leave free where
+    the target is not singular.
+    """
+    found = []
+    for k, parameter in enumerate(branches.redundancies):
+        if not math.isnan(problem.values[k]) or np.isnan(branches.values[good, k]).all():
+            continue
+        row, low, high = branches.arcs[k].T
+        if not problem.respect or (good[row.astype(np.intp)] & (high - low > TOLERANCES.merge)).any():
+            found.append(parameter.label)
+    return tuple(found)
 
 
 def free_rows(problem: IKProblem, branches: Branches, good: Flags) -> Flags:

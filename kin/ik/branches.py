@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from kin.ik.details import JointKind, LimitViolation, Redundancy
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKSolution
 from kin.solvers.contract import APPROACH, Completeness, Obstacle, RedundancyParameter, SolverInput
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _NO_LIMIT = 1e6
@@ -32,7 +34,7 @@ class Branches:
         closed, good: ``(k,)``, which rows meet the task, and which of them the limits allow (if they count).
         order: the good rows, nearest to the seed first, each configuration once.
         redundancies: the redundancy parameters of `values` and `arcs`.
-        values, arcs, gap, obstacle, completeness: as in `kin.solvers.contract.Candidates`.
+        values, arcs, gap, obstacle, completeness, further: as in `kin.solvers.contract.Candidates`.
     """
 
     q: Array
@@ -46,6 +48,7 @@ class Branches:
     gap: float
     obstacle: Obstacle | None
     completeness: Completeness
+    further: Callable[[], Array] | None
 
 
 def is_closed(problem: IKProblem, stats: Array) -> Flags:
@@ -89,7 +92,7 @@ def solve_branches(
     count = unchecked()(problem.requirement, problem.T, seed, problem.seed, rows)
     return Branches(
         q, rows.stats, rows.closed, rows.good, rows.order[:count].tolist(), redundancies, found.values,
-        list(found.arcs), found.gap, found.obstacle, found.completeness,
+        list(found.arcs), found.gap, found.obstacle, found.completeness, found.further,
     )  # fmt: skip
 
 
@@ -123,7 +126,7 @@ def redundancy_of(
     problem: IKProblem, branches: Branches, rows: list[int], every: Flags
 ) -> tuple[list[tuple[Redundancy, ...]], tuple[Redundancy, ...]]:
     """The redundancy parameters of each branch in `rows`: values and ranges; and those of the first row with the
-    ranges of all branches in `every` ``(k,)``.
+    ranges of all branches in `every` ``(k,)``, but for further ones (`with_further`).
 
     A parameter that is a joint's value follows its whole-turn image. Without limits an angle may have any value.
     """
@@ -142,6 +145,20 @@ def redundancy_of(
         if not math.isnan(there[rows[0]]):
             together += (Redundancy(name, label, values[rows[0]], intervals[-1]),)
     return found, together
+
+
+def with_further(branches: Branches, together: tuple[Redundancy, ...]) -> tuple[Redundancy, ...]:
+    """The redundancy parameters with the values at which there are configurations on no row of `branches`."""
+    if branches.further is None or not together:
+        return together
+    first = together[0]
+    joined: list[tuple[float, float]] = []
+    for low, high in sorted([*first.intervals, *map(tuple, branches.further().tolist())]):
+        if joined and low <= joined[-1][1] + TOLERANCES.merge:
+            joined[-1] = joined[-1][0], max(joined[-1][1], high)
+        else:
+            joined.append((low, high))
+    return (first._replace(intervals=tuple(joined)), *together[1:])
 
 
 def _intervals(

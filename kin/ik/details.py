@@ -151,16 +151,18 @@ class Touching(NamedTuple):
     """Configurations exist, but in all that were looked at the arm touches itself or an obstacle.
 
     Attributes:
-        branch: the posture in which bodies overlap least.
-        contact: what touches there; `distance` is negative.
+        branch: the posture with the fewest contacts; of several, the one whose deepest contact is the least deep.
+        contact: the deepest contact there; `distance` is negative.
         postures: how many postures were looked at, this one included.
         searched: labels of the redundancy parameters that were searched.
+        contacts: how many pairs of links, and of links and obstacles, touch there.
     """
 
     branch: str
     contact: Contact
     postures: int
     searched: tuple[str, ...] = ()
+    contacts: int = 1
 
 
 class NotOnBranch(NamedTuple):
@@ -169,10 +171,12 @@ class NotOnBranch(NamedTuple):
     Attributes:
         elsewhere: how many solutions there are on other branches.
         outside_limits: how many other branches exist, but outside the limits.
+        locked: indices of the locked joints.
     """
 
     elsewhere: int
     outside_limits: int
+    locked: tuple[int, ...] = ()
 
 
 class MaskNotMet(NamedTuple):

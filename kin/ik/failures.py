@@ -25,6 +25,7 @@ from kin.ik.branches import (
     solution,
     solve_branches,
     violations_of,
+    with_further,
 )
 from kin.ik.candidates import DISTANCE, OVERRUN, ROLL
 from kin.ik.details import (
@@ -115,7 +116,7 @@ def outside_limits(problem: IKProblem, branches: Branches, rows: Flags, good: Fl
         return _found_by_descent(problem, closest)
     order = by_key(branches.q, rows, branches.stats[:, OVERRUN])
     blocked = _blocked(problem, branches.q, order, range(len(branches.q)))
-    redundancy = redundancy_of(problem, branches, order[:1], rows)[1]
+    redundancy = with_further(branches, redundancy_of(problem, branches, order[:1], rows)[1])
     names = [parameter.name for parameter in problem.requested]
     details = OutsideLimits(
         branch=blocked[0].branch,
@@ -142,7 +143,9 @@ def not_on_branch(problem: IKProblem, branches: Branches, closed: Flags, good: F
     if _is_solution(closest, problem):
         return _found_by_descent(problem, closest)
     fits, exist = (len(by_key(branches.q, rows, branches.stats[:, DISTANCE])) for rows in (good, closed))
-    return make_result(problem, Status.UNREACHABLE, "branch", NotOnBranch(fits, exist - fits), closest=closest)
+    locked = tuple(np.flatnonzero(problem.locked).tolist())
+    details = NotOnBranch(fits, exist - fits, locked)
+    return make_result(problem, Status.UNREACHABLE, "branch", details, closest=closest)
 
 
 def compromise(problem: IKProblem, branches: Branches, allowed: Flags) -> IKResult:

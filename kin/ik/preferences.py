@@ -26,8 +26,8 @@ _SAMPLES = 24
 _ZOOMS = 4
 # Of a parameter whose rows are not the same branches at all values: samples of its range, and how many of the best
 # ones are refined.
-_ALL_SAMPLES = 72
-_REFINED = 3
+_ALL_SAMPLES = 108
+_REFINED = 10
 
 
 def scores(problem: IKProblem, q: Array) -> Array:

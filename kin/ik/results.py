@@ -134,7 +134,7 @@ class IKResult(Deferred):
         solutions: in the requested order (compromises: by their error); empty unless solved or approximate.
         closest: without a solution, the configuration inside the limits with the smallest
             ``√(|Δp|² + (0.1 m · angle)²)`` found on the requested branches, else None. Status ``collision``:
-            of the solutions without regard to collisions, the one in which bodies overlap least.
+            of the solutions without regard to collisions, the one with the fewest contacts.
         nearest_orientation: the configuration with the exact point and the smallest rotation error (status
             ``orientation``), None if none was found.
         blocked: every posture that is outside the limits, the closest to them first (status ``limits``).

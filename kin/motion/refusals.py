@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kin.ik import branch_names, branch_of, solve_ik
+from kin.ik.branches import Flags
 from kin.ik.details import JointKind, LimitViolation, OrientationNotMet, OutOfReach
 from kin.ik.options import Task
 from kin.ik.results import IKResult, Status
@@ -33,6 +34,7 @@ NEAR = 0.1  # radians or metres from a singularity that counts as the reason
 _SAME = 1e-6  # radians or metres between two configurations that count as one
 # A path is slow where the joints allow less than this part of its usual speed; how near a singularity is named.
 _SLOW, _WIDE = 0.4, 0.5
+_HALVINGS = 40  # of the interval in which a joint reaches its limit
 
 
 def violations(robot: Robot, q: Array) -> tuple[LimitViolation, ...]:
@@ -46,17 +48,38 @@ def violations(robot: Robot, q: Array) -> tuple[LimitViolation, ...]:
     return tuple(found)
 
 
-def limit_met(robot: Robot, q: Array) -> tuple[int, LimitViolation] | None:
-    """The first configuration of a path ``(k, n)`` outside the limits, and how far that joint would go."""
+def outside(robot: Robot, q: Array) -> Flags:
+    """Which configurations of a path ``(k, n)`` are outside the limits ``(k,)``."""
     slack = TOLERANCES.limit
-    outside = (q < robot.lower - slack) | (q > robot.upper + slack)
-    if not outside.any():
+    return np.asarray(((q < robot.lower - slack) | (q > robot.upper + slack)).any(axis=1))
+
+
+def limit_met(
+    robot: Robot, s: Array, q: Array, at: Callable[[float, Array], Array]
+) -> tuple[float, LimitViolation] | None:
+    """Where a path first reaches the limit of a joint, and how far that joint would go beyond it.
+
+    Args:
+        s, q: places ``(k,)`` and the configurations ``(k, n)`` there.
+        at: the configuration ``(n,)`` at any place, given one that is close to it.
+    """
+    beyond = outside(robot, q)
+    if not beyond.any():
         return None
-    row = int(np.argmax(outside.any(axis=1)))
-    first = violations(robot, q[row])[0]
-    beyond = q[row:, first.joint]
-    value = float(beyond.max() if first.limit == robot.upper[first.joint] else beyond.min())
-    return row, replace(first, value=value)
+    row = int(np.argmax(beyond))
+    high, there = float(s[row]), q[row]
+    low, here = (float(s[row - 1]), q[row - 1]) if row else (high, there)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        between = at(middle, 0.5 * (here + there))
+        if outside(robot, between[None])[0]:
+            high, there = middle, between
+        else:
+            low, here = middle, between
+    first = violations(robot, there)[0]
+    rest = q[row:, first.joint]
+    value = float(rest.max() if first.limit == robot.upper[first.joint] else rest.min())
+    return high, replace(first, value=value)
 
 
 def lost(robot: Robot, poses: Array, before: Array, task: Task) -> tuple[Cause, RefusalDetails]:

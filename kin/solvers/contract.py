@@ -110,6 +110,9 @@ class Candidates:
         gap: metres by which the geometry does not close when no branch exists.
         obstacle: what does not fit then; None if the solver cannot tell.
         completeness: how it is known that no configuration is missing.
+        further: gives intervals ``(k, 2)`` of the first redundancy parameter in which there are configurations
+            inside the limits, also on branches that none of the rows is on. It takes long, so it is called when
+            they are asked for.
     """
 
     q: Array
@@ -118,6 +121,7 @@ class Candidates:
     gap: float = 0.0
     obstacle: Obstacle | None = None
     completeness: Completeness = "proved"
+    further: Callable[[], Array] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from kin import Contact, LimitViolation, Redundancy, Singularity
 from kin.ik.details import (
     Details,
     MaskNotMet,
+    NotOnBranch,
     OrientationNotMet,
     OutOfReach,
     OutsideLimits,
@@ -178,7 +179,7 @@ class IkDetails(TypedDict, total=False):
     """Cause "rotation": the limit that keeps the arm from the approach direction; null if no limit does."""
     branch: str
     """Cause "joint limits": the posture that is closest to the limits. Causes "self-collision" and "obstacle": the
-    one in which bodies overlap least."""
+    one with the fewest contacts."""
     violations: list[Violation]
     """Cause "joint limits": its joint values outside the limits."""
     branches: int
@@ -188,13 +189,17 @@ class IkDetails(TypedDict, total=False):
     elsewhere: int
     """Causes "joint limits" and "branch": how many solutions there are on branches that were not requested."""
     contact: ContactAnswer
-    """Causes "self-collision" and "obstacle": what touches in the posture `branch`, in which it overlaps least."""
+    """Causes "self-collision" and "obstacle": the deepest contact in the posture `branch`."""
+    contacts: int
+    """Causes "self-collision" and "obstacle": how many pairs of links, and of links and obstacles, touch there."""
     searched: list[str]
     """Causes "self-collision" and "obstacle": labels of the redundancy parameters that were searched."""
     touching: int
     """Cause "" (solved): how many configurations were left out because something touches; absent if none were."""
     outside_limits: int
     """Cause "branch": how many other branches exist, but outside the limits."""
+    locked: list[int]
+    """Cause "branch": indices of the locked joints; absent if there are none."""
     distance: float
     """Causes "too far", "too near", "around the axis" and "outside": metres by which the point is out of reach."""
     obstacle: ObstacleAnswer | None
@@ -251,6 +256,10 @@ def details_answer(details: Details) -> IkDetails:
             fields["curves"] = [curve._asdict() for curve in details.curves]
             if not details.curves:
                 del fields["curves"]
+        case NotOnBranch():
+            fields["locked"] = list(details.locked)
+            if not details.locked:
+                del fields["locked"]
         case Touching():
             fields["contact"], fields["searched"] = contact_answer(details.contact), list(details.searched)
         case OrientationNotMet():

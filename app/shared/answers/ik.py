@@ -113,7 +113,7 @@ class IkAnswer(TypedDict):
     closest: Solution | None
     """When there is no exact answer, the configuration inside the limits with the least
     √(|Δp|² + (0.1 m · angle)²) on the requested branches; null when solved. For "collision": of the
-    solutions without regard to collisions, the one in which bodies overlap least."""
+    solutions without regard to collisions, the one with the fewest contacts."""
     nearest_orientation: Solution | None
     """For "orientation": the exact point with the least rotation error; null otherwise."""
     blocked: list[Blocked]

@@ -115,7 +115,8 @@ def _title(details: Details, headline: str, units: Units) -> str:
         case RotationError(_, error):
             return f"Point reached, orientation off by {units.angle(error)}"
         case OutsideLimits(_, violations):
-            return f"{headline}: {numbered([v.joint for v in violations])}"
+            beyond = [v.joint for v in violations if not v.locked]
+            return f"{headline}: {numbered(beyond)}" if beyond else headline
         case OrientationNotMet():
             return "Orientation not possible here"
         case OutOfReach(distance, restriction) if distance > 0.0:
@@ -138,11 +139,13 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
                 why = f"the approach direction would need {need(violation, units)}"
             return f"Point reached, orientation off by {angle(error)}", why
         case OutsideLimits():
-            return "Outside the limits", _outside(details, units)
+            return _refusing(details), _outside(details, units)
         case Touching():
             return "No collision-free posture found", _touching(details, units)
-        case NotOnBranch(elsewhere, outside):
+        case NotOnBranch(elsewhere, outside, locked):
             why = f"{count(outside, 'other posture exists', 'other postures exist')}, outside the joint limits"
+            if locked:
+                why += f" or only with {numbered(locked)} unlocked"
             if elsewhere:
                 reach = count(elsewhere, "configuration reaches", "configurations reach")
                 why = f"{reach} this target in other postures"
@@ -164,14 +167,16 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
 
 
 def _touching(details: Touching, units: Units) -> str:
-    """What touches what in the posture that overlaps least, before redundancy parameters were searched."""
+    """What touches what in the posture with the fewest contacts, before redundancy parameters were searched."""
     contact, name = details.contact, f" ({details.branch})" if details.branch != "numeric" else ""
     text = f"{contact.text} by {units.lengths.value(-contact.distance)}"
+    if details.contacts > 1:
+        text += f", the deepest of {details.contacts} contacts"
     if details.postures == 1:
         text += name
     else:
-        others = count(details.postures - 1, "other posture overlaps", "other postures overlap")
-        text += f" in the posture that overlaps least{name}; {others} more"
+        others = count(details.postures - 1, "other posture has", "other postures have")
+        text += f" in the posture with the fewest contacts{name}; {others} at least as many"
     if details.searched:
         text += f"; a search over {listed(details.searched)} found no value without a collision"
     return text
@@ -240,16 +245,27 @@ def _out_of_reach(restriction: Restriction | None, cause: str, units: Units) -> 
     return f"{_SIDES[cause]}; {_possible(restriction, f'it would still be out of reach by {missing}')}"
 
 
+def _refusing(details: OutsideLimits) -> str:
+    """What refuses the posture that comes closest: limits, locks or both."""
+    locked = [v.joint for v in details.violations if v.locked]
+    if not locked:
+        return "Outside the limits"
+    lock = f"while {numbered(locked)} {are(locked)} locked"
+    return f"Not possible {lock}" if len(locked) == len(details.violations) else f"Outside the limits {lock}"
+
+
 def _outside(details: OutsideLimits, units: Units) -> str:
     """Which joints would be where, on the posture that is closest to the limits."""
-    which = "the posture closest to the limits" if details.branches > 1 else "the posture"
+    locks = any(v.locked for v in details.violations)
+    limits = "limits and locks" if locks else "limits"
+    which = f"the posture closest to the {limits}" if details.branches > 1 else "the posture"
     given = ", ".join(f"{r.label} = {units.angles.value(r.value)}" for r in details.requested)
     needs = listed([need(violation, units) for violation in details.violations])
     name = f" ({details.branch})" if details.branch != "numeric" else ""
     text = f"{f'with {given} ' if given else ''}{which}{name} needs {needs}"
     if details.branches > 1:
         others = count(details.branches - 1, "other posture is", "other postures are")
-        text += f". {others[0].upper()}{others[1:]} outside the limits too"
+        text += f". {others[0].upper()}{others[1:]} {'not possible either' if locks else 'outside the limits too'}"
     possible = [r for r in details.requested if r.intervals]
     for r in possible:
         text += f". Possible {r.label}: {ranges(r.intervals, units)}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -38,7 +39,7 @@ from kin.motion.paths import (
 )
 from kin.motion.planning.plan import CODES, Plan, RefusedError
 from kin.motion.program import Circ, Dwell, JointTarget, Lin, Ptp, Spline, Target
-from kin.motion.refusals import helps_at, helps_for, limit_met, lost, violations
+from kin.motion.refusals import helps_at, helps_for, limit_met, lost, outside, violations
 from kin.transforms import Array
 
 _REST = 9  # places of the rest of a segment that are asked how far out of reach they are
@@ -164,12 +165,12 @@ def _ends(plan: Plan, curves: list[Curve], near: Array) -> Array:
 def _lost(plan: Plan, layout: Layout, chain: Chain, error: LostError) -> RefusedError:
     """The refusal of a path that the joints cannot follow."""
     robot = plan.robot
-    met = limit_met(robot, error.q[:-1])
+    met = limit_met(robot, error.s[:-1], error.q[:-1], _settled(plan, chain))
     s = float(error.s[-1])
     if met is not None:
         cause: Cause = "limits"
-        details: RefusalDetails = LimitMet(met[1])
-        s = float(error.s[met[0]])
+        s, violation = met
+        details: RefusalDetails = LimitMet(violation)
     else:
         end = float(layout.bounds[np.searchsorted(layout.bounds[:-1], s, side="left")])
         poses = chain.poses(np.linspace(s, end, _REST))
@@ -177,12 +178,28 @@ def _lost(plan: Plan, layout: Layout, chain: Chain, error: LostError) -> Refused
     return _refused_at(plan, layout, chain, s, cause, details)
 
 
+def _settled(plan: Plan, chain: Chain) -> Callable[[float, Array], Array]:
+    """The configuration at a place of the tool's path, from one that is close to it."""
+
+    def at(s: float, near: Array) -> Array:
+        q = near[None].copy()
+        settle(plan.robot.model, chain.poses(np.array([s])), ROWS[CODES[plan.task]], q, np.empty(1))
+        return np.asarray(q[0])
+
+    return at
+
+
 def check_limits(plan: Plan, run: Run, chain: Chain | tuple[()]) -> None:
     """Refuse a path that leaves the limits of the joints anywhere."""
-    at = turning_points(run.knots, run.pieces)
-    met = limit_met(plan.robot, values(run.knots, run.pieces, at))
+
+    def driven(s: float, near: Array) -> Array:
+        return np.asarray(values(run.knots, run.pieces, np.array([s]))[0])
+
+    s = turning_points(run.knots, run.pieces)
+    at = driven if isinstance(chain, tuple) else _settled(plan, chain)
+    met = limit_met(plan.robot, s, values(run.knots, run.pieces, s), at)
     if met is not None:
-        raise _refused_at(plan, run.layout, chain, float(at[met[0]]), "limits", LimitMet(met[1]))
+        raise _refused_at(plan, run.layout, chain, met[0], "limits", LimitMet(met[1]))
 
 
 def _refused_at(
@@ -204,7 +221,7 @@ def _refused_at(
             knots, pieces = followed(plan.robot, chain, q, CODES[plan.task], plan.stop)
         except LostError:
             return False
-        return limit_met(plan.robot, values(knots, pieces, np.linspace(0.0, float(knots[-1]), 999))) is None
+        return not outside(plan.robot, values(knots, pieces, np.linspace(0.0, float(knots[-1]), 999))).any()
 
     helps = helps_for(plan.robot, poses, plan.q, plan.task, cause, can_follow)
     return plan.refused(layout.owners[0][0] + k, cause, details, helps, (fraction, distance))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,6 +35,9 @@ from kin.transforms import Array
 NAME = "general7"
 TITLE = "all solutions, seven revolute joints of which one is given"
 _SCAN = 64  # values that are tried where none near the seed's is feasible
+# Samples of a turn for the ranges of all solutions, and between two of them where solutions come close to the
+# limits; how close (rad, all joints together); motion between two samples that counts as going on (rad).
+_SAMPLES, _FINER, _CLOSE, _SAME_MOTION = 144, 12, 0.3, 0.3
 
 
 Match = Callable[[Robot], ClosedForm | None]
@@ -140,7 +144,8 @@ class General7(ClosedForm):
         completeness = weakest(self._add_missing(p, value, out), "agreed")
         values = np.where(np.isnan(out[:, :1]), math.nan, value)
         arcs = self._ranges(p, out) if p.respect_limits else np.empty((0, 3))
-        return Candidates(out, values, (arcs,), completeness=completeness)
+        further = (lambda: self._all_ranges(p)) if p.respect_limits else None
+        return Candidates(out, values, (arcs,), completeness=completeness, further=further)
 
     def _at(self, problem: SolverInput, values: Array) -> Array:
         """All solutions ``(N, rows, 7)`` at these values of the given joint."""
@@ -214,6 +219,62 @@ class General7(ClosedForm):
                 low, high = turn_around(least, most, float(out[i, self.given]))
             found.append((float(i), max(low, least), min(high, most)))
         return np.array(found).reshape(-1, 3)
+
+    def _all_ranges(self, problem: SolverInput) -> Array:
+        """The values ``(k, 2)`` of the given joint at which any solution is inside the limits.
+
+        Samples tell where there are solutions; the ends between two samples are found by following self-motions. A
+        range between two samples is found if solutions that are outside the limits come close to them there.
+        """
+        least, most = float(problem.lower[self.given]), float(problem.upper[self.given])
+        low, high = turn_around(least, most, float(problem.seed[self.given]))
+        if high <= low:
+            return np.empty((0, 2))
+        values = np.linspace(low, high, 1 + math.ceil(_SAMPLES * (high - low) / TURN))
+        found = self._at(problem, values)
+        outside = self._outside(problem, found)
+        near = outside.min(axis=1)
+        finer = [
+            np.linspace(values[i - 1], values[i + 1], 2 * _FINER + 1)[1:-1]
+            for i in range(1, len(values) - 1)
+            if 0.0 < near[i] < _CLOSE and near[i] <= near[i - 1] and near[i] <= near[i + 1]
+        ]
+        if finer:
+            values = np.unique(np.concatenate([values, *finer]))
+            found = self._at(problem, values)
+            outside = self._outside(problem, found)
+        inside = outside == 0.0
+        ranges: list[tuple[float, float]] = []
+        for i in np.flatnonzero(inside.any(axis=1)).tolist():
+            low = high = float(values[i])
+            if i > 0:
+                low = self._reached(
+                    problem, found[i - 1][inside[i - 1]], found[i][inside[i]], float(values[i - 1])
+                )
+            if i < len(values) - 1:
+                high = self._reached(
+                    problem, found[i + 1][inside[i + 1]], found[i][inside[i]], float(values[i + 1])
+                )
+            ranges.append((low, high))
+        turns: range | tuple[int, ...] = (0,)
+        if most - least < UNBOUNDED:
+            turns = range(math.floor((least - values[-1]) / TURN), math.ceil((most - values[0]) / TURN) + 1)
+        shifted = [(max(a + k * TURN, least), min(b + k * TURN, most)) for k in turns for a, b in ranges]
+        return np.array([(a, b) for a, b in shifted if a <= b]).reshape(-1, 2)
+
+    def _reached(self, problem: SolverInput, there: Array, here: Array, to: float) -> float:
+        """How far solutions `here` ``(k, 7)`` go on towards the next value; those there are `there` ``(m, 7)``."""
+        start = float(here[0, self.given])
+        if len(there):
+            off = np.abs((there[:, None] - here[None] + math.pi) % TURN - math.pi).max(axis=2)
+            if off.min() < _SAME_MOTION:
+                return to
+        sense = math.copysign(1.0, to - start)
+        lower, upper = problem.lower.copy(), problem.upper.copy()
+        lower[self.given], upper[self.given] = min(start, to), max(start, to)
+        cell = replace(problem, lower=lower, upper=upper)
+        ends = [self._end(cell, row, sense) for row in here]
+        return max(ends) if sense > 0.0 else min(ends)
 
     def branch_of(self, q: Array) -> int:
         """The row of q ``(7,)`` among all solutions of its pose with the same value of the given joint."""

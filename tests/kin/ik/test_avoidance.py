@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import kin
+from kin.collision.contacts import surroundings
 from kin.ik.details import Solved, Touching
 
 UR5, IIWA, PIONEER = (kin.get_robot(name) for name in ("ur5", "iiwa14", "pioneer5"))
@@ -37,9 +38,13 @@ def test_solutions_are_those_that_do_not_touch(robot):
         if not clear:
             assert found.status == "collision"
             assert found.cause == "self-collision"
-            least = max(float(kin.self_distance(robot, s.q)) for s in every)
+            contacts = [surroundings(robot).touches(s.q) for s in every]
+            fewest, depth = min((len(each), -each[0].distance) for each in contacts)
             assert isinstance(found.details, Touching)
-            assert found.details.contact.distance == pytest.approx(least, abs=1e-9)
+            assert found.details.contacts == fewest
+            assert found.details.contact.distance == pytest.approx(-depth, abs=1e-9)
+            assert found.details.searched == ()
+            assert "search" not in found.reason
             assert found.closest is not None
             assert found.closest.position_error < 1e-9
             assert found.details.contact.text in found.reason
@@ -78,6 +83,41 @@ def test_an_obstacle_that_encloses_the_target_leaves_nothing():
     assert (found.status, found.cause) == ("collision", "obstacle")
     assert "crate" in found.reason
     assert not found.solutions
+
+
+def test_a_freedom_is_named_only_if_it_was_searched():
+    """A wall around the target leaves no posture, whatever the arm angle is; a locked or requested one stays."""
+    T = kin.fk(IIWA, IIWA.q_home)
+    box = [kin.Obstacle("box", T[:3, 3].tolist(), size=(0.3, 0.3, 0.3), name="crate")]
+    found = kin.solve_ik(IIWA, T, obstacles=box)
+    assert isinstance(found.details, Touching)
+    assert found.details.searched == ("arm angle ψ",)
+    assert found.completeness == "unknown"
+    psi = kin.solve_ik(IIWA, T).redundancy[0].value
+    for fixed in ({"redundancy": psi}, {"locked": [None, None, float(IIWA.q_home[2]), *[None] * 4]}):
+        given = kin.solve_ik(IIWA, T, obstacles=box, **fixed)
+        assert isinstance(given.details, Touching)
+        assert given.details.searched == ()
+        assert "search" not in given.reason
+
+
+def test_the_posture_with_the_fewest_contacts_is_shown():
+    """Where axes cross, the depth is the sum of two radii in one posture as in another; the contacts differ."""
+    wall = kin.Obstacle("box", [0.0, 0.0, 0.45], size=(3.0, 3.0, 0.6), name="slab")
+    counts = []
+    for T in targets(UR5, 30):
+        every = kin.solve_ik(UR5, T).solutions
+        found = kin.solve_ik(UR5, T, obstacles=[wall])
+        if found.status != "collision":
+            continue
+        near = surroundings(UR5, (wall,), False)
+        contacts = [len(near.touches(s.q)) for s in every]
+        assert found.closest is not None
+        assert len(near.touches(found.closest.q)) == min(contacts)
+        counts.append(max(contacts) - min(contacts))
+        if min(contacts) > 1:
+            assert f"the deepest of {min(contacts)} contacts" in found.reason
+    assert max(counts) > 0
 
 
 def test_arms_with_few_joints_leave_out_what_touches_too():

@@ -141,6 +141,8 @@ def test_a_violation_says_that_the_joint_is_locked():
     result = solve_ik(robot, target, task="approach", locked=[1.0, None, None, None, None])
     assert result.status is Status.LIMITS
     assert "joint 1 (rotating base) at 90.0° (locked at 57.3°)" in result.reason
+    assert result.reason.startswith("Not possible while joint 1 is locked: ")
+    assert "outside the limits" not in result.reason
 
 
 @pytest.mark.parametrize(("name", "point"), [("puma560", [0.2, 0.5, 0.5]), ("ur5", [0.1, 0.4, 0.4])])

@@ -281,6 +281,31 @@ def test_a_joint_limit_on_the_way_is_named_with_what_would_help():
     assert "joint 2 (shoulder) reaches its limit of -45.0°" in motion.reason
 
 
+@pytest.mark.parametrize("arm", ["irb120", "ur5", "puma560"])
+def test_a_line_is_refused_where_the_joint_reaches_its_limit(arm):
+    """At that place the joint is at its limit, to a millionth of the line."""
+    robot, rng, count = kin.get_robot(arm), np.random.default_rng(5), 0
+    for q in robot.random_q(rng, 60):
+        T = kin.fk(robot, q)
+        offset = rng.normal(size=3)
+        offset *= 0.25 / np.linalg.norm(offset)
+        refusal = kin.plan_motion(robot, [kin.Lin(kin.PoseTarget(tuple(T[:3, 3] + offset)))], q).refusal
+        if refusal is None or refusal.cause != "limits":
+            continue
+        count += 1
+        at = kin.tolerances.TOLERANCES.limit
+        violation = refusal.details.violation
+        here = []
+        for share in (refusal.fraction, refusal.fraction - 1e-6, refusal.fraction + 1e-6):
+            T[:3, 3] = kin.fk(robot, q)[:3, 3] + share * offset
+            postures = kin.solve_ik(robot, T, q_seed=q, respect_limits=False).solutions
+            off = [math.remainder(s.q[violation.joint] - violation.limit, 2.0 * math.pi) for s in postures]
+            here.append(min(off, key=abs))
+        assert abs(here[0]) < 10.0 * at
+        assert min(here[1:]) < 0.0 < max(here[1:])  # beyond it on one side, and not on the other
+    assert count > 5
+
+
 @pytest.mark.parametrize(("arm", "seed"), [("irb120", 6), ("irb120", 32), ("puma560", 4), ("stanford", 26)])
 def test_a_suggested_posture_can_follow_the_line(arm, seed):
     robot = kin.get_robot(arm)

@@ -277,6 +277,33 @@ def test_a_pose_beyond_a_limit_says_so(robot):
     assert all(4 in {v.joint + 1 for v in posture.violations} for posture in result.blocked)
 
 
+def test_the_ranges_of_a_result_are_those_of_all_branches():
+    """At a value inside them there is a solution, and at one outside there is none."""
+    rng = np.random.default_rng(1)
+    disagree = further = 0
+    for q in SAWYER.random_q(rng, 6):
+        T = kin.fk(SAWYER, q)
+        result = kin.solve_ik(SAWYER, T)
+        ranges = result.redundancy[0].intervals
+        own = [interval for s in result.solutions for interval in s.redundancy[0].intervals]
+        for value in rng.uniform(SAWYER.lower[6], SAWYER.upper[6], 30).tolist():
+            exists = kin.solve_ik(SAWYER, T, redundancy={"theta7": value}).status == "solved"
+            disagree += exists != any(low <= value <= high for low, high in ranges)
+            further += exists and not any(low <= value <= high for low, high in own)
+    assert disagree == 0
+    assert further > 10
+
+
+@pytest.mark.parametrize("row", [8, 20])
+def test_no_narrow_best_value_is_passed_over(row):
+    """Against thousands of values; with fewer samples and peaks the answer was 1.5 % short of the best."""
+    values = np.linspace(SAWYER.lower[6], SAWYER.upper[6], 3000)
+    T = kin.fk(SAWYER, SAWYER.random_q(np.random.default_rng(4), 40)[row])
+    result = kin.solve_ik(SAWYER, T, prefer="manipulability")
+    best = preferences._best_at(problem_of(SAWYER, T, prefer="manipulability"), values).max()
+    assert kin.manipulability(SAWYER, result.best.q) >= (1.0 - 1e-5) * best
+
+
 @pytest.mark.parametrize("prefer", ["limits", "manipulability"])
 @pytest.mark.parametrize("robot", [PANDA, SAWYER], ids=lambda robot: robot.id)
 def test_a_preference_is_met_by_the_best_of_the_whole_family(robot, prefer):

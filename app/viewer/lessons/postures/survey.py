@@ -52,6 +52,7 @@ class Posture:
         manipulability: Yoshikawa's measure.
         share: the same, relative to the arm's best.
         touches: what the arm touches there, in a few words; empty if nothing.
+        locked: whether it is blocked by a locked joint.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Posture:
     manipulability: float = 0.0
     share: float = 0.0
     touches: str = ""
+    locked: bool = False
 
     @property
     def available(self) -> bool:
@@ -147,8 +149,10 @@ def _unavailable(robot: Robot, T: Array, options: IKOptions, q: Array, units: Un
         if not closed[i]:
             found[name] = Posture(name, "absent", "no real solution")
         elif branches.stats[i, OVERRUN] > 0.0:
-            words = limit_violation(robot, violations_of(problem, branches.q[i]), problem.locked, units)
-            found[name] = Posture(name, "blocked", words, branches.q[i].copy())
+            violations = violations_of(problem, branches.q[i])
+            words = limit_violation(robot, violations, problem.locked, units)
+            locked = any(violation.locked for violation in violations)
+            found[name] = Posture(name, "blocked", words, branches.q[i].copy(), locked=locked)
         else:
             found[name] = Posture(name, "absent", "same as another")  # two branches coincide
     return found
@@ -203,7 +207,8 @@ def color_of(index: int, posture: Posture) -> Color:
 def _row(robot: Robot, index: int, posture: Posture, here: bool, shown: bool, units: Units) -> dict[str, object]:
     """The values of one row of the template."""
     r, g, b = color_of(index, posture)
-    status = "outside limits" if posture.state == "blocked" else posture.words
+    blocked = "joint locked" if posture.locked else "outside limits"
+    status = blocked if posture.state == "blocked" else posture.words
     detail = posture.words if posture.state == "blocked" else ""
     if posture.available:
         detail = "no limits"
