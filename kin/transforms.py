@@ -109,16 +109,20 @@ def from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) -> Ar
         raise InputError("position", f"shape {p.shape}", "three numbers x, y, z in metres")
     T[:3, 3] = p
     if wxyz is not None:
-        q = finite_array("wxyz", wxyz, (4,))
-        if q.ndim != 1:
-            raise InputError("wxyz", f"shape {q.shape}", "four numbers w, x, y, z")
-        T[:3, :3] = rotation_from_wxyz(q)
+        T[:3, :3] = rotation_from_wxyz(wxyz)
     return T
 
 
-def rotation_from_wxyz(wxyz: Array) -> Array:
-    """Rotation matrix ``(3, 3)`` of a quaternion ``(4,)``; raises `InputError` for a zero quaternion."""
-    given = wxyz.tolist()
+def rotation_from_wxyz(wxyz: ArrayLike) -> Array:
+    """Rotation matrix ``(3, 3)`` of a quaternion ``(4,)`` of any length.
+
+    Raises:
+        InputError: it is zero, not finite, or not four numbers.
+    """
+    numbers = finite_array("wxyz", wxyz, (4,))
+    if numbers.ndim != 1:
+        raise InputError("wxyz", f"shape {numbers.shape}", "four numbers w, x, y, z")
+    given = numbers.tolist()
     scale = max(map(abs, given))
     if not scale > 1e-12:
         raise InputError("wxyz", given, "a quaternion that is not zero")

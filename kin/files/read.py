@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 import tomllib
 from collections.abc import Sequence
@@ -47,17 +48,19 @@ _SURROGATE = re.compile("[\ud800-\udfff]")  # half a character, which no encodin
 UNLIMITED = "none"
 
 
-def load_folder(folder: Path) -> dict[str, Robot]:
+def load_folder(folder: Path | str) -> dict[str, Robot]:
     """The robots of every ``*.toml`` file in a folder, by id.
 
     Raises:
-        RobotFileError: a file is invalid, two files have the same id, or the folder cannot be read.
+        RobotFileError: a file is invalid, or two files have the same id.
+        InputError: `folder` is no path, or a folder that cannot be read.
     """
     robots: dict[str, Robot] = {}
+    folder = _path("folder", folder)
     try:
         paths = sorted(path for path in folder.iterdir() if path.suffix == ".toml")
-    except OSError as error:  # glob would report an empty folder instead
-        raise RobotFileError(str(folder), "folder", str(error), "a folder that can be read") from error
+    except (OSError, ValueError) as error:  # glob would report an empty folder instead
+        raise InputError("folder", str(error), "a folder that can be read") from error
     for path in paths:
         robot = load_robot(path)
         if robot.id in robots:
@@ -67,16 +70,29 @@ def load_folder(folder: Path) -> dict[str, Robot]:
 
 
 def load_robot(path: Path | str) -> Robot:
-    """The robot described by a TOML file; raises `RobotFileError` if the file is invalid."""
+    """The robot described by a TOML file.
+
+    Raises:
+        RobotFileError: the file is invalid or cannot be read.
+        InputError: `path` is no path.
+    """
+    path = _path("path", path)
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")  # some editors on Windows write a byte order mark
-    except (OSError, UnicodeDecodeError) as error:
+        text = path.read_text(encoding="utf-8-sig")  # some editors on Windows write a byte order mark
+    except (OSError, ValueError) as error:  # a path may contain a null character
         raise RobotFileError(str(path), "file", str(error), "a readable UTF-8 text file") from error
     return parse_robot(text, str(path))
 
 
 def parse_robot(text: str, file: str = "robot") -> Robot:
-    """The robot described by TOML text; `file` is the name used in messages."""
+    """The robot described by TOML text; `file` is the name used in messages.
+
+    Raises:
+        RobotFileError: the text is invalid.
+        InputError: `text` is no text.
+    """
+    if not isinstance(text, str):
+        raise InputError("text", text, "the text of a robot file as str; bytes are decoded first")
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError, as is an integer too long
@@ -93,6 +109,13 @@ def robot_from_dict(data: dict[str, Any], source: str = "robot") -> Robot:
     if not isinstance(data, dict):
         raise RobotFileError(source, "robot", data, "a table with the fields " + ", ".join(sorted(_TOP)))
     return Reader(source).robot(data)
+
+
+def _path(field: str, given: Path | str) -> Path:
+    """A path that a caller gave."""
+    if not isinstance(given, str | os.PathLike):
+        raise InputError(field, given, "a path, as pathlib.Path or str")
+    return Path(given)
 
 
 class Reader:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import FrozenInstanceError, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -422,3 +423,25 @@ def test_lengths_keep_their_digits_in_any_unit(unit, per_metre):
         assert (robot.rows[0].d, robot.rows[0].a) == (float(repr(metres)), -metres)
         written = kin.robot_to_dict(kin.Robot.from_dh([(0, metres, -metres, 0)]), length=unit)
         assert {key: written["rows"][0][key] for key in row} == row
+
+
+@pytest.mark.parametrize(
+    ("call", "field", "valid"),
+    [
+        (lambda: kin.load_folder(None), "folder", "a path"),
+        (lambda: kin.load_folder("/no/such/folder"), "folder", "a folder that can be read"),
+        (lambda: kin.load_folder(Path("with\0null")), "folder", "a folder that can be read"),
+        (lambda: kin.load_robot(None), "path", "a path"),
+        (lambda: kin.parse_robot(b""), "text", "the text of a robot file"),
+        (lambda: kin.load_urdf(None), "source", "the text of a URDF"),
+        (lambda: kin.urdf_tips(b"<robot/>"), "source", "the text of a URDF"),
+    ],
+)
+def test_what_is_no_file_is_refused_with_what_is_valid(call, field, valid):
+    with pytest.raises(kin.InputError, match=valid) as caught:
+        call()
+    assert caught.value.field == field
+
+
+def test_a_folder_may_be_given_as_text(tmp_path):
+    assert kin.load_folder(str(tmp_path)) == {}

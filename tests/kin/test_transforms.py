@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import kin
 from kin import InputError
 from kin.transforms import (
     as_transform,
@@ -104,4 +105,28 @@ def test_an_invalid_pose_is_rejected(change, field):
 def test_invalid_input_names_the_field(call, field):
     with pytest.raises(InputError) as caught:
         call()
+    assert caught.value.field == field
+
+
+def test_a_quaternion_may_be_a_list_of_any_length():
+    """Also where the squares of its numbers overflow or vanish."""
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    for size in (1e200, 1.0, 1e-11):
+        assert kin.rotation_from_wxyz([size, 0, 0, size]) == pytest.approx(quarter, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("wxyz", "field"),
+    [
+        (None, "wxyz"),
+        ("abc", "wxyz"),
+        ([1, 0, 0], "wxyz"),
+        ([[1, 0, 0, 0]], "wxyz"),
+        ([1, math.nan, 0, 0], "wxyz[1]"),
+        ([0, 0, 0, 0], "wxyz"),
+    ],
+)
+def test_what_is_no_quaternion_is_refused(wxyz, field):
+    with pytest.raises(kin.InputError) as caught:
+        kin.rotation_from_wxyz(wxyz)
     assert caught.value.field == field

@@ -69,6 +69,34 @@ def test_a_chain_becomes_a_robot():
     assert kin.load_urdf(GOOD, tip="tcp") == robot
 
 
+BESIDE = """
+  <joint name="finger" type="prismatic">
+    <parent link="hand"/><child link="claw"/><origin xyz="0 0.1 0"/><limit lower="0" upper="0"/>
+  </joint>
+  <link name="claw"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>
+</robot>"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "placed"),
+    [
+        ("", "", True),
+        ('lower="0" upper="0"', 'lower="2" upper="1"', True),
+        ('lower="0" upper="0"', 'lower="wide" upper="nan"', True),
+        ('xyz="0 0.1 0"', 'xyz="0 0.1"', False),
+        ('type="prismatic"', 'type="magnetic"', True),
+    ],
+)
+def test_only_joints_of_the_chain_are_judged(old, new, placed):
+    """A gripper joint beyond the tip may have limits without a range, or say what nobody can read."""
+    text = GOOD.replace("</robot>", BESIDE.replace(old, new))
+    robot, report = kin.read_urdf(text, tip="tcp")
+    assert (robot.n, "finger" in report.ignored) == (3, True)
+    assert any("claw" in body.names for body in report.bodies) is placed
+    with pytest.raises(RobotFileError, match="joint finger"):
+        kin.read_urdf(text, tip="claw")
+
+
 def test_base_and_tip_may_be_any_links_of_the_chain(tmp_path):
     path = tmp_path / "bench.urdf"
     path.write_text(GOOD, encoding="utf-8")

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from kin.errors import RobotFileError
 from kin.files.urdf.tree import MOVING, UrdfJoint, UrdfTree
 from kin.frames import matrix_of
 from kin.transforms import Array
 
 
 def poses_of(tree: UrdfTree, chain: tuple[UrdfJoint, ...]) -> tuple[dict[str, int], dict[str, Array]]:
-    """For each link below the root of the chain: the joints of the chain that move it, and its pose at zero."""
+    """For each link below the root of the chain: the joints of the chain that move it, and its pose at zero.
+
+    Links behind a joint beside the chain whose numbers cannot be read are left out: only the chain is judged.
+    """
     moving = {joint.name for joint in chain if joint.moves}
     children: dict[str, list[UrdfJoint]] = {}
     for joint in tree.joints:
@@ -19,19 +23,18 @@ def poses_of(tree: UrdfTree, chain: tuple[UrdfJoint, ...]) -> tuple[dict[str, in
     carriers, poses = {links[0]: 0}, {links[0]: np.eye(4)}
     for link in links:  # grows meanwhile
         for joint in children.get(link, ()):
-            T = poses[link] @ np.array(matrix_of(*joint.origin()))
-            if joint.type in MOVING and joint.name not in moving:
-                T = T @ motion_of(joint, np.array([_rest(joint)]))[0]
+            try:
+                T = poses[link] @ np.array(matrix_of(*joint.origin()))
+                if joint.type in MOVING and joint.name not in moving:
+                    T = T @ motion_of(joint, np.array([joint.resting()]))[0]
+            except RobotFileError:
+                if joint in chain:
+                    raise
+                continue  # nobody knows where the links behind it are
             carriers[joint.child] = carriers[link] + (joint.name in moving)
             poses[joint.child] = T
             links.append(joint.child)
     return carriers, poses
-
-
-def _rest(joint: UrdfJoint) -> float:
-    """Zero, or the limit closest to it."""
-    low, high = joint.limits() or (0.0, 0.0)
-    return min(max(0.0, low), high)
 
 
 def motion_of(joint: UrdfJoint, values: Array) -> Array:

@@ -18,7 +18,7 @@ import numpy as np
 
 from kin.axes import frame_of, inverse, perpendicular_to
 from kin.dh import SAMPLES, table_of_chain
-from kin.errors import RobotFileError
+from kin.errors import InputError, RobotFileError
 from kin.files.home import default_home
 from kin.files.numbers import LARGEST
 from kin.files.read import MAX_REACH, MAX_ROWS
@@ -109,7 +109,9 @@ def read_urdf(
         fit: gives the capsules of each URDF link with collision bodies, for an arm with this reach (m).
 
     Raises:
-        RobotFileError: the file is invalid, or describes no serial arm; the message names the joint or link.
+        RobotFileError: the file is invalid, or describes no serial arm; the message names the joint or link. Only
+            the joints of the chain are judged.
+        InputError: `source` is neither.
     """
     tree = _tree(source, file)
     chain = tree.chain(base, tip)
@@ -125,6 +127,8 @@ def urdf_tips(source: Path | str, file: str = "") -> tuple[Tip, ...]:
 
 
 def _tree(source: Path | str, file: str) -> UrdfTree:
+    if not isinstance(source, str | Path):
+        raise InputError("source", source, "the text of a URDF as str, or the Path of a file")
     if isinstance(source, str):
         if "<" not in source:
             raise RobotFileError(file or "URDF", "file", source, "the text of a URDF, or the Path of a file")

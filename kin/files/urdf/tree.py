@@ -103,6 +103,18 @@ class UrdfJoint(UrdfElement):
             raise self.refuse("limit", [lower, upper], "lower below upper; a joint that does not move is fixed")
         return lower, upper
 
+    def resting(self) -> float:
+        """The value of a joint beside the arm: zero, or the limit closest to it.
+
+        Such a joint is not judged: some files hold a finger by limits that are both zero. What cannot be read
+        counts as zero.
+        """
+        limit = self.element.find("limit")
+        if self.type == "continuous" or limit is None:
+            return 0.0
+        low, high = (number_of(limit.get(key, "0")) for key in ("lower", "upper"))
+        return min(max(0.0, low), high) if -LARGEST < low <= high < LARGEST else 0.0
+
     def positive(self, key: str) -> float | None:
         """A limit of velocity or effort; None if it is not stated or zero, which stands for unknown.
 
@@ -121,7 +133,7 @@ class UrdfTree:
     """A URDF file: links that joints connect, each link with one parent at most.
 
     Raises:
-        RobotFileError: names that occur twice or do not exist, two parents, a cycle, an unknown type of joint.
+        RobotFileError: names that occur twice or do not exist, two parents, a cycle.
     """
 
     file: str
@@ -198,6 +210,8 @@ class UrdfTree:
         if not any(joint.moves for joint in chain):
             raise RobotFileError(self.file, "tip", tip, f"a link that joints move, such as {self.choices()}")
         for joint in chain:
+            if joint.type not in TYPES:
+                raise joint.refuse("type", joint.type, "one of " + ", ".join(TYPES))
             if joint.moves and joint.type not in MOVING:
                 raise joint.refuse("type", joint.type, "one of " + ", ".join((*MOVING, "fixed")))
             if joint.element.find("mimic") is not None:
@@ -254,10 +268,7 @@ def _joint(element: Element, file: str) -> UrdfJoint:
         if child is None:
             raise RobotFileError(file, f"joint {name}: {tag}", "nothing", f'<{tag} link="…"/>')
         ends.append(_attribute(child, "link", file, f"joint {name}: {tag}"))
-    kind = element.get("type", "")
-    if kind not in TYPES:
-        raise RobotFileError(file, f"joint {name}: type", kind, "one of " + ", ".join(TYPES))
-    return UrdfJoint(file, element, name, kind, *ends)
+    return UrdfJoint(file, element, name, element.get("type", ""), *ends)
 
 
 def _attribute(element: Element, key: str, file: str, field: str) -> str:
