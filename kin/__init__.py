@@ -21,6 +21,7 @@ from kin.collision import (
 )
 from kin.comparison import Comparison, compare
 from kin.dh import Screws, convert, exp_screw, robot_from_screws, screws
+from kin.differential.task import Task
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.files import (
     UrdfReport,
@@ -44,7 +45,6 @@ from kin.frames import frame_pose, from_xyz_rpy
 from kin.ik import IKOptions, JointConstraints, branch_meanings, branch_names, branch_of, solve_ik
 from kin.ik.batch import IKResults, ik_branches, solve_ik_many
 from kin.ik.details import LimitViolation, Redundancy
-from kin.ik.options import Task
 from kin.ik.results import BlockedBranch, IKResult, IKSolution, Status
 from kin.motion import (
     Circ,

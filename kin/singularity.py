@@ -9,17 +9,14 @@ the smallest singular value of the Jacobian, the least tool speed per unit of jo
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
-import numpy as np
 from numpy.typing import ArrayLike
 
+from kin.differential.task import natural_task, task_jacobian, usual_rank
 from kin.errors import InputError
-from kin.fk import fk, jacobian
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.solvers.numeric import spread
 from kin.solvers.singular import Singularity, by_jacobian
 from kin.transforms import Array
 
@@ -58,29 +55,6 @@ def singularities_at(robot: Robot, q: Array, within: float) -> tuple[Singularity
     return tuple(sorted(found, key=lambda s: s.distance / (robot.reach if s.unit == "m" else 1.0)))
 
 
-def task_jacobian(robot: Robot, q: Array) -> Array:
-    """The rows of the Jacobian that `n` joints can control ``(..., m, n)``, at ``(..., n)``.
-
-    Six joints or more: all six. Five: the velocity of the tool point and the turning of the approach direction,
-    about the tool's x and y axes (m = 5). Fewer: the velocity of the tool point (m = 3).
-    """
-    J = jacobian(robot, q)
-    if robot.n >= 6:
-        return J
-    if robot.n < 5:
-        return J[..., :3, :]
-    R_T = np.swapaxes(fk(robot, q)[..., :3, :2], -1, -2)
-    return np.concatenate([J[..., :3, :], R_T @ J[..., 3:, :]], axis=-2)
-
-
-@lru_cache(maxsize=256)
-def usual_rank(robot: Robot) -> int:
-    """The rank of `task_jacobian` almost everywhere: a planar arm, for one, never leaves its plane."""
-    J = task_jacobian(robot, spread(robot.lower, robot.upper, 16))
-    return int(np.linalg.matrix_rank(J, rtol=1e-9).max())
-
-
 def _by_jacobian(robot: Robot, q: Array) -> Singularity:
     """The last singular value that is not zero everywhere."""
-    J = task_jacobian(robot, q)
-    return by_jacobian(J, usual_rank(robot))
+    return by_jacobian(task_jacobian(robot, q), usual_rank(robot, natural_task(robot)))

@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[1]
 # library. The longest matching row counts. A name allows what is below it too.
 MODEL = {
     "kin.axes",
+    "kin.differential",
     "kin.errors",
     "kin.fk",
     "kin.named",
@@ -27,6 +28,7 @@ RULES: dict[str, set[str]] = {
     "kin": {"kin", "numpy", "numba"},
     "kin/kernels": {"numpy", "numba", "llvmlite", "kin.kernels", "kin.tolerances", "kin.transforms"},
     "kin/comparison": {"numpy", "kin.comparison", "kin.dh", *MODEL},
+    "kin/differential": {"numpy", "kin.axes", "kin.differential", "kin.fk", "kin.robot", "kin.transforms"},
     "kin/files": {"numpy", "kin.collision", "kin.dh", "kin.files", "kin.fitting", "kin.frames", *MODEL},
     "kin/fitting": {"numpy", "kin.fitting", "kin.robot", "kin.transforms"},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},

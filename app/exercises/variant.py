@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 import kin
 from app.exercises.expressions import Expression, Function
 from kin import Robot
-from kin.singularity import task_jacobian
+from kin.differential.task import rank, task_jacobian
 from kin.transforms import Array
 from kin.units import Unit, Units, general
 
@@ -32,7 +32,7 @@ class Facts(Mapping[str, "float | Function"]):
         self._made: dict[str, Callable[[], float | Function]] = {
             "n": lambda: float(robot.n),
             "w": lambda: float(kin.manipulability(robot, q)),
-            "rank": lambda: float(np.linalg.matrix_rank(task_jacobian(robot, q), rtol=1e-6)),
+            "rank": lambda: float(rank(robot, task_jacobian(robot, q), 1e-6)),
             "J": lambda: self._entry(kin.jacobian(robot, q)),
             "sigma": lambda: self._entry(np.linalg.svd(task_jacobian(robot, q), compute_uv=False)),
             "postures": lambda: lambda: float(len(kin.solve_ik(robot, self._pose, q_seed=q).solutions)),

@@ -14,6 +14,8 @@ from pathlib import Path
 from textwrap import dedent
 from typing import NamedTuple
 
+SOURCES = ("differential/task.py", "ik/options.py")  # of the tasks, and of everything else
+
 
 class Option(NamedTuple):
     """One option, or a limit or lock of `kin.JointConstraints`.
@@ -47,9 +49,9 @@ def declared() -> dict[str, Option]:
     found = find_spec("kin")  # of the package alone, which does not run it
     assert found is not None
     assert found.submodule_search_locations
-    source = Path(found.submodule_search_locations[0], "ik", "options.py").read_text(encoding="utf-8")
-    module = ast.parse(source)
-    words = {name: _words(value) for name, value in _assignments(module)}
+    folder = Path(found.submodule_search_locations[0])
+    task, module = (ast.parse((folder / path).read_text(encoding="utf-8")) for path in SOURCES)
+    words = {name: _words(value) for each in (task, module) for name, value in _assignments(each)}
     classes = {node.name: node for node in module.body if isinstance(node, ast.ClassDef)}
     limits, options = (_fields(classes[name], words) for name in ("JointConstraints", "IKOptions"))
     rows: dict[str, Option] = {}

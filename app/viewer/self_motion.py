@@ -12,7 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import kin
-from kin import IKOptions, IKResult, Redundancy, Robot
+from kin import IKOptions, IKResult, Redundancy, Robot, Task
+from kin.differential.null_space import null_space
+from kin.differential.task import free_motions
 from kin.ik import solve
 from kin.ik.problem import prepare
 from kin.transforms import Array
@@ -21,6 +23,7 @@ SMOOTH = 0.6  # rad; a larger step of a joint in one event is a jump to another 
 INSET = 1e-6  # rad; the end of a range is evaluated this far inside it
 AT_LIMIT = 1e-4  # rad or m
 _SEAM = 1e-9
+_OFFERED = 1e-3  # least share of a joint in the null space to be offered as a parameter
 
 
 @dataclass(frozen=True)
@@ -100,4 +103,20 @@ def ends(robot: Robot, T: Array, options: IKOptions, q: Array, item: Redundancy)
                 nearest = int(np.argmin(room))
                 joint = nearest if room[nearest] < AT_LIMIT else -1
             found.append(End(value, joint))
+    return tuple(found)
+
+
+def leaders(robot: Robot, q: Array, task: Task, locked: tuple[int, ...] = ()) -> tuple[Redundancy, ...]:
+    """The revolute joints that take part in the null space at q ``(n,)``, as parameters that can be given a value.
+
+    Without a closed form nobody knows the feasible range: it is that of the joint's own limits.
+    """
+    if not free_motions(robot, task, locked):
+        return ()
+    basis = null_space(robot, q, task, locked).basis
+    found = []
+    for i in np.flatnonzero(robot.revolute & (np.linalg.norm(basis, axis=1) > _OFFERED)).tolist():
+        low, high = float(robot.lower[i]), float(robot.upper[i])
+        ends = (low, high) if math.isfinite(high - low) else (-math.pi, math.pi)
+        found.append(Redundancy(f"theta{i + 1}", f"θ{i + 1}", float(q[i]), (ends,)))
     return tuple(found)

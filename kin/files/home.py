@@ -17,9 +17,9 @@ import math
 
 import numpy as np
 
+from kin.differential.task import task_jacobian
 from kin.fk import link_frames
 from kin.robot import Robot
-from kin.singularity import task_jacobian
 from kin.transforms import Array
 
 _BEND = math.pi / 4

@@ -20,20 +20,10 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from kin.collision import Obstacle
+from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.answers import answer
-from kin.ik.options import (
-    Frame,
-    IKOptions,
-    Images,
-    JointConstraints,
-    Limits,
-    Locks,
-    Preference,
-    Solver,
-    Task,
-    Values,
-)
+from kin.ik.options import Frame, IKOptions, Images, JointConstraints, Limits, Locks, Preference, Solver, Values
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKResult
 from kin.named import robot_of

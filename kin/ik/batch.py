@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kin.collision import Obstacle
+from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.answers import answer
-from kin.ik.options import Frame, IKOptions, Images, Limits, Locks, Preference, Solver, Task, Values
+from kin.ik.options import Frame, IKOptions, Images, Limits, Locks, Preference, Solver, Values
 from kin.ik.problem import listed, prepare, read_poses, read_seed
 from kin.ik.results import IKResult, Status
 from kin.kernels import fk as fk_kernels

@@ -7,7 +7,8 @@ value is made; :mod:`kin.ik.problem` checks the rest against an arm, once for ea
 The class is the only description of the options: its annotations hold the choices, ranges and units, its docstring
 the texts. The fields of REST requests and the flags of the command line follow from it, and tests compare the
 keywords of `kin.solve_ik`, `kin.solve_ik_many`, `kin.solve_path` and `kin.plan_motion` with it. The command line
-reads this module without importing it: the choices of an option are an alias of `Literal` here.
+reads this module without importing it: the choices of an option are an alias of `Literal` here, those of the task
+in :mod:`kin.differential.task`.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.collision.obstacles import Obstacle, checked_obstacles
+from kin.differential.task import Task
 from kin.errors import InputError
 from kin.robot import Robot
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION, TASK_CODES
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array, finite_array
 
-Task = Literal["pose", "approach", "position"]
 Frame = Literal["tool", "base"]
 Images = Literal["nearest", "all"]
 Solver = Literal["auto", "numeric"]

@@ -12,8 +12,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kin.differential.task import Task
 from kin.errors import InputError
-from kin.ik.options import Task, finite_number
+from kin.ik.options import finite_number
 from kin.transforms import Array, as_transform, from_position_wxyz, wxyz_from_rotation
 
 Orientation = Literal["geodesic", "two-axis"]

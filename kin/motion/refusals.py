@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from kin.differential.task import Task
 from kin.ik import branch_names, branch_of, solve_ik
 from kin.ik.branches import Flags
 from kin.ik.details import JointKind, LimitViolation, OrientationNotMet, OutOfReach
-from kin.ik.options import Task
 from kin.ik.results import IKResult, Status
 from kin.motion.details import (
     BranchNeeded,

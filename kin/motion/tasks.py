@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from kin.differential.task import Task
 from kin.fk import fk, jacobian
-from kin.ik.options import Task
 from kin.robot import Robot
 from kin.transforms import Array
 

@@ -29,8 +29,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.collision import Obstacle
+from kin.differential.task import Task
 from kin.errors import InputError
-from kin.ik.options import Frame, IKOptions, Limits, Locks, Task, finite_number
+from kin.ik.options import Frame, IKOptions, Limits, Locks, finite_number
 from kin.ik.problem import IKProblem, listed, never_cancel, read_poses
 from kin.named import robot_of
 from kin.path.details import JumpCause

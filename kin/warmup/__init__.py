@@ -23,11 +23,11 @@ from numba.core.event import install_recorder
 from kin.collision import Obstacle, clearance, nearest_links, self_distance
 from kin.collision.contacts import surroundings
 from kin.collision.sweep import touches_along
+from kin.differential.task import Task
 from kin.files import builtin_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
 from kin.ik.candidates import unchecked
-from kin.ik.options import Task
 from kin.kernels.cache import is_cached
 from kin.kernels.fk import fk_one
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion

@@ -17,8 +17,8 @@ from few import ELBOW3, ELBOW5, PITCH, PLANAR2, PLANAR4, TURNED3
 
 import kin
 from kin import Joint, Robot, Status
+from kin.differential.task import task_jacobian
 from kin.ik.messages import obstacle, singularity
-from kin.singularity import task_jacobian
 from kin.solvers import FAMILIES, closed_form_of
 from kin.solvers.contract import APPROACH, MASK, POSE, POSITION, ObstacleCode, SolverInput
 from kin.solvers.reversed import ReversedJoints

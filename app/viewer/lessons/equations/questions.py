@@ -16,9 +16,9 @@ from app.viewer.lessons.guide.outline import (
     one_right,
 )
 from app.viewer.lessons.guide.poses import as_configuration
-from app.viewer.lessons.guide.rank import lifts
 from kin import Robot, fk, jacobian
 from kin.axes import NEARLY
+from kin.differential.task import lifts
 from kin.transforms import Array
 from kin.units import Units, fixed
 

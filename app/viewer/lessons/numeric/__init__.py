@@ -22,12 +22,12 @@ from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.numeric import basins, views
 from app.viewer.lessons.numeric.drawing import Drawing
 from app.viewer.lessons.numeric.example import example, usual_match
-from app.viewer.lessons.numeric.methods import METHODS, Match, Method, Problem, Run, Settings, iterate
 from app.viewer.lessons.numeric.picture import Picture
 from app.viewer.lessons.numeric.questions import outline
 from app.viewer.panel import assign, listen, listen_click, update_html
 from app.viewer.panel.status import Notice
 from kin import InputError
+from kin.differential.iteration import METHODS, Match, Method, Problem, Run, Settings, iterate
 from kin.transforms import Array
 from kin.units import Units
 from kin.warmup import ALL

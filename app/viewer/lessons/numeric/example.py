@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from app.viewer.lessons.numeric import methods
-from app.viewer.lessons.numeric.methods import Match, Problem, Run, Settings
 from kin import Robot, fk
+from kin.differential import iteration
+from kin.differential.iteration import Match, Problem, Run, Settings
 from kin.transforms import Array
 
 _SAMPLES, _OFFSETS = 64, (0.3, 0.15, 0.075, 0.03)
@@ -42,7 +42,7 @@ def example(robot: Robot) -> Example:
     pattern = np.where(np.arange(robot.n) % 2, -1.0, 1.0) * np.where(robot.revolute, 1.0, _SLIDE) * problem.travel
     for offset in _OFFSETS:
         start = np.clip(aim + offset * pattern, robot.lower, robot.upper)
-        found = methods.run(problem, Settings("newton"), start)
+        found = iteration.run(problem, Settings("newton"), start)
         if found.outcome == "reached":
             break
     return Example(problem, start, found)

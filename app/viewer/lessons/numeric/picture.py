@@ -8,9 +8,9 @@ import viser
 
 from app.viewer.lessons.numeric import basins, views
 from app.viewer.lessons.numeric.basins import Basins
-from app.viewer.lessons.numeric.methods import Problem, Settings
 from app.viewer.panel import Post, listen, update_html
 from kin import fk, get_robot
+from kin.differential.iteration import Problem, Settings
 from kin.transforms import Array
 from kin.units import Units
 

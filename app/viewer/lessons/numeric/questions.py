@@ -20,12 +20,12 @@ from app.viewer.lessons.guide.outline import (
     two_percent,
 )
 from app.viewer.lessons.guide.poses import as_configuration
-from app.viewer.lessons.numeric import methods
 from app.viewer.lessons.numeric.example import Example, example
-from app.viewer.lessons.numeric.methods import Method, Problem, Settings
 from app.viewer.lessons.numeric.views import NAMES, amount, error_chart
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from kin import Robot, fk, get_robot
+from kin.differential import iteration
+from kin.differential.iteration import Method, Problem, Settings
 from kin.transforms import Array
 from kin.units import Unit, Units, power
 
@@ -148,7 +148,7 @@ def _newton(known: Example, units: Units) -> Step:
 
 
 def _transpose(known: Example, units: Units) -> Step:
-    run = methods.run(known.problem, Settings("transpose"), known.start)
+    run = iteration.run(known.problem, Settings("transpose"), known.start)
     if run.outcome == "reached":
         words = f"The transpose needs {run.count} iterations"
     else:
@@ -189,7 +189,7 @@ def _damping(known: Example, units: Units) -> Step:
     sigma = round(max(smallest_value(known), 1e-3), 3)
     square = sigma * sigma + DAMPING**2
     answer = sigma * sigma / square
-    run = methods.run(known.problem, Settings("damped", DAMPING), known.start)
+    run = iteration.run(known.problem, Settings("damped", DAMPING), known.start)
     return Step(
         "Damping",
         f"Damped least squares steps by f(σ) = σ/(σ² + λ²) along each direction; J then reduces the error by "
@@ -229,7 +229,7 @@ def first_steps(bends: Array) -> tuple[Array, Array]:
             T = fk(robot, each)
             T[:3, 3] *= 1.0 - ERROR * _planar_size(robot) / np.linalg.norm(T[:3, 3])
             problem = Problem(robot, T, "point")
-            moved = methods.advance(problem, Settings(method, DAMPING), each[None], problem.error(each[None]))
+            moved = iteration.advance(problem, Settings(method, DAMPING), each[None], problem.error(each[None]))
             found.append(float(moved.step[0]))
         lengths.append(np.array(found))
     return lengths[0], lengths[1]

@@ -10,10 +10,10 @@ from markupsafe import Markup
 
 from app.exports.svg import AxisStyle, Plot, axes, png_url
 from app.viewer.lessons.numeric.basins import COLOURS, Basins, off_by, pixels, turned_within
-from app.viewer.lessons.numeric.methods import MOST, Method, Problem, Run
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from app.viewer.views.templates import render
 from kin import Robot
+from kin.differential.iteration import MOST, Method, Problem, Run
 from kin.transforms import Array
 from kin.units import Unit, Units, power
 

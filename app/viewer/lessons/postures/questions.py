@@ -19,10 +19,11 @@ from app.viewer.lessons.guide.outline import (
     one_right,
 )
 from app.viewer.lessons.guide.poses import as_configuration
-from app.viewer.lessons.guide.rank import rank, self_motions
 from app.viewer.lessons.postures import planar
 from app.viewer.scene.chain import rotation
 from kin import IKOptions, IKSolution, Robot, Status, branch_names, branch_of, fk, jacobian
+from kin.axes import NEARLY
+from kin.differential.task import free_motions, rank
 from kin.ik import solve
 from kin.transforms import Array
 from kin.units import Units
@@ -65,7 +66,7 @@ def facts(robot: Robot) -> Facts:
     other = as_configuration(solutions[int(np.argmax(away))].q) if away and max(away) > 1e-3 else None
     status, rolled = _exact(robot, T @ rotation(2, ROLL))
     here = branch_of(robot, q) if names else ""
-    return Facts(names, here, len(solutions), other, len(rolled), status, rank(robot, jacobian(robot, q)))
+    return Facts(names, here, len(solutions), other, len(rolled), status, rank(robot, jacobian(robot, q), NEARLY))
 
 
 def _exact(robot: Robot, T: Array) -> tuple[Status, tuple[IKSolution, ...]]:
@@ -113,7 +114,7 @@ def outline(robot: Robot, units: Units) -> Outline:
 
 
 def _many(robot: Robot) -> str:
-    if self_motions(robot):
+    if free_motions(robot, "pose"):
         return "A redundant arm has infinitely many solutions; one for each posture is counted."
     return "Solutions are counted that keep the joint limits."
 
@@ -197,7 +198,7 @@ def _check(robot: Robot, known: Facts, units: Units) -> tuple[Number | Choice, .
 
 def _many_or_few(robot: Robot, known: Facts) -> Choice:
     """Whether the configurations that hold a pose can be counted."""
-    free = self_motions(robot)
+    free = free_motions(robot, "pose")
     why = f"Of {_counted(robot.n, 'joint')}, {robot.n - free} move the tool independently. "
     why += f"That leaves {_counted(free, 'self-motion')}." if free else "None is left for a self-motion."
     options = [

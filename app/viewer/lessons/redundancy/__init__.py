@@ -25,13 +25,13 @@ from app.viewer.lessons.redundancy import views
 from app.viewer.lessons.redundancy.drawing import Drawing
 from app.viewer.lessons.redundancy.questions import outline
 from app.viewer.lessons.redundancy.ring import coaxial, elbow_circle
-from app.viewer.null_space import lead, leaders, within
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.fields import limit_marks
 from app.viewer.panel.posture import on_side_of
 from app.viewer.panel.status import Notice
-from app.viewer.self_motion import INSET, SMOOTH, End, ends, range_of, redundancy_at, self_motion
+from app.viewer.self_motion import INSET, SMOOTH, End, ends, leaders, range_of, redundancy_at, self_motion
 from kin import IKResult, InputError, Redundancy
+from kin.differential.null_space import lead, within
 from kin.transforms import Array
 from kin.units import Units
 from kin.warmup import ALL

@@ -6,8 +6,9 @@ import numpy as np
 
 from app.viewer.lessons.guide.outline import PLAIN, Choice, Number, Option, Outline, Step, count, one_right
 from app.viewer.lessons.guide.poses import as_configuration
-from app.viewer.lessons.guide.rank import point_motions, rank, self_motions
 from kin import Robot, jacobian
+from kin.axes import NEARLY
+from kin.differential.task import free_motions, rank
 from kin.transforms import Array
 from kin.units import Units, fixed
 
@@ -18,7 +19,7 @@ STILL = 1e-6
 def null_vector(robot: Robot) -> Array:
     """Joint speeds ``(n,)`` of norm 1 that do not move the tool at home; zeros if there are none."""
     J = jacobian(robot, robot.q_home)
-    free: Array = np.linalg.svd(J)[2][rank(robot, J) :]
+    free: Array = np.linalg.svd(J)[2][rank(robot, J, NEARLY) :]
     if not len(free):
         return np.zeros(robot.n)
     # Of several, the direction in which a single joint moves most.
@@ -29,7 +30,7 @@ def null_vector(robot: Robot) -> Array:
 
 def outline(robot: Robot, units: Units) -> Outline:
     """The outline for this arm."""
-    free, home = self_motions(robot), as_configuration(robot.q_home)
+    free, home = free_motions(robot, "pose"), as_configuration(robot.q_home)
     z = null_vector(robot)
     steps = [
         Step(
@@ -80,7 +81,7 @@ def _dimension(robot: Robot, free: int) -> Number:
 def _point(robot: Robot) -> Number:
     return count(
         "How many independent motions of the joints leave the tool point where it is?",
-        point_motions(robot),
+        free_motions(robot, "position"),
         "The number of joints less the rank of the upper three rows of J.",
         [(robot.n, "Each condition that is independent of the others takes one away.")],
     )

@@ -8,11 +8,11 @@ import numpy as np
 from markupsafe import Markup
 
 import kin
-from app.viewer.null_space import free_motions
 from app.viewer.panel.posture import feasible_html
 from app.viewer.self_motion import End
 from app.viewer.views.templates import render
 from kin import Redundancy, Robot, Task
+from kin.differential.task import free_motions
 from kin.transforms import Array, rotation_angle, vector_angle
 from kin.units import Unit, Units, power
 

@@ -24,21 +24,10 @@ from app.viewer.lessons.velocity.jog import BUTTONS, Frame, Press, Step, button,
 from app.viewer.lessons.velocity.line import Line
 from app.viewer.lessons.velocity.null_motion import FRAME, NullMotion
 from app.viewer.lessons.velocity.questions import outline
-from app.viewer.lessons.velocity.rates import (
-    Axes,
-    Ellipsoid,
-    axes_of,
-    lost,
-    nice,
-    part_of,
-    real,
-    semi_axes,
-    state_of,
-    task_rates,
-)
 from app.viewer.lessons.velocity.statics import Statics
 from app.viewer.panel import assign, listen, listen_click, update_html
 from kin import InputError
+from kin.differential.ellipsoids import Axes, Ellipsoid, axes_of, lost, part_of, semi_axes, task_rates
 from kin.transforms import Array
 from kin.units import Unit, Units
 
@@ -307,7 +296,7 @@ class VelocityLesson(Lesson):
         semi = semi_axes(axes_of(part_of(kin.jacobian(robot, robot.q_home), kind)).values, kind)
         usual = semi[np.isfinite(semi) & (semi > 1e-6) & (semi < 1e6)]
         longest = float(usual.max()) if len(usual) else 1.0
-        return nice(views.SAMPLE * longest / (0.42 * self._drawing.radius))
+        return views.nice(views.SAMPLE * longest / (0.42 * self._drawing.radius))
 
     def _draw(self, q: Array, T_base_tool: Array) -> None:
         """Update what moves with each frame."""
@@ -353,8 +342,8 @@ class VelocityLesson(Lesson):
     def _show_singularities(self, R_base_tool: Array) -> None:
         stage, robot = self.stage, self.stage.robot
         found = kin.singularities(robot, stage.q)
-        nearest = real(found)
-        state = state_of(nearest[0], robot.reach) if nearest else "far"
+        nearest = views.real(found)
+        state = views.state_of(nearest[0], robot.reach) if nearest else "far"
         twists = np.empty((0, 6))
         if state != "far":
             rates = task_rates(robot, stage.q)

@@ -13,11 +13,11 @@ import viser
 
 from app.viewer.labels import add_label
 from app.viewer.lessons.figures import set_visible
-from app.viewer.lessons.velocity.rates import Ellipsoid
 from app.viewer.scene.arm import GIZMO
 from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import Solid, cone, merged, placed, tube
 from kin import Robot
+from kin.differential.ellipsoids import Ellipsoid
 from kin.transforms import Array, frame_from_approach, wxyz_from_rotation
 
 COLORS: dict[Ellipsoid, tuple[int, int, int]] = {

@@ -10,10 +10,10 @@ import kin
 from app.viewer.feature import Stage
 from app.viewer.lessons.velocity import section_views as views
 from app.viewer.lessons.velocity.along import controllable
-from app.viewer.null_space import Goal, hold, margin, measure, null_space, secondary
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.status import Notice
 from kin import InputError
+from kin.differential.null_space import Goal, hold, margin, measure, null_space, secondary
 from kin.transforms import Array
 
 GOALS: dict[str, Goal] = {"Away from limits": "limits", "Higher manipulability": "manipulability"}

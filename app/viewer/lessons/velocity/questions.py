@@ -18,11 +18,10 @@ from app.viewer.lessons.guide.outline import (
     two_percent,
 )
 from app.viewer.lessons.guide.poses import as_configuration
-from app.viewer.lessons.guide.rank import lifts
 from kin import Robot, Singularity, fk, jacobian, singularities
 from kin.axes import NEARLY, joint_axes, size
+from kin.differential.task import lifts, natural_task, rank, task_jacobian, usual_rank
 from kin.ik.messages.singularity import short
-from kin.singularity import task_jacobian, usual_rank
 from kin.transforms import Array
 from kin.units import Unit, Units
 
@@ -82,14 +81,15 @@ def singular(robot: Robot) -> tuple[Array, Singularity] | None:
             continue
         (joint, value), q = near.met_at[0], robot.q_home.copy()
         q[joint] = value
-        if robot.lower[joint] <= value <= robot.upper[joint] and rank_of(robot, q) < usual_rank(robot):
+        within = robot.lower[joint] <= value <= robot.upper[joint]
+        if within and rank_of(robot, q) < usual_rank(robot, natural_task(robot)):
             return q, near
     return None
 
 
 def rank_of(robot: Robot, q: Array) -> int:
     """The rank of the Jacobian of the arm's task."""
-    return int(np.linalg.matrix_rank(task_jacobian(robot, q), rtol=1e-9))
+    return rank(robot, task_jacobian(robot, q))
 
 
 def torque(J: Array, joint: int) -> float:
@@ -168,7 +168,7 @@ def _torque(robot: Robot, J: Array, k: int) -> Number:
 
 
 def _rank(robot: Robot, q: Array) -> Number:
-    usual = usual_rank(robot)
+    usual = usual_rank(robot, natural_task(robot))
     return count(
         f"Elsewhere the Jacobian of the arm’s task has rank {usual}. Which rank does it have there?",
         rank_of(robot, q),

@@ -7,10 +7,10 @@ import numpy as np
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from app.viewer.lessons.velocity.along import SHARE, Along
 from app.viewer.lessons.velocity.views import axis_name
-from app.viewer.null_space import NullSpace
 from app.viewer.panel.joints import label
 from app.viewer.views.templates import render
 from kin import Robot, Task
+from kin.differential.null_space import NullSpace
 from kin.transforms import Array
 from kin.units import Units, fixed, power
 

@@ -10,12 +10,12 @@ import viser
 from app.viewer.feature import Stage
 from app.viewer.lessons.velocity import section_views as views
 from app.viewer.lessons.velocity.drawing import arrow_color
-from app.viewer.lessons.velocity.rates import axes_of
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.scene.meshes import body
 from app.viewer.viser_patches import assign as place
 from app.viewer.viser_patches import keep_private
 from kin import InputError
+from kin.differential.ellipsoids import axes_of
 from kin.transforms import Array
 
 LARGEST = 100.0  # N, of each component

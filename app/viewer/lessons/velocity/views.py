@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 from markupsafe import Markup
 
 from app.viewer.lessons.velocity.drawing import COLORS, COLUMN, LOST, SLOW
-from app.viewer.lessons.velocity.rates import Ellipsoid, State, TaskRates, condition, real, state_of
 from app.viewer.views.mathml import ident, sub, text
 from app.viewer.views.mathml import math as formula
 from app.viewer.views.templates import render
 from kin import Robot, Singularity
+from kin.differential.ellipsoids import Ellipsoid, TaskRates, condition
 from kin.ik.messages.singularity import short, there
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 from kin.units import Units, fixed
 
+State = Literal["far", "near", "at"]
+
+# A singularity is "near" within this angle, or within this angle times the arm's reach.
+NEAR = math.radians(10.0)
+NEAR_VALUE = 0.05  # the same for a singular value
 # Symbol, word and CSS class of each state.
 LOOKS: dict[State, tuple[str, str, str]] = {
     "far": ("✓", "far", "kb-green"),
@@ -28,6 +35,30 @@ CHOSEN = Markup(' class="kb-chosen"')
 SAMPLE = 0.1  # m: the length in the scene for which an ellipsoid's scale is given
 DECADES = (-3, 1)  # of the singular values' bars
 _ALIGNED = math.cos(math.radians(0.5))
+
+
+# How near
+
+
+def real(found: tuple[Singularity, ...]) -> tuple[Singularity, ...]:
+    """The singularities that cost the arm a motion; the others concern only a closed form."""
+    return tuple(s for s in found if s.kind != "algorithmic")
+
+
+def state_of(singularity: Singularity, reach: float) -> State:
+    """Whether the arm is far from, near or at a singularity; lengths are judged relative to the reach."""
+    if singularity.distance <= TOLERANCES.at_singularity:
+        return "at"
+    if singularity.unit == "SI":
+        return "near" if singularity.distance < NEAR_VALUE else "far"
+    angle = singularity.distance / (reach if singularity.unit == "m" else 1.0)
+    return "near" if angle < NEAR else "far"
+
+
+def nice(value: float) -> float:
+    """The smallest of 1, 2, 5, 10, 20, … that is not below a positive value."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return next((m * power for m in (1.0, 2.0, 5.0) if m * power >= value * (1.0 - 1e-9)), 10.0 * power)
 
 
 # The Jacobian

@@ -15,11 +15,12 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.dh import questions as dh
 from app.viewer.lessons.equations import questions as equations
 from app.viewer.lessons.guide.outline import Choice, Mistake, Number, Outline, apart, two_percent
-from app.viewer.lessons.guide.rank import rank, self_motions
 from app.viewer.lessons.postures import questions as postures
 from app.viewer.lessons.redundancy import questions as redundancy
 from app.viewer.lessons.velocity import questions as velocity
 from kin import Robot
+from kin.axes import NEARLY
+from kin.differential.task import free_motions, rank
 from kin.units import Units
 
 UNITS = Units()
@@ -90,8 +91,8 @@ def test_a_missed_target_is_beyond_every_posture() -> None:
 
 @pytest.mark.parametrize(("robot", "at_home", "free"), [(FIVE_OF_SIX, 5, 1), (PLANAR4, 3, 1)], ids=["six", "four"])
 def test_the_rank_counts_and_not_the_number_of_joints(robot: Robot, at_home: int, free: int) -> None:
-    assert rank(robot, kin.jacobian(robot, robot.q_home)) == at_home
-    assert self_motions(robot) == free
+    assert rank(robot, kin.jacobian(robot, robot.q_home), NEARLY) == at_home
+    assert free_motions(robot, "pose") == free
     outline = postures.outline(robot, UNITS)
     every, many = question(outline, "c1"), question(outline, "c2")
     assert right(every) == ["No"]
@@ -107,8 +108,8 @@ def test_the_rank_counts_and_not_the_number_of_joints(robot: Robot, at_home: int
 
 def test_a_rounded_table_has_the_rank_that_was_meant() -> None:
     typed = Robot.from_dh([(0, 0, 0.3, 3.1416)] * 4, home=PLANAR4.home)
-    assert rank(typed, kin.jacobian(typed, typed.q_home)) == 3
-    assert self_motions(typed) == 1
+    assert rank(typed, kin.jacobian(typed, typed.q_home), NEARLY) == 3
+    assert free_motions(typed, "pose") == 1
     assert right(question(postures.outline(typed, UNITS), "c2")) == ["Infinitely many"]
 
 

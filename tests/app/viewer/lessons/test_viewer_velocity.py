@@ -21,20 +21,10 @@ from app.shared.store import Store
 from app.viewer.lessons.velocity import VelocityLesson, views
 from app.viewer.lessons.velocity.drawing import ring_arrow, sides, wxyz_along
 from app.viewer.lessons.velocity.jog import BUTTONS, Press, button, moved, step
-from app.viewer.lessons.velocity.rates import (
-    NEAR,
-    axes_of,
-    condition,
-    lost,
-    nice,
-    part_of,
-    real,
-    semi_axes,
-    state_of,
-    task_rates,
-)
+from app.viewer.lessons.velocity.views import NEAR, nice, real, state_of
 from app.viewer.server import ViewerServer
-from kin.singularity import task_jacobian, usual_rank
+from kin.differential.ellipsoids import axes_of, condition, lost, part_of, semi_axes, task_rates
+from kin.differential.task import natural_task, task_jacobian, usual_rank
 from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
 from kin.units import DEFAULT_UNITS, Units
 
@@ -98,10 +88,10 @@ def test_singular_values_give_yoshikawas_measure(robot: kin.Robot) -> None:
     for q in configurations(robot):
         rates = task_rates(robot, q)
         J = task_jacobian(robot, q)
-        if usual_rank(robot) == len(J):  # a planar arm never leaves its plane
+        if usual_rank(robot, natural_task(robot)) == len(J):  # a planar arm never leaves its plane
             assert np.prod(rates.values) == pytest.approx(math.sqrt(abs(np.linalg.det(J @ J.T))), abs=1e-9)
         else:
-            values = np.linalg.svd(J, compute_uv=False)[: usual_rank(robot)]
+            values = np.linalg.svd(J, compute_uv=False)[: usual_rank(robot, natural_task(robot))]
             assert np.prod(rates.values) == pytest.approx(np.prod(values), abs=1e-12)
         if robot.n > 5:
             assert np.prod(rates.values) == pytest.approx(float(kin.manipulability(robot, q)), abs=1e-12)

@@ -17,12 +17,13 @@ from app.shared.store import Store
 from app.viewer.lessons.velocity import section_views as views
 from app.viewer.lessons.velocity.along import SAMPLES, along, between, controllable
 from app.viewer.lessons.velocity.null_motion import GOALS
-from app.viewer.lessons.velocity.rates import axes_of
 from app.viewer.lessons.velocity.statics import torques
-from app.viewer.null_space import margin, measure, null_space, secondary, task_rows, usual_rank
 from app.viewer.panel.joints import label
 from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
+from kin.differential.ellipsoids import axes_of
+from kin.differential.null_space import margin, measure, null_space, secondary
+from kin.differential.task import task_rows, usual_rank
 from kin.transforms import Array
 from kin.units import Units
 

@@ -8,19 +8,10 @@ import numpy as np
 import pytest
 
 import kin
-from app.viewer.null_space import (
-    error,
-    free_motions,
-    hold,
-    lead,
-    leaders,
-    margin,
-    measure,
-    null_space,
-    secondary,
-    task_rows,
-)
+from app.viewer.self_motion import leaders
 from kin import Robot, Task
+from kin.differential.null_space import error, hold, lead, margin, measure, null_space, secondary
+from kin.differential.task import free_motions, task_rows
 from kin.transforms import rotation_angle, vector_angle
 
 TASKS: tuple[Task, ...] = ("pose", "approach", "position")

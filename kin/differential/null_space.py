@@ -1,7 +1,7 @@
-"""Null space of an arm's task at one configuration, and motions in it, by the Jacobian alone.
+"""The null space of an arm's task at one configuration, and motions in it, by the Jacobian alone.
 
-It serves every arm: where the core has a closed form, the parameters of :mod:`app.viewer.self_motion` are exact;
-here the joints follow ``q̇ = J⁺v + (I − J⁺J) z``, and Newton's method corrects what a finite step misses.
+The joints follow ``q̇ = J⁺v + (I − J⁺J) z``: the first part moves the task, the second only the joints (Liégeois,
+IEEE Trans. Systems, Man, and Cybernetics 7(12), 1977). Newton's method corrects what a finite step misses.
 """
 
 from __future__ import annotations
@@ -9,24 +9,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
-from kin import Redundancy, Robot, Task, fk, jacobian
-from kin.axes import NEARLY, size
+from kin.differential.task import LOST, Task, task_rows, usual_rank, weight
+from kin.fk import fk
+from kin.robot import Robot
 from kin.transforms import Array, rotation_angle, wxyz_from_rotation
 
 Goal = Literal["limits", "manipulability"]
-SINGULAR = 1e-9  # of the largest singular value
 TOLERANCE = 1e-10  # m and rad; how exactly the task is held
 SMOOTH = 0.6  # rad or m of a joint; a larger correction is a jump
 FAST = 0.08  # rad or m of any joint in one step
 _ITERATIONS = 12
 _STEP = 1e-5  # rad or m, for the gradient
-_TAKES_PART, _MOVES = 1e-6, 1e-3  # least share of a joint in the null space: to be led, to be offered
-_SAMPLES = 8
+_TAKES_PART = 1e-6  # least share of a joint in the null space to be led
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,59 +47,19 @@ class NullSpace:
         return np.asarray(self.basis @ (self.basis.T @ z))
 
 
-def task_rows(robot: Robot, q: Array, task: Task) -> Array:
-    """The rows of the Jacobian that a task is about ``(..., m, n)``, in the base frame.
-
-    All six; the velocity of the tool point alone; or this and the turning about the tool's x and y.
-    """
-    J = jacobian(robot, q)
-    if task == "pose":
-        return J
-    if task == "position":
-        return J[..., :3, :]
-    R_T = np.swapaxes(fk(robot, q)[..., :3, :2], -1, -2)
-    return np.concatenate([J[..., :3, :], R_T @ J[..., 3:, :]], axis=-2)
-
-
 def null_space(robot: Robot, q: Array, task: Task, locked: Sequence[int] = ()) -> NullSpace:
     """The null space of a task at q ``(n,)``, of the joints that are not locked."""
     J = task_rows(robot, q, task)
     J[:, list(locked)] = 0.0
-    weight = _weight(robot, len(J))
-    U, s, Vt = np.linalg.svd(weight[:, None] * J)
-    rank = min(_above(s, SINGULAR), usual_rank(robot, task, tuple(locked)))
-    pinv = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T * weight
+    factors = weight(robot, len(J))
+    U, s, Vt = np.linalg.svd(factors[:, None] * J)
+    rank = min(int((s > LOST * s[:1]).sum()), usual_rank(robot, task, tuple(locked)))
+    pinv = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T * factors
     basis = Vt[rank:].T
     if locked:
         still = np.eye(robot.n)[:, list(locked)]
         basis = np.linalg.svd(np.concatenate([Vt[:rank], still.T]))[2][rank + len(locked) :].T
     return NullSpace(J, rank, pinv, basis)
-
-
-@lru_cache(maxsize=256)
-def usual_rank(robot: Robot, task: Task, locked: tuple[int, ...] = ()) -> int:
-    """The rank of the task's Jacobian almost everywhere; what is zero but for typed digits counts as zero."""
-    J = task_rows(robot, robot.random_q(np.random.default_rng(2), _SAMPLES), task)
-    J[..., list(locked)] = 0.0
-    values = np.linalg.svd(_weight(robot, J.shape[-2])[:, None] * J, compute_uv=False)
-    return max(_above(s, NEARLY) for s in values)
-
-
-def free_motions(robot: Robot, task: Task, locked: tuple[int, ...] = ()) -> int:
-    """The dimension of the null space almost everywhere."""
-    return robot.n - len(locked) - usual_rank(robot, task, locked)
-
-
-def _weight(robot: Robot, rows: int) -> Array:
-    """Factors of the rows ``(m,)``: lengths as shares of the arm's size, so that metres and radians compare."""
-    weight = np.ones(rows)
-    weight[:3] = 1.0 / size(robot)
-    return weight
-
-
-def _above(values: Array, share: float) -> int:
-    """How many singular values, descending, are more than a share of the largest."""
-    return int((values > share * values[0]).sum()) if len(values) else 0
 
 
 def measure(robot: Robot, q: Array, task: Task, rank: int) -> Array:
@@ -207,19 +165,3 @@ def _newton(
         if float(np.abs(q - start).max()) > 4.0 * SMOOTH:
             return None
     return None
-
-
-def leaders(robot: Robot, q: Array, task: Task, locked: tuple[int, ...] = ()) -> tuple[Redundancy, ...]:
-    """The revolute joints that take part in the null space at q ``(n,)``, as parameters that can be given a value.
-
-    Without a closed form nobody knows the feasible range: it is that of the joint's own limits.
-    """
-    if not free_motions(robot, task, locked):
-        return ()
-    basis = null_space(robot, q, task, locked).basis
-    found = []
-    for i in np.flatnonzero(robot.revolute & (np.linalg.norm(basis, axis=1) > _MOVES)).tolist():
-        low, high = float(robot.lower[i]), float(robot.upper[i])
-        ends = (low, high) if math.isfinite(high - low) else (-math.pi, math.pi)
-        found.append(Redundancy(f"theta{i + 1}", f"θ{i + 1}", float(q[i]), (ends,)))
-    return tuple(found)

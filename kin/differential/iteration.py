@@ -23,8 +23,9 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from kin import Robot, fk, jacobian
 from kin.axes import size
+from kin.fk import fk, jacobian
+from kin.robot import Robot
 from kin.transforms import Array, wxyz_from_rotation
 
 Method = Literal["newton", "transpose", "damped", "gauss-newton"]
