@@ -45,7 +45,7 @@ RULES: dict[str, set[str]] = {
     "app": {"app", "kin"},
     "app/shared": {
         *("kin", "numpy", "app.shared", "pydantic", "pydantic_settings", "prometheus_client", "starlette"),
-        *("typing_extensions", "distributed", "platformdirs"),
+        *("typing_extensions", "distributed", "platformdirs", "msgspec"),
     },
     "app/exports": {"kin", "numpy", "scipy", "tqdm", "trimesh", "PIL", "app.exports", "app.shared"},
     "app/equations": {"kin", "numpy", "sympy", "app.equations", "app.shared.computations"},
@@ -63,7 +63,7 @@ RULES: dict[str, set[str]] = {
         *("roboplan", "spatialmath", "ssik", "toppra"),
     },
     "app/api": {
-        *("fastapi", "starlette", "pydantic", "pydantic_core", "typing_extensions", "numpy", "kin"),
+        *("fastapi", "starlette", "pydantic", "pydantic_core", "msgspec", "numpy", "kin"),
         *("app.api", "app.classroom", "app.equations", "app.exports", "app.shared"),
     },
     "app/viewer": {

@@ -12,11 +12,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from fastapi import Response
-from pydantic_core import to_json
 from starlette.types import Receive, Scope, Send
 
 from app.api.problems import FieldError, ProblemError
 from app.api.work import Deadline, busy
+from app.shared.answers.answer import as_json
 from app.shared.memory.answers import SMALL, AnswerMemory, AnswerTooLargeError, MemoryFullError, Reservation
 
 MEDIA_TYPE = "application/json"
@@ -92,18 +92,18 @@ def one_or_all(answers: Callable[[slice], Sequence[object]], batch: Batch, deadl
     deadline, 413 if the answer is too large.
     """
     if batch.single and batch.size <= SMALL:
-        return Response(to_json(answers(slice(0, 1))[0], inf_nan_mode="null"), media_type=MEDIA_TYPE)
+        return Response(as_json(answers(slice(0, 1))[0]), media_type=MEDIA_TYPE)
     memory = deadline.memory
     reservation = batch.reserve(memory)
     if batch.single:
-        content = to_json(answers(slice(0, 1))[0], inf_nan_mode="null")
+        content = as_json(answers(slice(0, 1))[0])
         batch.resize(reservation, len(content), memory)
         return held_response([content], reservation)
     pieces = []
     size = 0
     for start in range(0, batch.count, batch.at_once):
         deadline.check()
-        piece = to_json(list(answers(slice(start, start + batch.at_once))), inf_nan_mode="null")
+        piece = as_json(list(answers(slice(start, start + batch.at_once))))
         pieces += [b"," if start else b'{"results":[', piece[1:-1]]
         size += len(piece)
         if size > batch.count * batch.size:  # estimated too low
@@ -114,7 +114,7 @@ def one_or_all(answers: Callable[[slice], Sequence[object]], batch: Batch, deadl
 
 def held_json(content: object, batch: Batch, reservation: Reservation, memory: AnswerMemory) -> Response:
     """One answer that may be large, as JSON; raises 413 naming the field if it is larger than allowed."""
-    body = to_json(content, inf_nan_mode="null")
+    body = as_json(content)
     batch.resize(reservation, len(body), memory)
     return held_response([body], reservation)
 

@@ -9,7 +9,6 @@ from typing import Literal
 
 from fastapi import Request, Response
 from pydantic import Field
-from typing_extensions import TypedDict
 
 from app.api import schemas
 from app.api.arms.operation import operation
@@ -27,7 +26,7 @@ from app.api.schemas import (
 from app.api.work import TooSlowError, busy, compute_slots, computed
 from app.equations import Book, DerivationError, Equation, Symbol, book_later, typeset
 from app.equations.expression import Expression
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer
 from app.shared.computations import TooManyPendingError
 from kin import Robot
 from kin.transforms import Array
@@ -44,8 +43,7 @@ EXAMPLES = {
 }
 
 
-@documented
-class Formula(TypedDict):
+class Formula(Answer):
     """An expression or equation, typeset as MathML and LaTeX."""
 
     mathml: str
@@ -54,8 +52,7 @@ class Formula(TypedDict):
     """The same in LaTeX, for math mode."""
 
 
-@documented
-class SymbolAnswer(TypedDict):
+class SymbolAnswer(Answer):
     """A symbol of the equations."""
 
     id: str
@@ -72,8 +69,7 @@ class SymbolAnswer(TypedDict):
     """m for lengths and values of prismatic joints; empty for pure numbers."""
 
 
-@documented
-class LineAnswer(TypedDict):
+class LineAnswer(Answer):
     """A named intermediate result."""
 
     id: str
@@ -82,8 +78,7 @@ class LineAnswer(TypedDict):
     """Its definition."""
 
 
-@documented
-class EquationAnswer(TypedDict):
+class EquationAnswer(Answer):
     """One equation of an arm: an entry of the tool's pose [n o a p]."""
 
     id: str
@@ -109,8 +104,7 @@ class EquationAnswer(TypedDict):
     """Ids of the `symbols` and `lines` that it depends on; other equations are not listed."""
 
 
-@documented
-class EquationsAnswer(TypedDict):
+class EquationsAnswer(Answer):
     """The equations of one arm."""
 
     source: Literal["chapter", "derived"]
@@ -123,8 +117,7 @@ class EquationsAnswer(TypedDict):
     """Intermediate results; each uses only earlier ones."""
 
 
-@documented
-class EquationValue(TypedDict):
+class EquationValue(Answer):
     """Value of one equation at one configuration."""
 
     id: str
@@ -145,16 +138,14 @@ class EquationValue(TypedDict):
     """m for p; empty for n, o, a, which are pure numbers."""
 
 
-@documented
-class EquationValues(TypedDict):
+class EquationValues(Answer):
     """Values of all equations at one configuration."""
 
     values: list[EquationValue]
     """One for every readable equation, in order."""
 
 
-@documented
-class EquationValuesList(TypedDict):
+class EquationValuesList(Answer):
     """Answers to a list of configurations."""
 
     results: list[EquationValues]
@@ -183,7 +174,7 @@ async def equations(request: Request, robot: Robot) -> Response:
             source=found.source,
             equations=[_equation(found, equation) for equation in found.equations],
             symbols=[_symbol(symbol) for symbol in found.symbols.values()],
-            lines=[{"id": line.name, "formula": _formula(line.name, line.expression)} for line in found.lines],
+            lines=[LineAnswer(line.name, _formula(line.name, line.expression)) for line in found.lines],
         )
     )
 
@@ -237,55 +228,47 @@ async def _book(request: Request, robot: Robot) -> Book:
 
 def _equation(found: Book, equation: Equation) -> EquationAnswer:
     correct = None if equation.correct is None else _formula(equation.entry, equation.correct)
-    return {
-        "id": equation.id,
-        "name": equation.entry,
-        "reference": equation.number,
-        "verdict": equation.verdict,
-        "as_printed": None if equation.printed is None else _formula(equation.entry, equation.printed),
-        "corrected": correct if equation.verdict == "misprinted" else None,
-        "derived": correct if equation.verdict == "derived" else None,
-        "note": equation.note,
-        "worst_q": list(equation.worst) or None,
-        "uses": [
+    return EquationAnswer(
+        id=equation.id,
+        name=equation.entry,
+        reference=equation.number,
+        verdict=equation.verdict,
+        as_printed=None if equation.printed is None else _formula(equation.entry, equation.printed),
+        corrected=correct if equation.verdict == "misprinted" else None,
+        derived=correct if equation.verdict == "derived" else None,
+        note=equation.note,
+        worst_q=list(equation.worst) or None,
+        uses=[
             *(symbol.name for symbol in found.symbols_of(equation)),
             *(line.name for line in found.lines_of(equation)),
         ],
-    }
+    )
 
 
 def _formula(name: str, expression: Expression) -> Formula:
-    return {"mathml": typeset.mathml(expression, name), "latex": typeset.latex(expression, name)}
+    return Formula(typeset.mathml(expression, name), typeset.latex(expression, name))
 
 
 def _symbol(symbol: Symbol) -> SymbolAnswer:
-    return {
-        "id": symbol.name,
-        "mathml": typeset.mathml_name(symbol.name),
-        "latex": typeset.latex_name(symbol.name),
-        "meaning": symbol.meaning,
-        "value": symbol.constant if symbol.fixed and symbol.kind in ("length", "number") else None,
-        "unit": "m" if symbol.kind in ("length", "slide") else "",
-    }
+    return SymbolAnswer(
+        id=symbol.name,
+        mathml=typeset.mathml_name(symbol.name),
+        latex=typeset.latex_name(symbol.name),
+        meaning=symbol.meaning,
+        value=symbol.constant if symbol.fixed and symbol.kind in ("length", "number") else None,
+        unit="m" if symbol.kind in ("length", "slide") else "",
+    )
 
 
 def _values(found: Book, q: Array) -> list[EquationValues]:
-    out: list[EquationValues] = [{"values": []} for _ in q]
+    out = [EquationValues([]) for _ in q]
     for equation, values in found.compare(q):
         printed = [None] * len(q) if values.printed is None else values.printed.tolist()
         numbers = (values.correct, values.dh, values.difference, values.turn)
         rows = zip(printed, *(column.tolist() for column in numbers), strict=True)
+        unit: Literal["m", ""] = "m" if equation.is_length else ""
         for answer, (as_printed, correct, dh, difference, turn) in zip(out, rows, strict=True):
-            answer["values"].append(
-                {
-                    "id": equation.id,
-                    "name": equation.entry,
-                    "printed": as_printed,
-                    "corrected": correct,
-                    "dh": dh,
-                    "difference": difference,
-                    "turn": turn,
-                    "unit": "m" if equation.is_length else "",
-                }
+            answer.values.append(
+                EquationValue(equation.id, equation.entry, as_printed, correct, dh, difference, turn, unit)
             )
     return out

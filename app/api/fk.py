@@ -6,7 +6,6 @@ from functools import partial
 
 from fastapi import Request, Response
 from pydantic import Field
-from typing_extensions import TypedDict
 
 from app.api import schemas
 from app.api.arms.frames import FrameName, WorkpiecesBody
@@ -21,7 +20,7 @@ from app.api.schemas import (
     settings_of,
 )
 from app.api.work import Deadline, compute_slots, computed
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer
 from app.shared.answers.fk import FkAnswer, fk_answers
 from kin import Robot
 from kin.frames import WORLD
@@ -75,8 +74,7 @@ class FkRequest(WorkpiecesBody):
         return None if self.frame == WORLD else self.pose_of(robot, self.frame, "frame")
 
 
-@documented
-class FkAnswers(TypedDict):
+class FkAnswers(Answer):
     """Answers to a list of configurations."""
 
     results: list[FkAnswer]

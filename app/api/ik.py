@@ -8,7 +8,6 @@ from typing import Annotated, ClassVar
 
 from fastapi import Request, Response
 from pydantic import Discriminator, Field, Tag
-from typing_extensions import TypedDict
 
 from app.api import schemas
 from app.api.arms.operation import operation
@@ -23,7 +22,7 @@ from app.api.schemas import (
     settings_of,
 )
 from app.api.work import Deadline, computed
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer
 from app.shared.answers.ik import IkAnswer, ik_answer
 from app.shared.metrics import SOLVE_SECONDS
 from app.shared.settings import Settings
@@ -96,8 +95,7 @@ class IkRequest(OptionsBody):
     )
 
 
-@documented
-class IkAnswers(TypedDict):
+class IkAnswers(Answer):
     """Answers to a list of targets."""
 
     results: list[IkAnswer]

@@ -7,7 +7,6 @@ from typing import Literal
 
 from fastapi import Request, Response
 from pydantic import Field
-from typing_extensions import TypedDict
 
 from app.api import schemas
 from app.api.arms.frames import FramesBody
@@ -16,7 +15,7 @@ from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
 from app.api.schemas import POST_REFUSALS, Configurations, example, settings_of
 from app.api.work import computed
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer
 from app.shared.answers.jacobian import JacobianAnswer, jacobian_answers
 from kin import Robot
 
@@ -45,8 +44,7 @@ class JacobianRequest(FramesBody):
     )
 
 
-@documented
-class JacobianAnswers(TypedDict):
+class JacobianAnswers(Answer):
     """Answers to a list of configurations."""
 
     results: list[JacobianAnswer]

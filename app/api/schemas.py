@@ -8,9 +8,10 @@ from typing import Annotated, Any
 import numpy as np
 from fastapi import Path, Request, Response
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
-from pydantic_core import CoreSchema, core_schema, to_json
+from pydantic_core import CoreSchema, core_schema
 
 from app.api.problems import FieldError, Problem, ProblemError, invalid, show
+from app.shared.answers.answer import as_json
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.threads.turns import offer
@@ -140,7 +141,7 @@ def example(summary: str, value: dict[str, Any]) -> dict[str, Any]:
 
 def reply(content: object) -> Response:
     """`content` as JSON, serialised by compiled code without validation."""
-    return Response(to_json(content, inf_nan_mode="null"), media_type="application/json")
+    return Response(as_json(content), media_type="application/json")
 
 
 def check_batch(field: str, count: int, settings: Settings, most: int | None = None) -> None:

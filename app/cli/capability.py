@@ -54,18 +54,18 @@ def _counted(blocks: Iterator[CapabilityBlock], advance: Callable[[int], object]
 
 def _summary(answer: CapabilityAnswer, found: CapabilityMap, units: Notation) -> list[str]:
     """The figures as lines of text, and a table of voxels by share of directions."""
-    length, a = units.of_length, "×".join(map(str, answer["shape"]))
+    length, a = units.of_length, "×".join(map(str, answer.shape))
 
     def at(place: list[float] | None) -> str:
         return "" if place is None else f" at {', '.join(units.length(x) for x in place)} {length}"
 
     lines = [
-        f"grid            {a} voxels of {units.length(answer['voxel'])} {length}",
-        f"directions      {answer['directions']}, {answer['method']}",
-        f"reachable       {answer['reachable']} voxels, {clean(answer['volume'], 4)} m³",
-        f"mean share      {100.0 * answer['mean_share']:.1f} %",
-        f"best share      {100.0 * answer['best_share']:.1f} %{at(answer['best_share_at'])}",
-        f"manipulability  {answer['best_manipulability']:.4g} at best{at(answer['best_manipulability_at'])}",
+        f"grid            {a} voxels of {units.length(answer.voxel)} {length}",
+        f"directions      {answer.directions}, {answer.method}",
+        f"reachable       {answer.reachable} voxels, {clean(answer.volume, 4)} m³",
+        f"mean share      {100.0 * answer.mean_share:.1f} %",
+        f"best share      {100.0 * answer.best_share:.1f} %{at(answer.best_share_at)}",
+        f"manipulability  {answer.best_manipulability:.4g} at best{at(answer.best_manipulability_at)}",
     ]
     steps = np.linspace(0.0, 1.0, 6)
     rows = [["none of the set", str(int((found.share == 0.0).sum()))]]

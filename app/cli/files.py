@@ -121,28 +121,28 @@ def run_check(arguments: Namespace) -> int:
 
 def _about(answer: InspectionAnswer, units: Notation) -> list[str]:
     """Lines about joint axes, solver and warnings."""
-    robot = answer["robot"]
+    robot = answer.robot
     lines = []
-    for pair in answer["axes"]:
-        a, b = (j + 1 for j in pair["joints"])
-        apart = "" if pair["distance"] is None else f", {units.length(pair['distance'])} {units.of_length} apart"
-        angle = f" ({units.angle(pair['angle'])})" if pair["relation"] == "oblique" else ""
-        where = "" if pair["relation"] == "same line" else ", intersecting" if pair["intersect"] else apart
-        lines.append(f"axes {a} and {b}: {pair['relation']}{angle}{where}")
-    lines += [f"joints {run[0] + 1} to {run[-1] + 1}: parallel axes" for run in answer["parallel"]]
-    lines += [f"joints {run[0] + 1} to {run[-1] + 1}: axes through one point" for run in answer["spherical"]]
-    count = len(robot["branches"])
+    for pair in answer.axes:
+        a, b = (j + 1 for j in pair.joints)
+        apart = "" if pair.distance is None else f", {units.length(pair.distance)} {units.of_length} apart"
+        angle = f" ({units.angle(pair.angle)})" if pair.relation == "oblique" else ""
+        where = "" if pair.relation == "same line" else ", intersecting" if pair.intersect else apart
+        lines.append(f"axes {a} and {b}: {pair.relation}{angle}{where}")
+    lines += [f"joints {run[0] + 1} to {run[-1] + 1}: parallel axes" for run in answer.parallel]
+    lines += [f"joints {run[0] + 1} to {run[-1] + 1}: axes through one point" for run in answer.spherical]
+    count = len(robot.branches)
     lines += [
         "",
-        f"convention  {robot['convention']}",
-        f"joints      {robot['n']}, giving the tool {answer['motions']} independent motions",
-        f"reach       {units.length(robot['reach'])} {units.of_length} at most",
-        f"solver      {answer['solver']}: {answer['reason']}",
+        f"convention  {robot.convention}",
+        f"joints      {robot.n}, giving the tool {answer.motions} independent motions",
+        f"reach       {units.length(robot.reach)} {units.of_length} at most",
+        f"solver      {answer.solver}: {answer.reason}",
         f"branches    {count if count else 'not known in advance: a search finds them one by one'}",
         "",
-        *(f"warning: {text}" for text in answer["warnings"]),
+        *(f"warning: {text}" for text in answer.warnings),
     ]
-    return lines if answer["warnings"] else [*lines, "No warnings."]
+    return lines if answer.warnings else [*lines, "No warnings."]
 
 
 def _meant(path: Path) -> str:

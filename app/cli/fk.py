@@ -32,9 +32,9 @@ def run(arguments: Namespace) -> int:
     ]
     print(f"{robot.name} ({robot.id})\n")
     print(table(["joint", "value", "limits", ""], rows))
-    frames = [("tool", answer["pose"])] + [(frame["name"], frame["pose"]) for frame in answer["frames"] or ()]
+    frames = [("tool", answer.pose)] + [(frame.name, frame.pose) for frame in answer.frames or ()]
     rows = [
-        [name, *(units.length(x) for x in pose["position"]), *(f"{clean(w, 5)}" for w in pose["wxyz"])]
+        [name, *(units.length(x) for x in pose.position), *(f"{clean(w, 5)}" for w in pose.wxyz)]
         for name, pose in frames
     ]
     if arguments.frame != WORLD:

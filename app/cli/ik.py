@@ -66,7 +66,7 @@ def run(arguments: Namespace) -> int:
         _print(answer, Notation(robot, arguments.rad))
         if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
             print("note: --position is in millimetres; --rad makes it metres", file=sys.stderr)
-    return 0 if answer["status"] == "solved" else 1
+    return 0 if answer.status == "solved" else 1
 
 
 def _vector(texts: list[str], unit: Unit, field: str) -> list[float]:
@@ -83,31 +83,31 @@ def _option(arguments: Namespace, option: Option, units: Units) -> Any:
 
 def _print(answer: IkAnswer, units: Notation) -> None:
     """Print the solutions, the redundancy parameters, and the postures outside the limits."""
-    listed = [(str(k + 1), solution) for k, solution in enumerate(answer["solutions"])]
-    if not listed and answer["closest"]:
-        listed.append(("closest", answer["closest"]))
-    if answer["nearest_orientation"]:
-        listed.append(("nearest orientation", answer["nearest_orientation"]))
+    listed = [(str(k + 1), solution) for k, solution in enumerate(answer.solutions)]
+    if not listed and answer.closest:
+        listed.append(("closest", answer.closest))
+    if answer.nearest_orientation:
+        listed.append(("nearest orientation", answer.nearest_orientation))
     if listed:
         print(_solutions(units, listed))
-    for parameter in answer["redundancy"]:
-        ranges = ", ".join(" … ".join(units.angle(x) for x in interval) for interval in parameter["intervals"])
-        print(f"\n{parameter['label']} = {units.angle(parameter['value'])}, possible: {ranges or 'nothing'}")
-    if answer["blocked"]:
-        print("\n" + table(["posture", "outside the limits"], _needs(units, answer["blocked"])))
+    for parameter in answer.redundancy:
+        ranges = ", ".join(" … ".join(units.angle(x) for x in interval) for interval in parameter.intervals)
+        print(f"\n{parameter.label} = {units.angle(parameter.value)}, possible: {ranges or 'nothing'}")
+    if answer.blocked:
+        print("\n" + table(["posture", "outside the limits"], _needs(units, answer.blocked)))
 
 
 def _solutions(units: Notation, listed: list[tuple[str, Solution]]) -> str:
     """The table of solutions."""
-    count = len(listed[0][1]["q"])
+    count = len(listed[0][1].q)
     head = ["", *(f"q{i + 1}" for i in range(count)), "point error", "rotation error", "posture"]
     rows = [
         [
             name,
-            *(units.joint(i, value) for i, value in enumerate(solution["q"])),
-            f"{units.length(solution['position_error'])} {units.of_length}",
-            units.angle(solution["rotation_error"]),
-            solution["branch"] + ("" if solution["in_limits"] else " (outside limits)"),
+            *(units.joint(i, value) for i, value in enumerate(solution.q)),
+            f"{units.length(solution.position_error)} {units.of_length}",
+            units.angle(solution.rotation_error),
+            solution.branch + ("" if solution.in_limits else " (outside limits)"),
         ]
         for name, solution in listed
     ]
@@ -135,11 +135,10 @@ def _needs(units: Notation, blocked: list[Blocked]) -> list[list[str]]:
     """The joint values of each posture that are outside the limits."""
     return [
         [
-            branch["branch"],
+            branch.branch,
             ", ".join(
-                f"q{v['joint'] + 1} = {units.joint(v['joint'], v['value'])} "
-                f"(limit {units.joint(v['joint'], v['limit'])})"
-                for v in branch["violations"]
+                f"q{v.joint + 1} = {units.joint(v.joint, v.value)} (limit {units.joint(v.joint, v.limit)})"
+                for v in branch.violations
             ),
         ]
         for branch in blocked

@@ -21,25 +21,23 @@ def run(arguments: Namespace) -> int:
     answers = [robot_answer(robot) for robot in store_of(arguments).robots]
     if arguments.json:
         return print_json({"robots": answers})
-    rows = [
-        [s["id"], str(s["n"]), s["convention"], f"{clean(s['reach'] * 1e3, 0)} mm", s["name"]] for s in answers
-    ]
+    rows = [[s.id, str(s.n), s.convention, f"{clean(s.reach * 1e3, 0)} mm", s.name] for s in answers]
     print(table(["robot", "joints", "convention", "reach at most", "name"], rows))
     return 0
 
 
 def _dh_table(answer: RobotAnswer, units: Notation) -> str:
-    limits = {joint["name"]: (joint["index"], joint["limits"]) for joint in answer["joints"]}
+    limits = {joint.name: (joint.index, joint.limits) for joint in answer.joints}
     rows = []
-    for row in answer["rows"]:
-        index, bounds = limits.get(row["name"], (0, None))
+    for row in answer.rows:
+        index, bounds = limits.get(row.name, (0, None))
         cells = [
-            units.angle(row["theta"]),
-            units.length(row["d"]),
-            units.length(row["a"]),
-            units.angle(row["alpha"]),
+            units.angle(row.theta),
+            units.length(row.d),
+            units.length(row.a),
+            units.angle(row.alpha),
         ]
-        rows.append([row["name"], row["kind"], *cells, " … ".join(units.joint(index, x) for x in bounds or ())])
+        rows.append([row.name, row.kind, *cells, " … ".join(units.joint(index, x) for x in bounds or ())])
     length = units.of_length
     head = ["row", "kind", "theta", f"d {length}", f"a {length}", "alpha", "limits"]
-    return f"DH table, {answer['convention']} convention\n\n" + table(head, rows)
+    return f"DH table, {answer.convention} convention\n\n" + table(head, rows)

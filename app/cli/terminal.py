@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from app.shared.answers.answer import as_plain
 from app.shared.store import Store
 from kin import (
     InputError,
@@ -183,5 +184,5 @@ def clean(value: float, digits: int) -> str:
 
 def print_json(answer: object) -> int:
     """Print an answer on one line; returns the exit code 0."""
-    print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
+    print(json.dumps(as_plain(answer), ensure_ascii=False, allow_nan=False))
     return 0

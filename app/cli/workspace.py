@@ -38,18 +38,15 @@ def run(arguments: Namespace) -> int:
         return print_json(answer)
     units = Notation(robot, arguments.rad)
     spans = [
-        *(("x", answer["x"]), ("y", answer["y"]), ("z", answer["z"])),
-        *(("from the axis of joint 1", answer["radius"]), ("from the shoulder", answer["reach"])),
+        *(("x", answer.x), ("y", answer.y), ("z", answer.z)),
+        *(("from the axis of joint 1", answer.radius), ("from the shoulder", answer.reach)),
     ]
-    rows = [
-        [name, units.length(span["least"]["value"]), units.length(span["largest"]["value"])]
-        for name, span in spans
-    ]
+    rows = [[name, units.length(span.least.value), units.length(span.largest.value)] for name, span in spans]
     print(f"{robot.name} ({robot.id})\n")
     print(table([f"tool point, {units.of_length}", "least", "largest"], rows) + "\n")
-    for name, unit, estimate in (("volume", "m³", answer["volume"]), ("surface", "m²", answer["surface"])):
+    for name, unit, estimate in (("volume", "m³", answer.volume), ("surface", "m²", answer.surface)):
         if estimate is not None:
-            print(f"{name:<8} {estimate['value']:.4g} ± {estimate['error']:.1g} {unit}: {estimate['method']}")
+            print(f"{name:<8} {estimate.value:.4g} ± {estimate.error:.1g} {unit}: {estimate.method}")
     return 0
 
 

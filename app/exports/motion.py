@@ -13,6 +13,7 @@ from pprint import pformat
 import numpy as np
 
 from app.exports.snippets import robot_code
+from app.shared.answers.answer import as_plain
 from app.shared.answers.motion import motion_answer, sample_times
 from kin import InputError, Motion, fk
 from kin.axes import inverse
@@ -68,7 +69,7 @@ def _csv(motion: Motion, rate: float) -> Generator[bytes]:
 
 def _ndjson(motion: Motion, rate: float) -> Generator[bytes]:
     """First the answer without samples, then one line per sample."""
-    yield _line(motion_answer(motion))
+    yield _line(as_plain(motion_answer(motion)))
     for sample in samples(motion, rate):
         wxyz = wxyz_from_rotation(sample.T[:, :3, :3])
         lines = zip(
@@ -85,7 +86,7 @@ def _line(content: object) -> bytes:
 
 
 def _json(motion: Motion, rate: float) -> Generator[bytes]:
-    yield _line(motion_answer(motion, sample_times(motion, rate)))
+    yield _line(as_plain(motion_answer(motion, sample_times(motion, rate))))
 
 
 def _python(motion: Motion, rate: float) -> Generator[bytes]:

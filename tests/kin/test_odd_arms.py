@@ -32,7 +32,7 @@ CASES = [
 
 @pytest.mark.parametrize("robot", CASES)
 def test_every_call_is_answered(robot):
-    assert inspect(robot)["motions"] <= min(robot.n, 6)
+    assert inspect(robot).motions <= min(robot.n, 6)
     assert kin.robot_from_dict(kin.robot_to_dict(robot)) == robot
     assert kin.convert(kin.convert(robot, "standard"), "modified").n == robot.n
     q = robot.random_q(np.random.default_rng(1))

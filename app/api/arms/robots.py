@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from fastapi import Request, Response
-from typing_extensions import TypedDict
 
 from app.api.body import versioned
 from app.api.schemas import RobotId, refusals, reply, robot_of, store_of
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer
 from app.shared.answers.robots import RobotAnswer, robot_answer
 
 router = versioned("robots")
 
 
-@documented
-class RobotList(TypedDict):
+class RobotList(Answer):
     """The robots this service offers."""
 
     robots: list[RobotAnswer]

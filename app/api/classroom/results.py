@@ -6,7 +6,6 @@ from typing import Annotated, Literal
 
 from fastapi import Path, Request, Response
 from starlette.concurrency import run_in_threadpool
-from typing_extensions import TypedDict
 
 from app.api.body import versioned
 from app.api.problems import ProblemError
@@ -14,14 +13,13 @@ from app.api.schemas import refusals, reply
 from app.classroom import Hub
 from app.classroom.results.check import check_code, facts
 from app.classroom.results.codes import MOST_LETTERS
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer
 from kin import KinematicsError
 
 router = versioned("results")
 
 
-@documented
-class OutcomeAnswer(TypedDict):
+class OutcomeAnswer(Answer):
     """What a student has reached."""
 
     kind: Literal["exercise", "course"]
@@ -44,8 +42,7 @@ class OutcomeAnswer(TypedDict):
     """When the code was made, as 2026-11-23 (UTC)."""
 
 
-@documented
-class CodeAnswer(TypedDict):
+class CodeAnswer(Answer):
     """Whether a code is right."""
 
     status: Literal["signed", "mistyped", "forged"]

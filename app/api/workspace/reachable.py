@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Generator
 from dataclasses import replace
 from itertools import chain
-from typing import Annotated, NotRequired
+from typing import Annotated
 
 from fastapi import Request, Response
+from msgspec import UNSET, UnsetType
 from pydantic import Discriminator, Field, Tag
 from pydantic_core import to_json
-from typing_extensions import TypedDict
 
 from app.api.arms.operation import operation
 from app.api.body import versioned
@@ -19,7 +19,7 @@ from app.api.problems import Problem, ProblemError
 from app.api.schemas import POST_REFUSALS, example, reply, settings_of
 from app.api.work import Deadline, DeadlineDep
 from app.api.workspace.streaming import ComputedResponse
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer, as_json
 from app.shared.answers.ik import ReachableAnswer, reachable_answer
 from kin import Robot
 from kin.ik import solve
@@ -58,13 +58,12 @@ class ReachableRequest(OptionsBody):
     ] = Field(description="One target, or a list of targets, each judged on its own.")
 
 
-@documented
-class ReachableAnswers(TypedDict):
+class ReachableAnswers(Answer):
     """Answers to a list of targets."""
 
     results: list[ReachableAnswer]
     """One per target, in the same order."""
-    problem: NotRequired[Problem]
+    problem: Problem | UnsetType = UNSET
     """Why results are missing: the time limit of the request was reached. Absent if all are there."""
 
 
@@ -114,7 +113,7 @@ def _pieces(robot: Robot, body: ReachableRequest, targets: list[Goal], deadline:
             yield b'],"problem":' + to_json(error.problem) + b"}"
             return
         with deadline.turn:
-            piece = to_json(_answers(robot, body, targets[start : start + AT_ONCE]), inf_nan_mode="null")[1:-1]
+            piece = as_json(_answers(robot, body, targets[start : start + AT_ONCE]))[1:-1]
         yield (b"," if start else b'{"results":[') + piece
     yield b"]}"
 

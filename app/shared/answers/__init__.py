@@ -1,6 +1,4 @@
-"""Results of the core as plain dicts: what REST answers and what ``kinboard … --json`` prints; a module per topic.
+"""Results of the core as REST answers them and ``kinboard … --json`` prints them; a module per topic.
 
-The types are the contract: REST publishes them as its OpenAPI schemas (the string under a field is its
-description), mypy checks the functions that fill them, and answers are not validated again at run time, so ten
-thousand poses cost little more than printing their digits. Metres, radians and ``wxyz`` quaternions throughout.
+`app.shared.answers.answer` says how a field is declared. Metres, radians and ``wxyz`` quaternions throughout.
 """

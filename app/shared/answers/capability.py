@@ -6,15 +6,13 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from typing_extensions import TypedDict
 
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer
 from app.shared.answers.fk import Matrix
 from kin import CapabilityMap
 
 
-@documented
-class CapabilityAnswer(TypedDict):
+class CapabilityAnswer(Answer):
     """Figures of a capability map: from which directions the tool reaches the voxels of the workspace."""
 
     robot: str
@@ -46,8 +44,7 @@ class CapabilityAnswer(TypedDict):
     """Centre of that voxel, in metres; null if it is 0 everywhere."""
 
 
-@documented
-class VoxelAnswer(TypedDict):
+class VoxelAnswer(Answer):
     """The reachable voxels of a capability map, one entry each, in the same order in all lists."""
 
     centres: Matrix
@@ -61,8 +58,7 @@ class VoxelAnswer(TypedDict):
     """Possible directions, "1" or "0" for each; null unless requested."""
 
 
-@documented
-class CapabilityMapAnswer(TypedDict):
+class CapabilityMapAnswer(Answer):
     """A capability map: figures, directions, voxels."""
 
     summary: CapabilityAnswer
@@ -75,37 +71,28 @@ class CapabilityMapAnswer(TypedDict):
 
 def capability_answer(found: CapabilityMap) -> CapabilityAnswer:
     """Figures of a map by `kin.capability_map`."""
-    grid = found.grid
-    return {
-        "robot": grid.robot.id,
-        "method": grid.method,
-        "directions": grid.count,
-        "voxel": grid.voxel,
-        "origin": list(grid.origin),
-        "shape": list(grid.shape),
-        "reachable": len(found.index),
-        "volume": found.volume,
-        "mean_share": float(found.share.mean(dtype=np.float64)) if len(found.share) else 0.0,
-        "best_share": float(found.share.max(initial=0.0)),
-        "best_share_at": _centre_of_best(found, found.share),
-        "best_manipulability": float(found.manipulability.max(initial=0.0)),
-        "best_manipulability_at": _centre_of_best(found, found.manipulability),
-    }
+    return CapabilityAnswer.of(
+        found.grid,
+        robot=found.grid.robot.id,
+        directions=found.grid.count,
+        reachable=len(found.index),
+        volume=found.volume,
+        mean_share=float(found.share.mean(dtype=np.float64)) if len(found.share) else 0.0,
+        best_share=float(found.share.max(initial=0.0)),
+        best_share_at=_centre_of_best(found, found.share),
+        best_manipulability=float(found.manipulability.max(initial=0.0)),
+        best_manipulability_at=_centre_of_best(found, found.manipulability),
+    )
 
 
 def capability_map_answer(found: CapabilityMap, approachable: bool = False) -> CapabilityMapAnswer:
     """A whole map by `kin.capability_map`; `approachable`: include the directions of each voxel."""
     fits = ["".join("01"[fit] for fit in row) for row in found.approachable.tolist()] if approachable else None
-    return {
-        "summary": capability_answer(found),
-        "directions": found.grid.directions.tolist(),
-        "voxels": {
-            "centres": found.centres.tolist(),
-            "share": found.share.tolist(),
-            "manipulability": found.manipulability.tolist(),
-            "approachable": fits,
-        },
-    }
+    return CapabilityMapAnswer(
+        summary=capability_answer(found),
+        directions=found.grid.directions.tolist(),
+        voxels=VoxelAnswer.of(found, approachable=fits),
+    )
 
 
 def _centre_of_best(found: CapabilityMap, values: NDArray[np.float32]) -> list[float] | None:

@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any
 
-from typing_extensions import TypedDict
-
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer, From
 from kin import Comparison, Robot, robot_to_dict
-from kin.comparison import Change, Difference, Explanation, Mapping, messages
+from kin.comparison import Explanation, messages
 from kin.comparison.mistakes import Mistake
 from kin.comparison.results import Quantity, Verdict
 
 
-@documented
-class MappingAnswer(TypedDict):
+class MappingAnswer(Answer):
     """How b maps to a: ``T_a(q) = base · T_b(signs∘q + offsets) · tool``."""
 
     base: list[list[float]]
     """4×4 homogeneous transform, row by row, in metres."""
     tool: list[list[float]]
     """The same after the last joint."""
-    signs: list[int]
+    signs: Annotated[list[int], From(lambda mapping: [1 if sign > 0.0 else -1 for sign in mapping.signs.tolist()])]
     """1, or −1 where a joint of b counts the other way."""
     offsets: list[float]
     """What a joint of b shows where that of a is at zero, in radians or metres."""
 
 
-@documented
-class DifferenceAnswer(TypedDict):
+class DifferenceAnswer(Answer):
     """A quantity of the joint axes that differs."""
 
     joints: list[int]
@@ -44,8 +40,7 @@ class DifferenceAnswer(TypedDict):
     """The same in words."""
 
 
-@documented
-class ChangeAnswer(TypedDict):
+class ChangeAnswer(Answer):
     """One change of the other table."""
 
     mistake: Mistake
@@ -60,8 +55,7 @@ class ChangeAnswer(TypedDict):
     """The same after the change."""
 
 
-@documented
-class ExplanationAnswer(TypedDict):
+class ExplanationAnswer(Answer):
     """One or two changes that make the other table the reference."""
 
     text: str
@@ -80,8 +74,7 @@ class ExplanationAnswer(TypedDict):
     """Largest angle between them, in radians."""
 
 
-@documented
-class LimitDifferenceAnswer(TypedDict):
+class LimitDifferenceAnswer(Answer):
     """Limits of a joint that differ although the arms are the same."""
 
     joint: int
@@ -92,8 +85,7 @@ class LimitDifferenceAnswer(TypedDict):
     """Those of the other arm, as joint values of the reference."""
 
 
-@documented
-class ComparisonAnswer(TypedDict):
+class ComparisonAnswer(Answer):
     """Whether two tables describe one arm."""
 
     verdict: Verdict
@@ -127,66 +119,16 @@ class ComparisonAnswer(TypedDict):
 
 def comparison_answer(found: Comparison, a: Robot, b: Robot) -> ComparisonAnswer:
     """The comparison of arm b with the reference a."""
-    return {
-        "verdict": found.verdict,
-        "text": messages.verdict(found, a, b),
-        "mapping": None if found.mapping is None else _mapping(found.mapping),
-        "sign_choices": found.sign_choices,
-        "free_offsets": [list(group) for group in found.free_offsets],
-        "position": found.position,
-        "rotation": found.rotation,
-        "worst_q": None if found.worst_q is None else found.worst_q.tolist(),
-        "differences": [_difference(each, a, b) for each in found.differences],
-        "limits": [
-            {"joint": each.joint, "in_a": _pair(each.in_a), "in_b": _pair(each.in_b)} for each in found.limits
+    return ComparisonAnswer.of(
+        found,
+        text=messages.verdict(found, a, b),
+        differences=[
+            DifferenceAnswer.of(each, text=messages.difference(each, a, b)) for each in found.differences
         ],
-        "rounded": found.rounded,
-        "explanations": [_explanation(each, a, b) for each in found.explanations],
-        "complete": found.complete,
-    }
-
-
-def _mapping(mapping: Mapping) -> MappingAnswer:
-    signs: list[Literal[1, -1]] = [1 if sign > 0.0 else -1 for sign in mapping.signs.tolist()]
-    return {
-        "base": mapping.base.tolist(),
-        "tool": mapping.tool.tolist(),
-        "signs": list(signs),
-        "offsets": mapping.offsets.tolist(),
-    }
-
-
-def _difference(found: Difference, a: Robot, b: Robot) -> DifferenceAnswer:
-    return {
-        "joints": list(found.joints),
-        "quantity": found.quantity,
-        "in_a": found.in_a,
-        "in_b": found.in_b,
-        "text": messages.difference(found, a, b),
-    }
+        explanations=[_explanation(each, a, b) for each in found.explanations],
+    )
 
 
 def _explanation(found: Explanation, a: Robot, b: Robot) -> ExplanationAnswer:
-    return {
-        "text": messages.explanation(found, a, b),
-        "changes": [_change(each) for each in found.changes],
-        "mapping": _mapping(found.mapping),
-        "robot": robot_to_dict(found.robot),
-        "cost": found.cost,
-        "position": found.position,
-        "rotation": found.rotation,
-    }
-
-
-def _change(found: Change) -> ChangeAnswer:
-    return {
-        "mistake": found.mistake,
-        "rows": list(found.rows),
-        "columns": list(found.columns),
-        "was": found.was,
-        "now": found.now,
-    }
-
-
-def _pair(limits: tuple[float, float] | None) -> list[float] | None:
-    return None if limits is None else list(limits)
+    text, robot = messages.explanation(found, a, b), robot_to_dict(found.robot)
+    return ExplanationAnswer.of(found, text=text, robot=robot)

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from typing_extensions import TypedDict
-
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer
 from app.shared.answers.robots import RobotAnswer, robot_answer
 from kin import Robot, UrdfRobot, convert, robot_to_dict, robot_to_toml
 from kin.dh import SAMPLES, largest_difference
 from kin.robot import Convention
 
 
-@documented
-class ConvertAnswer(TypedDict):
+class ConvertAnswer(Answer):
     """The same arm in the other convention, with the proof."""
 
     robot: RobotAnswer
@@ -29,8 +26,7 @@ class ConvertAnswer(TypedDict):
     """Number of these configurations."""
 
 
-@documented
-class TipAnswer(TypedDict):
+class TipAnswer(Answer):
     """A link that can be the tip of an arm."""
 
     link: str
@@ -39,8 +35,7 @@ class TipAnswer(TypedDict):
     """Number of moving joints between the root and the link."""
 
 
-@documented
-class UrdfBodyAnswer(TypedDict):
+class UrdfBodyAnswer(Answer):
     """What stands for a link of the arm in collisions."""
 
     link: int
@@ -55,8 +50,7 @@ class UrdfBodyAnswer(TypedDict):
     """Whether a tube is assumed, because something is missing or nothing is stated."""
 
 
-@documented
-class UrdfReportAnswer(TypedDict):
+class UrdfReportAnswer(Answer):
     """What became of a URDF."""
 
     base: str
@@ -87,8 +81,7 @@ class UrdfReportAnswer(TypedDict):
     """The same in words: the rest of a sentence that begins "Collisions: "."""
 
 
-@documented
-class ImportAnswer(TypedDict):
+class ImportAnswer(Answer):
     """An arm read from a URDF."""
 
     robot: RobotAnswer
@@ -104,43 +97,18 @@ class ImportAnswer(TypedDict):
 def convert_answer(robot: Robot, convention: Convention) -> ConvertAnswer:
     """The arm as a table in this convention."""
     other = convert(robot, convention)
-    return {
-        "robot": robot_answer(other),
-        "description": robot_to_dict(other),
-        "toml": robot_to_toml(other),
-        "difference": largest_difference(robot, other),
-        "samples": SAMPLES,
-    }
+    return ConvertAnswer(
+        robot=robot_answer(other),
+        description=robot_to_dict(other),
+        toml=robot_to_toml(other),
+        difference=largest_difference(robot, other),
+        samples=SAMPLES,
+    )
 
 
 def import_answer(found: UrdfRobot) -> ImportAnswer:
     """The arm, and the report about its file."""
     robot, report = found
-    return {
-        "robot": robot_answer(robot),
-        "description": robot_to_dict(robot),
-        "toml": robot_to_toml(robot),
-        "report": {
-            "base": report.base,
-            "tip": report.tip,
-            "tips": [{"link": tip.link, "joints": tip.joints} for tip in report.tips],
-            "joints": list(report.joints),
-            "merged": list(report.merged),
-            "ignored": list(report.ignored),
-            "tilts": list(report.tilts),
-            "notes": list(report.notes),
-            "difference": report.difference,
-            "samples": report.samples,
-            "bodies": [
-                {
-                    "link": body.link,
-                    "names": list(body.names),
-                    "capsules": body.capsules,
-                    "missing": list(body.missing),
-                    "assumed": body.assumed,
-                }
-                for body in report.bodies
-            ],
-            "about_bodies": report.about_bodies,
-        },
-    }
+    return ImportAnswer(
+        robot_answer(robot), robot_to_dict(robot), robot_to_toml(robot), UrdfReportAnswer.of(report)
+    )

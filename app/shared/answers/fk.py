@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing_extensions import TypedDict
-
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer
 from kin import Robot, fk, link_frames
 from kin.axes import inverse
 from kin.frames import WORLD
@@ -13,8 +11,7 @@ from kin.transforms import Array, wxyz_from_rotation
 Matrix = list[list[float]]
 
 
-@documented
-class Pose(TypedDict):
+class Pose(Answer):
     """A rigid transform, as a matrix and as a position with a quaternion."""
 
     matrix: Matrix
@@ -28,8 +25,7 @@ class Pose(TypedDict):
     base frame, that of the first DH row, unless the arm or the request has a `base`."""
 
 
-@documented
-class Frame(TypedDict):
+class Frame(Answer):
     """The frame at the end of one DH row."""
 
     name: str
@@ -38,8 +34,7 @@ class Frame(TypedDict):
     """Its pose."""
 
 
-@documented
-class FkAnswer(TypedDict):
+class FkAnswer(Answer):
     """Forward kinematics of one configuration."""
 
     pose: Pose
@@ -53,10 +48,7 @@ class FkAnswer(TypedDict):
 def poses(T: Array, frame: str) -> list[Pose]:
     """Poses of transforms ``(k, 4, 4)``, which are in this frame."""
     columns = zip(T.tolist(), T[:, :3, 3].tolist(), wxyz_from_rotation(T[:, :3, :3]).tolist(), strict=True)
-    return [
-        {"matrix": matrix, "position": position, "wxyz": wxyz, "frame": frame}
-        for matrix, position, wxyz in columns
-    ]
+    return [Pose(matrix, position, wxyz, frame) for matrix, position, wxyz in columns]
 
 
 def fk_answers(
@@ -76,10 +68,10 @@ def fk_answers(
     tools = framed(fk(robot, q))
     inside: list[bool] = robot.in_limits(q).tolist()
     if not frames:
-        return [{"pose": pose, "in_limits": ok, "frames": None} for pose, ok in zip(tools, inside, strict=True)]
+        return [FkAnswer(pose, ok, None) for pose, ok in zip(tools, inside, strict=True)]
     names = [row.name for row in robot.rows]
     flat = iter(framed(link_frames(robot, q).reshape(-1, 4, 4)))
     return [
-        {"pose": pose, "in_limits": ok, "frames": [{"name": name, "pose": next(flat)} for name in names]}
+        FkAnswer(pose, ok, [Frame(name, next(flat)) for name in names])
         for pose, ok in zip(tools, inside, strict=True)
     ]

@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Literal, NotRequired, cast
+from typing import Annotated, Literal
 
-from typing_extensions import TypedDict
+from msgspec import UNSET, UnsetType
 
-from app.shared.answers.details import (
-    IkDetails,
-    RedundancyAnswer,
-    SingularityAnswer,
-    Violation,
-    details_answer,
-    redundancy_answer,
-    singularity_answer,
-    violation_answer,
-)
-from app.shared.answers.document import documented
-from kin import BlockedBranch, IKResult, IKSolution, PathResult, Status
+from app.shared.answers.answer import Answer, From
+from app.shared.answers.details import IkDetails, RedundancyAnswer, SingularityAnswer, Violation
+from kin import IKResult, PathResult, Status
 from kin.ik.details import Solved
 from kin.ik.messages import explain
 from kin.ik.results import Cause
@@ -27,11 +18,11 @@ from kin.tolerances import TOLERANCES
 from kin.units import DEFAULT_UNITS
 
 TaskName = Literal["pose", "approach", "position", "mask"]
+StatusName = Literal["solved", "approximate", "limits", "orientation", "unreachable", "collision"]
 EXACT = (TOLERANCES.closure_position, TOLERANCES.closure_rotation)
 
 
-@documented
-class Solution(TypedDict):
+class Solution(Answer):
     """One joint configuration, with its errors measured by forward kinematics."""
 
     q: list[float]
@@ -54,8 +45,7 @@ class Solution(TypedDict):
     the point is kept and the whole rotation error is as small as it gets; "closest" for the nearest there is."""
 
 
-@documented
-class Blocked(TypedDict):
+class Blocked(Answer):
     """A posture that reaches the target only outside the limits."""
 
     branch: str
@@ -66,8 +56,7 @@ class Blocked(TypedDict):
     """Its joint values outside the limits."""
 
 
-@documented
-class Tolerances(TypedDict):
+class Tolerances(Answer):
     """Errors of a solution that count as none."""
 
     position: float
@@ -78,11 +67,10 @@ class Tolerances(TypedDict):
     """How rounded the entries of the target are, if its rotation had to be made one; else 0."""
 
 
-@documented
-class IkAnswer(TypedDict):
+class IkAnswer(Answer):
     """Inverse kinematics of one target. A target out of reach is an answer too: read `status`."""
 
-    status: Literal["solved", "approximate", "limits", "orientation", "unreachable", "collision"]
+    status: Annotated[StatusName, From("status.value")]
     """"solved": at least one exact answer. "approximate": the arm meets only a part of the task; `solutions` are
     the best compromises. "limits": postures exist, all of them outside the joint limits, see `blocked`.
     "orientation": the point can be reached, but not with this orientation; see `nearest_orientation`.
@@ -126,84 +114,43 @@ class IkAnswer(TypedDict):
     """Redundancy parameters: the values of the first solution, with the ranges of all branches together."""
     singularities: list[SingularityAnswer]
     """The singularities that the first solution (or `closest`) is at."""
-    tolerances: NotRequired[Tolerances]
+    tolerances: Tolerances | UnsetType = UNSET
     """The errors that count as none, if they are not 1e-9."""
 
 
 def ik_answer(result: IKResult) -> IkAnswer:
     """One result of `kin.solve_ik`."""
-    closest, oriented, found = result.closest, result.nearest_orientation, result.details
+    details, reason = _explained(result)
+    return IkAnswer.of(result, details=details, reason=reason, tolerances=tolerances_answer(result))
+
+
+def _explained(result: IKResult) -> tuple[IkDetails, str]:
+    """Details and reason of a result."""
+    found = result.details
     if isinstance(found, Solved) and not result.singularities and not result.target_error:
-        details, reason = _solved(found, result.task)
-    else:
-        details, reason = details_answer(found), result.reason
-    answer: IkAnswer = {
-        "status": result.status.value,
-        "cause": result.cause,
-        "details": details,
-        "reason": reason,
-        "task": cast(TaskName, result.task),
-        "complete": result.complete,
-        "completeness": result.completeness,
-        "solver": result.solver,
-        "solver_reason": result.solver_reason,
-        "solutions": [_solution(solution) for solution in result.solutions],
-        "closest": None if closest is None else _solution(closest),
-        "nearest_orientation": None if oriented is None else _solution(oriented),
-        "blocked": [_blocked(blocked) for blocked in result.blocked],
-        "violations": [violation_answer(violation) for violation in result.violations],
-        "distance": result.distance,
-        "redundancy": [redundancy_answer(each) for each in result.redundancy],
-        "singularities": [singularity_answer(each) for each in result.singularities],
-    }
-    tolerances = tolerances_answer(result)
-    if tolerances is not None:
-        answer["tolerances"] = tolerances
-    return answer
+        return _solved(found, result.task)
+    return IkDetails.of(found), result.reason
 
 
 @lru_cache(maxsize=512)
 def _solved(details: Solved, task: str) -> tuple[IkDetails, str]:
     """Details and reason of most answers: there are few different ones. Both are only read."""
-    return details_answer(details), explain(details, "", task, (), DEFAULT_UNITS).text
+    return IkDetails.of(details), explain(details, "", task, (), DEFAULT_UNITS).text
 
 
-def tolerances_answer(result: IKResult | PathResult) -> Tolerances | None:
-    """The tolerances of a result, None if they are the usual ones."""
+def tolerances_answer(result: IKResult | PathResult) -> Tolerances | UnsetType:
+    """The tolerances of a result; absent if they are the usual ones."""
     if not result.target_error and result.tolerances == EXACT:
-        return None
-    position, rotation = result.tolerances
-    return {"position": position, "rotation": rotation, "target_error": result.target_error}
+        return UNSET
+    return Tolerances(*result.tolerances, result.target_error)
 
 
-def _solution(solution: IKSolution) -> Solution:
-    return {
-        "q": solution.q.tolist(),
-        "branch": solution.branch,
-        "position_error": solution.position_error,
-        "rotation_error": solution.rotation_error,
-        "in_limits": solution.in_limits,
-        "distance": solution.distance,
-        "redundancy": [redundancy_answer(each) for each in solution.redundancy],
-        "compromise": solution.compromise,
-    }
-
-
-def _blocked(blocked: BlockedBranch) -> Blocked:
-    return {
-        "branch": blocked.branch,
-        "q": blocked.q.tolist(),
-        "violations": [violation_answer(violation) for violation in blocked.violations],
-    }
-
-
-@documented
-class ReachableAnswer(TypedDict):
+class ReachableAnswer(Answer):
     """Whether the arm reaches a target inside its limits."""
 
     reachable: bool
     """Whether it meets the whole task exactly."""
-    status: Literal["solved", "approximate", "limits", "orientation", "unreachable", "collision"]
+    status: Annotated[StatusName, From("status.value")]
     """What kind of answer `ik` gives: "solved" if it is reachable."""
     cause: Cause
     """What is in the way, as a code; empty when it is reachable."""
@@ -224,15 +171,14 @@ class ReachableAnswer(TypedDict):
 
 def reachable_answer(result: IKResult) -> ReachableAnswer:
     """One result of `kin.solve_ik`, as far as it says whether the target is reached."""
+    details, reason = _explained(result)
     best = result.best
-    return {
-        "reachable": result.status is Status.SOLVED,
-        "status": result.status.value,
-        "cause": result.cause,
-        "details": details_answer(result.details),
-        "reason": result.reason,
-        "distance": result.distance,
-        "q": None if best is None else best.q.tolist(),
-        "position_error": None if best is None else best.position_error,
-        "rotation_error": None if best is None else best.rotation_error,
-    }
+    return ReachableAnswer.of(
+        result,
+        reachable=result.status is Status.SOLVED,
+        details=details,
+        reason=reason,
+        q=None if best is None else best.q.tolist(),
+        position_error=None if best is None else best.position_error,
+        rotation_error=None if best is None else best.rotation_error,
+    )

@@ -6,12 +6,11 @@ Warnings forbid nothing: the arm works, but perhaps not as its author intended.
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from typing_extensions import TypedDict
 
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer, From
 from app.shared.answers.robots import RobotAnswer, robot_answer
 from kin import Robot, jacobian
 from kin.axes import Pair, generic_q, pairs, parallel_groups, size, spherical_groups
@@ -23,24 +22,31 @@ NEAR_SINGULAR, SINGULAR = 0.1, 1e-6  # of the best margin among the candidates f
 LONG, SHORT = 100.0, 0.01  # m; a reach beyond these suggests a wrong unit
 
 
-@documented
-class PairAnswer(TypedDict):
+Relation = Literal["same line", "parallel", "perpendicular", "oblique"]
+
+
+def _relation(pair: Pair) -> Relation:
+    if pair.one_line:
+        return "same line"
+    return "parallel" if pair.parallel else "perpendicular" if pair.perpendicular else "oblique"
+
+
+class PairAnswer(Answer):
     """Relation of two consecutive joint axes."""
 
-    joints: list[int]
+    joints: Annotated[list[int], From(lambda pair: (pair.joint, pair.joint + 1))]
     """Indices of the two moving joints."""
     angle: float
     """Angle between the axes, 0 to π/2 radians."""
-    distance: float | None
+    distance: Annotated[float | None, From(lambda pair: None if math.isnan(pair.distance) else pair.distance)]
     """Shortest distance between the axes in metres; null if one of the joints slides."""
-    relation: Literal["same line", "parallel", "perpendicular", "oblique"]
+    relation: Annotated[Relation, From(_relation)]
     """Kind of the angle; "same line" for coincident axes."""
     intersect: bool
     """Whether the axes intersect."""
 
 
-@documented
-class CapsuleAnswer(TypedDict):
+class CapsuleAnswer(Answer):
     """A part of a link's body: all points within `radius` of a segment."""
 
     link: int
@@ -57,8 +63,7 @@ class CapsuleAnswer(TypedDict):
     """Whether the real body is not known."""
 
 
-@documented
-class BodiesAnswer(TypedDict):
+class BodiesAnswer(Answer):
     """The bodies of the links, and which of them are compared."""
 
     assumed: bool
@@ -72,8 +77,7 @@ class BodiesAnswer(TypedDict):
     link between them and hardly touch."""
 
 
-@documented
-class InspectionAnswer(TypedDict):
+class InspectionAnswer(Answer):
     """What an arm is: its axes, its motions, its solver, and likely mistakes in its table."""
 
     robot: RobotAnswer
@@ -107,54 +111,31 @@ def inspect(robot: Robot, taken: bool = False) -> InspectionAnswer:
     """Describe an arm; `taken`: a built-in robot has the same id."""
     match = closed_form_of(robot)
     between, count, margin = pairs(robot), motions(robot), home_margin(robot)
-    return {
-        "robot": robot_answer(robot),
-        "axes": [_pair(pair) for pair in between],
-        "parallel": [list(range(first, last + 1)) for first, last in parallel_groups(robot)],
-        "spherical": [list(range(i, i + 3)) for i in spherical_groups(robot)],
-        "motions": count,
-        "redundancy": robot.n - count,
-        "home_margin": margin,
-        "singular_at_home": margin < SINGULAR,
-        "solver": "numeric" if match is None else match.name,
-        "reason": "none of Kinboard's closed forms fits this arm's axes" if match is None else match.reason,
-        "warnings": [*_odd_table(robot, taken), *_odd_axes(robot, between), *_odd_motion(robot, count, margin)],
-        "bodies": _bodies(robot),
-    }
+    return InspectionAnswer(
+        robot=robot_answer(robot),
+        axes=[PairAnswer.of(pair) for pair in between],
+        parallel=[list(range(first, last + 1)) for first, last in parallel_groups(robot)],
+        spherical=[list(range(i, i + 3)) for i in spherical_groups(robot)],
+        motions=count,
+        redundancy=robot.n - count,
+        home_margin=margin,
+        singular_at_home=margin < SINGULAR,
+        solver="numeric" if match is None else match.name,
+        reason="none of Kinboard's closed forms fits this arm's axes" if match is None else match.reason,
+        warnings=[*_odd_table(robot, taken), *_odd_axes(robot, between), *_odd_motion(robot, count, margin)],
+        bodies=_bodies(robot),
+    )
 
 
 def _bodies(robot: Robot) -> BodiesAnswer:
     found = bodies_of(robot)
     links = np.array([each.link for each in found.capsules], np.int64)
-    return {
-        "assumed": not robot.capsules,
-        "source": robot.capsules_source,
-        "capsules": [
-            {
-                "link": c.link,
-                "row": c.row,
-                "start": list(c.start),
-                "end": list(c.end),
-                "radius": c.radius,
-                "assumed": c.assumed,
-            }
-            for c in found.capsules
-        ],
-        "compared": sorted({(int(a), int(b)): [int(a), int(b)] for a, b in links[found.pairs]}.values()),
-    }
-
-
-def _pair(pair: Pair) -> PairAnswer:
-    turned: Literal["parallel", "perpendicular", "oblique"] = (
-        "parallel" if pair.parallel else "perpendicular" if pair.perpendicular else "oblique"
+    return BodiesAnswer(
+        assumed=not robot.capsules,
+        source=robot.capsules_source,
+        capsules=[CapsuleAnswer.of(each) for each in found.capsules],
+        compared=sorted({(int(a), int(b)): [int(a), int(b)] for a, b in links[found.pairs]}.values()),
     )
-    return {
-        "joints": [pair.joint, pair.joint + 1],
-        "angle": pair.angle,
-        "distance": None if math.isnan(pair.distance) else pair.distance,
-        "relation": "same line" if pair.one_line else turned,
-        "intersect": pair.intersect,
-    }
 
 
 def motions(robot: Robot) -> int:

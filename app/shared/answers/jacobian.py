@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from typing_extensions import TypedDict
 
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer
 from app.shared.answers.fk import Matrix
 from kin import Robot, jacobian, manipulability
 from kin.transforms import Array
 
 
-@documented
-class Manipulability(TypedDict):
+class Manipulability(Answer):
     """Yoshikawa's manipulability, by task: the product of the singular values of its rows; 0 at a singularity."""
 
     all: float
@@ -25,8 +23,7 @@ class Manipulability(TypedDict):
     """Angular: the three angular rows (dimensionless)."""
 
 
-@documented
-class JacobianAnswer(TypedDict):
+class JacobianAnswer(Answer):
     """The Jacobian of one configuration, its singular values and the manipulability."""
 
     jacobian: Matrix
@@ -50,10 +47,6 @@ def jacobian_answers(robot: Robot, q: Array, frame: Literal["base", "tool"] = "b
         strict=True,
     )
     return [
-        {
-            "jacobian": rows,
-            "manipulability": {"all": whole, "linear": linear, "angular": angular},
-            "singular_values": values,
-        }
+        JacobianAnswer(rows, Manipulability(whole, linear, angular), values)
         for rows, whole, linear, angular, values in columns
     ]

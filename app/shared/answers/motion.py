@@ -3,39 +3,33 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NotRequired, cast
+from typing import Annotated, Literal
 
 import numpy as np
-from typing_extensions import TypedDict
+from msgspec import UNSET, UnsetType
 
-from app.shared.answers.details import (
-    ContactAnswer,
-    IkDetails,
-    SingularityAnswer,
-    Violation,
-    contact_answer,
-    details_answer,
-    singularity_answer,
-    violation_answer,
-)
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer, From
+from app.shared.answers.details import ContactAnswer, IkDetails, SingularityAnswer, Violation
 from app.shared.answers.fk import Matrix
-from kin import Contact, Motion
-from kin.ik.details import LimitViolation
+from kin import Motion
 from kin.ik.results import Cause as IkCause
-from kin.motion import MotionLimits, MotionSample, Peak, Refusal, messages
-from kin.motion.details import Cause, HelpCode, Note, NotReached, RefusalDetails
+from kin.motion import MotionLimits, messages
+from kin.motion.details import BlendLeftOut, BlendShortened, Cause, HelpCode, JerkCost, Note, Slowed
 from kin.motion.program import Kind
 from kin.motion.results import Quantity
-from kin.path.details import JointMove
-from kin.robot import Robot
-from kin.solvers.singular import Singularity
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS
 
+NoteCode = Literal["blend shortened", "blend left out", "slowed", "jerk cost"]
+_NOTES: dict[type[Note], NoteCode] = {
+    BlendShortened: "blend shortened",
+    BlendLeftOut: "blend left out",
+    Slowed: "slowed",
+    JerkCost: "jerk cost",
+}
 
-@documented
-class SegmentTimesAnswer(TypedDict):
+
+class SegmentTimesAnswer(Answer):
     """When a segment is driven; blends are shared half and half."""
 
     index: int
@@ -50,8 +44,7 @@ class SegmentTimesAnswer(TypedDict):
     """Seconds from the start of the motion."""
 
 
-@documented
-class PeakAnswer(TypedDict):
+class PeakAnswer(Answer):
     """The largest value of a quantity, read off the motion by fine sampling."""
 
     joint: int | None
@@ -72,8 +65,7 @@ class PeakAnswer(TypedDict):
     """Whether the limit is assumed, because no robot file states it."""
 
 
-@documented
-class JointMoveAnswer(TypedDict):
+class JointMoveAnswer(Answer):
     """How far a joint moves."""
 
     joint: int
@@ -82,44 +74,42 @@ class JointMoveAnswer(TypedDict):
     """In radians (metres)."""
 
 
-@documented
-class RefusalDetailsAnswer(TypedDict, total=False):
+class RefusalDetailsAnswer(Answer):
     """The numbers behind a refusal; which fields there are depends on its cause. Metres and radians."""
 
-    violations: list[Violation]
+    violations: list[Violation] | UnsetType = UNSET
     """Causes "start" and "target": the joint values outside the limits."""
-    details: IkDetails
+    details: IkDetails | UnsetType = UNSET
     """Cause "unreachable": the numbers of inverse kinematics, as in the answers of `ik`."""
-    cause: IkCause
+    cause: IkCause | UnsetType = UNSET
     """Cause "unreachable": its cause, as in the answers of `ik`."""
-    task: str
+    task: str | UnsetType = UNSET
     """Cause "unreachable": what the tool would have had to meet."""
-    singularities: list[SingularityAnswer]
+    singularities: list[SingularityAnswer] | UnsetType = UNSET
     """Cause "unreachable": the singularities that the closest configuration is at."""
-    violation: Violation
+    violation: Violation | UnsetType = UNSET
     """Cause "limits": the joint that would pass its limit."""
-    singularity: SingularityAnswer | None
+    singularity: SingularityAnswer | UnsetType | None = UNSET
     """Cause "singularity": which one; null if no condition is known."""
-    move: JointMoveAnswer | None
+    move: JointMoveAnswer | UnsetType | None = UNSET
     """Cause "singularity": the joint that would have to jump farthest."""
-    start: str | None
+    start: str | UnsetType | None = UNSET
     """Cause "branch": the posture at the start; null if the arm's postures have no names."""
-    coincident: list[str] | None
+    coincident: list[str] | UnsetType | None = UNSET
     """Cause "circle": the two points that are the same; null: via is in line, but not between the others."""
-    joints: int
+    joints: int | UnsetType = UNSET
     """Cause "task": number of joints of the arm."""
-    position: float
+    position: float | UnsetType = UNSET
     """Cause "task": by how much the path is missed."""
-    rotation: float
+    rotation: float | UnsetType = UNSET
     """Cause "task": by how much the orientations on the path are missed."""
-    time: float
+    time: float | UnsetType = UNSET
     """Cause "collision": seconds from the start to the first contact."""
-    contact: ContactAnswer
+    contact: ContactAnswer | UnsetType = UNSET
     """Cause "collision": what touches."""
 
 
-@documented
-class HelpAnswer(TypedDict):
+class HelpAnswer(Answer):
     """What would help."""
 
     code: HelpCode
@@ -129,8 +119,7 @@ class HelpAnswer(TypedDict):
     """Name of the posture for "ptp" and "posture"."""
 
 
-@documented
-class RefusalAnswer(TypedDict):
+class RefusalAnswer(Answer):
     """Why a program cannot be driven."""
 
     segment: int
@@ -153,18 +142,16 @@ class RefusalAnswer(TypedDict):
     """All of it in sentences for people."""
 
 
-@documented
-class NoteAnswer(TypedDict):
+class NoteAnswer(Answer):
     """Something worth knowing about a motion."""
 
-    code: Literal["blend shortened", "blend left out", "slowed", "jerk cost"]
+    code: Annotated[NoteCode, From(lambda note: _NOTES[type(note)])]
     """What it is about."""
-    reason: str
+    reason: Annotated[str, From(lambda note: messages.note(note, DEFAULT_UNITS))]
     """The same in a sentence for people."""
 
 
-@documented
-class JointLimitsAnswer(TypedDict):
+class JointLimitsAnswer(Answer):
     """How fast a joint may move, in rad or m and seconds."""
 
     velocity: float
@@ -179,8 +166,7 @@ class JointLimitsAnswer(TypedDict):
     """Which of these are assumed, because no robot file states them."""
 
 
-@documented
-class MotionSamples(TypedDict):
+class MotionSamples(Answer):
     """The motion at equal steps of time; one item of each list for each time. The last one is the end."""
 
     t: list[float]
@@ -191,16 +177,15 @@ class MotionSamples(TypedDict):
     """Joint velocities."""
     qdd: Matrix
     """Joint accelerations."""
-    position: Matrix
+    position: Annotated[Matrix, From(lambda sample: sample.T[:, :3, 3])]
     """Tool points in the world frame, in metres."""
-    wxyz: Matrix
+    wxyz: Annotated[Matrix, From(lambda sample: wxyz_from_rotation(sample.T[:, :3, :3]))]
     """Orientations of the tool as quaternions w, x, y, z."""
     tool_speed: list[float]
     """Speed of the tool point, in m/s."""
 
 
-@documented
-class MotionAnswer(TypedDict):
+class MotionAnswer(Answer):
     """The motion of a program, or why it cannot be driven."""
 
     planned: bool
@@ -221,50 +206,18 @@ class MotionAnswer(TypedDict):
     """What is worth knowing: blends that are smaller than requested, where a path is slow and why."""
     limits: list[JointLimitsAnswer]
     """The limits that were kept, joint by joint."""
-    samples: NotRequired[MotionSamples]
+    samples: MotionSamples | UnsetType = UNSET
     """The motion itself, unless it was not requested; empty lists after a refusal."""
-
-
-_NOTES: dict[str, Literal["blend shortened", "blend left out", "slowed", "jerk cost"]] = {
-    "BlendShortened": "blend shortened",
-    "BlendLeftOut": "blend left out",
-    "Slowed": "slowed",
-    "JerkCost": "jerk cost",
-}
 
 
 def motion_answer(motion: Motion, times: Array | None = None) -> MotionAnswer:
     """A motion, with samples at these times ``(k,)``; None: without."""
-    answer: MotionAnswer = {
-        "planned": motion.planned,
-        "reason": motion.reason,
-        "duration": motion.duration,
-        "q_start": motion.q_start.tolist(),
-        "refusal": None if motion.refusal is None else _refusal(motion.refusal),
-        "segments": [
-            {"index": each.index, "kind": each.kind, "name": each.name, "start": each.start, "end": each.end}
-            for each in motion.segments
-        ],
-        "peaks": [_peak(each) for each in motion.peaks] if motion.planned else [],
-        "notes": [_note(each) for each in motion.notes],
-        "limits": _limits(motion.robot, motion.limits),
-    }
-    if times is not None:
-        answer["samples"] = samples_answer(motion.sample(times))
-    return answer
-
-
-def samples_answer(sample: MotionSample) -> MotionSamples:
-    """A motion at times ``(k,)``."""
-    return {
-        "t": sample.t.tolist(),
-        "q": sample.q.tolist(),
-        "qd": sample.qd.tolist(),
-        "qdd": sample.qdd.tolist(),
-        "position": sample.T[:, :3, 3].tolist(),
-        "wxyz": wxyz_from_rotation(sample.T[:, :3, :3]).tolist(),
-        "tool_speed": sample.tool_speed.tolist(),
-    }
+    return MotionAnswer.of(
+        motion,
+        peaks=[PeakAnswer.of(each) for each in motion.peaks] if motion.planned else [],
+        limits=_limits(motion.limits),
+        samples=UNSET if times is None else MotionSamples.of(motion.sample(times)),
+    )
 
 
 def sample_times(motion: Motion, rate: float) -> Array:
@@ -275,69 +228,15 @@ def sample_times(motion: Motion, rate: float) -> Array:
     return steps if motion.duration - steps[-1] < 1e-9 else np.append(steps, motion.duration)
 
 
-def _peak(peak: Peak) -> PeakAnswer:
-    return {
-        "joint": peak.joint,
-        "name": peak.name,
-        "quantity": peak.quantity,
-        "peak": peak.peak,
-        "time": peak.time,
-        "limit": peak.limit,
-        "ratio": peak.ratio,
-        "assumed": peak.assumed,
-    }
-
-
-def _note(fact: Note) -> NoteAnswer:
-    return {"code": _NOTES[type(fact).__name__], "reason": messages.note(fact, DEFAULT_UNITS)}
-
-
-def _limits(robot: Robot, limits: MotionLimits) -> list[JointLimitsAnswer]:
+def _limits(limits: MotionLimits) -> list[JointLimitsAnswer]:
     columns = zip(limits.velocity, limits.acceleration, limits.jerk, limits.effort, limits.assumed, strict=True)
     return [
-        {
-            "velocity": float(velocity),
-            "acceleration": float(acceleration),
-            "jerk": float(jerk),
-            "effort": None if math.isnan(effort) else float(effort),
-            "assumed": list(assumed),
-        }
+        JointLimitsAnswer(
+            float(velocity),
+            float(acceleration),
+            float(jerk),
+            None if math.isnan(effort) else float(effort),
+            list(assumed),
+        )
         for velocity, acceleration, jerk, effort, assumed in columns
     ]
-
-
-def _refusal(refusal: Refusal) -> RefusalAnswer:
-    return {
-        "segment": refusal.segment,
-        "kind": refusal.kind,
-        "name": refusal.name,
-        "fraction": refusal.fraction,
-        "distance": refusal.distance,
-        "cause": refusal.cause,
-        "details": _details(refusal.details),
-        "helps": [{"code": each.code, "posture": each.posture} for each in refusal.helps],
-        "reason": refusal.reason,
-    }
-
-
-def _details(details: RefusalDetails) -> RefusalDetailsAnswer:
-    """The fields of the details, those that are not numbers as answers of their own."""
-    fields: dict[str, Any] = {name: _field(value) for name, value in details._asdict().items()}
-    if isinstance(details, NotReached):
-        fields["details"] = details_answer(details.details)
-    return cast(RefusalDetailsAnswer, fields)
-
-
-def _field(value: object) -> object:
-    match value:
-        case LimitViolation():
-            return violation_answer(value)
-        case Contact():
-            return contact_answer(value)
-        case Singularity():
-            return singularity_answer(value)
-        case JointMove():
-            return {"joint": value.joint, "motion": value.motion}
-        case tuple():
-            return [_field(item) for item in value]
-    return value

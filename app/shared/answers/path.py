@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal, NotRequired, cast
+from typing import Annotated, Literal
 
-from typing_extensions import TypedDict
+from msgspec import UNSET, UnsetType
 
-from app.shared.answers.details import (
-    ContactAnswer,
-    IkDetails,
-    JumpDetailsAnswer,
-    contact_answer,
-    details_answer,
-    jump_details_answer,
-)
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer, From
+from app.shared.answers.details import ContactAnswer, IkDetails, JumpDetailsAnswer, jump_details_answer
 from app.shared.answers.fk import Matrix
 from app.shared.answers.ik import Tolerances, tolerances_answer
 from kin import PathResult
@@ -23,8 +16,7 @@ from kin.ik.results import Cause
 GapStatus = Literal["approximate", "limits", "orientation", "unreachable", "collision"]
 
 
-@documented
-class JumpAnswer(TypedDict):
+class JumpAnswer(Answer):
     """A step of the path that is not continuous."""
 
     index: int
@@ -43,13 +35,12 @@ class JumpAnswer(TypedDict):
     """The same in a sentence for people."""
 
 
-@documented
-class GapAnswer(TypedDict):
+class GapAnswer(Answer):
     """A waypoint without an exact answer."""
 
     index: int
     """Which waypoint, counted from 0."""
-    status: GapStatus
+    status: Annotated[GapStatus, From("status.value")]
     """The kind of answer that `ik` gives there."""
     cause: Cause
     """Its cause, as in the answers of `ik`."""
@@ -61,11 +52,10 @@ class GapAnswer(TypedDict):
     """How far out of reach it is, in metres; 0 within reach."""
 
 
-@documented
-class TouchAnswer(TypedDict):
+class TouchAnswer(Answer):
     """Where a path still touches something."""
 
-    index: int
+    index: Annotated[int, From("waypoint")]
     """It is on the way from waypoint index − 1 to waypoint index, counted from 0."""
     share: float
     """The share of this way at which the first touch was found, 0 to 1; 1 at the waypoint itself."""
@@ -73,8 +63,7 @@ class TouchAnswer(TypedDict):
     """The deepest contact on this way."""
 
 
-@documented
-class PathAnswer(TypedDict):
+class PathAnswer(Answer):
     """A joint path through a list of targets."""
 
     q: Matrix
@@ -93,50 +82,17 @@ class PathAnswer(TypedDict):
     """Name of the method that answered."""
     reason: str
     """The whole in a sentence for people."""
-    contacts: NotRequired[list[TouchAnswer]]
+    contacts: list[TouchAnswer] | UnsetType = UNSET
     """If collisions are avoided: where the path still touches something, at gaps or between waypoints."""
-    tolerances: NotRequired[Tolerances]
+    tolerances: Tolerances | UnsetType = UNSET
     """The errors that count as none, if they are not 1e-9; the largest ones of all waypoints."""
 
 
 def path_answer(result: PathResult) -> PathAnswer:
     """One result of `kin.solve_path`."""
-    answer: PathAnswer = {
-        "q": result.q.tolist(),
-        "continuous": result.continuous,
-        "jumps": [
-            {
-                "index": jump.index,
-                "joints": list(jump.joints),
-                "step": jump.step,
-                "cause": jump.cause,
-                "details": jump_details_answer(jump),
-                "reason": jump.reason,
-            }
-            for jump in result.jumps
-        ],
-        "gaps": [
-            {
-                "index": gap.index,
-                "status": cast(GapStatus, gap.status.value),
-                "cause": gap.cause,
-                "details": details_answer(gap.details),
-                "reason": gap.reason,
-                "distance": gap.distance,
-            }
-            for gap in result.gaps
-        ],
-        "position_error": result.position_error.tolist(),
-        "rotation_error": result.rotation_error.tolist(),
-        "solver": result.solver,
-        "reason": result.reason,
-    }
-    if result.avoids:
-        answer["contacts"] = [
-            {"index": touch.waypoint, "share": touch.share, "contact": contact_answer(touch.contact)}
-            for touch in result.contacts
-        ]
-    tolerances = tolerances_answer(result)
-    if tolerances is not None:
-        answer["tolerances"] = tolerances
-    return answer
+    return PathAnswer.of(
+        result,
+        jumps=[JumpAnswer.of(jump, details=jump_details_answer(jump)) for jump in result.jumps],
+        contacts=[TouchAnswer.of(touch) for touch in result.contacts] if result.avoids else UNSET,
+        tolerances=tolerances_answer(result),
+    )

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import Literal
+from typing import Annotated, Literal
 
-from typing_extensions import TypedDict
-
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer, From
 from app.shared.answers.fk import Matrix
 from kin import Joint, Robot, branch_meanings, branch_names
 
 
-@documented
-class JointAnswer(TypedDict):
+class JointAnswer(Answer):
     """A moving joint; q[index] is its value."""
 
     index: int
@@ -38,8 +35,7 @@ class JointAnswer(TypedDict):
     """Its value in the home configuration, in that unit."""
 
 
-@documented
-class RowAnswer(TypedDict):
+class RowAnswer(Answer):
     """One row of the DH table. A moving joint adds its value to theta (revolute) or to d (prismatic)."""
 
     name: str
@@ -56,8 +52,7 @@ class RowAnswer(TypedDict):
     """Rotation about x in radians."""
 
 
-@documented
-class RobotAnswer(TypedDict):
+class RobotAnswer(Answer):
     """Everything that defines an arm: T_world_tool = base · A_1 … A_m · tool, with one A per DH row.
 
     Poses are answered in the world frame. It is the base frame unless `base` is another transform than 1.
@@ -90,49 +85,31 @@ class RobotAnswer(TypedDict):
     """The moving rows, in the order of q."""
     home: list[float]
     """The home configuration, one value per moving joint, in radians (metres)."""
-    base: Matrix
+    base: Annotated[Matrix, From("T_world_base")]
     """Pose of the base frame, that of the first row, in the world frame: constant, 4×4, metres."""
-    tool: Matrix
+    tool: Annotated[Matrix, From("T_last_tool")]
     """Pose of the tool frame, which targets are about, in the frame after the last row: constant, 4×4, metres."""
 
 
 def robot_answer(robot: Robot) -> RobotAnswer:
     """Everything that defines an arm."""
-    rows: list[RowAnswer] = [
-        {"name": r.name, "kind": r.kind, "theta": r.theta, "d": r.d, "a": r.a, "alpha": r.alpha}
-        for r in robot.rows
-    ]
-    return {
-        "id": robot.id,
-        "name": robot.name,
-        "description": robot.description,
-        "n": robot.n,
-        "branches": list(branch_names(robot)),
-        "branch_meanings": branch_meanings(robot),
-        "convention": robot.convention,
-        "reach": robot.reach,
-        "source": robot.source,
-        "units": robot.units,
-        "rows": rows,
-        "joints": [_joint(i, joint, robot.home[i]) for i, joint in enumerate(robot.joints)],
-        "home": list(robot.home),
-        "base": robot.T_world_base.tolist(),
-        "tool": robot.T_last_tool.tolist(),
-    }
+    return RobotAnswer.of(
+        robot,
+        branches=list(branch_names(robot)),
+        branch_meanings=branch_meanings(robot),
+        joints=[_joint(i, joint, robot.home[i]) for i, joint in enumerate(robot.joints)],
+    )
 
 
 def _joint(index: int, joint: Joint, home: float) -> JointAnswer:
     # JSON has no infinity: the limits of an unlimited joint are null.
     bounded = joint.limits is not None and all(map(isfinite, joint.limits))
-    return {
-        "index": index,
-        "name": joint.name,
-        "kind": "prismatic" if joint.kind == "prismatic" else "revolute",
-        "unit": "m" if joint.kind == "prismatic" else "rad",
-        "limits": list(joint.limits) if joint.limits is not None and bounded else None,
-        "velocity": joint.velocity,
-        "acceleration": joint.acceleration,
-        "jerk": joint.jerk,
-        "effort": joint.effort,
-        "home": home,
-    }
+    slides = joint.kind == "prismatic"
+    return JointAnswer.of(
+        joint,
+        index=index,
+        kind="prismatic" if slides else "revolute",
+        unit="m" if slides else "rad",
+        limits=list(joint.limits) if joint.limits is not None and bounded else None,
+        home=home,
+    )

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing_extensions import TypedDict
-
-from app.shared.answers.document import documented
+from app.shared.answers.answer import Answer
 from app.shared.answers.fk import Matrix
-from kin import Estimate, Section, WorkspaceFacts
-from kin.workspace import Span
+from kin import Section, WorkspaceFacts
 
 
-@documented
-class ExtremeAnswer(TypedDict):
+class ExtremeAnswer(Answer):
     """The smallest or largest value of a coordinate or distance."""
 
     value: float
@@ -22,8 +18,7 @@ class ExtremeAnswer(TypedDict):
     """The tool point of that configuration, x, y, z in metres."""
 
 
-@documented
-class SpanAnswer(TypedDict):
+class SpanAnswer(Answer):
     """Smallest and largest value."""
 
     least: ExtremeAnswer
@@ -32,8 +27,7 @@ class SpanAnswer(TypedDict):
     """The largest value."""
 
 
-@documented
-class EstimateAnswer(TypedDict):
+class EstimateAnswer(Answer):
     """An estimate with its standard error."""
 
     value: float
@@ -44,8 +38,7 @@ class EstimateAnswer(TypedDict):
     """Method of the estimate."""
 
 
-@documented
-class ArcAnswer(TypedDict):
+class ArcAnswer(Answer):
     """Part of a section's boundary that is traced by one joint."""
 
     joint: int
@@ -64,8 +57,7 @@ class ArcAnswer(TypedDict):
     """Radius of that circle in metres; null if it is not circular."""
 
 
-@documented
-class SectionAnswer(TypedDict):
+class SectionAnswer(Answer):
     """Section of the workspace with a half-plane through the axis of joint 1, for all values of joint 1.
 
     The point [r, z] of the section is origin + r·u + z·v. For a section with the requested plane, u and v are two
@@ -87,8 +79,7 @@ class SectionAnswer(TypedDict):
     """Side in metres of the grid squares; smaller details may be missed."""
 
 
-@documented
-class WorkspaceAnswer(TypedDict):
+class WorkspaceAnswer(Answer):
     """Size of the set of points that the tool reaches inside the limits, in the base frame."""
 
     x: SpanAnswer
@@ -117,48 +108,4 @@ class WorkspaceAnswer(TypedDict):
 
 def workspace_answer(facts: WorkspaceFacts, cut: Section | None = None) -> WorkspaceAnswer:
     """Sizes by `kin.workspace_facts`, and a section by `kin.section`."""
-    return {
-        "x": _span(facts.x),
-        "y": _span(facts.y),
-        "z": _span(facts.z),
-        "axis_point": facts.axis_point.tolist(),
-        "axis": facts.axis.tolist(),
-        "shoulder": facts.shoulder.tolist(),
-        "radius": _span(facts.radius),
-        "reach": _span(facts.reach),
-        "volume": None if facts.volume is None else _estimate(facts.volume),
-        "surface": None if facts.surface is None else _estimate(facts.surface),
-        "section": None if cut is None else _section(cut),
-    }
-
-
-def _span(span: Span) -> SpanAnswer:
-    least, largest = (ExtremeAnswer(value=end.value, q=end.q.tolist(), point=end.point.tolist()) for end in span)
-    return {"least": least, "largest": largest}
-
-
-def _estimate(estimate: Estimate) -> EstimateAnswer:
-    return {"value": estimate.value, "error": estimate.error, "method": estimate.method}
-
-
-def _section(cut: Section) -> SectionAnswer:
-    return {
-        "origin": cut.origin.tolist(),
-        "u": cut.u.tolist(),
-        "v": cut.v.tolist(),
-        "curves": [curve.tolist() for curve in cut.curves],
-        "arcs": [
-            {
-                "joint": arc.joint,
-                "start": arc.start,
-                "stop": arc.stop,
-                "q": arc.q.tolist(),
-                "points": arc.points.tolist(),
-                "centre": None if arc.centre is None else list(arc.centre),
-                "radius": arc.radius,
-            }
-            for arc in cut.arcs
-        ],
-        "area": cut.area,
-        "step": cut.step,
-    }
+    return WorkspaceAnswer.of(facts, section=None if cut is None else SectionAnswer.of(cut))

@@ -14,6 +14,7 @@ from pydantic import TypeAdapter
 import kin
 from app.api import ComputeSlots, StreamLimit, api_routes, install_problem_handlers
 from app.shared import mapreduce
+from app.shared.answers.answer import as_plain
 from app.shared.answers.capability import CapabilityMapAnswer, capability_answer
 from app.shared.maps import Maps
 from app.shared.settings import Settings
@@ -57,7 +58,7 @@ def test_the_answer_is_the_map_of_the_core(client):
     TypeAdapter(CapabilityMapAnswer).validate_python(answer, strict=True)
     limits, locked = [None, (0.0, 1.0), None, None, None], [0.25, None, None, None, None]
     found = kin.capability_map(PIONEER, resolution=7, directions=12, limits=limits, locked=locked)
-    assert answer["summary"] == capability_answer(found)
+    assert answer["summary"] == as_plain(capability_answer(found))
     assert answer["directions"] == found.grid.directions.tolist()
     voxels = answer["voxels"]
     assert len(voxels["centres"]) == len(found.index) > 3

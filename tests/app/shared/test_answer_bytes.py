@@ -10,12 +10,8 @@ import pytest
 from pydantic_core import to_json
 
 import kin
-from app.shared.answers.details import (
-    details_answer,
-    redundancy_answer,
-    singularity_answer,
-    violation_answer,
-)
+from app.shared.answers.answer import as_plain
+from app.shared.answers.details import IkDetails, RedundancyAnswer, SingularityAnswer, Violation
 
 AWKWARD = (
     [-0.0, -0.0, -0.0],
@@ -52,7 +48,7 @@ def solution(found: kin.IKSolution) -> dict[str, Any]:
         "rotation_error": float(found.rotation_error),
         "in_limits": bool(found.in_limits),
         "distance": float(found.distance),
-        "redundancy": [redundancy_answer(each) for each in found.redundancy],
+        "redundancy": [as_plain(RedundancyAnswer.of(each)) for each in found.redundancy],
         "compromise": found.compromise,
     }
 
@@ -66,7 +62,7 @@ def plain(result: kin.IKResult) -> dict[str, Any]:
     return {
         "status": result.status.value,
         "cause": result.cause,
-        "details": details_answer(result.details),
+        "details": as_plain(IkDetails.of(result.details)),
         "reason": result.reason,
         "task": result.task,
         "complete": result.complete,
@@ -80,14 +76,14 @@ def plain(result: kin.IKResult) -> dict[str, Any]:
             {
                 "branch": each.branch,
                 "q": [float(v) for v in each.q],
-                "violations": [violation_answer(violation) for violation in each.violations],
+                "violations": [as_plain(Violation.of(violation)) for violation in each.violations],
             }
             for each in result.blocked
         ],
-        "violations": [violation_answer(each) for each in result.violations],
+        "violations": [as_plain(Violation.of(each)) for each in result.violations],
         "distance": float(result.distance),
-        "redundancy": [redundancy_answer(each) for each in result.redundancy],
-        "singularities": [singularity_answer(each) for each in result.singularities],
+        "redundancy": [as_plain(RedundancyAnswer.of(each)) for each in result.redundancy],
+        "singularities": [as_plain(SingularityAnswer.of(each)) for each in result.singularities],
         **({} if usual else {"tolerances": tolerances}),
     }
 

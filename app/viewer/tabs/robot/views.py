@@ -127,7 +127,7 @@ def about(found: InspectionAnswer, robot: Robot, units: Units) -> str:
     facts = [
         _fact("Joints", _joints(robot)),
         _fact("Axes", _axes(found)),
-        _fact("Tool motions", _MOTIONS.get(found["motions"], f"{found['motions']} independent")),
+        _fact("Tool motions", _MOTIONS.get(found.motions, f"{found.motions} independent")),
         _redundancy(found, robot),
         _solver(found),
         _fact("Reach", f"at most {units.distance(robot.reach)}"),
@@ -135,7 +135,7 @@ def about(found: InspectionAnswer, robot: Robot, units: Units) -> str:
         _bodies(found),
     ]
     near = "The home configuration is near a singularity"  # said by the row above
-    warnings = [text for text in found["warnings"] if not text.startswith(near)]
+    warnings = [text for text in found.warnings if not text.startswith(near)]
     return render("robot/about", facts=[fact for fact in facts if fact is not None], warnings=warnings)
 
 
@@ -151,9 +151,9 @@ def _joints(robot: Robot) -> str:
 
 
 def _axes(found: InspectionAnswer) -> str:
-    parts = [f"{_run(joints)} parallel" for joints in found["parallel"] if len(joints) > 1]
-    parts += [f"{_run(joints)} meet in one point" for joints in found["spherical"]]
-    turned = [pair["relation"] for pair in found["axes"]]
+    parts = [f"{_run(joints)} parallel" for joints in found.parallel if len(joints) > 1]
+    parts += [f"{_run(joints)} meet in one point" for joints in found.spherical]
+    turned = [pair.relation for pair in found.axes]
     if not parts and turned:
         same = f"each {turned[0]} to the next" if len(set(turned)) == 1 else "in no special position"
         parts = [same if len(turned) > 1 else f"1 and 2 {turned[0]}"]
@@ -166,38 +166,38 @@ def _run(joints: Sequence[int]) -> str:
 
 
 def _redundancy(found: InspectionAnswer, robot: Robot) -> dict[str, str]:
-    spare = found["redundancy"]
+    spare = found.redundancy
     if spare:
-        words = f"{robot.n} joints − {found['motions']} motions = {spare}: the arm can move while the tool stays"
+        words = f"{robot.n} joints − {found.motions} motions = {spare}: the arm can move while the tool stays"
         return _fact("Redundancy", words)
     return _fact("Redundancy", "none: no joint to spare")
 
 
 def _solver(found: InspectionAnswer) -> dict[str, str]:
-    if found["solver"] == "numeric":
-        words = f"a search from several starts: {found['reason']}. It may miss solutions."
+    if found.solver == "numeric":
+        words = f"a search from several starts: {found.reason}. It may miss solutions."
         return _fact("Inverse kinematics", words, "numeric:", "kb-amber")
-    count = len(found["robot"]["branches"])
+    count = len(found.robot.branches)
     postures = f", up to {count} postures" if count else ""
-    return _fact("Inverse kinematics", f"solver {found['solver']}{postures}: {found['reason']}.", "exact:")
+    return _fact("Inverse kinematics", f"solver {found.solver}{postures}: {found.reason}.", "exact:")
 
 
 def _home(found: InspectionAnswer) -> dict[str, str]:
-    if found["singular_at_home"]:
+    if found.singular_at_home:
         return _fact("Home", "the tool cannot move in some direction from there", "singular:", "kb-vermilion")
-    if found["home_margin"] < 0.1:
+    if found.home_margin < 0.1:
         return _fact("Home", "some tool motions there need fast joints", "near a singularity:", "kb-amber")
     return _fact("Home", "every possible motion of the tool starts freely", "not singular:")
 
 
 def _bodies(found: InspectionAnswer) -> dict[str, str]:
     """What collisions are judged by."""
-    bodies = found["bodies"]
-    if bodies["assumed"]:
+    bodies = found.bodies
+    if bodies.assumed:
         words = "tubes along the lengths of the table; the real bodies are not known, and may be thicker"
         return _fact("Collisions", words, "assumed:", "kb-amber")
-    known = {each["link"] for each in bodies["capsules"] if not each["assumed"]}
-    assumed = sorted({each["link"] for each in bodies["capsules"] if each["assumed"]})
+    known = {each.link for each in bodies.capsules if not each.assumed}
+    assumed = sorted({each.link for each in bodies.capsules if each.assumed})
     if not assumed:
         return _fact("Collisions", "capsules around the bodies of the links", "known:")
     parts = [f"{'what else belongs to ' * (k in known)}link {k}" for k in assumed]

@@ -53,7 +53,7 @@ def test_every_example_is_an_arm_with_a_regular_home(key):
     own = own_arm(PRESETS[key], key)
     assert unpack(pack(own)) == own
     assert label(own.robot) in ("My arm", f"My arm ({PRESETS[key]['name']})")
-    assert not inspect(own.robot)["singular_at_home"]
+    assert not inspect(own.robot).singular_at_home
 
 
 @pytest.mark.parametrize(("key", "robot_id"), [("planar-2r", "planar2r"), ("planar-3r", "planar3r")])
