@@ -50,7 +50,7 @@ from kin.workspace.capability.kernels import raise_best
 
 TASKS: tuple[Task, ...] = ("pose", "approach")
 # Families of `made_up_arms`, in their order: to match a general arm compiles kernels for many seconds.
-MADE_UP = ("parallel5", "planar4", "general5", "pair2", "turned3")
+MADE_UP = ("parallel5", "planar4", "general5", "pair2", "turned3", "slides3")
 NUMERIC = "numeric"  # the family of arms without a closed form
 # Parts that do not belong to a family of arms.
 COLLISIONS, MOTIONS, CLOUDS, CAPABILITY = "collisions", "motions", "clouds", "capability"
@@ -152,7 +152,13 @@ def made_up_arms() -> tuple[Robot, ...]:
     planar = ((0, 0.1, 0.3, 0),) * 4
     turned = (*oblique[:2], (0, 0.2, 0, 0.4))
     tables = (parallel, planar, oblique, oblique[:2], turned)
-    return tuple(Robot.from_dh(rows, home=[0.3, 0.5, 0.7, 0.4, 0.6][: len(rows)]) for rows in tables)
+    home = [0.3, 0.5, 0.7, 0.4, 0.6, 0.2]
+    arms = tuple(Robot.from_dh(rows, home=home[: len(rows)]) for rows in tables)
+    kinds = ("prismatic",) * 3 + ("revolute",) * 3
+    gantry = [
+        {"kind": kind, "theta": 0.7, "d": 0.1, "a": 0.1, "alpha": 0.9 + 0.1 * i} for i, kind in enumerate(kinds)
+    ]
+    return *arms, Robot.from_dh(gantry, home=home)
 
 
 def _first() -> Robot:
