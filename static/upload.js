@@ -11,7 +11,7 @@
 
   const block = () => document.querySelector('[data-arm="files"]');
   const limit = (name) => Number(block().querySelector("[data-arm-file]").dataset[name]);
-  const send = (value, done, direct = false) => viserPage.send("feature", ["robot", ["upload"], value], done, direct);
+  const send = (value, done, direct = false, key = "upload") => viserPage.send("feature", ["robot", [key], value], done, direct);
 
   // Choosing and dropping
 
@@ -79,6 +79,23 @@
     } else sendText(name, await file.slice(0, limit("most") + 1).text(), 0, mine);
   }
 
+  // The arm to compare with: its text is shown in the field, and sent
+
+  addEventListener("click", (event) => {
+    const button = event.target.closest?.("[data-compare-do]");
+    if (button?.dataset.compareDo === "open") document.querySelector("[data-compare-file]").click();
+    if (button?.dataset.compareDo === "send") sendText("your text", document.querySelector("[data-compare-text]").value, 0, ++uploading, "other-text");
+  });
+  addEventListener("change", async (event) => {
+    const input = event.target.closest?.("[data-compare-file]");
+    const [file] = input?.files ?? [];
+    if (!file) return;
+    input.value = "";
+    const text = await file.slice(0, limit("most") + 1).text();
+    document.querySelector("[data-compare-text]").value = text;
+    sendText(file.name.slice(0, 100), text, 0, ++uploading, "other-text");
+  });
+
   // Zipping
 
   const TABLE = Uint32Array.from({ length: 256 }, (_, n) => {
@@ -142,9 +159,9 @@
     const inside = text.codePointAt(from + length - 1) > 0xffff; // the second half of that character comes next
     return from + length - inside;
   }
-  function sendText(name, text, from, mine) {
+  function sendText(name, text, from, mine, key) {
     if (mine !== uploading) return;
     const to = endOfPart(text, from);
-    send([name, from === 0, to >= text.length, text.slice(from, to)], () => { if (to < text.length) sendText(name, text, to, mine); });
+    send([name, from === 0, to >= text.length, text.slice(from, to)], () => { if (to < text.length) sendText(name, text, to, mine, key); }, false, key);
   }
 })();

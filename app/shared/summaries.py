@@ -1,6 +1,7 @@
-"""Sizes and sections of workspaces, computed once for REST and for all visitors of the viewer.
+"""Sizes and sections of workspaces, and comparisons of arms, computed once for all who ask.
 
-A volume takes seconds, the other sizes a tenth of one. A computation ends when the last caller leaves its
+A volume takes seconds, as may the mistakes that explain why two arms differ; the other sizes take a tenth of
+one. A computation ends when the last caller leaves its
 subscription. A section takes some 100 kB.
 """
 
@@ -8,7 +9,8 @@ from __future__ import annotations
 
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.threads import DaemonExecutor, background_threads, lower_priority
-from kin import JointConstraints, Robot, Section, WorkspaceFacts, section, workspace_facts
+from kin import Comparison, JointConstraints, Robot, Section, WorkspaceFacts, compare, section, workspace_facts
+from kin.comparison import Frames
 from kin.ik.options import FREE
 
 Plane = tuple[tuple[float, ...], tuple[float, ...]]
@@ -17,7 +19,7 @@ KEPT = 64  # sizes, and as many sections
 
 
 class Summaries:
-    """Cache of `kin.workspace_facts` and `kin.section`. Any thread may use it.
+    """Cache of `kin.workspace_facts`, `kin.section` and `kin.compare`. Any thread may use it.
 
     Args:
         kept: how many results of each kind are kept.
@@ -30,6 +32,7 @@ class Summaries:
         self._executor = DaemonExecutor(threads or background_threads(), "summary", lower_priority)
         self._facts: ComputationCache[WorkspaceFacts] = ComputationCache(self._executor, kept)
         self._sections: ComputationCache[Section] = ComputationCache(self._executor, kept)
+        self._comparisons: ComputationCache[Comparison] = ComputationCache(self._executor, kept)
 
     def facts(
         self,
@@ -73,13 +76,23 @@ class Summaries:
         key = (robot, plane, constraints, resolution, signed)
         return self._sections.subscribe(key, compute, self._max_pending if limited else None)
 
+    def comparison(self, a: Robot, b: Robot, frames: Frames) -> Subscription[Comparison]:
+        """A comparison as by `kin.compare`; the partial result is the verdict without explanations."""
+
+        def compute(computation: SharedComputation[Comparison]) -> Comparison:
+            computation.latest = compare(a, b, frames=frames, explain=False)
+            return compare(a, b, frames=frames, stop=computation.check)
+
+        return self._comparisons.subscribe((a, b, frames), compute)
+
     @property
     def pending(self) -> int:
         """How many computations wait or run."""
-        return self._facts.pending + self._sections.pending
+        return self._facts.pending + self._sections.pending + self._comparisons.pending
 
     def close(self) -> None:
         """Start nothing more; returns at once."""
         self._facts.close()
         self._sections.close()
+        self._comparisons.close()
         self._executor.shutdown(wait=False)

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal
 
@@ -57,6 +58,7 @@ def compare(
     tolerance: tuple[float, float] | None = None,
     explain: bool = True,
     seconds: float = 2.0,
+    stop: Callable[[], None] | None = None,
 ) -> Comparison:
     """Compare arm b with the reference a.
 
@@ -68,6 +70,7 @@ def compare(
             By default none: then only digits beyond those that are printed are forgiven, 0.01 mm and 0.001°.
         explain: whether to look for mistakes in b.
         seconds: after which no further pairs of mistakes are tried; single ones are always tried.
+        stop: called every few milliseconds while mistakes are sought; what it raises ends the comparison.
 
     Returns:
         the verdict, the mapping, the differences and likely mistakes.
@@ -94,7 +97,7 @@ def compare(
         unchanged = math.inf
         if result.mapping is not None and result.is_same:
             unchanged = result.mapping.cost(axes) * (1.0 if frames == "fixed" else 0.1)
-        search = Search(a, b, frames == "fixed", axes, deadline)
+        search = Search(a, b, frames == "fixed", axes, deadline, stop or (lambda: None))
         found = search.run(_MOST, unchanged)
         result = replace(result, explanations=tuple(found), complete=search.complete)
     return result

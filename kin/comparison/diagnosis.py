@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,11 +52,14 @@ class Search:
     Args:
         fixed: whether the poses should agree as they are, so that base, tool and zeros are mistakes too.
         deadline: on `time.monotonic`; pairs are given up then.
+        stop: called between two steps.
     """
 
-    def __init__(self, a: Robot, b: Robot, fixed: bool, tolerance: Tolerance, deadline: float) -> None:
+    def __init__(
+        self, a: Robot, b: Robot, fixed: bool, tolerance: Tolerance, deadline: float, stop: Callable[[], None]
+    ) -> None:
         self._a, self._b, self._fixed = a, b, fixed
-        self._tolerance, self._deadline = tolerance, deadline
+        self._tolerance, self._deadline, self._stop = tolerance, deadline, stop
         self._probes = _probes(a)
         self._poses = fk(a, self._probes)
         table = Tables.of(a)
@@ -112,6 +115,7 @@ class Search:
                 key=lambda edit: edit.cost,
             )
             for edit in second:
+                self._stop()
                 if time.monotonic() > self._deadline:
                     self.complete = False
                     return
@@ -127,6 +131,10 @@ class Search:
     def _second_rows(self, level: _Level) -> None:
         """One more row left out or put in, of tables that still have another number of joints."""
         for i, history in enumerate(level.history):
+            self._stop()
+            if time.monotonic() > self._deadline:
+                self.complete = False
+                return
             single = level.tables.take(np.array([i]))
             start = _Level(single, [history], level.cost[i : i + 1])
             if len(single.joint_rows) > self._a.n:
@@ -163,6 +171,7 @@ class Search:
         for i in fits[np.argsort(level.cost[fits], kind="stable")][:_MOST_MATCHES]:
             if level.cost[i] >= min(self._least(), self._limit) or time.monotonic() > self._deadline:
                 break
+            self._stop()
             found = plainest(self._a, tables.robot(int(i), self._b), self._tolerance)
             if not isinstance(found, int):
                 self._keep(level, int(i), found[0])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from concurrent.futures import CancelledError
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -43,6 +46,19 @@ def test_invalid_requests_raise_each_time(summaries):
     for _ in range(2):
         with pytest.raises(InputError, match="effort"):
             summaries.facts(ARM, effort=1).future.result(60)
+
+
+def test_a_comparison_ends_when_nobody_waits_for_it(summaries):
+    two = kin.get_robot("ur5"), kin.get_robot("panda")
+    with summaries.comparison(*two, "fixed") as reader:
+        assert reader.future.result(60).verdict == "different"
+        assert summaries.comparison(*two, "fixed").future.result(0) is reader.future.result()
+    rows = [replace(row, alpha=row.alpha + 0.3, a=row.a + 0.2) for row in two[1].rows]
+    left = summaries.comparison(two[1], replace(two[1], rows=tuple(rows)), "fixed")
+    left.leave()
+    with pytest.raises(CancelledError):
+        left.future.result(60)
+    assert summaries.pending == 0
 
 
 def test_only_callers_who_ask_for_the_limit_are_refused():

@@ -215,8 +215,12 @@ def _cell_of(field: str, texts: Mapping[Cell, str]) -> Cell | None:
 
 def converted(robot: Robot, own: OwnArm | None) -> OwnArm:
     """The same arm as a table in the other convention; raises `EditError`."""
+    return with_table(robot, own, kin.convert(robot, "modified" if robot.convention == "standard" else "standard"))
+
+
+def with_table(robot: Robot, own: OwnArm | None, other: Robot) -> OwnArm:
+    """The arm with the table, base and tool of another one; raises `EditError`."""
     data, start = fields_of(robot, own)
-    other = kin.convert(robot, "modified" if robot.convention == "standard" else "standard")
     return built({**kin.robot_to_dict(other), **{key: data[key] for key in ("name", "source")}}, start, robot)
 
 

@@ -14,21 +14,24 @@ from app.exports.snippets import named
 from app.shared.answers.inspection import inspect
 from app.viewer.feature import Feature, Stage
 from app.viewer.frames import Frames
+from app.viewer.meshes.archive import MeshError
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits, views, workpieces
 from app.viewer.tabs.robot.beginnings import Beginnings
+from app.viewer.tabs.robot.compare.comparing import Comparing
 from app.viewer.tabs.robot.edits import Cell, EditError
 from app.viewer.tabs.robot.files import text_of
 from app.viewer.tabs.robot.texts import Texts
 from app.viewer.tabs.robot.uploads import Uploads
-from kin import InputError, RobotFileError
+from kin import InputError, KinematicsError, RobotFileError
 from kin.files.read import MAX_ROWS
 from kin.robot import Convention
+from kin.transforms import Array
 from kin.typed import LONGEST, cut
 
-PARTS = ("start", "table", "wrong", "about", "frames", "wrong-frames", "convert", "files")
+PARTS = ("start", "table", "wrong", "about", "frames", "wrong-frames", "convert")
 OTHER: dict[Convention, Convention] = {"standard": "modified", "modified": "standard"}
 UNUSED = "The file was not used"
 
@@ -43,6 +46,7 @@ class RobotTab(Feature):
             *("cell", "row", "start", "convention", "convert", "reset", "delete", "discard", "left"),
             *("download", "upload", "urdf", "tip", "cancel"),
             *("frame-add", "frame-remove"),
+            *("other", "agree", "other-text", "apply", "compare-stop"),
         }
     )
 
@@ -54,9 +58,12 @@ class RobotTab(Feature):
         self._editing = ""  # the part of the tab in which the visitor types
         self._uploads = Uploads(stage, self.post, lambda own, words: self._beginnings.begin(own, words))
         self._beginnings = Beginnings(stage, lambda: self._uploads.last)
+        self._stalled: float | None = None  # seconds until the next part of a file should have come
         self._converting = False
         gui = stage.client.gui
         self._html = {name: gui.add_html("") for name in PARTS}
+        self._comparing = Comparing(stage, stage.meshes.memory, self.post)
+        self._html["files"] = gui.add_html("")
         self._handlers: dict[str, Callable[[object], None]] = {
             "start": self._beginnings.start,
             "convention": self._reread,
@@ -72,6 +79,12 @@ class RobotTab(Feature):
             "cancel": lambda _: self._cancel(),
             "frame-add": lambda _: self._use_frames(workpieces.added(self.stage)),
             "frame-remove": lambda index: self._use_frames(workpieces.removed(self.stage.frames, index)),
+            "other": self._comparing.choose,
+            "agree": self._comparing.use_frames,
+            "other-text": self._take_other,
+            "apply": lambda index: self._try(lambda: self._comparing.proposed(index, self._own)),
+            "compare-stop": lambda _: self._comparing.stop(),
+            "walk": self._comparing.walk,
         }
         self._refresh()
 
@@ -92,13 +105,20 @@ class RobotTab(Feature):
                 self._show_files()
             case (str(name),) if name in self._handlers:
                 self._handlers[name](value)
+                self._plan()
             case _:
                 raise InputError("robot", key, "the key of a field or a button")
 
     def tick(self, now: float) -> None:
-        self.due = self._uploads.end_stalled(now)
-        if self.due is None:
+        before, self._stalled = self._stalled, self._uploads.end_stalled(now)
+        if before is not None and self._stalled is None:
             self._show_files()
+        self._comparing.tick()
+        self._plan()
+
+    def _plan(self) -> None:
+        """When to look at what is under way."""
+        self.due = min((due for due in (self._stalled, self._comparing.due) if due is not None), default=None)
 
     def step_name(self, key: Hashable) -> str:
         match key:
@@ -115,26 +135,41 @@ class RobotTab(Feature):
                 return "Convention"
             case ("frame-add" | "frame-remove",):
                 return "Workpiece frames"
+            case ("apply",):
+                return "Mistake mended"
+            case ("other" | "agree" | "other-text",):
+                return "Compare with"
         return self.title
 
     def state(self) -> dict[str, object]:
-        texts = self._texts.state()
-        return {"texts": texts} if texts else {}
+        parts = {"texts": self._texts.state(), "compare": self._comparing.state()}
+        return {key: part for key, part in parts.items() if part}
 
     def restore(self, state: Mapping[str, object]) -> None:
         self._texts.restore(state.get("texts"))
+        if state.get("compare", {}) != self._comparing.state():
+            self._comparing.restore(state.get("compare"))
+            self._plan()
         self._refresh()
 
     def on_robot(self) -> None:
         self._uploads.waiting = None
         self._refresh()
+        self._comparing.start()
+        self._plan()
+
+    def on_pose(self, T_base_tool: Array) -> None:
+        self._comparing.on_pose(self.stage.q)
 
     def on_style(self) -> None:
         self._refresh()
+        self._comparing.refresh()
 
     def on_activity(self) -> None:
         if self.stage.activity.withheld != self._withheld:
             self._refresh()
+            self._comparing.start()
+            self._plan()
 
     # Drawing
 
@@ -344,7 +379,7 @@ class RobotTab(Feature):
         self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
 
     def _upload(self, value: object) -> None:
-        self.due = 0.0  # `tick` says when to look whether the next part has come
+        self._stalled = 0.0  # `tick` says when to look whether the next part has come
         self._open(lambda: self._uploads.take(value))
 
     def _open(self, act: Callable[[], None]) -> None:
@@ -355,6 +390,13 @@ class RobotTab(Feature):
             self._refuse(UNUSED, str(error))
         self._show_files()
 
+    def _take_other(self, value: object) -> None:
+        """A part of a text with the arm to compare with."""
+        try:
+            self._comparing.take(value)
+        except (KinematicsError, MeshError) as error:
+            self._refuse(UNUSED, str(error))
+
     def _cancel(self) -> None:
         """End what goes on with a file."""
         if words := self._uploads.stop():
@@ -363,4 +405,5 @@ class RobotTab(Feature):
 
     def on_leave(self) -> None:
         self._uploads.forget()
+        self._comparing.forget()
         self.stage.bodies.clear()

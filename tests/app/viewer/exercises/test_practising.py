@@ -211,6 +211,7 @@ def test_no_tab_shows_the_table_that_an_exercise_asks_for(server: int, one: Exer
         assert "asks for this table" in shown(tab)
         assert 'data-arm="table"' not in tab.html
         assert 'data-arm="convert"' not in tab.html
+        assert 'data-arm="compare"' not in tab.html
         tab.say("feature", ["robot", ["download"], "toml"])
         tab.wait(lambda: "would contain the table" in shown(tab))
         for serial, form in enumerate(FILES, 1):
