@@ -162,6 +162,7 @@
   function sendText(name, text, from, mine, key) {
     if (mine !== uploading) return;
     const to = endOfPart(text, from);
-    send([name, from === 0, to >= text.length, text.slice(from, to)], () => { if (to < text.length) sendText(name, text, to, mine, key); }, false, key);
+    const next = () => { if (to < text.length) sendText(name, text, to, mine, key); };
+    send([name, from === 0, to >= text.length, text.slice(from, to)], next, false, key);
   }
 })();
