@@ -13,15 +13,15 @@ from __future__ import annotations
 import hmac
 import re
 import secrets
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlencode
 
 import jwt
-from itsdangerous import BadSignature, SignatureExpired, URLSafeTimedSerializer
+from itsdangerous import BadSignature, SignatureExpired, TimestampSigner, URLSafeTimedSerializer
 
+from app.classroom.clock import now
 from app.classroom.lti.keys import PlatformKeys
 from app.classroom.lti.platforms import Platform, Platforms, is_safe
 
@@ -76,17 +76,24 @@ class Launch:
     nonce: str
 
 
+class _Signer(TimestampSigner):
+    """Dates states by the time of rooms: a clock that is set back does not make an old state valid again."""
+
+    def get_timestamp(self) -> int:
+        return int(now())
+
+
 class Logins:
     """Begins and finishes launches.
 
     Args:
         key: signs states; the same in all processes.
-        use_nonce: called once with each valid nonce and the time when it expires; False: it was used before.
+        use_nonce: called once with each valid nonce and when it expires, in the time of rooms; False: used before.
     """
 
     def __init__(self, platforms: Platforms, key: str, use_nonce: Callable[[str, float], bool]) -> None:
         self._platforms = platforms
-        self._states = URLSafeTimedSerializer(key, salt="kinboard.lti.state")
+        self._states = URLSafeTimedSerializer(key, salt="kinboard.lti.state", signer=_Signer)
         self._use_nonce = use_nonce
         self._keys = {each.keys_url: PlatformKeys(each) for each in platforms.all}
 
@@ -151,7 +158,7 @@ class Logins:
 
     def use(self, launch: Launch) -> None:
         """Use up the nonce of a launch; raises `LaunchRefused`, or `ClassroomUnavailable`."""
-        if not self._use_nonce(launch.nonce, time.time() + LOGIN_TIME + CLOCKS):
+        if not self._use_nonce(launch.nonce, now() + LOGIN_TIME + CLOCKS):
             raise LaunchRefused("This launch was used before. Start it again on the platform.")
 
 

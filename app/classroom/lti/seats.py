@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import time
 from dataclasses import dataclass
 
 from sqlalchemy import delete, func, insert, select, update
@@ -46,9 +45,9 @@ class LtiSeats:
         self._rooms = rooms
 
     def use_nonce(self, nonce: str, expires: float) -> bool:
-        """Use up a nonce; False if it was used before, by whichever process."""
+        """Use up a nonce until a time of rooms; False if it was used before, by whichever process."""
         with self._database.write() as connection:
-            connection.execute(delete(LtiNonce).where(LtiNonce.expires < time.time()))
+            connection.execute(delete(LtiNonce).where(LtiNonce.expires < now()))
             try:
                 with connection.begin_nested():
                     connection.execute(insert(LtiNonce).values(id=nonce, expires=expires))

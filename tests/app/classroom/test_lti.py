@@ -16,7 +16,7 @@ from live_server import wait_for
 from lti_platform import CLIENT, MEMBER, TOOL, Platform, launch, login, new_key, registered
 from pydantic import SecretStr
 
-from app.classroom import COOKIE, Hub, NewAttempt
+from app.classroom import COOKIE, Hub, NewAttempt, clock
 from app.classroom.courses import Courses, course_of
 from app.classroom.lti import passback as passback_module
 from app.classroom.lti.exchange import PlatformError
@@ -166,6 +166,40 @@ def test_a_launch_counts_once(browser: TestClient, platform: Platform) -> None:
     again = browser.post("/lti/launch", data=sent)
     assert again.status_code == 403
     assert "was used before" in again.text
+
+
+@pytest.mark.parametrize(
+    ("passed", "ahead", "back", "words"),
+    [
+        (0.0, 3600.0, 0.0, "was used before"),
+        (0.0, 3600.0, -3600.0, "was used before"),
+        (700.0, 700.0, 0.0, "took too long"),
+    ],
+)
+def test_a_clock_that_is_set_lets_no_launch_be_replayed(
+    browser: TestClient, platform: Platform, application, monkeypatch, passed, ahead, back, words
+) -> None:
+    """`passed` seconds after a launch, by a clock that is `ahead`, another is made; then the clock is set back."""
+
+    def launched(client: TestClient) -> tuple[str, dict[str, str]]:
+        asked = login(client, platform)
+        cookie = client.cookies[STATE_COOKIE]
+        token = platform.token(asked["nonce"], iat=began, exp=began + 9000)
+        sent = {"id_token": token, "state": asked["state"]}
+        assert client.post("/lti/launch", data=sent).status_code == 303
+        return cookie, sent
+
+    wall, steady, began = time.time, clock.steady, int(time.time())
+    clock.now()  # as a service does when it starts
+    cookie, sent = launched(browser)
+    monkeypatch.setattr(clock, "steady", lambda: steady() + passed)
+    monkeypatch.setattr(time, "time", lambda: wall() + ahead)
+    launched(TestClient(application, base_url=TOOL, follow_redirects=False))  # forgets what is over
+    monkeypatch.setattr(time, "time", lambda: wall() + back)
+    browser.cookies.set(STATE_COOKIE, cookie)
+    again = browser.post("/lti/launch", data=sent)
+    assert again.status_code == 403
+    assert words in again.text
 
 
 def test_a_launch_belongs_to_the_browser_of_its_login(
