@@ -16,6 +16,7 @@ from app.exercises.poses import errors
 from app.exercises.typed import EntryError, read_number
 from app.exercises.variant import Variant
 from kin import IKOptions, InputError, Task
+from kin.ik.details import Solved
 from kin.ik.options import TASKS
 from kin.transforms import Array, vector_angle
 from kin.typed import LONGEST
@@ -48,6 +49,8 @@ class SolutionsKind(Kind):
         found = kin.ik.solve(variant.robot, variant.pose, IKOptions(task=self.task), variant.robot.q_home)
         if not found.complete:
             raise ValueError("the solutions of this arm and task are not all known")
+        if isinstance(found.details, Solved) and found.details.infinite:
+            raise ValueError("infinitely many configurations meet the target, so that no list has them all")
         return [solution.q for solution in found.solutions]
 
     def asked(self, variant: Variant, units: Units) -> Asked:

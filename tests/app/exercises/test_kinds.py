@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import kin
 from app.exercises import Exercise, Variant, Verdict, parse_exercise
+from app.exercises.exercise import VariantError
 from app.exercises.judging import judge
 from app.exercises.kinds import KINDS
 from app.exercises.questions import Number, count
@@ -239,6 +240,13 @@ def test_all_solutions_are_found_only_by_all_of_them() -> None:
     twice = judged(ALL, [*right, right[0]])
     assert "once more" in twice.reason
     assert judged(ALL, []).reason == "There is a solution."
+
+
+def test_a_target_that_a_curve_of_configurations_meets_is_no_question() -> None:
+    """With joint 5 at zero, axes 4 and 6 are one line: only the sum of their angles counts."""
+    singular = '[target]\nq = ["0.3", "0.9", "-2.0", "0.4", "0", "0.5"]\n[answer]\nrows = 8'
+    with pytest.raises(VariantError, match="infinitely many configurations"):
+        made("puma560", "solutions", singular)[0].verify()
 
 
 def test_a_row_that_is_no_solution_gets_its_reason() -> None:
