@@ -66,7 +66,7 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.shared.threads import end_process, pin
-from kin import RobotFileError, __version__
+from kin import InputError, RobotFileError, __version__
 
 # Seconds that a thread may keep the interpreter while others wait. A drag passes through three threads; next to a
 # REST batch, Python's default of 5 ms would make one drag in twenty take 36 ms instead of 13.
@@ -217,7 +217,7 @@ def run(settings: Settings, open_browser: bool = False) -> int:
             exercises = Exercises(settings.exercises, store.get)  # each process reads them again; errors show here
             _ = Courses(exercises, settings.courses, store.get).all
             check_platforms(settings)
-        except (RobotFileError, ExerciseFileError, PlatformsRefused) as error:
+        except (InputError, RobotFileError, ExerciseFileError, PlatformsRefused) as error:
             print(f"kinboard: {error}", file=sys.stderr)
             return 1
         if settings.token is None and not settings.read_only:

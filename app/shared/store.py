@@ -14,6 +14,7 @@ class Store:
 
     Raises:
         RobotFileError: a file of the folder is wrong, or its id is taken.
+        kin.InputError: the folder cannot be read.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
