@@ -50,7 +50,13 @@ class Comparing:
         gui = stage.client.gui
         self._form, self._answer = gui.add_html(""), gui.add_html("")
         self._walk = gui.add_slider(
-            "Joint", 1, 2, 1, 1, visible=False, hint="Marks the axis of one joint in both arms, in the scene"
+            "Joint of both arms",
+            1,
+            2,
+            1,
+            1,
+            visible=False,
+            hint="Marks the axis of one joint in both arms, in the scene",
         )
         listen(self._walk, post, ("walk",))
         self._about = gui.add_html("")

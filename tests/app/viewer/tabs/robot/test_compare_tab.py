@@ -89,7 +89,7 @@ def test_a_mistake_is_named_and_one_click_mends_it_in_one_step(port: int) -> Non
         assert "the axes of joints 2 and 3 are at a distance of 425.0 mm in a and 400.0 mm in b" in words
         assert "a of row 2 is wrong (−425 mm, not −400 mm)" in words
         assert len(ghosts(tab)) == 1
-        assert tab.value("Joint") == 3  # the first axis that lies otherwise
+        assert tab.value("Joint of both arms") == 3  # the first axis that lies otherwise
         assert "the first that differs" in part(tab, "compared-joint")
         say(tab, "apply", value="0")
         assert tab.script["undo"] == "Mistake mended"
@@ -157,9 +157,9 @@ def test_the_joint_slider_walks_along_both_arms(port: int) -> None:
         open_arm(tab, "panda")
         say(tab, "other", value="ur5")
         assert "a has 6 joints and b has 7" in compared(tab)
-        tab.wait(lambda: tab.value("Joint") == 7)
+        tab.wait(lambda: tab.value("Joint of both arms") == 7)
         assert "only one of the arms has it" in part(tab, "compared-joint")
-        tab.set("Joint", 2)
+        tab.set("Joint of both arms", 2)
         tab.wait(lambda: "Joint 2" in part(tab, "compared-joint"))
         before = np.array(tab.nodes[ghosts(tab)[0]]["props"]["batched_positions"])
         tab.set("Joint 1", 40)
