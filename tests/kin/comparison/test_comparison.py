@@ -193,6 +193,16 @@ def test_the_time_limit_is_admitted():
     assert not found.complete
 
 
+def test_the_time_limit_is_admitted_for_rows_left_out():
+    """With no time, a second row is not even looked for; with some, both are found."""
+    a = kin.get_robot("panda")
+    b = replace(a, rows=a.rows[:2] + a.rows[4:], home=a.home[:2] + a.home[4:])
+    found = kin.compare(a, b)
+    assert [each.mistake for each in found.explanations[0].changes] == ["missing row", "missing row"]
+    assert found.complete
+    assert not kin.compare(a, b, seconds=0.0).complete
+
+
 def test_a_table_of_the_ur5_in_a_toolbox_has_another_first_length():
     """d of row 1 is 0.089459 there and 0.089159 in the maker's table: poses see only a lower base."""
     a = kin.get_robot("ur5")
