@@ -25,7 +25,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kin
-from kin import InputError, Status, singularities, solve_ik
+from kin import InputError, Robot, Status, singularities, solve_ik
 from kin.ik.messages.singularity import long
 from kin.solvers import closed_form_of
 from kin.transforms import vector_angle
@@ -334,6 +334,13 @@ def only_singularity(robot, q):
     assert len(found) == 1
     assert (found[0].kind, found[0].unit) == ("jacobian", "SI")
     return found[0]
+
+
+def test_a_plane_typed_with_a_few_digits_is_no_singularity():
+    """With half turns of 3.1416 the tool leaves its plane by micrometres: no motion that it has, or can lose."""
+    q = [0.1, 0.3, 0.4, 0.5]
+    exact, typed = (Robot.from_dh([(0, 0, 0.3, turn)] * 4, home=q) for turn in (math.pi, 3.1416))
+    assert only_singularity(typed, q).distance == pytest.approx(only_singularity(exact, q).distance, rel=1e-3)
 
 
 def test_six_joints_without_a_closed_form_are_judged_by_the_whole_jacobian():
