@@ -197,6 +197,13 @@ def rotation_angle(R_a: Array, R_b: Array) -> float:
     return 2.0 * math.atan2(float(np.linalg.norm(q[1:])), float(q[0]))
 
 
+def rotation_vector(R: Array) -> Array:
+    """The rotation vector ``(3,)`` of a rotation ``(3, 3)``."""
+    q = wxyz_from_rotation(R)
+    size = float(np.linalg.norm(q[1:]))
+    return np.zeros(3) if size == 0.0 else np.asarray(q[1:] / size * (2.0 * math.atan2(size, float(q[0]))))
+
+
 def vector_angle(a: Array, b: Array) -> float:
     """Angle in radians between two vectors ``(3,)``, accurate from 0 to π."""
     return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(np.dot(a, b)))

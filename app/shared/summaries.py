@@ -1,8 +1,7 @@
 """Sizes and sections of workspaces, and comparisons of arms, computed once for all who ask.
 
 A volume takes seconds, as may the mistakes that explain why two arms differ; the other sizes take a tenth of
-one. A computation ends when the last caller leaves its
-subscription. A section takes some 100 kB.
+one. A computation ends when the last caller leaves its subscription. A section takes some 100 kB.
 """
 
 from __future__ import annotations

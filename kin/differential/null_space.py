@@ -16,7 +16,7 @@ import numpy as np
 from kin.differential.task import LOST, Task, task_rows, usual_rank, weight
 from kin.fk import fk
 from kin.robot import Robot
-from kin.transforms import Array, rotation_angle, wxyz_from_rotation
+from kin.transforms import Array, rotation_vector
 
 Goal = Literal["limits", "manipulability"]
 TOLERANCE = 1e-10  # m and rad; how exactly the task is held
@@ -103,10 +103,7 @@ def error(robot: Robot, q: Array, T_held: Array, task: Task) -> Array:
         sine, cosine = float(np.linalg.norm(axis)), float(T[:3, 2] @ T_held[:3, 2])
         turn = axis * (math.atan2(sine, cosine) / sine if sine > 0.0 else 1.0)
         return np.concatenate([way, T[:3, :2].T @ turn])
-    angle = rotation_angle(T_held[:3, :3], T[:3, :3])
-    axis = wxyz_from_rotation(T_held[:3, :3] @ T[:3, :3].T)[1:]
-    length = float(np.linalg.norm(axis))
-    return np.concatenate([way, axis * (angle / length) if length > 0.0 else np.zeros(3)])
+    return np.concatenate([way, rotation_vector(T_held[:3, :3] @ T[:3, :3].T)])
 
 
 def hold(robot: Robot, q: Array, T_held: Array, task: Task, locked: Sequence[int] = ()) -> Array | None:

@@ -15,7 +15,7 @@ import numpy as np
 from kin.motion.geometry import tables
 from kin.motion.geometry.splines import spline
 from kin.motion.geometry.tables import Table
-from kin.transforms import Array, wxyz_from_rotation
+from kin.transforms import Array, rotation_vector, wxyz_from_rotation
 
 TURN = 0.25  # metres that count as much as a radian
 
@@ -194,13 +194,6 @@ class Corner:
     def describe(self, table: Table, row: Array) -> None:
         """As in `Curve`."""
         tables.corner(row, self.radius, table.index(self.before), table.index(self.after))
-
-
-def rotation_vector(R: Array) -> Array:
-    """The rotation vector ``(3,)`` of a rotation ``(3, 3)``."""
-    q = wxyz_from_rotation(R)
-    size = float(np.linalg.norm(q[1:]))
-    return np.zeros(3) if size == 0.0 else np.asarray(q[1:] / size * (2.0 * math.atan2(size, float(q[0]))))
 
 
 def rotations(vector: Array, f: Array) -> Array:

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kin
-from kin.motion.geometry.curves import arc_through, poses, rotation_vector, rotations, turning
+from kin.motion.geometry.curves import arc_through, poses, rotations, turning
+from kin.transforms import rotation_vector
 
 ARMS = tuple(kin.builtin_robots())
 
