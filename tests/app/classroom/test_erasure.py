@@ -18,6 +18,7 @@ from fastapi.testclient import TestClient
 from live_server import wait_for
 from postgres_server import running
 from sqlalchemy import insert, select
+from stored_bytes import stored_bytes
 from test_hub import nothing, until
 
 from app.classroom import COOKIE, Hub, NewAttempt, erasure
@@ -44,7 +45,7 @@ def hub(tmp_path: Path) -> Iterator[Hub]:
 
 def left(folder: Path, *secrets: str) -> set[str]:
     """Which of these are in any file of the folder."""
-    stored = b"".join(path.read_bytes() for path in folder.rglob("*") if path.is_file())
+    stored = stored_bytes(folder)
     return {each for each in secrets or SECRETS if each.encode() in stored}
 
 

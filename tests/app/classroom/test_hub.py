@@ -14,6 +14,7 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from sqlalchemy import event, func, select, update
+from stored_bytes import stored_bytes
 
 from app.classroom import (
     Attendance,
@@ -302,7 +303,7 @@ def test_ending_erases_everything_for_all(hubs, tmp_path):
     until(lambda: student.room.closed)
     with pytest.raises(RefusedError):
         student.submit(attempt())
-    until(lambda: not any(b"Secret" in file.read_bytes() for file in (tmp_path / "data").iterdir()))
+    until(lambda: b"Secret" not in stored_bytes(tmp_path / "data"))
 
 
 def test_time_ends_a_room_and_a_new_clock_does_not(hubs, monkeypatch):

@@ -15,6 +15,7 @@ from fastapi.testclient import TestClient
 from live_server import wait_for
 from lti_platform import CLIENT, MEMBER, TOOL, Platform, launch, login, new_key, registered
 from pydantic import SecretStr
+from stored_bytes import stored_bytes
 
 from app.classroom import COOKIE, Hub, NewAttempt, clock
 from app.classroom.courses import Courses, course_of
@@ -92,7 +93,7 @@ def test_a_student_gets_a_seat(browser: TestClient, platform: Platform, applicat
     launch(other, platform, sub="user-8")
     seat = hub.ticket(other.cookies[COOKIE])
     assert (seat.room, seat.seat != ticket.seat) == (ticket.room, True)
-    stored = b"".join(path.read_bytes() for path in hub.folder.rglob("*") if path.is_file())
+    stored = stored_bytes(hub.folder)
     assert b"Ada" in stored
     assert b"Lovelace" not in stored
     assert b"ada@school" not in stored

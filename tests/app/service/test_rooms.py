@@ -8,6 +8,7 @@ import threading
 
 import pytest
 from fastapi.testclient import TestClient
+from stored_bytes import stored_bytes
 
 from app.classroom import COOKIE, ClassroomUnavailable, RefusedError, clock
 from app.classroom.tokens import CODE_LENGTH, LETTERS
@@ -81,9 +82,10 @@ def test_a_class_joins_by_code_and_ends(make, tmp_path):
     assert COOKIE not in student.cookies
     assert join(make(), code).status_code == 404
     assert student.get("/room/qr.svg").status_code == 404
-    for file in (tmp_path / "data").iterdir():
-        assert b"Ada" not in file.read_bytes()
-        assert b"Kinematics" not in file.read_bytes()
+    stored = stored_bytes(tmp_path / "data")
+    assert b"SQLite format 3" in stored
+    assert b"Ada" not in stored
+    assert b"Kinematics" not in stored
 
 
 @pytest.mark.parametrize(
