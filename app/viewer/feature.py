@@ -19,13 +19,14 @@ from app.shared.maps import Maps
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.activity.activity import Activity
+from app.viewer.arm import Arm
 from app.viewer.frames import Frames
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.meshes.reader import ClientMeshes
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
-from kin import Contact, IKOptions, IKResult, InputError, Obstacle, Robot, Task
+from kin import Contact, IKResult, InputError, Obstacle, Robot, Task
 from kin.transforms import Array
 from kin.units import Units
 
@@ -47,36 +48,12 @@ class Stage(Protocol):
         """The visitor's browser tab: its ``gui``, ``scene`` and ``camera``."""
 
     @property
-    def robot(self) -> Robot:
-        """The selected robot."""
+    def now(self) -> Arm:
+        """The arm as it is now: robot, configuration, target, and how targets are solved."""
 
     @property
     def own(self) -> OwnArm | None:
         """The visitor's own arm, whether or not it is on show."""
-
-    @property
-    def task(self) -> Task:
-        """How much of the target pose the arm must match."""
-
-    @property
-    def goal(self) -> Array:
-        """The configuration ``(n,)`` the arm is moving to, or has reached."""
-
-    @property
-    def q(self) -> Array:
-        """The configuration ``(n,)`` shown in the scene."""
-
-    @property
-    def target(self) -> Array | None:
-        """The target pose ``(4, 4)``; None while the target follows the tool."""
-
-    @property
-    def options(self) -> IKOptions:
-        """The options that targets are solved with: task, requested branch, and locked joints."""
-
-    @property
-    def branch(self) -> str | None:
-        """The requested branch, as `kin.solve_ik` takes it."""
 
     @property
     def units(self) -> Units:
@@ -94,19 +71,8 @@ class Stage(Protocol):
     def service(self) -> Service:
         """Where this page has come from, for code that asks the service."""
 
-    @property
-    def obstacles(self) -> tuple[Obstacle, ...]:
-        """The obstacles that the visitor has placed."""
-
-    @property
-    def avoid(self) -> bool:
-        """Whether the arm is to touch neither itself nor an obstacle."""
-
     def link_to(self, features: dict[str, dict[str, object]], lesson: str) -> str:
         """A link to a page with nothing but these states of features, at this lesson."""
-
-    def contacts_at(self, q: Array) -> tuple[Contact, ...]:
-        """What the arm touches at a configuration ``(n,)``, the deepest first."""
 
     def post(self, key: Hashable, value: object = None) -> None:
         """Queue an event for the worker; thread-safe. A newer value replaces a queued one of the same key."""
@@ -234,7 +200,7 @@ class Feature:
         """Another robot was selected. Not called for the robot that is there when the feature is constructed."""
 
     def on_pose(self, T_base_tool: Array) -> None:
-        """The scene shows the arm at another ``stage.q``, with the tool at this pose ``(4, 4)``."""
+        """The scene shows the arm at another ``stage.now.q``, with the tool at this pose ``(4, 4)``."""
 
     def on_result(self, result: IKResult) -> None:
         """Inverse kinematics was solved for a target."""

@@ -157,7 +157,7 @@ class CourseFeature(Feature):
             stage.post("lesson", "Exercises")
             stage.post(("feature", EXERCISES, ("open", item.key, 0)), None)
             return
-        if item.robot and stage.robot.id != item.robot:
+        if item.robot and stage.now.robot.id != item.robot:
             stage.change_robot(self._courses.find(item.robot))
         stage.post("lesson", next(lesson.title for lesson in LESSONS if lesson.key == item.key))
 

@@ -188,7 +188,7 @@ class Practising(Feature):
     def _set_scene(self, exercise: Exercise) -> None:
         stage, variant = self.stage, self._variant
         assert variant is not None
-        if stage.robot != exercise.robot:
+        if stage.now.robot != exercise.robot:
             stage.change_robot(exercise.robot)
         shows = exercise.kind.shows_posture or self._practice.record(exercise).closed
         q = variant.q if shows else exercise.robot.q_home
@@ -241,7 +241,9 @@ class Practising(Feature):
         if how == "fields":
             sheet.fill(value)
         try:
-            given = self.stage.goal.tolist() if form == "posture" else sheet.given(form, value, self.stage.units)
+            given = (
+                self.stage.now.goal.tolist() if form == "posture" else sheet.given(form, value, self.stage.units)
+            )
             if form == "frame":
                 self._drawing.place(sheet.ghost)
             verdict = exercise.judge(variant, given, self.stage.units)
@@ -264,7 +266,7 @@ class Practising(Feature):
         notice = Notice("hand", exercise.title, "The arm shows the answer.")
         if self._asked.form == "posture" and self._practice.record(exercise).mark == "shown":
             self.stage.move_to(np.array(exercise.kind.answer(variant)), notice)
-        elif exercise.q and not exercise.kind.shows_posture and self.stage.robot == exercise.robot:
+        elif exercise.q and not exercise.kind.shows_posture and self.stage.now.robot == exercise.robot:
             self.stage.move_to(variant.q, notice)
         self._draw(exercise)
 
@@ -291,7 +293,7 @@ class Practising(Feature):
         else:
             variant, closed = self._variant, practice.record(exercise).closed
             contents = [
-                views.task_html(exercise, variant, units, self.stage.robot == exercise.robot),
+                views.task_html(exercise, variant, units, self.stage.now.robot == exercise.robot),
                 views.question_html(self._asked, self._sheet, closed),
                 views.foot_html(exercise, variant, units, self._sheet, activity),
             ]

@@ -4,7 +4,7 @@ A figure belongs to one arm and one visitor. Its parts are made once and are hid
 part again moves it, so that nothing flickers while the arm is dragged. Everything is in the base frame, in metres
 and radians; values are written in the reader's units::
 
-    figure = Figure(stage.client.scene, "/triangle", body(stage.robot).size)
+    figure = Figure(stage.client.scene, "/triangle", body(stage.now.robot).size)
     normal, upper = figure.line("x₁", RED), figure.dimension("l₁", BLUE)
     elbow, plane = figure.angle("β", GREEN), figure.face(3, BLUE)
     wrist = figure.point("wrist centre w", AMBER)

@@ -74,7 +74,7 @@ class ObstaclesFeature(Feature):
     # Reports of the session
 
     def on_obstacles(self) -> None:
-        if self._chosen is not None and self._chosen >= len(self.stage.obstacles):
+        if self._chosen is not None and self._chosen >= len(self.stage.now.obstacles):
             self._chosen = None
         self._show()
 
@@ -97,20 +97,21 @@ class ObstaclesFeature(Feature):
     # Changes
 
     def _add(self, shape: str) -> None:
+        arm = self.stage.now
         stage = self.stage
-        if len(stage.obstacles) >= MOST_OBSTACLES:
+        if len(arm.obstacles) >= MOST_OBSTACLES:
             detail = f"A page has at most {MOST_OBSTACLES}. Remove one first."
             stage.notify(Notice("error", "No obstacle was added", detail))
             return
-        items = placed.added(stage.obstacles, shape, stage.robot, stage.goal)
+        items = placed.added(arm.obstacles, shape, arm.robot, arm.goal)
         self._choose(len(items) - 1, False)
         detail = "Drag its arrows, or type its place and size in the tab Move."
         stage.notify(Notice("hand", f"Added: {items[-1].label}", detail))
         self._use(items)
 
     def _choose(self, index: int | None, show: bool = True) -> None:
-        if index is not None and not 0 <= index < len(self.stage.obstacles) + (not show):
-            raise InputError("obstacle", index, f"0 to {len(self.stage.obstacles) - 1}")
+        if index is not None and not 0 <= index < len(self.stage.now.obstacles) + (not show):
+            raise InputError("obstacle", index, f"0 to {len(self.stage.now.obstacles) - 1}")
         self._chosen = None if index == self._chosen and show else index
         self._wrong, self._held = None, False
         if show:
@@ -120,10 +121,10 @@ class ObstaclesFeature(Feature):
         index = self._chosen
         if index is None:
             return
-        gone = self.stage.obstacles[index].label
+        gone = self.stage.now.obstacles[index].label
         self._choose(None, False)
         self.stage.notify(Notice("hand", f"Removed: {gone}", "Undo brings it back."))
-        self._use(placed.removed(self.stage.obstacles, index))
+        self._use(placed.removed(self.stage.now.obstacles, index))
 
     def _pull(self, pull: Pull) -> None:
         """One event of the gizmo. Obstacles do not avoid the arm: it may avoid them. What touches is red."""
@@ -133,7 +134,7 @@ class ObstaclesFeature(Feature):
         if pull.phase != "start":
             T = from_position_wxyz(pull.position, pull.wxyz)
             self._wrong = None
-            self._use(placed.moved(self.stage.obstacles, self._chosen, T))
+            self._use(placed.moved(self.stage.now.obstacles, self._chosen, T))
         if not self._held:
             self._show()
 
@@ -142,7 +143,7 @@ class ObstaclesFeature(Feature):
             return
         try:
             value = read_cell(text, self.stage.units.of(field in TURN))
-            items = placed.changed(self.stage.obstacles, self._chosen, field, value)
+            items = placed.changed(self.stage.now.obstacles, self._chosen, field, value)
         except ReadError as error:
             self._refuse(field, text, str(error))
         except InputError as error:
@@ -156,9 +157,9 @@ class ObstaclesFeature(Feature):
 
     def _use(self, items: tuple[Obstacle, ...]) -> None:
         """Take what the visitor has made of the obstacles; an arm that avoids them is solved again."""
-        before = self.stage.obstacles
+        before = self.stage.now.obstacles
         self.stage.use_obstacles(items)
-        if self.stage.avoid and items != before:
+        if self.stage.now.avoid and items != before:
             self.stage.solve_again()
 
     def _refuse(self, field: str, text: str, why: str) -> None:
@@ -169,7 +170,7 @@ class ObstaclesFeature(Feature):
     # Drawing
 
     def _show(self) -> None:
-        items, radius = self.stage.obstacles, body(self.stage.robot).radius
+        items, radius = self.stage.now.obstacles, body(self.stage.now.robot).radius
         self._nodes.show(items, radius)
         self._nodes.mark(self._touched, self._chosen)
         if not self._held:
@@ -178,7 +179,7 @@ class ObstaclesFeature(Feature):
         self._show_panel()
 
     def _show_panel(self) -> None:
-        items, chosen = self.stage.obstacles, self._chosen
+        items, chosen = self.stage.now.obstacles, self._chosen
         rows = [{"name": each.label, "touched": i in self._touched} for i, each in enumerate(items)]
         update_html(
             self._html,
@@ -193,7 +194,7 @@ class ObstaclesFeature(Feature):
         """The fields of the one that is chosen, by groups."""
         if self._chosen is None:
             return []
-        each = self.stage.obstacles[self._chosen]
+        each = self.stage.now.obstacles[self._chosen]
         place = "Middle of the top" if each.shape == "table" else "Centre"
         found = [(place, PLACE, each.xyz, False), ("Size", SIZES[each.shape], placed.sizes(each), False)]
         if each.shape != "sphere":

@@ -82,13 +82,13 @@ class Follower:
         if state.unreadable or state.refused or state.q is None or state.robot is None:
             return
         last, self._shown = self._shown, state
-        if self._page.obstacles != self._obstacles:
-            self._own_obstacles = self._page.obstacles
+        if self._page.now.obstacles != self._obstacles:
+            self._own_obstacles = self._page.now.obstacles
         self._obstacles = state.obstacles
         self._page.use_obstacles(state.obstacles)
         if last is None or _differs(last, state, "robot", "own", "task", "branch", "locks"):
             self._page.adopt(replace(state, own=self._own(state)))
-        elif not np.array_equal(state.q, self._page.goal) or not _equal(state.target, last.target):
+        elif not np.array_equal(state.q, self._page.now.goal) or not _equal(state.target, last.target):
             self._page.arm.follow(state.q, state.target)
             self.moving = True
         if state.target is None and (last is None or last.target is not None):
@@ -100,7 +100,7 @@ class Follower:
 
     def drop_obstacles(self) -> None:
         """Return to the visitor's own obstacles, unless the visitor has changed those that were shown."""
-        if self._page.obstacles == self._obstacles:
+        if self._page.now.obstacles == self._obstacles:
             self._page.use_obstacles(self._own_obstacles)
 
     def _own(self, state: PageState) -> OwnArm | None:

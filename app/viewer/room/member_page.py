@@ -55,9 +55,9 @@ class MemberPage(VisitorPage):
         """Show in all controls of the arm what is true."""
         self.numbers.use_goal(None)
         self.sliders.show_locks(self.arm.locks)
-        self.panel.robots.show(self.robot, self.own)
-        self.panel.target.show(self.task)
-        self.posture.choose(self.branch)
+        self.panel.robots.show(self.arm.robot, self.own)
+        self.panel.target.show(self.arm.task)
+        self.posture.choose(self.arm.branch)
 
     def be_led(self, led: bool) -> None:
         """Another page leads this one, or none does."""

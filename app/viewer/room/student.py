@@ -146,9 +146,9 @@ class Student(Member):
             if self.activity.lesson != EXERCISES:
                 lessons.open(EXERCISES)
             self.activity.leave_item()
-            before = self.page.robot.id, self.page.goal.tobytes()
+            before = self.page.arm.robot.id, self.page.arm.goal.tobytes()
             lessons.exercises.open(task.exercise)
-            if (self.page.robot.id, self.page.goal.tobytes()) != before:
+            if (self.page.arm.robot.id, self.page.arm.goal.tobytes()) != before:
                 self.follower.drop_obstacles()
             self._open_tab += 1
 

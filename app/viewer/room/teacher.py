@@ -262,7 +262,7 @@ class Teacher(Member):
 
     def _shown_own(self) -> OwnArm | None:
         own = self.page.own
-        return own if own is not None and own.robot.id == self.page.robot.id else None
+        return own if own is not None and own.robot.id == self.page.now.robot.id else None
 
     def refusal(self, act: str) -> str:
         if self._wall is not None:

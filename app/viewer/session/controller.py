@@ -23,6 +23,7 @@ import viser
 
 import kin
 from app.shared.metrics import SOLVE_SECONDS
+from app.viewer.arm import Arm
 from app.viewer.panel import Post
 from app.viewer.panel.target import DEFAULT_TASK
 from app.viewer.scene import gizmo
@@ -31,8 +32,7 @@ from app.viewer.scene.bodies import Drawing
 from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
 from app.viewer.session.listener import ArmListener
-from kin import Contact, IKOptions, JointConstraints, Obstacle, Robot, Task
-from kin.collision.contacts import surroundings
+from kin import Obstacle, Robot, Task
 from kin.ik import solve
 from kin.transforms import Array, rotation_from_wxyz
 
@@ -80,7 +80,7 @@ class ArmController:
         self._reached = False
         self.task: Task = DEFAULT_TASK
         self.branch: str | None = None
-        self.locks: list[bool] = []
+        self.locks: tuple[bool, ...] = ()
         self.target: Array | None = None
         self.dragging = False
         self.playing = False
@@ -100,7 +100,7 @@ class ArmController:
         self.robot = robot
         self.task = DEFAULT_TASK
         self.branch = None
-        self.locks = [False] * robot.n
+        self.locks = (False,) * robot.n
         self.target = None
         self.dragging = self.playing = False
         weights = np.where(robot.revolute, 1.0, PRISMATIC_WEIGHT)
@@ -127,24 +127,19 @@ class ArmController:
         return self._motion.moving
 
     @property
-    def options(self) -> IKOptions:
-        """The options that targets are solved with: task, requested branch, and locked joints."""
-        locked = None
-        if any(self.locks):
-            locked = tuple(x if lock else None for x, lock in zip(self.goal.tolist(), self.locks, strict=True))
-        constraints = JointConstraints(locked=locked)
-        return IKOptions(
-            task=self.task, constraints=constraints, branch=self.branch, avoid_self_collision=self.avoid,
-            obstacles=self.obstacles if self.avoid else (),
-        )  # fmt: skip
-
-    def contacts_at(self, q: Array) -> tuple[Contact, ...]:
-        """What the arm touches at a configuration ``(n,)``, the deepest contact first.
-
-        Links that are only assumed are compared with each other on request: they may be far from those drawn.
-        """
-        links = self.avoid or bool(self.robot.capsules)
-        return surroundings(self.robot, self.obstacles, links).touches(q) if links or self.obstacles else ()
+    def now(self) -> Arm:
+        """The arm as it is now."""
+        return Arm(
+            self.robot,
+            self.q,
+            self.goal,
+            self.target,
+            self.task,
+            self.branch,
+            self.locks,
+            self.obstacles,
+            self.avoid,
+        )
 
     def use_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take these obstacles. An arm that is at rest stays, whatever it touches: see `solve_again`."""
@@ -166,7 +161,7 @@ class ArmController:
         """
         if self.target is not None or self.dragging or self.playing:
             return
-        if renew or (self.avoid and self.contacts_at(self.goal)):
+        if renew or (self.avoid and self.now.contacts_at(self.goal)):
             self._solve(kin.fk(self.robot, self.goal))
 
     def _surroundings_changed(self, solve_again: bool) -> None:
@@ -233,7 +228,7 @@ class ArmController:
         self, q: Array, target: Array | None, task: Task, branch: str | None, locks: Sequence[bool]
     ) -> None:
         """Return to an earlier state of this robot: configuration ``(n,)``, open target, and requests."""
-        self.task, self.branch, self.locks, self.target = task, branch, list(locks), None
+        self.task, self.branch, self.locks, self.target = task, branch, tuple(locks), None
         self._set_gizmo_axes()
         self._listener.on_branch(branch)
         self._head_for(q)
@@ -250,7 +245,7 @@ class ArmController:
 
     def nudge(self, axis: int, turn: bool, amount: float) -> None:
         """Move the target along (m), or turn it about (rad), one axis of the gizmo."""
-        T = kin.fk(self.robot, self.goal) if self.target is None else self.target
+        T = self.now.aim
         self.set_target(gizmo.nudged(T, axis, turn, amount, self._in_base))
 
     def use_base_axes(self, in_base: bool) -> None:
@@ -295,7 +290,7 @@ class ArmController:
 
     def set_locks(self, locks: Sequence[bool]) -> None:
         """Lock exactly these joints ``(n,)``."""
-        self.locks = list(locks)
+        self.locks = tuple(locks)
         self._request_changed()
 
     def switch_branch(self, branch: str | None) -> bool:
@@ -303,10 +298,10 @@ class ArmController:
 
         False, and nothing changes, if the tool would have to leave a target that it has.
         """
-        T = kin.fk(self.robot, self.goal) if self.target is None else self.target
+        T = self.now.aim
         if self.open_target is None and branch is not None:
             target = T[:3, 3] if self.task == "position" else T
-            if solve(self.robot, target, replace(self.options, branch=branch), self.goal).status != "solved":
+            if solve(self.robot, target, replace(self.now.options, branch=branch), self.goal).status != "solved":
                 self._listener.on_branch(self.branch)
                 return False
         self.branch = branch
@@ -329,7 +324,7 @@ class ArmController:
         """Solve for a target, seeded with the goal so that the arm stays on its branch."""
         target = T[:3, 3] if self.task == "position" else T
         with SOLVE_SECONDS.labels("viewer").time():
-            result = solve(self.robot, target, self.options, self.goal)
+            result = solve(self.robot, target, self.now.options, self.goal)
         self.target = T
         if result.best is not None:
             self._head_for(result.best.q)

@@ -83,7 +83,7 @@ class LessonChoice:
             self._box = self._gui.add_folder(None)
             with self._box:
                 self.guide = Guide(self._stage, chosen)
-                if (left := self._left.get((chosen.key, self._stage.robot.id))) is not None:
+                if (left := self._left.get((chosen.key, self._stage.now.robot.id))) is not None:
                     self.guide.restore(left)
                 self.shown = chosen(self._stage)
                 self.guide.attach(self.shown)
@@ -133,7 +133,7 @@ class LessonChoice:
 
     def _keep(self, lesson: str, progress: dict[str, object]) -> None:
         """Keep the progress in a lesson that is closed."""
-        key = (lesson, self._stage.robot.id)
+        key = (lesson, self._stage.now.robot.id)
         self._left.pop(key, None)
         self._left[key] = progress
         while len(self._left) > KEPT:

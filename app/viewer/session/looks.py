@@ -17,7 +17,6 @@ from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.session.controller import ArmController
 from app.viewer.session.numbers import Numbers
 from app.viewer.session.posture import PosturePanel
-from kin import Robot
 from kin.units import Units
 
 
@@ -35,10 +34,6 @@ class LooksPage(Protocol):
     units: Units
     view: ViewState
     system_dark: bool
-
-    @property
-    def robot(self) -> Robot:
-        """The selected robot."""
 
     @property
     def dark(self) -> bool:
@@ -96,7 +91,7 @@ class Looks:
     def redraw_body(self) -> None:
         """Draw the body of the arm on show anew."""
         page = self._page
-        page.arm.scene.use_drawing(page.bodies.of(page.robot, page.own))
+        page.arm.scene.use_drawing(page.bodies.of(page.arm.robot, page.own))
         self.apply()
 
     def use_library(self, why: str) -> None:
@@ -107,7 +102,7 @@ class Looks:
         elif page.bodies.detailed and why != page.bodies.last_refusal:
             page.bodies.last_refusal = why
             detail = f"{why} The simple drawing stays."
-            page.status.show(Notice("error", f"The real shape of {page.robot.name} cannot be shown", detail))
+            page.status.show(Notice("error", f"The real shape of {page.arm.robot.name} cannot be shown", detail))
 
     def apply(self) -> None:
         """Show the scene as the page's view says."""

@@ -118,7 +118,7 @@ class Numbers:
 
     def _show_contacts(self) -> str:
         """Paint what touches; returns the sentence about it, or ""."""
-        page, contacts = self._page, self._page.arm.contacts_at(self._page.arm.q)
+        page, contacts = self._page, self._page.arm.now.contacts_at(self._page.arm.q)
         page.arm.scene.colors.show(contacts)
         if contacts != self._contacts:
             self._contacts = contacts

@@ -198,7 +198,7 @@ class VisitorPage(ShownArm, Worker):
 
     def change_lock(self, joint: int | None, lock: bool) -> None:
         """Lock or unlock one joint, or all of them, at the value it is heading for."""
-        joints = range(self.robot.n) if joint is None else (joint,)
+        joints = range(self.arm.robot.n) if joint is None else (joint,)
         locks = [lock if i in joints else before for i, before in enumerate(self.arm.locks)]
         self.status.show(lock_notice(locks))
         self.set_locks(locks)
@@ -364,13 +364,14 @@ class VisitorPage(ShownArm, Worker):
         self.bodies.detailed = self.view.detailed
         self.arm.use(robot, q, self.dark, self.view.base_axes, self.bodies.of(robot, self.own))
         self.numbers.use_frames()
-        self.panel.target.show(self.task)
+        self.panel.target.show(self.arm.task)
         self.sliders = self._make_sliders()
         self.posture.use_robot()
         self.looks.apply()
         self.arm.scene.size_gizmo(self.camera.small)
-        self.camera.aim(self.arm.scene.body, kin.link_frames(robot, self.goal)[:, :3, 3], glide)
+        self.camera.aim(self.arm.scene.body, kin.link_frames(robot, self.arm.goal)[:, :3, 3], glide)
 
     def _make_sliders(self) -> JointSliders:
         folders = [self.panel.joints] if self._more_joints is None else [self.panel.joints, self._more_joints]
-        return JointSliders(self.client.gui, folders, self.robot, self.goal, self.arm.locks, self.units, self.post)
+        arm = self.arm
+        return JointSliders(self.client.gui, folders, arm.robot, arm.goal, arm.locks, self.units, self.post)

@@ -11,7 +11,6 @@ import logging
 from collections.abc import Callable
 from dataclasses import replace
 
-import kin
 from app.exports.snippets import LOCAL, Moment, Service
 from app.shared.security import Rights
 from app.viewer.panel.share import SharePanel
@@ -102,8 +101,8 @@ class Persistence:
         page = self._page
         page.use_obstacles(saved.obstacles)
         if saved.locks:
-            page.set_locks([i in saved.locks for i in range(page.robot.n)])
-        if saved.task not in (None, page.task):
+            page.set_locks([i in saved.locks for i in range(page.now.robot.n)])
+        if saved.task not in (None, page.now.task):
             page.set_task(saved.task)
         if saved.branch is not None:
             page.set_branch(saved.branch)
@@ -163,14 +162,14 @@ class Persistence:
         page = self._page
         states = {feature.key: feature.state() for feature in page.features}
         return PageState(
-            robot=page.robot.id,
+            robot=page.now.robot.id,
             own=page.own,
             frames=page.frames,
-            obstacles=page.obstacles,
-            q=page.goal,
+            obstacles=page.now.obstacles,
+            q=page.now.goal,
             target=page.arm.open_target,
-            task=page.task,
-            branch=page.branch,
+            task=page.now.task,
+            branch=page.now.branch,
             lesson=page.activity.lesson,
             units=page.units,
             view=replace(page.view),
@@ -184,12 +183,21 @@ class Persistence:
         return f"{self._address}viewer/#s={encode(PageState(lesson=lesson, features=features))}"
 
     def _update_share(self) -> None:
+        arm = self._page.now
         page = self._page
-        target = kin.fk(page.robot, page.goal) if page.target is None else page.target
-        own = page.own is not None and page.own.robot == page.robot
+        target = arm.aim
+        own = page.own is not None and page.own.robot == arm.robot
         avoid = page.view.avoid
         moment = Moment(
-            page.robot, page.goal, target, page.task, self._address, self._token, own, page.obstacles, avoid
+            arm.robot,
+            arm.goal,
+            target,
+            arm.task,
+            self._address,
+            self._token,
+            own,
+            arm.obstacles,
+            avoid,
         )
         self._share.show(f"{self._address}viewer/#s={self._saved}", moment, page.activity.withheld == "table")
 

@@ -35,7 +35,7 @@ class PosturePanel:
     def use_robot(self) -> None:
         """Show the choices of another robot."""
         with self._folder:
-            self._choice = BranchChoice(self._stage.client.gui, self._stage.robot, self._post)
+            self._choice = BranchChoice(self._stage.client.gui, self._stage.now.robot, self._post)
         self.show()
 
     def remove(self) -> None:
@@ -45,10 +45,10 @@ class PosturePanel:
 
     def show(self) -> None:
         """Show the arm's branch, and the redundancy parameters there."""
-        robot = self._stage.robot
+        robot = self._stage.now.robot
         parameters = self._parameters()
         if kin.branch_names(robot):
-            self._choice.show(kin.branch_of(robot, self._stage.goal))
+            self._choice.show(kin.branch_of(robot, self._stage.now.goal))
         self._sliders.show(parameters, robot, self._stage.units, self._dragged)
         self._dragged = None
 
@@ -57,7 +57,7 @@ class PosturePanel:
         best = result.best
         # In other tasks the parameter may be a turn about the target's axis, which is not the tool's axis until
         # the arm has arrived.
-        if self._stage.task == "pose" and result.status == "solved" and best is not None:
+        if self._stage.now.task == "pose" and result.status == "solved" and best is not None:
             self._result = self._request(), best.redundancy
         else:
             self._result = None
@@ -69,7 +69,7 @@ class PosturePanel:
     def not_here(self, branch: str) -> Notice:
         """Why the arm cannot take a posture with the tool where it is."""
         stage = self._stage
-        robot, q, options = stage.robot, stage.goal, replace(stage.options, branch=branch)
+        robot, q, options = stage.now.robot, stage.now.goal, replace(stage.now.options, branch=branch)
         if robot.n < 6 and options.task == "pose":  # its postures are those of point and approach direction
             options = replace(options, task="approach")
         T = kin.fk(robot, q)
@@ -130,19 +130,19 @@ class PosturePanel:
 
     def _self_motion(self, name: str, value: float) -> IKResult:
         """Solve for the tool's present pose with a redundancy parameter set."""
-        stage, q = self._stage, self._stage.goal
-        return self_motion(stage.robot, kin.fk(stage.robot, q), stage.options, q, name, value)
+        arm = self._stage.now
+        return self_motion(arm.robot, arm.T_goal, arm.options, arm.goal, name, value)
 
     def _parameters(self) -> tuple[Redundancy, ...]:
         """The redundancy parameters at the goal, on the branch of the goal."""
-        stage, q = self._stage, self._stage.goal
+        arm = self._stage.now
         if self._result is not None and self._result[0] == self._request():
             return self._result[1]
-        seed = "seed" if kin.branch_names(stage.robot) else None
-        options = replace(stage.options, branch=seed, max_solutions=1)
-        found = solve(stage.robot, kin.fk(stage.robot, q), options, q)
+        seed = "seed" if kin.branch_names(arm.robot) else None
+        options = replace(arm.options, branch=seed, max_solutions=1)
+        found = solve(arm.robot, arm.T_goal, options, arm.goal)
         return found.solutions[0].redundancy if found.solutions else found.redundancy
 
     def _request(self) -> tuple[object, ...]:
-        stage = self._stage
-        return stage.robot.id, stage.task, stage.goal.tobytes(), stage.options.constraints
+        arm = self._stage.now
+        return arm.robot.id, arm.task, arm.goal.tobytes(), arm.options.constraints

@@ -99,16 +99,17 @@ class Preparing:
 
     def _needs(self, event: Hashable, value: object) -> tuple[tuple[str, ...], str]:
         """The parts of the core that an event needs, and what they are for."""
+        arm = self._page.now
         page = self._page
         match event:
             case "robot":
                 robot = page.panel.robots.read(value)
-                return (_parts(robot, page.lessons.shown) if robot != page.robot else ()), f"the {robot.name}"
+                return (_parts(robot, page.lessons.shown) if robot != arm.robot else ()), f"the {robot.name}"
             case "lesson":
                 chosen = lesson_titled(value)
                 if chosen is None:
                     return (), ""
-                return _parts_for(page.robot, chosen.kernels), f"the lesson “{chosen.title}”"
+                return _parts_for(arm.robot, chosen.kernels), f"the lesson “{chosen.title}”"
             case "feature":
                 name, key, _ = message_of(page.features, value)
             case ("feature", str(name), key):
@@ -118,7 +119,7 @@ class Preparing:
         feature = next((each for each in page.features if each.key == name), None)
         if feature is None:
             return (), ""
-        return _parts_for(page.robot, feature.kernels_of(key)), f"“{feature.title}”"
+        return _parts_for(arm.robot, feature.kernels_of(key)), f"“{feature.title}”"
 
 
 def _parts(robot: Robot, *shown: Feature | type[Feature] | None) -> tuple[str, ...]:

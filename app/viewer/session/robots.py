@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from app.viewer.arm import Arm
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.status import StatusLine
 from app.viewer.session.controller import ArmController
 from app.viewer.session.parts import Page
-from kin import Contact, IKOptions, Obstacle, Robot, Task
+from kin import Obstacle, Robot
 from kin.transforms import Array
 
 
@@ -17,40 +18,8 @@ class ShownArm:
     status: StatusLine
 
     @property
-    def robot(self) -> Robot:
-        return self.arm.robot
-
-    @property
-    def task(self) -> Task:
-        return self.arm.task
-
-    @property
-    def goal(self) -> Array:
-        return self.arm.goal
-
-    @property
-    def q(self) -> Array:
-        return self.arm.q
-
-    @property
-    def target(self) -> Array | None:
-        return self.arm.target
-
-    @property
-    def options(self) -> IKOptions:
-        return self.arm.options
-
-    @property
-    def branch(self) -> str | None:
-        return self.arm.branch
-
-    @property
-    def obstacles(self) -> tuple[Obstacle, ...]:
-        return self.arm.obstacles
-
-    @property
-    def avoid(self) -> bool:
-        return self.arm.avoid
+    def now(self) -> Arm:
+        return self.arm.now
 
     def play(self, on: bool) -> None:
         self.arm.playing = on
@@ -63,9 +32,6 @@ class ShownArm:
 
     def see_through(self, on: bool, gizmo: bool = False) -> None:
         self.arm.scene.see_through(on, gizmo)
-
-    def contacts_at(self, q: Array) -> tuple[Contact, ...]:
-        return self.arm.contacts_at(q)
 
     def use_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
         self.arm.use_obstacles(obstacles)
@@ -95,16 +61,16 @@ def edit(page: Page, own: OwnArm) -> None:
     Viewpoint, task and a target that is not reached stay; configuration and locks do if it has as many joints of
     the same kinds.
     """
-    robot, q, task, locks, viewpoint = own.robot, page.goal, page.task, page.arm.locks, page.camera.chosen
+    robot, q, task, locks, viewpoint = own.robot, page.now.goal, page.now.task, page.arm.locks, page.camera.chosen
     target = page.arm.open_target
-    alike = [joint.kind for joint in page.robot.joints] == [joint.kind for joint in robot.joints]
+    alike = [joint.kind for joint in page.now.robot.joints] == [joint.kind for joint in robot.joints]
     page.own = own
     page.change_robot(robot, robot.clip(q) if alike else None, glide=True)
     if viewpoint is not None:
         page.camera.restore(viewpoint)
-    if task != page.task:
+    if task != page.now.task:
         page.set_task(task)
     if alike and any(locks):
         page.set_locks(locks)
     if target is not None:
-        page.arm.restore_target(target, page.goal, ease=True)
+        page.arm.restore_target(target, page.now.goal, ease=True)

@@ -80,10 +80,10 @@ class Worksheets(Feature):
         """The worksheet for the arm as it is."""
         stage, lesson = self.stage, self._lesson
         if lesson is None:
-            return Sheet("The arm at a configuration", stage.robot, stage.goal, stage.units)
-        found = type(lesson).outline(stage.robot, stage.units)
+            return Sheet("The arm at a configuration", stage.now.robot, stage.now.goal, stage.units)
+        found = type(lesson).outline(stage.now.robot, stage.units)
         return Sheet(
-            type(lesson).title, stage.robot, stage.goal, stage.units, found.goal, parts_of(found),
+            type(lesson).title, stage.now.robot, stage.now.goal, stage.units, found.goal, parts_of(found),
             lesson.formulas(), lesson.to_fill,
         )  # fmt: skip
 

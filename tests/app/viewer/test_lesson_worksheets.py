@@ -13,6 +13,7 @@ import pytest
 import kin
 from app.equations import book
 from app.exports.worksheet import Sheet, latex
+from app.viewer.arm import Arm
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.equations import views
 from app.viewer.worksheet import FILES, Worksheets, parts_of
@@ -76,7 +77,7 @@ def test_equations_are_on_the_sheet_with_their_corrections_among_the_solutions()
 
 @pytest.fixture
 def worksheets():
-    stage = MagicMock(robot=PIONEER, goal=PIONEER.q_home, units=DEFAULT_UNITS)
+    stage = MagicMock(now=Arm(PIONEER, PIONEER.q_home, PIONEER.q_home), units=DEFAULT_UNITS)
     lesson = SimpleNamespace(key="dh", formulas=tuple, to_fill=True)
     made = Worksheets(stage, lesson, MagicMock())
     made.sheet = lambda: Sheet("An arm", PIONEER, np.array(PIONEER.q_home), DEFAULT_UNITS)

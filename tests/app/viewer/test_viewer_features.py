@@ -42,7 +42,7 @@ class Witness(Feature):
 
     def __init__(self, stage):
         super().__init__(stage)
-        self.note("made", stage.robot.id)
+        self.note("made", stage.now.robot.id)
         listen(stage.client.gui.add_slider(self.title, 0, 10, 1, 0), self.post, "slider")
 
     def note(self, *call):
@@ -56,13 +56,13 @@ class Witness(Feature):
         if value == 8:
             self.due = 0.01
         if value == 7:
-            self.stage.move_to(self.stage.robot.lower)
+            self.stage.move_to(self.stage.now.robot.lower)
 
     def on_robot(self):
-        self.note("robot", self.stage.robot.id)
+        self.note("robot", self.stage.now.robot.id)
 
     def on_pose(self, T_base_tool):
-        assert np.allclose(T_base_tool, kin.fk(self.stage.robot, self.stage.q))
+        assert np.allclose(T_base_tool, kin.fk(self.stage.now.robot, self.stage.now.q))
         self.note("pose")
 
     def on_result(self, result):

@@ -53,7 +53,7 @@ class DHLesson(Lesson):
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
-        self._player = Player(stage.robot)
+        self._player = Player(stage.now.robot)
         self._read_at = 0.0
         self._stale = False
         self._symbols = False
@@ -74,7 +74,7 @@ class DHLesson(Lesson):
         self._slider = gui.add_slider(
             "Row",
             0.0,
-            float(len(stage.robot.rows)),
+            float(len(stage.now.robot.rows)),
             0.01,
             0.0,
             hint="0: frame 0 at the base; 2: row 2 complete; a quarter is one motion. Arrow keys move it finely.",
@@ -133,7 +133,7 @@ class DHLesson(Lesson):
 
     def on_robot(self) -> None:
         self._pause()
-        self._player.robot, self._player.at = self.stage.robot, 0.0
+        self._player.robot, self._player.at = self.stage.now.robot, 0.0
         self._remove_drawings()
         self._view = None  # the page has moved the camera already
         self._start()
@@ -157,7 +157,7 @@ class DHLesson(Lesson):
 
     def tick(self, now: float) -> None:
         read = (self._stale or self._player.playing) and now - self._read_at >= READ
-        if self._player.playing and self._player.advance(now, self.stage.q):
+        if self._player.playing and self._player.advance(now, self.stage.now.q):
             self._pause()
         if self._player.playing or read:
             self._draw(names=read)
@@ -187,7 +187,7 @@ class DHLesson(Lesson):
         if isinstance(speed, str) and speed in SPEEDS:
             self._player.speed = speed
             assign(self._speed_choice, speed)
-        if isinstance(at, int | float) and not isinstance(at, bool) and 0.0 <= at <= length(self.stage.robot):
+        if isinstance(at, int | float) and not isinstance(at, bool) and 0.0 <= at <= length(self.stage.now.robot):
             self._player.at = float(at)
         if isinstance(lines := state.get("lines"), bool):
             self._lines = lines
@@ -251,7 +251,7 @@ class DHLesson(Lesson):
 
     def _start(self) -> None:
         """Show the walk on the selected robot."""
-        robot = self.stage.robot
+        robot = self.stage.now.robot
         self._slider.max = float(len(robot.rows))
         assign(self._slider, self._player.rows)
         self._nine.content = views.nine_steps_html(robot.convention)
@@ -297,7 +297,7 @@ class DHLesson(Lesson):
     def _show_other(self, aim: bool = False) -> None:
         """Show or hide the table in the other convention; `aim`: with the camera on both arms."""
         if self._compare and self._other is None:
-            self._other = OtherDrawing(self.stage.client.scene, self.stage.robot, f"/dh-{next(_fresh)}")
+            self._other = OtherDrawing(self.stage.client.scene, self.stage.now.robot, f"/dh-{next(_fresh)}")
             if aim:
                 self._show_both()
             self._draw()
@@ -309,7 +309,7 @@ class DHLesson(Lesson):
 
     def _draw(self, names: bool = True) -> None:
         """Update the scene; without `names`, the labels of frames are left out: they cost as much as the rest."""
-        robot, q = self.stage.robot, self.stage.q
+        robot, q = self.stage.now.robot, self.stage.now.q
         if self._assigning is not None:
             self._assigning.draw()
         if self._drawing is None:
@@ -328,7 +328,7 @@ class DHLesson(Lesson):
         """Update the texts."""
         self._read_at = time.perf_counter()
         self._stale = False
-        robot, q, units = self.stage.robot, self.stage.q, self.stage.units
+        robot, q, units = self.stage.now.robot, self.stage.now.q, self.stage.units
         if self._assigning is not None:
             self._assigning.write()
             return
@@ -346,7 +346,7 @@ class DHLesson(Lesson):
     def _show_both(self) -> None:
         """Move the camera back until arm and skeleton are in view, without changing its direction."""
         eye = self.stage.client.camera
-        robot = self.stage.robot
+        robot = self.stage.now.robot
         aspect = eye.image_width / eye.image_height if eye.image_height > 0 else 1.6
         position, look_at = camera.view(body(robot), aspect)
         before = (np.array(eye.position), np.array(eye.look_at))

@@ -56,8 +56,8 @@ class Assigning:
             self._block = stage.client.gui.add_html("")
             # Apart from the fields: it changes while the arm moves, and what is being typed must stay.
             self._rows = stage.client.gui.add_html("")
-        self.attempt = Attempt(Assignment(stage.robot))
-        self._drawing = AssignDrawing(stage.client.scene, stage.robot, root)
+        self.attempt = Attempt(Assignment(stage.now.robot))
+        self._drawing = AssignDrawing(stage.client.scene, stage.now.robot, root)
         self.write()
         self.draw()
 
@@ -68,7 +68,7 @@ class Assigning:
             case ("choose", str(part), int()):
                 attempt.choose(part, value)
             case ("check", int()):
-                attempt.check(value, self._stage.q, self._stage.units)
+                attempt.check(value, self._stage.now.q, self._stage.units)
             case ("show", int()):
                 attempt.show()
             case ("back", int()):
@@ -82,7 +82,7 @@ class Assigning:
 
     def restore(self, state: object) -> None:
         """Go on with what `Attempt.state` returned."""
-        self.attempt = Attempt.restored(self._stage.robot, state)
+        self.attempt = Attempt.restored(self._stage.now.robot, state)
         self.write()
         self.draw()
 
@@ -90,11 +90,11 @@ class Assigning:
         """Update the block."""
         units = self._stage.units
         update_html(self._block, assign_html(self.attempt, units))
-        update_html(self._rows, rows_html(self.attempt.work, self._stage.q, units))
+        update_html(self._rows, rows_html(self.attempt.work, self._stage.now.q, units))
 
     def draw(self) -> None:
         """Update the scene."""
-        self._drawing.show(self.attempt, self._stage.q, self._stage.units)
+        self._drawing.show(self.attempt, self._stage.now.q, self._stage.units)
 
     def remove(self) -> None:
         """Remove everything from scene and panel."""

@@ -52,7 +52,7 @@ class EquationsLesson(Lesson):
         self._requested: object = None  # id of the equation to show as soon as there is a book
         self._largest = 0.0  # largest error of the shown equation, m or rad
         self._equation: Equation | None = None
-        self._T: Array = fk(stage.robot, stage.q)
+        self._T: Array = stage.now.T_tool
         self._shown_at = 0.0
         self._about = gui.add_html("")
         self._choice = gui.add_dropdown("Equation", ("…",), hint="The entry of the tool's pose [n o a p] to show")
@@ -92,8 +92,8 @@ class EquationsLesson(Lesson):
                 super().handle(key, value)
 
     def on_robot(self) -> None:
-        robot, own = self.stage.robot, self.stage.own
-        self._T = fk(robot, self.stage.q)
+        robot, own = self.stage.now.robot, self.stage.own
+        self._T = fk(robot, self.stage.now.q)
         self._book = self._equation = None
         self._stop_deriving()
         self._empty("Deriving the equations of this arm …")
@@ -107,7 +107,7 @@ class EquationsLesson(Lesson):
         """Ask for the equations of the arm on show."""
         self._derive_at = None
         try:
-            self._derivation = derivation = book_later(self.stage.robot)
+            self._derivation = derivation = book_later(self.stage.now.robot)
         except TooManyRowsError as error:
             self._empty(f"No equations for so many rows: {error}.")
             return
@@ -239,21 +239,22 @@ class EquationsLesson(Lesson):
         update_html(self._symbols, content)
 
     def _show_values(self) -> None:
+        arm = self.stage.now
         self._shown_at = now = time.perf_counter()
         self.due = None if self._derive_at is None else max(0.0, self._derive_at - now)
         equation = self._equation
         if self._book is None or equation is None:
             return
         if self._book.source == "chapter":
-            update_html(self._test, views.test_html(self._book, self.stage.q))
+            update_html(self._test, views.test_html(self._book, arm.q))
         if equation.correct is None:
             update_html(self._values, views.unreadable_html(equation))
             return
-        values = self._book.values(equation, self.stage.q, self._T)
+        values = self._book.values(equation, arm.q, self._T)
         content = views.values_html(equation, values, self.stage.units, self._largest)
         update_html(self._values, content)
         if equation.verdict == "misprinted":
-            self._draw(views.segments(equation, values, self._T, 0.2 * self.stage.robot.reach))
+            self._draw(views.segments(equation, values, self._T, 0.2 * arm.robot.reach))
 
     def _draw(self, lines: Array) -> None:
         """Draw the misprint as lines, with a label at the far end."""

@@ -115,7 +115,7 @@ class Guide(Feature):
         self._show_joints(False)
 
     def _outline(self) -> Outline:
-        return self._lesson.outline(self.stage.robot, self.stage.units)
+        return self._lesson.outline(self.stage.now.robot, self.stage.units)
 
     def _type(self, key: str, text: object) -> None:
         question = self._progress.question(key)

@@ -102,7 +102,7 @@ class InverseLesson(Lesson):
         return names.get(str(key[0]), self.title) if isinstance(key, tuple) else self.title
 
     def on_steps(self, progress: Progress) -> Outline | None:
-        if self._arm is None or self._arm.robot is not self.stage.robot:
+        if self._arm is None or self._arm.robot is not self.stage.now.robot:
             return None
         if self._restart:
             progress.restart()
@@ -174,7 +174,7 @@ class InverseLesson(Lesson):
 
     def _begin(self) -> None:
         """Start with the example of the arm on show."""
-        arm = self._arm = arm_of(self.stage.robot)
+        arm = self._arm = arm_of(self.stage.now.robot)
         self._exercise = None if arm is None else exercise(arm, example(arm))
         self._psi, self._opened, self._at = None, (), 0
         self._taken.clear()
@@ -214,7 +214,7 @@ class InverseLesson(Lesson):
         arm = self._arm
         if arm is None:
             return
-        q = self.stage.goal.copy()
+        q = self.stage.now.goal.copy()
         self._exercise, self._restart = exercise(arm, q, signs_of(arm, q)), True
         self.stage.activity.changed()
         self.stage.notify(Notice("hand", "New questions", "They are about the pose that the arm has now."))
@@ -244,11 +244,11 @@ class InverseLesson(Lesson):
         arm, stage = self._arm, self.stage
         if arm is None:
             return ()
-        T = stage.target if stage.target is not None else kin.fk(stage.robot, stage.goal)
+        T = stage.now.aim
         psi = 0.0
         if arm.family == "srs7":
-            psi = arm_angle(arm, stage.goal) if self._psi is None else self._psi
-        return all_branches(arm, T, stage.goal, psi)
+            psi = arm_angle(arm, stage.now.goal) if self._psi is None else self._psi
+        return all_branches(arm, T, stage.now.goal, psi)
 
     # What is shown
 
@@ -306,7 +306,7 @@ class InverseLesson(Lesson):
         self._shown_at, self.due = time.perf_counter(), None
         arm, units = self._arm, self.stage.units
         if arm is None:
-            update_html(self._numbers, views.others_html(self.stage.robot))
+            update_html(self._numbers, views.others_html(self.stage.now.robot))
             return
         found = self._branches()
         branch = next(b for b in found if b.derivation.signs == self._signs)

@@ -156,8 +156,7 @@ class NumericLesson(Lesson):
                 self._match = MATCHES[str(value)]
                 self._aim(self._problem.T)
             case "target":
-                target = self.stage.target
-                self._aim(kin.fk(self.stage.robot, self.stage.goal) if target is None else target)
+                self._aim(self.stage.now.aim)
             case "follow":
                 self._follows = bool(value)
             case "take":
@@ -192,11 +191,11 @@ class NumericLesson(Lesson):
 
     def tick(self, now: float) -> None:
         self.due = None
-        if self._follows and self._work is None and not np.array_equal(self._start, self.stage.q):
+        if self._follows and self._work is None and not np.array_equal(self._start, self.stage.now.q):
             if now - self._restarted < INTERVAL:
                 self._wake(INTERVAL - (now - self._restarted))
             else:
-                self._start = self.stage.q.copy()
+                self._start = self.stage.now.q.copy()
                 self._restart()
         if self._work is not None:
             if next(self._work, self) is self:
@@ -234,7 +233,7 @@ class NumericLesson(Lesson):
             "point" if state.get("match") == "point" else "pose" if state.get("match") == "pose" else self._match
         )
         self._compares, self._picture.on = state.get("compare") is True, state.get("picture") is True
-        target, start = _numbers(state.get("target"), 16), _numbers(state.get("start"), self.stage.robot.n)
+        target, start = _numbers(state.get("target"), 16), _numbers(state.get("start"), self.stage.now.robot.n)
         try:
             T = self._problem.T if target is None else kin.transforms.as_transform(target.reshape(4, 4))
         except InputError:
@@ -269,17 +268,17 @@ class NumericLesson(Lesson):
     # Iterating
 
     def _use_robot(self) -> None:
-        robot = self.stage.robot
+        robot = self.stage.now.robot
         self._drawing = Drawing(self.stage.client.scene, robot, f"/numeric-{next(_NUMBERS)}")
         self._match = usual_match(robot)
-        self._start = self.stage.q.copy()
+        self._start = self.stage.now.q.copy()
         self._at, self._plays, self._in_view = None, False, False
         self._aim(example(robot).problem.T)
         self._again()
 
     def _aim(self, T: Array) -> None:
         """Take a target pose ``(4, 4)``, and solve it exactly if it has finitely many solutions."""
-        self._problem = Problem(self.stage.robot, np.array(T), self._match)
+        self._problem = Problem(self.stage.now.robot, np.array(T), self._match)
         assign(self._matches, next(name for name, match in MATCHES.items() if match == self._match))
         finite = self._problem.is_finite
         self._solutions = basins.exact(self._problem) if finite else None
@@ -340,7 +339,7 @@ class NumericLesson(Lesson):
         if run is None:
             return
         at = run.count if self._at is None else self._at
-        q = basins.within(self.stage.robot, run.q[at])
+        q = basins.within(self.stage.now.robot, run.q[at])
         if q is None:
             self.stage.notify(
                 Notice("limits", f"Iterate {at} is outside the limits", "The arm stays where it is.")
@@ -358,7 +357,7 @@ class NumericLesson(Lesson):
         self._drawing.show(self._problem.T, run.q[: at + 1])
         if not self._in_view:  # once for each arm: the view does not follow the iterates
             self._in_view = True
-            self.stage.fit_view((), kin.link_frames(self.stage.robot, run.q)[..., :3, 3].reshape(-1, 3))
+            self.stage.fit_view((), kin.link_frames(self.stage.now.robot, run.q)[..., :3, 3].reshape(-1, 3))
         update_html(self._outcome, views.outcome_html(self._problem, run, self._solutions, units))
         update_html(self._chart, views.chart_html(self._problem, list(self._runs.items()), units))
         update_html(self._table, views.table_html(self._problem, run, at, units))

@@ -146,7 +146,7 @@ class Postures(Lesson):
             self._wake(SURVEY_INTERVAL - (now - self._surveyed))
         if self._cone is not None:
             self._draw_cone(now)
-        if stage.target is None and self._result is not None:
+        if stage.now.target is None and self._result is not None:
             # The arm has reached the target, or was moved elsewhere.
             self._result, self._search = None, None
             self._drop_remedies()
@@ -185,7 +185,7 @@ class Postures(Lesson):
 
     def _build(self) -> None:
         """Build everything that depends on the robot."""
-        gui, scene, robot = self.stage.client.gui, self.stage.client.scene, self.stage.robot
+        gui, scene, robot = self.stage.client.gui, self.stage.client.scene, self.stage.now.robot
         self._names = kin.branch_names(robot) or (CLOSEST,)
         self._postures, self._key, self._cone_key = (), (), ()
         self._surveyed = self._drawn = self._answered = 0.0
@@ -263,30 +263,31 @@ class Postures(Lesson):
 
     @property
     def _target(self) -> Array:
-        target = self.stage.target
-        return kin.fk(self.stage.robot, self.stage.goal) if target is None else target
+        return self.stage.now.aim
 
     @property
     def _present(self) -> str:
-        names = kin.branch_names(self.stage.robot)
-        return kin.branch_of(self.stage.robot, self.stage.goal) if names else CLOSEST
+        arm = self.stage.now
+        names = kin.branch_names(arm.robot)
+        return kin.branch_of(arm.robot, arm.goal) if names else CLOSEST
 
     def _survey(self, now: float) -> None:
+        arm = self.stage.now
         stage, T = self.stage, self._target
-        options = stage.options
+        options = arm.options
         key: tuple[object, ...] = (
-            T.tobytes(), stage.goal.tobytes(), options.task, options.constraints, stage.units, stage.obstacles,
+            T.tobytes(), arm.goal.tobytes(), options.task, options.constraints, stage.units, arm.obstacles,
         )  # fmt: skip
         if key == self._key:
             return
         self._key, self._surveyed = key, now
-        self._postures = survey(stage.robot, T, options, stage.goal, stage.units, stage.contacts_at)
+        self._postures = survey(arm.robot, T, options, arm.goal, stage.units, arm.contacts_at)
         self._show()
 
     def _show(self) -> None:
         present = self._present
         seen = frozenset(set(self._names) - self._hidden) if self._ghosts_on else frozenset()
-        content = html(self.stage.robot, self._postures, present, seen, self.stage.units)
+        content = html(self.stage.now.robot, self._postures, present, seen, self.stage.units)
         update_html(self._list, content)
         if self._ghost_buttons.options != self._ghost_labels():
             self._ghost_buttons.options = self._ghost_labels()
@@ -308,14 +309,15 @@ class Postures(Lesson):
     # Why not
 
     def _show_reason(self) -> None:
-        update_html(self._why, remedies.html(self._result, self.stage.branch, self.stage.units))
+        update_html(self._why, remedies.html(self._result, self.stage.now.branch, self.stage.units))
 
     def _search_remedies(self) -> None:
         """Run one step of the search; the next one follows as soon as the worker is idle."""
+        arm = self.stage.now
         stage = self.stage
         if self._search is None:
             assert self._result is not None
-            request = Request(stage.robot, self._target, stage.options, stage.goal, self._result)
+            request = Request(arm.robot, self._target, arm.options, arm.goal, self._result)
             self._search = remedies.remedies(request, stage.units)
         try:
             remedy = next(self._search)
@@ -361,11 +363,12 @@ class Postures(Lesson):
     # The cone of approach directions
 
     def _draw_cone(self, now: float) -> None:
+        arm = self.stage.now
         assert self._cone is not None
         stage, T = self.stage, self._target
         if self._cone.visible != self._cone_on:
             self._cone.visible = self._cone_on
-        key = (stage.robot.id, T[:3, 3].round(4).tobytes(), T[:3, 2].round(3).tobytes())
+        key = (arm.robot.id, T[:3, 3].round(4).tobytes(), T[:3, 2].round(3).tobytes())
         if not self._cone_on or key == self._cone_key:
             return
         if now - self._drawn < CONE_INTERVAL:
@@ -373,13 +376,13 @@ class Postures(Lesson):
             return
         moved = self._cone_key[1:2] != key[1:2]
         self._cone_key, self._drawn = key, now
-        radius = 0.34 * body(stage.robot).radius
+        radius = 0.34 * body(arm.robot).radius
         self._cone.position = T[:3, 3]
         assert self._ray is not None
         self._ray.points = np.array([[np.zeros(3), radius * T[:3, 2]]], dtype=np.float32)
         if not moved:
             return
-        mask = reachable(stage.robot, T[:3, 3])
+        mask = reachable(arm.robot, T[:3, 3])
         vertices, faces = patch(mask)
         if self._cone_mesh is not None:
             self._cone_mesh.remove()

@@ -139,7 +139,7 @@ class RedundancyLesson(Lesson):
 
     def tick(self, now: float) -> None:
         self.due = None
-        if self._sent is None or not np.array_equal(self._sent, self.stage.goal):
+        if self._sent is None or not np.array_equal(self._sent, self.stage.now.goal):
             if self._sent is not None:
                 self._stop()
             self._hold()
@@ -188,9 +188,10 @@ class RedundancyLesson(Lesson):
 
     def _hold(self) -> None:
         """Hold the tool where the arm is heading, from now on."""
-        self._sent = self.stage.goal.copy()
-        self._T_held = kin.fk(self.stage.robot, self._sent)
-        self._shape = views.frame_origins(self.stage.robot, self._sent)
+        arm = self.stage.now
+        self._sent = arm.goal.copy()
+        self._T_held = kin.fk(arm.robot, self._sent)
+        self._shape = views.frame_origins(arm.robot, self._sent)
 
     def _stop(self) -> None:
         self._target, self._sweeps = None, False
@@ -272,35 +273,36 @@ class RedundancyLesson(Lesson):
         """The configuration for a value of an exact parameter."""
         stage = self.stage
         assert self._sent is not None
-        result = self_motion(stage.robot, self._T_held, stage.options, self._sent, item.name, value)
+        result = self_motion(stage.now.robot, self._T_held, stage.now.options, self._sent, item.name, value)
         return np.array(result.solutions[0].q) if result.solutions else None
 
     def _led(self, item: Redundancy, value: float) -> Array | None:
         """The configuration near the present one in which a joint of the null space has a value."""
-        stage, joint = self.stage, int(item.name.removeprefix("theta")) - 1
+        arm = self.stage.now
+        joint = int(item.name.removeprefix("theta")) - 1
         assert self._sent is not None
-        near = within(stage.robot, self._sent, stage.task, joint, value, self._locked())
-        return lead(stage.robot, self._sent, self._T_held, stage.task, joint, near, self._locked())
+        near = within(arm.robot, self._sent, arm.task, joint, value, self._locked())
+        return lead(arm.robot, self._sent, self._T_held, arm.task, joint, near, self._locked())
 
     def _locked(self) -> tuple[int, ...]:
-        locked = self.stage.options.constraints.locked or ()
+        locked = self.stage.now.options.constraints.locked or ()
         return tuple(i for i, value in enumerate(locked) if value is not None)
 
     # What is shown
 
     def _update(self, now: float) -> None:
         """Update the parameters at the goal, and the residual of the tool in the scene."""
-        stage, robot = self.stage, self.stage.robot
+        stage, robot = self.stage, self.stage.now.robot
         self._read_at = now
-        goal = stage.goal
-        constraints = stage.options.constraints
-        key: tuple[object, ...] = (goal.tobytes(), stage.q.tobytes(), stage.task, constraints, stage.units)
+        goal = stage.now.goal
+        constraints = stage.now.options.constraints
+        key: tuple[object, ...] = (goal.tobytes(), stage.now.q.tobytes(), stage.now.task, constraints, stage.units)
         if key != self._read_key:
             self._read_key, self._changed = key, now
-            self._parameters = redundancy_at(robot, self._T_held, stage.options, goal)
+            self._parameters = redundancy_at(robot, self._T_held, stage.now.options, goal)
             self._numeric = not self._parameters
             if self._numeric:
-                self._parameters = leaders(robot, goal, stage.task, self._locked())
+                self._parameters = leaders(robot, goal, stage.now.task, self._locked())
             if not any(item.name == self._name for item in self._parameters):
                 self._name = self._parameters[0].name if self._parameters else ""
             self._show_controls()
@@ -308,7 +310,7 @@ class RedundancyLesson(Lesson):
         item = self._item
         # The ranges of an arm angle depend on the target and the branch; they are constant during a self-motion.
         ends_key: tuple[object, ...] = (
-            self._T_held.tobytes(), stage.task, constraints, stage.units,
+            self._T_held.tobytes(), stage.now.task, constraints, stage.units,
             None if item is None else (item.name, np.round(item.intervals, 6).tobytes()),
         )  # fmt: skip
         if ends_key == self._ends_key:
@@ -318,14 +320,15 @@ class RedundancyLesson(Lesson):
             return
         self._ends_key = ends_key
         exact = None if self._numeric else item
-        self._ends = () if exact is None else ends(robot, self._T_held, stage.options, goal, exact)
+        self._ends = () if exact is None else ends(robot, self._T_held, stage.now.options, goal, exact)
         update_html(self._limits, "" if exact is None else views.limits_html(robot, self._ends, stage.units))
-        shown = exact if stage.task == "pose" or (exact is not None and exact.name == "psi") else None
+        shown = exact if stage.now.task == "pose" or (exact is not None and exact.name == "psi") else None
         self._drawing.show_ring(goal, self._T_held, shown, self._ends)
 
     def _show_numbers(self) -> None:
-        stage, robot, item = self.stage, self.stage.robot, self._item
-        self._drawing.show_present(stage.q, item, self._trades)
+        arm = self.stage.now
+        stage, robot, item = self.stage, arm.robot, self._item
+        self._drawing.show_present(arm.q, item, self._trades)
         if item is None:
             update_html(self._bar, "")
             update_html(self._residual, "")
@@ -336,28 +339,29 @@ class RedundancyLesson(Lesson):
         if self._slider is not None and self._target is None:
             value = stage.units.angles.shown(item.value)
             assign(self._slider, min(max(value, self._slider.min), self._slider.max))
-        position, rotation = views.residual(kin.fk(robot, stage.q), self._T_held, stage.task)
+        position, rotation = views.residual(kin.fk(robot, arm.q), self._T_held, arm.task)
         elbow = None
         if self._trades:
-            moved = views.frame_origins(robot, stage.q) - self._shape
+            moved = views.frame_origins(robot, arm.q) - self._shape
             elbow = float(np.linalg.norm(moved, axis=1).max())
         update_html(self._residual, views.residual_html(position, rotation, elbow, stage.units))
 
     @property
     def _trades(self) -> bool:
         """Whether the parameter only turns two coaxial joints against each other."""
-        return self._name == "theta1" and not self._numeric and coaxial(self.stage.robot)
+        return self._name == "theta1" and not self._numeric and coaxial(self.stage.now.robot)
 
     def _show_controls(self) -> None:
         """Slider, sweep and choice; rebuilt when the parameters change."""
+        arm = self.stage.now
         stage = self.stage
-        circle = elbow_circle(stage.robot, stage.goal)
+        circle = elbow_circle(arm.robot, arm.goal)
         exact = () if self._numeric else self._parameters
-        idea = views.idea(stage.robot, stage.task, exact, coaxial(stage.robot), circle is not None)
+        idea = views.idea(arm.robot, arm.task, exact, coaxial(arm.robot), circle is not None)
         if self._numeric and self._parameters:
-            idea = views.numeric_idea(stage.robot, stage.task, self._locked())
+            idea = views.numeric_idea(arm.robot, arm.task, self._locked())
         update_html(self._idea, views.idea_html(idea))
-        key = (stage.robot.id, stage.units, self._name, *(item.name for item in self._parameters))
+        key = (arm.robot.id, stage.units, self._name, *(item.name for item in self._parameters))
         if key == self._control_key:
             return
         self._control_key = key
@@ -368,7 +372,7 @@ class RedundancyLesson(Lesson):
         if item is None:
             return
         gui, unit = stage.client.gui, stage.units.angles
-        low, high = (unit.shown(x) for x in views.bounds(stage.robot, item))
+        low, high = (unit.shown(x) for x in views.bounds(arm.robot, item))
         with self._controls_container:
             if len(self._parameters) > 1:
                 labels = tuple(i.label for i in self._parameters)
@@ -390,4 +394,4 @@ class RedundancyLesson(Lesson):
             assign(self._sweep, self._sweeps)
 
     def _new_drawing(self) -> Drawing:
-        return Drawing(self.stage.client.scene, self.stage.robot, f"/{self.key}-{next(_NUMBERS)}")
+        return Drawing(self.stage.client.scene, self.stage.now.robot, f"/{self.key}-{next(_NUMBERS)}")

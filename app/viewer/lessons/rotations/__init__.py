@@ -13,7 +13,6 @@ from itertools import count
 import numpy as np
 import viser
 
-import kin
 from app.exercises.typed import EntryError
 from app.viewer.feature import Stage
 from app.viewer.lessons.guide.lesson import Lesson
@@ -177,10 +176,9 @@ class RotationsLesson(Lesson):
     def _act(self, name: str) -> None:
         self._error = ""
         if name == "From tool":
-            self._turn_to(kin.fk(self.stage.robot, self.stage.goal)[:3, :3])
+            self._turn_to(self.stage.now.T_goal[:3, :3])
         elif name == "To target":
-            target = self.stage.target
-            T = (kin.fk(self.stage.robot, self.stage.goal) if target is None else target).copy()
+            T = self.stage.now.aim.copy()
             T[:3, :3] = self._convention.rotation(self._angles)
             self.stage.set_target(T)
         else:
@@ -268,7 +266,7 @@ class RotationsLesson(Lesson):
     # What is shown
 
     def _use_robot(self) -> None:
-        self._drawing = Drawing(self.stage.client.scene, self.stage.robot, f"/rotations-{next(_NUMBERS)}")
+        self._drawing = Drawing(self.stage.client.scene, self.stage.now.robot, f"/rotations-{next(_NUMBERS)}")
         self.stage.fit_view([self._drawing.room])
         self._show()
 

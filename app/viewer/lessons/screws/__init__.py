@@ -49,7 +49,7 @@ class ScrewsLesson(Lesson):
         super().__init__(stage)
         self._form: Form = "space"
         self._now = False
-        self._factors = stage.robot.n
+        self._factors = stage.now.robot.n
         self._shown_at = 0.0
         self._chosen: int
         self._drawing: Drawing
@@ -71,7 +71,8 @@ class ScrewsLesson(Lesson):
         self._use_robot()
 
     def handle(self, key: Hashable, value: object) -> None:
-        n = self.stage.robot.n
+        arm = self.stage.now
+        n = arm.robot.n
         match key:
             case "form":
                 if value not in FORMS:
@@ -82,14 +83,14 @@ class ScrewsLesson(Lesson):
                     raise InputError("axes", value, "one of " + ", ".join(PLACES))
                 self._now = PLACES[str(value)] == "now"
             case ("joint", str(robot_id)):
-                names = views.joint_names(self.stage.robot)
-                if robot_id != self.stage.robot.id:
+                names = views.joint_names(arm.robot)
+                if robot_id != arm.robot.id:
                     return
                 if value not in names:
                     raise InputError("joint", value, "one of " + ", ".join(names))
                 self._chosen = names.index(str(value))
             case ("factors", str(robot_id)):
-                if robot_id != self.stage.robot.id:
+                if robot_id != arm.robot.id:
                     return
                 if not isinstance(value, int | float) or not 0 <= value <= n or value != int(value):
                     raise InputError("factors", value, f"a whole number from 0 to {n}")
@@ -100,7 +101,7 @@ class ScrewsLesson(Lesson):
 
     def on_robot(self) -> None:
         self._drawing.remove()
-        self._factors = self.stage.robot.n
+        self._factors = self.stage.now.robot.n
         self._use_robot()
 
     def on_pose(self, T_base_tool: Array) -> None:
@@ -131,10 +132,10 @@ class ScrewsLesson(Lesson):
             if state.get("axes") == place:
                 self._now = place == "now"
                 assign(self._places, name)
-        n, joint, factors = self.stage.robot.n, state.get("joint"), state.get("factors")
+        n, joint, factors = self.stage.now.robot.n, state.get("joint"), state.get("factors")
         if type(joint) is int and 1 <= joint <= n:
             self._chosen = joint - 1
-            assign(self._joint, views.joint_names(self.stage.robot)[self._chosen])
+            assign(self._joint, views.joint_names(self.stage.now.robot)[self._chosen])
         if type(factors) is int and 0 <= factors <= n:
             self._factors = factors
             assign(self._slider, factors)
@@ -148,7 +149,7 @@ class ScrewsLesson(Lesson):
 
     def _use_robot(self) -> None:
         """Create the drawing and the controls of the selected robot."""
-        stage, robot = self.stage, self.stage.robot
+        stage, robot = self.stage, self.stage.now.robot
         self._zero = kin.screws(robot)
         self._chosen = max(far_joint(self._zero.S), 0)
         self._drawing = Drawing(stage.client.scene, robot, f"/screws-{next(_NUMBERS)}")
@@ -170,13 +171,13 @@ class ScrewsLesson(Lesson):
         stage.fit_view([(center, LABELS * radius)])
 
     def _screws(self) -> Screws:
-        return kin.screws(self.stage.robot, self.stage.q) if self._now else self._zero
+        return kin.screws(self.stage.now.robot, self.stage.now.q) if self._now else self._zero
 
     def _draw(self) -> None:
         """Draw the axes, the chosen screw, and the arm that the factors give."""
-        stage, robot = self.stage, self.stage.robot
+        stage, robot = self.stage, self.stage.now.robot
         found = self._screws()
-        points, directions = axes_at(robot, stage.q if self._now else np.zeros(robot.n))
+        points, directions = axes_at(robot, stage.now.q if self._now else np.zeros(robot.n))
         self._drawing.show_axes(points, directions)
         self._drawing.show_chosen(
             self._chosen, found.S[:, self._chosen], origin_of(found, self._form), stage.units
@@ -185,27 +186,28 @@ class ScrewsLesson(Lesson):
 
     def _ghost(self) -> Array | None:
         """The arm after the factors that act; with all of them the arm at zero, if the axes are drawn there."""
-        stage = self.stage
-        if self._factors < stage.robot.n:
-            ghost = partial(stage.q, self._factors, self._form)
+        arm = self.stage.now
+        if self._factors < arm.robot.n:
+            ghost = partial(arm.q, self._factors, self._form)
         else:
-            ghost = stage.q if self._now else np.zeros(stage.robot.n)
-        return None if np.abs(ghost - stage.q).max() < 1e-9 else ghost
+            ghost = arm.q if self._now else np.zeros(arm.robot.n)
+        return None if np.abs(ghost - arm.q).max() < 1e-9 else ghost
 
     def _show(self) -> None:
         """Update the scene and the numbers."""
+        arm = self.stage.now
         self._shown_at, self.due = time.perf_counter(), None
-        stage, robot = self.stage, self.stage.robot
+        stage, robot = self.stage, arm.robot
         self._draw()
         found = self._screws()
         columns = seen(found, self._form)
         update_html(self._table, views.table_html(robot, columns, self._form, self._now, self._chosen))
-        value = float(stage.q[self._chosen])
+        value = float(arm.q[self._chosen])
         update_html(
             self._one,
             views.one_html(robot, self._chosen, columns[:, self._chosen], value, self._form, stage.units),
         )
-        q = partial(stage.q, self._factors, self._form)
+        q = partial(arm.q, self._factors, self._form)
         update_html(self._product, views.product_html(robot, self._zero, q, self._factors, self._form))
         ghost = None if self._ghost() is None else self._factors
         stage.show_legend(views.legend_html(robot, self._form, self._now, ghost, self._chosen))

@@ -67,7 +67,7 @@ class TrajectoriesLesson(Lesson):
     def _draw(self) -> None:
         """Draw both ways of the tool, or remove them."""
         self.remove()
-        found = ways(self.stage.robot) if self._on else None
+        found = ways(self.stage.now.robot) if self._on else None
         if found is None:
             return
         scene, root = self.stage.client.scene, f"/trajectories-{next(_NUMBERS)}"
@@ -75,5 +75,5 @@ class TrajectoriesLesson(Lesson):
         for name, motion in (("ptp", found.ptp), ("lin", found.lin)):
             points = motion.sample(np.linspace(0.0, motion.duration, SAMPLES)).T[:, :3, 3].astype(np.float32)
             chords = np.stack([points[:-1], points[1:]], axis=1)
-            size = body(self.stage.robot).size
+            size = body(self.stage.now.robot).size
             scene.add_line_segments(f"{root}/{name}", chords, COLOURS[name], thickness=0.3 * size)

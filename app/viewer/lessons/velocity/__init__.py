@@ -160,7 +160,7 @@ class VelocityLesson(Lesson):
                 self._kind = _one_of("ellipsoid", value, ELLIPSOIDS)
                 self._show_all()
             case ("column", str(robot_id), int(index)):
-                if robot_id == self.stage.robot.id:
+                if robot_id == self.stage.now.robot.id:
                     self._chosen = None if index == self._chosen else index
                     self._show_all()
             case ("step", Units() as units):
@@ -194,7 +194,7 @@ class VelocityLesson(Lesson):
         self._use_robot()
 
     def on_pose(self, T_base_tool: Array) -> None:
-        self._draw(self.stage.q, T_base_tool)
+        self._draw(self.stage.now.q, T_base_tool)
         self.due = max(0.0, INTERVAL - (time.perf_counter() - self._shown_at))
 
     def on_style(self) -> None:
@@ -237,7 +237,7 @@ class VelocityLesson(Lesson):
                 self._kind = kind
                 assign(self._kinds, name)
         joint = state.get("joint")
-        if type(joint) is int and 0 <= joint <= self.stage.robot.n:
+        if type(joint) is int and 0 <= joint <= self.stage.now.robot.n:
             self._chosen = joint - 1 if joint else None
         size, turn = state.get("step"), state.get("turn")
         if isinstance(size, float) and STEPS[0] <= size <= STEPS[1]:
@@ -259,11 +259,11 @@ class VelocityLesson(Lesson):
     def _jog(self, axis: int, sign: int) -> None:
         stage = self.stage
         amount = sign * (self._step if axis < 3 else self._turn)
-        options = stage.options
-        request = (stage.robot, stage.goal.tobytes(), options, axis, amount, self._frame)
+        options = stage.now.options
+        request = (stage.now.robot, stage.now.goal.tobytes(), options, axis, amount, self._frame)
         if request == self._refused:
             return  # a button held at a limit: the same request would be solved ten times a second
-        made: Step = step(stage.robot, stage.goal, options, axis, amount, self._frame, stage.units)
+        made: Step = step(stage.now.robot, stage.now.goal, options, axis, amount, self._frame, stage.units)
         if made.q is None:
             self._refused = request
             stage.notify(made.notice)
@@ -274,7 +274,7 @@ class VelocityLesson(Lesson):
 
     def _use_robot(self) -> None:
         """Create drawings, scales and column buttons of the selected robot."""
-        stage, robot = self.stage, self.stage.robot
+        stage, robot = self.stage, self.stage.now.robot
         self._chosen, self._refused = None, ()
         root = f"/velocity-{next(_NUMBERS)}"
         self._drawing = Drawing(stage.client.scene, robot, root)
@@ -287,12 +287,12 @@ class VelocityLesson(Lesson):
         self._show_all()
 
     def _show_all(self) -> None:
-        self._draw(self.stage.q, kin.fk(self.stage.robot, self.stage.q))
+        self._draw(self.stage.now.q, self.stage.now.T_tool)
         self._show_numbers()
 
     def _scale(self, kind: Ellipsoid) -> float:
         """The value that `views.SAMPLE` represents in the scene: the ellipsoid at home then has a fitting size."""
-        robot = self.stage.robot
+        robot = self.stage.now.robot
         semi = semi_axes(axes_of(part_of(kin.jacobian(robot, robot.q_home), kind)).values, kind)
         usual = semi[np.isfinite(semi) & (semi > 1e-6) & (semi < 1e6)]
         longest = float(usual.max()) if len(usual) else 1.0
@@ -300,7 +300,7 @@ class VelocityLesson(Lesson):
 
     def _draw(self, q: Array, T_base_tool: Array) -> None:
         """Update what moves with each frame."""
-        self._J = J = kin.jacobian(self.stage.robot, q)
+        self._J = J = kin.jacobian(self.stage.now.robot, q)
         self._T = T_base_tool
         self._drawing.place(T_base_tool[:3, 3])
         self._statics.draw(J, T_base_tool)
@@ -320,14 +320,14 @@ class VelocityLesson(Lesson):
     def _show_numbers(self) -> None:
         """Update numbers, sentences and singularities."""
         self._shown_at, self.due = time.perf_counter(), None
-        stage, robot, J, T = self.stage, self.stage.robot, self._J, self._T
+        stage, robot, J, T = self.stage, self.stage.now.robot, self._J, self._T
         R = T[:3, :3]
         rows = J if self._frame == "base" else np.vstack([R.T @ J[:3], R.T @ J[3:]])
         update_html(self._matrix, views.matrix_html(robot, rows, self._frame, self._chosen))
         update_html(self._units, views.units_html(robot, self._frame))
         update_html(self._column, views.column_html(robot, J, self._chosen))
         self._show_singularities(R)
-        rates = task_rates(robot, stage.q)
+        rates = task_rates(robot, stage.now.q)
         update_html(self._values, views.values_html(robot, rates, J))
         self._statics.show_numbers()
         self._null.show_numbers()
@@ -340,13 +340,14 @@ class VelocityLesson(Lesson):
         self._drawing.write_values(views.label_texts(semi), np.asarray(stage.client.camera.position))
 
     def _show_singularities(self, R_base_tool: Array) -> None:
-        stage, robot = self.stage, self.stage.robot
-        found = kin.singularities(robot, stage.q)
+        arm = self.stage.now
+        stage, robot = self.stage, arm.robot
+        found = kin.singularities(robot, arm.q)
         nearest = views.real(found)
         state = views.state_of(nearest[0], robot.reach) if nearest else "far"
         twists = np.empty((0, 6))
         if state != "far":
-            rates = task_rates(robot, stage.q)
+            rates = task_rates(robot, arm.q)
             twists = lost(rates) if state == "at" else rates.twists[-1:]
         self._drawing.show_lost(twists, state == "at")
         words = [views.lost_words(twist, R_base_tool, slowest=state == "near") for twist in twists]

@@ -41,9 +41,9 @@ class Line:
 
     def handle(self, key: tuple[Hashable, ...]) -> None:
         """Process an event of these controls."""
-        stage, robot = self._stage, self._stage.robot
+        stage, robot = self._stage, self._stage.now.robot
         if key == ("line", "start"):
-            self._start = stage.goal.copy()
+            self._start = stage.now.goal.copy()
             update_html(self._html, views.note_html("The line starts here. Move the arm, or type a target."))
             return
         if key != ("line", "plot"):
@@ -52,19 +52,19 @@ class Line:
         if np.abs(kin.fk(robot, start) - end).max() < _SAME:
             update_html(self._html, views.note_html(NO_LINE))
         else:
-            update_html(self._html, views.line_html(robot, along(robot, start, end, stage.task), stage.units))
+            update_html(self._html, views.line_html(robot, along(robot, start, end, stage.now.task), stage.units))
 
     def ends(self) -> tuple[Array, Array]:
         """The configuration ``(n,)`` at the start, and the pose ``(4, 4)`` at the end.
 
         From the marked start, or home, to the present pose; from the present pose to a target that is missed.
         """
-        stage = self._stage
-        here = kin.fk(stage.robot, stage.goal)
-        missed = stage.target is not None and float(np.abs(stage.target - here).max()) > _SAME
-        if missed and stage.target is not None:
-            return stage.goal if self._start is None else self._start, stage.target
-        return stage.robot.q_home if self._start is None else self._start, here
+        arm = self._stage.now
+        here = arm.T_goal
+        missed = arm.target is not None and float(np.abs(arm.target - here).max()) > _SAME
+        if missed and arm.target is not None:
+            return arm.goal if self._start is None else self._start, arm.target
+        return arm.robot.q_home if self._start is None else self._start, here
 
     def forget(self) -> None:
         """Another arm: no start, no plot."""

@@ -82,14 +82,14 @@ class NullMotion:
 
     def step(self, now: float) -> None:
         """One frame of the motion; another motion of the arm ends it."""
-        stage, robot = self._stage, self._stage.robot
+        stage, robot = self._stage, self._stage.now.robot
         if not self._runs or now - self._stepped < FRAME:
             return
         if self._sent is None:
-            self._sent = stage.goal.copy()
+            self._sent = stage.now.goal.copy()
             self._T, self._stepped = kin.fk(robot, self._sent), now
             return
-        if not np.array_equal(self._sent, stage.goal):
+        if not np.array_equal(self._sent, stage.now.goal):
             self.stop()
             return
         seconds = min(now - self._stepped, 2.0 * FRAME)
@@ -102,7 +102,7 @@ class NullMotion:
             return
         T = self._T.copy()
         T[:3, 3] += seconds * v
-        task = controllable(robot, stage.task)
+        task = controllable(robot, stage.now.task)
         found = hold(robot, q + seconds * (J_v + own * min(1.0, FASTEST / max(fast, 1e-12))), T, task)
         if found is None or (found < robot.lower).any() or (found > robot.upper).any():
             self.stop(Notice("limits", "The motion ends", "A joint is at its limit, or a singularity is reached."))
@@ -112,7 +112,8 @@ class NullMotion:
 
     def speeds(self, q: Array) -> tuple[Array, Array, Array]:
         """J⁺v, (I − J⁺J) z and z ``(n,)`` at a configuration; v is zero in the rows of the rotation."""
-        robot, task = self._stage.robot, controllable(self._stage.robot, self._stage.task)
+        arm = self._stage.now
+        robot, task = arm.robot, controllable(arm.robot, arm.task)
         space = null_space(robot, q, task)
         v = np.zeros(len(space.J))
         v[:3] = SPEEDS[self._speed]
@@ -121,8 +122,9 @@ class NullMotion:
 
     def show_numbers(self) -> None:
         """Write rank, null space and joint speeds at the configuration in the scene."""
-        stage, robot, q = self._stage, self._stage.robot, self._stage.q
-        task = controllable(robot, stage.task)
+        arm = self._stage.now
+        robot, q = arm.robot, arm.q
+        task = controllable(robot, arm.task)
         space = null_space(robot, q, task)
         J_v, own, z = self.speeds(q)
         html = views.null_html(robot, task, space, (z, J_v, own), float(measure(robot, q, task, space.rank)))

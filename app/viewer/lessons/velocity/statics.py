@@ -57,7 +57,7 @@ class Statics:
 
     def use_robot(self, root: str) -> None:
         """Make the nodes for the arm on show, below the node `root`: it is at the tool, and removed with them."""
-        scene, self._radius = self._stage.client.scene, body(self._stage.robot).radius
+        scene, self._radius = self._stage.client.scene, body(self._stage.now.robot).radius
         r = self._radius
         self._arrow = scene.add_arrows(
             f"{root}/force",
@@ -145,7 +145,7 @@ class Statics:
 
     def show_numbers(self) -> None:
         """Write the joint torques."""
-        robot = self._stage.robot
+        robot = self._stage.now.robot
         axes = axes_of(self._J[:3])
         tau = torques(self._J, self._force)
         least, cost = axes.R[:, 2], float(axes.values[2])

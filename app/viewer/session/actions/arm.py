@@ -48,7 +48,7 @@ class ArmControls:
         page = self._page
         changed, page.own = state.own != page.own, state.own
         robot = robot_of(page, state.robot)
-        if robot != page.robot:
+        if robot != page.now.robot:
             page.change_robot(robot, state.q)
             if state.camera is not None:
                 page.camera.restore(state.camera)
@@ -59,16 +59,16 @@ class ArmControls:
     def _restore_arm(self, state: PageState) -> None:
         page, arm = self._page, self._page.arm
         task: Task = state.task or DEFAULT_TASK
-        locks = [i in state.locks for i in range(page.robot.n)]
+        locks = [i in state.locks for i in range(page.now.robot.n)]
         page.panel.target.show(task)
         page.sliders.show_locks(locks)
-        q = page.robot.q_home if state.q is None else state.q
+        q = page.now.robot.q_home if state.q is None else state.q
         arm.restore(q, state.target, task, state.branch, locks)
 
     def _move_into_view(self, motion: Callable[[], None], title: str) -> None:
         """Move the arm, and the camera if it would not show the whole arm."""
         self._move(motion, title)
-        self._page.camera.keep(kin.link_frames(self._page.robot, self._page.goal)[:, :3, 3])
+        self._page.camera.keep(kin.link_frames(self._page.now.robot, self._page.now.goal)[:, :3, 3])
 
     def _move(self, motion: Callable[[], None], title: str) -> None:
         motion()
@@ -77,25 +77,25 @@ class ArmControls:
     def _on_slider(self, robot_id: str, index: int, units: Units, place: int, value: object) -> None:
         page = self._page
         # An event of sliders that have been replaced since is ignored.
-        if (robot_id, units) == (page.robot.id, page.units):
+        if (robot_id, units) == (page.now.robot.id, page.units):
             page.arm.move_joint(index, page.sliders.read(index, value, place))
             page.status.show(BY_HAND)
 
     def _on_redundancy(self, robot_id: str, name: str, units: Units, value: object) -> None:
         """Move through the self-motion while the tool is held."""
         page = self._page
-        if (robot_id, units) != (page.robot.id, page.units):
+        if (robot_id, units) != (page.now.robot.id, page.units):
             return
         self._typed.slide(name, value, held=True)
 
     def _on_lock(self, robot_id: str, joint: int | None, lock: object) -> None:
-        if robot_id == self._page.robot.id:
+        if robot_id == self._page.now.robot.id:
             self._page.change_lock(joint, bool(lock))
 
     def _on_branch_choice(self, robot_id: str, value: object) -> None:
         """Move to the same pose on another branch, and stay on that branch."""
         page = self._page
-        if robot_id == page.robot.id:
+        if robot_id == page.now.robot.id:
             branch = page.posture.read(value)
             if not page.arm.switch_branch(branch) and branch is not None:
                 page.status.show(page.posture.not_here(branch))
@@ -104,13 +104,13 @@ class ArmControls:
 
     def _on_robot_choice(self, value: object) -> None:
         page = self._page
-        if (robot := page.panel.robots.read(value)) == page.robot:
+        if (robot := page.panel.robots.read(value)) == page.now.robot:
             return
         # The visitor's own arm has another id after every change; only the present one can be shown again.
         own = None if page.own is None else page.own.robot.id
         ids = {own, *(offered.id for offered in page.store.robots)}
         self._left = {name: state for name, state in self._left.items() if name in ids}
-        self._left[page.robot.id] = page.snapshot()
+        self._left[page.now.robot.id] = page.snapshot()
         left = self._left.get(robot.id)
         page.change_robot(robot, None if left is None else left.q)
         page.status.show(introduction(robot))
@@ -120,6 +120,6 @@ class ArmControls:
     def _on_task(self, value: object) -> None:
         page = self._page
         if value not in TASKS:
-            page.panel.target.show(page.task)
+            page.panel.target.show(page.now.task)
             raise kin.InputError("task", value, "one of " + ", ".join(TASKS))
         page.arm.set_task(TASKS[str(value)])

@@ -55,7 +55,7 @@ class LookControls:
 
     def _frames(self) -> Array:
         """Origins ``(n, 3)`` of the frames of the arm where it is heading."""
-        frames: Array = kin.link_frames(self._page.robot, self._page.goal)[:, :3, 3]
+        frames: Array = kin.link_frames(self._page.now.robot, self._page.now.goal)[:, :3, 3]
         return frames
 
     def _on_colours(self, name: object) -> None:

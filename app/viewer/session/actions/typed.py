@@ -61,18 +61,18 @@ class TypedInput:
     def _set_target(self, kind: PoseKind, text: str, relative: bool) -> None:
         """Typed numbers are in the frame of the read-out, or `relative` to the tool."""
         page, arm = self._page, self._page.arm
-        tool = kin.fk(page.robot, arm.goal)
-        frame = page.frames.pose(page.robot, arm.goal, relative)
+        tool = kin.fk(page.now.robot, arm.goal)
+        frame = page.frames.pose(page.now.robot, arm.goal, relative)
         present = inverse(frame) @ (tool if relative or arm.target is None else arm.target)
         T, given = read_pose(kind, text, page.units, present)
         T = frame @ T
         arm.target = None  # a changed task must not solve for the target of before
-        if given != "pose" and page.task != given:
+        if given != "pose" and page.now.task != given:
             page.set_task(given)
-        elif given == "pose" and kind != "position" and page.task == "position":
+        elif given == "pose" and kind != "position" and page.now.task == "position":
             page.set_task("pose")
         arm.set_target(T)
-        page.camera.keep(kin.link_frames(page.robot, arm.goal)[:, :3, 3], T[:3, 3])
+        page.camera.keep(kin.link_frames(page.now.robot, arm.goal)[:, :3, 3], T[:3, 3])
 
     def _answer(self, number: int, action: Callable[[], None]) -> None:
         """Act on a typed text, and tell the page whether it was valid."""

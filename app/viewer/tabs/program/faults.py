@@ -43,12 +43,12 @@ def find_fault(plan: Plan | None, stage: Stage) -> Fault | None:
         return None
     if plan.motion.refusal is not None:
         return _refused(plan, stage)
-    constraints = stage.options.constraints
+    constraints = stage.now.options.constraints
     locked = () if constraints is None or constraints.locked is None else constraints.locked
     for index, item in enumerate(plan.items):
         for joint, (q, value) in enumerate(zip(item.q, locked, strict=False)):
             if value is not None and abs(q - value) > SAME:
-                unit = stage.units.of(bool(stage.robot.revolute[joint]))
+                unit = stage.units.of(bool(stage.now.robot.revolute[joint]))
                 words = (
                     f"Joint {joint + 1} is locked at {unit.text(value)}, and this waypoint has it at "
                     f"{unit.text(q)}. Unlock the joint, or set the waypoint to another pose."
@@ -87,7 +87,7 @@ def _way(items: Items, index: int, stage: Stage) -> tuple[Point, ...]:
 
 
 def _place(item: Item, stage: Stage) -> Point:
-    return point(kin.fk(stage.robot, np.array(item.q))[:3, 3])
+    return point(kin.fk(stage.now.robot, np.array(item.q))[:3, 3])
 
 
 def _moved(plan: Plan, motion: Motion, locked: Sequence[float | None]) -> Fault | None:

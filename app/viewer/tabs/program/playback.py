@@ -127,11 +127,11 @@ class Playback:
         """Show the next frame if it is due; seconds until the one after it."""
         if not self.player.playing:
             return None
-        if self._sent is None or not np.array_equal(self._sent, self._stage.goal):
+        if self._sent is None or not np.array_equal(self._sent, self._stage.now.goal):
             self.stop()  # the visitor has moved the arm
             return None
         if self._leading:
-            self._leading = not np.array_equal(self._stage.q, self._stage.goal)
+            self._leading = not np.array_equal(self._stage.now.q, self._stage.now.goal)
             self._stepped = now
             return self._stage.frame
         wait = self._stage.frame - (now - self._stepped)
@@ -165,5 +165,5 @@ class Playback:
     def _go(self, notice: Notice, ease: bool = False) -> None:
         """Move the arm to where it is at the present time."""
         assert self.motion is not None
-        self._sent = self._stage.robot.clip(self.motion.derivatives(self.player.time)[0])
+        self._sent = self._stage.now.robot.clip(self.motion.derivatives(self.player.time)[0])
         self._stage.move_to(self._sent, notice, at_once=not ease)

@@ -52,8 +52,9 @@ class Screen:
     @property
     def fields(self) -> Fields:
         """How values are written and read."""
+        arm = self._stage.now
         stage = self._stage
-        return Fields(stage.robot, stage.units, stage.frames.pose(stage.robot, stage.goal), stage.task)
+        return Fields(arm.robot, stage.units, stage.frames.pose(arm.robot, arm.goal), arm.task)
 
     def player(self, playback: Playback, any_items: bool, playable: bool) -> None:
         """Buttons, slider of time, and the legend of the path."""
@@ -86,7 +87,7 @@ class Screen:
         """Duration, peaks and limits."""
         stage = self._stage
         planned = plan is not None and plan.motion.planned
-        self._show("summary", views.summary(plan, stage.robot, own, stage.units) if plan and planned else "")
+        self._show("summary", views.summary(plan, stage.now.robot, own, stage.units) if plan and planned else "")
 
     def compare(self, motion: Motion | None, other: Motion | None, choice: Choice | None, zone: float) -> None:
         """The motion that the program is compared with."""
@@ -112,14 +113,14 @@ class Screen:
     def draw(self, items: Items, plan: Plan | None, fault: Fault | None, loop: bool, other: Motion | None) -> None:
         """Draw the program in the scene, if it is another one than before."""
         stage, shown = self._stage, self.shown
-        drawn = (stage.robot, items, loop, fault, shown, None if other is None else other.pieces)
+        drawn = (stage.now.robot, items, loop, fault, shown, None if other is None else other.pieces)
         if drawn == self._drawn:
             return
         self._drawn = drawn
         self.remove()
         if not any(item.q for item in items) or not shown.path:
             return
-        self._drawing = Drawing(stage.client.scene, stage.robot, items, views.shown_names(items), fault)
+        self._drawing = Drawing(stage.client.scene, stage.now.robot, items, views.shown_names(items), fault)
         motion = None if plan is None else plan.motion_or_none
         if shown.ghosts:
             self._drawing.show_ghosts()

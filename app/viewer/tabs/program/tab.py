@@ -13,7 +13,6 @@ from dataclasses import replace
 
 import numpy as np
 
-import kin
 from app.exercises.typed import EntryError
 from app.exports.motion_snippets import SNIPPETS
 from app.exports.snippets import named
@@ -144,13 +143,13 @@ class ProgramTab(Feature):
     @property
     def _key(self) -> str:
         own = self.stage.own
-        return KEY if own is not None and own.robot == self.stage.robot else self.stage.robot.id
+        return KEY if own is not None and own.robot == self.stage.now.robot else self.stage.now.robot.id
 
     @property
     def _items(self) -> Items:
         """The list for the robot on show; a visitor's own arm may have another number of joints by now."""
         items = self._programs.get(self._key, ())
-        return items if all(len(item.q) in (0, self.stage.robot.n) for item in items) else ()
+        return items if all(len(item.q) in (0, self.stage.now.robot.n) for item in items) else ()
 
     def _use(self, items: Items, chosen: int | None) -> None:
         """Take another list, with this item open."""
@@ -172,13 +171,14 @@ class ProgramTab(Feature):
 
     def _refresh(self, anew: bool = False) -> None:
         """Plan the motion, and show everything; `anew`: what was typed into the fields is replaced."""
+        arm = self.stage.now
         items, stage, loop = self._items, self.stage, self._player.loop
-        self._plan, self._stale = plan(items, stage.robot, loop, stage.avoid, stage.obstacles), None
+        self._plan, self._stale = plan(items, arm.robot, loop, arm.avoid, arm.obstacles), None
         self._fault = find_fault(self._plan, stage)
         self._playback.use(self._plan if self._plan is not None and self._plan.motion.planned else None)
         self._other = None
         if self._compared is not None and self._motion is not None:
-            self._other = other_motion(items, stage.robot, loop, self._compared, self._zone)
+            self._other = other_motion(items, arm.robot, loop, self._compared, self._zone)
         self._screen.draw(items, self._plan, self._fault, loop, self._other)
         self._show_player()
         self._show_list(anew)
@@ -201,7 +201,7 @@ class ProgramTab(Feature):
     # Changes of the list
 
     def _record(self, _: object) -> None:
-        self._insert(len(self._items), changes.waypoint(self.stage.goal), choose=False)
+        self._insert(len(self._items), changes.waypoint(self.stage.now.goal), choose=False)
 
     def _pause(self, _: object) -> None:
         """Add a pause behind the open item, else at the end."""
@@ -219,11 +219,11 @@ class ProgramTab(Feature):
         self._show_list()
 
     def _set_pose(self, index: int, _: object) -> None:
-        q = changes.waypoint(self.stage.goal).q
+        q = changes.waypoint(self.stage.now.goal).q
         self._use(changes.changed(self._items, index, q=q), index)
 
     def _set_via(self, index: int, _: object) -> None:
-        via = changes.point(kin.fk(self.stage.robot, self.stage.goal)[:3, 3])
+        via = changes.point(self.stage.now.T_goal[:3, 3])
         self._use(changes.changed(self._items, index, kind="circ", via=via), index)
 
     def _move(self, index: int, to: int) -> None:
@@ -250,7 +250,7 @@ class ProgramTab(Feature):
         item = self._items[index]
         match value:
             case ["kind", str(kind)] if kind in KINDS and item.kind in KINDS:
-                via = (item.via or halfway(self._items, index, self.stage.robot)) if kind == "circ" else None
+                via = (item.via or halfway(self._items, index, self.stage.now.robot)) if kind == "circ" else None
                 values = {"kind": kind, "via": via}
             case ["values", ("joints" | "pose") as shown]:
                 self._screen.by_pose = shown == "pose"
@@ -300,9 +300,11 @@ class ProgramTab(Feature):
             if item.blend:
                 q = np.array(item.q)  # the motion leaves before
         else:
-            q = np.array(next((each.q for each in reversed(self._items[: index + 1]) if each.q), self.stage.goal))
+            q = np.array(
+                next((each.q for each in reversed(self._items[: index + 1]) if each.q), self.stage.now.goal)
+            )
         title = item.name or (f"Waypoint {index + 1}" if item.q else "Pause")
-        self.stage.move_to(self.stage.robot.clip(q), Notice("hand", title))
+        self.stage.move_to(self.stage.now.robot.clip(q), Notice("hand", title))
 
     # Choices
 
@@ -324,7 +326,7 @@ class ProgramTab(Feature):
 
     def _set_joint(self, text: object) -> None:
         joint = int(text) if isinstance(text, str) and text.isdecimal() and len(text) < 4 else None
-        self._screen.joint = joint if joint is not None and joint < self.stage.robot.n else None
+        self._screen.joint = joint if joint is not None and joint < self.stage.now.robot.n else None
         self._screen.plot(self._motion, self._other)
 
     def _compare(self, value: object) -> None:
@@ -349,16 +351,17 @@ class ProgramTab(Feature):
     def _download(self, _: object) -> None:
         if self._plan is None:
             return
-        robot = self.stage.robot if self._key != KEY else named(self.stage.robot)
+        robot = self.stage.now.robot if self._key != KEY else named(self.stage.now.robot)
         program = replace(self._plan.motion.program, name=robot.name[:100])
         name = f"{robot.id}-program.toml"
         self.stage.client.send_file_download(name, toml_of(program, robot.name).encode(), save_immediately=True)
         self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
 
     def _upload(self, value: object) -> None:
+        arm = self.stage.now
         try:
-            name, program = read(value, self.stage.robot)
-            items = items_of(program, self.stage.robot, self.stage.goal)
+            name, program = read(value, arm.robot)
+            items = items_of(program, arm.robot, arm.goal)
         except KinematicsError as error:
             self._refuse("The file was not used", str(error))
         else:

@@ -27,13 +27,13 @@ class Beginnings:
     def own(self) -> OwnArm | None:
         """The visitor's own arm if it is on show."""
         own = self._stage.own
-        return own if own is not None and own.robot == self._stage.robot else None
+        return own if own is not None and own.robot == self._stage.now.robot else None
 
     @property
     def origin(self) -> str:
         """What the arm on show was made from: a key of *Start from*, or `views.FILE` or `views.LINK`."""
         own = self.own
-        start = self._stage.robot.id if own is None else own.start
+        start = self._stage.now.robot.id if own is None else own.start
         if start in PRESETS or any(robot.id == start for robot in self._stage.store.robots):
             return start
         last = self._opened()
@@ -72,7 +72,7 @@ class Beginnings:
             return
         name = label(self.own.robot)
         self._stage.discard_own()
-        detail = f"{self._stage.robot.name} is shown. Undo brings your arm back."
+        detail = f"{self._stage.now.robot.name} is shown. Undo brings your arm back."
         self._stage.notify(Notice("advice", f"{name} was deleted", detail))
 
     def reset(self) -> str:
@@ -86,7 +86,7 @@ class Beginnings:
             self._stage.notify(Notice("hand", last.robot.name, last.robot.description))
         elif origin in PRESETS:
             self._stage.show_own(own_arm(PRESETS[origin], origin))
-            self._stage.notify(Notice("hand", self._stage.robot.name, self._stage.robot.description))
+            self._stage.notify(Notice("hand", self._stage.now.robot.name, self._stage.now.robot.description))
         elif origin != views.LINK:
             self.start(origin)
         else:

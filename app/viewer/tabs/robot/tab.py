@@ -159,7 +159,7 @@ class RobotTab(Feature):
         self._plan()
 
     def on_pose(self, T_base_tool: Array) -> None:
-        self._comparing.on_pose(self.stage.q)
+        self._comparing.on_pose(self.stage.now.q)
 
     def on_style(self) -> None:
         self._refresh()
@@ -175,7 +175,7 @@ class RobotTab(Feature):
 
     def _refresh(self) -> None:
         """Show the arm as it is, but not in the part in which the visitor types."""
-        robot, units = self.stage.robot, self.stage.units
+        robot, units = self.stage.now.robot, self.stage.units
         self._withheld = self.stage.activity.withheld
         self._wrong = {cell: why for cell, why in self._wrong.items() if edits.part_of(cell) == self._editing}
         if self._editing != "table":
@@ -196,7 +196,7 @@ class RobotTab(Feature):
     def _table(self) -> str:
         if self.stage.activity.withheld == "table":
             return views.withheld()
-        return views.table(self.stage.robot, self.stage.units, self._revision, self._texts)
+        return views.table(self.stage.now.robot, self.stage.units, self._revision, self._texts)
 
     def _show(self, name: str, html: str) -> None:
         update_html(self._html[name], html)
@@ -207,7 +207,7 @@ class RobotTab(Feature):
         self._show("wrong-frames", views.wrong_frames(messages))
 
     def _show_conversion(self) -> None:
-        robot = self.stage.robot
+        robot = self.stage.now.robot
         if self.stage.activity.withheld == "table":
             self._show("convert", "")
             return
@@ -234,7 +234,7 @@ class RobotTab(Feature):
 
     def _edit(self, own: OwnArm, editing: str = "") -> None:
         mine = self._own is not None
-        if edits.alike(own.robot, self.stage.robot, mine) and (mine or editing != "start"):
+        if edits.alike(own.robot, self.stage.now.robot, mine) and (mine or editing != "start"):
             return
         replaced = None if mine else self.stage.own
         before = self._wrong
@@ -271,7 +271,7 @@ class RobotTab(Feature):
             case _:
                 raise InputError("cell", value, "a revision and a text")
         editing = edits.part_of(cell)
-        robot, units = self.stage.robot, self.stage.units
+        robot, units = self.stage.now.robot, self.stage.units
         if framed:
             self._type_workpiece(cell, text)
             return
@@ -296,7 +296,7 @@ class RobotTab(Feature):
     def _cell(self, where: int | str, column: str) -> Cell:
         """A cell of the page; raises `InputError` if there is none."""
         valid = edits.COLUMNS if isinstance(where, int) else ("name",) if where == "arm" else edits.AXES
-        rows = range(len(self.stage.robot.rows))
+        rows = range(len(self.stage.now.robot.rows))
         if where not in (rows if isinstance(where, int) else ("arm", *edits.FRAMES)) or column not in valid:
             raise InputError("cell", (where, column), "a cell of the table")
         return where, column
@@ -320,7 +320,7 @@ class RobotTab(Feature):
             self._editing = ""
 
     def _change_rows(self, action: str, index: int) -> None:
-        robot, own = self.stage.robot, self._own
+        robot, own = self.stage.now.robot, self._own
         count = len(robot.rows)
         if not 0 <= index < count:
             raise InputError("row", index, f"0 to {count - 1}")
@@ -335,7 +335,7 @@ class RobotTab(Feature):
     def _reread(self, convention: object) -> None:
         if convention not in kin.robot.CONVENTIONS:
             raise InputError("convention", convention, "one of " + ", ".join(kin.robot.CONVENTIONS))
-        self._try(lambda: edits.reread(self.stage.robot, self._own, str(convention)))
+        self._try(lambda: edits.reread(self.stage.now.robot, self._own, str(convention)))
 
     def _convert(self, action: object) -> None:
         """Show the arm in the other convention, take that table, or close it."""
@@ -343,7 +343,7 @@ class RobotTab(Feature):
             raise InputError("convert", action, "show, use or close")
         self._converting = action == "show"
         if action == "use":
-            self._try(lambda: edits.converted(self.stage.robot, self._own))
+            self._try(lambda: edits.converted(self.stage.now.robot, self._own))
         self._show_conversion()
 
     def _try(self, change: Callable[[], OwnArm], rows: tuple[str, int] | None = None) -> None:
@@ -373,7 +373,7 @@ class RobotTab(Feature):
             words = "The file would contain the table that the open exercise asks for."
             self.stage.notify(Notice("advice", "Not now", words))
             return
-        robot = self.stage.robot if self._own is None else named(self.stage.robot)
+        robot = self.stage.now.robot if self._own is None else named(self.stage.now.robot)
         name, text = text_of(robot, kind)
         self.stage.client.send_file_download(name, text.encode(), save_immediately=True)
         self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))

@@ -204,7 +204,7 @@ class Uploads:
             )
         except MeshError as error:
             raise file_error(source.name, error) from None
-        self._reading = _Reading(own, self._stage.robot.id, source, count, links if shapes.bodies else ())
+        self._reading = _Reading(own, self._stage.now.robot.id, source, count, links if shapes.bodies else ())
         future.add_done_callback(partial(self._post, done))
         self._future = future
         return f"Its {count} meshes are being read." if count else "Its collision meshes are being read."
@@ -246,7 +246,7 @@ class Uploads:
         own, words = with_capsules(reading.own, reading.links, meshes.fits)
         if self.last == reading.own:
             self.last = own
-        if self._stage.own == reading.own and self._stage.robot == reading.robot:
+        if self._stage.own == reading.own and self._stage.now.robot == reading.robot:
             self._stage.edit_arm(own)
         return words
 
@@ -261,7 +261,7 @@ class Uploads:
                 pass
             case _:
                 raise InputError("refused", value, "the file that is refused")
-        robot = self._stage.robot
+        robot = self._stage.now.robot
         if robot != reading.robot or robot.id == reading.replaced or not left:
             return words
         self._stage.post("undo")  # once more for each step that the visitor has made since

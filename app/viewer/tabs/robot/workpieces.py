@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 
-import kin
 from app.viewer.feature import Stage
 from app.viewer.frames import MOST, Frames
 from app.viewer.panel.entry import read_cell
@@ -46,7 +45,7 @@ def added(stage: Stage) -> Frames:
     """One more frame, upright at the tool point."""
     if len(stage.frames.workpieces) >= MOST:
         raise InputError("workpieces", f"{MOST + 1} frames", f"at most {MOST} in a page")
-    return stage.frames.add(kin.fk(stage.robot, stage.goal)[:3, 3])
+    return stage.frames.add(stage.now.T_goal[:3, 3])
 
 
 def removed(frames: Frames, index: object) -> Frames:

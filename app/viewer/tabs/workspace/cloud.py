@@ -133,8 +133,8 @@ class CloudView:
     def _requested(self) -> Cloud:
         """The cloud that settings and locks describe."""
         return Cloud(
-            self._stage.robot, self.settings.n, self.settings.seed, self.settings.strategy,
-            constraints=self._stage.options.constraints,
+            self._stage.now.robot, self.settings.n, self.settings.seed, self.settings.strategy,
+            constraints=self._stage.now.options.constraints,
         )  # fmt: skip
 
     def _is_shown(self, cloud: Cloud) -> bool:
@@ -224,7 +224,7 @@ class CloudView:
             if self.busy and not self._running:
                 state = "recolouring"
         speed = drawn / elapsed if elapsed > 0.0 else 0.0
-        constraints = self.nodes[0].cloud.constraints if self.nodes else self._stage.options.constraints
+        constraints = self.nodes[0].cloud.constraints if self.nodes else self._stage.now.options.constraints
         old = bool(self.nodes) and not self._is_shown(self._requested)
         line = views.progress(state, drawn, total or self.settings.n, speed, constraints.locked, old)
         percent = round(100.0 * drawn / total, 1) if total else 0.0
@@ -278,7 +278,7 @@ class CloudView:
         if self._grey or not any(nodes.parts for nodes in self.nodes):
             update_html(self._controls.legend, "")
             return
-        robot, other = self._stage.robot, self.other
+        robot, other = self._stage.now.robot, self.other
         if other is not None:
             content = colours.names_legend([(colours.OWN, robot.name), (colours.OTHER, other.name)])
         elif self.settings.by == "one":

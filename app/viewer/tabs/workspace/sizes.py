@@ -38,7 +38,7 @@ class Sizes:
         update_html(self._controls.sizes, wait)
         if not visible:
             return
-        robot, summaries = self._stage.robot, self._stage.summaries
+        robot, summaries = self._stage.now.robot, self._stage.summaries
         # Volume and surface take longer than the rest.
         rest, whole = summaries.facts(robot, effort=None), summaries.facts(robot)
         self._computations = rest, whole
@@ -57,7 +57,7 @@ class Sizes:
 
     def take(self, robot: Robot, found: WorkspaceFacts, complete: bool) -> None:
         """Take computed sizes, unless they are of a robot that is no longer selected."""
-        if self._visible and robot == self._stage.robot:
+        if self._visible and robot == self._stage.now.robot:
             self._found = (found, complete)
             self.refresh()
 

@@ -43,9 +43,9 @@ class Workspace(Feature):
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
-        self._settings = WorkspaceSettings(size=default_size(stage.robot))
+        self._settings = WorkspaceSettings(size=default_size(stage.now.robot))
         self._controls = Controls(
-            stage.client.gui, self._settings, stage.robot, stage.store.robots, stage.units, self.post
+            stage.client.gui, self._settings, stage.now.robot, stage.store.robots, stage.units, self.post
         )
         window = SendWindow(stage.client, lambda: self.post("more"))
         self._roots = 0
@@ -58,7 +58,7 @@ class Workspace(Feature):
         self._axes = Axes(stage.client.scene, self._new_root)
         self._cut: Cut | None = None
         self._plotted = self._dotted = self._moved = 0.0
-        self._tool = kin.fk(stage.robot, stage.q)[:3, 3]
+        self._tool = stage.now.T_tool[:3, 3]
         self._dot_due = False
         # Number of clouds, whether there is a map, and the arm whose axes are shown.
         self._in_view: tuple[int, bool, Robot | None] = (0, False, None)
@@ -110,7 +110,7 @@ class Workspace(Feature):
     def on_robot(self) -> None:
         self._clear()
         self._capability.use_robot()
-        robot = self.stage.robot
+        robot = self.stage.now.robot
         self._tool = kin.fk(robot, robot.q_home)[:3, 3]
         self._controls.use_robot(robot)
         self._use(self._settings.restored({"size": default_size(robot), "axis": None, "compare": None}, ()))
@@ -237,7 +237,7 @@ class Workspace(Feature):
     def _show_figure(self, robot_id: str, _: object) -> None:
         """A workspace as the source chapter shows it."""
         robot = self.stage.store.get(robot_id)
-        if robot != self.stage.robot:
+        if robot != self.stage.now.robot:
             self.stage.change_robot(robot)  # which calls `on_robot`
         for name, value in FIGURE.items():
             self._apply(name, value)
@@ -245,7 +245,7 @@ class Workspace(Feature):
         self._start()
 
     def _show_axes(self) -> None:
-        self._axes.show(self.stage.robot if self._settings.axes else None, self.stage.units, self.stage.dark)
+        self._axes.show(self.stage.now.robot if self._settings.axes else None, self.stage.units, self.stage.dark)
 
     def _set_length(self, name: str, units: Units, value: object) -> None:
         """Set a length; an event of a slider in other units is ignored, because it was replaced since."""
@@ -255,7 +255,7 @@ class Workspace(Feature):
 
     @property
     def _others(self) -> tuple[str, ...]:
-        return tuple(robot.id for robot in self.stage.store.robots if robot != self.stage.robot)
+        return tuple(robot.id for robot in self.stage.store.robots if robot != self.stage.now.robot)
 
     # Cloud and clicks
 
@@ -290,7 +290,7 @@ class Workspace(Feature):
         """Fit the default view to clouds, map and axes when they appear, and to the arm when they are gone."""
         clouds, mapped = self._clouds.extents, self._capability.extent
         corners = self._axes.corners
-        in_view = (len(clouds), mapped is not None, None if corners is None else self.stage.robot)
+        in_view = (len(clouds), mapped is not None, None if corners is None else self.stage.now.robot)
         if in_view != self._in_view:
             self._in_view = in_view
             self.stage.fit_view(clouds if mapped is None else [*clouds, mapped], corners)
@@ -301,8 +301,8 @@ class Workspace(Feature):
         """Cut along the axis in the settings, near the middle, or not at all."""
         self._cut = None
         if self._settings.axis is not None:
-            robots = [self.stage.robot, *([self._clouds.other] if self._clouds.other is not None else [])]
-            self._cut = cut_of(robots, self._settings.axis, self.stage.q)
+            robots = [self.stage.now.robot, *([self._clouds.other] if self._clouds.other is not None else [])]
+            self._cut = cut_of(robots, self._settings.axis, self.stage.now.q)
             self._use(self._settings.with_value("at", self._cut.middle, ()))
         self._controls.show_cut(self._cut, self._settings.at)
         self._clouds.set_cut(self._cut, None)
@@ -321,7 +321,7 @@ class Workspace(Feature):
             self._section.remove()
             self._section = None
         if visible:
-            self._tool = kin.fk(self.stage.robot, self.stage.q)[:3, 3]
+            self._tool = self.stage.now.T_tool[:3, 3]
             self._section = SectionPanel(self.stage, self._new_root(), self.post)
 
     def _take_section(self, found: object) -> None:

@@ -22,6 +22,7 @@ from app.shared.clouds import Clouds
 from app.shared.computations import ComputationCache
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.viewer.arm import Arm
 from app.viewer.lessons.equations import EquationsLesson, views
 from app.viewer.own_arm import OwnArm
 from app.viewer.server import ViewerServer
@@ -131,7 +132,7 @@ def test_a_failed_check_is_said_instead_of_shown(tab: FakeBrowser, monkeypatch: 
 
 
 def mocked_stage(robot: kin.Robot) -> MagicMock:
-    stage = MagicMock(robot=robot, q=robot.q_home, units=DEFAULT_UNITS)
+    stage = MagicMock(now=Arm(robot, robot.q_home, robot.q_home), units=DEFAULT_UNITS)
     stage.client.gui.add_dropdown.return_value._impl.removed = False
     return stage
 
@@ -163,18 +164,18 @@ def test_only_the_last_of_many_edits_is_derived(monkeypatch: pytest.MonkeyPatch)
     stage = mocked_stage(PIONEER)
     lesson = EquationsLesson(stage)
     for d in (0.1, 0.2, 0.3):
-        stage.robot = replace(PUMA, rows=(replace(PUMA.rows[0], d=d), *PUMA.rows[1:]))
-        stage.q = PUMA.q_home
-        stage.own = OwnArm(stage.robot)
+        robot = replace(PUMA, rows=(replace(PUMA.rows[0], d=d), *PUMA.rows[1:]))
+        stage.now = Arm(robot, PUMA.q_home, PUMA.q_home)
+        stage.own = OwnArm(stage.now.robot)
         lesson.on_robot()
         lesson.tick(time.perf_counter())
     assert lesson.due is not None
-    assert stage.robot not in cache
+    assert stage.now.robot not in cache
     lesson.tick(time.perf_counter() + 1.0)
-    assert stage.robot in cache
-    with books.book_later(stage.robot) as waiting:
+    assert stage.now.robot in cache
+    with books.book_later(stage.now.robot) as waiting:
         waiting.future.result(30)
-    assert derived == [stage.robot]
+    assert derived == [stage.now.robot]
     lesson.handle("ready", None)
     assert lesson.state() == {"equation": "p_x"}
 
@@ -196,7 +197,7 @@ def test_a_lesson_that_is_closed_or_left_waits_no_more(monkeypatch: pytest.Monke
 def test_an_arm_with_very_many_rows_has_no_equations() -> None:
     fixed_rows = tuple(kin.Joint(f"spacer {k}", kind="fixed") for k in range(books.MOST_ROWS))
     robot = replace(PUMA, rows=(*PUMA.rows, *fixed_rows))
-    stage = MagicMock(robot=robot, q=robot.q_home, units=DEFAULT_UNITS)
+    stage = MagicMock(now=Arm(robot, robot.q_home, robot.q_home), units=DEFAULT_UNITS)
     boxes = [MagicMock(name=str(k)) for k in range(5)]
     stage.client.gui.add_html.side_effect = boxes
     EquationsLesson(stage)

@@ -18,6 +18,7 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.viewer.arm import Arm
 from app.viewer.lessons.velocity import VelocityLesson, views
 from app.viewer.lessons.velocity.drawing import ring_arrow, sides, wxyz_along
 from app.viewer.lessons.velocity.jog import BUTTONS, Press, button, moved, step
@@ -440,10 +441,7 @@ def test_a_shared_state_is_restored_and_an_invalid_one_is_ignored() -> None:
         client = SimpleNamespace(gui=server.gui, scene=server.scene, camera=SimpleNamespace(position=np.ones(3)))
         stage = SimpleNamespace(
             client=client,
-            robot=robot,
-            q=robot.q_home,
-            goal=robot.q_home,
-            task="pose",
+            now=Arm(robot, robot.q_home, robot.q_home),
             units=DEFAULT_UNITS,
             dark=False,
             show_legend=lambda html: None,

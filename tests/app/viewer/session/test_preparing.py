@@ -14,6 +14,7 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.viewer.arm import Arm
 from app.viewer.server import ViewerServer
 from app.viewer.session.preparing import HELD, Preparing
 from app.viewer.session.state import PageState, encode
@@ -137,7 +138,7 @@ def test_an_impatient_visitor_fills_no_memory(preparation):
         """Has one tab that needs kernels."""
 
         lessons = None
-        robot = PIONEER
+        now = Arm(PIONEER, PIONEER.q_home, PIONEER.q_home)
         status = type("Status", (), {"wait": lambda self, words: None})()
         posted: list[object]
 

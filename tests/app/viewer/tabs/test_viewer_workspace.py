@@ -822,7 +822,7 @@ def test_the_outline_faces_as_joint_1_does_and_contains_the_tool():
     panel._outline, panel._angle = SimpleNamespace(wxyz=None), math.nan
     sides = set()
     for q in PIONEER.random_q(np.random.default_rng(5), 40):
-        panel._stage = SimpleNamespace(q=q)
+        panel._stage = SimpleNamespace(now=SimpleNamespace(q=q))
         tool = kin.fk(PIONEER, q)[:3, 3]
         panel.turn(tool)
         front = kin.transforms.rotation_from_wxyz(panel._outline.wxyz) @ section.u

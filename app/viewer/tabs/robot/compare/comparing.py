@@ -95,7 +95,7 @@ class Comparing:
         name, text, _ = arrived
         if not isinstance(text, str):
             raise InputError("text", name, "a robot file (TOML), a URDF or a table; no zip")
-        self._use(reference.of_text(name, text, self._stage.units, self._stage.robot.n))
+        self._use(reference.of_text(name, text, self._stage.units, self._stage.now.robot.n))
 
     def _use(self, other: Reference | None) -> None:
         self._other = other
@@ -115,7 +115,7 @@ class Comparing:
         self._found, self._stopped = None, False
         self._hide()
         if self._other is not None and self._stage.activity.withheld != "table":
-            self._reader = self._stage.summaries.comparison(self._other.robot, self._stage.robot, self._frames)
+            self._reader = self._stage.summaries.comparison(self._other.robot, self._stage.now.robot, self._frames)
         self.refresh()
 
     def stop(self) -> None:
@@ -163,7 +163,7 @@ class Comparing:
         found = () if self._found is None else self._found.explanations
         if not isinstance(index, str) or not index.isdecimal() or int(index) >= len(found):
             raise EditError(None, "The table has changed since; this proposal is no longer for it.")
-        return edits.with_table(self._stage.robot, own, found[int(index)].robot)
+        return edits.with_table(self._stage.now.robot, own, found[int(index)].robot)
 
     # The drawing
 
@@ -172,27 +172,30 @@ class Comparing:
         if isinstance(value, bool) or not isinstance(value, int | float) or not 1 <= value <= self._most:
             raise InputError("walk", value, f"1 to {self._most}")
         self._joint = int(value) - 1
-        self.on_pose(self._stage.q)
+        self.on_pose(self._stage.now.q)
         self._show_joint()
 
     @property
     def _most(self) -> int:
-        return self._stage.robot.n if self._other is None else max(self._stage.robot.n, self._other.robot.n)
+        return (
+            self._stage.now.robot.n if self._other is None else max(self._stage.now.robot.n, self._other.robot.n)
+        )
 
     def _draw(self) -> None:
+        arm = self._stage.now
         found, other = self._found, self._other
         if found is None or other is None:
             return
         if self._overlay is None and found.first is not None:
-            self._joint = max(found.first.joints, default=min(self._stage.robot.n, other.robot.n))
+            self._joint = max(found.first.joints, default=min(arm.robot.n, other.robot.n))
         self._hide()
-        self._overlay = Overlay(self._stage.client.scene, other.robot, self._stage.robot, found)
+        self._overlay = Overlay(self._stage.client.scene, other.robot, arm.robot, found)
         self._joint = min(self._joint, self._most - 1)
         self._walk.max = self._most
         assign(self._walk, self._joint + 1)
         self._walk.visible = self._most > 1
         self._stage.see_through(True, gizmo=True)
-        self._overlay.show(self._stage.q, self._joint)
+        self._overlay.show(arm.q, self._joint)
 
     def _hide(self) -> None:
         if self._overlay is not None:
@@ -220,7 +223,7 @@ class Comparing:
         answer = ""
         if other is not None:
             answer = views.answer(
-                self._found, other, stage.robot, stage.units, self._reader is not None, self._stopped
+                self._found, other, stage.now.robot, stage.units, self._reader is not None, self._stopped
             )
         update_html(self._answer, answer)
         self._show_joint()
@@ -228,7 +231,9 @@ class Comparing:
     def _show_joint(self) -> None:
         words = ""
         if self._overlay is not None and self._found is not None and self._other is not None:
-            words = views.joint(self._found, self._joint, self._other.robot, self._stage.robot, self._stage.units)
+            words = views.joint(
+                self._found, self._joint, self._other.robot, self._stage.now.robot, self._stage.units
+            )
         update_html(self._about, words)
 
     # Links

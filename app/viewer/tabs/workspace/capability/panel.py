@@ -61,13 +61,13 @@ class Capability:
         self._window = window
         self._post = post
         self._new_root = new_root
-        self._settings = MapSettings(directions=default_directions(stage.robot))
+        self._settings = MapSettings(directions=default_directions(stage.now.robot))
         self._look = Look(self._settings.by, colours)
         self._reader: Subscription[CapabilityMap] | None = None
         self._state: views.State = "ready"
         self._blocks = (0, 0)
         self._request: MapRequest | None = None  # the map that was started last
-        self._locked = stage.options.constraints.locked  # joints locked in the map
+        self._locked = stage.now.options.constraints.locked  # joints locked in the map
         self._found: CapabilityMap | None = None
         self._voxels: Voxels | None = None
         self._drawn = 0.0
@@ -134,7 +134,7 @@ class Capability:
         self.clear()
         stage, self._request = self._stage, self._requested
         self._reader = stage.maps.subscribe(self._request)
-        self._locked = stage.options.constraints.locked
+        self._locked = stage.now.options.constraints.locked
         self._state = "waiting"
         self.report()
 
@@ -142,7 +142,7 @@ class Capability:
     def _requested(self) -> MapRequest:
         """The map that settings and locks describe."""
         settings, stage = self._settings, self._stage
-        return MapRequest(stage.robot, settings.resolution, settings.directions, stage.options.constraints)
+        return MapRequest(stage.now.robot, settings.resolution, settings.directions, stage.now.options.constraints)
 
     def clear(self) -> None:
         """Stop, and remove everything."""
@@ -159,7 +159,7 @@ class Capability:
     def use_robot(self) -> None:
         """Another robot was selected: remove the map, and choose directions that suit the robot."""
         self.clear()
-        self._apply("directions", default_directions(self._stage.robot))
+        self._apply("directions", default_directions(self._stage.now.robot))
         assign(self._handles["directions"], self._written("directions"))
 
     def leave(self) -> None:

@@ -50,7 +50,7 @@ class SectionPanel:
     """
 
     def __init__(self, stage: Stage, root: str, post: Post) -> None:
-        client, robot = stage.client, stage.robot
+        client, robot = stage.client, stage.now.robot
         self.robot = robot
         self._scene = client.scene
         self._stage = stage
@@ -131,7 +131,7 @@ class SectionPanel:
             return
         across = tool - section.origin
         x, y = float(across @ section.u), float(across @ self._left)
-        faces = float(self._stage.q[0])
+        faces = float(self._stage.now.q[0])
         angle = math.atan2(y, x) if math.hypot(x, y) > 1e-6 else faces
         if math.cos(angle - faces) < 0.0:
             angle -= math.copysign(math.pi, angle)

@@ -1,0 +1,74 @@
+"""The arm of a page at one moment: everything that its numbers, pictures and answers follow from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from kin import Contact, IKOptions, JointConstraints, Obstacle, Robot, Task, fk
+from kin.collision.contacts import surroundings
+from kin.transforms import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A robot, where it is and is heading, and how its targets are solved. It does not change when the page does.
+
+    Attributes:
+        robot: the selected robot.
+        q: the configuration ``(n,)`` shown in the scene.
+        goal: the configuration ``(n,)`` the arm is moving to, or has reached.
+        target: the target pose ``(4, 4)``; None while the target follows the tool.
+        task: how much of the target pose the arm must match.
+        branch: the requested branch, as `kin.IKOptions` takes it.
+        locks: whether each joint ``(n,)`` is locked.
+        obstacles: those that the visitor has placed.
+        avoid: whether targets are solved so that the arm touches neither itself nor an obstacle.
+    """
+
+    robot: Robot
+    q: Array
+    goal: Array
+    target: Array | None = None
+    task: Task = "pose"
+    branch: str | None = None
+    locks: tuple[bool, ...] = ()
+    obstacles: tuple[Obstacle, ...] = ()
+    avoid: bool = False
+
+    @cached_property
+    def T_tool(self) -> Array:
+        """The pose ``(4, 4)`` of the tool in the scene."""
+        return fk(self.robot, self.q)
+
+    @cached_property
+    def T_goal(self) -> Array:
+        """The pose ``(4, 4)`` that the tool is moving to, or has reached."""
+        return fk(self.robot, self.goal)
+
+    @property
+    def aim(self) -> Array:
+        """The pose ``(4, 4)`` that is wanted: the target, or where the tool is going if the target follows it."""
+        return self.T_goal if self.target is None else self.target
+
+    @cached_property
+    def options(self) -> IKOptions:
+        """The options that targets are solved with: task, requested branch, and locked joints."""
+        locked = None
+        if any(self.locks):
+            locked = tuple(x if lock else None for x, lock in zip(self.goal.tolist(), self.locks, strict=True))
+        return IKOptions(
+            task=self.task,
+            constraints=JointConstraints(locked=locked),
+            branch=self.branch,
+            avoid_self_collision=self.avoid,
+            obstacles=self.obstacles if self.avoid else (),
+        )
+
+    def contacts_at(self, q: Array) -> tuple[Contact, ...]:
+        """What the arm touches at a configuration ``(n,)``, the deepest first.
+
+        Links that are only assumed are compared with each other on request: they may be far from those drawn.
+        """
+        links = self.avoid or bool(self.robot.capsules)
+        return surroundings(self.robot, self.obstacles, links).touches(q) if links or self.obstacles else ()
