@@ -18,7 +18,7 @@ import scipy.spatial
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from app.viewer.scene.bodies import FOLDER, MM, _loft
+from app.viewer.scene.bodies.drawing import FOLDER, MM, _loft
 from kin import builtin_robots, link_frames
 from kin.axes import inverse
 

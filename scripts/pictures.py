@@ -15,7 +15,7 @@ import viser
 from PIL import Image, ImageOps
 from playwright.sync_api import sync_playwright
 
-from app.viewer.scene.arm import ArmScene
+from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.camera import view
 from app.viewer.scene.lights import light_scene
 from app.viewer.scene.viewpoints import FOV

@@ -111,7 +111,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
     "app/cli/arguments": {"app.cli.arguments", "app.shared.options"},
-    "app/cli/bodies": {"kin", "app.viewer.meshes"},
+    "app/cli/bodies.py": {"kin", "app.viewer.meshes"},
     "app/cli/classroom": {"kin", "app.classroom", "app.cli", "app.exercises", "app.shared"},
     "app/cli/classroom/arguments.py": set(),
     "app/cli/xacro": {"kin", "app.cli.xacro"},

@@ -115,7 +115,8 @@ RECIPES: dict[str, dict[str, str | list[tuple[str, str]]]] = {
         ],
     },
     "lesson": {
-        "app/viewer/lessons/sums/__init__.py": LESSON,
+        "app/viewer/lessons/sums/__init__.py": "",
+        "app/viewer/lessons/sums/lesson.py": LESSON,
         "app/exercises/lessons.py": [('"trajectories",\n', '"trajectories",\n    "sums",\n')],
     },
     "kind of exercise": {

@@ -7,7 +7,8 @@ one. A computation ends when the last caller leaves its subscription. A section 
 from __future__ import annotations
 
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
-from app.shared.threads import DaemonExecutor, background_threads, lower_priority
+from app.shared.threads import background_threads, lower_priority
+from app.shared.threads.executor import DaemonExecutor
 from kin import Comparison, JointConstraints, Robot, Section, WorkspaceFacts, compare, section, workspace_facts
 from kin.comparison import Frames
 from kin.ik.options import FREE

@@ -19,7 +19,7 @@ from app.shared.security import Rights
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
-from app.viewer.meshes.library import Library
+from app.viewer.meshes.library.library import Library
 from app.viewer.meshes.reader import MeshReader
 from app.viewer.panel.status import LOOKING, READY, Notice
 from app.viewer.panel.view import configure_theme

@@ -16,8 +16,8 @@ import zstandard
 from websockets.sync.client import connect
 
 from app.viewer.panel.script import LABEL
-from app.viewer.session.worker import Worker
 from app.viewer.session.worker.inbox import Inbox
+from app.viewer.session.worker.worker import Worker
 from kin.transforms import from_position_wxyz, wxyz_from_rotation
 
 ANSWER = 1.5  # s until a message is answered on a busy machine

@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, Locator, Page, ViewportSize, expect
 import kin
 from app.viewer.panel.joints import label
 from app.viewer.scene import camera
-from app.viewer.scene.arm import FOR_FINGERS, GIZMO
+from app.viewer.scene.arm.arm_scene import FOR_FINGERS, GIZMO
 from app.viewer.scene.meshes import body
 from app.viewer.session.state import decode
 

@@ -1,7 +1,7 @@
 """Lessons: one idea each, one on show at a time.
 
-Adding a lesson is a folder here with a :class:`~app.viewer.lessons.guide.lesson.Lesson` in it, which says what it
-teaches and asks, and a row in `app/exercises/lessons.py`.
+Adding a lesson is a folder here with a :class:`~app.viewer.lessons.guide.lesson.Lesson` in its module `lesson`,
+which says what it teaches and asks, and a row in `app/exercises/lessons.py`.
 """
 
 from __future__ import annotations
@@ -13,10 +13,14 @@ from app.viewer.lessons.guide.lesson import Lesson
 
 
 def _lesson(key: str) -> type[Lesson]:
-    """The lesson with this key, in the folder of this name."""
-    found = vars(import_module(f"{__name__}.{key}")).values()
-    lessons = [each for each in found if isinstance(each, type) and issubclass(each, Lesson)]
-    return next(each for each in lessons if getattr(each, "key", "") == key)
+    """The lesson with this key, in the module `lesson` of the folder of this name."""
+    found = vars(import_module(f"{__name__}.{key}.lesson")).values()
+    (lesson,) = (
+        each
+        for each in found
+        if isinstance(each, type) and issubclass(each, Lesson) and vars(each).get("key") == key
+    )
+    return lesson
 
 
 # In the order of a course.

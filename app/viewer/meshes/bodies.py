@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from app.shared.memory.answers import Reservation
-from app.viewer.meshes.library import Library
+from app.viewer.meshes.library.library import Library
 from app.viewer.meshes.links import carried_over
 from app.viewer.own_arm import OwnArm
-from app.viewer.scene.bodies import Drawing, drawing
+from app.viewer.scene.bodies.drawing import Drawing, drawing
 from kin import Robot, builtin_robots
 
 KEPT = 3  # own arms whose meshes are kept, for undo

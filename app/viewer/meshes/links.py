@@ -10,7 +10,7 @@ import numpy as np
 from app.viewer.meshes.fitting import bodies_of
 from app.viewer.meshes.placing import PLAIN, Piece, Shapes, placed
 from app.viewer.meshes.surface import LinkBody, Surface
-from app.viewer.scene.bodies import Drawing
+from app.viewer.scene.bodies.drawing import Drawing
 from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.shapes import Solid, ball, box, cylinder

@@ -24,7 +24,8 @@ import numpy as np
 
 from app.shared.clients import share_of
 from app.shared.memory.answers import AnswerMemory, MemoryFullError, MemoryShare, Reservation
-from app.shared.threads import DaemonExecutor, lower_priority
+from app.shared.threads import lower_priority
+from app.shared.threads.executor import DaemonExecutor
 from app.viewer.meshes.archive import MOST_BYTES, MeshError, TooLargeError
 from app.viewer.meshes.fitting import checked
 from app.viewer.meshes.placing import MOST_DRAWN, Shapes

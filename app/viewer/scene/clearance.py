@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from app.viewer.scene.bodies import Drawing, drawing
+from app.viewer.scene.bodies.drawing import Drawing, drawing
 from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import Link
 from app.viewer.scene.meshes import FOOT, PLATE, Body, body

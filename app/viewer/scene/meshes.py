@@ -19,7 +19,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.viewer.scene.bodies import drawing
+from app.viewer.scene.bodies.drawing import drawing
 from app.viewer.scene.bodies.parts import Color, Part, joint_color
 from app.viewer.scene.chain import Chain, Link, chain, link_poses
 from app.viewer.scene.shapes import Solid, ball, box, cone, cylinder, merged, placed, tube

@@ -15,7 +15,7 @@ from app.viewer.lessons.guide.feature import Guide
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import Post, assign, listen
 from app.viewer.views.templates import render
-from app.viewer.worksheet import Worksheets
+from app.viewer.worksheet.feature import Worksheets
 from kin import InputError
 
 NONE = "None"

@@ -31,7 +31,7 @@ from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import READY, Notice, StatusLine
 from app.viewer.panel.view import ViewState, configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
-from app.viewer.session.actions import Actions
+from app.viewer.session.actions.actions import Actions
 from app.viewer.session.actions.typed import BY_HAND
 from app.viewer.session.controller import ArmController
 from app.viewer.session.events import LINK
@@ -44,7 +44,7 @@ from app.viewer.session.preparing import Preparing
 from app.viewer.session.robots import ShownArm, discard_own, edit, robot_of
 from app.viewer.session.services import Services
 from app.viewer.session.state import PageState, without_arm
-from app.viewer.session.worker import Worker
+from app.viewer.session.worker.worker import Worker
 from app.viewer.tabs import TABS
 from app.viewer.views.templates import render
 from app.viewer.viser_outbox import in_one_frame

@@ -13,7 +13,8 @@ import pytest
 from live_server import wait_for
 
 from app.shared.computations import ComputationCache, TooManyPendingError
-from app.shared.threads import DaemonExecutor, lower_priority
+from app.shared.threads import lower_priority
+from app.shared.threads.executor import DaemonExecutor
 
 
 @pytest.fixture
@@ -226,7 +227,7 @@ def test_shutting_a_daemon_executor_down_cancels_what_has_not_begun_and_does_not
 def test_a_process_ends_in_the_middle_of_a_computation_of_a_daemon_executor():
     code = (
         "import time\n"
-        "from app.shared.threads import DaemonExecutor\n"
+        "from app.shared.threads.executor import DaemonExecutor\n"
         "DaemonExecutor(1, 'test', lambda: None).submit(time.sleep, 600)\n"
     )
     root = Path(__file__).parents[3]

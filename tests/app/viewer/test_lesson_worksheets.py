@@ -16,7 +16,7 @@ from app.exports.worksheet import Sheet, latex
 from app.viewer.arm import Arm
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.equations import views
-from app.viewer.worksheet import FILES, Worksheets, parts_of
+from app.viewer.worksheet.feature import FILES, Worksheets, parts_of
 from app.viewer.worksheet.views import page_html
 from kin.units import DEFAULT_UNITS, Units
 

@@ -13,7 +13,7 @@ import viser
 
 from app.viewer.labels import add_label
 from app.viewer.lessons.figures import set_visible
-from app.viewer.scene.arm import GIZMO
+from app.viewer.scene.arm.arm_scene import GIZMO
 from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import Solid, cone, merged, placed, tube
 from kin import Robot

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import viser
 
-from app.viewer.scene.bodies import Drawing
+from app.viewer.scene.bodies.drawing import Drawing
 from app.viewer.scene.bodies.parts import Color, Part
 from app.viewer.scene.shapes import merged, placed
 from kin import Contact

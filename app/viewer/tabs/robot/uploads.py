@@ -16,7 +16,7 @@ from app.viewer.meshes.reader import MOST_TRIANGLES, Meshes, full
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post
 from app.viewer.panel.status import Notice
-from app.viewer.scene.bodies import Drawing
+from app.viewer.scene.bodies.drawing import Drawing
 from app.viewer.tabs.robot.files import (
     Busy,
     Incoming,

@@ -22,7 +22,7 @@ from app.shared.store import Store
 from app.viewer.activity.practice import Practice, Record
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
-from app.viewer.worksheet import FILES
+from app.viewer.worksheet.feature import FILES
 from kin import InputError
 from kin.units import Units
 

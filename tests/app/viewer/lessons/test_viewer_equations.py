@@ -23,7 +23,8 @@ from app.shared.computations import ComputationCache
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.arm import Arm
-from app.viewer.lessons.equations import EquationsLesson, views
+from app.viewer.lessons.equations import views
+from app.viewer.lessons.equations.lesson import EquationsLesson
 from app.viewer.own_arm import OwnArm
 from app.viewer.server import ViewerServer
 from kin import chapter

@@ -19,8 +19,9 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons.axes import axes_at
 from app.viewer.lessons.guide.outline import Choice, Number
-from app.viewer.lessons.screws import FORMS, PLACES, views
+from app.viewer.lessons.screws import views
 from app.viewer.lessons.screws.drawing import spread_tips
+from app.viewer.lessons.screws.lesson import FORMS, PLACES
 from app.viewer.lessons.screws.product import Form, foot, origin_of, partial, product, seen
 from app.viewer.lessons.screws.questions import far_joint, outline
 from app.viewer.server import ViewerServer

@@ -19,9 +19,10 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.arm import Arm
-from app.viewer.lessons.velocity import VelocityLesson, views
+from app.viewer.lessons.velocity import views
 from app.viewer.lessons.velocity.drawing import ring_arrow, sides, wxyz_along
 from app.viewer.lessons.velocity.jog import BUTTONS, Press, button, moved, step
+from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.lessons.velocity.views import NEAR, nice, real, state_of
 from app.viewer.server import ViewerServer
 from kin.differential.ellipsoids import axes_of, condition, lost, part_of, semi_axes, task_rates

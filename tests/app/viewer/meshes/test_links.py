@@ -17,12 +17,12 @@ from zips import TWO_JOINTS, packed, robot_files
 import kin
 from app.viewer.meshes.archive import MeshError
 from app.viewer.meshes.bodies import KEPT, Bodies
-from app.viewer.meshes.library import Library, detailed
+from app.viewer.meshes.library.library import Library, detailed
 from app.viewer.meshes.links import carried_over, drawing_of, shapes_of
 from app.viewer.meshes.placing import PLAIN
 from app.viewer.meshes.reader import Meshes, MeshReader
 from app.viewer.own_arm import OwnArm
-from app.viewer.scene.bodies import Drawing, drawing
+from app.viewer.scene.bodies.drawing import Drawing, drawing
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.clearance import clearance_of
 from kin import Robot, RobotFileError

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 import kin
-from app.viewer.lessons.postures import Postures
-from app.viewer.lessons.velocity import VelocityLesson
+from app.viewer.lessons.postures.lesson import Postures
+from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.panel import status as module
 from app.viewer.panel.status import NEWS, READY, Kind, Notice, StatusLine
 from kin.units import DEFAULT_UNITS

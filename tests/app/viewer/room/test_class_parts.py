@@ -19,7 +19,7 @@ from app.viewer.room.submissions import Submissions
 from app.viewer.room.wall import MOST, cells, columns_of
 from app.viewer.scene.camera import DIRECTION
 from app.viewer.session.state import PageState
-from app.viewer.worksheet import Worksheets
+from app.viewer.worksheet.feature import Worksheets
 
 ATTEMPT = NewAttempt("swing", 1, [1], "Yes.", 1.0, 0.0)
 

@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 
 import kin
 from app.viewer.panel.view import LOOKS
-from app.viewer.scene.arm import ArmScene
-from app.viewer.scene.bodies import FOLDER, drawing
+from app.viewer.scene.arm.arm_scene import ArmScene
+from app.viewer.scene.bodies.drawing import FOLDER, drawing
 from app.viewer.scene.chain import link_poses
 
 FILES = sorted(path.stem for path in FOLDER.glob("*.toml"))

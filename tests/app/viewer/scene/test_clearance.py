@@ -8,7 +8,7 @@ from fake_browser import FakeBrowser
 
 import kin
 from app.shared.store import Store
-from app.viewer.scene.bodies import drawing
+from app.viewer.scene.bodies.drawing import drawing
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.clearance import clearance
 from app.viewer.scene.meshes import body

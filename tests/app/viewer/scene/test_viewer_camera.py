@@ -15,7 +15,7 @@ from fake_browser import FakeBrowser
 import kin
 from app.shared.store import Store
 from app.viewer.scene import camera, viewpoints
-from app.viewer.scene.arm import FOR_FINGERS, GIZMO
+from app.viewer.scene.arm.arm_scene import FOR_FINGERS, GIZMO
 from app.viewer.scene.meshes import body
 from app.viewer.session.state import PageState, decode, encode
 

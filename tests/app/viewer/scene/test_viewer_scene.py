@@ -14,8 +14,8 @@ import kin
 from app.shared.store import Store
 from app.viewer.panel import joints, readout, status
 from app.viewer.scene import camera
-from app.viewer.scene.arm import ArmScene
-from app.viewer.scene.bodies import drawing
+from app.viewer.scene.arm.arm_scene import ArmScene
+from app.viewer.scene.bodies.drawing import drawing
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.chain import chain, link_poses
 from app.viewer.scene.meshes import body

@@ -11,8 +11,8 @@ from collections.abc import Callable, Hashable, Iterator
 import pytest
 
 from app.viewer.panel.status import Notice
-from app.viewer.session.worker import Worker
 from app.viewer.session.worker.crew import BUILDS, Crew, Place
+from app.viewer.session.worker.worker import Worker
 
 WAIT = 10.0  # s for what takes milliseconds
 LONG = 2.0  # s of a step that blocks

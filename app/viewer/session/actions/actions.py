@@ -1,0 +1,196 @@
+"""The visitor's actions: what each event of the panel and the scene does to the page.
+
+Only the visitor's worker calls these methods, one event at a time.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import kin
+from app.viewer.feature import Feature, message_of
+from app.viewer.panel.script import Reply
+from app.viewer.panel.status import Notice
+from app.viewer.scene.gizmo import Pull
+from app.viewer.session.actions.arm import ArmControls
+from app.viewer.session.actions.looks import LookControls
+from app.viewer.session.actions.typed import TypedInput
+from app.viewer.session.events import MESSAGES, RULES, belongs_before, pause_within
+from app.viewer.session.history import History, Step, same, without_results
+from app.viewer.session.parts import Page
+from app.viewer.session.persistence import link_notice
+from app.viewer.session.state import PageState, decode
+from kin.units import Units
+
+
+class Actions:
+    """Handles the events of one page, and keeps its `history`."""
+
+    def __init__(self, page: Page) -> None:
+        self._page = page
+        self.history = History()
+        self._gesture: tuple[object, ...] | None = None  # the control of the last step, while it may go on
+        self._changed_at = 0.0
+        typed = TypedInput(page)
+        self._arm = ArmControls(page, typed)
+        # Events by the first part of their key. A handler takes the other parts, and the value.
+        self._handlers: dict[str, Callable[..., Any]] = {
+            **self._arm.handlers,
+            **LookControls(page).handlers,
+            "grab": self._on_grab,
+            "feature": self._on_feature,
+            "news": self._on_feature,
+            "lesson": lambda title: page.lessons.choose(title),
+            "axes": typed.use_axes,
+            # Messages of the page's own script
+            "undo": self._undo,
+            "redo": self._redo,
+            "travel": self._travel,
+            "released": self._on_release,
+            "snap": typed.snap,
+            "nudge": typed.nudge,
+            "field": typed.set_field,
+            "target": typed.set_target,
+        }
+
+    def adopt(self, state: PageState) -> None:
+        """Show the arm of another state: robot, requests and configuration."""
+        self._arm.adopt(state)
+
+    def handle(self, key: Hashable, value: object) -> None:
+        """Process one event; raises `kin.InputError` for a value that none of our controls sends."""
+        name, *arguments = key if isinstance(key, tuple) else (key,)
+        if name == "message":
+            name, number = arguments
+            if name not in MESSAGES:
+                raise kin.InputError("message", name, "one of " + ", ".join(MESSAGES))
+            arguments = [number] if RULES[name].answered else []
+            if name == "feature":
+                try:
+                    *arguments, value = message_of(self._page.features, value)
+                    self._act(name, arguments, value)
+                finally:
+                    self._page.panel.script.reply(Reply(number, ""))
+                return
+        self._act(name, arguments, value)
+
+    def _act(self, name: str, arguments: list[Any], value: object) -> None:
+        action = self._handlers[name]
+        if not RULES[name].step:
+            action(*arguments, value)
+            return
+        shown = self._page.status.count
+        gesture = (name, *(a for a in arguments if not isinstance(a, Units)))
+        now = time.perf_counter()
+        if self._continues(gesture, value, now):
+            action(*arguments, value)
+            return
+        before = self._page.snapshot()
+        try:
+            action(*arguments, value)
+            if self._page.status.count == shown:  # the news were about an earlier action
+                self._page.settle_status()
+        finally:
+            if not same(before, self._page.snapshot()):
+                self.history.record(_label(gesture, self._page.features), before)
+                self._gesture, self._changed_at = gesture, now
+                self._show_history()
+
+    def _continues(self, gesture: tuple[object, ...], value: object, now: float) -> bool:
+        """Whether an event belongs to the same step as the one before."""
+        if belongs_before(gesture):
+            self.history.proceed()
+            return True
+        longest = pause_within(gesture, value)
+        if gesture[0] == "feature" and gesture[2] == "grab":
+            self._gesture = None
+        if gesture != self._gesture or longest == 0.0 or now - self._changed_at > longest:
+            return False
+        self._changed_at = now
+        self.history.proceed()
+        return True
+
+    # History
+
+    def _undo(self, _: object) -> None:
+        self._take("Undone", "Redo brings it back.", self.history.undo(self._page.snapshot()))
+
+    def _redo(self, _: object) -> None:
+        self._take("Redone", "Undo takes it back again.", self.history.redo(self._page.snapshot()))
+
+    def _take(self, verb: str, detail: str, step: Step | None) -> None:
+        if step is None:
+            self._page.status.show(Notice("hand", f"Nothing can be {verb.lower()}"))
+        else:
+            self._page.status.show(Notice("hand", f"{verb}: {step.label}", detail))
+            self.show(step.state)
+        self._show_history()
+
+    def _travel(self, text: object) -> None:
+        """Go to the state of an entry in the browser's history."""
+        page = self._page
+        state = decode(text, page.store.robots) if isinstance(text, str) else PageState(unreadable=True)
+        if (notice := link_notice(state)) is not None:
+            page.status.show(notice)
+            return
+        page.status.show(Notice("hand", "Back to this point of the browser's history"))
+        self.show(self.history.travel(state, page.snapshot()))
+        self._show_history()
+
+    def record(self, label: str, before: PageState) -> None:
+        """Let undo lead back to the state `before`."""
+        self.history.record(label, before)
+        self._show_history()
+
+    def show(self, state: PageState) -> None:
+        """Show another state, except for the viewpoint unless the robot is another one."""
+        page = self._page
+        self._gesture = None
+        self.history.arrive()
+        if state.units != page.units:
+            page.panel.units.show(state.units)
+            page.looks.use_units(state.units)
+        if state.frames != page.frames:
+            page.use_frames(state.frames)
+        page.use_obstacles(state.obstacles)
+        if state.view != page.view:
+            page.looks.use_view(replace(state.view))
+        self.adopt(state)
+        if state.lesson != page.activity.lesson:
+            page.lessons.open(state.lesson)
+        for feature in page.features:
+            wanted = without_results(state.features.get(feature.key, {}))
+            if wanted != without_results(feature.state()):
+                feature.restore(wanted)
+        page.for_features(lambda feature: feature.on_request())
+
+    def _show_history(self) -> None:
+        self._page.panel.script.show_history(*self.history.labels)
+
+    def _on_release(self, _: object) -> None:
+        """The visitor has released a control: what follows is another step."""
+        self._gesture = None
+
+    # Controls of the panel
+
+    def _on_grab(self, pull: Pull) -> None:
+        self._gesture = None
+        self._page.arm.pull(pull)
+
+    def _on_feature(self, name: str, key: Hashable, value: object) -> None:
+        for feature in self._page.features:
+            if feature.key == name:
+                feature.handle(key, value)
+
+
+def _label(gesture: tuple[object, ...], features: Sequence[Feature]) -> str:
+    """What changed, for people."""
+    match gesture:
+        case ("joint", _, int(index), int()):
+            return f"Joint {index + 1}"
+        case ("feature", name, key, *_):
+            return next((feature.step_name(key) for feature in features if feature.key == name), "Lesson")
+    return RULES[str(gesture[0])].label

@@ -1,0 +1,109 @@
+"""Worksheets of the tab *Learn*: the lesson on show, or the arm alone, for print and as files.
+
+The printable page is ``static/sheet.html``. ``static/sheets.js`` opens it and hands it what `Worksheets` puts into
+the panel, so the service keeps nothing, and it works for an arm of the visitor's own too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+
+import viser
+
+from app.exercises.judging import solution_text
+from app.exports.snippets import named
+from app.exports.worksheet import Part, Question, Sheet, csv_text, draw, latex
+from app.viewer.feature import Feature, Stage
+from app.viewer.lessons.guide import outline as guide
+from app.viewer.lessons.guide.lesson import Lesson
+from app.viewer.panel import update_html
+from app.viewer.panel.status import Notice
+from app.viewer.views.templates import render
+from app.viewer.worksheet.views import page_html
+from kin import InputError
+
+FILES: dict[str, tuple[str, Callable[[Sheet], str]]] = {
+    "latex": ("tex", latex),
+    "csv": ("csv", csv_text),
+    "svg": ("svg", lambda sheet: draw(sheet).svg()),
+}
+
+
+class Worksheets(Feature):
+    """The buttons below a lesson. Also pressed in the tab *View*.
+
+    Args:
+        lesson: the lesson on show, if there is one.
+        page: holds the page to print, hidden. Not in a tab: what is in a closed tab reaches the browser late.
+        folder: whether there are buttons in the tab *Learn*; otherwise only those in the tab *View*.
+    """
+
+    key = "sheet"
+    title = "Worksheet"
+    acts = False
+    messages = frozenset({"page", *FILES})
+
+    def __init__(
+        self, stage: Stage, lesson: Lesson | None, page: viser.GuiHtmlHandle, folder: bool = True
+    ) -> None:
+        super().__init__(stage)
+        self._lesson = lesson
+        self._page = page
+        self._folder: viser.GuiFolderHandle | None = None
+        if folder:
+            self._folder = stage.client.gui.add_folder("Worksheet", expand_by_default=lesson is not None)
+            with self._folder:
+                stage.client.gui.add_html(render("sheet/buttons", lesson=lesson is not None))
+
+    def handle(self, key: Hashable, value: object) -> None:
+        match key:
+            case ("page", int(serial)):
+                page = render("sheet/withheld") if self._withheld else page_html(self.sheet())
+                update_html(self._page, render("sheet/handed", page=page, serial=serial))
+            case (str(name), int()) if name in FILES and self._withheld:
+                words = "The worksheet would contain the table that the open exercise asks for."
+                self.stage.notify(Notice("advice", "Not now", words))
+            case (str(name), int()) if name in FILES:
+                sheet = self.sheet()
+                suffix, write = FILES[name]
+                what = "arm" if self._lesson is None else self._lesson.key
+                file = f"{named(sheet.robot).id}-{what}.{suffix}"
+                self.stage.client.send_file_download(file, write(sheet).encode(), save_immediately=True)
+            case _:
+                raise InputError("worksheet", key, "one of page, " + ", ".join(FILES))
+
+    @property
+    def _withheld(self) -> bool:
+        return self.stage.activity.withheld == "table"
+
+    def sheet(self) -> Sheet:
+        """The worksheet for the arm as it is."""
+        stage, lesson = self.stage, self._lesson
+        if lesson is None:
+            return Sheet("The arm at a configuration", stage.now.robot, stage.now.goal, stage.units)
+        found = type(lesson).outline(stage.now.robot, stage.units)
+        return Sheet(
+            type(lesson).title, stage.now.robot, stage.now.goal, stage.units, found.goal, parts_of(found),
+            lesson.formulas(), lesson.to_fill,
+        )  # fmt: skip
+
+    def remove(self) -> None:
+        update_html(self._page, "")
+        if self._folder is not None:
+            self._folder.remove()
+
+
+def parts_of(outline: guide.Outline) -> tuple[Part, ...]:
+    """Steps and check of a lesson, for paper."""
+    parts = []
+    for number, step in enumerate(outline.steps, 1):
+        questions = () if step.question is None else (_question(step.question, step.shown),)
+        parts.append(Part(f"{number}. {step.title}", step.text, questions))
+    return (*parts, Part("Check", "", tuple(_question(question) for question in outline.check)))
+
+
+def _question(question: guide.Question, shown: str = "") -> Question:
+    solution = " ".join(filter(None, (solution_text(question), shown)))
+    if isinstance(question, guide.Choice):
+        return Question(question.prompt, solution, tuple(option.text for option in question.options))
+    return Question(question.prompt, solution, (), question.unit.name)
