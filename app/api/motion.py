@@ -16,11 +16,11 @@ from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
 from app.api.options import AvoidingBody
 from app.api.problems import FieldError, from_input_error, invalid
-from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
+from app.api.schemas import POST_REFUSALS, Configuration, example, settings_of
 from app.api.work import Deadline, computed
 from app.api.workspace.streaming import ComputedResponse
 from app.exports.motion import FORMATS
-from app.shared.answers.motion import MotionAnswer, motion_answer, sample_times
+from app.shared.answers.motion import MotionAnswer, motion_answer
 from app.shared.settings import Settings
 from app.shared.threads.turns import Turn
 from kin import InputError, Motion, Robot, plan_motion
@@ -151,7 +151,9 @@ async def motion(request: Request, robot: Robot, body: MotionRequest) -> Respons
     """A program of PTP, LIN, CIRC, spline and dwell segments, timed so that no joint exceeds its limits.
 
     A program that cannot be driven is answered with 200 and `planned` false, in JSON whatever the format:
-    `refusal` holds the segment, the place on its path, the cause as a code with its numbers, and what would help.
+    `refusal` holds the segment, the place on its path, the cause as a code with its numbers, and what would help,
+    `part` what can be driven up to there. `arrival` says in which posture a segment meets its target: a line to
+    joint values `q` may arrive in others, which have the same pose, and a note says by how much.
     A malformed program is refused with 422 and the field. Peaks are measured on the motion, without what the
     planner knows.
     """
@@ -196,13 +198,12 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
     except InputError as error:
         prefix = "" if error.field.partition("[")[0] in ("program", "q_start") else "program."
         raise invalid(from_input_error(error, prefix)) from None
-    if not found.planned:
-        return reply(motion_answer(found, sample_times(found, body.rate) if body.samples else None))
-    _check_length(found, body.rate)
+    if found.driven is not None:
+        _check_length(found.driven, body.rate)
+    if body.format == "json" or not found.planned:
+        return _whole(found, body, deadline)
     if body.format in ("csv", "ndjson"):
         return found
-    if body.format == "json":
-        return _whole(found, body, deadline)
     kind = FORMATS[body.format]
     try:
         text = b"".join(kind.pieces(found, body.rate))
@@ -222,8 +223,10 @@ def _check_length(found: Motion, rate: float) -> None:
 
 def _whole(found: Motion, body: MotionRequest, deadline: Deadline) -> Response:
     """The answer with its samples, as far as there is memory for it."""
-    times = sample_times(found, body.rate) if body.samples else None
-    count = 0 if times is None else len(times)
-    size = 4000 + 400 * found.robot.n + 300 * len(found.segments) + count * NUMBER * (3 * found.robot.n + 9)
+    driven = found if found.driven is None else found.driven
+    count = int(driven.duration * body.rate) + 2 if body.samples else 0
+    segments = (300 + NUMBER * 2 * found.robot.n) * len(driven.segments)
+    size = 4000 + 400 * found.robot.n + segments + count * NUMBER * (3 * found.robot.n + 9)
     batch = Batch("rate", 1, True, size, "a lower rate, format ndjson, or samples false")
-    return one_or_all(lambda _: [motion_answer(found, times)], batch, deadline)
+    rate = body.rate if body.samples else None
+    return one_or_all(lambda _: [motion_answer(found, rate)], batch, deadline)

@@ -53,12 +53,19 @@ def run(arguments: Namespace) -> int:
         print_json(motion_answer(motion))
     elif arguments.output != "-":
         print(motion.explain(units_of(arguments)))
-        if motion.planned:
-            print("\n" + _report(motion, Notation(robot, arguments.rad)))
-    if not motion.planned:
-        if arguments.output == "-":
-            print(motion.reason, file=sys.stderr)
-        return 1
+        if motion.part is not None:
+            print(f"\nUp to there: {motion.part.explain(units_of(arguments))}")
+        if motion.driven is not None:
+            print("\n" + _report(motion.driven, Notation(robot, arguments.rad)))
+    elif not motion.planned:
+        print(motion.reason, file=sys.stderr)
+    driven = motion.driven if motion.planned or arguments.partial else None
+    if driven is not None:
+        _write_files(arguments, driven, kind, rate)
+    return 0 if motion.planned else 1
+
+
+def _write_files(arguments: Namespace, motion: Motion, kind: MotionFormat | None, rate: float) -> None:
     if arguments.output is not None and kind is not None:
         _write(arguments.output, motion, kind, rate, arguments.json)
     if arguments.picture is not None:
@@ -66,7 +73,6 @@ def run(arguments: Namespace) -> int:
             Path(arguments.picture).write_text(motion_plot(motion), encoding="utf-8")
         except OSError as error:
             raise InputError("--picture", arguments.picture, f"a file that can be written ({error})") from None
-    return 0
 
 
 def _text(path: str) -> str:

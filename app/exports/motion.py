@@ -86,7 +86,7 @@ def _line(content: object) -> bytes:
 
 
 def _json(motion: Motion, rate: float) -> Generator[bytes]:
-    yield _line(as_plain(motion_answer(motion, sample_times(motion, rate))))
+    yield _line(as_plain(motion_answer(motion, rate)))
 
 
 def _python(motion: Motion, rate: float) -> Generator[bytes]:

@@ -7,7 +7,8 @@
    :mod:`kin.motion.planning`: a PTP is timed joint by joint (:mod:`kin.motion.scurve`). Curves of the tool and
    corners are built in :mod:`kin.motion.paths` from :mod:`kin.motion.geometry`, which also finds the joint path;
    :mod:`kin.motion.timing` times it.
-4. :mod:`kin.motion.results` holds the answer, :mod:`kin.motion.details` the facts behind a refusal or a note, and
+4. :mod:`kin.motion.results` holds the answer, :mod:`kin.motion.arrivals` in which configuration a segment meets
+   its target, :mod:`kin.motion.details` the facts behind a refusal or a note, and
    :mod:`kin.motion.messages` words them.
 """
 
@@ -23,9 +24,11 @@ from kin.collision.contacts import surroundings
 from kin.errors import InputError
 from kin.ik.options import IKOptions
 from kin.ik.problem import never_cancel
+from kin.motion.arrivals import Arrival
 from kin.motion.limits import MotionLimits, limits_of
 from kin.motion.planner import planned
 from kin.motion.planning.collisions import checked
+from kin.motion.planning.starts import start_as_recorded
 from kin.motion.program import Circ, Dwell, JointTarget, Lin, PoseTarget, Program, Ptp, Spline
 from kin.motion.reading import parse_program, program_from_dict, program_to_dict
 from kin.motion.results import Motion, MotionSample, Peak, Refusal, SegmentTimes
@@ -33,6 +36,7 @@ from kin.named import robot_of
 from kin.robot import Robot
 
 __all__ = [
+    "Arrival",
     "Circ",
     "Dwell",
     "JointTarget",
@@ -52,6 +56,7 @@ __all__ = [
     "plan_motion",
     "program_from_dict",
     "program_to_dict",
+    "start_as_recorded",
 ]
 
 

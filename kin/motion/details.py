@@ -7,8 +7,11 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+import numpy as np
+
 from kin.collision import Contact
-from kin.ik.details import Details, LimitViolation
+from kin.ik.details import Details, JointKind, LimitViolation
+from kin.motion.arrivals import Arrival
 from kin.path.details import JointMove
 from kin.solvers.singular import Singularity
 
@@ -185,4 +188,30 @@ class JerkCost(NamedTuple):
     without: float
 
 
-Note = BlendShortened | BlendLeftOut | Slowed | JerkCost
+class ArrivesOtherwise(NamedTuple):
+    """A segment meets the pose of its target, but not in the joint values it was recorded with.
+
+    Attributes:
+        segment: which.
+        posture, recorded: names of the postures; None if they have none.
+        move: the joint that differs most, and by how much.
+    """
+
+    segment: int
+    posture: str | None
+    recorded: str | None
+    move: JointMove
+
+    @classmethod
+    def of(cls, segment: int, arrival: Arrival) -> ArrivesOtherwise:
+        """The note on an arrival that differs from what was recorded."""
+        assert arrival.difference is not None
+        sizes = np.abs(arrival.difference)
+        joint = int(np.argmax(np.round(sizes, 6)))  # the first one of several that differ by the same
+        row = arrival.robot.joints[joint]
+        kind: JointKind = "prismatic" if row.kind == "prismatic" else "revolute"
+        move = JointMove(joint, row.name, kind, float(sizes[joint]))
+        return cls(segment, arrival.posture, arrival.recorded_posture, move)
+
+
+Note = ArrivesOtherwise | BlendShortened | BlendLeftOut | Slowed | JerkCost

@@ -9,6 +9,7 @@ from kin.ik.messages import explain
 from kin.ik.messages.singularity import short
 from kin.ik.messages.values import joint, joint_value, listed, need
 from kin.motion.details import (
+    ArrivesOtherwise,
     BlendLeftOut,
     BlendShortened,
     BranchNeeded,
@@ -99,6 +100,15 @@ def _why(details: RefusalDetails, units: Units) -> str:
 def note(fact: Note, units: Units) -> str:
     """Something worth knowing of a planned motion."""
     match fact:
+        case ArrivesOtherwise(segment, posture, recorded, move):
+            how = "with other joint values than recorded"
+            if posture != recorded:
+                how = f"in another posture than recorded ({posture}, not {recorded})"
+            away = f"{joint(move.joint, move.name)} is {joint_value(move.kind, move.motion, units)} away"
+            return (
+                f"Segment {segment + 1} meets its target {how}: {away}. Record the joint values of arrival, start "
+                "in another posture, or drive PTP."
+            )
         case BlendShortened(segment, asked, used):
             sizes = f"{units.lengths.value(used)} instead of {units.lengths.value(asked)}"
             return f"Segment {segment + 1} is blended within {sizes}: at most half of the shorter segment is used."

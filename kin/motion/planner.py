@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from kin.motion.details import Help, StartOutside
 from kin.motion.limits import MotionLimits
+from kin.motion.planning.parts import driven, part_before
 from kin.motion.planning.plan import Plan, RefusedError
-from kin.motion.planning.zones import drive_fastest
 from kin.motion.program import JointTarget, Program, Spline
 from kin.motion.refusals import violations
 from kin.motion.results import Motion
@@ -21,18 +21,16 @@ def planned(
     """The motion of a program from a configuration ``(n,)``."""
     _check_targets(robot, program)
     plan = Plan(robot, program, limits, q_start.copy(), stop)
+    outside = violations(robot, q_start)
+    if outside:
+        refused = plan.refused(0, "start", StartOutside(outside), (Help("start"),))
+        return Motion(robot, program, limits, q_start, refused.refusal, ())
     try:
-        outside = violations(robot, q_start)
-        if outside:
-            raise plan.refused(0, "start", StartOutside(outside), (Help("start"),))
-        index = 0
-        while index < len(program.segments):
-            stop()
-            index = drive_fastest(plan, index)
+        driven(plan, 0)
     except RefusedError as error:
-        return Motion(robot, program, limits, q_start, error.refusal, ())
-    parts = tuple(plan.segments), tuple(plan.notes), tuple(plan.pieces)
-    return Motion(robot, program, limits, q_start, None, *parts)
+        part = part_before(plan, q_start, error.refusal)
+        return Motion(robot, program, limits, q_start, error.refusal, (), part=part)
+    return plan.motion(q_start)
 
 
 def _check_targets(robot: Robot, program: Program) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from kin.fk import fk, jacobian
 from kin.motion import messages
+from kin.motion.arrivals import Arrival
 from kin.motion.details import Cause, Help, Note, RefusalDetails
 from kin.motion.limits import MotionLimits
 from kin.motion.pieces import Piece
@@ -36,13 +37,18 @@ def _times(t: ArrayLike) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class SegmentTimes:
-    """When a segment is driven, in seconds from the start; blends are shared half and half."""
+    """When a segment is driven, in seconds from the start; blends are shared half and half.
+
+    Attributes:
+        arrival: in which configuration it meets its target; None for a pause.
+    """
 
     index: int
     kind: Kind
     name: str
     start: float
     end: float
+    arrival: Arrival | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +147,8 @@ class Motion:
         q_start: ``(n,)``, where it begins.
         refusal: why it cannot be driven; None if it can.
         segments: when each segment is driven; empty after a refusal, as is the motion.
+        part: after a refusal the motion of a shorter program: what can be driven, at rest just before the place
+            where it cannot go on. None if that is nothing, or nothing was refused.
         notes: what is worth knowing, see :mod:`kin.motion.details`.
         pieces: the joints as functions of time, one after the other.
     """
@@ -153,6 +161,7 @@ class Motion:
     segments: tuple[SegmentTimes, ...]
     notes: tuple[Note, ...] = ()
     pieces: tuple[Piece, ...] = field(default=())
+    part: Motion | None = None
 
     def __repr__(self) -> str:
         """The sentence about it."""
@@ -162,6 +171,11 @@ class Motion:
     def planned(self) -> bool:
         """Whether it can be driven."""
         return self.refusal is None
+
+    @property
+    def driven(self) -> Motion | None:
+        """The motion itself, or after a refusal the part of it that can be driven; None if that is nothing."""
+        return self if self.planned else self.part
 
     @cached_property
     def starts(self) -> Array:
@@ -184,6 +198,14 @@ class Motion:
             return self.refusal.explain(units)
         said = [messages.note(fact, units) for fact in self.notes]
         return " ".join([messages.summary(len(self.segments), self.duration), *said])
+
+    def q_before(self, index: int) -> Array | None:
+        """Where a segment begins ``(n,)``: where the one before arrives; None if that one is not planned."""
+        done = () if self.driven is None else self.driven.segments
+        if index > len(done):
+            return None
+        arrivals = [each.arrival for each in done[:index] if each.arrival is not None]
+        return arrivals[-1].q if arrivals else self.q_start
 
     def derivatives(self, t: ArrayLike) -> Array:
         """Joint values and their first three derivatives ``(4, ..., n)`` at times ``(...)``.

@@ -133,6 +133,10 @@ def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "--format", choices=("csv", "json", "ndjson", "urscript", "python"),
         help="format of the file (default: by the ending of its name)",
     )  # fmt: skip
+    parser.add_argument(
+        "--partial", action="store_true",
+        help="if the program cannot be driven, write its beginning that can; the exit code stays 1",
+    )  # fmt: skip
     parser.add_argument("--rate", default="100", help="samples per second (default 100)")
     parser.add_argument("--picture", metavar="FILE", help="draw joint values and speeds over time (SVG)")
     add_options(parser, ["avoid_self_collision", "obstacles"])

@@ -14,19 +14,44 @@ from app.shared.answers.fk import Matrix
 from kin import Motion
 from kin.ik.results import Cause as IkCause
 from kin.motion import MotionLimits, messages
-from kin.motion.details import BlendLeftOut, BlendShortened, Cause, HelpCode, JerkCost, Note, Slowed
+from kin.motion.details import (
+    ArrivesOtherwise,
+    BlendLeftOut,
+    BlendShortened,
+    Cause,
+    HelpCode,
+    JerkCost,
+    Note,
+    Slowed,
+)
 from kin.motion.program import Kind
 from kin.motion.results import Quantity
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS
 
-NoteCode = Literal["blend shortened", "blend left out", "slowed", "jerk cost"]
+NoteCode = Literal["arrives otherwise", "blend shortened", "blend left out", "slowed", "jerk cost"]
 _NOTES: dict[type[Note], NoteCode] = {
+    ArrivesOtherwise: "arrives otherwise",
     BlendShortened: "blend shortened",
     BlendLeftOut: "blend left out",
     Slowed: "slowed",
     JerkCost: "jerk cost",
 }
+
+
+class ArrivalAnswer(Answer):
+    """In which configuration a segment meets its target; with a blend, in which it would."""
+
+    q: list[float]
+    """Joint values, in radians (metres)."""
+    posture: str | None
+    """Name of the branch; null if the arm's branches have no names."""
+    recorded_posture: str | None
+    """Name of the branch of the target's joint values; null likewise, or where the target is a pose."""
+    difference: list[float] | None
+    """Joint values of the arrival minus those of the target, which have the same pose; null where it is a pose."""
+    as_recorded: bool
+    """False if a joint differs by more than 0.001 rad or m; a note says so in words."""
 
 
 class SegmentTimesAnswer(Answer):
@@ -42,6 +67,8 @@ class SegmentTimesAnswer(Answer):
     """Seconds from the start of the motion."""
     end: float
     """Seconds from the start of the motion."""
+    arrival: ArrivalAnswer | None
+    """In which configuration it meets its target; null for a pause."""
 
 
 class PeakAnswer(Answer):
@@ -185,6 +212,21 @@ class MotionSamples(Answer):
     """Speed of the tool point, in m/s."""
 
 
+class PartAnswer(Answer):
+    """What can be driven of a program that is refused: its beginning, up to just before the place in question."""
+
+    duration: float
+    """Seconds; the arm is at rest at the end."""
+    segments: list[SegmentTimesAnswer]
+    """When each segment is driven; of a line or an arc that is refused on its way, its beginning is the last."""
+    peaks: list[PeakAnswer]
+    """As for a whole motion."""
+    notes: list[NoteAnswer]
+    """As for a whole motion."""
+    samples: MotionSamples | UnsetType = UNSET
+    """The motion of this part, unless it was not requested."""
+
+
 class MotionAnswer(Answer):
     """The motion of a program, or why it cannot be driven."""
 
@@ -206,18 +248,26 @@ class MotionAnswer(Answer):
     """What is worth knowing: blends that are smaller than requested, where a path is slow and why."""
     limits: list[JointLimitsAnswer]
     """The limits that were kept, joint by joint."""
+    part: PartAnswer | None
+    """After a refusal what can be driven nevertheless; null if that is nothing, or nothing was refused."""
     samples: MotionSamples | UnsetType = UNSET
     """The motion itself, unless it was not requested; empty lists after a refusal."""
 
 
-def motion_answer(motion: Motion, times: Array | None = None) -> MotionAnswer:
-    """A motion, with samples at these times ``(k,)``; None: without."""
+def motion_answer(motion: Motion, rate: float | None = None) -> MotionAnswer:
+    """A motion, with this many samples per second; None: without."""
+    part = motion.part
     return MotionAnswer.of(
         motion,
         peaks=[PeakAnswer.of(each) for each in motion.peaks] if motion.planned else [],
         limits=_limits(motion.limits),
-        samples=UNSET if times is None else MotionSamples.of(motion.sample(times)),
+        part=None if part is None else PartAnswer.of(part, samples=_samples(part, rate)),
+        samples=_samples(motion, rate),
     )
+
+
+def _samples(motion: Motion, rate: float | None) -> MotionSamples | UnsetType:
+    return UNSET if rate is None else MotionSamples.of(motion.sample(sample_times(motion, rate)))
 
 
 def sample_times(motion: Motion, rate: float) -> Array:

@@ -11,6 +11,7 @@ from kin.collision.contacts import Surroundings
 from kin.collision.sweep import Rows, first_touches
 from kin.motion.details import Collides, Help
 from kin.motion.pieces import Hold, Piece
+from kin.motion.planning.parts import part_of
 from kin.motion.results import Motion, Refusal
 from kin.transforms import Array
 
@@ -26,6 +27,9 @@ def checked(motion: Motion, near: Surroundings, stop: Callable[[], None]) -> Mot
     faster anywhere than at the times of `Piece.grid` around.
     """
     if not motion.planned:
+        part = None if motion.part is None else checked(motion.part, near, stop)
+        if part is not None and not part.planned:  # something touches before the place that was refused
+            return replace(part, program=motion.program)
         return motion
     pieces: tuple[Piece, ...] = tuple(motion.pieces) or (Hold(motion.q_start, 0.0),)
     begins = np.concatenate([np.linspace(0.0, piece.duration, PARTS, endpoint=False) for piece in pieces])
@@ -55,7 +59,9 @@ def checked(motion: Motion, near: Surroundings, stop: Callable[[], None]) -> Mot
     refusal = Refusal(
         segment.index, segment.kind, segment.name, None, None, "collision", Collides(time, contact), helps
     )
-    return replace(motion, refusal=refusal, segments=(), notes=(), pieces=())
+    part = part_of(motion, segment.index, stop)
+    free = None if part is None else checked(part, near, stop).driven
+    return replace(motion, refusal=refusal, segments=(), notes=(), pieces=(), part=free)
 
 
 def _bounds(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:

@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from kin.differential.task import Task
-from kin.motion.details import Cause, Help, Note, RefusalDetails
+from kin.motion.arrivals import Arrival
+from kin.motion.details import ArrivesOtherwise, Cause, Help, Note, RefusalDetails
 from kin.motion.limits import MotionLimits
 from kin.motion.pieces import Piece
 from kin.motion.program import Move, Program, kind_of
-from kin.motion.results import Refusal, SegmentTimes
+from kin.motion.results import Motion, Refusal, SegmentTimes
 from kin.motion.tasks import most_kept
 from kin.robot import Robot
 from kin.solvers.contract import APPROACH, POSE, POSITION
@@ -79,17 +80,29 @@ class Plan:
         self.notes += other.notes
         self.q, self.time = other.q, other.time
 
-    def add(self, first: int, piece: Piece | None, ends: Sequence[float]) -> None:
-        """A piece that is some segments, the first of them with this index; when each ends, from its start."""
+    def add(self, first: int, piece: Piece | None, ends: Sequence[float], arrivals: Array) -> None:
+        """A piece that is some segments, the first of them with this index.
+
+        Args:
+            ends, arrivals: when each ends, from the start of the piece, and in which configurations ``(k, n)``.
+        """
         start = 0.0
-        for k, end in enumerate(ends):
+        for k, (end, q) in enumerate(zip(ends, arrivals, strict=True)):
             segment = self.program.segments[first + k]
             times = self.time + start, self.time + end
-            self.segments.append(SegmentTimes(first + k, kind_of(segment), segment.name, *times))
+            arrival = Arrival.of(self.robot, segment, q) if isinstance(segment, Move) else None
+            self.segments.append(SegmentTimes(first + k, kind_of(segment), segment.name, *times, arrival))
+            if arrival is not None and not arrival.as_recorded:
+                self.notes.append(ArrivesOtherwise.of(first + k, arrival))
             start = end
         if piece is not None and piece.duration > 0.0:
             self.pieces.append(piece)
             self.time += piece.duration
+
+    def motion(self, q_start: Array) -> Motion:
+        """What is planned, as a motion that began at a configuration ``(n,)``."""
+        parts = tuple(self.segments), tuple(self.notes), tuple(self.pieces)
+        return Motion(self.robot, self.program, self.limits, q_start, None, *parts)
 
     def move(self, index: int) -> Move:
         """A segment that is not a pause."""

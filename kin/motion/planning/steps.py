@@ -18,7 +18,7 @@ def drive(plan: Plan, index: int) -> int:
     """Add the segment with this index to the plan, with those that it is blended into; the index after them."""
     segment = plan.program.segments[index]
     if isinstance(segment, Dwell):
-        plan.add(index, Hold(plan.q, segment.seconds), [segment.seconds])
+        plan.add(index, Hold(plan.q, segment.seconds), [segment.seconds], plan.q[None])
         return index + 1
     run, first = run_from(plan, index), index
     index = plan.done
@@ -36,7 +36,7 @@ def drive(plan: Plan, index: int) -> int:
         check_limits(plan, run, ())
         index = plan.done
     if run is None:
-        plan.add(first, None, [0.0])
+        plan.add(first, None, [0.0], plan.q[None])
     else:
         _time(plan, first, run)
     return index
@@ -58,7 +58,7 @@ def _time(plan: Plan, first: int, run: Run) -> None:
     if len(layout.owners) == 1 and isinstance(segment, Ptp):
         piece = alone(plan.robot, plan.limits, segment, run)
         plan.halves[first] = plan.time + 0.5 * piece.duration
-        plan.add(first, piece, [piece.duration])
+        plan.add(first, piece, [piece.duration], run.ends[1:])
         return
     moves = {i: move for i, move in enumerate(plan.program.segments) if isinstance(move, Move)}
     own = range(first, first + len(layout.bounds) - 1)
@@ -70,7 +70,7 @@ def _time(plan: Plan, first: int, run: Run) -> None:
         stopping = stopping_times(plan.limits, [moves[i] for i in own], run, path, plan.program.jerk_limited)
         plan.stopping.update(zip(own, stopping, strict=True))
         plan.blended.extend(own[:-1])
-    plan.add(first, found, [*found.when(layout.bounds[1:-1]).tolist(), found.duration])
+    plan.add(first, found, [*found.when(layout.bounds[1:-1]).tolist(), found.duration], run.ends[1:])
     if plan.program.jerk_limited and found.duration > found.without * (1.0 + 1e-6):
         plan.notes.append(JerkCost(first, own[-1], found.duration, found.without))
     plan.notes.extend(slow_places(plan.robot, layout, path))

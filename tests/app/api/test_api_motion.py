@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 
 import numpy as np
 import pytest
@@ -278,3 +279,24 @@ def test_a_line_that_leaves_the_workspace_is_refused_at_its_place(client):
     missing = kin.solve_ik(UR5, ends).details.distance
     assert missing > 0.5
     assert f"at the worst place after it, out of reach by {missing * 1000:.1f} mm" in refusal["reason"]
+
+
+def test_a_line_that_arrives_otherwise_and_the_part_of_a_refused_program_are_answered(client):
+    first = [math.radians(x) for x in (215.70215832, -94.13277042, 106.01340862, -101.8806382, -90.0, 35.70215832)]
+    then = [math.radians(x) for x in (209.38701291, -192.42399488, 91.0728513, 11.35114358, -90.0, 29.38701291)]
+    segments = [{"kind": "ptp", "q": first}, {"kind": "lin", "q": then}, {"kind": "lin", "position": [9, 0, 0.3]}]
+    body = {"program": {"segments": segments}, "rate": 20}
+    answer = post(client, body, path="robots/ur5/motion").json()
+    part = answer["part"]
+    assert (answer["planned"], answer["refusal"]["segment"], len(part["segments"])) == (False, 2, 3)
+    arrival = part["segments"][1]["arrival"]
+    assert not arrival["as_recorded"]
+    assert arrival["posture"] != arrival["recorded_posture"]
+    assert np.allclose(arrival["difference"], np.subtract(arrival["q"], then))
+    assert max(map(abs, arrival["difference"])) == pytest.approx(math.radians(149.3), abs=1e-3)
+    assert "arrives otherwise" in [note["code"] for note in part["notes"]]
+    assert part["samples"]["t"][-1] == pytest.approx(part["duration"])
+    whole = post(client, {"program": {"segments": segments[:2]}}, path="robots/ur5/motion").json()
+    assert whole["part"] is None
+    assert whole["segments"][1]["arrival"]["q"] == pytest.approx(arrival["q"])
+    assert whole["segments"][1]["end"] == pytest.approx(part["segments"][1]["end"])

@@ -1,5 +1,6 @@
 """The command line: what it prints, and with which exit code it ends."""
 
+import csv
 import gc
 import json
 import math
@@ -860,6 +861,26 @@ def test_a_program_that_cannot_be_driven_is_exit_code_1_and_a_reason(capsys, tmp
     code, out, err = run(capsys, "move", "ur5", file, "-o", "-", "--format", "csv")
     assert (code, out) == (1, "")
     assert "joint 1" in err
+
+
+def test_move_reports_what_can_be_driven_and_writes_it_where_that_is_asked_for(capsys, tmp_path):
+    file, table = tmp_path / "far.toml", tmp_path / "far.csv"
+    file.write_text(
+        '[[segments]]\nkind = "ptp"\nq = [0.5, -1.2, 1.4, 0.2, 1.2, 0.1]\n'
+        '[[segments]]\nkind = "lin"\nposition = [9, 0, 1]\n'
+    )
+    code, out, _ = run(capsys, "move", "ur5", file, "-o", table)
+    assert code == 1
+    assert not table.exists()
+    assert "Segment 2 (LIN) cannot be driven" in out
+    assert "Up to there: 2 segments in" in out
+    assert "1  ptp          0.000" in out
+    code, out, _ = run(capsys, "move", "ur5", file, "-o", table, "--partial")
+    assert code == 1
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    part = kin.plan_motion("ur5", kin.motion.parse_program(file.read_text())).part
+    assert float(rows[-1]["t"]) == pytest.approx(part.duration)
+    assert float(rows[-1]["x"]) == pytest.approx(part.sample(part.duration).T[0, 3])
 
 
 @pytest.mark.parametrize(
