@@ -6,7 +6,7 @@ contain functions of the previous version. The cache here uses the text of that 
 that it imports, directly or not, as its key: a change recompiles what depends on it and nothing else.
 
 Damaged files are recognised by a checksum. The cache is optional: if it cannot be read, kernels are compiled
-again; if it cannot be written, they are compiled in every process.
+again; if it cannot be written, they are compiled in every process. A process warns of each once.
 
 Loading is where a process with compiled kernels spends its time until the first result: so it neither prepares
 numba's compiler, for which numba imports a hundred modules, nor reads the bitcode of a kernel, which only the
@@ -205,7 +205,7 @@ class _Cache(FunctionCache):
             with self._guard_against_spurious_io_errors():
                 return self._load_overload(sig, target_context)
         except Exception as error:  # noqa: BLE001 - unpickling a damaged file may raise anything
-            _warn(f"machine code in {self.cache_path} cannot be read ({error!r}) and is compiled again")
+            _warn("cached machine code cannot be read and is compiled again", f"{self.cache_path}: {error!r}")
             # New entries could not be added to a damaged index either.
             with contextlib.suppress(OSError):
                 Path(self._cache_file._index_path).unlink()
@@ -217,7 +217,7 @@ class _Cache(FunctionCache):
             super().save_overload(sig, data)
         except Exception as error:  # noqa: BLE001 - as above
             self.disable()
-            _warn(f"machine code cannot be written to {self.cache_path} ({error!r})")
+            _warn("machine code cannot be written to the cache", f"{self.cache_path}: {error!r}")
 
 
 class LaterCache:
@@ -240,8 +240,16 @@ class LaterCache:
         return getattr(self.opened, name)
 
 
-def _warn(what: str) -> None:
-    warnings.warn(f"{what}. Kernels are compiled on first use, which takes seconds.", stacklevel=2)
+_warned: set[str] = set()  # what this process has warned of
+
+
+def _warn(what: str, where: str = "") -> None:
+    """Warn once per process: a service whose cache is damaged would otherwise write hundreds of lines."""
+    if what in _warned:
+        return
+    _warned.add(what)
+    first = f" (first in {where})" if where else ""
+    warnings.warn(f"{what}{first}. Kernels are compiled on first use, which takes seconds.", stacklevel=2)
 
 
 def is_cached(kernel: Any) -> bool:
@@ -253,6 +261,7 @@ def is_cached(kernel: Any) -> bool:
         return True
     file: Any = cache._cache_file
     try:
-        return bool(file._load_index())
+        names = file._load_index().values()
+        return bool(names) and all(_intact(Path(file._data_path(name)).read_bytes()) for name in names)
     except Exception:  # noqa: BLE001 - unpickling a damaged file may raise anything, and it is compiled again
         return False

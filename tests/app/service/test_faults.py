@@ -343,7 +343,7 @@ def twice(x):
 """
 
 
-def twice(folder: Path, before: str = "") -> dict[str, object]:
+def twice(folder: Path, before: str = "", kernel: str = KERNEL) -> dict[str, object]:
     """Run a kernel of this folder in a new process: its result, cache hits and warnings."""
     code = f"""
         import json, sys, warnings
@@ -355,7 +355,7 @@ def twice(folder: Path, before: str = "") -> dict[str, object]:
         hits = sum(kernel.twice.stats.cache_hits.values())
         print(json.dumps({{"result": result, "hits": hits, "warnings": [str(w.message) for w in caught]}}))
     """
-    (folder / "kernel.py").write_text(KERNEL)
+    (folder / "kernel.py").write_text(kernel)
     env = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
     done = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True, timeout=120,
@@ -375,6 +375,21 @@ def test_truncated_machine_code_is_discarded(tmp_path, ending, left):
     (message,) = found["warnings"]
     assert "cannot be read" in message
     assert twice(tmp_path) == {"result": 3.0, "hits": 1, "warnings": []}
+
+
+def test_many_damaged_files_are_one_line_of_the_log(tmp_path):
+    """A kernel and another one that it calls."""
+    both = KERNEL.replace("2.0 * x", "2.0 * same(x)") + "\n\n@jit\ndef same(x):\n    return x\n"
+    assert twice(tmp_path, kernel=both)["warnings"] == []
+    files = list((tmp_path / "__pycache__").glob("*.nbc"))
+    assert len(files) == 2
+    for file in files:
+        file.write_bytes(b"")
+    found = twice(tmp_path, kernel=both)
+    assert (found["result"], found["hits"]) == (3.0, 0)
+    (message,) = found["warnings"]
+    assert "cannot be read" in message
+    assert twice(tmp_path, kernel=both) == {"result": 3.0, "hits": 1, "warnings": []}
 
 
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])

@@ -37,3 +37,6 @@ def test_kernels_are_compiled_again_when_a_kernel_they_call_has_changed(tmp_path
     common = package / "solvers" / "common.py"
     common.write_text(common.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
     assert run() == "2 0 False True", "compiled anew"
+    for file in (tmp_path / "cache").rglob("*.nbc"):
+        file.write_bytes(file.read_bytes()[:-1])
+    assert run() == "2 0 False True", "damaged"
