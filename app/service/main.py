@@ -232,7 +232,11 @@ def run(settings: Settings, open_browser: bool = False) -> int:
         others = url_for_others(settings.host, port, clean_prefix(settings.root_path))
         greeting = Greeting(url_of(settings, port), open_browser, others)
         partners = settings.rest_workers if SUPPORTED else 0
-        parts = members(listeners, partners, shared_bytes)
+        try:
+            parts = members(listeners, partners, shared_bytes)
+        except OSError as error:
+            print(f"kinboard: there is no memory for the processes to share: {error}", file=sys.stderr)
+            return 1
         for part in parts:
             for link in part.links.values():
                 stack.enter_context(link)

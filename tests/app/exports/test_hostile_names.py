@@ -8,9 +8,12 @@ from __future__ import annotations
 import ast
 import csv
 import io
+import json
 import re
+import shlex
 import tomllib
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -24,6 +27,7 @@ from app.exports.robots import FORMATS, robot_file
 from app.exports.snippets import SNIPPETS, Moment
 from app.exports.worksheet import Sheet, csv_text, draw, latex
 from app.exports.worksheet.words import to_latex
+from app.viewer.obstacles import placed
 from app.viewer.own_arm import own_arm, pack, unpack
 from app.viewer.worksheet.views import page_html
 from kin import Robot
@@ -149,6 +153,28 @@ def test_programs_hold_names_as_text(name):
             assert _skeleton(made) == _skeleton(plain)
         if kind == "MATLAB":
             assert len(made.splitlines()) == len(plain.splitlines())
+
+
+@names
+def test_programs_hold_names_of_obstacles_as_text(name):
+    """Of obstacles as a link has them: in the programs of Python as literals, for the shell as one word."""
+    UR5 = kin.get_robot("ur5")
+
+    def around(name: str) -> Moment:
+        obstacles = placed.unpack([["b", name, 0.5, 0, 0.2, 0, 0, 0, 0.1, 0.1, 0.1]])
+        assert len(obstacles) == 1
+        return replace(moment(UR5, kin.fk(UR5, UR5.q_home)), obstacles=obstacles, avoid=True)
+
+    hostile, plain = around(name), around("plain")
+    for kind, snippet in SNIPPETS.items():
+        made, harmless = snippet(hostile), snippet(plain)
+        if "Python" in kind:
+            assert _skeleton(made) == _skeleton(harmless)
+        if kind == "curl":
+            words, expected = (shlex.split(text.replace("\\\n", "")) for text in (made, harmless))
+            assert len(words) == len(expected)
+            (asked,) = [json.loads(word) for word in words if '"obstacles"' in word]
+            assert asked["obstacles"][0]["name"] == hostile.obstacles[0].name
 
 
 def moment(robot: Robot, T: np.ndarray) -> Moment:

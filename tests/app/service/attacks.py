@@ -91,14 +91,15 @@ def victim(
         [*before, sys.executable, "-c", code],
         cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
+        errors: list[str] = []
+        reading = threading.Thread(target=lambda: errors.extend(process.stderr or ()), daemon=True)
+        reading.start()
         try:
             assert process.stdout is not None
-            assert process.stderr is not None
             found = re.search(r":(\d+)/", process.stdout.readline())
-            assert found, process.stderr.read()
-            errors: list[str] = []
-            reading = threading.Thread(target=lambda: errors.extend(process.stderr or ()), daemon=True)
-            reading.start()
+            if found is None:  # it has ended, and said why
+                reading.join(10)
+            assert found, "".join(errors)
             service = Victim(process, int(found[1]), errors)
             path = "readyz" if ready else "livez"
             url = f"{service.url}/{path}"

@@ -2,14 +2,17 @@
 
 The folders of the service are filesystems of its own (`unshare`, as root), so that they can be filled and made
 read-only while it runs. Where that is not allowed, `Machine.mounted` is False: a folder that should be full or
-read-only is replaced by a file instead, in which nothing can be written either.
+read-only is replaced by a file instead, in which nothing can be written either. What a folder holds at first is
+copied from a folder of the same name, `seeds`.
 """
 
 from __future__ import annotations
 
 import contextlib
 import functools
+import itertools
 import json
+import mmap
 import os
 import re
 import shutil
@@ -22,7 +25,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -34,19 +37,27 @@ from attacks import ROOT, Victim, victim
 from cryptography.hazmat.primitives.asymmetric import rsa
 from fake_browser import FakeBrowser
 from live_server import wait_for
+from numba.core.caching import UserProvidedCacheLocator
 from websockets.exceptions import WebSocketException
 
 from app.classroom import COOKIE
 from app.classroom.lti.platforms import key_file, make_key
 from app.classroom.tables import Attempt
+from app.exports.robots import robot_file
 from app.viewer.session.state import PageState, encode
+from kin import get_robot
 
-MOST = 8 << 20  # bytes of each folder
+MOST = 8 << 20  # bytes of each folder, besides compiled kernels
 SILENCE = 10.0  # s: KINBOARD_WORKER_TIMEOUT
 EXERCISE = "which-joint-goes-down"
-POSE = {"target": {"position": [0.045, 0.191, -0.211]}}
-CLOCK = """
-import os, time
+ASKED = (
+    ("POST", "/api/v1/robots/pioneer5/ik", {"target": {"position": [0.045, 0.191, -0.211]}}),
+    *(("GET", path, None) for path in ("/livez", "/readyz", "/room")),
+)
+# Of every Python of the machine. The end of a terminal ends the service, also where these tests run without one.
+STARTUP = """
+import os, signal, time
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 _true = time.time
 
 def _time():
@@ -55,9 +66,11 @@ def _time():
 
 time.time = _time
 """
-MOUNT = f"""
-for folder in "$FAULTY_FOLDERS"/*/ /dev/shm; do mount -t tmpfs -o size={MOST} tmpfs "$folder" || exit 1; done
-mkdir "$FAULTY_FOLDERS"/temp/in "$FAULTY_FOLDERS"/robots/in
+MOUNT = """
+for folder in "$FAULTY_FOLDERS"/*/ /dev/shm; do
+    mount -t tmpfs -o size="$FAULTY_SIZE" tmpfs "$folder" || exit 1
+done
+cp -r "$FAULTY_SEEDS"/. "$FAULTY_FOLDERS" || exit 1
 exec "$@"
 """
 APART = ("unshare", "--mount", "--propagation", "private")
@@ -77,7 +90,7 @@ class Machine:
     """A running service, and what can go wrong around it.
 
     Attributes:
-        folders: where its folders are, as the service sees them: temp, data, robots.
+        folders: where its folders are, as the service sees them: temp, data and those of `SEEDS`.
         platforms: addresses of learning platforms, by the manner in which they misbehave.
         cookie: of a student in a room.
         confirmed: how many of the student's answers were confirmed.
@@ -145,6 +158,13 @@ class Machine:
         """Delete everything in a folder, as programs do that clean up."""
         for entry in self._seen(name).iterdir():
             shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+
+    def damage(self, name: str) -> None:
+        """Change a bit in each file of a folder."""
+        for file in self._seen(name).rglob("*.nb?"):
+            content = bytearray(file.read_bytes())
+            content[len(content) // 2] ^= 0x10
+            file.write_bytes(content)
 
     def replace(self, name: str) -> None:
         """Put a file where a folder was."""
@@ -233,25 +253,70 @@ def stored(tab: FakeBrowser) -> int:
     return int(found[1]) if found else 0
 
 
+# Folders of the operator, and the file that the service reads in each at its start.
+EXERCISE_FILE = """
+id = "of-this-machine"
+title = "Of this machine"
+topic = "Forward kinematics"
+level = 1
+robot = "of-this-machine"
+kind = "number"
+text = "What is θ1?"
+
+[answer]
+value = "q1"
+unit = "deg"
+tolerance = 0.5
+method = "It is read from the slider."
+"""
+SEEDS = {
+    "robots": robot_file(replace(get_robot("planar3r"), id="of-this-machine"), "toml"),
+    "exercises": EXERCISE_FILE,
+    "courses": 'title = "Of this machine"\n[[item]]\nexercise = "of-this-machine"\n',
+}
+
+
+def seed(folder: Path, kernels: bool) -> int:
+    """Write what the folders of a machine hold at first; returns the bytes of its compiled kernels."""
+    for name in ("temp", *SEEDS):
+        (folder / name / "in").mkdir(parents=True)
+    for name, text in SEEDS.items():
+        (folder / name / "in" / "of-this-machine.toml").write_text(text)
+    size = 0
+    for file in (ROOT / "kin").rglob("__pycache__/*.nb?") if kernels else ():
+        module = file.parents[1] / "any.py"
+        to = folder / "cache" / "in" / UserProvidedCacheLocator.get_suitable_cache_subpath(str(module))
+        to.mkdir(parents=True, exist_ok=True)
+        shutil.copy(file, to)
+        size += -(-file.stat().st_size // mmap.PAGESIZE) * mmap.PAGESIZE
+    return size
+
+
 @contextmanager
-def running_machine(base: Path) -> Iterator[Machine]:
-    """A service with folders and a clock of its own, and a student in a room."""
-    folders, clock = base / "folders", base / "clock"
-    for name in ("temp", "data", "robots"):
-        (folders / name).mkdir(parents=True)
+def running_machine(base: Path, kernels: bool = False) -> Iterator[Machine]:
+    """A service with folders and a clock of its own, and a student in a room.
+
+    Args:
+        kernels: whether a folder of compiled kernels is among the folders; otherwise that of the tests is used.
+    """
+    folders, clock, seeds = base / "folders", base / "clock", base / "seeds"
+    size = MOST + seed(seeds, kernels)
     clock.write_text("0")
     (base / "code").mkdir()
-    (base / "code" / "sitecustomize.py").write_text(CLOCK)
+    (base / "code" / "sitecustomize.py").write_text(STARTUP)
     mounted = can_mount()
+    for name in ("data", *(each.name for each in seeds.iterdir())):
+        (folders / name).mkdir(parents=True)
     if not mounted:
-        (folders / "temp" / "in").mkdir()
-        (folders / "robots" / "in").mkdir()
+        shutil.copytree(seeds, folders, dirs_exist_ok=True)
     environment = {
         "PYTHONPATH": os.pathsep.join((str(base / "code"), str(ROOT))), "FAULTY_CLOCK": str(clock),
-        "FAULTY_FOLDERS": str(folders), "TMPDIR": str(folders / "temp" / "in"),
-        "KINBOARD_DATA": str(folders / "data" / "in"), "KINBOARD_ROBOTS": str(folders / "robots" / "in"),
+        "FAULTY_FOLDERS": str(folders), "FAULTY_SEEDS": str(seeds), "FAULTY_SIZE": str(size),
+        "TMPDIR": str(folders / "temp" / "in"), "KINBOARD_DATA": str(folders / "data" / "in"),
         "KINBOARD_BENCH": "1", "KINBOARD_WORKER_TIMEOUT": str(SILENCE),
-    }  # fmt: skip
+    } | {f"KINBOARD_{name.upper()}": str(folders / name / "in") for name in SEEDS}  # fmt: skip
+    if kernels:
+        environment["NUMBA_CACHE_DIR"] = str(folders / "cache" / "in")
     before = (*APART, "sh", "-c", MOUNT, "sh") if mounted else ()
     with (
         platforms(base) as (file, addresses),
@@ -270,7 +335,7 @@ def strain() -> float:
 
 
 class Asking(threading.Thread):
-    """Asks REST over new connections, one request after the other, until the end of the context.
+    """Asks over new connections, one request after the other, until the end of the context: REST, health, rooms.
 
     Attributes:
         answers: seconds and status of each request; None: the connection broke.
@@ -291,13 +356,14 @@ class Asking(threading.Thread):
         self.join(60)
 
     def run(self) -> None:
-        while not self._ended.wait(0.02):
+        options: dict[str, Any] = {"trust_env": False, "timeout": 60, "verify": False}
+        for method, path, body in itertools.cycle(ASKED):
+            if self._ended.wait(0.02):
+                return
             began = time.monotonic()
             status: int | None = None
             with contextlib.suppress(httpx2.TransportError):
-                status = httpx2.post(
-                    f"{self._url}/api/v1/robots/pioneer5/ik", json=POSE, trust_env=False, timeout=60, verify=False
-                ).status_code
+                status = httpx2.request(method, f"{self._url}{path}", json=body, **options).status_code
             self.answers.append((time.monotonic() - began, status))
 
 

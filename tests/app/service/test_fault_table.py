@@ -20,7 +20,7 @@ from pathlib import Path
 
 import pytest
 from attacks import ROOT
-from faulty_machine import MANNERS, SILENCE, Asking, Machine, launches, misbehave, running_machine, strain
+from faulty_machine import MANNERS, SEEDS, SILENCE, Asking, Machine, launches, misbehave, running_machine, strain
 from live_server import wait_for
 
 from app.service.handover import SUPPORTED, Role
@@ -29,6 +29,7 @@ from app.shared.settings import Settings
 REST = 5.0  # s
 VISITORS = 10.0  # s
 LINES = 60  # of the log during one fault
+COMPILING = 60.0  # s, until a page opens and REST answers without any compiled kernel
 
 pytestmark = pytest.mark.skipif(not SUPPORTED, reason="processes of several roles are on Linux only")
 
@@ -42,7 +43,7 @@ class Fault:
     Attributes:
         act: lets it happen; what it adds to the stack lasts while the service is watched.
         sample: whether it is tried in every run, not only in slow ones.
-        late: seconds until the service can notice it.
+        late: seconds until the service can notice it, or has compiled what it needs.
         lost: requests that may break, because a process was working on them.
         keeps: whether the answers that were stored before are there afterwards.
     """
@@ -112,14 +113,19 @@ PROCESSES = [
 ]  # fmt: skip
 
 FOLDERS = [
-    Fault(name, how, and_replace_all(act), name == "temp" and how != "read-only", lost=2)
-    for name in ("temp", "shm", "data", "robots")
+    Fault(
+        name, how, and_replace_all(act), name == "temp" and how != "read-only", lost=2,
+        late=COMPILING if name == "cache" and how in ("damaged", "gone") else 0.0,
+    )
+    for name in ("temp", "shm", "data", "cache", *SEEDS)
     for how, act in (
         ("full", lambda on, name=name: on.fill(name)),
         ("read-only", lambda on, name=name: on.protect(name)),
+        ("damaged", lambda on, name=name: on.damage(name)),
         ("gone", lambda on, name=name: on.remove(name)),
     )
-]
+    if how != "damaged" or name == "cache"  # damaged databases and robot files have tests of their own
+]  # fmt: skip
 
 CLOCKS = [
     Fault("clock", how, lambda on, _, seconds=seconds: on.set_clock(seconds))
@@ -156,10 +162,17 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
         yield found
 
 
+@pytest.fixture(scope="module")
+def with_own_kernels(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
+    with running_machine(tmp_path_factory.mktemp("machine"), kernels=True) as found:
+        yield found
+
+
 @pytest.mark.parametrize(
     "fault", [pytest.param(row, marks=() if row.sample else pytest.mark.slow, id=str(row)) for row in TABLE]
 )
-def test_the_service_holds(fault: Fault, service: Machine) -> None:
+def test_the_service_holds(fault: Fault, request: pytest.FixtureRequest) -> None:
+    service: Machine = request.getfixturevalue("with_own_kernels" if fault.what == "cache" else "service")
     if not service.cookie:
         service.enter_room()
     with service.student() as page:
@@ -175,7 +188,7 @@ def test_the_service_holds(fault: Fault, service: Machine) -> None:
         back = time.monotonic() - began
         factor = max(factor, strain())
         count = len(asking.answers)
-        wait_for(lambda: len(asking.answers) > count + 3, 60)
+        wait_for(lambda: len(asking.answers) > count + 3, 60 + fault.late)
     worst = max(seconds for seconds, _ in asking.answers)
     broken = sum(status is None for _, status in asking.answers)
     lines = service.service.errors[said:]
@@ -215,10 +228,14 @@ DECLARED = {
     "folders": {
         "data": ("data",),
         "robots": ("robots",),
-        "exercises": (),
-        "courses": (),
+        "exercises": ("exercises",),
+        "courses": ("courses",),
         "lti": ("app/classroom/test_lti.py::test_the_service_does_not_start_with_a_wrong_file",),
         "app/service/main.py": ("temp", "shm"),
+        "app/shared/memory/shared.py": (
+            "app/shared/test_memory.py::test_without_anonymous_memory_the_space_of_a_file_is_reserved",
+        ),
+        "kin/kernels/cache.py": ("cache",),
         "app/bench/board/runs.py": ("app/service/web/test_scoreboard.py::test_a_folder_that_cannot_be_used",),
         "app/bench/contestants/motions.py": ("bench/test_board.py::test_a_run_that_fails_or_is_killed_says_so",),
     },
@@ -234,7 +251,7 @@ DECLARED = {
 # How a module declares it: what it calls.
 CALLS = {
     "processes": {"Popen", "Process", "fork", "run_subprocess"},
-    "folders": {"mkdtemp", "mkstemp", "TemporaryDirectory", "TemporaryFile", "NamedTemporaryFile"},
+    "folders": {"mkdtemp", "mkstemp", "TemporaryDirectory", "TemporaryFile", "NamedTemporaryFile", "_Cache"},
     "peers": {"create_server", "create_engine", "HTTPConnection", "HTTPSConnection", "urlopen", "build_opener"},
 }
 
@@ -272,7 +289,8 @@ def test_the_table_is_complete() -> None:
     roles = {role.value for role in Role} - {"all"}  # that one is by itself, without a supervisor
     assert ways(*roles) == {role: set(SIGNALS) for role in roles}
     folders = {row.what for row in FOLDERS}
-    assert ways(*folders) == {folder: {"full", "read-only", "gone"} for folder in folders}
+    every = {"full", "read-only", "gone"}
+    assert ways(*folders) == {folder: every | ({"damaged"} if folder == "cache" else set()) for folder in folders}
     peers = {row.what for row in PEERS}
     assert ways(*peers) == {peer: set(MANNERS) for peer in peers}
     assert len({str(row) for row in TABLE}) == len(TABLE)

@@ -113,6 +113,14 @@ def test_what_touches_is_red_and_named(port: int) -> None:
         assert tuple(painted[-1]["updates"].get("color", ())) == TOUCHING
 
 
+def test_names_of_obstacles_in_a_link_are_text_on_the_page(port: int) -> None:
+    hostile = replace(WALL, name="<img src=x onerror=alert(1)>")
+    q = np.array([np.radians(TOUCHING_AT), *UR5.q_home[1:]])
+    with FakeBrowser(port, memory=opened(PageState("ur5", q, obstacles=(hostile,)))) as tab:
+        tab.wait(lambda: "touches &lt;img src=x" in tab.html)
+        assert "<img src=x" not in tab.html
+
+
 def test_a_drag_of_the_target_avoids_the_wall_on_request(port: int) -> None:
     q = UR5.q_home.copy()
     q[0] = np.radians(150.0)
