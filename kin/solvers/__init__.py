@@ -23,6 +23,7 @@ from kin.solvers import (
     planar4,
     scara4,
     slide6,
+    slides2,
     slides3,
     srs7,
     turned,
@@ -55,6 +56,7 @@ FAR = 2e-5
 # For arms that fit no family.
 GENERAL: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     slides3.match,
+    slides2.match,
     general6.match,
     lambda robot: turned.with_point(robot, general5.match(robot, _six_joints), _six_joints),
     lambda robot: general7.match(robot, _six_joints, lambda other: _closed_form(other, ())),

@@ -50,7 +50,7 @@ from kin.workspace.capability.kernels import raise_best
 
 TASKS: tuple[Task, ...] = ("pose", "approach")
 # Families of `made_up_arms`, in their order: to match a general arm compiles kernels for many seconds.
-MADE_UP = ("parallel5", "planar4", "general5", "pair2", "turned3", "slides3")
+MADE_UP = ("parallel5", "planar4", "general5", "pair2", "turned3", "slides3", "slides2")
 NUMERIC = "numeric"  # the family of arms without a closed form
 # Parts that do not belong to a family of arms.
 COLLISIONS, MOTIONS, CLOUDS, CAPABILITY = "collisions", "motions", "clouds", "capability"
@@ -158,7 +158,7 @@ def made_up_arms() -> tuple[Robot, ...]:
     gantry = [
         {"kind": kind, "theta": 0.7, "d": 0.1, "a": 0.1, "alpha": 0.9 + 0.1 * i} for i, kind in enumerate(kinds)
     ]
-    return *arms, Robot.from_dh(gantry, home=home)
+    return *arms, Robot.from_dh(gantry, home=home), Robot.from_dh(gantry[1:4], home=home[:3])
 
 
 def _first() -> Robot:

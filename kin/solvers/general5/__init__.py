@@ -1,4 +1,4 @@
-"""All solutions of arms with three to five revolute joints, for arms that belong to no family.
+"""All solutions of arms with three to five joints, turning or sliding, for arms that belong to no family.
 
 Virtual joints at the tool complete the arm to six joints, so that the families and the general solver of six
 joints (:mod:`kin.solvers.general6`) apply:

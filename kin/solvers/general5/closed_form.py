@@ -1,4 +1,4 @@
-"""The solver of three to five revolute joints: the choice of virtual joints, solutions, singularities."""
+"""The solver of three to five joints: the choice of virtual joints, solutions, singularities."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.general5.completion import BALL, COMPLETIONS, ROLL, Axes, completed
+from kin.solvers.general6.closed_form import moves_freely
 from kin.solvers.reversed import WrappedKernels
 from kin.solvers.rolled import roll_sense
 from kin.solvers.singular import Singularity, by_jacobian, those_within
@@ -32,7 +33,7 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "general5"
-TITLE = "all solutions, three to five revolute joints"
+TITLE = "all solutions, three to five joints"
 # Orientations in no special position.
 _TURNS = tuple(
     (screw_z(a, 0.0) @ screw_x(0.0, b) @ screw_z(c, 0.0))[:3, :3]
@@ -41,7 +42,6 @@ _TURNS = tuple(
 _POINTS = 4  # the most configurations of three joints for a point
 _AT_ZERO = TOLERANCES.near_miss
 _CHUNK = 256  # targets whose solutions are compared at a time
-_REGULAR = 1e-4  # smallest singular value of a completed arm, of the largest: with less, solutions would be lost
 
 
 def match(robot: Robot, form_of: Callable[[Robot], ClosedForm | None]) -> General5 | None:
@@ -49,16 +49,12 @@ def match(robot: Robot, form_of: Callable[[Robot], ClosedForm | None]) -> Genera
 
     `form_of` gives the solver of an arm with six joints.
     """
-    if robot.n not in COMPLETIONS or not robot.revolute.all():
-        return None
-    q = np.random.default_rng(5).uniform(-1.0, 1.0, (4, 6))
-    for axes in COMPLETIONS[robot.n]:
+    for axes in COMPLETIONS.get(robot.n, ()):
+        if robot.revolute.all() and robot.n == 3 and axes is not BALL:
+            continue  # planar arms have a family
         longer = completed(robot, axes)
-        J = jacobian(longer, q)
-        J[:, :3] /= robot.reach or 1.0
-        if np.linalg.matrix_rank(J, rtol=_REGULAR).max() < 6:
-            continue
-        form = form_of(longer)
+        # Where the completed arm can barely move in some direction, solutions would be lost.
+        form = form_of(longer) if moves_freely(longer) else None
         if form is not None:
             return General5(robot, form, axes)
     return None
@@ -74,11 +70,11 @@ class General5(ClosedForm):
     def __init__(self, robot: Robot, form: ClosedForm, axes: Axes) -> None:
         self.robot, self.form, self.off = robot, form, form.off
         self._point, self._rolls = axes is BALL, axes is ROLL
-        self._last_rolls = not (self._point or self._rolls) and roll_sense(robot) != 0.0
+        rolls = bool(robot.revolute[-1]) and roll_sense(robot) != 0.0
+        self._last_rolls = not (self._point or self._rolls) and rolls
         virtual = "a virtual joint" if len(axes) == 1 else f"{len(axes)} virtual joints"
-        self.reason = (
-            f"{robot.n} revolute joints whose axes fit no closed form; with {virtual} at the tool: {form.name}"
-        )
+        kind = "revolute joints" if robot.revolute.all() else "joints"
+        self.reason = f"{robot.n} {kind} whose axes fit no closed form; with {virtual} at the tool: {form.name}"
         # Names belong to all solutions of the six joints; for a point, the last part is about the virtual joints.
         self.named = form.named and not self._last_rolls
         self._pairs = self._point and form.named
@@ -161,7 +157,7 @@ class General5(ClosedForm):
         if self._point:
             own = np.where(there[:, :, None], q[:, :, :3], math.inf)
             with np.errstate(invalid="ignore"):
-                gap = np.abs((own[:, :, None] - own[:, None] + math.pi) % TURN - math.pi).max(axis=3)
+                gap = self._gaps(own[:, :, None] - own[:, None]).max(axis=3)
             again = np.tril(gap < TOLERANCES.merge, -1).any(axis=2)
             there = there & ~again
             order = np.argsort(~there, axis=1, kind="stable")[:, :_POINTS]
@@ -170,6 +166,11 @@ class General5(ClosedForm):
             off = np.abs((q[:, :, self.robot.n :] + math.pi) % TURN - math.pi).max(axis=2)
             there = there & (off < _AT_ZERO)
         return np.where(there, numbers, -1)
+
+    def _gaps(self, off: Array) -> Array:
+        """Differences of joint values ``(…, n)`` without their signs, whole turns aside."""
+        turns = self.robot.revolute
+        return np.abs(np.where(turns, (off + math.pi) % TURN - math.pi, off))
 
     def _kernels(self, form: BatchKernels) -> BatchKernels:
         """The batch kernels of the arm from those of the six joints."""
@@ -232,7 +233,7 @@ class General5(ClosedForm):
             return row // 2 if self._pairs else row
         out = np.empty((len(self.branches), self.robot.n))
         self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, np.asarray(q), out)
-        apart = np.abs((out - q + math.pi) % TURN - math.pi).max(axis=1)
+        apart = self._gaps(out - q).max(axis=1)
         return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kin.axes import inverse, is_zero, screw_x, screw_z
+from kin.axes import inverse, is_zero, screw_x, screw_z, size
 from kin.robot import Joint, Robot
 from kin.transforms import Array
 
@@ -16,16 +16,21 @@ _X, _Y, _Z, _TOOL = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0
 # Direction and a point of each virtual axis, in the tool's frame; points in shares of the arm's reach.
 ROLL: Axes = ((_Z, _TOOL),)
 BALL: Axes = ((_X, _TOOL), (_Y, _TOOL), (_Z, _TOOL))
-_ANY: Axes = (((0.53, 0.61, 0.59), (0.11, -0.07, 0.05)), ((-0.47, 0.71, 0.52), (-0.06, 0.09, 0.13)))
-COMPLETIONS: dict[int, tuple[Axes, ...]] = {3: (BALL,), 4: (_ANY,), 5: (ROLL, _ANY[:1])}
+_ANY: Axes = (
+    ((0.53, 0.61, 0.59), (0.11, -0.07, 0.05)),
+    ((-0.47, 0.71, 0.52), (-0.06, 0.09, 0.13)),
+    ((0.81, -0.35, 0.47), (0.09, 0.12, -0.04)),
+)
+COMPLETIONS: dict[int, tuple[Axes, ...]] = {3: (BALL, _ANY), 4: (_ANY[:2],), 5: (ROLL, _ANY[:1])}
 
 
 def completed(robot: Robot, axes: Axes) -> Robot:
     """The arm with virtual joints about these axes."""
+    extent = robot.reach if math.isfinite(robot.reach) else size(robot)
     frame, rows, tool = np.eye(4), list(robot.rows), robot.T_last_tool
     for k, (direction, place) in enumerate(axes):
         z = tool[:3, :3] @ np.asarray(direction) / np.linalg.norm(direction)
-        point = tool[:3, 3] + robot.reach * (tool[:3, :3] @ np.asarray(place))
+        point = tool[:3, 3] + extent * (tool[:3, :3] @ np.asarray(place))
         theta, d, a, alpha = link_to(inverse(frame), z, point)
         frame = frame @ screw_z(theta, d) @ screw_x(a, alpha)
         name = f"virtual {k + 1}"

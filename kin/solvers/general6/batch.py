@@ -18,11 +18,12 @@ from kin.solvers.general6.cuts import (
     SIGN,
     SIZE,
     SIZE_OF_ARM,
+    SLIDES,
     TURN_D,
     TURN_E,
 )
 from kin.solvers.general6.elimination import QUANTITIES, UNKNOWN, condense, eliminate
-from kin.solvers.general6.recovery import angles_of, monomials, null_vectors, others, polish
+from kin.solvers.general6.recovery import monomials, null_vectors, others, polish, values_of
 from kin.solvers.general6.roots import ROOTS, coefficients, covers_circle, polynomial_at, zeros
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -79,10 +80,11 @@ def solve_cut(params: Array, T: Array, doubtful: bool, out: Array, count: int) -
     found, t = np.empty(ROOTS), np.empty(6)
     z, radius = np.empty(ROOTS, dtype=np.complex128), np.empty(ROOTS)
     row, angles, met = np.empty(6), np.empty(SOLUTIONS), np.zeros(SOLUTIONS, dtype=np.bool_)
-    shift = int(params[SHIFT])
+    shift, slides, size = int(params[SHIFT]), params[SLIDES:SIZE], params[SIZE_OF_ARM]
+    third = slides[2] != 0.0
     loop_of(params, T, F)
-    eliminate(F, B, Q, diagonal, E)
-    for k in range(zeros(E, doubtful, z, radius, found)):
+    eliminate(F, slides, B, Q, diagonal, E)
+    for k in range(zeros(E, third, doubtful, z, radius, found)):
         own = False
         for least in range(1, 3):
             # A root that leads to a known solution has a close neighbour: two null vectors span both solutions.
@@ -90,18 +92,19 @@ def solve_cut(params: Array, T: Array, doubtful: bool, out: Array, count: int) -
                 break
             condense(E, math.cos(found[k]), math.sin(found[k]), A, W)
             for m in range(monomials(vectors, null_vectors(W, vectors, least))):
-                t[2] = found[k]
-                t[3], t[4] = angles_of(vectors[m])
-                others(F, B, Q, diagonal, t)
-                if not polish(F, t):
+                t[2] = math.tan(0.5 * found[k]) if third else found[k]
+                t[3], t[4] = values_of(vectors[m], slides)
+                others(F, slides, B, Q, diagonal, t)
+                if not polish(F, slides, t):
                     continue
-                close = abs(wrap(t[2] - found[k])) < _CLOSE
-                t[3] += TURN_D
-                t[4] += TURN_E
+                close = abs(wrap((2.0 * math.atan(t[2]) if third else t[2]) - found[k])) < _CLOSE
+                t[3] += TURN_D if slides[3] == 0.0 else 0.0
+                t[4] += TURN_E if slides[4] == 0.0 else 0.0
                 for i in range(6):
                     j = (i + shift) % 6
-                    row[j] = wrap(params[SIGN + j] * (t[i] - params[OFFSET + j]))
-                same = _place_of(row, out, count)
+                    value = params[SIGN + j] * (t[i] - params[OFFSET + j])
+                    row[j] = wrap(value) if slides[i] == 0.0 else value * size
+                same = _place_of(row, out, count, slides, shift)
                 if same == SOLUTIONS or (same < count and met[same]):
                     continue
                 if same == count:
@@ -113,18 +116,21 @@ def solve_cut(params: Array, T: Array, doubtful: bool, out: Array, count: int) -
     number, joint = 0, (2 + shift) % 6
     for k in range(count):
         number += 1 if met[k] else 0
-        angles[k] = params[SIGN + joint] * out[k, joint] + params[OFFSET + joint]
+        value = params[SIGN + joint] * out[k, joint]
+        angles[k] = (
+            2.0 * math.atan(value / size + params[OFFSET + joint]) if third else value + params[OFFSET + joint]
+        )
     return count, number, covers_circle(z, radius, angles, count)
 
 
 @jit
-def _place_of(row: Array, out: Array, count: int) -> int:
+def _place_of(row: Array, out: Array, count: int, slides: Array, shift: int) -> int:
     """The first of `count` rows of out ``(16, 6)`` that equals row ``(6,)``; `count` if none does."""
     for k in range(count):
         apart = 0.0
         for i in range(6):
             gap = abs(out[k, i] - row[i])
-            apart = max(apart, min(gap, TURN - gap))
+            apart = max(apart, min(gap, TURN - gap) if slides[(i - shift) % 6] == 0.0 else gap)
         if apart < _MERGE:
             return k
     return count
@@ -202,14 +208,18 @@ def misfit_of_degree(params: Array, T: Array) -> float:
     B, Q, diagonal = np.empty((QUANTITIES, 9)), np.empty((QUANTITIES, 9)), np.empty(UNKNOWN)
     re, im = np.empty(ROOTS + 1), np.empty(ROOTS + 1)
     A, W = np.empty((2, 6, 9), dtype=np.complex128), np.empty((6, 6), dtype=np.complex128)
+    slides = params[SLIDES:SIZE]
+    third = slides[2] != 0.0
     loop_of(params, T, F)
-    eliminate(F, B, Q, diagonal, E)
-    scale = coefficients(E, re, im)
+    eliminate(F, slides, B, Q, diagonal, E)
+    scale = coefficients(E, third, re, im)
     worst = 0.0
     for k in range(_PROBES.shape[0]):
         z = complex(_PROBES[k, 0], _PROBES[k, 1])
+        if third and z.real < 0.0:  # too small a determinant to be divided
+            continue
         predicted = 0.0 + 0.0j
         for n in range(ROOTS, -1, -1):
             predicted = predicted * z + complex(re[n], im[n])
-        worst = max(worst, abs(polynomial_at(E, z, A, W) / scale - predicted))
+        worst = max(worst, abs(polynomial_at(E, third, z, A, W) / scale - predicted))
     return worst

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
-from kin.axes import inverse, is_along, is_zero, links_of, screw_x, screw_z
+from kin.axes import is_along, is_zero, links_of, screw_x, screw_z, size
 from kin.fk import fk, jacobian
 from kin.robot import Robot
 from kin.solvers.canonical import free_last, without_last
@@ -22,7 +23,6 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.curves import curves_among
-from kin.solvers.general6.backwards import backwards, turned_round
 from kin.solvers.general6.batch import (
     AGREED,
     PROVED,
@@ -32,15 +32,19 @@ from kin.solvers.general6.batch import (
     misfit_of_degree,
     solve_all,
 )
-from kin.solvers.general6.cuts import cut_at
+from kin.solvers.general6.cuts import cuts_of
+from kin.solvers.general6.opposite import OppositeKernels, loop_with_opposite_slides, solve_opposite
+from kin.solvers.general6.orders import Reading, readings
 from kin.solvers.numeric import each_of
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.transforms import Array
 
 NAME = "general6"
-TITLE = "elimination, any six revolute joints"
+TITLE = "elimination, any six joints of which at least four turn"
 BRANCHES = tuple(f"solution {i + 1}" for i in range(SOLUTIONS))
 _THETA6 = RedundancyParameter("theta6", "θ6", joint=5)
+_MOST_SLIDES = 2  # `slides3` has three; more cannot turn the tool in every direction
+_REGULAR = 1e-4  # smallest singular value of the Jacobian, of the largest
 _VALID = 1e-9  # largest misfit of degree of a valid cut
 _EXACT = 1e-14  # a misfit that is rounding error
 _SIMILAR = 30.0  # misfits within this factor are as good
@@ -56,6 +60,7 @@ _STEPS = tuple(
 _MASK = np.array([1.0] * 6 + [0.0])
 _MET, _SAME = 1e-10, 1e-6
 _JOINTS = np.arange(6)
+SolveAll = Callable[[Array, Array, Array], int]
 # Beside curves: random starts of each of two searches, rows that are compared.
 _STARTS, _MOST_ROWS = 40, 60
 _FOLD, _NEAR_FOLD = 1e-2, 1e-4  # smallest singular values: near a fold, and so near that nothing is agreed
@@ -64,44 +69,61 @@ _RARE = 1  # of these poses, those with an odd number of solutions on an arm wit
 
 
 def match(robot: Robot) -> General6 | None:
-    """The general solver, if the robot has six revolute joints and its loop can be cut somewhere.
+    """The general solver, if at least four of six joints turn and the arm's loop can be cut somewhere.
 
-    Where some poses of the arm have solutions that it misses, the arm from tool to base may have better cuts.
+    Where it misses solutions of some poses, the arm in another order may have better cuts.
     """
-    if robot.n != 6 or not robot.revolute.all():
+    slides = int((~robot.revolute).sum())
+    if robot.n != 6 or slides > _MOST_SLIDES or (slides and not moves_freely(robot)):
         return None
-    links = links_of(robot, (1,) * 5)
-    on_axis = is_zero(links.tool[0, 3], links.tool[1, 3]) and is_along(links.tool)
-    params = _best_cuts(robot, [cut_at(links, shift) for shift in range(6)])
-    missed = _missed(robot, params)
-    kernels = BatchKernels(params, branches_one, branches_many)
-    if missed > _RARE:
-        back = backwards(robot)
-        links = links_of(back, (1,) * 5)
-        other = _best_cuts(back, [cut_at(links, shift) for shift in range(6)])
-        if _missed(back, other) < missed:
-            return General6(robot, turned_round(BatchKernels(other, branches_one, branches_many)), on_axis, True)
-    return General6(robot, kernels, on_axis) if len(params) else None
+    tool = links_of(robot, (1,) * 5).tool
+    on_axis = bool(robot.revolute[5]) and is_zero(tool[0, 3], tool[1, 3]) and is_along(tool)
+    best: tuple[int, General6] | None = None
+    for reading in readings(robot):
+        cuts = _best_cuts(reading.robot)
+        kernels, solve = BatchKernels(cuts, branches_one, branches_many), solve_all
+        opposite = None if len(cuts) else loop_with_opposite_slides(reading.robot)
+        if opposite is not None:
+            kernels, solve = OppositeKernels(opposite), solve_opposite
+        missed = _missed(reading.robot, kernels)
+        if len(kernels.params) and (best is None or missed < best[0]):
+            best = missed, General6(robot, kernels, on_axis, reading, solve)
+        if missed <= _RARE:
+            break
+    return best[1] if best is not None and best[0] < _POSES // 2 else None
 
 
 def _poses(robot: Robot) -> tuple[Array, Array]:
     """Random configurations, and their poses."""
     q = np.random.default_rng(6).uniform(-math.pi, math.pi, (_POSES, 6))
+    q[:, ~robot.revolute] *= _size(robot) / math.pi
     return q, fk(robot, q)
 
 
-def _missed(robot: Robot, params: Array) -> int:
-    """How many of the random poses have an odd number of solutions, or none, with these cuts."""
-    if not len(params):
+def _size(robot: Robot) -> float:
+    """The reach of an arm, or something like it if a slide has no limits, metres."""
+    return robot.reach if 0.0 < robot.reach < math.inf else size(robot)
+
+
+def moves_freely(robot: Robot) -> bool:
+    """Whether an arm with six joints can move its tool in every direction."""
+    J = jacobian(robot, np.random.default_rng(5).uniform(-1.0, 1.0, (4, 6)))
+    J[:, :3, robot.revolute] /= _size(robot)
+    return int(np.linalg.matrix_rank(J, rtol=_REGULAR).max()) == 6
+
+
+def _missed(robot: Robot, kernels: BatchKernels) -> int:
+    """How many of the random poses have an odd number of solutions, or none."""
+    if not len(kernels.params):
         return _POSES
     q, T = _poses(robot)
     out = np.empty((_POSES, SOLUTIONS, 6))
-    branches_many(params, T, np.array([math.nan]), q[0], out)
+    kernels.many(kernels.params, T, np.array([math.nan]), q[0], out)
     count = (~np.isnan(out[:, :, 0])).sum(axis=1)
     return int(((count % 2 == 1) | (count == 0)).sum())
 
 
-def _best_cuts(robot: Robot, cuts: list[Array]) -> Array:
+def _best_cuts(robot: Robot) -> Array:
     """The parameters of the best valid cuts, concatenated: the most exact ones, and of these those that find most.
 
     A cut counts as valid if it is for most of a few poses; one that misses a quarter of the poses is not used. A
@@ -110,13 +132,13 @@ def _best_cuts(robot: Robot, cuts: list[Array]) -> Array:
     q, T = _poses(robot)
     ranked: list[tuple[int, int, int, int, Array]] = []
     out = np.empty((_POSES, SOLUTIONS, 6))
-    for cut in cuts:
+    for cut in cuts_of(robot):
         misfit = max(float(np.median([misfit_of_degree(cut, pose) for pose in T[:_PROBES]])), _EXACT)
         if not misfit <= _VALID:
             continue
         branches_many(cut, T, np.array([math.nan]), q[0], out)
         there = ~np.isnan(out[:, :, 0])
-        apart = np.abs((out - q[:, None] + math.pi) % TURN - math.pi).max(axis=2)
+        apart = _apart(robot, out, q[:, None])
         apart[~there] = math.inf
         missed = int((apart.min(axis=1) > 1e-6).sum())
         if missed < _POSES // 4:
@@ -126,28 +148,34 @@ def _best_cuts(robot: Robot, cuts: list[Array]) -> Array:
     return np.concatenate([entry[4] for entry in ranked[:_CUTS]] or [np.empty(0)])
 
 
-def _apart(rows: Array, q: Array) -> Array:
-    """The largest joint difference ``(k,)`` of each row ``(k, 6)`` from q ``(6,)``, whole turns aside."""
-    return np.asarray(np.abs((rows - q + math.pi) % TURN - math.pi).max(axis=1, initial=0.0))
+def _apart(robot: Robot, rows: Array, q: Array) -> Array:
+    """The largest joint difference ``(…)`` of each row ``(…, 6)`` from q ``(6,)``, whole turns aside."""
+    off = rows - q
+    off = np.where(robot.revolute, (off + math.pi) % TURN - math.pi, off)
+    return np.asarray(np.abs(off).max(axis=-1, initial=0.0))
 
 
 class General6(ClosedForm):
-    """All solutions of an arm with six revolute joints that has no closed form of its own.
+    """All solutions of an arm with six joints, of which at most two slide, that has no closed form of its own.
 
     Rows are numbered, not named: there may be up to sixteen, the arm may pass from one to another without meeting
     a singularity, and their number changes from pose to pose.
     """
 
     name, title, branches = NAME, TITLE, BRANCHES
-    reason = "six revolute joints whose axes fit no closed form: all real solutions by elimination"
     lengths = ()
     named = False
 
-    def __init__(self, robot: Robot, kernels: BatchKernels, tool_on_axis: bool, turned: bool = False) -> None:
+    def __init__(
+        self, robot: Robot, kernels: BatchKernels, tool_on_axis: bool, reading: Reading, solve: SolveAll
+    ) -> None:
         self.robot = robot
         self.tool_on_axis = tool_on_axis
-        self.kernels = kernels
-        self._turned = turned
+        self.kernels = reading.kernels(kernels)
+        self._reading, self._solve = reading, solve
+        slides = int((~robot.revolute).sum())
+        kind = ("revolute joints", "joints, one of which slides,", "joints, two of which slide,")[slides]
+        self.reason = f"six {kind} whose axes fit no closed form: all real solutions by elimination"
 
     def handles(self, task: int) -> bool:
         """Poses, and an approach direction when it is the last joint's own axis (then that joint is free)."""
@@ -182,10 +210,8 @@ class General6(ClosedForm):
 
     def _solve_all(self, T: Array, q: Array) -> int:
         """q ``(16, 6)`` ← the solutions that the kernels find, and what `solve_all` knows of them."""
-        if not self._turned:
-            return int(solve_all(self.kernels.params, np.ascontiguousarray(T), q))
-        known = int(solve_all(self.kernels.params, np.ascontiguousarray(inverse(T)), q))
-        q[:] = q[:, ::-1].copy()
+        known = int(self._solve(self.kernels.params, self._reading.target(T), q))
+        q[:, list(self._reading.order)] = q.copy()
         return known
 
     def _beside_curves(self, T: Array, near: Array, q: Array) -> Completeness:
@@ -197,6 +223,7 @@ class General6(ClosedForm):
         rows = self._thinned(T, np.concatenate([self._descended(T, near[None]), q[~np.isnan(q[:, 0])]]))
         close = [self._near_target(T, step) for step in _STEPS]
         starts = np.random.default_rng(8).uniform(-math.pi, math.pi, (2, _STARTS, 6))
+        starts[..., ~self.robot.revolute] *= _size(self.robot) / math.pi
         for each in (np.concatenate(close), *starts):
             before = len(rows)
             rows = self._thinned(T, np.concatenate([rows, self._descended(T, each)]))
@@ -208,7 +235,7 @@ class General6(ClosedForm):
         """The configurations ``(k, 6)``, each once, and of those on one curve the first."""
         kept: list[int] = []
         for i, row in enumerate(rows):
-            if all(_apart(rows[kept], row) > _SAME) and len(kept) < _MOST_ROWS:
+            if all(_apart(self.robot, rows[kept], row) > _SAME) and len(kept) < _MOST_ROWS:
                 kept.append(i)
         rows = np.ascontiguousarray(rows[kept])
         return rows[curves_among(self.robot, T, POSE, _JOINTS, rows, list(range(len(rows))))[1]]
@@ -221,7 +248,7 @@ class General6(ClosedForm):
     def _folds(self, q: Array) -> Array:
         """The smallest singular value ``(k,)`` at each configuration, lengths in shares of the reach."""
         J = jacobian(self.robot, q)
-        J[:, :3] /= self.robot.reach or 1.0
+        J[:, :3, self.robot.revolute] /= _size(self.robot)
         return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1])
 
     def _add_nearby(self, T: Array, q: Array) -> bool:
@@ -248,7 +275,7 @@ class General6(ClosedForm):
     def _add(self, T: Array, starts: Array, q: Array, count: int) -> int:
         """Add to the first `count` rows of q ``(16, 6)`` where descents from `starts` end; their number."""
         for row in self._descended(T, starts):
-            if count < SOLUTIONS and all(_apart(q[:count], row) > _SAME):
+            if count < SOLUTIONS and all(_apart(self.robot, q[:count], row) > _SAME):
                 q[count] = row
                 count += 1
         return count
@@ -256,7 +283,7 @@ class General6(ClosedForm):
     def _near_target(self, T: Array, step: Array) -> Array:
         """The solutions ``(k, 6)`` of a target close by."""
         moved, rows = T @ step, np.empty((SOLUTIONS, 6))
-        moved[:3, 3] = T[:3, 3] + self.robot.reach * step[:3, 3]
+        moved[:3, 3] = T[:3, 3] + _size(self.robot) * step[:3, 3]
         self._solve_all(moved, rows)
         return rows[~np.isnan(rows[:, 0])]
 
@@ -265,13 +292,14 @@ class General6(ClosedForm):
         rows, errors, wide = starts.copy(), np.empty(len(starts)), np.full(6, UNBOUNDED)
         goal = (np.ascontiguousarray(T), POSE, _MASK, 1.0)
         each_of(self.robot.model, goal, (-wide, wide, np.zeros(6)), -1.0, len(rows) + 1, rows, errors)
-        return np.asarray(math.pi - (math.pi - rows[errors < _MET]) % TURN)
+        met = rows[errors < _MET]
+        return np.asarray(np.where(self.robot.revolute, math.pi - (math.pi - met) % TURN, met))
 
     def branch_of(self, q: Array) -> int:
         """The row of q ``(6,)`` among all solutions of its pose."""
         out = np.empty((SOLUTIONS, 6))
         self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, q, out)
-        apart = np.abs((out - q + math.pi) % TURN - math.pi).max(axis=1)
+        apart = _apart(self.robot, out, q)
         return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:

@@ -11,6 +11,11 @@ and of the same of a and b on the right (Raghavan and Roth, J. Mechanical Design
 of the right-hand matrix removes a and b. With half-angle tangents of d and e six equations in nine monomials are
 left; multiplied by the tangent of d once more they are the twelve rows of a square matrix Z(c), which is singular
 where the loop closes.
+
+**Slides.** A joint that slides by s puts Tz(s) in the place of its turn. The fourteen quantities are quadratic in
+s, so (1, s, s²) takes the place of (1, cos, sin), and s that of the half tangent. For c, s = tan(φ/2) makes the
+equations linear in (1, cos φ, sin φ) once they are multiplied by cos²(φ/2): the rest of the method does not see
+the difference, but for a factor cos⁸(φ/2) of the determinant (:mod:`kin.solvers.general6.roots`). f must turn.
 """
 
 from __future__ import annotations
@@ -67,57 +72,72 @@ def moved_back(F: Array, x: float, y: float, z: float, w: float) -> tuple[float,
 
 
 @jit
-def _fourier(G: Array) -> None:
-    """G ``(14, 9)``: values at three by three angles → coefficients of (1, cos, sin) × (1, cos, sin), in place."""
+def _sample(slides: float, k: int) -> tuple[float, float, float]:
+    """(cos, sin, travel) of the k-th of the three values at which a joint is sampled."""
+    if slides != 0.0:
+        return 1.0, 0.0, k - 1.0
+    return COS3[k], SIN3[k], 0.0
+
+
+@jit
+def _fourier(G: Array, first: float, second: float) -> None:
+    """G ``(14, 9)``: values at three by three samples → coefficients of (1, cos, sin) × (1, cos, sin), in place.
+
+    Of a joint that slides, of (1, s, s²).
+    """
     for r in range(QUANTITIES):
         for part in range(2):
             stride, step = (1, 3) if part == 0 else (3, 1)
+            slides = (second if part == 0 else first) != 0.0
             for k in range(3):
                 i = k * step
                 u, v, w = G[r, i], G[r, i + stride], G[r, i + 2 * stride]
+                if slides:
+                    G[r, i], G[r, i + stride], G[r, i + 2 * stride] = v, 0.5 * (w - u), 0.5 * (u + w) - v
+                    continue
                 G[r, i] = (u + v + w) / 3.0
                 G[r, i + stride] = (2.0 * u - v - w) / 3.0
                 G[r, i + 2 * stride] = (v - w) / math.sqrt(3.0)
 
 
 @jit
-def _left(F: Array, B: Array) -> None:
+def _left(F: Array, slides: Array, B: Array) -> None:
     """B ``(14, 9)`` ← the quantities of F3 Rz(d) F4 Rz(e) F5 as coefficients of (d) × (e)."""
     col = np.empty(QUANTITIES)
     lx, ly, lz = F[4, 0, 2], F[4, 1, 2], F[4, 2, 2]
     px, py, pz = F[4, 0, 3], F[4, 1, 3], F[4, 2, 3]
     for j in range(3):
-        c, s = COS3[j], SIN3[j]
+        c, s, z = _sample(slides[4], j)
         l0, l1, l2 = moved(F[3], c * lx - s * ly, s * lx + c * ly, lz, 0.0)
-        p0, p1, p2 = moved(F[3], c * px - s * py, s * px + c * py, pz, 1.0)
+        p0, p1, p2 = moved(F[3], c * px - s * py, s * px + c * py, pz + z, 1.0)
         for i in range(3):
-            c, s = COS3[i], SIN3[i]
+            c, s, z = _sample(slides[3], i)
             u0, u1, u2 = moved(F[2], c * l0 - s * l1, s * l0 + c * l1, l2, 0.0)
-            v0, v1, v2 = moved(F[2], c * p0 - s * p1, s * p0 + c * p1, p2, 1.0)
+            v0, v1, v2 = moved(F[2], c * p0 - s * p1, s * p0 + c * p1, p2 + z, 1.0)
             quantities(u0, u1, u2, v0, v1, v2, col)
             for r in range(QUANTITIES):
                 B[r, 3 * i + j] = col[r]
-    _fourier(B)
+    _fourier(B, slides[3], slides[4])
 
 
 @jit
-def _right(F: Array, Q: Array) -> None:
+def _right(F: Array, slides: Array, Q: Array) -> None:
     """Q ``(14, 9)`` ← the quantities of F2⁻¹ Rz(−b) F1⁻¹ Rz(−a) F6⁻¹ as coefficients of (a) × (b)."""
     col = np.empty(QUANTITIES)
     lx, ly, lz = moved_back(F[5], 0.0, 0.0, 1.0, 0.0)
     px, py, pz = moved_back(F[5], 0.0, 0.0, 0.0, 1.0)
     for i in range(3):
-        c, s = COS3[i], SIN3[i]
+        c, s, z = _sample(slides[0], i)
         l0, l1, l2 = moved_back(F[0], c * lx + s * ly, c * ly - s * lx, lz, 0.0)
-        p0, p1, p2 = moved_back(F[0], c * px + s * py, c * py - s * px, pz, 1.0)
+        p0, p1, p2 = moved_back(F[0], c * px + s * py, c * py - s * px, pz - z, 1.0)
         for j in range(3):
-            c, s = COS3[j], SIN3[j]
+            c, s, z = _sample(slides[1], j)
             u0, u1, u2 = moved_back(F[1], c * l0 + s * l1, c * l1 - s * l0, l2, 0.0)
-            v0, v1, v2 = moved_back(F[1], c * p0 + s * p1, c * p1 - s * p0, p2, 1.0)
+            v0, v1, v2 = moved_back(F[1], c * p0 + s * p1, c * p1 - s * p0, p2 - z, 1.0)
             quantities(u0, u1, u2, v0, v1, v2, col)
             for r in range(QUANTITIES):
                 Q[r, 3 * i + j] = col[r]
-    _fourier(Q)
+    _fourier(Q, slides[0], slides[1])
 
 
 @jit
@@ -148,11 +168,16 @@ def _householder(Q: Array, diagonal: Array) -> None:
 
 
 @jit
-def _half_angles(E: Array) -> None:
-    """E ``(6, 9)``: coefficients of (1, cos, sin) of d and of e → those of powers 0…2 of their half tangents."""
+def _half_angles(E: Array, slides: Array) -> None:
+    """E ``(6, 9)``: coefficients of (1, cos, sin) of d and of e → those of powers 0…2 of their half tangents.
+
+    Those of a joint that slides are powers already.
+    """
     for r in range(6):
         for part in range(2):
             stride, step = (1, 3) if part == 0 else (3, 1)
+            if slides[4 - part] != 0.0:
+                continue
             for k in range(3):
                 i = k * step
                 one, cosine, sine = E[r, i], E[r, i + stride], E[r, i + 2 * stride]
@@ -160,14 +185,14 @@ def _half_angles(E: Array) -> None:
 
 
 @jit
-def eliminate(F: Array, B: Array, Q: Array, diagonal: Array, E: Array) -> None:
-    """The six equations that are left of the loop F ``(6, 3, 4)``.
+def eliminate(F: Array, slides: Array, B: Array, Q: Array, diagonal: Array, E: Array) -> None:
+    """The six equations that are left of the loop F ``(6, 3, 4)``; joints with slides ``(6,)`` ≠ 0 slide.
 
     B, Q ``(14, 9)`` ← both sides (Q as `_householder` leaves it, its first column being the constant), diagonal
     ``(8,)``, E ``(3, 6, 9)`` ← the parts of the equations that go with 1, cos c and sin c.
     """
-    _left(F, B)
-    _right(F, Q)
+    _left(F, slides, B)
+    _right(F, slides, Q)
     _householder(Q, diagonal)
     row = np.empty(QUANTITIES)
     for n in range(6):
@@ -179,7 +204,11 @@ def eliminate(F: Array, B: Array, Q: Array, diagonal: Array, E: Array) -> None:
                 dot += Q[r, k + 1] * row[r]
             for r in range(k, QUANTITIES):
                 row[r] -= dot * Q[r, k + 1]
+        if slides[2] != 0.0:
+            _slide_of_c(B, row, E[0, n], E[1, n], E[2, n])
         for m in range(9):
+            if slides[2] != 0.0:
+                break
             constant = row[12] * B[12, m] + row[13] * B[13, m]
             cosine = sine = 0.0
             for v in range(0, SCALARS, 3):
@@ -188,9 +217,29 @@ def eliminate(F: Array, B: Array, Q: Array, diagonal: Array, E: Array) -> None:
                 sine += row[v + 1] * B[v, m] - row[v] * B[v + 1, m]
             E[0, n, m], E[1, n, m], E[2, n, m] = constant, cosine, sine
         for r in range(QUANTITIES):
-            E[0, n, 0] -= row[r] * Q[r, 0]
+            shift = row[r] * Q[r, 0]
+            # cos² = ½ + ½ cos φ
+            E[0, n, 0] -= shift if slides[2] == 0.0 else 0.5 * shift
+            E[1, n, 0] -= 0.0 if slides[2] == 0.0 else 0.5 * shift
     for part in range(3):
-        _half_angles(E[part])
+        _half_angles(E[part], slides)
+
+
+@jit
+def _slide_of_c(B: Array, row: Array, one: Array, cosine: Array, sine: Array) -> None:
+    """One equation where c slides: one, cosine, sine ``(9,)`` ← its parts with 1, cos φ, sin φ, by cos²(φ/2).
+
+    p + s z for p in the fourteen quantities: l stays, the others get parts with s and s².
+    """
+    for m in range(9):
+        unit = 1.0 if m == 0 else 0.0
+        constant = 0.0
+        for r in range(QUANTITIES):
+            constant += row[r] * B[r, m]
+        linear = row[5] * unit - row[6] * B[1, m] + row[7] * B[0, m] + row[13] * B[2, m]
+        linear += 2.0 * (row[9] * B[7, m] - row[10] * B[6, m] - row[11] * B[13, m] + row[12] * B[5, m])
+        square = row[9] * B[0, m] + row[10] * B[1, m] - row[11] * B[2, m] + row[12] * unit
+        one[m], cosine[m], sine[m] = 0.5 * (constant + square), 0.5 * (constant - square), 0.5 * linear
 
 
 @inlined

@@ -1,6 +1,7 @@
 """From one angle to the whole configuration: null vector, back substitution, and least squares.
 
-A vector of monomials here is (x_d, x_d²) × (1, x_e, x_e²), with x_d and x_e the tangents of half of d and e.
+A vector of monomials here is (x_d, x_d²) × (1, x_e, x_e²), with x_d and x_e the tangents of half of d and e, or
+the travel of a joint that slides.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import numpy as np
 
 from kin.kernels.compile import jit
 from kin.solvers.common import wrap
-from kin.solvers.general6.elimination import QUANTITIES, SCALARS, UNKNOWN, moved
+from kin.solvers.general6.elimination import QUANTITIES, SCALARS, UNKNOWN, moved, quantities
 from kin.transforms import Array
 
 _FLAT = 1e-7  # of the largest entry: a pivot that leaves a second null vector
@@ -102,35 +103,56 @@ def monomials(vectors: Array, count: int) -> int:
 
 
 @jit
-def angles_of(v: Array) -> tuple[float, float]:
+def values_of(v: Array, slides: Array) -> tuple[float, float]:
     """d and e of a vector of monomials (x_d, x_d²) × (1, x_e, x_e²), with any factor."""
     j = 0
     for k in range(1, 3):
         if abs(v[k]) + abs(v[3 + k]) > abs(v[j]) + abs(v[3 + j]):
             j = k
-    d = 2.0 * math.atan2(v[3 + j], v[j])
+    d = _value(v[3 + j], v[j], slides[3])
     first = 0 if abs(v[0]) + abs(v[1]) + abs(v[2]) > abs(v[3]) + abs(v[4]) + abs(v[5]) else 3
     if abs(v[first]) + abs(v[first + 1]) < abs(v[first + 1]) + abs(v[first + 2]):
         first += 1
-    return d, 2.0 * math.atan2(v[first + 1], v[first])
+    return d, _value(v[first + 1], v[first], slides[4])
 
 
 @jit
-def others(F: Array, B: Array, Q: Array, diagonal: Array, t: Array) -> None:
+def _value(x: float, one: float, slides: float) -> float:
+    """A joint's value from x and 1 times the same factor."""
+    if slides != 0.0:
+        return x / one if one != 0.0 else math.inf
+    return 2.0 * math.atan2(x, one)
+
+
+@jit
+def _power(t: float, k: int, slides: float) -> float:
+    """Of (1, cos t, sin t) the k-th; of a joint that slides, of (1, t, t²)."""
+    if k == 0:
+        return 1.0
+    if slides != 0.0:
+        return t if k == 1 else t * t
+    return math.cos(t) if k == 1 else math.sin(t)
+
+
+@jit
+def others(F: Array, slides: Array, B: Array, Q: Array, diagonal: Array, t: Array) -> None:
     """t[0], t[1], t[5] ← a, b, f for the c, d, e in t ``(6,)``; the others as `eliminate` left them."""
     m = np.empty(9)
     for i in range(3):
-        x = 1.0 if i == 0 else (math.cos(t[3]) if i == 1 else math.sin(t[3]))
         for j in range(3):
-            m[3 * i + j] = x * (1.0 if j == 0 else (math.cos(t[4]) if j == 1 else math.sin(t[4])))
+            m[3 * i + j] = _power(t[3], i, slides[3]) * _power(t[4], j, slides[4])
     right = np.zeros(QUANTITIES)
     for r in range(QUANTITIES):
         for k in range(9):
             right[r] += B[r, k] * m[k]
-    c, s = math.cos(t[2]), math.sin(t[2])
-    for v in range(0, SCALARS, 3):
-        x, y = right[v], right[v + 1]
-        right[v], right[v + 1] = c * x - s * y, s * x + c * y
+    if slides[2] != 0.0:
+        s = right.copy()
+        quantities(s[0], s[1], s[2], s[3], s[4], s[5] + t[2], right)
+    else:
+        cosine, sine = math.cos(t[2]), math.sin(t[2])
+        for v in range(0, SCALARS, 3):
+            x, y = right[v], right[v + 1]
+            right[v], right[v + 1] = cosine * x - sine * y, sine * x + cosine * y
     for r in range(QUANTITIES):
         right[r] -= Q[r, 0]
     for k in range(UNKNOWN):
@@ -143,12 +165,13 @@ def others(F: Array, B: Array, Q: Array, diagonal: Array, t: Array) -> None:
         for j in range(k + 1, UNKNOWN):
             right[k] -= Q[k, j + 1] * right[j]
         right[k] = right[k] / diagonal[k] if diagonal[k] != 0.0 else 0.0
-    # Columns 1… of Q: cos b, sin b, cos a, cos a cos b, cos a sin b, sin a, …
-    t[1], t[0] = math.atan2(right[1], right[0]), math.atan2(right[5], right[2])
+    # Columns 1… of Q: cos b, sin b, cos a, cos a cos b, cos a sin b, sin a, …, or b, b², a, …
+    t[1] = right[0] if slides[1] != 0.0 else math.atan2(right[1], right[0])
+    t[0] = right[2] if slides[0] != 0.0 else math.atan2(right[5], right[2])
     t[5] = 0.0
     T = np.empty((3, 4))
     axes = np.empty((6, 6))
-    close(F, t, T, axes)
+    close(F, slides, t, T, axes)
     # The loop without f is M F6, and F6 M = Rz(−f): its first column.
     x, y, z = moved(T, F[5, 0, 0], F[5, 0, 1], F[5, 0, 2], 0.0)
     cosine, sine, _ = moved(F[5], x, y, z, 0.0)
@@ -156,8 +179,11 @@ def others(F: Array, B: Array, Q: Array, diagonal: Array, t: Array) -> None:
 
 
 @jit
-def close(F: Array, t: Array, T: Array, axes: Array) -> None:
-    """T ``(3, 4)`` ← the product around the loop, axes ``(6, 6)`` ← rows (direction, moment) of the joint axes."""
+def close(F: Array, slides: Array, t: Array, T: Array, axes: Array) -> None:
+    """T ``(3, 4)`` ← the product around the loop, axes ``(6, 6)`` ← rows (direction, moment) of the joint axes.
+
+    Of a joint that slides, the row is (0, direction).
+    """
     for r in range(3):
         for k in range(4):
             T[r, k] = 1.0 if r == k else 0.0
@@ -167,6 +193,11 @@ def close(F: Array, t: Array, T: Array, axes: Array) -> None:
         axes[i, 0], axes[i, 1], axes[i, 2] = zx, zy, zz
         axes[i, 3], axes[i, 4], axes[i, 5] = oy * zz - oz * zy, oz * zx - ox * zz, ox * zy - oy * zx
         c, s = math.cos(t[i]), math.sin(t[i])
+        if slides[i] != 0.0:
+            c, s = 1.0, 0.0
+            for r in range(3):
+                axes[i, r], axes[i, 3 + r] = 0.0, T[r, 2]
+                T[r, 3] += t[i] * T[r, 2]
         for r in range(3):
             x = c * T[r, 0] + s * T[r, 1]
             y = c * T[r, 1] - s * T[r, 0]
@@ -192,11 +223,11 @@ def _miss(T: Array, e: Array) -> float:
 
 
 @jit
-def polish(F: Array, t: Array) -> bool:
+def polish(F: Array, slides: Array, t: Array) -> bool:
     """Move t ``(6,)`` onto a solution of the loop, in place; False if none is near (Levenberg and Marquardt)."""
     T, axes, e, step = np.empty((3, 4)), np.empty((6, 6)), np.empty(6), np.empty(6)
     H, g, trial = np.empty((6, 6)), np.empty(6), np.empty(6)
-    close(F, t, T, axes)
+    close(F, slides, t, T, axes)
     cost = _miss(T, e)
     damping = 1e-3
     left = _STEPS
@@ -217,7 +248,7 @@ def polish(F: Array, t: Array) -> bool:
             if _damped_step(H, g, damping * cost + 1e-16, step):
                 for i in range(6):
                     trial[i] = t[i] + step[i]
-                close(F, trial, T, axes)
+                close(F, slides, trial, T, axes)
                 better = _miss(T, e)
                 if better < cost:
                     break
@@ -233,7 +264,7 @@ def polish(F: Array, t: Array) -> bool:
             break
         cost = better
     for i in range(6):
-        t[i] = wrap(t[i])
+        t[i] = wrap(t[i]) if slides[i] == 0.0 else t[i]
     return cost < _THERE * _THERE
 
 

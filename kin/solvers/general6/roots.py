@@ -15,6 +15,10 @@ as on a table whose angles were typed with a few decimals.
 With this noise each root gets a disc that bounds how far it may be off (Smith, J. ACM 17(4), 1970). Any k discs
 that hang together, apart from the others, hold exactly k roots. Groups that do not reach the unit circle hold no
 angle. If each group that does holds as many solutions as it has discs, no solution is missing (`covers_circle`).
+
+Where joint c slides by s = tan(φ/2), the determinant is a polynomial p(s) of degree sixteen times cos²⁴(φ/2), and
+p(s) cos¹⁶(φ/2) is a trigonometric polynomial of degree eight in φ. Near φ = π the determinant is too small to be
+divided by cos⁸(φ/2): there the coefficients of p, from samples on the circle |s| = 1, give the values.
 """
 
 from __future__ import annotations
@@ -54,18 +58,60 @@ _NEARBY = 0.4  # |log |z||: roots that are corrected
 _ON_CIRCLE = 0.03  # |log |z||: roots that are tried as real angles
 _OFF_CIRCLE = 1e4  # radii of uncertainty: a root that is farther from the circle is no real angle
 _CORRECTIONS = 40
+_FAR_OUT = 0.02  # |1 + z|; a slide beyond a hundred sizes of the arm
 _STRIDE = 0.1  # of one correction at most
 _RADII = 100.0  # the same in radii of uncertainty
 
 
 @jit
-def coefficients(E: Array, re: Array, im: Array) -> float:
+def _sampled_slide(E: Array, f: Array) -> None:
+    """f ``(17,)`` ← p(s) cos¹⁶(φ/2) at the samples of φ, where c slides."""
+    parts, A, W = (
+        np.empty((3, 6, 9)),
+        np.empty((2, 6, 9), dtype=np.complex128),
+        np.empty((6, 6), dtype=np.complex128),
+    )
+    p, x, y = np.zeros(TERMS), np.empty(TERMS), np.empty(TERMS)
+    parts[0], parts[1], parts[2] = E[0] + E[1], 2.0 * E[2], E[0] - E[1]  # of 1, s, s²
+    for j in range(DEGREE + 1):
+        s = complex(SAMPLES[j, 0], SAMPLES[j, 1])
+        value = times_determinant(condense(parts, s, s * s, A, W), W)
+        x[j], y[j] = value.real, value.imag
+    for k in range(TERMS):
+        p[k] = x[0] / TERMS
+        for j in range(1, DEGREE + 1):
+            at = (k * j) % TERMS
+            p[k] += 2.0 * (x[j] * SAMPLES[at, 0] + y[j] * SAMPLES[at, 1]) / TERMS
+    for j in range(TERMS):
+        half = math.pi * j / TERMS
+        cosine, sine, total, power = math.cos(half), math.sin(half), 0.0, 1.0
+        for k in range(TERMS):
+            total = total * cosine + p[k] * power
+            power *= sine
+        f[j] = total
+
+
+@jit
+def _factor(slides: bool, z: complex) -> complex:
+    """What the determinant at z = exp(iφ) has besides the trigonometric polynomial: cos⁸(φ/2) where c slides."""
+    if not slides:
+        return 1.0 + 0.0j
+    square = (1.0 + z) * (1.0 + z) / (4.0 * z)
+    return square * square * square * square
+
+
+@jit
+def coefficients(E: Array, slides: bool, re: Array, im: Array) -> float:
     """re, im ``(17,)`` ← the polynomial z⁸ det Z, lowest power first, divided by its largest modulus.
 
-    Returns that modulus.
+    `slides`: whether c does. Returns that modulus.
     """
     A, W, f = np.empty((2, 6, 9)), np.empty((6, 6)), np.empty(TERMS)
+    if slides:
+        _sampled_slide(E, f)
     for k in range(TERMS):
+        if slides:
+            break
         f[k] = times_determinant(condense(E, SAMPLES[k, 0], SAMPLES[k, 1], A, W), W)
     largest = 1e-300
     for k in range(DEGREE + 1):
@@ -84,14 +130,15 @@ def coefficients(E: Array, re: Array, im: Array) -> float:
 
 
 @jit
-def _noise_of(E: Array, re: Array, im: Array, largest: float) -> float:
+def _noise_of(E: Array, slides: bool, re: Array, im: Array, largest: float) -> float:
     """How far the determinant is from the polynomial between the samples, in largest coefficients."""
     A, W = np.empty((2, 6, 9)), np.empty((6, 6))
     worst = _NOISE
     for j in range(_PROBES.shape[0]):
         value = times_determinant(condense(E, _PROBE_X[j], _PROBE_Y[j], A, W), W) / largest
+        factor = _factor(slides, complex(_PROBE_X[j], _PROBE_Y[j])).real
         for k in range(DEGREE + 1):
-            value -= re[DEGREE + k] * _PROBE_COSINES[j, k] - im[DEGREE + k] * _PROBE_SINES[j, k]
+            value -= factor * (re[DEGREE + k] * _PROBE_COSINES[j, k] - im[DEGREE + k] * _PROBE_SINES[j, k])
         worst = max(worst, abs(value))
     return worst
 
@@ -149,7 +196,7 @@ def _near_circle(z: complex, bound: float) -> bool:
 
 
 @jit
-def _correct(E: Array, noise: float, z: Numbers, slope: Array) -> None:
+def _correct(E: Array, slides: bool, noise: float, z: Numbers, slope: Array) -> None:
     """Correct the roots z ``(16,)`` complex whose place is uncertain, in place."""
     A, W = np.empty((2, 6, 9), dtype=np.complex128), np.empty((6, 6), dtype=np.complex128)
     lead = 0.0 + 0.0j
@@ -158,15 +205,17 @@ def _correct(E: Array, noise: float, z: Numbers, slope: Array) -> None:
         for i in range(ROOTS):
             if slope[i] * _SURE > noise or not _near_circle(z[i], _NEARBY):
                 continue
+            if slides and abs(1.0 + z[i]) < _NEARBY:
+                continue
             if lead == 0.0:
-                lead = _leading(E, z)
+                lead = _leading(E, slides, z)
             far = lead
             for j in range(ROOTS):
                 far *= z[i] - z[j] if j != i else 1.0 + 0.0j
             square = far.real * far.real + far.imag * far.imag
             if not 0.0 < square < math.inf:
                 continue
-            step = polynomial_at(E, z[i], A, W) * far.conjugate() / square
+            step = polynomial_at(E, slides, z[i], A, W) * far.conjugate() / square
             size, most = abs(step), min(_STRIDE, _RADII * noise / (slope[i] + noise))
             if not size < most:
                 step *= most / size
@@ -177,17 +226,17 @@ def _correct(E: Array, noise: float, z: Numbers, slope: Array) -> None:
 
 
 @jit
-def polynomial_at(E: Array, z: complex, A: Numbers, W: Numbers) -> complex:
-    """z⁸ det Z; A ``(2, 6, 9)`` and W ``(6, 6)`` complex are scratch."""
+def polynomial_at(E: Array, slides: bool, z: complex, A: Numbers, W: Numbers) -> complex:
+    """z⁸ det Z, without the factor of a slide; A ``(2, 6, 9)`` and W ``(6, 6)`` complex are scratch."""
     back = 1.0 / z
     cosine, sine = 0.5 * (z + back), -0.5j * (z - back)
     z2 = z * z
     z4 = z2 * z2
-    return times_determinant(condense(E, cosine, sine, A, W), W) * (z4 * z4)
+    return times_determinant(condense(E, cosine, sine, A, W), W) * (z4 * z4) / _factor(slides, z)
 
 
 @jit
-def _leading(E: Array, z: Numbers) -> complex:
+def _leading(E: Array, slides: bool, z: Numbers) -> complex:
     """The leading coefficient a of ``z⁸ det Z = a Π (z − z_j)``, from the sample farthest from all roots."""
     A, W = np.empty((2, 6, 9), dtype=np.complex128), np.empty((6, 6), dtype=np.complex128)
     best, product, at = 0.0, 1.0 + 0.0j, 1.0 + 0.0j
@@ -196,26 +245,30 @@ def _leading(E: Array, z: Numbers) -> complex:
         far = 1.0 + 0.0j
         for j in range(ROOTS):
             far *= x - z[j]
+        if slides and x.real < 0.0:
+            continue
         if best < abs(far) < math.inf:
             best, product, at = abs(far), far, x
-    return polynomial_at(E, at, A, W) / product
+    return polynomial_at(E, slides, at, A, W) / product
 
 
 @jit
-def zeros(E: Array, doubtful: bool, z: Numbers, radius: Array, out: Array) -> int:
+def zeros(E: Array, slides: bool, doubtful: bool, z: Numbers, radius: Array, out: Array) -> int:
     """out ``(16,)`` ← the angles of all roots on the unit circle or almost there; returns their number.
 
     z ``(16,)`` complex ← centres of discs around all roots, radius ``(16,)`` ← theirs. With `doubtful` the angles
     are also those of roots that lie beside the circle by more than rounding explains.
     """
     re, im, zx, zy, slope = np.empty(TERMS), np.empty(TERMS), np.empty(ROOTS), np.empty(ROOTS), np.empty(ROOTS)
-    noise = _noise_of(E, re, im, coefficients(E, re, im))
+    noise = _noise_of(E, slides, re, im, coefficients(E, slides, re, im))
     aberth(re, im, noise, zx, zy, slope)
     for i in range(ROOTS):
         z[i] = complex(zx[i], zy[i])
-    _correct(E, noise, z, slope)
+    _correct(E, slides, noise, z, slope)
     count = 0
     for i in range(ROOTS):
+        if slides and abs(1.0 + z[i]) < _FAR_OUT:
+            continue
         off = abs(math.hypot(z[i].real, z[i].imag) - 1.0)
         if off < _ON_CIRCLE and (doubtful or off * slope[i] < _OFF_CIRCLE * noise):
             out[count] = math.atan2(z[i].imag, z[i].real)

@@ -3,26 +3,16 @@
 from __future__ import annotations
 
 import itertools
-import math
 
 import numpy as np
 import pytest
+from sliding import RIGHT, arm, check_postures, random_arm
 
 import kin
 from kin.robot import Robot
 from kin.solvers import closed_form_of
 
-RIGHT = 0.5 * math.pi
 ORDERS = sorted(set(itertools.permutations("PPPRRR")))
-
-
-def arm(kinds: str, numbers) -> Robot:
-    """A standard table from rows (θ, d, a, α); P slides and R turns."""
-    return Robot.from_dh([
-        {"kind": "prismatic" if kind == "P" else "revolute", "theta": theta, "d": d, "a": a, "alpha": alpha,
-         **({"limits": (-1.0, 1.0)} if kind == "P" else {})}
-        for kind, (theta, d, a, alpha) in zip(kinds, numbers, strict=True)
-    ])  # fmt: skip
 
 
 GANTRY = arm(
@@ -31,29 +21,10 @@ GANTRY = arm(
 )
 
 
-def random_arm(kinds: str, rng: np.random.Generator) -> Robot:
-    return arm(
-        kinds, np.column_stack([rng.uniform(-3, 3, 6), rng.uniform(-0.5, 0.5, (6, 2)), rng.uniform(-2.8, 2.8, 6)])
-    )
-
-
-def apart(robot: Robot, a, b) -> float:
-    off = np.asarray(a) - b
-    return float(np.abs(np.where(robot.revolute, (off + math.pi) % (2.0 * math.pi) - math.pi, off)).max())
-
-
 def check(robot: Robot, rng: np.random.Generator, poses: int, descents: int) -> None:
-    """The generating configuration is there, each is verified, and descents from random starts find no other."""
+    """Every posture is there, and proved to be all."""
     assert closed_form_of(robot).name == "slides3"
-    for q in robot.random_q(rng, poses):
-        T = kin.fk(robot, q)
-        result = kin.solve_ik(robot, T, respect_limits=False)
-        assert result.completeness == "proved"
-        assert min(apart(robot, s.q, q) for s in result.solutions) < 1e-6
-        assert max(s.position_error + s.rotation_error for s in result.solutions) < 1e-9
-        for seed in robot.random_q(rng, descents):
-            for other in kin.solve_ik(robot, T, solver="numeric", q_seed=seed, respect_limits=False).solutions:
-                assert min(apart(robot, s.q, other.q) for s in result.solutions) < 1e-5
+    assert check_postures(robot, rng, poses, descents) == {"proved": poses}
 
 
 @pytest.mark.parametrize("kinds", ORDERS[::4], ids="".join)

@@ -1,0 +1,186 @@
+"""Arms with one turning and two sliding joints, in any order: both postures of a point.
+
+Let P(θ) be the tool's point with both slides at zero, and u(θ), v(θ) their directions, all in the base frame. A
+point p is met where p − P is in the plane of u and v:
+
+    (p − P(θ)) · (u(θ) × v(θ)) = 0.
+
+This is A cos θ + B sin θ + C = 0, wherever the turning joint is. With both slides before it, only P turns. With
+both after it, the part R w of P that turns meets the normal R (u × v), and their product does not depend on θ.
+With one on each side, R w · (u × R v) = u · R (v × w). So there are two values of θ, or none. The slides follow
+from two linear equations.
+
+Degenerate: A = B = 0, where no value or every value of θ is right (planar arms: they cannot reach most points),
+and u parallel to v at these values.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.fk import fk, jacobian
+from kin.kernels.compile import jit
+from kin.kernels.jacobian import jacobian_into
+from kin.robot import Robot
+from kin.solvers.common import TURN, clear, wrap
+from kin.solvers.contract import (
+    APPROACH,
+    POSE,
+    POSITION,
+    BatchKernels,
+    Candidates,
+    ClosedForm,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
+from kin.solvers.singular import Singularity, by_jacobian, those_within
+from kin.transforms import Array
+
+NAME = "slides2"
+TITLE = "closed form, one turning and two sliding joints"
+BRANCHES = ("solution 1", "solution 2")
+_REGULAR = 1e-4  # smallest singular value of the Jacobian, of the largest
+_FLAT = 1e-14  # square of the sine between two slides that count as parallel
+_ALIKE = 1e-9  # how far beyond ±1 the cosine of an angle may be: rounding error
+_THIRD = 2.0 * math.pi / 3.0
+# Layout of the parameters: the indices of the turning and of the sliding joints, the arm's model.
+TURN_AT, SLIDES, MODEL = 0, 1, 3
+
+
+def match(robot: Robot) -> Slides2 | None:
+    """The closed form, if one of three joints turns, two slide, and the point can move in any direction."""
+    if robot.n != 3 or robot.revolute.sum() != 1:
+        return None
+    J = jacobian(robot, np.random.default_rng(5).uniform(-1.0, 1.0, (4, 3)))[:, :3]
+    J[..., robot.revolute] /= robot.reach if math.isfinite(robot.reach) else 1.0
+    return Slides2(robot) if np.linalg.matrix_rank(J, rtol=_REGULAR).max() == 3 else None
+
+
+@jit
+def _at(params: Array, T: Array, angle: float, left: Array, axes: Array) -> float:
+    """left ``(3,)`` ← p − P, axes ``(2, 3)`` ← the slides' directions; returns (p − P) · (u × v)."""
+    J, P, lines, q = np.empty((6, 3)), np.empty((4, 4)), np.empty((3, 7)), np.zeros(3)
+    q[int(params[TURN_AT])] = angle
+    jacobian_into(params[MODEL:], q, J, P, lines)
+    for i in range(3):
+        left[i] = T[i, 3] - P[i, 3]
+        for k in range(2):
+            axes[k, i] = J[i, int(params[SLIDES + k])]
+    u, v = axes[0], axes[1]
+    return float(
+        left[0] * (u[1] * v[2] - u[2] * v[1])
+        + left[1] * (u[2] * v[0] - u[0] * v[2])
+        + left[2] * (u[0] * v[1] - u[1] * v[0])
+    )
+
+
+@jit
+def configurations(params: Array, T: Array, near: Array, out: Array) -> None:
+    """out ``(2, 3)`` ← the configurations that meet the point of a finite target T ``(4, 4)``, then NaN.
+
+    `near` decides θ where every value is right.
+    """
+    clear(out)
+    left, axes, f = np.empty(3), np.empty((2, 3)), np.empty(3)
+    for k in range(3):
+        f[k] = _at(params, T, k * _THIRD, left, axes)
+    constant = (f[0] + f[1] + f[2]) / 3.0
+    cosine, sine = (2.0 * f[0] - f[1] - f[2]) / 3.0, (f[1] - f[2]) / math.sqrt(3.0)
+    size = math.sqrt(cosine * cosine + sine * sine)
+    if abs(constant) > size * (1.0 + _ALIKE):
+        return
+    if size > 0.0:
+        middle, half = math.atan2(sine, cosine), math.acos(min(max(-constant / size, -1.0), 1.0))
+    else:
+        middle, half = near[int(params[TURN_AT])], 0.0
+    for row in range(2):
+        angle = middle + half if row == 0 else middle - half
+        _at(params, T, angle, left, axes)
+        uv = ux = vx = 0.0
+        for i in range(3):
+            uv += axes[0, i] * axes[1, i]
+            ux += axes[0, i] * left[i]
+            vx += axes[1, i] * left[i]
+        square = 1.0 - uv * uv
+        if square < _FLAT:
+            continue
+        out[row, int(params[TURN_AT])] = wrap(angle)
+        out[row, int(params[SLIDES])] = (ux - uv * vx) / square
+        out[row, int(params[SLIDES + 1])] = (vx - uv * ux) / square
+
+
+@jit
+def branches_one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+    """out ``(2, 3)`` ← the configurations for the point of the target T ``(4, 4)``; False if T is not finite.
+
+    `value` is not used: a point leaves nothing free.
+    """
+    for r in range(4):
+        for k in range(4):
+            if not math.isfinite(T[r, k]):
+                clear(out)
+                return False
+    configurations(params, T, near, out)
+    return True
+
+
+@jit
+def branches_many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+    """out ``(N, 2, 3)`` ← the configurations for each of the targets T ``(N, 4, 4)``."""
+    for k in range(T.shape[0]):
+        branches_one(params, T[k], values[0], near, out[k])
+
+
+class Slides2(ClosedForm):
+    """The closed form of an arm with one turning and two sliding joints."""
+
+    name, title, branches = NAME, TITLE, BRANCHES
+    reason = "one of three joints turns and two slide"
+    lengths = ()
+    named = False
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        order = np.concatenate([np.flatnonzero(robot.revolute), np.flatnonzero(~robot.revolute)])
+        params = np.concatenate([order, robot.model]).astype(np.float64)
+        self.kernels = BatchKernels(params, branches_one, branches_many)
+
+    def handles(self, task: int) -> bool:
+        """Points; of a pose or an approach direction the point is met, and the caller judges the rest."""
+        return task in (POSE, APPROACH, POSITION)
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """None."""
+        return ()
+
+    def solve(self, problem: SolverInput) -> Candidates:
+        """Both configurations."""
+        q = np.empty((2, 3))
+        configurations(self.kernels.params, np.ascontiguousarray(problem.T), problem.seed, q)
+        there = ~np.isnan(q[:, 0])
+        obstacle = None if there.any() else Obstacle("point")
+        flat = bool((self._smallest(q[there]) < _REGULAR).any())
+        return Candidates(q, np.empty((2, 0)), (), 0.0, obstacle, "agreed" if flat else "proved")
+
+    def _smallest(self, q: Array) -> Array:
+        """The smallest singular value of the Jacobian of the point ``(k,)``, lengths in shares of the reach."""
+        J = jacobian(self.robot, q)[:, :3]
+        J[..., self.robot.revolute] /= self.robot.reach if math.isfinite(self.robot.reach) else 1.0
+        return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1])
+
+    def branch_of(self, q: Array) -> int:
+        """The row of q ``(3,)`` among the configurations of its point."""
+        out, near = np.empty((2, 3)), np.array(q, dtype=np.float64)
+        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, near, out)
+        off = out - q
+        turns = self.robot.revolute
+        off[:, turns] = (off[:, turns] + math.pi) % TURN - math.pi
+        apart = np.abs(off).max(axis=1)
+        return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
+
+    def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
+        """The smallest singular value of the Jacobian of the point."""
+        return those_within(within, by_jacobian(jacobian(self.robot, q)[:3], rank=3))
