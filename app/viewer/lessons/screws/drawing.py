@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import viser
 
+from app.viewer.declared.scene import arrow_color
 from app.viewer.lessons.figures import GREY, Figure, clear_of, set_visible
 from app.viewer.lessons.screws.product import foot
-from app.viewer.lessons.velocity.drawing import arrow_color, ring_arrow, wxyz_along
+from app.viewer.lessons.velocity.drawing import ring_arrow, wxyz_along
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.meshes import body
 from app.viewer.skeleton import cylinder, places, skeleton

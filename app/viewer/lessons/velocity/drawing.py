@@ -1,7 +1,4 @@
-"""The lesson's drawings at the tool: ellipsoid, arrows of a column, lost directions.
-
-Nodes are created once for an arm and then posed: the ellipsoid is a unit sphere with a rotation and three scales.
-"""
+"""The lesson's drawings at the tool: ellipsoid, arrows of a column and of a force, lost directions."""
 
 from __future__ import annotations
 
@@ -9,10 +6,10 @@ import math
 from functools import lru_cache
 
 import numpy as np
-import viser
 
-from app.viewer.labels import add_label
-from app.viewer.lessons.figures import set_visible
+from app.viewer.declared.scene import Color, Lazy, Node, arrows, frame, handle, label, lines, mesh
+from app.viewer.lessons.velocity.facts import VelocityFacts, scale_of
+from app.viewer.lessons.velocity.views import COLORS, COLUMN, LOST, SAMPLE, SLOW, label_texts
 from app.viewer.scene.arm.arm_scene import GIZMO
 from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import Solid, cone, merged, placed, tube
@@ -20,190 +17,125 @@ from kin import Robot
 from kin.differential.ellipsoids import Ellipsoid
 from kin.transforms import Array, frame_from_approach, wxyz_from_rotation
 
-COLORS: dict[Ellipsoid, tuple[int, int, int]] = {
-    "velocity": (86, 180, 233),
-    "turning": (204, 121, 167),
-    "force": (230, 159, 0),
-    "moment": (240, 228, 66),
-}
-COLUMN, LOST, SLOW = (0, 114, 178), (213, 40, 0), (184, 122, 0)
 AXIS_LINE = (90, 90, 90)
-# Relative to the radius of the sphere around the arm.
+# All lengths are relative to the radius of the sphere around the arm.
 FLAT, LONGEST = 0.004, 0.62
 # What is lost is drawn outside of the gizmo, whose arrows are `GIZMO` long: from `CLEAR` on.
 CLEAR = 1.12 * GIZMO
 RING, LOST_RING, LOST_ARROW = 0.13, 0.075, CLEAR + 0.2
 MOST_LOST = 3
+FORCE = 0.35  # of the arrow of 10 N
+HANDLE = 0.11  # of the arrows that are dragged
+CROSS = np.stack([-np.eye(3), np.eye(3)], axis=1).astype(np.float32)
 CHOICES = np.array([(1.0, b, c) for b in (1.0, -1.0) for c in (1.0, -1.0)])
 
 
-class Drawing:
-    """The drawings for one arm, below the node `root`; the visitor's worker calls it."""
-
-    def __init__(self, scene: viser.SceneApi, robot: Robot, root: str) -> None:
-        self.radius = body(robot).radius
-        r = self.radius
-        self._root = scene.add_frame(root, show_axes=False)
-        self._kind: Ellipsoid | None = None
-        self._tips = np.zeros(3)
-        self._R = np.eye(3)
-        # All parts of the ellipsoid are children of its principal axes: rotating it is one message.
-        self._body = scene.add_frame(f"{root}/body", show_axes=False, visible=False)
-        from trimesh.creation import icosphere  # its import takes a quarter of a second
-
-        sphere = icosphere(subdivisions=3)
-        self._ellipsoid = scene.add_mesh_simple(
-            f"{root}/body/ellipsoid",
-            np.asarray(sphere.vertices),
-            np.asarray(sphere.faces),
-            opacity=0.32,
-            cast_shadow=False,
-            receive_shadow=False,
+def scene(now: VelocityFacts, read: VelocityFacts, eye: Array) -> list[Node]:
+    """All drawings; numbers and lost directions are those that the panel shows, as seen from `eye` ``(3,)``."""
+    r, kind, chosen = body(now.robot).radius, now.settings.ellipsoid, now.settings.joint
+    parts: list[Node | Lazy] = [Lazy("lost", _lost, (read,))]
+    if kind is not None:
+        parts.append(_ellipsoid(now, read, kind, eye, r))
+    if chosen is not None:
+        parts += _column(now, chosen, r)
+    if now.settings.statics.on:
+        end = force_scale(now.robot) * np.array(now.settings.statics.force)
+        parts.append(
+            arrows("force", np.array([[np.zeros(3), end]]), COLORS["force"], (0.013 * r, 0.034 * r, 0.08 * r))
         )
-        ends = np.eye(3, dtype=np.float32)
-        self._axes = scene.add_line_segments(
-            f"{root}/body/axes",
-            np.stack([-ends, ends], axis=1),
-            AXIS_LINE,
-            thickness=2.0,
-            thickness_units="screen",
-        )
-        self._labels = [
-            add_label(scene, f"{root}/body/value-{k + 1}", "", scale=0.8, anchor="center-center") for k in range(3)
-        ]
-        self._column, self._lost = (
-            scene.add_arrows(
-                f"{root}/{name}",
-                np.zeros((1, 2, 3), np.float32),
-                arrow_color(color),
-                shaft_radius=0.011 * r,
-                head_radius=0.028 * r,
-                head_length=0.07 * r,
-                visible=False,
-            )
-            for name, color in (("column", COLUMN), ("lost", LOST))
-        )
-        self._turn = self._ring(scene, f"{root}/turn", False, COLUMN, RING)
-        self._lost_turns = [
-            self._ring(scene, f"{root}/lost-turn-{k + 1}", True, LOST, LOST_RING) for k in range(MOST_LOST)
-        ]
-
-        self._lost_axes = scene.add_line_segments(
-            f"{root}/lost-axes",
-            np.zeros((1, 2, 3), np.float32),
-            LOST,
-            thickness=1.5,
-            thickness_units="screen",
-            visible=False,
-        )
-
-    def _ring(
-        self, scene: viser.SceneApi, name: str, double: bool, color: tuple[int, int, int], radius: float
-    ) -> viser.MeshHandle:
-        mesh = ring_arrow(double)
-        return scene.add_mesh_simple(
-            name,
-            np.asarray(mesh.vertices),
-            np.asarray(mesh.faces),
-            color=color,
-            scale=radius * self.radius,
-            cast_shadow=False,
-            visible=False,
-        )
-
-    def place(self, tool: Array) -> None:
-        """Move everything to the tool point ``(3,)``."""
-        self._root.position = tool
-
-    def show_ellipsoid(self, kind: Ellipsoid, R: Array, lengths: Array) -> bool:
-        """Draw an ellipsoid with axes R ``(3, 3)`` and semi-axes `lengths` ``(3,)`` in metres.
-
-        Flat ellipsoids are drawn as thin discs, very long ones truncated; returns whether it was truncated.
-        """
-        shown = np.clip(lengths, FLAT * self.radius, LONGEST * self.radius)
-        if kind != self._kind:
-            self._kind = kind
-            self._ellipsoid.color = COLORS[kind]
-            self._body.visible = True
-        self._R = R
-        self._body.wxyz = wxyz_from_rotation(R)
-        self._ellipsoid.scale = self._axes.scale = (float(shown[0]), float(shown[1]), float(shown[2]))
-        # Values are outside of the gizmo too.
-        self._tips = np.maximum(shown + 0.05 * self.radius, CLEAR * self.radius)
-        return bool((lengths > LONGEST * self.radius).any())
-
-    def write_values(self, texts: tuple[str, str, str], eye: Array) -> None:
-        """Label the axes of the ellipsoid with their values, as seen from a point ``(3,)``."""
-        ends = np.diag(self._tips * sides(self._R * self._tips, eye - self._root.position))
-        for label, text, end in zip(self._labels, texts, ends, strict=True):
-            label.text = text
-            label.position = end
-
-    def hide_ellipsoid(self) -> None:
-        """Hide the ellipsoid."""
-        self._kind = None
-        self._body.visible = False
-
-    def show_column(self, linear: Array | None, angular: Array | None) -> None:
-        """Draw a straight arrow ``(3,)`` in metres and a turning arrow about ``(3,)``; None or zero hides one."""
-        straight = linear is not None and float(np.linalg.norm(linear)) > 0.02 * self.radius
-        set_visible(self._column, straight)
-        if straight:
-            self._column.points = np.array([[np.zeros(3), linear]], np.float32)
-        turning = angular is not None and float(np.linalg.norm(angular)) > 1e-6
-        set_visible(self._turn, turning)
-        if angular is not None and turning:
-            self._turn.wxyz = wxyz_along(angular)
-
-    def show_lost(self, twists: Array, certain: bool) -> None:
-        """Draw double arrows along and about twists ``(k, 6)``: red if lost, amber if only slow."""
-        color = LOST if certain else SLOW
-        arrows = []
-        for twist in twists[:MOST_LOST]:
-            size = float(np.linalg.norm(twist[:3]))
-            if size > 1e-3:
-                end = twist[:3] / size * LOST_ARROW * self.radius
-                start = end * (CLEAR / LOST_ARROW)
-                arrows += [[start, end], [-start, -end]]
-        set_visible(self._lost, bool(arrows))
-        if arrows:
-            self._lost.points = np.array(arrows, np.float32)
-            self._lost.colors = np.array(arrow_color(color), np.uint8)
-        turning = [twist for twist in twists[:MOST_LOST] if float(np.linalg.norm(twist[3:])) > 1e-3]
-        set_visible(self._lost_axes, bool(turning))
-        if turning:
-            places = np.array([[np.zeros(3), self._ring_place(twist)] for twist in turning], np.float32)
-            self._lost_axes.points = places
-            self._lost_axes.colors = np.array(color, np.uint8)
-        for k, node in enumerate(self._lost_turns):
-            shown = k < len(twists) and float(np.linalg.norm(twists[k, 3:])) > 1e-3
-            set_visible(node, shown)
-            if shown:
-                node.wxyz = wxyz_along(twists[k, 3:])
-                node.position = self._ring_place(twists[k])
-                node.color = color
-
-    def _ring_place(self, twist: Array) -> Array:
-        """Where the arrow of a lost rotation is, on its axis ``(3,)``: at the side that is farther up.
-
-        Beyond the arrow of the motion that is lost with it, if they are along the same line.
-        """
-        axis = twist[3:] / float(np.linalg.norm(twist[3:]))
-        axis = axis if axis[2] >= 0.0 else -axis
-        along = float(np.linalg.norm(twist[:3])) > 1e-3 and abs(float(axis @ twist[:3])) > 0.8 * float(
-            np.linalg.norm(twist[:3])
-        )
-        return np.asarray(axis * ((LOST_ARROW if along else CLEAR) + 0.5 * LOST_RING) * self.radius)
-
-    def remove(self) -> None:
-        """Remove everything from the scene."""
-        self._root.remove()
+        parts.append(handle("tip", end, HANDLE * r, ("on_tip",)))
+    return [frame("tool", *parts, position=now.T[:3, 3])]
 
 
-def arrow_color(color: tuple[int, int, int]) -> tuple[int, int, int]:
-    """The colour to send for arrows that look like a mesh of `color`: the scene applies gamma to arrows."""
-    red, green, blue = (round(255 * ((v / 255 + 0.055) / 1.055) ** 2.4) for v in color)
-    return red, green, blue
+def force_scale(robot: Robot) -> float:
+    """Metres in the scene for a newton."""
+    return FORCE * body(robot).radius / 10.0
+
+
+def truncated(facts: VelocityFacts) -> bool:
+    """Whether the ellipsoid is too long to be drawn."""
+    return bool((_lengths(facts) > LONGEST * body(facts.robot).radius).any())
+
+
+def _lengths(facts: VelocityFacts) -> Array:
+    return facts.semi * (SAMPLE / scale_of(facts.robot, facts.settings.ellipsoid or "velocity"))
+
+
+def _ellipsoid(now: VelocityFacts, read: VelocityFacts, kind: Ellipsoid, eye: Array, r: float) -> Node:
+    """A unit sphere with a rotation and three scales: flat ones are thin discs."""
+    a, b, c = np.clip(_lengths(now), FLAT * r, LONGEST * r).tolist()
+    return frame(
+        "body",
+        mesh("ellipsoid", _sphere(), COLORS[kind], (a, b, c), opacity=0.32, receive_shadow=False),
+        lines("axes", CROSS, AXIS_LINE, 2.0, (a, b, c)),
+        Lazy("values", _values, (read, eye)),
+        wxyz=wxyz_from_rotation(now.axes.R),
+    )
+
+
+def _values(facts: VelocityFacts, eye: Array) -> list[Node]:
+    """The values at the ends of the axes, outside of the gizmo."""
+    r = body(facts.robot).radius
+    tips = np.maximum(np.clip(_lengths(facts), FLAT * r, LONGEST * r) + 0.05 * r, CLEAR * r)
+    ends = np.diag(tips * sides(facts.axes.R * tips, eye - facts.T[:3, 3]))
+    texts = label_texts(facts.semi)
+    return [label(f"value-{k + 1}", text, end, 0.8) for k, (text, end) in enumerate(zip(texts, ends, strict=True))]
+
+
+def _column(now: VelocityFacts, joint: int, r: float) -> list[Node]:
+    """A straight arrow for the motion of the tool, and a round one for its turning."""
+    linear, angular = now.J[:3, joint] * (SAMPLE / scale_of(now.robot, "velocity")), now.J[3:, joint]
+    parts = []
+    if np.linalg.norm(linear) > 0.02 * r:
+        parts.append(_arrows("column", [[np.zeros(3), linear]], COLUMN, r))
+    if np.linalg.norm(angular) > 1e-6:
+        parts.append(mesh("turn", ring_arrow(False), COLUMN, RING * r, wxyz=wxyz_along(angular)))
+    return parts
+
+
+def _lost(facts: VelocityFacts) -> list[Node]:
+    """Double arrows along and about the directions that are lost: red; amber if they are only slow."""
+    straight: list[list[Array]] = []
+    parts, r = [], body(facts.robot).radius
+    color, twists = LOST if facts.state == "at" else SLOW, facts.twists[:MOST_LOST]
+    turning = [(k, twist) for k, twist in enumerate(twists, 1) if np.linalg.norm(twist[3:]) > 1e-3]
+    for twist in twists:
+        if (size := float(np.linalg.norm(twist[:3]))) > 1e-3:
+            end = twist[:3] / size * LOST_ARROW * r
+            start = end * (CLEAR / LOST_ARROW)
+            straight += [[start, end], [-start, -end]]
+    if straight:
+        parts.append(_arrows("lost", straight, color, r))
+    if turning:
+        places = np.array([[np.zeros(3), _ring_place(twist, r)] for _, twist in turning])
+        parts.append(lines("lost-axes", places, color, 1.5))
+    for k, twist in turning:
+        turn, at = wxyz_along(twist[3:]), _ring_place(twist, r)
+        parts.append(mesh(f"lost-turn-{k}", ring_arrow(True), color, LOST_RING * r, position=at, wxyz=turn))
+    return parts
+
+
+def _arrows(key: str, points: list[list[Array]], color: Color, r: float) -> Node:
+    return arrows(key, np.array(points), color, (0.011 * r, 0.028 * r, 0.07 * r))
+
+
+def _ring_place(twist: Array, r: float) -> Array:
+    """Where the arrow of a lost rotation is, on its axis ``(3,)``: at the side that is farther up.
+
+    Beyond the arrow of the motion that is lost with it, if they are along the same line.
+    """
+    axis, size = twist[3:] / float(np.linalg.norm(twist[3:])), float(np.linalg.norm(twist[:3]))
+    axis = axis if axis[2] >= 0.0 else -axis
+    along = size > 1e-3 and abs(float(axis @ twist[:3])) > 0.8 * size
+    return np.asarray(axis * ((LOST_ARROW if along else CLEAR) + 0.5 * LOST_RING) * r)
+
+
+@lru_cache(maxsize=1)
+def _sphere() -> Solid:
+    from trimesh.creation import icosphere  # its import takes a quarter of a second
+
+    sphere = icosphere(subdivisions=3)
+    return Solid(np.asarray(sphere.vertices), np.asarray(sphere.faces))
 
 
 def sides(tips: Array, towards: Array) -> Array:

@@ -14,7 +14,6 @@ from kin.differential.null_space import NullSpace
 from kin.transforms import Array
 from kin.units import Units, fixed, power
 
-FORCE = (230, 159, 0)  # as the ellipsoid of forces
 FREE = 1e-6  # m; a direction whose force needs less torque per newton needs none
 TASKS: dict[Task, str] = {"pose": "pose", "approach": "point + approach", "position": "point"}
 CONDITION = "Condition number κ"
@@ -68,6 +67,13 @@ def null_html(robot: Robot, task: Task, space: NullSpace, speeds: tuple[Array, A
 def margin_html(share: float) -> str:
     """How near the nearest joint limit is."""
     return render("velocity/margin", share=f"{100.0 * share:.0f}")
+
+
+def null_and_margin_html(
+    robot: Robot, task: Task, space: NullSpace, speeds: tuple[Array, Array, Array], w: float, share: float
+) -> str:
+    """`null_html` and `margin_html`."""
+    return null_html(robot, task, space, speeds, w) + margin_html(share)
 
 
 def line_html(robot: Robot, found: Along, units: Units) -> str:

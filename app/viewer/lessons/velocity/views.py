@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 from markupsafe import Markup
 
-from app.viewer.lessons.velocity.drawing import COLORS, COLUMN, LOST, SLOW
 from app.viewer.views.mathml import ident, sub, text
 from app.viewer.views.mathml import math as formula
 from app.viewer.views.templates import render
@@ -20,6 +19,13 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 from kin.units import Units, fixed
 
+COLORS: dict[Ellipsoid, tuple[int, int, int]] = {
+    "velocity": (86, 180, 233),
+    "turning": (204, 121, 167),
+    "force": (230, 159, 0),
+    "moment": (240, 228, 66),
+}
+COLUMN, LOST, SLOW = (0, 114, 178), (213, 40, 0), (184, 122, 0)
 State = Literal["far", "near", "at"]
 
 # A singularity is "near" within this angle, or within this angle times the arm's reach.

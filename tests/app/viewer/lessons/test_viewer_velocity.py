@@ -6,11 +6,10 @@ import itertools
 import math
 import re
 from collections.abc import Iterator
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import viser
+from bare_page import bare_page
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
@@ -18,17 +17,17 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.arm import Arm
+from app.viewer.declared.press import Press
 from app.viewer.lessons.velocity import views
 from app.viewer.lessons.velocity.drawing import ring_arrow, sides, wxyz_along
-from app.viewer.lessons.velocity.jog import BUTTONS, Press, button, moved, step
+from app.viewer.lessons.velocity.jog import BUTTONS, button, moved, step
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.lessons.velocity.views import NEAR, nice, real, state_of
 from app.viewer.server import ViewerServer
 from kin.differential.ellipsoids import axes_of, condition, lost, part_of, semi_axes, task_rates
 from kin.differential.task import natural_task, task_jacobian, usual_rank
 from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
-from kin.units import DEFAULT_UNITS, Units
+from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -413,12 +412,18 @@ def test_a_singular_pose_is_shown_with_its_kind_and_lost_directions(tab: FakeBro
 
 
 def test_a_column_is_drawn_and_removed(tab: FakeBrowser) -> None:
-    arrow, ring = (next(n for n in tab.nodes if n.endswith(end)) for end in ("/column", "/turn"))
+    def drawn(part: str) -> bool:
+        return any(n.endswith(part) and tab.visible.get(n) is not False for n in tab.nodes)
+
+    assert not drawn("/column")
+    assert not drawn("/turn")
     tab.set("Column", "2")
-    tab.wait(lambda: tab.visible.get(ring) is True and tab.visible.get(arrow) is True)
-    assert "Joint 2 at 1 rad/s" in tab.html
+    tab.wait(lambda: drawn("/column") and drawn("/turn"))
+    tab.wait(lambda: "Joint 2 at 1 rad/s" in tab.html)
     tab.set("Column", "2")
-    tab.wait(lambda: tab.visible.get(ring) is False and tab.visible.get(arrow) is False)
+    tab.wait(lambda: not drawn("/column") and not drawn("/turn"))
+    tab.set("Column", "1")
+    tab.wait(lambda: drawn("/column"))
     tab.set("Lesson", "None")
     tab.wait(lambda: not [n for n in tab.nodes if n.startswith("/velocity")])
 
@@ -436,18 +441,8 @@ def test_buttons_are_named_after_their_action() -> None:
 
 
 def test_a_shared_state_is_restored_and_an_invalid_one_is_ignored() -> None:
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
-        robot = STORE.get("ur5")
-        client = SimpleNamespace(gui=server.gui, scene=server.scene, camera=SimpleNamespace(position=np.ones(3)))
-        stage = SimpleNamespace(
-            client=client,
-            now=Arm(robot, robot.q_home, robot.q_home),
-            units=DEFAULT_UNITS,
-            dark=False,
-            show_legend=lambda html: None,
-        )
-        lesson = VelocityLesson(stage)  # type: ignore[arg-type]
+    with bare_page(STORE.get("ur5")) as page:
+        lesson = page.open(VelocityLesson)
         first = lesson.state()
         force = {"on": True, "force": [1.0, -2.0, 3.0]}
         other = {"frame": "tool", "ellipsoid": "moment", "joint": 6, "step": 0.02, "turn": 0.1, "statics": force}
@@ -460,20 +455,20 @@ def test_a_shared_state_is_restored_and_an_invalid_one_is_ignored() -> None:
         lesson.restore(first)
         assert lesson.state() == first
         # Late events of replaced fields are not read in the new units.
-        stage.units = Units(False, "cm")
+        page.set("Step, mm", 5.0)
+        page.set("Turn, °", 0.2)
+        page.units = Units(False, "cm")
         lesson.on_style()
-        lesson.handle(("step", DEFAULT_UNITS), 5.0)
-        lesson.handle(("turn", DEFAULT_UNITS), 0.2)
+        page.rest()
         assert lesson.state() == first
-        lesson.handle(("step", stage.units), 5.0)
-        lesson.handle(("turn", stage.units), 0.2)
+        page.set("Step, cm", 5.0)
+        page.set("Turn, rad", 0.2)
+        page.rest()
         assert lesson.state() == {**first, "step": 0.05, "turn": 0.2}
         lesson.restore(first)
         lesson.restore({"ellipsoid": "none"})
         assert lesson.state()["ellipsoid"] == "none"
         lesson.remove()
-    finally:
-        server.stop()
 
 
 def test_values_are_labelled_at_axis_ends_that_are_apart_on_screen() -> None:

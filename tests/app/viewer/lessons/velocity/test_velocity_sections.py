@@ -16,8 +16,8 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons.velocity import section_views as views
 from app.viewer.lessons.velocity.along import SAMPLES, along, between, controllable
-from app.viewer.lessons.velocity.null_motion import GOALS
-from app.viewer.lessons.velocity.statics import torques
+from app.viewer.lessons.velocity.facts import torques
+from app.viewer.lessons.velocity.settings import GOALS
 from app.viewer.panel.joints import label
 from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer

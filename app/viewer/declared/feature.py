@@ -1,0 +1,205 @@
+"""A feature that declares what it shows: the settings, the nodes of panel and scene, and what events do.
+
+Subclasses have a class of settings and one of facts, and override what they need; nothing they override touches
+viser::
+
+    class Counter(DeclaredFeature[CounterSettings, Sum]):
+        key, title, settings_of, facts_of = "counter", "Counter", CounterSettings, Sum
+
+        def panel(self) -> Sequence[panel.Node]:
+            total = Html(views.sum_html, (self.read.sum,))
+            return [Control("step"), Button("Add", self.event(self.on_add)), total]
+
+        def on_add(self) -> None:
+            self.change(total=self.settings.total + self.settings.step)
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Generic, ParamSpec, TypeVar, cast
+
+from app.viewer.declared.facts import Facts
+from app.viewer.declared.fields import Settings
+from app.viewer.declared.panel import Event, PanelView
+from app.viewer.declared.panel import Node as PanelNode
+from app.viewer.declared.scene import Lazy, SceneView
+from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.feature import Feature, Stage
+from kin import InputError
+from kin.transforms import Array
+
+S = TypeVar("S", bound=Settings)
+F = TypeVar("F", bound=Facts[Any])
+P = ParamSpec("P")
+OWN = frozenset({"at", "do", "drag"})  # the keys of events of declared nodes
+
+
+class DeclaredFeature(Feature, Generic[S, F]):
+    """See the module.
+
+    Attributes:
+        settings_of, facts_of: the classes of settings and facts.
+        undo: what undo calls an event, by the method that it calls, if not by the feature's title.
+        pace: the panel follows a moving arm at this interval (s): nobody reads faster, and HTML is long.
+        facts: what is known of settings and arm now, made by `look`; the same object as long as both are.
+        read: the facts that the panel shows. Drawings that change no faster than the panel use these.
+    """
+
+    settings_of: ClassVar[type[Settings]]
+    facts_of: ClassVar[type[Facts[Any]]]
+    undo: ClassVar[dict[str, str]] = {}
+    pace: ClassVar[float] = 0.05
+
+    def __init_subclass__(cls) -> None:
+        # Otherwise the page's own script could call any method.
+        if cls.messages & OWN:
+            raise TypeError(f"{cls.__name__}.messages must not contain {', '.join(sorted(cls.messages & OWN))}")
+
+    def __init__(self, stage: Stage) -> None:
+        super().__init__(stage)
+        self.settings: S = cast(S, self.settings_of.fresh(stage.now.robot))
+        self._panel = PanelView(stage.client.gui, self.post)
+        self._scene = SceneView(stage.client.scene, self.key, self.post)
+        self._shown_at = 0.0
+        self._write = self._stale = False
+        self._seen: tuple[object, ...] = ()
+        self.facts: F
+        self.read: F
+        self.started()
+        self.refresh()
+
+    # To be overridden
+
+    def started(self) -> None:
+        """There is a robot: the first, or another one."""
+
+    def look(self) -> F:
+        """The facts of the present settings and arm."""
+        return cast(F, self.facts_of(self.settings, self.stage.now))
+
+    def panel(self) -> Sequence[PanelNode]:
+        """What the panel shows."""
+        return ()
+
+    def scene(self) -> Sequence[SceneNode | Lazy]:
+        """What the scene shows; asked for with each frame of a moving arm."""
+        return ()
+
+    def legend(self) -> str | None:
+        """What is drawn, in words; None: the feature has no legend."""
+        return None
+
+    def changed(self, path: str) -> None:
+        """The visitor has set the field at this path."""
+
+    def advance(self, now: float) -> float | None:
+        """Continue a motion or long work; returns in how many seconds to go on, None: there is none."""
+        return None
+
+    # For subclasses
+
+    def change(self, **values: Any) -> None:
+        """Set fields."""
+        self.settings = replace(self.settings, **values)
+
+    @staticmethod
+    def event(method: Callable[P, None], *args: P.args, **_: P.kwargs) -> Event:
+        """The event that calls one of the feature's methods; the arguments are hashable."""
+        return method.__name__, *args
+
+    def wake(self, seconds: float = 0.0) -> None:
+        """Ask for `advance`, and show what is declared, in so many seconds or earlier."""
+        self._stale = self._stale or seconds == 0.0
+        self.due = seconds if self.due is None else min(self.due, seconds)
+
+    def refresh(self) -> None:
+        """Show what is declared now."""
+        self._shown_at, self.due, self._stale = time.perf_counter(), None, False
+        self._look()
+        self.read = self.facts
+        stage = self.stage
+        self._panel.show(self.panel(), self.settings, stage.now.robot, stage.units, self._write)
+        self._write = False
+        self._scene.show(self.scene())
+        if (words := self.legend()) is not None:
+            stage.show_legend(words)
+
+    def _look(self) -> None:
+        arm = self.stage.now
+        target = None if arm.target is None else arm.target.tobytes()
+        places = (arm.q.tobytes(), arm.goal.tobytes(), target)
+        seen = (self.settings, *places, arm.robot, arm.task, arm.branch, arm.locks, arm.obstacles, arm.avoid)
+        if seen != self._seen:
+            self._seen, self.facts = seen, self.look()
+
+    # Feature
+
+    def handle(self, key: Hashable, value: object) -> None:
+        self.wake()  # shown once, after all events that wait, and after errors
+        match key:
+            case ("at", str(path), int(serial)):
+                if (spec := self._panel.spec(serial)) is None:
+                    return  # replaced since, by a control in other units
+                name = spec.names or path.rpartition(".")[2]
+                found = spec.read(name, value, self.stage.now.robot, self.stage.units)
+                self._panel.took(serial, found)
+                self.settings = self.settings.with_value(path, found)
+                self.changed(path)
+            case ("do", (str(name), *arguments), int(serial), int()):
+                if self._panel.is_live(serial):
+                    getattr(self, name)(*arguments)
+            case ("drag", (str(name), *arguments)):
+                assert isinstance(value, tuple)
+                getattr(self, name)(*arguments, *value[:1], value[1:])
+            case _:
+                raise InputError(self.key, key, "a control of this feature")
+
+    def step_name(self, key: Hashable) -> str:
+        match key:
+            case ("at", str(path), int()):
+                return self.settings_of.spec(path).undo or self.title
+            case ("do" | "drag", (str(name), *_), *_):
+                return self.undo.get(name, self.title)
+        return self.title
+
+    def on_robot(self) -> None:
+        self._scene.remove()
+        self.settings = self.settings.for_robot(self.stage.now.robot)
+        self.started()
+        self.refresh()
+
+    def on_pose(self, T_base_tool: Array) -> None:
+        self._look()
+        self._scene.show(self.scene())
+        self.due = max(0.0, self.pace - (time.perf_counter() - self._shown_at))
+
+    def on_style(self) -> None:
+        self.refresh()
+
+    def tick(self, now: float) -> None:
+        again = self.advance(now)
+        wait = self.pace - (now - self._shown_at)
+        if wait <= 0.0 or self._stale:
+            self.refresh()
+            wait = self.pace
+        elif again is None:
+            self.due = wait
+        if again is not None:
+            self.due = min(wait, again)
+
+    def state(self) -> dict[str, object]:
+        return self.settings.state()
+
+    def restore(self, state: dict[str, object]) -> None:
+        self.settings = self.settings.restored(state, self.stage.now.robot)
+        self._write = True
+        self.refresh()
+
+    def remove(self) -> None:
+        if self.legend() is not None:
+            self.stage.show_legend("")
+        self._scene.remove()
+        self._panel.remove()

@@ -1,0 +1,344 @@
+"""What a panel shows, as nodes, and the reconciler that keeps viser's controls equal to them.
+
+Nodes are made anew for each update. A node is the successor of the one with the same key in the same folder;
+without a key, of the one of the same type and number. A successor changes properties of the control that is there.
+A control is only replaced if it shows another unit, so that what was typed before is not read in the new unit, or
+if its `of` is another one.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Any
+
+import numpy as np
+import viser
+
+from app.viewer.declared.fields import Settings, Spec
+from app.viewer.declared.press import Press
+from app.viewer.viser_patches import show_content, show_value
+from kin import Robot
+from kin.units import Units
+
+Event = tuple[Hashable, ...]
+Post = Callable[[Hashable, object], None]
+
+
+@dataclass(slots=True, eq=False)
+class Html:
+    """HTML that `view` makes of `args`; it is called again only when these have changed."""
+
+    view: Callable[..., str]
+    args: tuple[Any, ...] = ()
+    key: str = ""
+
+
+@dataclass(slots=True, eq=False)
+class Folder:
+    """A folder with nodes; without a label only a container."""
+
+    label: str | None
+    children: Sequence[Node]
+    open: bool = True
+    key: str = ""
+    visible: bool = True
+
+
+@dataclass(slots=True, eq=False)
+class Control:
+    """The control of the field at a path of the settings.
+
+    Attributes:
+        label, hint: in place of those of the field.
+        spec: what is valid here, in place of the field's own, where it depends on facts: options, limits.
+        of: another one makes a new control, so that late events of the old one are void.
+    """
+
+    path: str
+    hint: str | None = None
+    visible: bool = True
+    key: str = ""
+    label: str | None = None
+    spec: Spec | None = None
+    of: Hashable = None
+
+
+@dataclass(slots=True, eq=False)
+class Button:
+    """A button and its event; with `hold`, also that many events a second while it is held down."""
+
+    label: str
+    event: Event
+    hint: str | None = None
+    hold: float = 0.0
+    key: str = ""
+    visible: bool = True
+    of: Hashable = None
+
+
+@dataclass(slots=True, eq=False)
+class Buttons:
+    """A group of buttons, and the events by their labels. Another `of` makes a new group: late events are void.
+
+    `offered` are the labels on show, all if it is None: a click on one that has just gone still counts.
+    """
+
+    label: str
+    events: Mapping[str, Event]
+    hint: str | None = None
+    offered: tuple[str, ...] | None = None
+    of: Hashable = None
+    key: str = ""
+
+
+@dataclass(slots=True, eq=False)
+class Progress:
+    """A progress bar, in per cent."""
+
+    value: float
+    key: str = ""
+
+
+@dataclass(slots=True, eq=False)
+class Native:
+    """What no node describes: `build` makes it in the open container, once; what it returns has `remove`."""
+
+    build: Callable[[], Any]
+    key: str = ""
+
+
+Node = Html | Folder | Control | Button | Buttons | Progress | Native
+
+
+@dataclass(slots=True, eq=False)
+class _Mounted:
+    """A control in the page. `serial` is in its events; `known`: the value of the setting that it shows."""
+
+    handle: Any
+    identity: Hashable
+    order: float
+    serial: int
+    spec: Spec | None = None
+    known: Any = None
+    props: dict[str, Any] = field(default_factory=dict)
+    args: tuple[Any, ...] = ()
+    events: Mapping[str, Event] = field(default_factory=dict)
+    children: dict[Hashable, _Mounted] = field(default_factory=dict)
+
+
+class PanelView:
+    """The controls of one feature, in the container that is open when this is made.
+
+    Events are posted as ``("at", path, serial)`` with a value, and ``("do", event, serial, press)``.
+    """
+
+    def __init__(self, gui: viser.GuiApi, post: Post) -> None:
+        self._gui, self._post = gui, post
+        self._top = gui.add_folder(None)
+        self._mounted: dict[Hashable, _Mounted] = {}
+        self._live: dict[int, _Mounted] = {}
+        self._serials = count(1)
+
+    def show(
+        self, nodes: Sequence[Node], settings: Settings, robot: Robot, units: Units, write: bool = False
+    ) -> None:
+        """Make the panel equal to these nodes. `write`: controls whose value was refused show the setting."""
+        self._settings, self._robot, self._units, self._write = settings, robot, units, write
+        self._fill(self._top, nodes, self._mounted)
+
+    def spec(self, serial: object) -> Spec | None:
+        """What is valid for the control with this number; None: it is no longer there."""
+        found = self._live.get(serial) if isinstance(serial, int) else None
+        return None if found is None else found.spec
+
+    def is_live(self, serial: object) -> bool:
+        """Whether the control with this number is still there; 0: an event of no control."""
+        return serial == 0 or serial in self._live
+
+    def took(self, serial: int, value: object) -> None:
+        """A control's own event has set this value: it is not sent back, so that a slider follows its finger."""
+        self._live[serial].known = value
+
+    def remove(self) -> None:
+        """Remove everything."""
+        self._top.remove()
+        self._live.clear()
+
+    def _fill(
+        self, parent: viser.GuiFolderHandle, nodes: Sequence[Node], mounted: dict[Hashable, _Mounted]
+    ) -> None:
+        numbers: dict[type, int] = {}
+        gone = set(mounted)
+        for order, node in enumerate(nodes, 1):
+            kind = type(node)
+            number = numbers[kind] = numbers.get(kind, 0) + 1
+            key: Hashable = node.key or (node.path if isinstance(node, Control) else (kind, number))
+            gone.discard(key)
+            identity = self._identity(node)
+            one = mounted.get(key)
+            if one is not None and one.identity != identity:
+                self._drop(one)
+                one = None
+            if one is None:
+                with parent:
+                    one = mounted[key] = self._make(node, identity, float(order))
+                self._live[one.serial] = one
+            elif one.order != order:
+                one.order = one.handle.order = float(order)
+            self._update(node, one)
+        for key in gone:
+            self._drop(mounted.pop(key))
+
+    def _drop(self, one: _Mounted) -> None:
+        self._forget(one)
+        one.handle.remove()
+
+    def _forget(self, one: _Mounted) -> None:
+        self._live.pop(one.serial, None)
+        for child in one.children.values():
+            self._forget(child)
+
+    def _spec(self, node: Control) -> Spec:
+        return node.spec or self._settings.spec(node.path)
+
+    def _identity(self, node: Node) -> Hashable:
+        """A control of another identity is made anew."""
+        match node:
+            case Control(of=of):
+                spec = self._spec(node)
+                fixed = spec.fixed(self._robot, self._units)
+                return spec.kind, spec.unit(self._units), of, tuple(fixed.items())
+            case Buttons(of=of) | Button(of=of):
+                return of
+        return None
+
+    def _inputs(self, node: Node) -> tuple[Any, ...]:
+        """What the properties of a control depend on."""
+        match node:
+            case Control(label=label, hint=hint, visible=visible, spec=spec):
+                return label, hint, visible, spec, self._robot, self._units
+            case Button(label=label, hint=hint, visible=visible):
+                return label, hint, visible
+            case Buttons(label=label, hint=hint, events=events, offered=offered):
+                return label, hint, offered or tuple(events)
+            case Folder(label=label, visible=visible):
+                return label, visible
+            case Html(args=args):
+                return args
+        return ()
+
+    def _props(self, node: Node) -> dict[str, Any]:
+        match node:
+            case Control(hint=hint, visible=visible):
+                spec = self._spec(node)
+                props = spec.props(self._robot, self._units)
+                unit, label = props.pop("unit", ""), node.label or spec.label
+                label = label if not unit else f"{label}, {unit}"
+                return {"label": label, "hint": hint or spec.hint, "visible": visible, **props}
+            case Button(label=label, hint=hint, visible=visible):
+                return {"label": label, "hint": hint, "visible": visible}
+            case Buttons(label=label, hint=hint, events=events, offered=offered):
+                return {"label": label, "hint": hint, "options": offered or tuple(events)}
+            case Folder(label=label, visible=visible):
+                return {"label": label, "visible": visible}
+        return {}
+
+    def _make(self, node: Node, identity: Hashable, order: float) -> _Mounted:
+        gui, props = self._gui, self._props(node)
+        one = _Mounted(None, identity, order, next(self._serials), props=props, args=self._inputs(node))
+        match node:
+            case Html(view=view, args=args):
+                one.handle = gui.add_html(view(*args), order=order)
+            case Folder(open=is_open):
+                one.handle = gui.add_folder(**props, expand_by_default=is_open, order=order)
+            case Control(path=path):
+                spec, one.known = self._spec(node), self._settings.at(path)
+                shown = spec.shown(one.known, self._robot, self._units)
+                fixed = spec.fixed(self._robot, self._units)
+                one.handle = getattr(gui, f"add_{spec.kind}")(initial_value=shown, order=order, **props, **fixed)
+                self._listen(one.handle, path, one.serial)
+            case Button(event=event, hold=hold):
+                one.handle = gui.add_button(order=order, **props)
+                one.events = {"": event}
+                self._listen_button(one.handle, one, hold)
+            case Buttons():
+                one.handle = gui.add_button_group(order=order, **props)
+                self._listen_group(one.handle, one)
+            case Progress(value=value):
+                one.handle = gui.add_progress_bar(value, order=order)
+            case Native(build=build):
+                one.handle = build()
+        return one
+
+    def _update(self, node: Node, one: _Mounted) -> None:
+        args = self._inputs(node)
+        if not same(args, one.args):
+            one.args = args
+            if isinstance(node, Html):
+                show_content(one.handle, node.view(*args))
+            else:
+                props, before = self._props(node), one.props
+                for name, value in props.items():
+                    if before[name] != value:
+                        setattr(one.handle, name, value)
+                one.props = props
+        if isinstance(node, Folder):
+            self._fill(one.handle, node.children, one.children)
+        elif isinstance(node, Button):
+            one.events = {"": node.event}
+        elif isinstance(node, Buttons):
+            one.events = node.events
+        elif isinstance(node, Progress):
+            show_value(one.handle, node.value)
+        elif isinstance(node, Control):
+            one.spec = spec = self._spec(node)
+            value = self._settings.at(node.path)
+            if self._write or value != one.known:
+                one.known = value
+                show_value(one.handle, spec.shown(value, self._robot, self._units))
+
+    def _listen(self, handle: Any, path: str, serial: int) -> None:
+        async def changed(event: Any) -> None:
+            if event.client is not None:
+                self._post(("at", path, serial), event.target.value)
+
+        handle.on_update(changed)
+
+    def _listen_group(self, handle: Any, one: _Mounted) -> None:
+        async def clicked(event: Any) -> None:
+            if event.client is not None and (found := one.events.get(event.target.value)) is not None:
+                self._post(("do", found, one.serial, 0), None)
+
+        handle.on_click(clicked)
+
+    def _listen_button(self, handle: Any, one: _Mounted, hold: float) -> None:
+        press = Press()
+
+        # Each press has a number, so that no tap is lost; a slow worker skips repeats of one press.
+        async def held(found: Any) -> None:
+            if found.client is not None and press.held(time.monotonic()):
+                self._post(("do", one.events[""], one.serial, press.number), None)
+
+        async def clicked(found: Any) -> None:
+            if found.client is not None and (not hold or press.clicked(time.monotonic())):
+                self._post(("do", one.events[""], one.serial, press.number), None)
+
+        if hold:
+            handle.on_hold(held, callback_hz=hold)
+        handle.on_click(clicked)
+
+
+def same(a: Sequence[Any], b: Sequence[Any]) -> bool:
+    """Whether arguments are the same: arrays by their values, everything else as it compares."""
+    return len(a) == len(b) and all(x is y or _equal(x, y) for x, y in zip(a, b, strict=True))
+
+
+def _equal(x: Any, y: Any) -> bool:
+    if isinstance(x, np.ndarray) or isinstance(y, np.ndarray):
+        return isinstance(x, np.ndarray) and isinstance(y, np.ndarray) and np.array_equal(x, y)
+    if isinstance(x, list | tuple) and isinstance(y, list | tuple):
+        return same(x, y)
+    return bool(x == y)

@@ -1,0 +1,249 @@
+"""A page without a browser, a worker or a session: a feature and what viser's handles say it shows.
+
+`BarePage` is the stage of one feature. `panel` and `scene` describe what is on show in a form that does not depend
+on how it was made: names, ids and hidden nodes of the scene do not count.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import Hashable, Iterator
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import viser
+
+import kin
+from app.shared.store import Store
+from app.viewer.arm import Arm
+from app.viewer.feature import Feature
+from kin.transforms import Array, from_position_wxyz
+from kin.units import DEFAULT_UNITS
+
+STORE = Store()
+EYE = np.array([1.7, 1.1, 0.9])
+
+
+class BarePage:
+    """The stage of one feature; the arm moves where it is sent, at once.
+
+    Attributes:
+        sent: the kinds of the messages to the browser.
+        notices, legend, poses: what the feature has said, and where it has sent the arm.
+    """
+
+    def __init__(self, server: viser.ViserServer, robot: kin.Robot) -> None:
+        self.client = SimpleNamespace(
+            gui=server.gui, scene=server.scene, camera=SimpleNamespace(position=EYE), client_id=0
+        )
+        self.store, self.units, self.dark, self.frame = STORE, DEFAULT_UNITS, False, 1 / 30
+        self.own: Any = None
+        self.legend, self.translucent = "", False
+        self.notices: list[Any] = []
+        self.views: list[tuple[Any, ...]] = []
+        self.events: list[tuple[Hashable, object]] = []
+        self.feature: Feature | None = None
+        self.targets: list[Array] = []
+        self.activity = SimpleNamespace(changed=lambda: None, lesson=None)
+        self.use(robot)
+
+    def use(self, robot: kin.Robot, q: Array | None = None, **more: Any) -> None:
+        """Show a robot at a configuration, and what else `Arm` has."""
+        q = robot.q_home if q is None else q
+        self.now = Arm(robot, q, q, **more)
+
+    def post(self, key: Hashable, value: object = None) -> None:
+        self.events.append((key, value))
+
+    def move_to(self, q: Array, notice: Any = None, at_once: bool = False) -> None:
+        self.now = Arm(self.now.robot, np.array(q), np.array(q), task=self.now.task)
+        if notice is not None:
+            self.notices.append(notice)
+        if self.feature is not None:
+            self.feature.on_pose(self.now.T_tool)
+
+    def set_target(self, T: Array) -> None:
+        self.targets.append(T)
+
+    def notify(self, notice: Any) -> None:
+        self.notices.append(notice)
+
+    def show_legend(self, html: str) -> None:
+        self.legend = html
+
+    def see_through(self, on: bool, gizmo: bool = False) -> None:
+        self.translucent = on
+
+    def fit_view(self, spheres: Any, points: Array | None = None) -> None:
+        self.views.append((spheres, points))
+
+    def play(self, on: bool) -> None:
+        pass
+
+    # What happens
+
+    def open(self, feature: type[Feature]) -> Any:
+        """Build a feature."""
+        self.feature = feature(self)  # type: ignore[arg-type]
+        self.rest()
+        return self.feature
+
+    def rest(self, most: float = 60.0) -> None:
+        """Handle what was posted, and tick until the feature sleeps."""
+        assert self.feature is not None
+        end = time.monotonic() + most
+        while self.events or self.feature.due is not None:
+            while self.events:
+                key, value = self.events.pop(0)
+                assert isinstance(key, tuple)
+                assert key[:2] == ("feature", self.feature.key)
+                self.feature.handle(key[2], value)
+            if self.feature.due is not None:
+                time.sleep(min(self.feature.due, 0.3))
+                self.feature.tick(time.perf_counter())
+            assert time.monotonic() < end, "the feature does not come to rest"
+
+    def pose(self, q: Array, **more: Any) -> None:
+        """Move the arm."""
+        assert self.feature is not None
+        self.use(self.now.robot, q, **more)
+        self.feature.on_pose(self.now.T_tool)
+        self.rest()
+
+    def restore(self, state: dict[str, object]) -> None:
+        """Restore a state as a link does."""
+        assert self.feature is not None
+        self.feature.restore(state)
+        self.rest()
+
+    def style(self, units: Any) -> None:
+        """Change the units."""
+        assert self.feature is not None
+        self.units = units
+        self.feature.on_style()
+        self.rest()
+
+    def change(self, robot: kin.Robot) -> None:
+        """Select another robot."""
+        assert self.feature is not None
+        self.use(robot)
+        self.translucent = False
+        self.feature.on_robot()
+        self.rest()
+
+    def set(self, label: str, value: object) -> None:
+        """Set a control as a visitor does; what it posts waits for `rest`."""
+        handle = self.control(label)
+        handle._impl.value = value
+        target = SimpleNamespace(value=value)
+        for call in handle._impl.update_cb:
+            asyncio.run(call(SimpleNamespace(client=self.client, target=target)))
+
+    def press(self, label: str, option: str | None = None) -> None:
+        """Press a button as a visitor does, or one of a group."""
+        self.set(label, True if option is None else option)
+
+    def watch(self) -> None:
+        """Note the kinds of messages in `sent` from now on."""
+        self.sent: list[str] = []
+        interface = self.client.gui._websock_interface
+        queue = type(interface).queue_message
+
+        def noted(message: Any) -> None:
+            self.sent.append(type(message).__name__)
+            queue(interface, message)
+
+        interface.queue_message = noted
+
+    # What is shown
+
+    def control(self, label: str) -> Any:
+        """The handle of the control with this label."""
+        handles = list(self.client.gui._gui_input_handle_from_uuid.values())
+        (found,) = [h for h in handles if getattr(h._impl.props, "label", None) == label]
+        return found
+
+    def panel(self) -> list[Any]:
+        """The controls that are seen, in their order, with all their properties; containers without a name do not
+        count."""
+        gui = self.client.gui
+        return list(_inside(gui, gui._container_handle_from_uuid["root"]))
+
+    def scene(self) -> list[tuple[str, list[float], dict[str, Any]]]:
+        """What is drawn: kind, pose in the scene ``(12,)``, and properties of each visible node."""
+        nodes = self.client.scene._handle_from_node_name
+        found = []
+        for name, node in nodes.items():
+            if (T := _pose(nodes, name)) is None:
+                continue
+            props = {key: _plain(value) for key, value in vars(node._impl.props).items()}
+            kind = type(node).__name__
+            if kind == "FrameHandle" and not props["show_axes"]:
+                continue
+            if kind == "LineSegmentsHandle" and not len(props["points"]):
+                continue
+            found.append((kind, T[:3].ravel().tolist(), props))
+        return found
+
+
+@contextmanager
+def bare_page(robot: kin.Robot) -> Iterator[BarePage]:
+    """A page for a robot, with a server of its own."""
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        yield BarePage(server, robot)
+    finally:
+        server.stop()
+
+
+def _inside(gui: Any, container: Any) -> Iterator[Any]:
+    children = sorted(container._children.values(), key=lambda child: child._impl.props.order)
+    for child in children:
+        props = {k: _plain(v) for k, v in vars(child._impl.props).items()}
+        if not props.get("visible", True):
+            continue
+        for name in ("order", "visible", "_markdown"):
+            props.pop(name, None)
+        kind = type(child).__name__
+        if kind == "GuiFolderHandle":
+            inner = list(_inside(gui, child))
+            if props["label"] is None:
+                yield from inner
+            else:
+                yield {"kind": kind, **props, "inside": inner}
+        elif kind != "GuiHtmlHandle" or props["content"]:
+            value = getattr(child._impl, "value", None)
+            yield {"kind": kind, "value": _plain(value) if kind != "GuiButtonGroupHandle" else None, **props}
+
+
+def _pose(nodes: dict[str, Any], name: str) -> Array | None:
+    """The pose in the scene ``(4, 4)``; None: it is hidden."""
+    T = np.eye(4)
+    parts = name.strip("/").split("/")
+    for k in range(len(parts)):
+        above = nodes.get("/" + "/".join(parts[: k + 1]))
+        if above is None:
+            continue
+        if not above._impl.visible:
+            return None
+        T = T @ from_position_wxyz(above._impl.position, above._impl.wxyz)
+    return T
+
+
+def _plain(value: Any) -> Any:
+    """A property as JSON has it."""
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if value is None or isinstance(value, str | int | float):
+        return value
+    return vars(value) if hasattr(value, "__dict__") else str(value)

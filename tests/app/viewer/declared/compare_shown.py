@@ -1,0 +1,145 @@
+"""Compares what features show here with what they show in another checkout: panels, scenes, links, legends.
+
+    python tests/app/viewer/declared/compare_shown.py /path/to/other/checkout [feature …]
+
+Each feature gets a page, on which all arms follow each other. Each of them is shown at home, with some settings,
+at random configurations, and in other units. Numbers may differ by `TOLERANCE`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from bare_page import STORE, bare_page
+
+from kin.units import DEFAULT_UNITS, Units
+
+TOLERANCE = 2e-5
+STATES: dict[str, list[dict[str, object]]] = {
+    "velocity": [
+        {"frame": "tool", "ellipsoid": "moment", "joint": 2, "statics": {"on": True, "force": [1, -2, 3.5]}},
+        {"frame": "base", "ellipsoid": "none", "joint": 1, "step": 0.02, "turn": 0.1, "statics": {"on": False}},
+        {"frame": ["tool"], "ellipsoid": "soul", "joint": 99, "step": 1e9, "turn": "1", "statics": 5},
+        {"ellipsoid": "force", "joint": 0},
+    ],
+    "redundancy": [{"free": "theta2", "swing": False}, {"free": 5, "swing": "yes"}],
+    "rotations": [
+        {"convention": "zxz-moving", "angles": [0.1, 0.0, 0.2], "chained": False, "turn": 1.0, "shift": 0.1},
+        {"chained": True, "chain": [[True, 0, 0.5, True], [False, 2, 0.1, False]], "motion": "Shift along x"},
+        {"convention": 5, "angles": [1, 2], "chain": "x", "motion": [], "own": 3, "turn": 99.0, "shift": "far"},
+        {"chained": True, "own": False, "motion": "Turn about y"},
+    ],
+    "numeric": [
+        {"method": "transpose", "damping": 0.2, "gain": 0.5, "longest": 0.3, "limits": True, "match": "point"},
+        {"method": "damped", "compare": True, "at": 2, "picture": True},
+        {"method": "guess", "damping": 99, "gain": "1", "longest": -1, "match": 3, "target": [1], "start": [1]},
+    ],
+    "postures": [
+        {"ghosts": False, "cone": True, "hidden": []},
+        {"ghosts": True, "cone": False, "hidden": ["shoulder_right/elbow_up/wrist_flip", "nonsense", 5]},
+        {"ghosts": 1, "cone": 0, "hidden": 3},
+        {"ghosts": True, "cone": True},
+    ],
+    "screws": [
+        {"form": "body", "axes": "now", "joint": 1, "factors": 1},
+        {"form": "space", "axes": "zero", "joint": 2, "factors": 0},
+        {"form": 1, "axes": "then", "joint": 77, "factors": -1},
+    ],
+    "equations": [{"equation": "3.14"}, {"equation": 7}],
+    "trajectories": [{"paths": True}, {"paths": 5}],
+}
+
+
+def record(key: str) -> dict[str, Any]:
+    """What a feature shows, by arm and moment."""
+    from app.viewer.lessons import LESSONS
+
+    feature = next(lesson for lesson in LESSONS if lesson.key == key)
+    found: dict[str, Any] = {}
+    rng = np.random.default_rng(12)
+    with bare_page(STORE.robots[0]) as page:
+        shown = page.open(feature)
+        for robot in STORE.robots:
+            if robot is not page.now.robot:
+                page.change(robot)
+
+            def note(moment: str, robot: Any = robot) -> None:
+                found[f"{robot.id}: {moment}"] = {
+                    "panel": page.panel(),
+                    "scene": page.scene(),
+                    "link": shown.state(),
+                    "legend": page.legend,
+                    "view": [str(page.views[-1:]), page.translucent],
+                }
+
+            note("at home")
+            for k, state in enumerate(STATES[key]):
+                page.restore(state)
+                note(f"state {k}")
+                page.pose(robot.random_q(rng))
+                note(f"state {k}, elsewhere")
+            page.style(Units(False, "cm"))
+            note("radians")
+            page.style(DEFAULT_UNITS)
+    return found
+
+
+def differences(old: Any, new: Any, path: str = "") -> list[str]:
+    """Where two records differ."""
+    if isinstance(old, int | float) and isinstance(new, int | float):
+        return [] if abs(old - new) <= TOLERANCE * max(1.0, abs(old)) else [f"{path}: {old} → {new}"]
+    if isinstance(old, dict) and isinstance(new, dict) and old.keys() == new.keys():
+        return [line for name in old for line in differences(old[name], new[name], f"{path} / {name}")]
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        return [line for k, item in enumerate(old) for line in differences(item, new[k], f"{path} / {k}")]
+    return [] if old == new else [f"{path}: {str(old)[:400]}\n    → {str(new)[:400]}"]
+
+
+def scenes_differ(old: list[Any], new: list[Any]) -> list[str]:
+    """Nodes of one scene that the other does not have."""
+    left, missing = list(new), []
+    for node in old:
+        same = next((other for other in left if node[0] == other[0] and not differences(node, other)), None)
+        if same is None:
+            missing.append(f"only before: {str(node[:2])[:300]} {str(node[2])[:600]}")
+        else:
+            left.remove(same)
+    return missing + [f"only now: {str(node[:2])[:300]} {str(node[2])[:600]}" for node in left]
+
+
+def main() -> int:
+    other, *keys = sys.argv[1:]
+    if other == "--record":
+        Path(keys[0]).write_text(json.dumps({key: record(key) for key in keys[1:]}), encoding="utf-8")
+        return 0
+    root, failed = Path(__file__).resolve().parents[4], 0
+    with tempfile.TemporaryDirectory() as folder:
+        records = []
+        for k, checkout in enumerate((Path(other), root)):
+            out = Path(folder) / f"{k}.json"
+            environment = {**os.environ, "PYTHONPATH": str(checkout)}
+            command = [sys.executable, __file__, "--record", str(out), *(keys or STATES)]
+            subprocess.run(command, check=True, env=environment, cwd=checkout, stdout=subprocess.DEVNULL)
+            records.append(json.loads(out.read_text(encoding="utf-8")))
+    for key, before in records[0].items():
+        for moment, old in before.items():
+            new = records[1][key][moment]
+            lines = scenes_differ(old.pop("scene"), new.pop("scene")) + differences(old, new)
+            failed += len(lines)
+            for line in lines[:6]:
+                print(f"{key}, {moment}: {line}")
+        print(f"{key}: {len(before)} moments compared")
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

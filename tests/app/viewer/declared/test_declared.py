@@ -1,0 +1,346 @@
+"""Laws of declared settings, and what the reconcilers of panel and scene send."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pytest
+from bare_page import STORE, BarePage, bare_page
+
+from app.viewer.declared.facts import Facts
+from app.viewer.declared.feature import DeclaredFeature
+from app.viewer.declared.fields import (
+    Choice,
+    Index,
+    Kept,
+    Number,
+    Part,
+    Settings,
+    Spec,
+    Text,
+    Vector,
+    choice,
+    flag,
+    joint,
+    number,
+    part,
+    slider,
+    vector,
+)
+from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node, Progress
+from app.viewer.declared.scene import Lazy, arrows, axes, frame, label
+from app.viewer.declared.scene import Node as SceneNode
+from app.viewer.lessons import LESSONS
+from app.viewer.lessons.guide.lesson import Lesson
+from kin import InputError
+from kin.units import DEFAULT_UNITS, Units
+
+DECLARED = tuple(lesson for lesson in LESSONS if issubclass(lesson, DeclaredFeature))
+CLASSES = tuple(lesson.settings_of for lesson in DECLARED)
+UNITS = (DEFAULT_UNITS, Units(False, "cm"), Units(True, "m"))
+JUNK = (
+    None,
+    True,
+    math.nan,
+    math.inf,
+    -math.inf,
+    "junk",
+    -1e99,
+    [],
+    {},
+    [1, 2],
+    [math.nan] * 3,
+    {"on": 5},
+    10**400,
+)
+
+
+def leaves(settings_of: type[Settings], prefix: str = "") -> Iterator[tuple[str, Spec]]:
+    """The paths of all fields with a value of their own, and what they declare."""
+    for name, spec in settings_of.specs():
+        if isinstance(spec, Part):
+            yield from leaves(spec.of, f"{prefix}{name}.")
+        elif isinstance(spec, Vector):
+            yield from ((f"{prefix}{name}.{k}", settings_of.spec(f"{name}.{k}")) for k in range(len(spec.labels)))
+        else:
+            yield prefix + name, spec
+
+
+# Laws of settings
+
+
+@pytest.mark.parametrize("settings_of", CLASSES, ids=lambda each: each.__name__)
+def test_links_give_back_the_settings_and_ignore_what_they_do_not_know(settings_of: type[Settings]) -> None:
+    for robot in STORE.robots:
+        fresh = settings_of.fresh(robot)
+        state = json.loads(json.dumps(fresh.state(), allow_nan=False))
+        assert fresh.restored(state, robot) == fresh
+        assert fresh.restored({**state, "unknown": 5}, robot) == fresh
+        for junk in JUNK:
+            assert fresh.restored(junk, robot) == fresh or junk == {"on": 5}
+            for name, spec in settings_of.specs():
+                found = fresh.restored({name: junk}, robot)
+                if spec.link and not isinstance(spec, Part | Kept) and found != fresh:
+                    assert spec.unpack(name, junk, robot) == found.at(name)
+                assert json.loads(json.dumps(found.state(), allow_nan=False)) == found.state()
+
+
+@pytest.mark.parametrize("settings_of", CLASSES, ids=lambda each: each.__name__)
+def test_controls_read_what_they_show_and_refuse_the_rest(settings_of: type[Settings]) -> None:
+    for robot in STORE.robots:
+        fresh = settings_of.fresh(robot)
+        for path, spec in leaves(settings_of):
+            for units in UNITS:
+                if not spec.kind:
+                    continue
+                values = list(spec.offered(robot).values()) if isinstance(spec, Choice) else [fresh.at(path)]
+                for value in values:
+                    read = spec.read(path, spec.shown(value, robot, units), robot, units)
+                    assert read == (pytest.approx(value, abs=1e-3) if isinstance(spec, Number) else value)
+                for junk in (["junk"], None, math.nan, {}):
+                    with pytest.raises(InputError, match=path.rpartition(".")[2]):
+                        spec.read(path.rpartition(".")[2], junk, robot, units)
+
+
+# A feature of tests
+
+
+@dataclass(frozen=True)
+class Force(Settings):
+    on: bool = flag("On", undo="Force")
+    parts: tuple[float, float] = vector(("Fx, N", "Fy, N"), (1.0, 2.0), Number(limits=(-5.0, 5.0), digits=2))
+
+
+@dataclass(frozen=True)
+class Knobs(Settings):
+    frame: str | None = choice("Frame", {"Base": "base", "None": None}, "base", none="none", old={"world": "base"})
+    step: float = number("Step", 0.005, (1e-4, 0.1), "length", hint="How far")
+    count: int = slider("Count", lambda robot: robot.n, (0, 9), whole=True)
+    joint: int | None = joint()
+    runs: bool = flag("Run", link=False, renew=True)
+    force: Force = part(Force)
+
+
+@dataclass(frozen=True, eq=False)
+class Sums(Facts[Knobs]):
+    @cached_property
+    def total(self) -> float:
+        return float(np.abs(self.q).sum()) + self.settings.step
+
+
+class Toy(DeclaredFeature[Knobs, Sums]):
+    key, title, settings_of, facts_of = "toy", "Toy", Knobs, Sums
+    undo = {"on_add": "Add"}  # noqa: RUF012
+    rendered = 0
+
+    def started(self) -> None:
+        self.heard: list[object] = []
+        self.frames = 0
+
+    def panel(self) -> Sequence[Node]:
+        s = self.settings
+        more = [Html(str, ("more",), key="more")] if s.runs else []
+        return [
+            *more,
+            Control("frame"),
+            Folder("Amounts", [Control("step"), Control("count", of=self.stage.now.robot.id)]),
+            Html(self.render, (round(self.read.total, 6), self.stage.units)),
+            Control("force.parts.1", label="Sideways, N", visible=s.force.on),
+            Button("Add", self.event(self.on_add, 1), hold=10.0),
+            Buttons("Go", {"a": self.event(self.on_go, "a"), "b": self.event(self.on_go, "b")}, offered=("a",)),
+            Progress(50.0),
+        ]
+
+    def scene(self) -> Sequence[SceneNode | Lazy]:
+        f, s = self.facts, self.settings
+        parts = [arrows("arrow", np.array([[np.zeros(3), f.T[:3, 2]]]), (200, 0, 0), (0.01, 0.02, 0.05))]
+        if s.force.on:
+            parts.append(label("name", f"{s.step}", np.zeros(3)))
+        return [frame("tool", *parts, position=f.T[:3, 3]), axes("base", np.eye(4), 0.1, 0.01), self.lazy()]
+
+    def lazy(self) -> Lazy:
+        return Lazy("lazy", self.far, (self.settings.step,))
+
+    def far(self, step: float) -> list[SceneNode]:
+        self.frames += 1
+        return [label("far", f"{step}", np.ones(3))] if step > 0.01 else []
+
+    def render(self, total: float, units: Units) -> str:
+        self.rendered += 1
+        return f"Σ {total} {units.length}"
+
+    def changed(self, path: str) -> None:
+        self.heard.append(path)
+
+    def on_add(self, amount: int) -> None:
+        self.change(count=self.settings.count + amount)
+
+    def on_go(self, where: str) -> None:
+        self.heard.append(where)
+
+
+@pytest.fixture
+def page() -> Iterator[BarePage]:
+    with bare_page(STORE.get("ur5")) as found:
+        yield found
+
+
+def handles(page: BarePage) -> dict[str, Any]:
+    every = page.client.gui._gui_input_handle_from_uuid.values()
+    return {h._impl.props.label: h for h in every if hasattr(h._impl.props, "label")}
+
+
+def test_the_panel_shows_what_is_declared_and_controls_survive(page: BarePage) -> None:
+    toy = page.open(Toy)
+    first = handles(page)
+    assert [item.get("label", item["kind"]) for item in page.panel()] == [
+        "Frame", "Amounts", "GuiHtmlHandle", "Add", "Go", "GuiProgressBarHandle",
+    ]  # fmt: skip
+    assert page.panel()[4]["options"] == ["a"]
+    page.set("Step, mm", 12.5)
+    page.rest()
+    assert toy.settings.step == 0.0125
+    assert toy.heard == ["step"]
+    toy.change(runs=True, force=replace(toy.settings.force, on=True))
+    toy.refresh()
+    assert page.panel()[0]["content"] == "more"
+    assert [item.get("label") for item in page.panel()][4] == "Sideways, N"
+    after = handles(page)
+    assert {name: after[name] for name in first} == first, "nothing that stays was made anew"
+    page.set("Step, mm", 0.01)
+    with pytest.raises(InputError, match=r"step: got 0\.01, expected a number from 0\.1 to 100"):
+        page.rest()
+    assert toy.settings.step == 0.0125
+    toy.remove()
+    assert page.panel() == []
+    assert page.scene() == []
+
+
+def test_a_value_is_not_sent_back_to_the_control_that_sent_it(page: BarePage) -> None:
+    toy = page.open(Toy)
+    page.watch()
+    page.set("Count", 3)
+    page.rest()
+    assert toy.settings.count == 3
+    assert page.sent == []
+    toy.change(count=4)
+    toy.refresh()
+    assert page.control("Count").value == 4
+
+
+def test_events_of_controls_that_are_gone_are_void(page: BarePage) -> None:
+    toy = page.open(Toy)
+    page.set("Step, mm", 50.0)
+    page.units = Units(True, "cm")
+    toy.on_style()
+    page.rest()
+    assert toy.settings.step == 0.005
+    assert "Step, cm" in handles(page)
+    page.set("Count", 2)
+    page.change(STORE.get("scara"))
+    assert toy.settings.count == 4, "the slider of the last robot"
+
+
+def test_a_click_on_what_was_just_offered_counts(page: BarePage) -> None:
+    toy = page.open(Toy)
+    page.press("Go", "b")
+    page.rest()
+    assert toy.heard == ["b"]
+    page.press("Add")
+    page.press("Add")
+    assert toy.step_name(page.events[0][0][2]) == "Add"
+    page.rest()
+    assert toy.settings.count == 8
+
+
+def test_undo_names_and_links(page: BarePage) -> None:
+    toy = page.open(Toy)
+    assert toy.step_name(("at", "force.on", 3)) == "Force"
+    assert toy.step_name(("at", "step", 3)) == "Toy"
+    assert toy.state() == {
+        "frame": "base", "step": 0.005, "count": 6, "joint": 0, "force": {"on": False, "parts": [1.0, 2.0]},
+    }  # fmt: skip
+    toy.restore({"frame": "world", "joint": 3, "force": {"on": True, "parts": [9.0, 1.0]}, "step": "far"})
+    assert toy.state() == {**toy.state(), "frame": "base", "joint": 3, "force": {"on": True, "parts": [1.0, 2.0]}}
+    page.change(STORE.get("scara"))
+    assert (toy.settings.joint, toy.settings.count, toy.settings.force.on) == (None, 4, True)
+
+
+def test_the_scene_is_changed_and_hidden_not_made_again(page: BarePage) -> None:
+    toy = page.open(Toy)
+    assert [node[0] for node in page.scene()] == ["ArrowHandle", "FrameHandle"] or len(page.scene()) == 2
+    toy.change(step=0.05, force=replace(toy.settings.force, on=True))
+    toy.refresh()
+    assert sorted(node[2]["text"] for node in page.scene() if "text" in node[2]) == ["0.05", "0.05"]
+    names = set(page.client.scene._handle_from_node_name)
+    for on in (False, True, False):
+        toy.change(step=0.05 if on else 0.005, force=replace(toy.settings.force, on=on))
+        toy.refresh()
+        assert len(page.scene()) == (4 if on else 2)
+        assert set(page.client.scene._handle_from_node_name) == names
+    page.change(STORE.get("scara"))
+    assert not names & set(page.client.scene._handle_from_node_name) - {"/WorldAxes"}, "names are never used again"
+
+
+def test_a_frame_sends_only_what_moved_and_renders_nothing_twice(page: BarePage) -> None:
+    toy = page.open(Toy)
+    rng = np.random.default_rng(1)
+    rendered, frames = toy.rendered, toy.frames
+    page.watch()
+    page.now = replace(page.now, q=page.now.robot.random_q(rng))
+    toy.on_pose(page.now.T_tool)
+    assert sorted(page.sent) == ["SceneNodeUpdateMessage", "SetPositionMessage"]
+    assert (toy.rendered, toy.frames) == (rendered, frames)
+    toy.on_pose(page.now.T_tool)
+    assert len(page.sent) == 2, "nothing has changed"
+    page.rest()
+    assert toy.rendered == rendered + 1
+    page.sent.clear()
+    toy.refresh()
+    assert page.sent == []
+
+
+def test_facts_are_the_same_object_until_something_changes(page: BarePage) -> None:
+    toy = page.open(Toy)
+    facts = toy.facts
+    toy.refresh()
+    assert toy.facts is facts
+    toy.change(step=0.01)
+    toy.refresh()
+    assert toy.facts is not facts
+    other = toy.facts.at(page.now.robot.q_home + 0.1)
+    assert other.total == pytest.approx(np.abs(page.now.robot.q_home + 0.1).sum() + 0.01)
+
+
+def test_scripts_of_the_page_cannot_call_methods() -> None:
+    with pytest.raises(TypeError, match="must not contain do"):
+        type("Open", (Toy,), {"messages": frozenset({"do"})})
+    for lesson in DECLARED:
+        assert not lesson.messages & {"at", "do", "drag"}
+
+
+def test_events_of_no_control_are_refused_with_the_key(page: BarePage) -> None:
+    toy = page.open(Toy)
+    with pytest.raises(InputError, match="a control of this feature"):
+        toy.handle(("step", 5), 1.0)
+
+
+def test_every_kind_of_field_is_tried() -> None:
+    tried = {type(spec) for settings_of in (*CLASSES, Knobs) for _, spec in leaves(settings_of)}
+    assert tried >= {Choice, Index, Number}
+    assert {Kept, Text} <= tried or not any(lesson.key == "rotations" for lesson in DECLARED)
+
+
+@pytest.mark.parametrize("lesson", DECLARED, ids=lambda each: each.key)
+def test_panels_of_all_arms_name_fields_that_exist(lesson: type[Lesson]) -> None:
+    with bare_page(STORE.robots[0]) as page:
+        page.open(lesson)
+        for robot in STORE.robots[1:]:
+            page.change(robot)
+            assert page.panel()
