@@ -172,8 +172,56 @@ def test_cycles_are_refused():
     beside = (
         "<link name='c'/><link name='d'/><joint name='l' type='continuous'><parent link='c'/><child link='d'/>"
     )
+    assert kin.load_urdf(text + beside + "</joint></robot>", tip="d").n == 1  # the cycle is not on its way
     with pytest.raises(RobotFileError, match="no cycle"):
-        kin.load_urdf(text + beside + "</joint></robot>", tip="d")
+        kin.load_urdf(text + beside + "</joint></robot>", tip="b")
+    with pytest.raises(RobotFileError, match="no cycle"):
+        kin.load_urdf(text + beside + "</joint></robot>")
+
+
+GRIPPER = """
+  <link name="palm"/><link name="left"/><link name="right"/>
+  <joint name="grip" type="fixed"><parent link="tcp"/><child link="palm"/></joint>
+  <joint name="left" type="prismatic"><parent link="palm"/><child link="left"/></joint>
+  <joint name="right" type="prismatic"><parent link="palm"/><child link="right"/></joint>
+</robot>"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field"),
+    [
+        ('<child link="right"/>', '<child link="rihgt"/>', "joint right: child"),
+        ('<child link="right"/>', "", "joint right: child"),
+        ('<child link="right"/>', '<child link="left"/>', "link left"),
+        ('<parent link="palm"/><child link="right"/>', '<parent link="plam"/><child link="right"/>', "joint right: parent"),
+        ('<joint name="right"', '<joint name="left"', "joint"),
+        ('<joint name="right"', "<joint", "joint name"),
+        ('<link name="right"/>', '<link name="right"/><link name="right"/>', "link"),
+        ('<link name="right"/>', '<link name="right"/><link/>', "link name"),
+        ('<parent link="palm"/><child link="right"/>', '<parent link="right"/><child link="right"/>', "joint"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_beside_the_chain_is_left_out(old, new, field):
+    """Other readers take such a file; it concerns the arm only if it may be a part of it."""
+    assert old in GRIPPER
+    text = GOOD.replace("</robot>", GRIPPER.replace(old, new))
+    whole, _ = kin.read_urdf(GOOD.replace("</robot>", GRIPPER), base="world", tip="tcp")
+    robot, _ = kin.read_urdf(text, base="world", tip="tcp")
+    assert robot == whole
+    if "plam" not in new and "<joint" != new:
+        assert kin.load_urdf(text, tip="tcp") == whole
+    with pytest.raises(RobotFileError) as caught:
+        kin.load_urdf(text)
+    assert caught.value.field == field
+
+
+@pytest.mark.parametrize("wrong", ['<child link="rial"/>', ""])
+def test_an_arm_is_never_cut_short_by_a_joint_that_is_left_out(wrong):
+    """The chain to the tool would begin behind the joint."""
+    text = GOOD.replace('<child link="rail"/>', wrong)
+    with pytest.raises(RobotFileError, match=r"joint slide: child"):
+        kin.load_urdf(text, tip="tcp")
+    assert kin.load_urdf(text, base="rail", tip="tcp").n == 1
 
 
 TWO = """<robot name="two"><link name="a"/><link name="b"/><link name="c"/><link name="t"/>

@@ -16,13 +16,10 @@ def poses_of(tree: UrdfTree, chain: tuple[UrdfJoint, ...]) -> tuple[dict[str, in
     Links behind a joint beside the chain whose numbers cannot be read are left out: only the chain is judged.
     """
     moving = {joint.name for joint in chain if joint.moves}
-    children: dict[str, list[UrdfJoint]] = {}
-    for joint in tree.joints:
-        children.setdefault(joint.parent, []).append(joint)
     links = [chain[0].parent]
     carriers, poses = {links[0]: 0}, {links[0]: np.eye(4)}
     for link in links:  # grows meanwhile
-        for joint in children.get(link, ()):
+        for joint in tree.children.get(link, ()):
             try:
                 T = poses[link] @ np.array(matrix_of(*joint.origin()))
                 if joint.type in MOVING and joint.name not in moving:

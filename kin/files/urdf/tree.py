@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -18,6 +18,7 @@ MOVING = ("revolute", "continuous", "prismatic")
 TYPES = (*MOVING, "fixed", "floating", "planar")
 MOST = 12  # names in a message
 MAX_LINKS = 5000
+_ONCE = "a name that no other {} has"
 
 
 class Tip(NamedTuple):
@@ -128,12 +129,33 @@ class UrdfJoint(UrdfElement):
         return value or None
 
 
+class Unread(NamedTuple):
+    """A joint or a link with something wrong that concerns only the arms it belongs to.
+
+    Attributes:
+        element: of the file.
+        parent, child: the links that it names; the child is the link itself, or the one that a joint moves.
+        error: what is wrong.
+        connects: whether a joint is left out, so that links behind it hang on nothing.
+    """
+
+    element: Element
+    parent: str
+    child: str
+    error: RobotFileError
+    connects: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class UrdfTree:
-    """A URDF file: links that joints connect, each link with one parent at most.
+    """A URDF file: links that joints connect.
 
-    Raises:
-        RobotFileError: names that occur twice or do not exist, two parents, a cycle.
+    What is wrong beside an arm does not concern it: joints without their links are left out, and `chain` refuses
+    only what belongs to the arm that is asked for.
+
+    Attributes:
+        joints: those with a parent and a child.
+        unread: what is wrong with links, joints, and joints that were left out.
     """
 
     file: str
@@ -141,22 +163,29 @@ class UrdfTree:
     links: tuple[str, ...]
     joints: tuple[UrdfJoint, ...]
     root: Element
+    unread: tuple[Unread, ...] = ()
 
     @cached_property
     def parents(self) -> dict[str, UrdfJoint]:
-        """For each link that has a parent, the joint to it."""
-        return {joint.child: joint for joint in self.joints}
+        """For each link that has a parent, the joint to it; the first one if there are several."""
+        return {joint.child: joint for joint in reversed(self.joints)}
+
+    @cached_property
+    def children(self) -> dict[str, list[UrdfJoint]]:
+        """For each link that has children, the joints to them: each link is the child of one."""
+        found: dict[str, list[UrdfJoint]] = {}
+        for joint in self.joints:
+            if self.parents[joint.child] is joint:
+                found.setdefault(joint.parent, []).append(joint)
+        return found
 
     @cached_property
     def depths(self) -> dict[str, int]:
         """For each link, the moving joints from its root to it; links of or behind a cycle are missing."""
-        children: dict[str, list[UrdfJoint]] = {}
-        for joint in self.joints:
-            children.setdefault(joint.parent, []).append(joint)
         found = {link: 0 for link in self.links if link not in self.parents}
         links = list(found)
         for link in links:  # grows meanwhile
-            for joint in children.get(link, ()):
+            for joint in self.children.get(link, ()):
                 found[joint.child] = found[link] + joint.moves
                 links.append(joint.child)
         return found
@@ -165,7 +194,7 @@ class UrdfTree:
     def tips(self) -> tuple[Tip, ...]:
         """Links without children that joints move, those with the most joints first."""
         inner = {joint.parent for joint in self.joints}
-        found = [Tip(link, self.depths[link]) for link in self.links if link not in inner]
+        found = [Tip(link, self.depths.get(link, 0)) for link in self.links if link not in inner]
         return tuple(sorted((tip for tip in found if tip.joints), key=lambda tip: -tip.joints))
 
     def to_root(self, link: str) -> list[UrdfJoint]:
@@ -191,6 +220,7 @@ class UrdfTree:
                 names = self.names(self.links) if field == "base" else self.choices()
                 raise RobotFileError(self.file, field, link, f"one of {names}")
         if tip is None:
+            self._check_all()
             if len(self.tips) != 1:
                 given = "no tip, and several are possible" if self.tips else "no moving joints"
                 expected = f"one of {self.choices()}" if self.tips else "a chain with revolute or prismatic joints"
@@ -203,8 +233,47 @@ class UrdfTree:
                 names = self.names([joint.parent for joint in found])
                 raise RobotFileError(self.file, "base", base, f"a link on the way to {tip}: {names}")
             found = found[above[0] :]
+        self._check_whole(found, tip, base)
         self._check(found, tip)
         return tuple(found)
+
+    def _check_all(self) -> None:
+        """Without a tip, the whole file is the arm."""
+        for each in self.unread:
+            raise each.error
+        for link in self.links:
+            if link not in self.depths:
+                self.to_root(link)  # raises: there is a cycle
+
+    def _check_whole(self, chain: list[UrdfJoint], tip: str, base: str | None) -> None:
+        """Whether nothing of the chain is wrong, and no joint above it was left out."""
+        start = chain[0].parent if chain else tip
+        names = {joint.name for joint in chain}
+        links = {joint.child for joint in chain} | ({start} if base is None else set())
+        for each in self.unread:
+            is_link = each.element.tag == "link"
+            named = not each.connects and each.element.get("name", "").strip() in names
+            if (
+                each.child in links
+                or (is_link and each.child == start)
+                or (named and not is_link)
+                or (base is None and each.connects and self._hides_parent(each, start))
+            ):
+                raise each.error
+
+    def _hides_parent(self, left_out: Unread, start: str) -> bool:
+        """Whether a joint without a known child may be what a chain from `start` hangs on."""
+        if left_out.child in self.known:
+            return False  # it hangs on another joint, or the chain would have met it
+        if left_out.parent not in self.known:
+            return True
+        above = self.to_root(left_out.parent)
+        return (above[0].parent if above else left_out.parent) != start  # else it is further down the same tree
+
+    @cached_property
+    def known(self) -> frozenset[str]:
+        """The names of all links."""
+        return frozenset(self.links)
 
     def _check(self, chain: list[UrdfJoint], tip: str) -> None:
         if not any(joint.moves for joint in chain):
@@ -235,32 +304,44 @@ def read_tree(text: bytes | str, file: str) -> UrdfTree:
     if any(element.tag.startswith("xacro:") for element in root.iter()):
         expected = "plain URDF; `xacro FILE.xacro > FILE.urdf`, or `kinboard import FILE.xacro`, expands it"
         raise RobotFileError(file, "file", "xacro elements", expected)
-    links = tuple(_attribute(element, "name", file, "link") for element in root.findall("link"))
-    if len(links) > MAX_LINKS:
-        raise RobotFileError(file, "link", f"{len(links)} links", f"at most {MAX_LINKS} links")
-    joints = tuple(_joint(element, file) for element in root.findall("joint"))
-    for field, names in (("link", links), ("joint", [joint.name for joint in joints])):
-        twice = [name for name, count in Counter(names).items() if count > 1]
-        if twice:
-            raise RobotFileError(file, field, twice[0], f"a name that no other {field} has")
-    known = set(links)
-    for joint in joints:
-        for field, link in (("parent", joint.parent), ("child", joint.child)):
-            if link not in known:
-                raise joint.refuse(field, link, "the name of a link of this file")
-    twice = [link for link, count in Counter(joint.child for joint in joints).items() if count > 1]
-    if twice:
-        both = " and ".join(joint.name for joint in joints if joint.child == twice[0])
-        expected = "one parent: a loop is no serial arm"
-        raise RobotFileError(file, f"link {twice[0]}", f"the child of {both}", expected)
-    tree = UrdfTree(file, root.get("name", ""), links, joints, root)
-    for link in links:
-        if link not in tree.depths:
-            tree.to_root(link)  # raises: there is a cycle
-    return tree
+    elements = root.findall("link")
+    if len(elements) > MAX_LINKS:
+        raise RobotFileError(file, "link", f"{len(elements)} links", f"at most {MAX_LINKS} links")
+    unread: list[Unread] = []
+    links: dict[str, Element] = {}
+    for element in elements:
+        try:
+            name = _attribute(element, "name", file, "link")
+        except RobotFileError as error:
+            unread.append(Unread(element, "", "", error))
+            continue
+        if name in links:
+            unread.append(Unread(element, "", name, RobotFileError(file, "link", name, _ONCE.format("link"))))
+        links.setdefault(name, element)
+    joints: list[UrdfJoint] = []
+    names: set[str] = set()
+    children: dict[str, str] = {}
+    for element in root.findall("joint"):
+        try:
+            joint = _joint(element, file, links)
+        except RobotFileError as error:
+            ends = (_end(element, tag) for tag in ("parent", "child"))
+            unread.append(Unread(element, *ends, error, connects=True))
+            continue
+        if joint.name in names:
+            error = RobotFileError(file, "joint", joint.name, _ONCE.format("joint"))
+            unread.append(Unread(element, joint.parent, joint.child, error))
+        elif joint.child in children:
+            both = f"the child of {children[joint.child]} and {joint.name}"
+            error = RobotFileError(file, f"link {joint.child}", both, "one parent: a loop is no serial arm")
+            unread.append(Unread(element, joint.parent, joint.child, error))
+        names.add(joint.name)
+        children.setdefault(joint.child, joint.name)
+        joints.append(joint)
+    return UrdfTree(file, root.get("name", ""), tuple(links), tuple(joints), root, tuple(unread))
 
 
-def _joint(element: Element, file: str) -> UrdfJoint:
+def _joint(element: Element, file: str, links: Collection[str]) -> UrdfJoint:
     name = _attribute(element, "name", file, "joint")
     ends = []
     for tag in ("parent", "child"):
@@ -268,7 +349,17 @@ def _joint(element: Element, file: str) -> UrdfJoint:
         if child is None:
             raise RobotFileError(file, f"joint {name}: {tag}", "nothing", f'<{tag} link="…"/>')
         ends.append(_attribute(child, "link", file, f"joint {name}: {tag}"))
-    return UrdfJoint(file, element, name, element.get("type", ""), *ends)
+    joint = UrdfJoint(file, element, name, element.get("type", ""), *ends)
+    for field, link in (("parent", joint.parent), ("child", joint.child)):
+        if link not in links:
+            raise joint.refuse(field, link, "the name of a link of this file")
+    return joint
+
+
+def _end(joint: Element, tag: str) -> str:
+    """The link that a joint names as its parent or child; empty if it names none."""
+    child = joint.find(tag)
+    return "" if child is None else child.get("link", "").strip()
 
 
 def _attribute(element: Element, key: str, file: str, field: str) -> str:
