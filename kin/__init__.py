@@ -24,9 +24,12 @@ from kin.dh import Screws, convert, exp_screw, robot_from_screws, screws
 from kin.differential.task import Task
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.files import (
+    UrdfExamination,
+    UrdfFinding,
     UrdfReport,
     UrdfRobot,
     builtin_robots,
+    examine_urdf,
     get_robot,
     load_folder,
     load_robot,
@@ -142,6 +145,8 @@ __all__ = [
     "Status",
     "Task",
     "UnknownRobotError",
+    "UrdfExamination",
+    "UrdfFinding",
     "UrdfReport",
     "UrdfRobot",
     "WorkspaceChunk",
@@ -160,6 +165,7 @@ __all__ = [
     "compare",
     "configuration_at",
     "convert",
+    "examine_urdf",
     "exp_screw",
     "fk",
     "fk_positions",

@@ -5,20 +5,26 @@ They are read by the process that parses visitors' meshes, with the same limits.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from urllib.parse import unquote
 
-from app.viewer.meshes.archive import MeshError
+from app.viewer.meshes.archive import MB, MeshError
 from app.viewer.meshes.fitting import bodies_of
 from app.viewer.meshes.placing import Shapes
 from app.viewer.meshes.reader import MeshReader
 from kin import RobotFileError
 from kin.files.urdf.collisions import Fitted, LinkPieces, Piece, without_meshes
+from kin.files.urdf.doctor.meshes import extent_of
 from kin.files.urdf.visuals import MeshFile
+from kin.transforms import Array
 
 ABOVE = 6  # folders above the URDF in which a package is looked for
+MOST_SEARCHED = 20_000  # files beside a URDF in which one that was moved is looked for
+MOST_OF_MESH = 200 * MB
 _SCHEMES = ("package", "model", "file")
 
 
@@ -69,4 +75,34 @@ class MeshesBeside:
             for path in (above / wanted, above / inside):
                 if inside and path.is_file():
                     return path
+        return None
+
+
+@dataclass(frozen=True)
+class MeshFilesBeside:
+    """The meshes beside a URDF, as `kin.examine_urdf` takes them."""
+
+    urdf: Path
+
+    def extent(self, path: str) -> Array | None:
+        """The sides of a mesh; raises `LookupError` with the reason why there is none."""
+        found = MeshesBeside(self.urdf).file_of(path)
+        if found is None:
+            raise LookupError("there is no such file beside the URDF")
+        try:
+            if found.stat().st_size > MOST_OF_MESH:
+                raise LookupError(f"the file has more than {MOST_OF_MESH // MB} MB")
+            return extent_of(found.name, found.read_bytes())
+        except OSError as error:
+            raise LookupError(f"the file cannot be read ({error.strerror})") from None
+
+    def elsewhere(self, path: str) -> str | None:
+        """A file of the same name in the folder of the URDF or of its package, as a path from the URDF."""
+        name, folder = unquote(path).rpartition("/")[2], self.urdf.resolve().parent
+        for root in (folder, folder.parent):
+            found = [
+                file for file in islice(root.rglob("*"), MOST_SEARCHED) if file.name == name and file.is_file()
+            ]
+            if len(found) == 1:
+                return os.path.relpath(found[0], folder).replace(os.sep, "/")
         return None

@@ -30,7 +30,7 @@ def run_import(arguments: Namespace) -> int:
     found = _read(arguments)
     text = robot_to_toml(found.robot)
     if arguments.output is not None:
-        _write(arguments.output, text)
+        write_file(arguments.output, text)
     if arguments.json:
         return print_json(import_answer(found))
     if arguments.output is None:
@@ -42,14 +42,19 @@ def run_import(arguments: Namespace) -> int:
 
 def _read(arguments: Namespace) -> UrdfRobot:
     """The arm of a URDF, or of a xacro file."""
-    path, base, tip = Path(arguments.file), arguments.base, arguments.tip
+    path = Path(arguments.file)
+    return read_urdf(source_of(arguments), arguments.base, arguments.tip, file=str(path), fit=MeshesBeside(path))
+
+
+def source_of(arguments: Namespace) -> Path | str:
+    """The path of a URDF, or the text that a xacro file becomes."""
+    path = Path(arguments.file)
     if is_xacro(path):
-        text = expanded(path, arguments.arg, arguments.folder)
-        return read_urdf(text, base, tip, file=str(path), fit=MeshesBeside(path))
+        return expanded(path, arguments.arg, arguments.folder)
     for option, given in (("--arg", arguments.arg), ("--folder", arguments.folder)):
         if given:
             raise InputError(option, given, "nothing: only xacro (*.xacro) is expanded")
-    return read_urdf(path, base, tip, fit=MeshesBeside(path))
+    return path
 
 
 def run_export(arguments: Namespace) -> int:
@@ -58,7 +63,7 @@ def run_export(arguments: Namespace) -> int:
     if arguments.output is None:
         print(text, end="")
     else:
-        _write(arguments.output, text)
+        write_file(arguments.output, text)
         print(f"{arguments.output}: {len(text.encode())} bytes")
     return 0
 
@@ -79,7 +84,8 @@ def report_lines(report: UrdfReport) -> list[str]:
     return [*lines, f"bodies      {report.about_bodies}", *(f"note: {note}" for note in report.notes)]
 
 
-def _write(path: str, text: str) -> None:
+def write_file(path: str, text: str) -> None:
+    """Write a text; raises `InputError` where that cannot be done."""
     try:
         Path(path).write_text(text, encoding="utf-8")
     except OSError as error:

@@ -169,6 +169,12 @@ def _load_compare() -> Run:
     return run
 
 
+def _load_doctor() -> Run:
+    from app.cli.doctor import run
+
+    return run
+
+
 def _load_move() -> Run:
     from app.cli.move import run
 
@@ -231,6 +237,7 @@ COMMANDS = (
     Command(declare.add_bench, _load_bench),
     Command(declare.add_check, _load_check, interpreted=True),
     Command(declare.add_compare, _load_compare, interpreted=True),
+    Command(declare.add_doctor, _load_doctor, interpreted=True),
     Command(declare.add_capability, _load_capability),
     Command(declare.add_import, _load_import, interpreted=True),
     Command(declare.add_export, _load_export, interpreted=True),

@@ -34,14 +34,19 @@ An error raises `RobotFileError` with the file, the field, the value and what wo
 
 from kin.files.builtin import builtin_robots, get_robot
 from kin.files.read import load_folder, load_robot, parse_robot, robot_from_dict
+from kin.files.urdf.doctor.examine import examine_urdf
+from kin.files.urdf.doctor.findings import UrdfExamination, UrdfFinding
 from kin.files.urdf.read import UrdfReport, UrdfRobot, load_urdf, read_urdf, urdf_tips
 from kin.files.urdf.write import to_urdf
 from kin.files.write import robot_to_dict, robot_to_toml, save_robot
 
 __all__ = [
+    "UrdfExamination",
+    "UrdfFinding",
     "UrdfReport",
     "UrdfRobot",
     "builtin_robots",
+    "examine_urdf",
     "get_robot",
     "load_folder",
     "load_robot",

@@ -15,9 +15,10 @@ from app.api.problems import from_input_error, invalid
 from app.api.schemas import POST_REFUSALS, example, refusals, reply
 from app.api.work import computed
 from app.exports.robots import FORMATS, robot_file
+from app.shared.answers.examination import ExaminationAnswer, examination_answer
 from app.shared.answers.exchange import ConvertAnswer, ImportAnswer, convert_answer, import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
-from kin import InputError, Robot, RobotFileError, UrdfRobot, read_urdf
+from kin import InputError, Robot, RobotFileError, UrdfRobot, examine_urdf, read_urdf
 from kin.files.urdf.xml import MAX_BYTES
 
 router = versioned("robots")
@@ -102,6 +103,21 @@ async def import_robot(
     with the product of the URDF's own transforms. If several tips are possible, the problem document lists them.
     """
     return await computed(request, lambda _: reply(import_answer(_read(body))))
+
+
+@router.post(
+    "/robots/doctor", summary="Examine a URDF", response_model=ExaminationAnswer, responses=_IMPORT_REFUSALS
+)
+async def examine(
+    request: Request, body: Annotated[ImportRequest, Body(openapi_examples=IMPORT_EXAMPLES)]
+) -> Response:
+    """What is wrong, suspicious or left out in a URDF, with line numbers, and the text with it mended.
+
+    A file that cannot be read is no error here: that is a finding. Meshes are not sent along, and not looked at.
+    """
+    return await computed(
+        request, lambda _: reply(examination_answer(examine_urdf(body.urdf, body.base, body.tip)))
+    )
 
 
 def _read(body: ImportRequest) -> UrdfRobot:

@@ -259,6 +259,16 @@ def add_import(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     return parser
 
 
+def add_doctor(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard doctor``."""
+    parser = _command(commands, "doctor", "find what is wrong in a URDF, and mend it", takes_robot=False)
+    parser.add_argument("file", metavar="FILE", help="URDF, or xacro (*.xacro, with kinboard[xacro])")
+    _add_links(parser)
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the mended URDF")
+    parser.add_argument("--json", action="store_true", help="print the findings as JSON")
+    return parser
+
+
 def _add_links(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--base", metavar="LINK", help="link of the URDF that is the base (default: the root)")
     parser.add_argument("--tip", metavar="LINK", help="link of the URDF that is the tool, if several are possible")

@@ -297,8 +297,12 @@ class UrdfTree:
 
 
 def read_tree(text: bytes | str, file: str) -> UrdfTree:
-    """The links and joints of a URDF; raises `RobotFileError`."""
-    root = parse_xml(text, file)
+    """The links and joints of a URDF; raises `RobotFileError`. See `UrdfTree` for what is left out."""
+    return tree_of(parse_xml(text, file), file)
+
+
+def tree_of(root: Element, file: str) -> UrdfTree:
+    """The links and joints below the root element of a URDF; raises `RobotFileError`."""
     if root.tag != "robot":
         raise RobotFileError(file, "root element", root.tag, "<robot>, the root of a URDF")
     if any(element.tag.startswith("xacro:") for element in root.iter()):
@@ -325,16 +329,15 @@ def read_tree(text: bytes | str, file: str) -> UrdfTree:
         try:
             joint = _joint(element, file, links)
         except RobotFileError as error:
-            ends = (_end(element, tag) for tag in ("parent", "child"))
-            unread.append(Unread(element, *ends, error, connects=True))
+            unread.append(Unread(element, _end(element, "parent"), _end(element, "child"), error, connects=True))
             continue
         if joint.name in names:
-            error = RobotFileError(file, "joint", joint.name, _ONCE.format("joint"))
-            unread.append(Unread(element, joint.parent, joint.child, error))
+            twice = RobotFileError(file, "joint", joint.name, _ONCE.format("joint"))
+            unread.append(Unread(element, joint.parent, joint.child, twice))
         elif joint.child in children:
             both = f"the child of {children[joint.child]} and {joint.name}"
-            error = RobotFileError(file, f"link {joint.child}", both, "one parent: a loop is no serial arm")
-            unread.append(Unread(element, joint.parent, joint.child, error))
+            loop = RobotFileError(file, f"link {joint.child}", both, "one parent: a loop is no serial arm")
+            unread.append(Unread(element, joint.parent, joint.child, loop))
         names.add(joint.name)
         children.setdefault(joint.child, joint.name)
         joints.append(joint)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
@@ -12,8 +13,25 @@ MAX_DEPTH = 64
 MAX_ELEMENTS = 100_000
 
 
-def parse_xml(text: bytes | str, file: str) -> Element:
-    """The root element; raises `RobotFileError`. A `str` is decoded already, whatever encoding it declares."""
+class Place(NamedTuple):
+    """Where an element is in a text.
+
+    Attributes:
+        line: of its start tag, from 1.
+        start, end: bytes of its start tag, and of the end of its end tag or of a tag that is both.
+    """
+
+    line: int
+    start: int
+    end: int
+
+
+def parse_xml(text: bytes | str, file: str, places: dict[Element, Place] | None = None) -> Element:
+    """The root element; raises `RobotFileError`. A `str` is decoded already, whatever encoding it declares.
+
+    Args:
+        places: gets the place of each element, in the text as UTF-8.
+    """
     encoding = None
     if isinstance(text, str):
         text, encoding = text.encode("utf-8", "replace"), "utf-8"
@@ -22,6 +40,7 @@ def parse_xml(text: bytes | str, file: str) -> Element:
     builder = TreeBuilder()
     parser = expat.ParserCreate(encoding)
     count = depth = 0
+    begun: list[tuple[Element, int, int]] = []
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal count, depth
@@ -30,12 +49,20 @@ def parse_xml(text: bytes | str, file: str) -> Element:
             raise RobotFileError(file, "file", f"more than {MAX_ELEMENTS} elements", "fewer elements")
         if depth > MAX_DEPTH:
             raise RobotFileError(file, f"<{tag}>", f"nested more than {MAX_DEPTH} deep", "less nesting")
-        builder.start(tag, attributes)
+        element = builder.start(tag, attributes)
+        if places is not None:
+            begun.append((element, parser.CurrentLineNumber, parser.CurrentByteIndex))
 
     def end(tag: str) -> None:
         nonlocal depth
         depth -= 1
         builder.end(tag)
+        if places is not None:
+            element, line, first = begun.pop()
+            last = parser.CurrentByteIndex  # of an end tag its beginning, else the end of the only tag
+            if text[last : last + 2] == b"</":
+                last = text.index(b">", last) + 1
+            places[element] = Place(line, first, last)
 
     def doctype(name: str, *_: object) -> None:
         raise RobotFileError(file, "DOCTYPE", name, "a file without DOCTYPE and entities")

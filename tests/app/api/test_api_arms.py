@@ -300,6 +300,24 @@ def test_import_of_urdf(client):
         assert "root:" not in str(problem)
 
 
+def test_the_doctor_for_urdf(client):
+    text = (FILES / "panda.urdf").read_text(encoding="utf-8")
+    found = post(client, "robots/doctor", {"urdf": text, "tip": "panda_link8"})
+    assert (found["refusal"], found["mended"], found["text"]) == ("", None, "Nothing is wrong or suspicious.")
+    sick = text.replace('<axis xyz="0 0 1" />', '<axis xyz="0 0 2" />', 1)
+    found = post(client, "robots/doctor", {"urdf": sick, "tip": "panda_link8"})
+    first = found["findings"][0]
+    assert (first["symptom"], first["line"]) == ("axis", sick[: sick.index("0 0 2")].count("\n") + 1)
+    assert first["automatic"]
+    assert post(client, "robots/import", {"urdf": found["mended"], "tip": "panda_link8"})["robot"]["n"] == 7
+    assert found["moved"] == 0.0
+    broken = post(client, "robots/doctor", {"urdf": "<robot>\n<link></robot>"})
+    assert (broken["findings"][0]["line"], broken["findings"][0]["rank"]) == (2, "wrong")
+    hostile = post(client, "robots/doctor", {"urdf": '<!DOCTYPE robot SYSTEM "file:///etc/passwd"><robot/>'})
+    assert "DOCTYPE" in hostile["refusal"]
+    assert post(client, "robots/doctor", {"urdf": 7}, 422)["errors"][0]["field"] == "urdf"
+
+
 def test_export(client):
     panda = kin.get_robot("panda")
     for name, convention in (("toml", "modified"), ("mdh", "modified"), ("dh", "standard")):

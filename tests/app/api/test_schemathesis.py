@@ -53,7 +53,7 @@ def contract():
 # Tests made from it are subtests: made where they run, and not by every process that collects this file.
 schema = schemathesis.pytest.from_fixture("contract")
 # Their handlers are those of the operations on arms of the service.
-# GET /robots/import asks for a robot of that name: 404 instead of 405.
+# GET /robots/import and /robots/doctor ask for a robot of that name: 404 instead of 405.
 SHADOWED = "unsupported_method"
 OF_SENT_ARMS = r"^/api/v1/(?!robots$|robots/\{robot_id\})"
 
@@ -87,7 +87,7 @@ def test_every_answer_is_one_the_document_tells_of(case):
     judge(case)
 
 
-@schema.include(path=["/api/v1/fk", "/api/v1/robots/import"]).parametrize()
+@schema.include(path=["/api/v1/fk", "/api/v1/robots/import", "/api/v1/robots/doctor"]).parametrize()
 @FEW
 def test_so_is_every_answer_about_an_arm_sent_along(case):
     judge(case, SHADOWED)

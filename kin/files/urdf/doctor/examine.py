@@ -1,0 +1,210 @@
+"""The whole examination of a URDF, and its text with all mends that need no decision."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kin.errors import InputError, RobotFileError
+from kin.files.urdf.doctor.bodies import MeshFiles, check_link
+from kin.files.urdf.doctor.findings import RANKS, UrdfExamination, UrdfFinding
+from kin.files.urdf.doctor.joints import check_joint
+from kin.files.urdf.doctor.notes import Notes, cut
+from kin.files.urdf.doctor.source import SourceText, decoded
+from kin.files.urdf.doctor.tree import LISTED, check_elements, check_tree
+from kin.files.urdf.read import UrdfRobot, read_urdf
+from kin.files.urdf.tree import UrdfTree, tree_of
+from kin.fk import fk
+
+MOST_FINDINGS = 500
+_ROUNDS = 3  # a mend may show what was hidden: limits in degrees that were exchanged
+_LINE = re.compile(r"line ([0-9]+)")
+_PLACE = re.compile(r"(joint|link) (.+?):")
+SAMPLES = 256
+
+
+def examine_urdf(
+    source: Path | str,
+    base: str | None = None,
+    tip: str | None = None,
+    file: str = "",
+    files: MeshFiles | None = None,
+) -> UrdfExamination:
+    """Look for what is wrong, suspicious or left out in a URDF, with the line of each finding and its mend.
+
+    A file that cannot be read is no error: that is a finding.
+
+    Args:
+        source: a `Path` of a file, or a `str`, which is the text itself and never a path.
+        base, tip: the links of the arm, as for `read_urdf`.
+        file: the name used in messages.
+        files: the meshes that came with it; without it, no mesh is looked at.
+
+    Raises:
+        InputError: `source` is neither.
+        RobotFileError: there is no such file, or it is no text.
+    """
+    if not isinstance(source, str | Path):
+        raise InputError("source", source, "the text of a URDF as str, or the Path of a file")
+    file = file or (str(source) if isinstance(source, Path) else "URDF")
+    text = source if isinstance(source, str) else decoded(_content(source), file)
+    first = _examined(text, base, tip, file, files)
+    mended = first.mended
+    for _ in range(_ROUNDS - 1):
+        if mended is None or (further := _examined(mended, base, tip, file, files).mended) is None:
+            break
+        mended = further
+    if mended is None:
+        return first
+    try:
+        arm: UrdfRobot | None = read_urdf(mended, base, tip, file)
+    except RobotFileError:
+        arm = None
+    return replace(first, mended=mended, mended_arm=arm, moved=_moved(first.arm, arm))
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        raise RobotFileError(str(path), "file", str(error), "a readable URDF file") from error
+
+
+def _examined(text: str, base: str | None, tip: str | None, file: str, files: MeshFiles | None) -> UrdfExamination:
+    """One round; `mended` are the changes of this round only."""
+    try:
+        source = SourceText(text, file)
+        tree = tree_of(source.root, file)
+    except RobotFileError as error:
+        return UrdfExamination(file, (), (_unreadable(error),), None, str(error))
+    notes, refusal = Notes(source), ""
+    arms: dict[str, UrdfRobot | str] = {}
+    several = tip is None and len(tree.tips) > 1 and not tree.unread
+    for each in [each.link for each in tree.tips[:LISTED]] if several else [tip]:
+        try:
+            arms[each or ""] = read_urdf(text, base, each, file)
+        except RobotFileError as error:
+            arms[each or ""] = f"{error.field}: got {error.value}, expected {error.expected}"
+    known = [arm for arm in arms.values() if isinstance(arm, UrdfRobot)]
+    arm = known[0] if known and not several else None
+    if not known:
+        refusal = str(next(iter(arms.values())))
+    check_tree(notes, tree)
+    joints = {joint.name: joint.element for joint in tree.joints}
+    for element in tree.root.findall("joint"):
+        check_joint(notes, element, f"joint {element.get('name', '').strip()}", joints)
+    reach = max((each.robot.reach for each in known), default=1.0)
+    for element in tree.root.findall("link"):
+        check_link(notes, element, f"link {element.get('name', '').strip()}", reach, files)
+    check_elements(notes, tree.root)
+    if arm is not None:
+        _note_arm(notes, tree, arm)
+    if refusal and not tree.unread:  # else a finding has said why
+        _note_refusal(notes, tree, refusal)
+    _note_meshes(notes, tree, files)
+    ranked = sorted(notes.findings, key=lambda each: (RANKS.index(each.rank), each.line or 0))
+    more = len(ranked) - MOST_FINDINGS
+    if more > 0:
+        words = f"{more} more findings are not listed."
+        ranked = [*ranked[:MOST_FINDINGS], UrdfFinding(None, "robot", "file", "left out", words)]
+    mended = source.changed(notes.edits) if notes.edits else None
+    return UrdfExamination(file, _read(tree, arm, arms), tuple(ranked), arm, refusal, mended)
+
+
+def _unreadable(error: RobotFileError) -> UrdfFinding:
+    line = _LINE.search(error.value)
+    words = f"{error.field}: {error.value}, expected {error.expected}."
+    return UrdfFinding(
+        int(line[1]) if line else None, "robot", "file", "wrong", words, "Nothing else was looked at."
+    )
+
+
+def _read(tree: UrdfTree, arm: UrdfRobot | None, arms: Mapping[str, UrdfRobot | str]) -> tuple[str, ...]:
+    """What the file holds, and what was read of it."""
+    kinds = Counter(joint.type for joint in tree.joints)
+    counted = ", ".join(f"{count} {cut(kind) or 'without a type'}" for kind, count in kinds.most_common())
+    bodies = [
+        sum(1 for link in tree.root.findall("link") for _ in link.findall(tag)) for tag in ("visual", "collision")
+    ]
+    lines = [
+        f"{len(tree.links)} links; {len(tree.joints)} joints{f' ({counted})' if counted else ''}; "
+        f"{bodies[0]} visible bodies, {bodies[1]} for collisions."
+    ]
+    if arm is not None:
+        report = arm.report
+        lines.append(
+            f"Read: {report.base} to {report.tip}, {len(report.joints)} moving joints ({', '.join(report.joints)})"
+            f"{f', and {len(report.merged)} fixed ones' if report.merged else ''}."
+        )
+        lines += report.notes
+        lines.append(f"Collisions: {report.about_bodies}")
+    elif len(arms) > 1:
+        more = f" and {len(tree.tips) - LISTED} more" if len(tree.tips) > LISTED else ""
+        ends = [f"{cut(tip)} ({_result(each)})" for tip, each in arms.items()]
+        lines.append(f"It has several ends, and one has to be chosen as the tip: {', '.join(ends)}{more}.")
+    return tuple(lines)
+
+
+def _result(arm: UrdfRobot | str) -> str:
+    return f"refused: {arm}" if isinstance(arm, str) else f"{arm.robot.n} joint{'s' * (arm.robot.n > 1)}"
+
+
+def _note_arm(notes: Notes, tree: UrdfTree, arm: UrdfRobot) -> None:
+    """What is beside the arm."""
+    report = arm.report
+    beside = [joint for joint in tree.joints if joint.name in set(report.ignored)]
+    if beside:
+        more = f" and {len(beside) - LISTED} more" if len(beside) > LISTED else ""
+        names = ", ".join(cut(joint.name) for joint in beside[:LISTED]) + more
+        what = "Joint" if len(beside) == 1 else f"{len(beside)} joints"
+        words = f"{what} beside the way from {report.base} to {report.tip}: {names}."
+        notes.add(beside[0].element, "robot", "beside the arm", "left out", words)
+
+
+def _note_refusal(notes: Notes, tree: UrdfTree, refusal: str) -> None:
+    """Why there is no arm, unless a finding has said so."""
+    place = _PLACE.match(refusal)
+    named = [e for e in tree.root if place and e.tag == place[1] and e.get("name", "").strip() == place[2]]
+    known = {each.place for each in notes.findings if each.rank == "wrong"}
+    if place and any(each.startswith(f"{place[1]} {cut(place[2])}") for each in known):
+        return
+    mimic = named[0].find("mimic") if named else None
+    if mimic is not None and "mimic" in refusal:
+        words = (
+            "It follows another joint, but lies on the way to the tool: a table has joints that move on their own."
+        )
+        mend = "Let it move on its own, or choose another tip."
+        notes.add(
+            mimic,
+            f"{place[1]} {place[2]}" if place else "",
+            "mimic",
+            "wrong",
+            words,
+            mend,
+            notes.source.without(mimic),
+        )
+        return
+    words, mend = f"No arm is read. {refusal}.", "Mend what is wrong, or choose another base or tip."
+    notes.add(named[0] if named else tree.root, "robot", "tree", "wrong", words, mend)
+
+
+def _note_meshes(notes: Notes, tree: UrdfTree, files: MeshFiles | None) -> None:
+    meshes = [mesh for link in tree.root.findall("link") for mesh in link.iter("mesh")]
+    if meshes and files is None:
+        many = "1 mesh file is" if len(meshes) == 1 else f"{len(meshes)} mesh files are"
+        words = f"{many} named, but none came along: they were not looked at."
+        notes.add(meshes[0], "robot", "mesh", "left out", words)
+
+
+def _moved(before: UrdfRobot | None, after: UrdfRobot | None) -> float | None:
+    """Largest distance between the tools of two arms with the same joints."""
+    if before is None or after is None or before.report.joints != after.report.joints:
+        return None
+    q = after.robot.random_q(np.random.default_rng(0), SAMPLES)
+    apart = fk(after.robot, q)[:, :3, 3] - fk(before.robot, q)[:, :3, 3]
+    return float(np.linalg.norm(apart, axis=1).max())

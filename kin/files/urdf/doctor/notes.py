@@ -1,0 +1,71 @@
+"""A pad on which the checks write their findings, with the changes of the text that mend them."""
+
+from __future__ import annotations
+
+from xml.etree.ElementTree import Element
+
+from kin.files.numbers import number_of
+from kin.files.urdf.doctor.findings import Rank, Symptom, UrdfFinding
+from kin.files.urdf.doctor.source import Edit, SourceText
+
+_LONGEST = 60  # characters of a name or a text in a sentence
+
+
+class Notes:
+    """The findings of one text so far."""
+
+    def __init__(self, source: SourceText) -> None:
+        self.source = source
+        self.findings: list[UrdfFinding] = []
+        self.edits: list[Edit] = []
+
+    def add(
+        self,
+        element: Element | None,
+        place: str,
+        symptom: Symptom,
+        rank: Rank,
+        text: str,
+        mend: str = "",
+        *edits: Edit,
+    ) -> None:
+        """A finding; with `edits` it is mended by them."""
+        line = None if element is None else self.source.line(element)
+        self.findings.append(UrdfFinding(line, cut(place), symptom, rank, text, mend, bool(edits)))
+        self.edits += edits
+
+    def numbers(self, element: Element, place: str, key: str, count: int = 1) -> list[float] | None:
+        """The finite numbers of an attribute; None, and a note, if it has not so many; also None without it.
+
+        A decimal comma, and commas between numbers, are mended.
+        """
+        text = element.get(key)
+        if text is None:
+            return None
+        values = [number_of(part) for part in text.split()]
+        if len(values) == count and all(abs(value) < float("inf") for value in values):
+            return values
+        what = "a finite number" if count == 1 else f"{count} finite numbers with blanks between them"
+        split = count > 1 and (len(text.split()) != count or text.split()[0].endswith(","))
+        mended = text.replace(",", " " if split else ".")
+        parts = [number_of(part) for part in mended.split()]
+        words = f"{key} is “{cut(text)}”, not {what}."
+        if mended != text and len(parts) == count and all(abs(value) < float("inf") for value in parts):
+            clean = " ".join(mended.split())
+            edit = self.source.with_attribute(element, key, clean)
+            self.add(element, place, "number", "wrong", words, f"Write “{clean}”.", edit)
+            return None
+        hint = " Expand xacro first." if "$" in text else ""
+        self.add(element, place, "number", "wrong", words, f"Write {what}.{hint}")
+        return None
+
+
+def cut(text: str) -> str:
+    """The beginning of a text of the file, for a sentence: without line breaks and invisible characters."""
+    text = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+
+
+def spelled(*values: float) -> str:
+    """Numbers as a URDF has them, to be read back exactly."""
+    return " ".join(repr(value + 0.0) for value in values)
