@@ -31,8 +31,6 @@ class StoredRooms(Protocol):
 
     def end(self, room: str) -> bool: ...
 
-    def count_solved(self, room: str, exercise: str) -> int: ...
-
 
 class LiveRooms(Protocol):
     """What `app.classroom.hub.Hub` does for a page."""
@@ -109,7 +107,14 @@ class Attendance:
         self._only_student()
         seat = self.room.seat
         if seat is not None and seat.task != exercise:
-            self._tell_seat(task=exercise[:200], tries=0, solved=False)
+            self._tell_seat(task=exercise[:200])
+
+    def tell_gone(self, gone: bool) -> None:
+        """Whether the student has stopped following."""
+        self._only_student()
+        seat = self.room.seat
+        if seat is not None and seat.gone != gone:
+            self._tell_seat(gone=gone)
 
     def secret(self) -> bytes:
         """A secret of the seat, from which the numbers of its exercises follow; raises `ClassroomUnavailable`."""
@@ -214,11 +219,6 @@ class Attendance:
         self._only_teacher()
         self._hub.rooms.rename_seat(self.ticket.room, seat, alias)
         self._hub.refresh(self.ticket.room)
-
-    def count_solved(self, exercise: str) -> int:
-        """How many students have solved an exercise; raises `ClassroomUnavailable`."""
-        self._only_teacher()
-        return self._hub.rooms.count_solved(self.ticket.room, exercise)
 
     def end_room(self) -> None:
         """End the room for all and erase everything in it; raises `ClassroomUnavailable`."""

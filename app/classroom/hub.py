@@ -17,7 +17,7 @@ others in the same process see at once. Those in other processes, on this or ano
 database: a thread writes what was reported in one transaction, at once when a page has set something, and every
 `TICK` reads the rooms whose version has changed. Pages are notified only of what they can see. `changed` must
 return at once: post to the inbox of the page. All methods are thread-safe. Only `ticket` (once per process),
-`attend`, `submit`, `remove_seat`, `rename_seat`, `count_solved` and `end_room` wait for the database; they belong
+`attend`, `submit`, `remove_seat`, `rename_seat` and `end_room` wait for the database; they belong
 in the worker of a page, never in the event loop.
 """
 
@@ -27,7 +27,7 @@ import contextlib
 import logging
 import os
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -358,7 +358,7 @@ class Hub:
             from app.classroom.ticks import fetch
 
             with database.read() as connection:
-                found = fetch(connection, known)
+                found = fetch(connection, known, self._tries_of)
         except ClassroomUnavailable as error:
             self._set_problem(known, str(error))
             return False
@@ -372,6 +372,12 @@ class Hub:
             self._close(ended)
         self._set_problem(known, "")
         return True
+
+    def _tries_of(self, room: str) -> Mapping[str, int]:
+        """How many attempts of each seat are known."""
+        with self._lock:
+            live = self._lives.get(room)
+            return {} if live is None else {seat: one.row["tries"] for seat, one in live.seats.items()}
 
     def _set_problem(self, rooms: Iterable[str], problem: str) -> None:
         with self._lock:

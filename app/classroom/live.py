@@ -15,13 +15,13 @@ from app.classroom.views import Poll, RoomView, SeatView, Shown, Task, Ticket
 
 AWAY = 7.0  # seconds without a beat after which nobody is assumed to be there
 REMOVED = "The teacher has removed you."
-_UNSEEN = {"beat", "version"}  # columns that no page shows
+_UNSEEN = {"beat", "version", "tries"}  # columns that no page shows
 _PAGE = {"page"}
 
 
 @dataclass
 class LiveSeat:
-    """One seat: the columns of its row, and when its beat was last seen to grow."""
+    """One seat: the columns of its row with its work by exercise, and when its beat was last seen to grow."""
 
     row: dict[str, Any]
     heard: float = field(default_factory=steady)
@@ -101,16 +101,13 @@ class LiveRoom:
         for new in seats:
             known = self.seats.get(new["id"])
             pending = self.pending.seats.get(new["id"], {})
-            if pending.get("task") == new["task"]:  # what is stored has counted its answers
-                for name in ("task", "tries", "solved"):
-                    del pending[name]
             if known is None:
-                self.seats[new["id"]] = LiveSeat({**new, **pending})
+                self.seats[new["id"]] = LiveSeat({"work": {}, **new, **pending})
                 self._seen_by_all += 1
                 continue
             if new["beat"] != known.row["beat"]:
                 known.heard = steady()
-            before_seat, known.row = known.row, {**new, **pending}
+            before_seat, known.row = known.row, {"work": known.row["work"], **new, **pending}
             self._note(new["id"], _changed(before_seat, known.row))
 
     def tell_page(self, page: str) -> None:
@@ -189,7 +186,7 @@ class LiveRoom:
         )
 
     def _seat(self, row: Mapping[str, Any]) -> SeatView:
-        names = ("id", "alias", "hand", "task", "tries", "solved", "page")
+        names = ("id", "alias", "hand", "task", "gone", "work", "page")
         seen = row["beat"] > 0 or row["id"] in self.here
         return SeatView(**{name: row[name] for name in names}, away=row["id"] in self.away, seen=seen)
 

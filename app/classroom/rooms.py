@@ -12,10 +12,10 @@ from sqlalchemy import Connection, Text, cast, delete, func, insert, select, upd
 from app.classroom import erasure, marks
 from app.classroom.clock import now
 from app.classroom.database import Database
+from app.classroom.standing import ANSWER_SHOWN
 from app.classroom.tables import TOKEN_BYTES, Attempt, LtiSeat, Room, Seat
 from app.classroom.tokens import Tokens, new_code, read_code
 from app.classroom.views import (
-    ANSWER_SHOWN,
     DELETED,
     ERASED,
     ERASING,
@@ -140,7 +140,7 @@ class Rooms:
             connection.execute(
                 insert(Seat).values(
                     id=ticket.seat, room_id=room, alias=alias, joined=now(), hand=0.0, task="", tries=0,
-                    solved=False, voted="", vote=0, page="", beat=0, version=version, removed=False,
+                    solved=False, voted="", vote=0, page="", beat=0, version=version, removed=False, gone=False,
                 )
             )  # fmt: skip
         return ticket
@@ -238,7 +238,7 @@ class Rooms:
         with self._database.write() as connection:
             version = next_version(connection, ticket.room)
             mine = (Seat.id == ticket.seat, Seat.room_id == ticket.room, Seat.removed.is_(False))
-            seat = connection.execute(select(Seat.task, Seat.tries).where(*mine)).one_or_none()
+            seat = connection.execute(select(Seat.id).where(*mine)).one_or_none()
             if version is None or seat is None:
                 raise RefusedError("The room has ended, or the teacher has removed you. The answer is not stored.")
             stored = connection.execute(
@@ -260,19 +260,8 @@ class Rooms:
             at = now()
             values = {field.name: getattr(attempt, field.name) for field in fields(attempt)}
             connection.execute(insert(Attempt).values(room_id=ticket.room, seat_id=ticket.seat, at=at, **values))
-            tries = (seat.tries if seat.task == attempt.exercise else 0) + (not attempt.gave_up)
-            connection.execute(
-                update(Seat).where(*mine).values(
-                    task=attempt.exercise, tries=tries, solved=attempt.score >= 1.0, version=version
-                )
-            )  # fmt: skip
+            connection.execute(update(Seat).where(*mine).values(tries=made + 1, version=version))
         return Confirmed(attempt.id, at)
-
-    def count_solved(self, room: str, exercise: str) -> int:
-        """How many students have given a right answer to an exercise."""
-        right = (Attempt.room_id == room, Attempt.exercise == exercise, Attempt.score >= 1.0)
-        with self._database.read() as connection:
-            return connection.scalar(select(func.count(Attempt.seat_id.distinct())).where(*right)) or 0
 
     def sweep(self) -> int:
         """Erase the rooms whose time is over; returns how many. For those that go on, store what the time is."""
@@ -289,7 +278,7 @@ class Rooms:
 
 
 _ERASED: dict[str, object] = {
-    "removed": True, "alias": "", "page": "", "hand": 0.0, "task": "", "voted": "",
+    "removed": True, "alias": "", "page": "", "hand": 0.0, "task": "", "tries": 0, "voted": "",
 }  # fmt: skip
 
 

@@ -61,6 +61,10 @@ class Seat(Base):
 
     Attributes:
         hand: when it was raised; 0: it is down.
+        task: the exercise that the page shows, or empty.
+        tries: how many attempts are stored; pages read the attempts again when it has changed.
+        solved: of earlier versions; not read any more.
+        gone: whether the student has stopped following.
         voted: id of the poll that `vote` belongs to.
         beat: grows every few seconds while a page of this seat is connected.
         version: that of the room when the seat last changed.
@@ -83,6 +87,7 @@ class Seat(Base):
     beat: Mapped[int] = mapped_column(BigInteger, default=0)
     version: Mapped[int] = mapped_column(BigInteger, default=0)
     removed: Mapped[bool] = mapped_column(default=False, server_default=false())
+    gone: Mapped[bool] = mapped_column(default=False, server_default=false())
 
 
 class Attempt(Base):

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import secrets
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
+
+from app.classroom.standing import ANSWER_SHOWN, Work
 
 NO_ROOM = "No room has this code. Ask your teacher; rooms end after a while."
 # What can be said of a room that has ended.
@@ -66,8 +69,8 @@ class SeatView:
     Attributes:
         hand: when the hand was raised, in seconds since 1970; 0: it is down.
         task: the exercise that the student's page shows, or empty.
-        tries: attempts at this task.
-        solved: whether the last of them was right.
+        gone: whether the student has stopped following.
+        work: what was answered, by exercise.
         page: the packed state of the page (`app.viewer.session.state`), or empty.
         away: whether no page of this seat is connected.
         seen: whether one ever was.
@@ -77,8 +80,8 @@ class SeatView:
     alias: str
     hand: float = 0.0
     task: str = ""
-    tries: int = 0
-    solved: bool = False
+    gone: bool = False
+    work: Mapping[str, Work] = field(default_factory=dict)
     page: str = ""
     away: bool = False
     seen: bool = True
@@ -166,9 +169,6 @@ class RoomView:
     seats: tuple[SeatView, ...] = ()
     closed: str = ""
     problem: str = ""
-
-
-ANSWER_SHOWN = "The answer was shown."
 
 
 @dataclass(frozen=True)

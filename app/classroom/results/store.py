@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain
 
-from sqlalchemy import literal, null, select, tuple_
+from sqlalchemy import Text, cast, func, literal, select, tuple_
 
 from app.classroom.database import Database
-from app.classroom.results.table import Attempt
+from app.classroom.results.table import Member
+from app.classroom.standing import SHOWN_ANSWER, Attempt
 from app.classroom.tables import Attempt as Stored
-from app.classroom.tables import Seat
+from app.classroom.tables import Room, Seat
 
 PAGE = 100  # attempts that are read at a time; each has up to 20 000 characters of an answer
 SHORT_PAGE = 5000  # the same without answers
@@ -21,6 +23,25 @@ def attempts_of(database: Database, room: str, answers: bool = True) -> list[Att
     return list(chain.from_iterable(pages_of(database, room, answers, PAGE if answers else SHORT_PAGE)))
 
 
+def members_of(database: Database, room: str) -> list[Member]:
+    """The students of a room, without those who were removed. Numbers count these too, so they never change."""
+    query = select(Seat.id, Seat.alias, Seat.beat, Seat.tries, Seat.removed).where(Seat.room_id == room)
+    with database.read() as connection:
+        seats = connection.execute(query.order_by(Seat.joined, Seat.id)).all()
+    return [
+        Member(seat.id, seat.alias, number, seat.beat > 0 or seat.tries > 0)
+        for number, seat in enumerate(seats, 1)
+        if not seat.removed
+    ]
+
+
+def task_of(database: Database, room: str) -> str:
+    """The exercise that is the task of a room, or empty."""
+    with database.read() as connection:
+        state = connection.scalar(select(Room.state).where(Room.id == room)) or {}
+    return str((state.get("task") or {}).get("exercise", ""))
+
+
 def pages_of(database: Database, room: str, answers: bool = True, size: int = PAGE) -> Iterator[list[Attempt]]:
     """The attempts of a room's present seats in the order of time, `size` at a time.
 
@@ -28,9 +49,11 @@ def pages_of(database: Database, room: str, answers: bool = True, size: int = PA
     `ClassroomUnavailable`.
 
     Args:
-        answers: whether the answers are read: a class may have given gigabytes of them, and a table needs none.
+        answers: whether answers are read whole: a class may have given gigabytes of them. Otherwise the
+            beginning of their JSON is.
     """
-    answer = Stored.answer if answers else null()
+    answer = Stored.answer if answers else func.substr(cast(Stored.answer, Text), 1, SHOWN_ANSWER)
+    numbers = {one.seat: one.number for one in members_of(database, room)}
     query = (
         select(
             Stored.seat_id, Seat.alias, Stored.exercise, Stored.seed, answer, Stored.verdict, Stored.score,
@@ -47,7 +70,7 @@ def pages_of(database: Database, room: str, answers: bool = True, size: int = PA
         with database.read() as connection:
             rows = connection.execute(after).all()
         if rows:
-            yield [Attempt(*row[:-1]) for row in rows]
+            yield [replace(Attempt(*row[:-1]), number=numbers.get(row.seat_id, 0)) for row in rows]
         if len(rows) < size:
             return
         after = query.where(place > tuple_(literal(rows[-1].at), literal(rows[-1].id)))

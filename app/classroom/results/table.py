@@ -5,107 +5,103 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from itertools import groupby
 
-from app.classroom.views import ANSWER_SHOWN
+from app.classroom.standing import NOTHING, URGENCY, Attempt, Work, works
 from app.shared.spreadsheets import cell
 
-STUCK_TRIES, STUCK_SECONDS = 3, 300.0  # without a right answer
 COLUMNS = (
     "alias", "exercise", "title", "attempt", "variant", "answer", "verdict", "score", "started",
-    "answered", "seconds",
+    "answered", "seconds", "seat", "state",
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Attempt:
-    """One answer of a student.
+class Member:
+    """A student who may have a row in the table.
 
     Attributes:
-        seat, alias: whose.
-        answer: plain data, as it was given.
-        score: 0 to 1.
-        started, at: seconds since 1970.
+        number: 1 for who joined the room first.
+        came: whether a page of the student was ever connected.
     """
 
     seat: str
     alias: str
-    exercise: str
-    seed: int
-    answer: object
-    verdict: str
-    score: float
-    started: float
-    at: float
+    number: int
+    came: bool = True
 
 
 @dataclass(frozen=True)
 class Row:
-    """One student's work on one exercise.
+    """One student's work on one exercise, or that there is none (`exercise` is empty).
 
     Attributes:
-        tries: answers so far; a request for the right one is none.
-        score: of the best, 0 to 1.
         seconds: since the student began; until the right answer, if there is one.
-        solved: whether an answer was right.
-        verdict: the sentence about the last answer.
     """
 
-    seat: str
-    alias: str
+    member: Member
     exercise: str
-    tries: int
-    score: float
-    seconds: float
-    solved: bool
-    verdict: str
+    work: Work
+    seconds: float = 0.0
 
     @property
-    def stuck(self) -> bool:
-        """Whether help is due: several wrong answers, or a long time without a right one."""
-        return not self.solved and (self.tries >= STUCK_TRIES or self.seconds >= STUCK_SECONDS)
+    def state(self) -> str:
+        """In words, as in the list of students."""
+        if not self.member.came:
+            return "has not come"
+        return self.work.progress if self.exercise else "no answer"
 
 
-def rows(attempts: Iterable[Attempt], now: float) -> list[Row]:
-    """The table: who is stuck first, then who is at work, then who has solved; each by tries and time."""
-    found = []
-    ordered = sorted(attempts, key=lambda one: (one.seat, one.exercise, one.at))
-    for (seat, exercise), group in groupby(ordered, key=lambda one: (one.seat, one.exercise)):
-        tries = list(group)
-        right = next((one.at for one in tries if one.score >= 1.0), None)
-        begin = min(one.started for one in tries)
-        count = sum(one.verdict != ANSWER_SHOWN for one in tries)
-        found.append(
-            Row(
-                seat, tries[-1].alias, exercise, count, max(one.score for one in tries),
-                max(0.0, (now if right is None else right) - begin), right is not None, tries[-1].verdict,
-            )
-        )  # fmt: skip
-    return sorted(found, key=lambda row: (row.solved, not row.stuck, -row.tries, -row.seconds, row.alias))
+def rows(members: Iterable[Member], attempts: Iterable[Attempt], task: str, now: float) -> list[Row]:
+    """The table: a row for each exercise of a student, and for each student one of the task.
+
+    Who needs the teacher comes first, then who has tried most and longest. Who has never come is at the end.
+
+    Args:
+        attempts: in the order of time.
+        task: the exercise that the room has as its task, or empty.
+    """
+    found, done = [], works(attempts)
+    for member in members:
+        mine = done.get(member.seat, {})
+        if task or not mine:
+            mine = {task: NOTHING, **mine}
+        for exercise, work in mine.items():
+            end = now if work.found is None else work.found
+            found.append(Row(member, exercise, work, max(0.0, end - work.began) if work.numbers else 0.0))
+    return sorted(
+        found,
+        key=lambda row: (
+            not row.member.came, URGENCY.index(row.work.progress), -row.work.tries, -row.seconds,
+            row.member.number,
+        ),
+    )  # fmt: skip
 
 
 def csv_of(pages: Iterable[Iterable[Attempt]], titles: Mapping[str, str]) -> Iterator[str]:
     """One row per attempt, in the given order, which is that of time: first the head, then a text for each page.
 
+    A request for the right answer has a row, and no number of an attempt. The state is that after the attempt, so
+    the last row of a student and an exercise has what the list of students says.
+
     Args:
         titles: of the exercises, by id.
     """
     yield _lines([COLUMNS])
-    counts: Counter[tuple[str, str]] = Counter()
+    done: dict[tuple[str, str], Work] = {}
     for page in pages:
         rows: list[list[object]] = []
         for one in page:
-            counts[one.seat, one.exercise] += 1
+            work = done[one.seat, one.exercise] = done.get((one.seat, one.exercise), NOTHING).plus(one)
             answer = json.dumps(one.answer, ensure_ascii=False, separators=(",", ":"))
             words = [one.alias, one.exercise, titles.get(one.exercise, ""), answer, one.verdict]
             alias, exercise, title, answer, verdict = map(cell, words)
             rows.append(
-                [alias, exercise, title, counts[one.seat, one.exercise], one.seed, answer, verdict,
-                 f"{one.score:.2f}", _time(one.started), _time(one.at), f"{max(0.0, one.at - one.started):.0f}"]
+                [alias, exercise, title, "" if one.gave_up else work.tries, one.seed, answer, verdict,
+                 f"{one.score:.2f}", _time(one.started), _time(one.at), f"{max(0.0, one.at - one.started):.0f}",
+                 one.number, work.progress]
             )  # fmt: skip
         yield _lines(rows)
 

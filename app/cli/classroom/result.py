@@ -11,7 +11,8 @@ from typing import Any
 from app.classroom import ClassroomUnavailable, Hub
 from app.classroom.results.check import check_code, facts
 from app.classroom.results.store import pages_of
-from app.classroom.results.table import Attempt, csv_of
+from app.classroom.results.table import csv_of
+from app.classroom.standing import Attempt
 from app.classroom.tokens import read_code
 from app.cli.terminal import print_json
 from app.exercises import Exercises

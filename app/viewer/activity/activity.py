@@ -6,11 +6,12 @@ and asks here what the others have open; `Feature.on_activity` reports every cha
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Final, NamedTuple, Protocol
 
 from app.classroom.courses import Course, Courses
+from app.classroom.standing import Work
 from app.exercises import Exercise, Verdict
 from app.viewer.activity.places import Place
 from app.viewer.activity.practice import Practice
@@ -130,6 +131,11 @@ class Activity:
         self.practice.enter(place)
 
     # Answers
+
+    def know(self, work: Mapping[str, Work]) -> None:
+        """Take what is stored of this seat, by exercise: answers on other pages of the seat count here too."""
+        if self.practice.know(work):
+            self.changed()
 
     def answer(self, exercise: Exercise, given: object, verdict: Verdict, seconds: float) -> None:
         """An answer was judged while the right one was not on show."""

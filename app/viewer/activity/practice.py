@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import random
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, get_args
 
+from app.classroom.standing import Numbers, Settled, Work
 from app.exercises import Exercise, Exercises, Variant, Verdict
 from app.viewer.activity.places import LABEL, Place
 from kin import InputError
 
 Mark = Literal["open", "wrong", "right", "shown"]
 MARKS: tuple[Mark, ...] = get_args(Mark)
+MARK_OF: dict[Settled, Mark] = {"open": "open", "right": "right", "shown": "shown"}
 MOST = 100_000  # attempts, seconds, variants
 
 
@@ -70,6 +73,7 @@ class Practice:
         self._place: Place | None = None
         self._elsewhere: dict[str, dict[str, Record]] = {}  # records of this page in other places, by label
         self._claims: dict[str, Claim] = {}  # what was restored for other places
+        self._known: dict[tuple[str, int], Numbers] = {}  # what was taken of the seat, by id and seed
         self._settled: dict[tuple[str, int], Record] = {}  # answers that this page has shown, by id and seed
 
     def enter(self, place: Place | None) -> None:
@@ -144,6 +148,23 @@ class Practice:
 
     def _settle(self, exercise: Exercise) -> None:
         self._settled[exercise.id, self.seed_of(exercise)] = self.record(exercise)
+
+    def know(self, work: Mapping[str, Work]) -> bool:
+        """Take what is stored of the seat, which may be of other pages; returns whether it is news."""
+        before = {key: replace(record) for key, record in self.records.items()}
+        for exercise_id, done in work.items():
+            exercise = self._exercises.get(exercise_id)
+            numbers = None if exercise is None else done.numbers.get(self.seed_of(exercise))
+            place = exercise_id, 0 if exercise is None else self.seed_of(exercise)
+            if exercise is None or numbers is None or self._known.get(place) == numbers:
+                continue
+            self._known[place] = numbers
+            record, known = self.record(exercise), MARK_OF[numbers.settled]
+            record.attempts = min(max(record.attempts, numbers.tries), MOST)
+            record.credit = max(record.credit, round(100 * numbers.credit))
+            if not record.closed:
+                record.mark = known if known != "open" or not numbers.tries else "wrong"
+        return before != self.records
 
     def again(self, exercise: Exercise) -> None:
         """Begin anew, with other numbers."""

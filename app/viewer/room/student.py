@@ -62,6 +62,8 @@ class Student(Member):
             self._end()
             return
         task, activity = self.activity.task, self.activity
+        if self.room.seat is not None:
+            activity.know(self.room.seat.work)
         activity.task = None if self.room.task is None else activity.exercises.get(self.room.task.exercise)
         self._set_course(task if self.room.task is None else None)
         self._set_task()
@@ -242,6 +244,7 @@ class Student(Member):
                 self._open_task()
 
     def refresh(self) -> None:
+        self.attendance.tell_gone(self._gone and self.leader == "")
         guest = self.page.guest
         update_html(
             self._head, views.student_html(self.room, self.mode, self.activity.task, self._submissions, guest)
@@ -252,7 +255,7 @@ class Student(Member):
 
     def bar(self) -> str:
         away = self.activity.task is not None and self.activity.exercise != self.activity.task
-        return views.student_bar(self.room, self.mode, self._open_tab, away)
+        return views.student_bar(self.room, self.mode, self._open_tab, self.activity.task, away)
 
     @property
     def mode(self) -> views.Mode:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 from dataclasses import replace
 
 from app.classroom.clock import now
 from app.classroom.courses import Course, to_data
-from app.classroom.views import ClassroomUnavailable, RoomView, SeatView
+from app.classroom.standing import standing
+from app.classroom.views import RoomView, SeatView
 from app.viewer.feature import Stage
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
@@ -33,7 +33,7 @@ class Teacher(Member):
     messages = frozenset(
         {
             *("follow", "freeze", "fields", "untask", "uncourse", "close", "unask", "look", "return", "show"),
-            *("hide", "pick", "remove", "sweep", "lower", "wall", "end"),
+            *("hide", "pick", "find", "remove", "sweep", "lower", "wall", "end"),
         }
     )
 
@@ -47,8 +47,9 @@ class Teacher(Member):
             self._join = gui.add_html("")
         with students:
             self._tools = gui.add_html("")
-            self._one = gui.add_html("")
             self._list = gui.add_html("")
+            self._one = gui.add_html("")  # below the student that it is about
+            self._rest = gui.add_html("")
         with task:
             self._task = gui.add_html("")
             self._course = gui.add_html("")
@@ -57,8 +58,7 @@ class Teacher(Member):
             self._tally = gui.add_html("")
         self._end = gui.add_html("")
         self._picked = ""  # the student whose details are open
-        self._solved = 0  # how many have solved the task
-        self._counted: tuple[object, ...] = ()  # what the count is of
+        self._open_tab = 0
         self._wall: Wall | None = None
         self._curtain: Curtain | None = None  # before all but the wall
         self._before: PageState | None = None  # the own page while a student's is on show, or the wall
@@ -123,6 +123,9 @@ class Teacher(Member):
         match kind:
             case "pick":
                 self._picked = "" if self._picked == seat else seat
+            case "find":
+                self._picked = seat
+                self._open_tab += 1
             case "look":
                 self._picked = seat
                 self._look(seat)
@@ -237,7 +240,9 @@ class Teacher(Member):
             state = decoded(seat.page, self.page.store.robots) if seat.page else PageState()
             robot = self._robot(state)
             if robot is not None and state.q is not None:
-                arms.append(SmallArm(seat.id, seat.alias, robot, state.q, views.doing(seat, self.room)))
+                found = standing(seat, self.room)
+                state_of = "away" if not found.here else found.progress or "none"
+                arms.append(SmallArm(seat.id, seat.alias, robot, state.q, state_of, found.hand))
         return arms[:MOST]
 
     def _robot(self, state: PageState) -> Robot | None:
@@ -282,28 +287,20 @@ class Teacher(Member):
         update_html(self._join, views.join_html(room, now()))
         update_html(self._tools, views.tools_html(room, self._wall is not None, self.is_armed("sweep")))
         seat = self._seat(self._picked)
-        update_html(self._one, views.seat_html(room, seat, self.leader, self.is_armed(("remove", self._picked))))
-        update_html(self._list, views.list_html(room, self._picked, exercises))
-        self._count_solved()
-        update_html(self._task, views.task_html(room, task, self._solved, exercises))
+        armed = self.is_armed(("remove", self._picked))
+        above, below = views.list_html(room, self._picked, exercises)
+        update_html(self._list, above)
+        update_html(self._one, views.seat_html(room, seat, self.leader, armed, exercises))
+        update_html(self._rest, below)
+        update_html(self._task, views.task_html(room, task, exercises))
         update_html(self._course, views.course_html(room, self._offered, task))
         update_html(self._ask, views.ask_html(room, QUESTION, CHOICES))
         update_html(self._tally, views.poll_html(room.poll, teacher=True))
         update_html(self._end, views.end_html(room, self.is_armed("end")))
         self._draw_wall()
 
-    def _count_solved(self) -> None:
-        """Count again who has solved the task if a student has answered, or gone to another exercise."""
-        room = self.room
-        state = (room.task, *((seat.id, seat.task, seat.tries, seat.solved) for seat in room.seats))
-        if room.task is None or room.closed or state == self._counted:
-            return
-        with contextlib.suppress(ClassroomUnavailable):  # the page says so; the count is of before
-            self._solved = self.attendance.count_solved(room.task.exercise)
-            self._counted = state
-
     def bar(self) -> str:
-        return views.teacher_bar(self.room, self._seat(self.leader), self._wall is not None)
+        return views.teacher_bar(self.room, self._seat(self.leader), self._wall is not None, self._open_tab)
 
 
 def _texts(value: object) -> list[str]:

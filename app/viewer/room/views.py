@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 from app.classroom.courses import Course
+from app.classroom.standing import URGENCY, Presence, Progress, Standing, standing
 from app.classroom.tokens import show_code
 from app.classroom.views import Poll, RoomView, SeatView
 from app.exercises import Exercise, Exercises
+from app.exercises.said import answer_in_words
 from app.viewer.room.submissions import Submissions
-from app.viewer.room.wall import State
 from app.viewer.views.templates import render
 
 Mode = Literal["free", "led", "gone", "shown", "frozen", "paused", "closed"]
-STUCK = 3  # attempts that were not right
 MANY = 3  # students who have never come, from which on they can be removed together
 # Symbol, headline, sentence and colour of who leads a student's page.
 MODES: dict[Mode, tuple[str, str, str, str]] = {
@@ -29,31 +30,22 @@ MODES: dict[Mode, tuple[str, str, str, str]] = {
 }  # fmt: skip
 STAYS = "What you have done stays on this page and in its link."
 GO_ON = "You can go on by yourself, or join a room."  # where no access token is needed
-# Symbol, words and colour of how a student is doing.
-DOING: dict[State, tuple[str, str, str]] = {
-    "working": ("", "here", ""),
-    "hand": ("☝", "hand up", "amber"),
-    "stuck": ("!", "stuck", "vermilion"),
-    "solved": ("✓", "solved", "green"),
-    "away": ("…", "away", ""),
-}
-
-
-def doing(seat: SeatView, room: RoomView) -> State:
-    """How a student is doing, in a word: the most urgent one."""
-    on_task = room.task is not None and seat.task == room.task.exercise
-    if seat.away:
-        return "away"
-    if seat.hand:
-        return "hand"
-    if on_task and seat.solved:
-        return "solved"
-    return "stuck" if on_task and seat.tries >= STUCK else "working"
+# Symbol and colour of what has become of the task, or of the exercise on show.
+PROGRESS: dict[Progress, tuple[str, str]] = {
+    "not begun": ("○", ""), "at it": ("✎", "blue"), "stuck": ("!", "vermilion"), "gave up": ("⚑", "mauve"),
+    "solved": ("✓", "green"),
+}  # fmt: skip
+HAND, AWAY = "☝", "…"
 
 
 def students(count: int) -> str:
     """``1 student``, ``12 students``."""
     return f"{count} student{'s' if count != 1 else ''}"
+
+
+def tries(count: int) -> str:
+    """``1 try``, ``3 tries``."""
+    return f"{count} {'try' if count == 1 else 'tries'}"
 
 
 def _mode(room: RoomView, mode: Mode, guest: bool) -> dict[str, str]:
@@ -76,17 +68,26 @@ def student_html(room: RoomView, mode: Mode, task: Exercise | None, sent: Submis
         guest: whether the page may be used no longer than the seat is there.
     """
     seat = room.seat or SeatView("", "")
-    mine = room.task is not None and seat.task == room.task.exercise
-    mark = ("solved", "green") if mine and seat.solved else ("", "")
-    if mine and seat.tries and not seat.solved:
-        mark = (f"{seat.tries} attempt{'s' if seat.tries > 1 else ''}, not right yet", "amber")
+    mark = _own_mark(room)
     return render(
         "room/student", room=room, seat=seat, mode=mode, lead=_mode(room, mode, guest), task=task, mark=mark,
         sent=sent,
     )  # fmt: skip
 
 
-def student_bar(room: RoomView, mode: Mode, open_tab: int, away: bool) -> str:
+def _own_mark(room: RoomView) -> tuple[str, str]:
+    """What has become of the task of a student who looks, in words, and its colour."""
+    if room.seat is None or room.task is None:
+        return "", ""
+    found = standing(room.seat, room)
+    words: dict[Progress, str] = {
+        "not begun": "not begun", "solved": "solved", "gave up": f"{tries(found.work.tries)}, answer shown",
+    }  # fmt: skip
+    progress = found.progress or "not begun"
+    return words.get(progress, tries(found.work.tries)), PROGRESS[progress][1]
+
+
+def student_bar(room: RoomView, mode: Mode, open_tab: int, task: Exercise | None, away: bool) -> str:
     """What a student must see whatever tab is open.
 
     Args:
@@ -97,7 +98,7 @@ def student_bar(room: RoomView, mode: Mode, open_tab: int, away: bool) -> str:
     quiet = mode == "free" and poll is None and not room.problem
     return render(
         "room/student_bar", room=room, mode=mode, lead=_mode(room, mode, guest=True), poll=poll, quiet=quiet,
-        stays=STAYS,
+        stays=STAYS, task=task, mark=_own_mark(room)[0],
         open_tab=open_tab, away=away and mode == "free", hand=bool(room.seat and room.seat.hand),
     )  # fmt: skip
 
@@ -126,7 +127,7 @@ def stored_html(room: RoomView, now: float) -> str:
 
 def lead_html(room: RoomView) -> str:
     """Follow me and Freeze."""
-    return render("room/lead", room=room, count=students(room.students))
+    return render("room/lead", room=room, count=students(Class.of(room).came))
 
 
 def join_html(room: RoomView, now: float) -> str:
@@ -140,57 +141,126 @@ def tools_html(room: RoomView, wall: bool, armed: bool) -> str:
     Args:
         armed: whether that button was pressed once.
     """
-    counts = [doing(seat, room) for seat in room.seats]
-    unseen = sum(seat.away and not seat.seen for seat in room.seats)
-    facts = [(DOING[s], counts.count(s)) for s in ("hand", "stuck", "solved", "away") if s in counts]
+    members = Class.of(room)
+    unseen = sum(not one.came for one in members.all)
     return render(
-        "room/tools", room=room, wall=wall, count=students(len(counts)), facts=facts, armed=armed,
+        "room/tools", room=room, wall=wall, count=students(members.came), facts=members.facts(room), armed=armed,
         unseen=unseen if unseen >= MANY else 0,
     )  # fmt: skip
 
 
-def seat_html(room: RoomView, seat: SeatView | None, looked: str, armed: bool) -> str:
+def seat_html(room: RoomView, seat: SeatView | None, looked: str, armed: bool, exercises: Exercises) -> str:
     """One student, and what can be done."""
     if seat is None or room.closed:
         return ""
     shown = room.shown is not None and room.shown.seat == seat.id
     return render(
         "room/seat", room=room, seat=seat, looked=looked == seat.id, shown=shown, armed=armed,
-        named=bool(shown and room.shown and room.shown.alias),
+        named=bool(shown and room.shown and room.shown.alias), row=_row(seat, room, exercises),
     )  # fmt: skip
 
 
-def list_html(room: RoomView, picked: str, exercises: Exercises) -> str:
-    """All students."""
-    rows = []
-    for seat in room.seats:
-        state = doing(seat, room)
-        symbol, words, color = DOING[state]
-        rows.append(
-            {"seat": seat, "symbol": symbol, "color": color, "words": _where(seat, room, state, words, exercises)}
-        )
-    return render("room/students", rows=rows, picked=picked)
+def list_html(room: RoomView, picked: str, exercises: Exercises) -> tuple[str, str]:
+    """All students, who needs the teacher first: down to the picked one, whose card follows, and the rest."""
+    members = sorted(room.seats, key=lambda seat: (standing(seat, room).rank, seat.hand))
+    place = next((i + 1 for i, seat in enumerate(members) if seat.id == picked), len(members))
+    rows = [_row(seat, room, exercises) for seat in members]
+    above = render("room/students", rows=rows[:place], picked=picked, empty=not members)
+    return above, render("room/students", rows=rows[place:], picked="", empty=False) if rows[place:] else ""
 
 
-def _where(seat: SeatView, room: RoomView, state: State, words: str, exercises: Exercises) -> str:
-    if state == "away":
-        return words if seat.seen else "has not come"
+def _row(seat: SeatView, room: RoomView, exercises: Exercises) -> dict[str, object]:
+    """One student in the list."""
+    found = standing(seat, room)
+    symbol, color = PROGRESS[found.progress] if found.progress else ("", "")
+    if not found.here:
+        symbol, color = (symbol, color) if found.progress in ("solved", "gave up") else (AWAY, "")
+    wrong = found.progress in ("stuck", "at it", "gave up") and found.work.tries
+    return {
+        "seat": seat, "hand": found.hand, "symbol": symbol, "color": color, "away": not found.here,
+        "words": " · ".join(_words(seat, room, found, exercises)),
+        "answer": said(found, exercises) if wrong else "", "verdict": found.work.verdict if wrong else "",
+    }  # fmt: skip
+
+
+def said(found: Standing, exercises: Exercises) -> str:
+    """The last answer of a student, in words."""
+    exercise, answer = exercises.get(found.exercise), str(found.work.answer or "")
+    return answer if exercise is None else answer_in_words(exercise, found.work.seed, answer)
+
+
+def _words(seat: SeatView, room: RoomView, found: Standing, exercises: Exercises) -> list[str]:
+    if not found.came:
+        return [found.presence]
+    words: list[str] = [] if found.here else [found.presence]
+    if found.hand:
+        words.append("hand up")
+    if found.progress:
+        words.append(found.progress)
+        if found.work.tries:
+            words.append(tries(found.work.tries))
+    if found.here:
+        words += _place(seat, room, found, exercises)
+    return words
+
+
+def _place(seat: SeatView, room: RoomView, found: Standing, exercises: Exercises) -> list[str]:
+    """What a student who is here looks at, as far as it is not the task."""
+    if found.presence == "following":
+        return ["follows"]
+    place = ["stopped following"] if room.follow or room.shown is not None else []
     exercise = exercises.get(seat.task) if seat.task else None
-    on_task = room.task is not None and seat.task == room.task.exercise
-    place = ["at the task" if on_task else exercise.title if exercise is not None else "at the arm"]
-    if seat.tries and not seat.solved:
-        place.append(f"{seat.tries} attempt{'s' if seat.tries > 1 else ''}")
-    if seat.solved and state != "solved":
-        place.append("solved")
-    if on_task and (len(place) > 1 or state == "solved"):
-        place = place[1:]  # who has answered is at the task
-    return " · ".join(place if state == "working" else [words, *place])
+    if room.task is None or found.elsewhere:
+        place.append("at the arm" if exercise is None else exercise.title)
+    return place
 
 
-def task_html(room: RoomView, task: Exercise | None, solved: int, exercises: Exercises) -> str:
+@dataclass(frozen=True)
+class Class:
+    """How all students are doing, and how many there are of each kind."""
+
+    all: tuple[Standing, ...]
+
+    @classmethod
+    def of(cls, room: RoomView) -> Class:
+        """Those of a room, in the order of joining."""
+        return cls(tuple(standing(seat, room) for seat in room.seats))
+
+    @property
+    def came(self) -> int:
+        """How many have ever come: the others do not count."""
+        return sum(one.came for one in self.all)
+
+    @property
+    def hands(self) -> int:
+        """How many hands are up."""
+        return sum(one.hand for one in self.all)
+
+    def at(self, progress: Progress) -> int:
+        """How many have come that far."""
+        return sum(one.came and one.progress == progress for one in self.all)
+
+    def being(self, presence: Presence) -> int:
+        """How many follow, are away, …"""
+        return sum(one.presence == presence for one in self.all)
+
+    def facts(self, room: RoomView) -> list[tuple[tuple[str, str, str], int]]:
+        """Symbol, words and colour with a number, for all that there is."""
+        facts = [((HAND, "hand up", "amber"), self.hands)]
+        facts += [((PROGRESS[each][0], each, PROGRESS[each][1]), self.at(each)) for each in URGENCY]
+        if room.follow or room.shown is not None:
+            facts += [(("▶", "following", "green"), self.being("following"))]
+            facts += [(("", "by themselves", ""), self.being("by themselves"))]
+        facts += [((AWAY, "away", ""), self.being("away")), (("", "has not come", ""), self.being("has not come"))]
+        return [fact for fact in facts if fact[1]]
+
+
+def task_html(room: RoomView, task: Exercise | None, exercises: Exercises) -> str:
     """The form to send an exercise, and how many have solved the present one."""
+    members = Class.of(room)
     return render(
-        "room/task", room=room, task=task, topics=exercises.topics(), solved=solved, count=len(room.seats)
+        "room/task", room=room, task=task, topics=exercises.topics(), solved=members.at("solved"),
+        count=members.came,
     )  # fmt: skip
 
 
@@ -216,11 +286,21 @@ def end_html(room: RoomView, armed: bool) -> str:
     return render("room/end", room=room, armed=armed)
 
 
-def teacher_bar(room: RoomView, looked: SeatView | None, wall: bool) -> str:
-    """What the teacher must see whatever tab is open."""
+def teacher_bar(room: RoomView, looked: SeatView | None, wall: bool, open_tab: int) -> str:
+    """What the teacher must see whatever tab is open.
+
+    Args:
+        open_tab: grows when the tab Class is to be opened.
+    """
     hands = sorted((seat for seat in room.seats if seat.hand), key=lambda seat: seat.hand)
+    members = Class.of(room)
+    led = room.follow or room.shown is not None
+    following = members.being("following")
+    apart = [(members.being("by themselves"), "by themselves"), (members.being("away"), "away")]
+    words = [f"{count} {what}" for count, what in apart if count] if led else []
     return render(
-        "room/teacher_bar", room=room, looked=looked, wall=wall, hands=hands, count=students(room.students),
+        "room/teacher_bar", room=room, looked=looked, wall=wall, hands=hands, count=students(members.came),
+        following=following, apart=words, stuck=members.at("stuck"), open_tab=open_tab,
     )  # fmt: skip
 
 

@@ -11,12 +11,13 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from app.classroom.standing import Progress
 from app.viewer.labels import add_label
 from app.viewer.scene.camera import DIRECTION
 from app.viewer.scene.meshes import Body, body
@@ -24,14 +25,16 @@ from app.viewer.skeleton import cylinder, places, skeleton
 from kin import Robot
 from kin.transforms import Array
 
-State = Literal["working", "hand", "stuck", "solved", "away"]
-STATES: tuple[State, ...] = get_args(State)
+State = Progress | Literal["away", "none"]
 # Colour of the pad, and symbol before the name.
 PADS: dict[State, tuple[int, int, int]] = {
-    "working": (118, 142, 166), "hand": (230, 159, 0), "stuck": (213, 94, 0), "solved": (0, 158, 115),
-    "away": (150, 150, 150),
+    "none": (118, 142, 166), "not begun": (118, 142, 166), "at it": (86, 140, 190), "stuck": (213, 94, 0),
+    "gave up": (204, 121, 167), "solved": (0, 158, 115), "away": (150, 150, 150),
 }  # fmt: skip
-SYMBOLS: dict[State, str] = {"working": "", "hand": "☝ ", "stuck": "! ", "solved": "✓ ", "away": "… "}
+SYMBOLS: dict[State, str] = {
+    "none": "", "not begun": "○ ", "at it": "✎ ", "stuck": "! ", "gave up": "⚑ ", "solved": "✓ ", "away": "… ",
+}  # fmt: skip
+HAND, RAISED = "☝ ", (230, 159, 0)  # before the name, and colour of the pad's column
 LINK, JOINT, AWAY = (86, 140, 190), (44, 62, 80), (165, 170, 175)
 MOST = 40  # arms on the wall
 WIDTH = 4.4  # of the wall, in radii of the sphere around the arm on show
@@ -46,13 +49,24 @@ _WALLS = itertools.count(1)
 
 @dataclass(frozen=True, eq=False)
 class SmallArm:
-    """One student's arm: the seat, the name shown, robot, configuration ``(n,)``, and how the student is doing."""
+    """One student's arm: the seat, the name shown, robot, configuration ``(n,)``, and how the student is doing.
+
+    Attributes:
+        hand: whether it is up, whatever the state is.
+    """
 
     seat: str
     name: str
     robot: Robot
     q: Array
     state: State
+    hand: bool = False
+
+    @property
+    def label(self) -> str:
+        """The name, with how the student is doing in a symbol and a word."""
+        words = "" if self.state == "none" else f" · {self.state}"
+        return f"{HAND if self.hand else ''}{SYMBOLS[self.state]}{self.name}{words}"
 
 
 def columns_of(count: int, aspect: float) -> int:
@@ -90,7 +104,7 @@ class Wall:
         self._scene, self._around, self._aspect, self._clicked = scene, around, aspect, clicked
         self._layout: tuple[tuple[str, Robot], ...] | None = None
         self._shown: list[bytes] = []
-        self._states: tuple[State, ...] = ()
+        self._states: tuple[tuple[State, bool], ...] = ()
         self._root: viser.SceneNodeHandle | None = None
         self._nodes: list[viser.BatchedMeshHandle] = []
         self._labels: list[viser.LabelHandle] = []
@@ -107,15 +121,16 @@ class Wall:
         if fresh:
             self._build(arms, layout)
         self._pose(arms)
-        states = tuple(arm.state for arm in arms)
+        states = tuple((arm.state, arm.hand) for arm in arms)
         if self._nodes and (fresh or states != self._states):
             self._states = states
             self._nodes[0].batched_colors = _colors(arms)
-            self._nodes[1].batched_colors = np.array([PADS[state] for state in states * 2], np.uint8)
+            pads = [PADS[state] for state, _ in states]
+            columns = [RAISED if hand else PADS[state] for state, hand in states]
+            self._nodes[1].batched_colors = np.array(pads + columns, np.uint8)
         for label, arm in zip(self._labels, arms, strict=True):
-            text = SYMBOLS[arm.state] + arm.name
-            if label.text != text:
-                label.text = text
+            if label.text != arm.label:
+                label.text = arm.label
         return fresh
 
     def remove(self) -> None:
@@ -149,7 +164,7 @@ class Wall:
         ]
         out = 0.3 * self._pitch * DIRECTION / np.linalg.norm(DIRECTION) - [0.0, 0.0, LABEL * self._pitch]
         self._labels = [
-            add_label(self._scene, f"{root}/name/{i}", arm.name, position=cell + out, anchor="top-center")
+            add_label(self._scene, f"{root}/name/{i}", arm.label, position=cell + out, anchor="top-center")
             for i, (arm, cell) in enumerate(zip(arms, self._cells, strict=True))
         ]
 

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,7 @@ from app.classroom import (
     clock,
 )
 from app.classroom.live import Pending
+from app.classroom.standing import standing
 from app.classroom.tables import REVISION, Attempt, Base, Room, Seat
 from app.classroom.ticks import store
 from app.classroom.tokens import Tokens
@@ -205,11 +207,17 @@ TEACHERS = {
     "remove_seat": ("x",),
     "remove_unseen": (),
     "rename_seat": ("x", "y"),
-    "count_solved": ("swing",),
     "end_room": (),
     "teacher_token": (),
 }
-STUDENTS = {"secret": (), "raise_hand": (True,), "vote": (0,), "tell_task": ("swing",), "submit": (attempt(),)}
+STUDENTS = {
+    "secret": (),
+    "raise_hand": (True,),
+    "vote": (0,),
+    "tell_task": ("swing",),
+    "tell_gone": (True,),
+    "submit": (attempt(),),
+}
 BOTH = {"room", "leave", "tell_page", "ticket", "changed"}
 
 
@@ -516,30 +524,62 @@ def test_other_databases_are_refused_and_not_shown(url, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("of_another", [False, True])
-def test_an_answer_given_at_once_counts_for_the_task_that_has_just_opened(hubs, monkeypatch, of_another):
-    monkeypatch.setattr("app.classroom.hub.TICK", 0.2)
+def test_what_was_answered_stays_when_the_student_goes_on_or_raises_a_hand(hubs, of_another):
     hub, other = hubs
     room = hub.rooms.open("Kinematics", 3600)
     seat = hub.rooms.join(room.code, "Ada")
     student, teacher = hub.attend(seat, nothing), hub.attend(hub.ticket(room.token), nothing)
     first = attempt()
     student.tell_task(first.exercise)
+    teacher.send_task(first.exercise)
     if of_another:
         other.rooms.submit(seat, first)
     else:
         student.submit(first)
-    until(lambda: teacher.room.seats[0].tries == 1)
+
+    def found():
+        return standing(teacher.room.seats[0], teacher.room)
+
+    until(lambda: found().progress == "solved")
     student.raise_hand(True)
-    until(lambda: not hub._lives[seat.room].pending)
-    time.sleep(0.5)
-    assert (teacher.room.seats[0].tries, teacher.room.seats[0].solved) == (1, True)
+    student.tell_task("another")
+    until(lambda: found().hand and found().elsewhere and not hub._lives[seat.room].pending)
+    assert (found().progress, found().work.tries) == ("solved", 1)
+    hub.rooms.submit(seat, replace(first, id="f" * 16, exercise="another", score=0.0))
+    until(lambda: "another" in teacher.room.seats[0].work)
+    assert found().progress == "solved"
+    late = other.attend(hub.ticket(room.token), nothing)
+    assert late.room.seats[0].work == teacher.room.seats[0].work
+    teacher.remove_seat(seat.seat)
+    again = other.attend(hub.ticket(room.token), nothing)
+    until(lambda: again.room.seats == ())
+    assert other._lives[seat.room].seats[seat.seat].row["work"] == {}
+
+
+def test_who_follows_is_known_to_the_teacher(hubs):
+    hub, other = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    teacher = other.attend(hub.ticket(room.token), nothing)
+    ann, bob = (hub.attend(hub.rooms.join(room.code, alias), nothing) for alias in ("Ann", "Bob"))
+    teacher.set_follow(True)
+    bob.tell_gone(True)
+
+    def presences():
+        return [standing(seat, teacher.room).presence for seat in teacher.room.seats]
+
+    until(lambda: presences() == ["following", "by themselves"])
+    bob.tell_gone(False)
+    until(lambda: presences() == ["following", "following"])
+    teacher.set_follow(False)
+    assert presences() == ["by themselves", "by themselves"]
+    assert ann.room.seats == ()
 
 
 def test_storing_leaves_what_is_pending_as_it_is(hubs):
     hub, _ = hubs
     room = hub.rooms.open("Kinematics", 3600)
     seat = hub.rooms.join(room.code, "Ada")
-    opened = {"task": "swing", "tries": 0, "solved": False}
+    opened = {"task": "swing", "hand": 0.0, "gone": False}
     pending = Pending(seats={seat.seat: dict(opened)})
     with hub.database.write() as connection:
         assert store(connection, seat.room, pending, set()) is not None

@@ -132,7 +132,9 @@ def goes_on(hub: Hub) -> None:
     teacher = hub.attend(Ticket("room1"), nothing)
     student = hub.attend(Ticket("room1", "seat1"), nothing)
     until(lambda: teacher.room.seats)
-    assert [(seat.alias, seat.page, seat.tries) for seat in teacher.room.seats] == [("Ada", "mine", 2)]
+    assert [(seat.alias, seat.page, seat.work["two-elbows"].tries) for seat in teacher.room.seats] == [
+        ("Ada", "mine", 1)
+    ]
     hub.rooms.join("KVNWZTRB", "Emmy")
     confirmed = student.submit(attempt())
     until(lambda: {seat.alias for seat in teacher.room.seats} == {"Ada", "Emmy"})

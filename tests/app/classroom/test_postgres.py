@@ -52,7 +52,7 @@ def test_a_class_on_two_machines(hubs):
     student.tell_page("mine")
     confirmed = student.submit(attempt())
     until(lambda: teacher.room.poll.votes == (0, 1) and teacher.room.seats)
-    until(lambda: teacher.room.seats[0].page == "mine" and teacher.room.seats[0].solved)
+    until(lambda: teacher.room.seats[0].page == "mine" and teacher.room.seats[0].work)
     assert there.rooms.find(seat).students == 1
     with here.database.read() as connection:
         assert connection.scalars(select(Attempt.id)).all() == [confirmed.id]
@@ -76,7 +76,7 @@ def test_two_machines_that_write_at_the_same_time_lose_nothing(hubs):
     teacher = here.attend(here.ticket(room.token), nothing)
     until(lambda: [seat.page for seat in teacher.room.seats].count("") == 0)
     assert {seat.page for seat in teacher.room.seats} == {f"page {k}" for k in range(30)}
-    assert {seat.tries for seat in teacher.room.seats} == {3}
+    assert {work.tries for seat in teacher.room.seats for work in seat.work.values()} == {3}
     with there.database.read() as connection:
         assert set(connection.scalars(select(Attempt.id))) == {each.id for each in confirmed}
 

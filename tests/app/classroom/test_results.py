@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from binascii import crc_hqx
+from dataclasses import replace
 from datetime import date, timedelta
 
 import pytest
@@ -12,7 +13,8 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from app.classroom.results import ForgedCodeError, MistypedCodeError, Outcome, codes, read_code, write_code
-from app.classroom.results.table import COLUMNS, STUCK_SECONDS, Attempt, csv_of, rows
+from app.classroom.results.table import COLUMNS, Member, csv_of, rows
+from app.classroom.standing import ANSWER_SHOWN, Attempt
 from kin import InputError
 
 KEY, OTHER = b"k" * 32, b"o" * 32
@@ -120,22 +122,28 @@ def attempt(
     return Attempt(seat, f"alias of {seat}", exercise, 7, answer, "Too large.", score, started, at)
 
 
-def test_who_is_stuck_comes_first() -> None:
+def test_who_needs_the_teacher_comes_first_and_everybody_has_a_row() -> None:
     attempts = [
         attempt("fast", "a", 1.0, 10.0),
-        attempt("slow", "a", 0.0, 20.0),
-        attempt("busy", "a", 0.5, 20.0, started=STUCK_SECONDS - 50.0),
-        *(attempt("lost", "a", 0.0, float(at)) for at in range(4)),
+        attempt("busy", "a", 0.5, 20.0, started=15.0),
+        *(attempt("lost", "a", 0.0, float(at)) for at in range(3)),
         attempt("late", "a", 0.0, 5.0),
         attempt("late", "a", 1.0, 9.0),
+        attempt("late", "b", 0.0, 11.0, answer=3),
+        replace(attempt("shown", "a", 0.0, 30.0), verdict=ANSWER_SHOWN),
     ]
-    table = rows(attempts, now=STUCK_SECONDS)
-    assert [row.seat for row in table] == ["lost", "slow", "busy", "late", "fast"]
-    assert [row.stuck for row in table] == [True, True, False, False, False]
-    assert [(row.tries, row.score, row.solved) for row in table[-2:]] == [(2, 1.0, True), (1, 1.0, True)]
-    assert table[0].seconds == STUCK_SECONDS
-    assert table[-1].seconds == 10.0
-    assert table[2].score == 0.5
+    names = ("fast", "busy", "lost", "late", "shown", "idle")
+    members = [Member(name, name.title(), i) for i, name in enumerate(names)]
+    table = rows([*members, Member("ghost", "Ghost", 9, came=False)], attempts, task="a", now=300.0)
+    assert [(row.member.seat, row.exercise, row.state) for row in table] == [
+        ("lost", "a", "stuck"), ("shown", "a", "gave up"), ("idle", "a", "not begun"), ("late", "b", "at it"),
+        ("busy", "a", "at it"), ("late", "a", "solved"), ("fast", "a", "solved"), ("ghost", "a", "has not come"),
+    ]  # fmt: skip
+    assert [row.work.tries for row in table] == [3, 0, 0, 1, 1, 2, 1, 0]
+    assert (table[0].seconds, table[-2].seconds, table[2].seconds) == (300.0, 10.0, 0.0)
+    assert [(row.work.score, row.work.answer) for row in table[3:5]] == [(0.0, 3), (0.5, 1)]
+    (alone,) = rows(members[:1], [], task="", now=1.0)
+    assert (alone.exercise, alone.state) == ("", "no answer")
 
 
 @given(st.text(max_size=12), st.text(max_size=12))
@@ -151,6 +159,16 @@ def test_no_cell_is_a_formula(alias: str, answer: str) -> None:
     for value in row:
         assert not value.lstrip(" ")[:1] or value.lstrip(" ")[0] not in "=+-@\t\r"
     assert row[0].removeprefix("'") == alias or row[0] == alias
+
+
+def test_the_file_tells_students_apart_and_has_the_state_of_the_list() -> None:
+    asked = replace(attempt("b", "x", 0.0, 30.0), verdict=ANSWER_SHOWN)
+    given = [attempt("a", "x", 0.0, 10.0), attempt("b", "x", 0.0, 20.0), asked, attempt("a", "x", 1.0, 40.0)]
+    numbered = [replace(one, alias="Bob", number=1 + (one.seat == "b")) for one in given]
+    found = list(csv.DictReader(io.StringIO("".join(csv_of([numbered[:2], numbered[2:]], {})))))
+    assert [(row["seat"], row["attempt"], row["state"]) for row in found] == [
+        ("1", "1", "at it"), ("2", "1", "at it"), ("2", "", "gave up"), ("1", "2", "solved"),
+    ]  # fmt: skip
 
 
 def test_each_attempt_is_a_row_and_each_page_a_text() -> None:

@@ -17,13 +17,15 @@ from starlette.types import Send
 from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, Role
 from app.classroom.clock import now
-from app.classroom.results.table import Attempt, csv_of, rows
+from app.classroom.results.table import Row, csv_of, rows
+from app.classroom.standing import Attempt
 from app.service.web.rooms.page import results_page
 from app.shared.settings import Settings
 from app.shared.store import Store
 
 if TYPE_CHECKING:
     from app.classroom.rooms import OpenRoom
+    from app.exercises import Exercises
 
 logger = logging.getLogger("kinboard.classroom")
 
@@ -39,23 +41,31 @@ class Results:
     async def show(self, request: Request) -> Response:
         """The table; its script asks for this page again and again."""
         try:
-            room, attempts = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
+            room, task, table, attempts = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
         except ClassroomUnavailable as error:
             return results_page(request, 503, problem=str(error))
-        titles = await run_in_threadpool(lambda: self._titles)
-        table = rows(attempts, now())
-        shown = [
-            {
-                "alias": row.alias, "title": titles.get(row.exercise, row.exercise), "tries": row.tries,
-                "score": round(100 * row.score), "time": f"{int(row.seconds) // 60}:{int(row.seconds) % 60:02}",
-                "verdict": row.verdict, "state": "solved" if row.solved else "stuck" if row.stuck else "at work",
-            }
-            for row in table[:MOST]
-        ]  # fmt: skip
-        counts = {state: sum(row["state"] == state for row in shown) for state in ("stuck", "at work", "solved")}
+        shown = await run_in_threadpool(lambda: [self._shown(row) for row in table[:MOST]])
+        states = ("stuck", "gave up", "not begun", "at it", "solved", "has not come")
+        counted = [row for row in table if not task or row.exercise == task]
+        counts = {state: sum(row.state == state for row in counted) for state in states}
         return results_page(
-            request, room=room, rows=shown, counts=counts, more=len(table) - len(shown), attempts=len(attempts)
+            request, room=room, rows=shown, counts=counts, more=len(table) - len(shown), attempts=attempts
         )
+
+    def _shown(self, row: Row) -> dict[str, object]:
+        """A row as the page has it."""
+        exercise, work = self._exercises.get(row.exercise), row.work
+        said = str(work.answer or "")
+        if exercise is not None and work.tries:
+            from app.exercises.said import answer_in_words
+
+            said = answer_in_words(exercise, work.seed, said)
+        return {
+            "alias": row.member.alias, "number": row.member.number, "state": row.state,
+            "title": row.exercise if exercise is None else exercise.title, "tries": work.tries,
+            "score": round(100 * work.score), "time": f"{int(row.seconds) // 60}:{int(row.seconds) % 60:02}",
+            "answer": said, "verdict": work.verdict, "begun": bool(work.numbers),
+        }  # fmt: skip
 
     async def download(self, request: Request) -> Response:
         """One row per attempt; what has been read is sent before more is."""
@@ -75,12 +85,14 @@ class Results:
         texts = csv_of(chain([first], pages), titles)
         return _Download(_encoded(texts), media_type="text/csv; charset=utf-8", headers=headers)
 
-    def _read(self, token: str) -> tuple[OpenRoom, list[Attempt]]:
-        """The room of the teacher's cookie and its attempts without the answers; raises 403."""
-        from app.classroom.results.store import attempts_of  # imports SQLAlchemy
+    def _read(self, token: str) -> tuple[OpenRoom, str, list[Row], int]:
+        """The room of the teacher's cookie, its task and table, and the number of attempts; raises 403."""
+        from app.classroom.results.store import attempts_of, members_of, task_of  # imports SQLAlchemy
 
-        room = self._room(token)
-        return room, attempts_of(self._hub.database, room.id, answers=False)
+        room, database = self._room(token), self._hub.database
+        attempts = attempts_of(database, room.id, answers=False)
+        task = task_of(database, room.id)
+        return room, task, rows(members_of(database, room.id), attempts, task, now()), len(attempts)
 
     def _room(self, token: str) -> OpenRoom:
         """The room of the teacher's cookie; raises 403."""
@@ -93,11 +105,14 @@ class Results:
         return room
 
     @cached_property
-    def _titles(self) -> dict[str, str]:
+    def _exercises(self) -> Exercises:
         from app.exercises import Exercises  # with the first page: the start need not wait
 
-        exercises = Exercises(self._settings.exercises, self._store.get)
-        return {one.id: one.title for one in exercises.all}
+        return Exercises(self._settings.exercises, self._store.get)
+
+    @property
+    def _titles(self) -> dict[str, str]:
+        return {one.id: one.title for one in self._exercises.all}
 
 
 class _Download(StreamingResponse):

@@ -230,7 +230,7 @@ def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
     attendance = room.hub.attend(Ticket(ticket.room), lambda: None)
     (seat,) = attendance.room.seats
     attendance.leave()
-    assert (seat.task, seat.tries, seat.solved) == (EXERCISE, 2, True)
+    assert (seat.task, seat.work[EXERCISE].tries, seat.work[EXERCISE].progress) == (EXERCISE, 2, "solved")
 
     # The words below an answer do not stay below the next exercise, from which the bar leads back.
     assert "Open the task</button>" not in student.html.partition("data-class-bar")[2]
@@ -244,7 +244,7 @@ def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
 
     # Who goes on to something else has still solved it.
     student.set("Lesson", "Screws")
-    teacher.wait(lambda: ">at the arm</span>" in teacher.html)
+    teacher.wait(lambda: ">solved · 2 tries · at the arm</span>" in teacher.html)
     assert "1 of 1 solved" in teacher.html
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import threading
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.classroom import ClassroomUnavailable, Confirmed, NewAttempt, RefusedError, RoomView, SeatView, Task
+from app.classroom.standing import ANSWER_SHOWN, Attempt, Work, standing, works
+from app.exercises import Exercises
 from app.viewer.exercises.feature import Practising
 from app.viewer.room import submissions, views
 from app.viewer.room.member import act_of
@@ -21,6 +26,7 @@ from app.viewer.scene.camera import DIRECTION
 from app.viewer.session.state import PageState
 from app.viewer.worksheet.feature import Worksheets
 
+EXERCISES = Exercises()
 ATTEMPT = NewAttempt("swing", 1, [1], "Yes.", 1.0, 0.0)
 
 
@@ -100,15 +106,64 @@ def test_acts_are_what_a_visitor_does_to_the_arm(key: object, value: object, act
     assert act_of(key, value, (Practising, Student, Worksheets)) == act  # type: ignore[arg-type]
 
 
+def work(*scores: float | None, exercise: str = "swing") -> dict[str, Work]:
+    """What these answers give; None: the right one was shown."""
+    attempts = [
+        Attempt("1", "A", exercise, 7, "[1]", "No." if score is not None else ANSWER_SHOWN, score or 0.0, 0.0, at)
+        for at, score in enumerate(scores)
+    ]
+    return works(attempts).get("1", {})
+
+
+ALONE = "by themselves"
+
+
 @pytest.mark.parametrize(
-    ("seat", "state"),
+    ("seat", "presence", "progress", "words"),
     [
-        (SeatView("1", "A", away=True, hand=3.0), "away"),
-        (SeatView("1", "A", hand=3.0, task="swing", solved=True), "hand"),
-        (SeatView("1", "A", task="swing", solved=True, tries=1), "solved"),
-        (SeatView("1", "A", task="swing", tries=3), "stuck"),
-        (SeatView("1", "A", task="other", tries=3), "working"),
+        ({"task": "swing"}, ALONE, "not begun", "not begun"),
+        ({"task": "swing", "work": work(0.0)}, ALONE, "at it", "at it · 1 try"),
+        ({"task": "swing", "work": work(0, 0.5, 0)}, ALONE, "stuck", "stuck · 3 tries"),
+        ({"work": work(0, None)}, ALONE, "gave up", "gave up · 1 try · at the arm"),
+        ({"task": "x", "work": work(0, 1, 0)}, ALONE, "solved", "solved · 3 tries · at the arm"),
+        ({"task": "swing", "hand": 3.0, "work": work(1.0)}, ALONE, "solved", "hand up · solved · 1 try"),
+        ({"away": True, "work": work(1.0)}, "away", "solved", "away · solved · 1 try"),
+        ({"away": True, "seen": False}, "has not come", "not begun", "has not come"),
+        ({"task": "x", "work": work(0, 0, exercise="x")}, ALONE, "not begun", "not begun · at the arm"),
     ],
 )
-def test_how_a_student_is_doing(seat: SeatView, state: str) -> None:
-    assert views.doing(seat, RoomView("r", task=Task("swing", 1.0))) == state
+def test_how_a_student_is_doing(seat: dict[str, Any], presence: str, progress: str, words: str) -> None:
+    one = SeatView("1", "A", **seat)
+    room = RoomView("r", task=Task("swing", 1.0), seats=(one,))
+    found = standing(one, room)
+    assert (found.presence, found.progress, found.hand) == (presence, progress, "hand" in seat)
+    listed, rest = views.list_html(room, "", EXERCISES)
+    assert re.findall(r'class="kb-class-where">([^<]*)<', listed) == [words]
+    assert rest == ""
+
+
+def test_list_chips_bar_and_task_say_the_same_of_thirty() -> None:
+    """Three have stopped following, one is away, two never came; ten have solved the task."""
+    seats = [
+        SeatView(f"{i}", f"S{i}", hand=float(i == 9), gone=i < 3, work=work(1.0) if i < 10 else {})
+        for i in range(28)
+    ]
+    seats[20] = replace(seats[20], away=True, work=work(0, 0, 0))
+    seats[21] = replace(seats[21], work=work(0, 0, 0))
+    seats += [SeatView("28", "S28", away=True, seen=False), SeatView("29", "S29", away=True, seen=False)]
+    room = RoomView("r", follow=True, task=Task("swing", 1.0), seats=tuple(seats), students=30)
+    bar = plain(views.teacher_bar(room, None, False, 0))
+    assert "You lead 24 of 28 students · 3 by themselves · 1 away · 2 stuck" in bar
+    assert "10 of 28 solved it" in plain(views.task_html(room, EXERCISES.all[0], EXERCISES))
+    chips = plain(views.tools_html(room, False, False))
+    for fact in ("1 hand up", "2 stuck", "16 not begun", "10 solved", "24 following", "3 by themselves", "1 away"):
+        assert fact in chips, fact
+    assert "2 has not come" in chips
+    above, rest = views.list_html(room, "21", EXERCISES)
+    order = re.findall(r'data-question-key="(\d+)"', above + rest)
+    assert [order[0], order[1], *order[-3:]] == ["9", "21", "20", "28", "29"]
+    assert re.findall(r'data-question-key="(\d+)"', above) == ["9", "21"], "the card stands below who was picked"
+
+
+def plain(html: str) -> str:
+    return " ".join(re.sub("<[^>]+>", " ", html).split())

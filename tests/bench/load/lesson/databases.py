@@ -85,6 +85,11 @@ def _tell(hub: Hub, room: str, way: Way, seconds: float) -> None:
                 connection.execute(text(f"NOTIFY {CHANNEL}"))
 
 
+def _nothing(room: str) -> dict[str, int]:
+    """No attempt of any seat is known; there are none."""
+    return {}
+
+
 def _wait(folder: Path, url: str | None, way: Way, room: str, pipe: Connection) -> None:
     """The other process: sends the latencies when the last page has come."""
     hub = Hub(folder, url)
@@ -95,11 +100,11 @@ def _wait(folder: Path, url: str | None, way: Way, room: str, pipe: Connection) 
         listening = psycopg.connect(url, autocommit=True)
         listening.execute(f"LISTEN {CHANNEL}")
     with hub.database.read() as connection:
-        assert fetch(connection, {room: known})[room] is not None
+        assert fetch(connection, {room: known}, _nothing)[room] is not None
     pipe.send("ready")
     while page != "end":
         with hub.database.read() as connection:
-            found = fetch(connection, {room: known}).get(room)
+            found = fetch(connection, {room: known}, _nothing).get(room)
         if found is not None:
             known, new = found[0]["version"], found[0]["page"]
             if new not in (page, "", "end"):
