@@ -327,7 +327,7 @@ class Hub:
                 beats = live.here if beat and live.row else set()
                 if not live.closed and (live.pending or beats):
                     news[room] = live.pending, set(beats)
-                    live.pending = Pending()
+                    live.flying, live.pending = live.pending, Pending()
         if not news:
             return True
         from app.classroom.ticks import store
@@ -339,12 +339,16 @@ class Hub:
             with self._lock:
                 for room, (pending, _) in news.items():
                     self._lives[room].pending.add_older(pending)
+                    self._lives[room].flying = Pending()
             self._set_problem(news, str(error))
             return False
         with self._lock:
             for room, version in versions.items():
                 live = self._lives[room]
-                if version == live.version + 1:  # nobody else has written: there is nothing to read
+                live.flying = Pending()
+                if version is not None and version <= live.version:  # read meanwhile, below what was on its way
+                    live.row["version"] = version - 1
+                elif version == live.version + 1:  # nobody else has written: there is nothing to read
                     live.row["version"] = version
         return True
 

@@ -55,6 +55,7 @@ class LiveRoom:
         self.state: dict[str, Any] = {}
         self.seats: dict[str, LiveSeat] = {}
         self.pending = Pending()
+        self.flying = Pending()  # on its way into the database
         self.pages: dict[str, str] = {}  # newest states of students' pages, for the next time they are due
         self._paged = -math.inf  # when they were last taken
         self._seen_by_all = self._seen_by_teacher = 0  # counts of changes
@@ -89,18 +90,19 @@ class LiveRoom:
             self._seen_by_teacher += 1
 
     def load(self, row: Mapping[str, Any], seats: list[dict[str, Any]]) -> None:
-        """Take over what the database says; what is pending is newer."""
+        """Take over what the database says; what is pending or on its way is newer."""
         if self.row and row["beat"] != self.row["beat"]:
             self.heard = steady()
-        page = self.row.get("page", "") if self.pending.page is not None else row["page"]
+        told = self.pending.page is not None or self.flying.page is not None
+        page = self.row.get("page", "") if told else row["page"]
         before = self.row, self.state
         self.row = {**row, "page": page}
-        self.state = {**row["state"], **self.pending.state}
+        self.state = {**row["state"], **self.flying.state, **self.pending.state}
         if self.state != before[1] or _changed(before[0], self.row) - {"state"}:
             self._seen_by_all += 1
         for new in seats:
             known = self.seats.get(new["id"])
-            pending = self.pending.seats.get(new["id"], {})
+            pending = {**self.flying.seats.get(new["id"], {}), **self.pending.seats.get(new["id"], {})}
             if known is None:
                 self.seats[new["id"]] = LiveSeat({"work": {}, **new, **pending})
                 self._seen_by_all += 1

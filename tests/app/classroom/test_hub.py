@@ -556,6 +556,29 @@ def test_what_was_answered_stays_when_the_student_goes_on_or_raises_a_hand(hubs,
     assert other._lives[seat.room].seats[seat.seat].row["work"] == {}
 
 
+def test_what_is_on_its_way_is_not_undone_by_what_is_read_meanwhile(hubs, monkeypatch):
+    """An answer is stored, and read, between the moment a task is taken to be written and the writing."""
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    seat = hub.rooms.join(room.code, "Ada")
+    student, teacher = hub.attend(seat, nothing), hub.attend(hub.ticket(room.token), nothing)
+    write, answered = hub.database.write, []
+
+    def late(**options):
+        if not options.get("durable", True) and hub._lives[room.id].flying.state and not answered:
+            answered.append(student.submit(attempt()))
+        return write(**options)
+
+    monkeypatch.setattr(hub.database, "write", late)
+    teacher.send_task("swing")
+    until(lambda: answered and not hub._lives[room.id].flying and not hub._lives[room.id].pending)
+    time.sleep(0.2)
+    assert teacher.room.task is not None
+    assert teacher.room.seats[0].work
+    with hub.database.read() as connection:
+        assert connection.scalar(select(Room.state))["task"]["exercise"] == "swing"
+
+
 def test_who_follows_is_known_to_the_teacher(hubs):
     hub, other = hubs
     room = hub.rooms.open("Kinematics", 3600)
