@@ -240,13 +240,7 @@ def run(settings: Settings, open_browser: bool = False) -> int:
         for part in parts:
             for link in part.links.values():
                 stack.enter_context(link)
-        bench = None
-        if settings.bench:
-            try:
-                bench = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="kinboard-bench-")))
-            except OSError as error:
-                print(f"kinboard: no folder for runs of the benchmark, which are off: {error}", file=sys.stderr)
-                settings = settings.model_copy(update={"bench": False})
+        settings, bench = _with_bench_folder(settings, stack)
         if len(parts) == 1:
             return _serve(settings, parts[0], store=store, greeting=greeting, bench=bench)
         return supervise(
@@ -258,6 +252,17 @@ def run(settings: Settings, open_browser: bool = False) -> int:
             on_start=greeting.show,
             on_end=_forget,
         )
+
+
+def _with_bench_folder(settings: Settings, stack: contextlib.ExitStack) -> tuple[Settings, Path | None]:
+    """The folder for runs of the benchmark; without one, the settings with the benchmark switched off."""
+    if not settings.bench:
+        return settings, None
+    try:
+        return settings, Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="kinboard-bench-")))
+    except OSError as error:
+        print(f"kinboard: no folder for runs of the benchmark, which are off: {error}", file=sys.stderr)
+        return settings.model_copy(update={"bench": False}), None
 
 
 def _forget(member: Member, pid: int) -> None:

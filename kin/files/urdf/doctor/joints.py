@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element
 
 from kin.files.numbers import LARGEST, number_of
 from kin.files.urdf.doctor.notes import Notes, cut, spelled
+from kin.files.urdf.doctor.source import Edit
 from kin.files.urdf.tree import MOVING, TYPES
 from kin.units import general
 
@@ -90,17 +91,27 @@ def _check_limits(notes: Notes, joint: Element, place: str, kind: str) -> bool:
         words = f"The lower limit is above the upper one: {shown}."
         notes.add(limit, place, "limit", "wrong", words, "Exchange them.", low, high)
         return False
-    most = max(abs(lower), abs(upper))
     if kind == "prismatic":
-        if most > _LONGEST_SLIDE:
-            edits = [
-                source.with_attribute(limit, key, spelled(value / 1000.0))
-                for key, value in (("lower", lower), ("upper", upper))
-            ]
-            words = f"It slides from {shown} m: these look like millimetres."
-            mend = f"Write metres, {general(lower / 1000.0)} to {general(upper / 1000.0)}."
-            notes.add(limit, place, "millimetres", "suspicious", words, mend, *edits)
+        _check_slide(notes, limit, place, lower, upper)
         return False
+    return _check_turns(notes, limit, place, lower, upper, free)
+
+
+def _check_slide(notes: Notes, limit: Element, place: str, lower: float, upper: float) -> None:
+    if max(abs(lower), abs(upper)) <= _LONGEST_SLIDE:
+        return
+    edits = [
+        notes.source.with_attribute(limit, key, spelled(value / 1000.0))
+        for key, value in (("lower", lower), ("upper", upper))
+    ]
+    words = f"It slides from {general(lower)} to {general(upper)} m: these look like millimetres."
+    mend = f"Write metres, {general(lower / 1000.0)} to {general(upper / 1000.0)}."
+    notes.add(limit, place, "millimetres", "suspicious", words, mend, *edits)
+
+
+def _check_turns(notes: Notes, limit: Element, place: str, lower: float, upper: float, free: Edit) -> bool:
+    """Look at limits of a turning joint; returns whether they look like degrees. `free` makes it continuous."""
+    source, most, shown = notes.source, max(abs(lower), abs(upper)), f"{general(lower)} to {general(upper)}"
     if most > _MOST_DEGREES:
         words = f"Its limits, {shown} rad, are {round(most / TURN)} turns: they stand for none."
         notes.add(limit, place, "limit", "suspicious", words, 'Write type="continuous".', free)
