@@ -197,7 +197,9 @@ class Motion:
         if self.refusal is not None:
             return self.refusal.explain(units)
         said = [messages.note(fact, units) for fact in self.notes]
-        return " ".join([messages.summary(len(self.segments), self.duration), *said])
+        pauses = sum(each.kind == "dwell" for each in self.segments)
+        motions = sum(each.kind != "dwell" and each.end > each.start for each in self.segments)
+        return " ".join([messages.summary(motions, pauses, self.duration), *said])
 
     def q_before(self, index: int) -> Array | None:
         """Where a segment begins ``(n,)``: where the one before arrives; None if that one is not planned."""

@@ -873,7 +873,7 @@ def test_move_reports_what_can_be_driven_and_writes_it_where_that_is_asked_for(c
     assert code == 1
     assert not table.exists()
     assert "Segment 2 (LIN) cannot be driven" in out
-    assert "Up to there: 2 segments in" in out
+    assert "Up to there: 2 motions in" in out
     assert "1  ptp          0.000" in out
     code, out, _ = run(capsys, "move", "ur5", file, "-o", table, "--partial")
     assert code == 1

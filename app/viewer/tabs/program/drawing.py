@@ -24,6 +24,7 @@ FINEST, MOST = 0.01, 1200  # s between two samples of the path; samples at most
 FAULT, VIA, OTHER, GHOST = (213, 94, 0), (204, 121, 167), (213, 94, 0), (120, 144, 168)
 GHOSTS = 12  # at most; waypoints between are left out evenly
 FRAMES = 14  # frames along the path
+LABEL = 1.2  # of the arm's size: labels that are closer share one
 _NUMBERS = count(1)
 
 
@@ -56,11 +57,11 @@ class Drawing:
         self._q = np.array([item.q for item in waypoints])
         poses = fk(robot, self._q)
         self._axes("waypoints", poses, 2.2, 0.11)
-        at: dict[tuple[float, ...], list[str]] = {}  # names of waypoints at the same place share a label
-        for pose, name in zip(poses, names, strict=True):
-            at.setdefault(tuple(np.round(pose[:3, 3], 3).tolist()), []).append(name)
-        for i, (place, words) in enumerate(at.items()):
-            add_label(scene, f"{self._root}/name-{i}", " · ".join(words), position=np.array(place), scale=0.9)
+        labels = [(pose[:3, 3], name) for pose, name in zip(poses, names, strict=True)]
+        if fault is not None and fault.place is not None:
+            labels.append((np.array(fault.place), "✕ cannot go on"))
+        for i, (place, words) in enumerate(shared(labels, LABEL * self._size)):
+            add_label(scene, f"{self._root}/name-{i}", words, position=place, scale=0.9)
         for i, item in enumerate(waypoints[1:]):
             if item.kind == "circ" and item.via is not None:
                 self._dot(f"via-{i}", 0.3, VIA, 1.0, np.array(item.via))
@@ -74,9 +75,7 @@ class Drawing:
             chords = np.stack([points[:-1], points[1:]], axis=1)
             self._scene.add_line_segments(f"{self._root}/fault-way", chords, FAULT, thickness=0.22 * self._size)
         if fault.place is not None:
-            place = np.array(fault.place)
-            self._dot("fault-place", 0.36, FAULT, 1.0, place)
-            add_label(self._scene, f"{self._root}/fault-name", "✕ cannot go on", position=place, scale=0.9)
+            self._dot("fault-place", 0.36, FAULT, 1.0, np.array(fault.place))
 
     def _dot(self, name: str, radius: float, colour: tuple[int, int, int], opacity: float, at: Array) -> None:
         self._scene.add_icosphere(
@@ -144,6 +143,18 @@ def _path(motion: Motion) -> tuple[Array, Array]:
     """Points ``(k, 3)`` of the tool's path, and its speed there."""
     sample = motion.sample(np.linspace(0.0, motion.duration, path_samples(motion.duration)))
     return sample.T[:, :3, 3], sample.tool_speed
+
+
+def shared(labels: list[tuple[Array, str]], near: float) -> list[tuple[Array, str]]:
+    """Labels of places ``(3,)``; those within `near` (m) of one another are one, which would overprint else."""
+    found: list[tuple[Array, list[str]]] = []
+    for place, name in labels:
+        other = next((words for at, words in found if np.linalg.norm(at - place) < near), None)
+        if other is None:
+            found.append((place, [name]))
+        else:
+            other.append(name)
+    return [(place, " · ".join(words)) for place, words in found]
 
 
 def path_samples(duration: float) -> int:

@@ -28,6 +28,8 @@ class Fault:
         ptp: whether a PTP to the same waypoint would help.
         way: points of the tool's way at fault (m); a line is drawn through them.
         place: where on it the arm cannot go on (m); None: at its end, or not known.
+        whole: whether nothing can be played, as a locked joint would move; otherwise all before it can be.
+        start: whether the item can be met from another posture at its start.
     """
 
     index: int
@@ -35,6 +37,8 @@ class Fault:
     ptp: bool = False
     way: tuple[Point, ...] = ()
     place: Point | None = None
+    whole: bool = False
+    start: bool = False
 
 
 def find_fault(plan: Plan | None, stage: Stage) -> Fault | None:
@@ -53,7 +57,7 @@ def find_fault(plan: Plan | None, stage: Stage) -> Fault | None:
                     f"Joint {joint + 1} is locked at {unit.text(value)}, and this waypoint has it at "
                     f"{unit.text(q)}. Unlock the joint, or set the waypoint to another pose."
                 )
-                return Fault(index, words)
+                return Fault(index, words, whole=True)
     return _moved(plan, plan.motion, locked)
 
 
@@ -69,7 +73,8 @@ def _refused(plan: Plan, stage: Stage) -> Fault:
     if refusal.fraction is not None and items[index].kind == "lin" and len(way) == 2:
         start, end = np.array(way)
         place = point(start + refusal.fraction * (end - start))
-    return Fault(index, plan.explain(stage.units), helps, way, place)
+    start = plan.start_as_recorded(index) is not None
+    return Fault(index, plan.explain(stage.units), helps, way, place, start=start)
 
 
 def _way(items: Items, index: int, stage: Stage) -> tuple[Point, ...]:
@@ -101,5 +106,5 @@ def _moved(plan: Plan, motion: Motion, locked: Sequence[float | None]) -> Fault 
             index = plan.item_at(float(times[off[0]])) or 0
             words = f"Joint {joint + 1} is locked, and would move on the way. Unlock the joint, or choose PTP."
             ptp = index < len(plan.items) and plan.items[index].kind in _TOOL
-            return Fault(index, words, ptp)
+            return Fault(index, words, ptp, whole=True)
     return None

@@ -30,14 +30,17 @@ from app.viewer.tabs.program.items import (
 )
 from kin import InputError, Obstacle, Robot
 from kin.collision.contacts import surroundings
-from kin.motion import Circ, Dwell, JointTarget, Lin, Motion, PoseTarget, Program, Ptp, Spline
-from kin.motion.details import Collides, JerkCost, Note
+from kin.motion import Circ, Dwell, JointTarget, Lin, Motion, PoseTarget, Program, Ptp, Spline, start_as_recorded
+from kin.motion.arrivals import Arrival
+from kin.motion.details import ArrivesOtherwise, Collides, JerkCost, Note
+from kin.motion.messages import note
 from kin.motion.planning.collisions import checked
 from kin.motion.program import Segment, Target, kind_of
-from kin.motion.results import Refusal
+from kin.motion.results import Refusal, SegmentTimes
 from kin.transforms import Array
 from kin.units import Units
 
+_MET = 1e-6  # m
 _LOOKS = 200  # times in a spline at which its distance from a point is looked at
 
 
@@ -58,9 +61,44 @@ class Plan:
     touch: Refusal | None = None
 
     @property
-    def motion_or_none(self) -> Motion | None:
-        """The motion, if it can be driven."""
-        return self.motion if self.motion.planned else None
+    def driven(self) -> Motion | None:
+        """The motion, or the part of it that can be driven; None if that is nothing."""
+        return self.motion.driven
+
+    @cached_property
+    def otherwise(self) -> dict[int, Arrival]:
+        """By item, the arrivals in other joint values than recorded."""
+        found = {}
+        for index, (item, end) in enumerate(zip(self.items, self.ends, strict=False)):
+            arrival = self._arrival(index, item, end) if item.q else None
+            if arrival is not None and not arrival.as_recorded:
+                found[index] = arrival
+        return found
+
+    def _arrival(self, index: int, item: Item, end: float) -> Arrival | None:
+        assert self.driven is not None  # there are ends
+        arrival = self.driven.segments[self.segments[index]].arrival
+        if arrival is None or item.kind != "spline":
+            return arrival
+        if passed_through(self.items, index):
+            near = self.driven.derivatives(end)[0]
+            pose = PoseTarget.of(kin.fk(self.motion.robot, np.array(item.q)))
+            return Arrival(self.motion.robot, _configuration(pose, self.motion.robot, near), np.array(item.q))
+        return replace(arrival, recorded=np.array(item.q))
+
+    def start_as_recorded(self, index: int) -> tuple[int, Array] | None:
+        """The waypoint before an item, and the configuration ``(n,)`` from which the item is met as recorded."""
+        if index not in self._starts:
+            before = max((i for i, item in enumerate(self.items[:index]) if item.q), default=None)
+            known = before is not None and index < len(self.items)
+            q = start_as_recorded(self.motion, self.segments[index]) if known else None
+            self._starts[index] = None if q is None or before is None else (before, q)
+        return self._starts[index]
+
+    @cached_property
+    def _starts(self) -> dict[int, tuple[int, Array] | None]:
+        """What `start_as_recorded` has found."""
+        return {}
 
     def item_of(self, segment: int) -> int:
         """Index of the item at which a segment ends; that of the way back is the number of items."""
@@ -78,36 +116,53 @@ class Plan:
 
     @cached_property
     def ends(self) -> tuple[float, ...]:
-        """When each item is reached, and the way back; empty for a refused motion."""
-        times = self.motion.segments
-        if not times:
+        """When each item is reached, and the way back; of a refused motion those before the place."""
+        driven = self.driven
+        if driven is None:
             return ()
+        count = len(driven.segments) if self.motion.refusal is None else self.motion.refusal.segment
+        times = driven.segments[:count]
         inner = [passed_through(self.items, i) for i in range(len(self.items))]
-        found = [times[s].end if not inner[i] else self._passed(i) for i, s in enumerate(self.segments)]
-        return (*found, self.motion.duration)
+        found = [
+            times[s].end if not inner[i] else self._passed(i, times[s])
+            for i, s in enumerate(self.segments)
+            if s < len(times)
+        ]
+        return (*found, driven.duration) if self.motion.planned else tuple(found)
 
-    def _passed(self, index: int) -> float:
+    def _passed(self, index: int, times: SegmentTimes) -> float:
         """When the tool is closest to an inner point of a spline."""
-        times = self.motion.segments[self.segments[index]]
+        assert self.driven is not None  # it has these times
         at = np.linspace(times.start, times.end, _LOOKS)
         wanted = kin.fk(self.motion.robot, np.array(self.items[index].q))[:3, 3]
         first = self.segments.index(self.segments[index])
         count = self.segments.count(self.segments[index])
-        off = np.linalg.norm(self.motion.sample(at).T[:, :3, 3] - wanted, axis=1)
+        off = np.linalg.norm(self.driven.sample(at).T[:, :3, 3] - wanted, axis=1)
         # Of a curve that comes there twice, the place that fits the order of the points.
         usual = np.linspace(0.0, 1.0, _LOOKS) - (index - first + 1) / count
         return float(at[int(np.argmin(off + 1e-6 * np.abs(usual)))])
 
     def item_at(self, time: float) -> int | None:
-        """Index of the item that is driven to at a time; None after a refusal."""
-        return next((i for i, end in enumerate(self.ends) if time <= end), None)
+        """Index of the item that is driven to at a time; None if nothing can be driven."""
+        if self.driven is None:
+            return None
+        return next((i for i, end in enumerate(self.ends) if time <= end), len(self.ends))
 
     def explain(self, units: Units) -> str:
-        """What is worth knowing of the motion, or why it is refused, with the numbers of the list."""
-        motion = self.motion
-        if motion.refusal is not None:
-            return replace(motion.refusal, segment=self.item_of(motion.refusal.segment)).explain(units)
-        return replace(motion, notes=tuple(map(self._numbered, motion.notes))).explain(units)
+        """Why the motion is refused, with the numbers of the list; "" if it is not."""
+        refusal = self.motion.refusal
+        if refusal is None:
+            return ""
+        return replace(refusal, segment=self.item_of(refusal.segment)).explain(units)
+
+    def notes(self, units: Units) -> str:
+        """What is worth knowing of what can be driven, with the numbers of the list.
+
+        Arrivals in other joint values are left out: the list says them at their waypoints.
+        """
+        facts = () if self.driven is None else self.driven.notes
+        said = [note(self._numbered(fact), units) for fact in facts if not isinstance(fact, ArrivesOtherwise)]
+        return " ".join(said)
 
     def _numbered(self, note: Note) -> Note:
         if isinstance(note, JerkCost):
@@ -132,9 +187,10 @@ def plan(
         robot, program, first.q, avoid_self_collision=avoid, obstacles=obstacles if avoid else ()
     )
     touch = None
-    if not avoid and (obstacles or robot.capsules):
-        touch = checked(motion, surroundings(robot, obstacles, bool(robot.capsules)), lambda: None).refusal
-    return Plan(items, motion, segments_of(items), touch if motion.planned else None)
+    if not avoid and motion.driven is not None and (obstacles or robot.capsules):
+        near = surroundings(robot, obstacles, bool(robot.capsules))
+        touch = checked(motion.driven, near, lambda: None).refusal
+    return Plan(items, motion, segments_of(items), touch)
 
 
 def segments_of(items: Items) -> tuple[int, ...]:
@@ -175,10 +231,10 @@ def _segment(item: Item, robot: Robot, first: bool, points: list[PoseTarget]) ->
     }
     match item.kind:
         case "lin":
-            return Lin(_pose(item, robot), **options)
+            return Lin(JointTarget(item.q), **options)
         case "circ":
             assert item.via is not None
-            return Circ(item.via, _pose(item, robot), **options)
+            return Circ(item.via, JointTarget(item.q), **options)
         case "spline":
             return Spline(tuple(points), **options)
     return Ptp(JointTarget(item.q), **options)
@@ -198,14 +254,12 @@ def items_of(program: Program, robot: Robot, q: Array) -> Items:
     """The list for a program that was read from a file, which starts at q ``(n,)``.
 
     Raises:
-        InputError: the program cannot be driven, or has something that the list cannot hold.
+        InputError: a pose that the arm cannot reach, or something that the list cannot hold.
     """
     _only_what_the_list_holds(program)
     first = program.segments[0]
     start = first.target.q if isinstance(first, Ptp) and isinstance(first.target, JointTarget) else q
     motion = kin.plan_motion(robot, program, start)
-    if motion.refusal is not None:
-        raise InputError("program", motion.refusal.reason, "a program that this arm can drive")
     found: list[Item] = []
     for k, segment in enumerate(program.segments):
         if isinstance(segment, Dwell):
@@ -230,14 +284,17 @@ def _waypoints(segment: Segment, robot: Robot, motion: Motion, index: int, befor
     if isinstance(segment, Spline):
         kind, targets = "spline", segment.points
     found = []
+    done = () if motion.driven is None else motion.driven.segments
+    refused = len(done) if motion.refusal is None else motion.refusal.segment
+    arrival = done[index].arrival if index < min(len(done), refused) else None
     for k, target in enumerate(targets):
-        end = motion.derivatives(motion.segments[index].end)[0]
         if isinstance(target, JointTarget):
-            end = np.array(target.q)
-        elif k < len(targets) - 1 or segment.blend:
-            end = _configuration(target, robot, before if k < len(targets) - 1 else end)
-        before = end
-        found.append(replace(waypoint(robot.clip(end)), kind=kind))
+            before = np.array(target.q)
+        elif k == len(targets) - 1 and arrival is not None:
+            before = arrival.q
+        else:
+            before = _reached(target, robot, before, f"segments[{index}]")
+        found.append(replace(waypoint(robot.clip(before)), kind=kind))
     via = segment.via if isinstance(segment, Circ) else None
     found[-1] = replace(
         found[-1], via=via, speed=max(segment.speed, SLOWEST), acceleration=max(segment.acceleration, SLOWEST),
@@ -245,6 +302,17 @@ def _waypoints(segment: Segment, robot: Robot, motion: Motion, index: int, befor
         name=clean(segment.name, NAME),
     )  # fmt: skip
     return found
+
+
+def _reached(target: PoseTarget, robot: Robot, seed: Array, where: str) -> Array:
+    """As `_configuration`; raises `InputError` for a point out of reach."""
+    q = _configuration(target, robot, seed)
+    off = float(np.linalg.norm(kin.fk(robot, q)[:3, 3] - target.position))
+    if off > _MET:
+        raise InputError(
+            where, list(target.position), f"a point that the arm can reach; the nearest is {off:.3f} m away"
+        )
+    return q
 
 
 def _configuration(target: PoseTarget, robot: Robot, seed: Array) -> Array:

@@ -71,8 +71,8 @@ class Playback:
 
     @property
     def motion(self) -> Motion | None:
-        """The motion that is played."""
-        return None if self.plan is None else self.plan.motion
+        """The motion that is played: of a program that is refused, the part that can be driven."""
+        return None if self.plan is None else self.plan.driven
 
     @property
     def _items(self) -> Items:
@@ -147,8 +147,7 @@ class Playback:
         if player.playing:
             self._go(self._notice())
         else:
-            words = f"{self.duration:.2f} s, as planned." if player.rate == 1.0 else ""
-            self._go(Notice("hand", "The program has ended", words))
+            self._go(self._ended())
             self._stage.play(False)
         if now - self._reported >= max(CLOCK, self._stage.frame) or not player.playing:
             self._reported = now
@@ -161,6 +160,14 @@ class Playback:
         item = self._items[here]
         words = f"Waits {item.seconds:g} s" if item.kind == "pause" else f"To waypoint {here + 1}"
         return Notice("hand", "Playing", f"{words}: {item.name}" if item.name else words)
+
+    def _ended(self) -> Notice:
+        assert self.plan is not None
+        if self.plan.motion.planned:
+            words = f"{self.duration:.2f} s, as planned." if self.player.rate == 1.0 else ""
+            return Notice("hand", "The program has ended", words)
+        index = self.plan.item_of(self.plan.motion.refusal.segment) if self.plan.motion.refusal else 0
+        return Notice("error", f"The program ends on the way to {index + 1}", self.plan.explain(self._stage.units))
 
     def _go(self, notice: Notice, ease: bool = False) -> None:
         """Move the arm to where it is at the present time."""

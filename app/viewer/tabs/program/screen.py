@@ -86,8 +86,10 @@ class Screen:
     def summary(self, plan: Plan | None, own: bool) -> None:
         """Duration, peaks and limits."""
         stage = self._stage
-        planned = plan is not None and plan.motion.planned
-        self._show("summary", views.summary(plan, stage.now.robot, own, stage.units) if plan and planned else "")
+        driven = plan is not None and (
+            plan.motion.planned or (plan.driven is not None and plan.driven.duration > 0)
+        )
+        self._show("summary", views.summary(plan, stage.now.robot, own, stage.units) if plan and driven else "")
 
     def compare(self, motion: Motion | None, other: Motion | None, choice: Choice | None, zone: float) -> None:
         """The motion that the program is compared with."""
@@ -121,7 +123,7 @@ class Screen:
         if not any(item.q for item in items) or not shown.path:
             return
         self._drawing = Drawing(stage.client.scene, stage.now.robot, items, views.shown_names(items), fault)
-        motion = None if plan is None else plan.motion_or_none
+        motion = None if plan is None else plan.driven
         if shown.ghosts:
             self._drawing.show_ghosts()
         if motion is not None and motion.duration > 0.0:

@@ -39,7 +39,8 @@ _LABELS = {
     "record": "Record a pose", "pause": "Add a pause", "set": "Set to this pose", "duplicate": "Duplicate",
     "up": "Move up", "down": "Move down", "delete": "Delete", "go": "Go to", "scrub": "Time of the program",
     "clear": "Clear the program", "upload": "Open a program", "loop": "Loop", "field": "Waypoint",
-    "via": "Via point", "ptp": "PTP instead",
+    "via": "Via point", "ptp": "PTP instead", "take": "Joints of arrival",
+    "start": "Start in another posture",
 }  # fmt: skip
 
 
@@ -163,11 +164,17 @@ class ProgramTab(Feature):
         self._programs, self._screen.chosen = programs, chosen
         self._playback.stop()
         self._refresh()
+        self._say_fault()
 
     @property
     def _motion(self) -> Motion | None:
-        """The motion of the list; None: there is none, or it cannot be driven."""
+        """The motion of the list, or the part of it that can be driven; None: there is none."""
         return self._playback.motion
+
+    @property
+    def _whole(self) -> Motion | None:
+        """The motion of the whole list; None: it cannot be driven."""
+        return self._motion if self._plan is not None and self._plan.motion.planned else None
 
     def _refresh(self, anew: bool = False) -> None:
         """Plan the motion, and show everything; `anew`: what was typed into the fields is replaced."""
@@ -175,22 +182,37 @@ class ProgramTab(Feature):
         items, stage, loop = self._items, self.stage, self._player.loop
         self._plan, self._stale = plan(items, arm.robot, loop, arm.avoid, arm.obstacles), None
         self._fault = find_fault(self._plan, stage)
-        self._playback.use(self._plan if self._plan is not None and self._plan.motion.planned else None)
+        self._playback.use(self._plan if self._plan is not None and self._plan.driven is not None else None)
         self._other = None
-        if self._compared is not None and self._motion is not None:
+        if self._compared is not None and self._whole is not None:
             self._other = other_motion(items, arm.robot, loop, self._compared, self._zone)
         self._screen.draw(items, self._plan, self._fault, loop, self._other)
         self._show_player()
         self._show_list(anew)
         self._screen.plot(self._motion, self._other)
         self._screen.summary(self._plan, self._key == KEY)
-        self._screen.compare(self._motion, self._other, self._compared, self._zone)
+        self._screen.compare(self._whole, self._other, self._compared, self._zone)
         self._screen.files(self._motion, bool(items), self._key == KEY)
         self._show_clock()
 
+    def _say_fault(self) -> None:
+        """Say in the status card where the program ends, if it cannot be driven to its end."""
+        if self._fault is None or self._plan is None:
+            return
+        index, count = self._fault.index, len(self._items)
+        where = "on the way back to the start" if index >= count else f"on the way to {index + 1} of {count}"
+        if index < count and self._items[index] is changes.start_of(self._items):
+            where = "at its start"
+        self.stage.notify(Notice("error", f"The program ends {where}", self._fault.words))
+
     def _show_player(self) -> None:
-        playable = self._motion is not None and self._motion.duration > 0.0 and self._fault is None
+        playable = self._motion is not None and self._motion.duration > 0.0 and not self._blocked
         self._screen.player(self._playback, bool(self._items), playable)
+
+    @property
+    def _blocked(self) -> bool:
+        """Whether nothing may be played, as a locked joint would move."""
+        return self._fault is not None and self._fault.whole
 
     def _show_list(self, anew: bool = False) -> None:
         self._screen.list(self._items, self._plan, self._fault, self._player.loop, anew)
@@ -246,6 +268,19 @@ class ProgramTab(Feature):
                 items = changes.changed(items, i, kind="ptp", via=None)
         self._use(items, self._screen.chosen)
 
+    def _take(self, index: int, _: object) -> None:
+        """Record the joint values in which the arm arrives at a waypoint."""
+        arrival = None if self._plan is None else self._plan.otherwise.get(index)
+        if arrival is not None:
+            self._use(changes.changed(self._items, index, q=changes.configuration(arrival.q)), self._screen.chosen)
+
+    def _start(self, index: int, _: object) -> None:
+        """Change the posture at the waypoint before, so that the arm arrives as recorded."""
+        found = None if self._plan is None else self._plan.start_as_recorded(index)
+        if found is not None:
+            before, q = found
+            self._use(changes.changed(self._items, before, q=changes.configuration(q)), self._screen.chosen)
+
     def _type(self, index: int, value: object) -> None:
         item = self._items[index]
         match value:
@@ -278,7 +313,7 @@ class ProgramTab(Feature):
             self._playback.stop()
             return
         self._fault = find_fault(self._plan, self.stage)
-        if self._motion is None or self._motion.duration == 0.0 or self._fault is not None:
+        if self._motion is None or self._motion.duration == 0.0 or self._blocked:
             words = "Record at least two poses." if self._fault is None else self._fault.words
             self._refuse("The program cannot be played", words)
             return
@@ -288,12 +323,12 @@ class ProgramTab(Feature):
     def _scrub(self, time: object) -> None:
         if not isinstance(time, int | float) or isinstance(time, bool) or not 0.0 <= time < 1e9:
             raise InputError("time", time, "seconds, 0 or more")
-        if self._motion is not None and self._fault is None:
+        if self._motion is not None and not self._blocked:
             self._playback.go_to(float(time))
 
     def _go_to_item(self, index: int, _: object) -> None:
         item = self._items[index]
-        if self._plan is not None and self._motion is not None:
+        if self._plan is not None and self._motion is not None and index < len(self._plan.ends):
             end = self._plan.ends[index]  # a line may end in another posture than the recorded one
             self._playback.note(end)
             q = self._motion.derivatives(end)[0]
@@ -366,7 +401,8 @@ class ProgramTab(Feature):
             self._refuse("The file was not used", str(error))
         else:
             self._use(items, None)
-            self.stage.notify(Notice("hand", name, f"{len(items)} waypoints and pauses."))
+            if self._fault is None:
+                self.stage.notify(Notice("hand", name, f"{len(items)} waypoints and pauses."))
 
 
 _ITEM_HANDLERS: dict[str, Callable[[ProgramTab, int, object], None]] = {
@@ -376,6 +412,8 @@ _ITEM_HANDLERS: dict[str, Callable[[ProgramTab, int, object], None]] = {
     "set": ProgramTab._set_pose,
     "via": ProgramTab._set_via,
     "ptp": ProgramTab._use_ptp,
+    "take": ProgramTab._take,
+    "start": ProgramTab._start,
     "duplicate": lambda tab, index, _: tab._insert(index + 1, tab._items[index]),
     "up": lambda tab, index, _: tab._move(index, index - 1),
     "down": lambda tab, index, _: tab._move(index, index + 1),

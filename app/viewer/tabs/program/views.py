@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
 
 from app.viewer.tabs.program.compare import CHOICES, Choice, about, jerk_is_infinite
 from app.viewer.tabs.program.drawing import Shown
@@ -15,15 +18,15 @@ from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.workspace.colours import bar
 from app.viewer.views.templates import render
 from kin import Robot
-from kin.motion import Motion, MotionLimits, Peak
+from kin.motion import Arrival, Motion, MotionLimits, Peak
 from kin.motion.results import Quantity
 from kin.units import Units, fixed
 
 KINDS: dict[Kind, tuple[str, str]] = {
-    "ptp": ("PTP – every joint goes the shortest way", "PTP"),
-    "lin": ("LIN – the tool moves on a straight line", "LIN"),
-    "circ": ("CIRC – the tool moves on an arc through a via point", "CIRC"),
-    "spline": ("Spline – a smooth curve through neighbouring points", "spline"),
+    "ptp": ("PTP – all joints straight to their values", "PTP"),
+    "lin": ("LIN – tool on a straight line", "LIN"),
+    "circ": ("CIRC – tool on an arc, by a via point", "CIRC"),
+    "spline": ("Spline – tool on a smooth curve", "spline"),
 }
 QUANTITIES: dict[Quantity, str] = {"velocity": "velocities", "acceleration": "accelerations", "jerk": "jerks"}
 EXCEEDED = 1.0 + 1e-6
@@ -71,15 +74,21 @@ def items_html(
 ) -> str:  # fmt: skip
     """The list; the chosen item is open. `by_pose`: its values are those of the tool, not of the joints."""
     first = start_of(items)
-    ends = plan.ends if plan is not None and fault is None else ()
+    ends = plan.ends if plan is not None else ()
+    whole = plan is not None and plan.motion.planned
+    otherwise = {} if plan is None else plan.otherwise
+    start = None
+    if plan is not None and chosen in otherwise and items[chosen].kind != "spline":
+        start = plan.start_as_recorded(chosen)
     rows = []
     for i, item in enumerate(items):
         rows.append(
             {
                 "title": item.name or ("Pause" if item.kind == "pause" else f"Waypoint {i + 1}"),
                 "words": _words(items, i, fields),
-                "time": f"{ends[i]:.2f} s" if ends else "",
+                "time": f"{ends[i]:.2f} s" if i < len(ends) else "",
                 "item": item,
+                "otherwise": None if i not in otherwise else _otherwise(otherwise[i], fields),
                 "starts": item is first,
                 "inner": item is not first and passed_through(items, i),
                 "fault": fault if fault is not None and fault.index == i else None,
@@ -87,7 +96,7 @@ def items_html(
         )
     back = None
     if loop and first is not None:
-        time = f"{ends[-1]:.2f} s" if ends else ""
+        time = f"{ends[-1]:.2f} s" if whole else ""
         back = {"time": time, "fault": fault if fault is not None and fault.index == len(items) else None}
     return render(
         "program/list",
@@ -99,7 +108,31 @@ def items_html(
         revision=revision,
         fields=fields,
         by_pose=by_pose,
+        start=None if start is None else start[0] + 1,
     )
+
+
+class Otherwise(NamedTuple):
+    """An arrival in other joint values than recorded, as it is shown: a headline, a sentence, the true values."""
+
+    title: str
+    detail: str
+    values: list[str]
+
+
+def _otherwise(arrival: Arrival, fields: Fields) -> Otherwise:
+    assert arrival.difference is not None
+    others = arrival.posture != arrival.recorded_posture
+    title = "Arrives in another posture" if others else "Arrives in other joint values"
+    joint = int(np.argmax(np.round(np.abs(arrival.difference), 6)))
+    units = [fields.units.of(turning) for turning in fields.robot.revolute.tolist()]
+    away = units[joint].text(abs(float(arrival.difference[joint])))
+    name = fields.robot.joints[joint].name
+    detail = f"The same pose, but joint {joint + 1} ({name}) is {away} from its recorded value."
+    if others:
+        detail += f" It arrives as {arrival.posture}; recorded is {arrival.recorded_posture}."
+    values = [unit.number(value, 3) for unit, value in zip(units, arrival.q.tolist(), strict=True)]
+    return Otherwise(title, detail, values)
 
 
 def _words(items: Items, index: int, fields: Fields) -> str:
@@ -123,7 +156,8 @@ def _words(items: Items, index: int, fields: Fields) -> str:
 
 def summary(plan: Plan, robot: Robot, own: bool, units: Units) -> str:
     """How long the motion takes, how near each joint comes to its limits, and what is assumed of them."""
-    motion, limits = plan.motion, plan.motion.limits
+    motion, limits = plan.driven, plan.motion.limits
+    assert motion is not None
     heads = [f"{units.angles.name}{per}" for per in ("/s", "/s²", "/s³")]
     if not robot.revolute.all():
         heads = [
@@ -137,8 +171,8 @@ def summary(plan: Plan, robot: Robot, own: bool, units: Units) -> str:
     speed, turn = peaks[None, "tool_speed"].peak, peaks[None, "tool_turn"].peak
     return render(
         "program/summary",
-        words=_busiest(motion),
-        notes=plan.explain(units) if motion.notes else "",
+        words=("" if plan.motion.planned else "Up to where the program ends: ") + _busiest(motion),
+        notes=plan.notes(units),
         touches=plan.touches(),
         assumed=assumption(limits, own, units),
         heads=list(zip(QUANTITIES, heads, strict=True)),

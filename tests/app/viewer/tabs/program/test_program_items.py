@@ -15,6 +15,7 @@ from app.exercises.typed import EntryError
 from app.viewer.own_arm import clean
 from app.viewer.tabs.program import items as lists
 from app.viewer.tabs.program.compare import CHOICES, Choice, jerk_is_infinite, other_motion
+from app.viewer.tabs.program.drawing import shared
 from app.viewer.tabs.program.files import toml_of
 from app.viewer.tabs.program.items import Item
 from app.viewer.tabs.program.links import pack, unpack
@@ -254,7 +255,7 @@ def test_a_file_of_poses_becomes_waypoints() -> None:
     (item,) = items_of(program, PIONEER, PIONEER.q_home)
     assert np.allclose(kin.fk(PIONEER, np.array(item.q)), T, atol=1e-6)
     far = kin.program_from_dict({"segments": [{"kind": "ptp", "position": [9, 9, 9]}]}, PIONEER)
-    with pytest.raises(InputError, match="cannot be driven"):
+    with pytest.raises(InputError, match="a point that the arm can reach"):
         items_of(far, PIONEER, PIONEER.q_home)
 
 
@@ -278,3 +279,25 @@ def test_assumed_limits_are_said() -> None:
     assert said.startswith("The maker publishes no ")
     assert "full acceleration after 0.1 s" in said
     assert assumption(limits_of(PIONEER), True, DEFAULT_UNITS).startswith("Your arm states no velocities,")
+
+
+def test_labels_that_would_overprint_are_one() -> None:
+    places = [
+        (np.array([0.0, 0.0, z]), name) for z, name in ((0.0, "1"), (0.5, "5 pick"), (0.51, "✕ cannot go on"))
+    ]
+    assert [(float(at[2]), words) for at, words in shared(places, 0.03)] == [
+        (0.0, "1"),
+        (0.5, "5 pick · ✕ cannot go on"),
+    ]
+
+
+def test_a_program_that_cannot_be_driven_is_opened_with_its_recorded_joints() -> None:
+    far = POSES[0].copy()
+    far[0] = PIONEER.upper[0] + 1.0
+    first, last = (kin.motion.JointTarget(tuple(q.tolist())) for q in (POSES[0], POSES[1]))
+    program = kin.motion.Program(
+        (kin.motion.Ptp(first), kin.motion.Ptp(kin.motion.JointTarget(tuple(far))), kin.motion.Lin(last))
+    )
+    items = items_of(program, PIONEER, PIONEER.q_home)
+    assert [item.kind for item in items] == ["ptp", "ptp", "lin"]
+    assert np.allclose(items[2].q, POSES[1], atol=1e-6)

@@ -217,6 +217,88 @@ def test_a_line_that_cannot_be_driven_says_what_would_help(tab: FakeBrowser) -> 
     tab.wait(lambda: "kb-fault" in part(tab, "list"))
 
 
+NEAR = [215.70215832, -94.13277042, 106.01340862, -101.8806382, -90.0, 35.70215832]
+FAR = [209.38701291, -192.42399488, 91.0728513, 11.35114358, -90.0, 29.38701291]
+OTHER = "Arrives in another posture"
+
+
+def line_of_the_ur5(tab: FakeBrowser, *more: str) -> None:
+    """A line between two recorded postures of the UR5 that do not lead to one another."""
+    segments = [("ptp", f"q = {NEAR}"), ("lin", f"q = {FAR}"), *(each.split(" ", 1) for each in more)]
+    rows = "".join(f"[[segments]]\nkind = '{kind}'\n{target}\n" for kind, target in segments)
+    press(tab, "upload", value=["line.toml", f"units = {{ angle = 'deg' }}\n{rows}"])
+
+
+def recorded(tab: FakeBrowser, index: int) -> np.ndarray:
+    """The joint values in the fields of a waypoint, in radians."""
+    if f'data-index="{index}" aria-expanded="true"' not in part(tab, "list"):
+        press(tab, "choose", index)
+    fields = inputs(tab)
+    return np.radians([float(fields[f"q{i}"].replace("−", "-")) for i in range(6)])
+
+
+@pytest.fixture
+def ur5(page: FakeBrowser) -> Iterator[FakeBrowser]:
+    page.choose(UR5.name)
+    press(page, "clear")
+    yield page
+    home = f"[[segments]]\nkind = 'ptp'\nq = {UR5.q_home.tolist()}\n"
+    press(page, "upload", value=["home.toml", home])
+    press(page, "go", 0)
+    shows(page, UR5, UR5.q_home)
+    press(page, "clear")
+
+
+def test_a_line_that_arrives_otherwise_shows_its_true_values_and_each_remedy_holds(ur5: FakeBrowser) -> None:
+    line_of_the_ur5(ur5)
+    assert part(ur5, "list").count(OTHER) == 1
+    before, after = recorded(ur5, 0), recorded(ur5, 1)
+    words = html.unescape(part(ur5, "list"))
+    assert "149.3° from its recorded value" in words
+    shown = re.findall(r"On arrival:</span> (.*?)</p>", words)[0]
+    arrival = np.radians([float(text.replace("−", "-")) for text in shown.split(", ")])
+    press(ur5, "go", 1)
+    shows(ur5, UR5, arrival)
+
+    press(ur5, "take", 1)
+    assert OTHER not in part(ur5, "list")
+    assert np.allclose(recorded(ur5, 1), arrival, atol=1e-5)
+    ur5.say("undo")
+    ur5.wait(lambda: OTHER in part(ur5, "list"))
+
+    press(ur5, "start", 1)
+    assert OTHER not in part(ur5, "list")
+    assert np.allclose(recorded(ur5, 1), after, atol=1e-6)
+    start = recorded(ur5, 0)
+    assert np.abs(start - before).max() > 1.0
+    assert np.abs(kin.fk(UR5, start) - kin.fk(UR5, before)).max() < 1e-4
+    ur5.say("undo")
+    ur5.wait(lambda: OTHER in part(ur5, "list"))
+
+    press(ur5, "ptp", 1)
+    assert OTHER not in part(ur5, "list")
+    assert np.allclose(recorded(ur5, 1), after, atol=1e-6)
+
+
+def test_a_program_that_cannot_be_driven_keeps_what_can_and_says_where_it_ends(ur5: FakeBrowser) -> None:
+    line_of_the_ur5(ur5, "ptp q = [180, -110, 110, -90, -90, 0]", "lin q = [0, -110, 110, -90, -90, 0]")
+    assert "The program ends on the way to 4 of 4" in ur5.html
+    rows = part(ur5, "list").split("<li")[1:]
+    assert ["kb-fault" in row for row in rows] == [False, False, False, True]
+    times = [re.findall(r'kb-program-at">(.*?)<', row)[0] for row in rows]
+    assert [bool(text) for text in times] == [True, True, True, False]
+    assert float(clock(ur5)["duration"]) > float(times[2].split()[0])
+    assert 'aria-disabled="true"' not in part(ur5, "player")
+    assert "kb-motion-curve" in part(ur5, "plot")
+    assert "Up to where the program ends" in part(ur5, "summary")
+    assert "kin.plan_motion(" in part(ur5, "files")
+    press(ur5, "scrub", value=float(clock(ur5)["duration"]) - 0.05)
+    press(ur5, "play")
+    ur5.wait(lambda: clock(ur5)["playing"] == "0")
+    ur5.wait(lambda: "The program ends on the way to 4" in ur5.html)
+    assert clock(ur5)["time"] == clock(ur5)["duration"]
+
+
 def test_a_file_is_opened_and_one_that_does_not_fit_is_refused(tab: FakeBrowser) -> None:
     text = "units = { angle = 'deg' }\n" + "[[segments]]\nkind = 'ptp'\nq = [90, 30, 60, 30, 30]\n" * 2
     press(tab, "upload", value=["two.toml", text])
