@@ -47,7 +47,7 @@ RULES: dict[str, set[str]] = {
         *("kin", "numpy", "app.shared", "pydantic", "pydantic_settings", "prometheus_client", "starlette"),
         *("typing_extensions", "distributed", "platformdirs", "msgspec"),
     },
-    "app/exports": {"kin", "numpy", "scipy", "tqdm", "trimesh", "PIL", "app.exports", "app.shared"},
+    "app/exports": {"kin", "mcap", "numpy", "scipy", "tqdm", "trimesh", "PIL", "app.exports", "app.shared"},
     "app/equations": {"kin", "numpy", "sympy", "app.equations", "app.shared.computations"},
     "app/exercises": {"kin", "numpy", "app.exercises"},
     "app/classroom/courses": {"kin", "app.exercises", "app.classroom.courses"},

@@ -202,7 +202,8 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
         _check_length(found.driven, body.rate)
     if body.format == "json" or not found.planned:
         return _whole(found, body, deadline)
-    if body.format in ("csv", "ndjson"):
+    if body.format not in ("urscript", "python"):
+        _check_format(body.format)
         return found
     kind = FORMATS[body.format]
     try:
@@ -211,6 +212,14 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
         raise invalid(from_input_error(error)) from None
     headers = {"content-disposition": f'attachment; filename="{robot.id}-motion{kind.suffix}"'}
     return Response(text, media_type=kind.media_type, headers=headers)
+
+
+def _check_format(name: str) -> None:
+    """Refuse a format whose optional package is not installed, before the answer begins."""
+    try:
+        FORMATS[name].check()
+    except InputError as error:
+        raise invalid(from_input_error(error)) from None
 
 
 def _check_length(found: Motion, rate: float) -> None:

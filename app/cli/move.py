@@ -88,7 +88,8 @@ def _format(arguments: Namespace) -> MotionFormat | None:
         return None
     if arguments.format is not None:
         return FORMATS[arguments.format]
-    found = next((each for each in FORMATS.values() if arguments.output.endswith(each.suffix)), None)
+    fitting = [each for each in FORMATS.values() if arguments.output.endswith(each.suffix)]
+    found = max(fitting, key=lambda each: len(each.suffix), default=None)
     if found is None:
         endings = ", ".join(each.suffix for each in FORMATS.values())
         raise InputError("--output", arguments.output, f"a name that ends in {endings}, or --format")

@@ -1,28 +1,25 @@
-"""Motions as text: samples as CSV and NDJSON, URScript, and Python.
-
-Samples are generated in chunks, so that a long motion is never in memory as text.
-"""
+"""Motions as files: samples as CSV and NDJSON, ROS messages, MCAP, URScript, and Python."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pprint import pformat
 
 import numpy as np
 
+from app.exports.motion_ros import mcap, mcap_writer, trajectory_json, trajectory_yaml
+from app.exports.motion_samples import about, samples
 from app.exports.snippets import robot_code
 from app.shared.answers.answer import as_plain
-from app.shared.answers.motion import motion_answer, sample_times
+from app.shared.answers.motion import motion_answer
 from kin import InputError, Motion, fk
 from kin.axes import inverse
-from kin.motion import Circ, Dwell, Lin, MotionSample, PoseTarget, Ptp, Spline, program_to_dict
+from kin.motion import Circ, Dwell, Lin, PoseTarget, Ptp, Spline, program_to_dict
 from kin.motion.details import BlendLeftOut, BlendShortened
 from kin.motion.program import Move, Segment
 from kin.transforms import Array, wxyz_from_rotation
-
-AT_ONCE = 500  # samples of a chunk
 
 
 @dataclass(frozen=True)
@@ -35,6 +32,7 @@ class MotionFormat:
         meaning: for people.
         media_type: of a response.
         pieces: the bytes of a motion, sampled at a rate (per second).
+        check: raises `InputError` if a package that it needs is not installed.
     """
 
     name: str
@@ -42,6 +40,7 @@ class MotionFormat:
     meaning: str
     media_type: str
     pieces: Callable[[Motion, float], Generator[bytes]]
+    check: Callable[[], object] = lambda: None
 
 
 def columns(motion: Motion) -> list[str]:
@@ -51,13 +50,6 @@ def columns(motion: Motion) -> list[str]:
     return ["t", *names, "x", "y", "z", "qw", "qx", "qy", "qz", "tool_speed"]
 
 
-def samples(motion: Motion, rate: float) -> Iterator[MotionSample]:
-    """The motion at `rate` samples per second, in chunks."""
-    times = sample_times(motion, rate)
-    for start in range(0, len(times), AT_ONCE):
-        yield motion.sample(times[start : start + AT_ONCE])
-
-
 def _csv(motion: Motion, rate: float) -> Generator[bytes]:
     yield (",".join(columns(motion)) + "\n").encode()
     for sample in samples(motion, rate):
@@ -65,6 +57,12 @@ def _csv(motion: Motion, rate: float) -> Generator[bytes]:
         parts += [wxyz_from_rotation(sample.T[:, :3, :3]), sample.tool_speed[:, None]]
         rows = np.hstack(parts).tolist()
         yield "".join(",".join(map(repr, row)) + "\n" for row in rows).encode()
+
+
+def _commented_csv(motion: Motion, rate: float) -> Generator[bytes]:
+    """The table behind lines that say what is in it."""
+    yield "".join(f"# {key}: {value}\n" for key, value in about(motion)).encode()
+    yield from _csv(motion, rate)
 
 
 def _ndjson(motion: Motion, rate: float) -> Generator[bytes]:
@@ -202,6 +200,35 @@ def _number(value: float) -> str:
 FORMATS = {
     each.name: each
     for each in (
+        MotionFormat(
+            "csv-commented",
+            ".commented.csv",
+            "a table behind lines with # that say arm, units, limits",
+            "text/csv",
+            _commented_csv,
+        ),
+        MotionFormat(
+            "trajectory-yaml",
+            ".trajectory.yaml",
+            "a trajectory_msgs/JointTrajectory of ROS",
+            "application/yaml",
+            trajectory_yaml,
+        ),
+        MotionFormat(
+            "trajectory-json",
+            ".trajectory.json",
+            "the same as JSON, with arm, units and limits",
+            "application/json",
+            trajectory_json,
+        ),
+        MotionFormat(
+            "mcap",
+            ".mcap",
+            "a recording of joint states and transforms, with the program",
+            "application/octet-stream",
+            mcap,
+            mcap_writer,
+        ),
         MotionFormat("json", ".json", "the answer with samples", "application/json", _json),
         MotionFormat("csv", ".csv", "a table of samples", "text/csv", _csv),
         MotionFormat("ndjson", ".ndjson", "the answer, then one line per sample", "application/x-ndjson", _ndjson),

@@ -130,7 +130,10 @@ def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "-o", "--output", metavar="FILE", help="write the motion in radians and metres; - is standard output"
     )
     parser.add_argument(
-        "--format", choices=("csv", "json", "ndjson", "urscript", "python"),
+        "--format", choices=(
+            *("csv", "csv-commented", "json", "ndjson", "trajectory-yaml", "trajectory-json", "mcap"),
+            *("urscript", "python"),
+        ),
         help="format of the file (default: by the ending of its name)",
     )  # fmt: skip
     parser.add_argument(

@@ -12,7 +12,8 @@ import pytest
 
 import kin
 from app.api import motion as motion_module
-from app.exports.motion import AT_ONCE, FORMATS, columns
+from app.exports.motion import FORMATS, columns
+from app.exports.motion_samples import AT_ONCE
 from app.shared.answers.motion import sample_times
 from app.shared.threads.turns import Turn, Turns
 

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import json
 
+from app.exports.motion import FORMATS
 from app.viewer.own_arm import clean
 from kin import InputError, Robot
-from kin.motion import Program, parse_program, program_to_dict
+from kin.motion import Motion, Program, parse_program, program_to_dict
 
+MOTIONS: dict[str, str] = {
+    "csv-commented": "CSV", "trajectory-yaml": "ROS YAML", "trajectory-json": "ROS JSON", "mcap": "MCAP",
+    "urscript": "URScript",
+}  # fmt: skip
+RATE, MOST_SAMPLES = 100.0, 30_000  # samples per second, and in all: a longer motion has fewer per second
 LARGEST = 30_000  # bytes of a file: it comes in one message of the page
 
 
@@ -20,6 +26,21 @@ def toml_of(program: Program, robot_name: str) -> str:
     for segment in segments:
         lines += ["", "[[segments]]", *_fields(segment)]
     return "\n".join(lines) + "\n"
+
+
+def motion_file(motion: Motion, name: object) -> tuple[str, bytes, str]:
+    """Name and bytes of a motion over time in one of `MOTIONS`, and how it is sampled, in a sentence.
+
+    Raises:
+        InputError: another format, one that the arm does not fit, or one whose package is not installed.
+    """
+    if not isinstance(name, str) or name not in MOTIONS:
+        raise InputError("format", name, "one of " + ", ".join(MOTIONS))
+    kind = FORMATS[name]
+    rate = min(RATE, MOST_SAMPLES / max(motion.duration, 1e-9))
+    data = b"".join(kind.pieces(motion, rate))
+    sampled = "" if name == "urscript" else f"{rate:.4g} samples per second. "
+    return f"{motion.robot.id}-motion{kind.suffix}", data, sampled
 
 
 def read(value: object, robot: Robot) -> tuple[str, Program]:

@@ -10,7 +10,7 @@ from app.viewer.tabs.program import views
 from app.viewer.tabs.program.compare import Choice
 from app.viewer.tabs.program.drawing import Drawing, Shown
 from app.viewer.tabs.program.faults import Fault
-from app.viewer.tabs.program.files import LARGEST
+from app.viewer.tabs.program.files import LARGEST, MOTIONS
 from app.viewer.tabs.program.items import Items
 from app.viewer.tabs.program.planning import Plan
 from app.viewer.tabs.program.playback import Playback
@@ -108,7 +108,7 @@ class Screen:
             "files",
             render(
                 "program/files", any=any_items, most=f"{LARGEST // 1000} kB", bytes=LARGEST, code=code,
-                languages=list(SNIPPETS), language=self.language,
+                languages=list(SNIPPETS), language=self.language, motions=MOTIONS if motion is not None else {},
             ),
         )  # fmt: skip
 

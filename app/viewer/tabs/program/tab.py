@@ -22,7 +22,7 @@ from app.viewer.panel.status import Notice
 from app.viewer.tabs.program import items as changes
 from app.viewer.tabs.program.compare import CHOICES, ZONE, Choice, other_motion
 from app.viewer.tabs.program.faults import Fault, find_fault
-from app.viewer.tabs.program.files import read, toml_of
+from app.viewer.tabs.program.files import motion_file, read, toml_of
 from app.viewer.tabs.program.items import MOST, PAUSE, Item, Items
 from app.viewer.tabs.program.links import pack, unpack
 from app.viewer.tabs.program.planning import Plan, halfway, items_of, plan
@@ -392,6 +392,21 @@ class ProgramTab(Feature):
         self.stage.client.send_file_download(name, toml_of(program, robot.name).encode(), save_immediately=True)
         self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
 
+    def _save(self, name: object) -> None:
+        """Download the motion over time, or the part of it that can be driven."""
+        if self._motion is None:
+            return
+        own = self._key == KEY
+        motion = replace(self._motion, robot=named(self._motion.robot)) if own else self._motion
+        try:
+            file, data, sampled = motion_file(motion, name)
+        except InputError as error:
+            self._refuse("The motion was not saved", f"This format is for {error.expected}.")
+            return
+        self.stage.client.send_file_download(file, data, save_immediately=True)
+        part = "" if self._whole is not None else "Only up to where the program ends. "
+        self.stage.notify(Notice("hand", f"{file} is saved", f"{part}{sampled}Radians, metres and seconds."))
+
     def _upload(self, value: object) -> None:
         arm = self.stage.now
         try:
@@ -435,6 +450,7 @@ _HANDLERS: dict[str, Callable[[ProgramTab, object], None]] = {
     "zone": ProgramTab._set_zone,
     "language": ProgramTab._set_language,
     "download": ProgramTab._download,
+    "save": ProgramTab._save,
     "upload": ProgramTab._upload,
 }
 ProgramTab.messages = frozenset({*_ITEM_HANDLERS, *_HANDLERS})

@@ -13,10 +13,12 @@ import pytest
 from fake_browser import FakeBrowser
 
 import kin
+from app.exports.motion import FORMATS
 from app.exports.motion_snippets import SNIPPETS
 from app.exports.snippets import Service
 from app.shared.store import Store
 from app.viewer.session.state import decode
+from app.viewer.tabs.program.files import MOTIONS
 from app.viewer.tabs.program.items import MOST
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -311,6 +313,16 @@ def test_a_file_is_opened_and_one_that_does_not_fit_is_refused(tab: FakeBrowser)
         press(tab, "upload", value=[name, content])
         tab.wait(lambda: "The file was not used" in tab.html)
         assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
+
+
+def test_a_motion_over_time_is_saved_in_each_format(ur5: FakeBrowser) -> None:
+    line_of_the_ur5(ur5)
+    for name, title in MOTIONS.items():
+        assert f'data-argument="{name}">{title}<' in part(ur5, "files")
+        press(ur5, "save", value=name)
+        ur5.wait(lambda name=name: f"ur5-motion{FORMATS[name].suffix} is saved" in ur5.html)  # type: ignore[misc]
+    press(ur5, "save", value="pdf")
+    ur5.wait(lambda: "The motion was not saved" in ur5.html)
 
 
 def test_a_program_has_an_end(tab: FakeBrowser) -> None:
