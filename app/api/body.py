@@ -183,7 +183,12 @@ def versioned(tag: str) -> APIRouter:
 
     The application adds their routes one by one: nested routers are searched several times per request.
     """
-    return APIRouter(prefix="/api/v1", tags=[tag], route_class=JsonRoute)
+    return APIRouter(
+        prefix="/api/v1",
+        tags=[tag],
+        route_class=JsonRoute,
+        generate_unique_id_function=lambda route: route.name,  # generated clients name their functions by it
+    )
 
 
 def parsed(body: bytes) -> Any:

@@ -1,4 +1,4 @@
-"""Additions to FastAPI's OpenAPI document: media types, ids of the robots, and access control."""
+"""Additions to FastAPI's OpenAPI document: media types and access control."""
 
 from __future__ import annotations
 
@@ -9,30 +9,38 @@ from fastapi import FastAPI
 
 from app.api.problems import MEDIA_TYPE
 from app.shared.settings import Settings
-from app.shared.store import Store
 
 _PROBLEM = {"$ref": "#/components/schemas/Problem"}
+# Which of these are answered depends on the settings of a service. A client is made for all services.
+_OF_ACCESS: dict[str, Any] = {
+    status: {"description": text, "content": {MEDIA_TYPE: {"schema": _PROBLEM}}}
+    for status, text in {
+        "401": "The token is missing or wrong, where the service asks for one.",
+        "403": "The service is read-only, or this is not allowed.",
+        "429": "Too many requests; the header Retry-After says when to try again.",
+    }.items()
+}
+
+# Parts of the schema of an arm that is sent along, and their names: generated clients have a class for each.
+_PARTS = {"rows": ("RowDescription", "A DH row."), "capsules": ("CapsuleDescription", "A body of a link.")}
 
 
-def complete_document(app: FastAPI, store: Store, settings: Settings) -> None:
-    """Add to ``/openapi.json`` of `app` what depends on this service."""
+def complete_document(app: FastAPI, settings: Settings) -> None:
+    """Add to ``/openapi.json`` of `app`: media types of problems, answers of access control, names of parts."""
     plain = app.openapi
 
     def openapi() -> dict[str, Any]:
         if app.openapi_schema is not None:
             return app.openapi_schema
         document = plain()
-        ids = [robot.id for robot in store.robots]
         for path, operation in _operations(document):
             _name_media_type(operation)
-            for parameter in operation.get("parameters", []):
-                if parameter["name"] == "robot_id":
-                    parameter["schema"]["enum"] = ids
             if path.startswith("/api/"):
-                operation["responses"].update(_of_access(settings))
-        if settings.token is not None:
-            document["components"]["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
-            document["security"] = [{"token": []}, {}] if settings.read_only else [{"token": []}]
+                operation["responses"].update(_OF_ACCESS)
+        _name_parts(document["components"]["schemas"])
+        document["components"]["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
+        asked = settings.token is not None and not settings.read_only
+        document["security"] = [{"token": []}] if asked else [{"token": []}, {}]
         return document
 
     app.openapi = openapi  # type: ignore[method-assign]  # FastAPI's own way to adjust the document
@@ -52,16 +60,13 @@ def _name_media_type(operation: dict[str, Any]) -> None:
             content[MEDIA_TYPE] = content.pop("application/json")
 
 
-def _of_access(settings: Settings) -> dict[str, Any]:
-    """The error responses that depend on the settings."""
-    reasons = {}
-    if settings.token is not None:
-        reasons["401"] = "The token is missing or wrong."
-    if settings.read_only:
-        reasons["403"] = "The service is read-only."
-    if settings.token is not None or settings.rate_limit:
-        reasons["429"] = "Too many requests; the header Retry-After says when to try again."
-    return {
-        status: {"description": text, "content": {MEDIA_TYPE: {"schema": _PROBLEM}}}
-        for status, text in reasons.items()
-    }
+def _name_parts(schemas: dict[str, Any]) -> None:
+    """Give `_PARTS` names. The field `d` of a row comes last: openapi-python-client has a variable `d` too."""
+    properties = schemas["RobotDescription"]["properties"]
+    for key, (name, text) in _PARTS.items():
+        schemas[name] = {"description": text, **properties[key]["items"]}
+        properties[key] = properties[key] | {"items": {"$ref": f"#/components/schemas/{name}"}}
+    for name in ("RowDescription", "RowAnswer"):
+        row = dict(schemas[name]["properties"])
+        row["d"] = row.pop("d")
+        schemas[name] = schemas[name] | {"properties": row}

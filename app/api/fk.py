@@ -84,6 +84,7 @@ class FkAnswers(Answer):
 @operation(
     router,
     "fk",
+    name="fk",
     examples=EXAMPLES,
     summary="Forward kinematics",
     response_model=FkAnswer | FkAnswers,

@@ -105,6 +105,7 @@ class IkAnswers(Answer):
 @operation(
     router,
     "ik",
+    name="ik",
     examples=EXAMPLES,
     summary="Inverse kinematics",
     response_model=IkAnswer | IkAnswers,

@@ -54,6 +54,7 @@ class JacobianAnswers(Answer):
 @operation(
     router,
     "jacobian",
+    name="jacobian",
     examples=EXAMPLES,
     summary="Jacobian and manipulability",
     response_model=JacobianAnswer | JacobianAnswers,

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Annotated, Any
 
 from fastapi import Request, Response
-from pydantic import Field, WithJsonSchema
+from pydantic import Field
 
 from app.api import schemas
 from app.api.arms.operation import operation
@@ -16,6 +16,7 @@ from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
 from app.api.options import AvoidingBody
 from app.api.problems import FieldError, from_input_error, invalid
+from app.api.program import DescribedBy, ProgramBody
 from app.api.schemas import POST_REFUSALS, Configuration, example, settings_of
 from app.api.work import Deadline, computed
 from app.api.workspace.streaming import ComputedResponse
@@ -25,67 +26,12 @@ from app.shared.settings import Settings
 from app.shared.threads.turns import Turn
 from kin import InputError, Motion, Robot, plan_motion
 from kin.motion import program_from_dict
-from kin.motion.program import KINDS, LONGEST_NAME, MOST_SEGMENTS, TASKS
 
 router = versioned("motion")
 
 MOST_RATE = 1000.0  # samples per second
 MOST_SAMPLES = 1_000_000
 NUMBER = 21  # bytes of a number in JSON, about
-
-_SEGMENT: dict[str, Any] = {
-    "type": "object",
-    "required": ["kind"],
-    "properties": {
-        "kind": {
-            "enum": list(KINDS),
-            "description": "ptp: MoveJ, lin: MoveL, circ: MoveC, spline, or dwell: a pause.",
-        },
-        "q": {"type": "array", "items": {"type": "number"}, "description": "Target: joint values."},
-        "position": {
-            "type": "array",
-            "items": {"type": "number"},
-            "description": "Target: the tool point x, y, z.",
-        },
-        "wxyz": {
-            "type": "array",
-            "items": {"type": "number"},
-            "description": "Orientation at `position`; by default that at the start of the segment.",
-        },
-        "pose": {"type": "array", "items": {"type": "array"}, "description": "Target: a 4×4 matrix instead."},
-        "via": {"type": "array", "items": {"type": "number"}, "description": "circ: a point of the arc."},
-        "points": {"type": "array", "items": {"type": "object"}, "description": "spline: targets as above."},
-        "orientation": {"enum": ["geodesic", "two-axis"], "description": "lin, circ: how the tool turns."},
-        "seconds": {"type": "number", "description": "dwell: how long."},
-        "speed": {"type": "number", "description": "Part of the joints' velocity limits, above 0 and at most 1."},
-        "acceleration": {"type": "number", "description": "The same for acceleration and jerk."},
-        "tool_speed": {"type": "number", "description": "Largest speed of the tool point, per second."},
-        "tool_turn": {"type": "number", "description": "Largest angular velocity of the tool."},
-        "blend": {
-            "type": "number",
-            "description": "Radius about the target within which the next segment may begin.",
-        },
-        "name": {"type": "string", "maxLength": LONGEST_NAME, "description": "For people."},
-    },
-}
-_PROGRAM: dict[str, Any] = {
-    "type": "object",
-    "description": "Segments, one after the other; docs/motion.md lists their fields.",
-    "required": ["segments"],
-    "additionalProperties": False,
-    "properties": {
-        "segments": {"type": "array", "minItems": 1, "maxItems": MOST_SEGMENTS, "items": _SEGMENT},
-        "units": {
-            "type": "object",
-            "additionalProperties": False,
-            "properties": {"length": {"enum": ["m", "cm", "mm"]}, "angle": {"enum": ["rad", "deg"]}},
-            "description": "Units of the numbers in the program; by default metres and radians.",
-        },
-        "name": {"type": "string", "maxLength": LONGEST_NAME, "description": "For people."},
-        "task": {"enum": [*TASKS, None], "description": "What the tool keeps of poses; by default all it can."},
-        "jerk_limited": {"type": "boolean", "description": "Whether paths keep the limits of jerk too."},
-    },
-}
 
 EXAMPLES = {
     "ptp": example(
@@ -115,7 +61,7 @@ EXAMPLES = {
 class MotionRequest(AvoidingBody):
     """What the arm should do, and how the motion is answered."""
 
-    program: Annotated[dict[str, Any], WithJsonSchema(_PROGRAM)] = Field(
+    program: Annotated[dict[str, Any], DescribedBy(ProgramBody)] = Field(
         description="The segments of the motion. Poses are those of the tool in the world frame."
     )
     q_start: Configuration | None = Field(
@@ -134,6 +80,7 @@ class MotionRequest(AvoidingBody):
 @operation(
     router,
     "motion",
+    name="plan_motion",
     examples=EXAMPLES,
     summary="Motion of a program",
     response_model=MotionAnswer,

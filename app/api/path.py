@@ -73,6 +73,7 @@ class PathRequest(OptionsBody):
 @operation(
     router,
     "ik/path",
+    name="ik_path",
     examples=EXAMPLES,
     summary="Inverse kinematics along a path",
     response_model=PathAnswer,

@@ -142,7 +142,7 @@ def create_app(
     state.uploads = UploadMemory(max(settings.upload_memory, settings.max_body), settings.client_share)
     state.update_gauges = partial(update_gauges, state, bridge)
     install_problem_handlers(app)
-    complete_document(app, store, settings)
+    complete_document(app, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
     app.router.routes.extend([*room_routes(classroom, settings, store), *scoreboard.routes()])
     app.router.routes.extend(lti_routes(classroom, settings, partial(_courses, settings, store)))

@@ -15,7 +15,7 @@ from app.service.startup import Status
 from app.shared.metrics import CONTENT_TYPE, exposition
 from kin.warmup.preparation import Preparation
 
-router = APIRouter(tags=["service"])
+router = APIRouter(tags=["service"], generate_unique_id_function=lambda route: route.name)
 
 
 class Alive(BaseModel):

@@ -36,6 +36,7 @@ def operation(
     *,
     method: str = "POST",
     sent: str = "",
+    name: str = "",
     examples: dict[str, Any] | None = None,
     **route: Any,
 ) -> Callable[[Handler], Handler]:
@@ -46,6 +47,8 @@ def operation(
         path: below ``/robots/{robot_id}/``, and by default of the second route.
         method: of the first route.
         sent: another path of the second route.
+        name: id of the first route in the OpenAPI document, by default the name of the handler; that of the second
+            one ends with ``_sent``.
         examples: request bodies for the arm pioneer5; the first is one of the second route as well.
         route: further arguments of the routes; `responses` are those of the first one.
     """
@@ -60,7 +63,10 @@ def operation(
         if model is not None:
             plain[part] = Annotated[model, Query() if part == "query" else Body(openapi_examples=examples)]
         url = f"/robots/{{robot_id}}/{path}"
-        router.add_api_route(url, _by_id(handler, plain), methods=[method], responses=responses, **route)
+        short = name or handler.__name__
+        router.add_api_route(
+            url, _by_id(handler, plain), methods=[method], responses=responses, operation_id=short, **route
+        )
 
         first = list((examples or {"one": example("An arm", {})}).items())[:1]
         given: Any = {key: example(each["summary"], {"robot": EXAMPLE, **each["value"]}) for key, each in first}
@@ -71,7 +77,7 @@ def operation(
             {"request": Request, **others, "body": Annotated[body, Body(openapi_examples=given)]},
             part if model else None,
         )
-        more = {**route, "summary": f"{route['summary']} (arm sent along)"}
+        more = {**route, "operation_id": f"{short}_sent", "summary": f"{route['summary']} (arm sent along)"}
         more["description"] = f"{inspect.getdoc(handler)}\n\n{_SENT_ALONG}"
         router.add_api_route(f"/{sent or path}", endpoint, methods=["POST"], responses=refusals, **more)
         return handler
