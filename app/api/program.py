@@ -1,4 +1,4 @@
-"""The schema of a program in requests: one model per kind of segment, told apart by `kind`.
+"""The schema of a program in requests: one model per kind of segment, distinguished by `kind`.
 
 `kin.motion.program_from_dict` reads and checks programs, with messages of its own. These models tell clients what
 it accepts: generated code then has a type for each segment. A test compares the fields with those of the core.
