@@ -34,6 +34,7 @@ from kin.typed import LONGEST, cut
 PARTS = ("start", "table", "wrong", "about", "frames", "wrong-frames", "convert")
 OTHER: dict[Convention, Convention] = {"standard": "modified", "modified": "standard"}
 UNUSED = "The file was not used"
+SAVED = "Your browser has put it where it puts downloads."
 
 
 class RobotTab(Feature):
@@ -44,7 +45,7 @@ class RobotTab(Feature):
     messages = frozenset(
         {
             *("cell", "row", "start", "convention", "convert", "reset", "delete", "discard", "left"),
-            *("download", "upload", "urdf", "tip", "cancel"),
+            *("download", "upload", "urdf", "tip", "cancel", "mended"),
             *("frame-add", "frame-remove"),
             *("other", "agree", "other-text", "apply", "compare-stop"),
         }
@@ -63,7 +64,7 @@ class RobotTab(Feature):
         gui = stage.client.gui
         self._html = {name: gui.add_html("") for name in PARTS}
         self._comparing = Comparing(stage, stage.meshes.memory, self.post)
-        self._html["files"] = gui.add_html("")
+        self._html |= {name: gui.add_html("") for name in ("files", "doctor")}
         self._handlers: dict[str, Callable[[object], None]] = {
             "start": self._beginnings.start,
             "convention": self._reread,
@@ -77,6 +78,7 @@ class RobotTab(Feature):
             "urdf": lambda value: self._open(lambda: self._uploads.choose("urdf", value)),
             "tip": lambda value: self._open(lambda: self._uploads.choose("tip", value)),
             "cancel": lambda _: self._cancel(),
+            "mended": self._use_mended,
             "frame-add": lambda _: self._use_frames(workpieces.added(self.stage)),
             "frame-remove": lambda index: self._use_frames(workpieces.removed(self.stage.frames, index)),
             "other": self._comparing.choose,
@@ -127,7 +129,7 @@ class RobotTab(Feature):
                 return f"{words[0].upper()}{words[1:]}"
             case ("row", str(action), int(index)):
                 return f"Row {index + 1}: {action}"
-            case ("start" | "reset" | "upload" | "urdf" | "tip", *_):
+            case ("start" | "reset" | "upload" | "urdf" | "tip" | "mended", *_):
                 return "Another arm"
             case ("delete",):
                 return "Own arm deleted"
@@ -219,6 +221,7 @@ class RobotTab(Feature):
         file = "" if own is None else self.stage.bodies.file_of(own)
         heavy, uploads = bool(file) or self.stage.bodies.detailed, self._uploads
         self._show("files", views.files(uploads.waiting, uploads.busy, file, heavy))
+        self._show("doctor", uploads.doctor.html())
 
     def _leave_table(self) -> None:
         """The visitor has left the fields: write every value as it is read, unless something is wrong."""
@@ -376,7 +379,7 @@ class RobotTab(Feature):
         robot = self.stage.now.robot if self._own is None else named(self.stage.now.robot)
         name, text = text_of(robot, kind)
         self.stage.client.send_file_download(name, text.encode(), save_immediately=True)
-        self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
+        self.stage.notify(Notice("hand", f"{name} is saved", SAVED))
 
     def _upload(self, value: object) -> None:
         self._stalled = 0.0  # `tick` says when to look whether the next part has come
@@ -389,6 +392,21 @@ class RobotTab(Feature):
         except RobotFileError as error:
             self._refuse(UNUSED, str(error))
         self._show_files()
+
+    def _use_mended(self, action: object) -> None:
+        """Save or open the mended URDF, or close the report about it."""
+        doctor = self._uploads.doctor
+        if action == "close":
+            doctor.close()
+            self._show_files()
+        elif action == "save":
+            name, text = doctor.file_name, doctor.mended.text
+            self.stage.client.send_file_download(name, text.encode(), save_immediately=True)
+            self.stage.notify(Notice("hand", f"{name} is saved", SAVED))
+        elif action == "open":
+            self._open(self._uploads.open_mended)
+        else:
+            raise InputError("mended", action, "save, open or close")
 
     def _take_other(self, value: object) -> None:
         """A part of a text with the arm to compare with."""

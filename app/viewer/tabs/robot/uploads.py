@@ -17,6 +17,7 @@ from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post
 from app.viewer.panel.status import Notice
 from app.viewer.scene.bodies.drawing import Drawing
+from app.viewer.tabs.robot.doctor import Doctor
 from app.viewer.tabs.robot.files import (
     Busy,
     Incoming,
@@ -26,6 +27,7 @@ from app.viewer.tabs.robot.files import (
     file_error,
     is_urdf,
     opened,
+    tips_of,
     with_capsules,
 )
 from kin import InputError, KinematicsError, Robot, RobotFileError
@@ -70,6 +72,7 @@ class Uploads:
     Attributes:
         waiting: a file about which something is to be chosen.
         last: the arm of the file that was opened last.
+        doctor: the report about the URDF that was opened last.
     """
 
     def __init__(self, stage: Stage, post: Post, begin: Callable[[OwnArm, str], None]) -> None:
@@ -78,10 +81,12 @@ class Uploads:
         self._begin = begin
         self._incoming = Incoming(stage.meshes.memory)
         self._number = 0
+        self._tip: str | None = None  # of the URDF that was opened last
         self._reading: _Reading | None = None
         self._future: Future[Meshes] | None = None
         self.waiting: Source | None = None
         self.last: OwnArm | None = None
+        self.doctor = Doctor()
 
     @property
     def busy(self) -> Busy | None:
@@ -107,6 +112,7 @@ class Uploads:
         """The visitor has left."""
         self._incoming.forget()
         self.waiting = self._reading = None
+        self.doctor.close()
         self._cancel()
 
     def _cancel(self) -> None:
@@ -123,7 +129,17 @@ class Uploads:
             raise file_error("upload", error) from None
         if file is not None:
             self.waiting = None
-            self._open(opened(*file))
+            name, content, room = file
+            self.doctor.close()
+            if isinstance(content, str):
+                self.doctor.look(Source(name, content))
+            self._open(opened(name, content, room))
+
+    def open_mended(self) -> None:
+        """Open the URDF of the report once more, mended; raises `kin.KinematicsError`."""
+        source = self.doctor.mended
+        self.waiting = None
+        self._open(replace(source, tips=tips_of(source.name, source.text)), self._tip)
 
     def end_stalled(self, now: float) -> float | None:
         """End an upload whose next part does not come.
@@ -163,6 +179,8 @@ class Uploads:
             self._stage.notify(Notice("advice", title, f"Choose {what[1]}, below."))
             return
         name = f"{source.name}: {source.urdf}" if source.urdf else source.name
+        self._tip = tip
+        self.doctor.look(source, tip)
         try:
             own, words = arm_of(name, source.text, tip, reading=source.archive is not None)
         except InputError as error:

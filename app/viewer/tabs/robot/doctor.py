@@ -1,0 +1,112 @@
+"""The report about the URDF that was opened last: what is wrong in it, line by line, and the file mended."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from app.shared.answers.examination import TITLES, outcome
+from app.viewer.meshes.archive import MB, Archive, MeshError
+from app.viewer.tabs.robot.files import Source, is_urdf
+from app.viewer.views.templates import render
+from kin import InputError, RobotFileError, UrdfExamination, examine_urdf
+from kin.files.urdf.doctor.findings import RANKS
+from kin.files.urdf.doctor.meshes import extent_of
+from kin.transforms import Array
+
+MOST_LISTED = 40  # findings of one rank
+MOST_MEASURED = 60 * MB  # of meshes whose size is looked at
+MOST_OF_TEXT = 2 * MB  # of a mesh that is text, which takes longer
+
+
+class MeshesSent:
+    """The meshes of a zip, as `kin.examine_urdf` takes them; the size of a few is looked at."""
+
+    def __init__(self, archive: Archive, urdf: str) -> None:
+        self._archive, self._urdf, self._left = archive, urdf, MOST_MEASURED
+        self._known: dict[str, Array | None] = {}
+
+    def extent(self, path: str) -> Array | None:
+        """The sides of a mesh, None if they are not looked at; raises `LookupError` with the reason."""
+        try:
+            name = self._archive.find(path, self._urdf)
+            if name in self._known:
+                return self._known[name]
+            if self._left <= 0:
+                return None
+            data = self._archive.read(name)
+        except MeshError as error:
+            raise LookupError(f"{error.value}; what helps is {error.expected}") from None
+        self._left -= len(data)
+        is_text = name.lower().endswith(".obj") or np.frombuffer(data[:200], np.uint8).max(initial=0) < 128
+        found = None if is_text and len(data) > MOST_OF_TEXT else extent_of(name, data)
+        self._known[name] = found
+        return found
+
+    def elsewhere(self, path: str) -> str | None:
+        """None: a file of the same name anywhere in the zip is found already."""
+        return None
+
+
+class Doctor:
+    """The report of one page.
+
+    Attributes:
+        found: about the URDF that was opened last; None if there is none, or it was closed.
+    """
+
+    def __init__(self) -> None:
+        self.found: UrdfExamination | None = None
+        self._source: Source | None = None
+
+    def look(self, source: Source, tip: str | None = None) -> None:
+        """Examine a file; one that is no URDF has no report."""
+        self.close()
+        if not is_urdf(source.text):
+            return
+        name = source.urdf or source.name
+        meshes = None if source.archive is None else MeshesSent(source.archive, source.urdf)
+        try:
+            self.found, self._source = examine_urdf(source.text, tip=tip, file=name, files=meshes), source
+        except RobotFileError:
+            return  # whoever opens the file says so
+
+    def close(self) -> None:
+        """Forget the report."""
+        self.found = self._source = None
+
+    @property
+    def mended(self) -> Source:
+        """The file mended; raises `InputError` if nothing in it can be."""
+        if self.found is None or self.found.mended is None or self._source is None:
+            raise InputError("mended", None, "a URDF that was opened and can be mended")
+        return replace(self._source, text=self.found.mended, tips=())
+
+    @property
+    def file_name(self) -> str:
+        """The name of the mended file."""
+        name = "" if self.found is None else self.found.file.rpartition("/")[2]
+        return f"{name.removesuffix('.urdf').removesuffix('.xml') or 'robot'}-mended.urdf"
+
+    def html(self) -> str:
+        """The report; empty if there is none."""
+        found = self.found
+        if found is None:
+            return ""
+        groups = []
+        for rank in RANKS:
+            several = [each for each in found.findings if each.rank == rank]
+            if several:
+                more = max(0, len(several) - MOST_LISTED)
+                groups.append(
+                    {"rank": rank, "title": TITLES[rank], "findings": several[:MOST_LISTED], "more": more}
+                )
+        wrong, suspicious = found.count("wrong"), found.count("suspicious")
+        colour, symbol = ("kb-green", "✓") if not wrong + suspicious else ("kb-amber", "!")
+        if found.refusal:
+            colour, symbol = "kb-vermilion", "✕"
+        return render(
+            "robot/doctor", file=found.file, words=outcome(found), colour=colour, symbol=symbol, read=found.read,
+            refusal=found.refusal, groups=groups, mends=found.mends if found.mended is not None else 0,
+        )  # fmt: skip

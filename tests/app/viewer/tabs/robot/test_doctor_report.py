@@ -1,0 +1,106 @@
+"""The report about a URDF in the tab Robot: findings with lines, the mended file saved and opened."""
+
+from __future__ import annotations
+
+import html
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from test_robot_tab import part, say, shows
+from test_uploads import TWO, send
+from zips import TWO_JOINTS, packed, robot_files
+
+import kin
+from app.viewer.tabs.robot.doctor import Doctor
+from app.viewer.tabs.robot.files import Source
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+LONG = TWO_JOINTS.replace('axis xyz="0 1 0"', 'axis xyz="0 3 0"', 1)
+assert LONG != TWO_JOINTS
+LINE = LONG[: LONG.index('"0 3 0"')].count("\n") + 1
+
+
+def report(tab: FakeBrowser) -> str:
+    return html.unescape(part(tab, "doctor"))
+
+
+def upload(tab: FakeBrowser, text: str, name: str = "two.urdf") -> None:
+    say(tab, "upload", value=[name, True, True, text])
+
+
+def test_an_import_has_a_report_and_the_mended_file_is_saved_and_opened(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        upload(tab, LONG)
+        shows(tab, TWO, TWO.q_home)
+        assert "1 suspicious; 1 of them can be mended at once." in report(tab)
+        assert f"<b>Line {LINE}</b>, joint" in report(tab)
+        assert "has the length 3, not 1" in report(tab)
+        assert "Mending does not move the tool" in report(tab)
+        say(tab, "mended", value="save")
+        assert "two-mended.urdf is saved" in tab.html
+        say(tab, "mended", value="open")
+        tab.wait(lambda: "Nothing is wrong or suspicious." in report(tab))
+        assert "Save mended" not in report(tab)
+        say(tab, "mended", value="close")
+        tab.wait(lambda: 'data-arm="doctor"' not in tab.html)
+
+
+def test_a_refused_file_has_a_report_that_mends_it(port: int) -> None:
+    wrong = TWO_JOINTS.replace('axis xyz="0 1 0"', 'axis xyz="0 1,0 0"', 1)
+    assert wrong != TWO_JOINTS
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        before = tab.value("Robot")
+        upload(tab, wrong)
+        assert "The file was not used" in tab.html
+        assert tab.value("Robot") == before
+        assert "No arm is read:" in report(tab)
+        assert "The mended file is read, with 2 joints." in report(tab)
+        say(tab, "mended", value="open")
+        shows(tab, TWO, TWO.q_home)
+        assert "Nothing is wrong or suspicious." in report(tab)
+
+
+def test_what_is_no_xml_has_a_line(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        upload(tab, "<robot>\n<link>\n</robot>")
+        assert "<b>Line 3</b>" in report(tab)
+        assert "Save mended" not in report(tab)
+        upload(tab, kin.robot_to_toml("ur5"), "ur5.toml")
+        tab.wait(lambda: 'data-arm="doctor"' not in tab.html)
+
+
+def test_the_meshes_of_a_zip_are_looked_at(port: int) -> None:
+    files = robot_files()
+    meshes = [name for name in files if not name.endswith(".urdf")]
+    lost = {name: data for name, data in files.items() if name != meshes[0]}
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        send(tab, "two.zip", packed(lost))
+        tab.wait(lambda: "cannot be used: no such file in the zip" in report(tab))
+        send(tab, "two.zip", packed(files))
+        tab.wait(lambda: "Nothing is wrong or suspicious." in report(tab))
+
+
+@pytest.mark.parametrize("value", ["steal", "", None, 7, ["save"]])
+def test_what_the_buttons_do_not_send_changes_nothing(port: int, value: object) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        upload(tab, LONG)
+        before = report(tab)
+        say(tab, "mended", value=value)
+        assert report(tab) == before
+
+
+def test_without_a_report_there_is_nothing_to_open() -> None:
+    doctor = Doctor()
+    with pytest.raises(kin.InputError, match="mended"):
+        _ = doctor.mended
+    doctor.look(Source("ur5.toml", kin.robot_to_toml("ur5")))
+    assert doctor.found is None
+    doctor.look(Source("two.urdf", LONG))
+    assert np.allclose(kin.fk(kin.load_urdf(doctor.mended.text), [0.3, 0.2]), kin.fk(TWO, [0.3, 0.2]))
