@@ -7,15 +7,18 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 unset PYTHONDONTWRITEBYTECODE # hundreds of processes are started, each of which would compile all it imports
 chromium=${KINBOARD_TEST_CHROMIUM:-/usr/bin/chromium}
 
-# Chromium, PostgreSQL and the two proxies, if they are missing.
+# Three browsers, a screen for two of them, PostgreSQL and the two proxies, if they are missing.
 install_programs() {
   missing=
   [ -x "$chromium" ] || missing=chromium
+  command -v firefox-esr >/dev/null || missing="${missing:+$missing }firefox-esr"
+  command -v WebKitWebDriver >/dev/null || missing="${missing:+$missing }webkit2gtk-driver"
+  command -v Xvfb >/dev/null || missing="${missing:+$missing }xvfb"
   command -v initdb >/dev/null || ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || \
     missing="${missing:+$missing }postgresql"
   # shellcheck disable=SC2086 # several words
-  [ -z "$missing" ] || apt_install $missing || fail "the tests of pages and classrooms need a browser and a database:" \
-    "Chromium and PostgreSQL. On Debian: sudo apt-get install $missing"
+  [ -z "$missing" ] || apt_install $missing || fail "the tests of pages and classrooms need browsers and a database." \
+    "On Debian: sudo apt-get install $missing"
   for proxy in nginx caddy; do
     command -v $proxy >/dev/null || apt_unpack $proxy || fail "the tests of deploy/ need $proxy in the PATH"
   done

@@ -4,8 +4,7 @@
   const root = document.documentElement;
   const DARK = matchMedia("(prefers-color-scheme: dark)");
   const SYSTEM_IS_DARK = "The system is dark"; // label of a check box: see app/viewer/panel/view.py
-  const SCHEME = "kinboard-scheme";
-  const PATIENCE = 120000; // ms until the page is shown in any case; a first start on a slow machine compiles for a minute
+  const SCHEME = "kinboard-scheme"; // read by static/start.js
   // Buttons in a corner of the scene: name, drawing, message and argument for the server. The standard views are drawn
   // as an arm seen from there: towards the viewer, bent to the right, from above, and a cube.
   const TOOLS = [
@@ -17,14 +16,8 @@
     ["Save a picture of the scene", '<path d="M4 8h3.2l1.6-2.4h6.4L16.8 8H20a1 1 0 0 1 1 1v9.5a1 1 0 0 1-1 1H4a1 1 0 0 1-1-1V9a1 1 0 0 1 1-1z"/><circle cx="12" cy="13.3" r="3.6"/>'],
   ];
 
-  // A browser may forbid storage; then a reload is covered in the system's colours.
-  const recall = () => { try { return sessionStorage.getItem(SCHEME); } catch { return null; } };
+  // A browser may forbid storage; then static/start.js covers a reload in the system's colours.
   const keep = (scheme) => { try { sessionStorage.setItem(SCHEME, scheme); } catch { /* see above */ } };
-
-  // Until the service knows the colours, viser's page is white: a cover in the right colour hides it.
-  root.dataset.kbCover = recall() ?? (DARK.matches ? "dark" : "light");
-  const uncover = () => delete root.dataset.kbCover;
-  setTimeout(uncover, PATIENCE);
 
   // Without a graphics card, clouds of many points make the page stop: static/viewer.css shows a warning then.
   const gl = document.createElement("canvas").getContext("webgl");
@@ -50,9 +43,12 @@
   }
   addEventListener("pagehide", coloured);
 
+  let there = false; // the cover is removed
   function follow() {
     tell();
-    if (coloured() && root.dataset.kbCover) requestAnimationFrame(() => requestAnimationFrame(uncover));
+    if (!coloured() || there) return;
+    there = true;
+    requestAnimationFrame(() => requestAnimationFrame(() => dispatchEvent(new Event("kinboard-there"))));
   }
 
   /** Save what the scene shows as a PNG file. */

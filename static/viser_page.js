@@ -1,7 +1,7 @@
 "use strict";
 // The only script that knows viser's page: how its parts are found (PARTS), what viser calls in the browser (HOOKS), and
 // what is mended in its controls. It is loaded first, before viser's own script; the other scripts ask `viserPage`, whose
-// functions are described at its end. static/viser_page.css has the styles of viser's parts.
+// functions are described at its end. The styles of viser's parts are in static/viewer.css and static/layout.css.
 //
 // tests/e2e/test_viser_page.py fails with the name of each part and hook that viser's page no longer has.
 const viserPage = (() => {
@@ -29,6 +29,14 @@ const viserPage = (() => {
   };
   // What viser calls, and how often it has since this page was loaded.
   const HOOKS = { readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0 };
+
+  // WebKit on Linux names the locale C as a language. viser's script would end there: no Intl knows it.
+  const known = (tag) => { try { return Intl.getCanonicalLocales(tag).length > 0; } catch { return false; } };
+  if (!known(navigator.language)) {
+    const languages = Object.freeze([...navigator.languages.filter(known), "en"]);
+    Object.defineProperty(Navigator.prototype, "languages", { get: () => languages });
+    Object.defineProperty(Navigator.prototype, "language", { get: () => languages[0] });
+  }
 
   const all = (selector, root = document) => [...root.querySelectorAll(selector)];
   const closest = (node, selector) => (node instanceof Element ? node.closest(selector) : null);

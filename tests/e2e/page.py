@@ -210,18 +210,7 @@ class Tab:
         """Page coordinates of a point of the scene, in the default view with room for these spheres."""
         area = self.page.locator("canvas").first.bounding_box()
         assert area is not None
-        position, look_at = camera.view(body(robot), area["width"] / area["height"], room=room)
-        forward = (look_at - position) / np.linalg.norm(look_at - position)
-        right = np.cross(forward, [0.0, 0.0, 1.0])
-        right /= np.linalg.norm(right)
-        seen = np.array([right, np.cross(right, forward), forward]) @ (point - position)
-        half = math.tan(camera.FOV / 2) * seen[2] * 2
-        return np.array(
-            [
-                area["x"] + area["width"] / 2 + seen[0] / half * area["height"],
-                area["y"] + area["height"] / 2 - seen[1] / half * area["height"],
-            ]
-        )
+        return pixel((area["x"], area["y"], area["width"], area["height"]), robot, point, room)
 
     def arrow(
         self,
@@ -232,9 +221,8 @@ class Tab:
         room: Sequence[camera.Sphere] = (),
     ) -> tuple[np.ndarray, np.ndarray]:
         """Page coordinates of a point on an arrow of the gizmo at pose T, and of one farther by its length."""
-        arrow = GIZMO * (FOR_FINGERS if self.touch else 1.0) * body(robot).radius * T[:3, axis]
-        start, end = (self.pixel(robot, T[:3, 3] + far * arrow, room) for far in (0.8, 0.8 + lengths))
-        return start, end
+        start, end = arrow(robot, T, axis, lengths, FOR_FINGERS if self.touch else 1.0)
+        return self.pixel(robot, start, room), self.pixel(robot, end, room)
 
     def drag_arrow(
         self,
@@ -294,6 +282,28 @@ class Tab:
         if PICTURES:
             self.page.wait_for_timeout(400)
             save_picture(self.page, name)
+
+
+def pixel(
+    area: Sequence[float], robot: kin.Robot, point: np.ndarray, room: Sequence[camera.Sphere] = ()
+) -> np.ndarray:
+    """Page coordinates of a point of the scene in an area (x, y, width, height), in the default view."""
+    left, top, width, height = area
+    position, look_at = camera.view(body(robot), width / height, room=room)
+    forward = (look_at - position) / np.linalg.norm(look_at - position)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    seen = np.array([right, np.cross(right, forward), forward]) @ (point - position)
+    half = math.tan(camera.FOV / 2) * seen[2] * 2
+    return np.array([left + width / 2 + seen[0] / half * height, top + height / 2 - seen[1] / half * height])
+
+
+def arrow(
+    robot: kin.Robot, T: np.ndarray, axis: int, lengths: float, factor: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """A point on an arrow of the gizmo at pose T, and one farther by so many of its lengths, in the scene."""
+    along = GIZMO * factor * body(robot).radius * T[:3, axis]
+    return T[:3, 3] + 0.8 * along, T[:3, 3] + (0.8 + lengths) * along
 
 
 def save_picture(page: Page, name: str, full_page: bool = False) -> None:

@@ -70,3 +70,24 @@ def test_cover_says_why_a_page_waits(browser: Browser, address: str) -> None:
     page.clock.fast_forward(61_000)
     expect(page.locator("html")).not_to_have_attribute("data-kb-cover", "light")
     page.close()
+
+
+def test_cover_says_that_a_script_failed(browser: Browser, address: str) -> None:
+    page = browser.new_page()
+    page.add_init_script("window.Worker = class { constructor() { throw new Error('no workers here'); } }")
+    page.goto(address + "viewer/")
+    said = page.get_by_role("alert").filter(has=page.get_by_role("button", name="Reload"))
+    expect(said).to_contain_text("The page could not start.", timeout=WAIT)
+    expect(said).to_contain_text("no workers here")
+    expect(page.locator("html")).to_have_attribute("data-kb-cover", "light")
+    page.close()
+
+
+def test_a_page_that_comes_despite_an_error_says_nothing(browser: Browser, address: str) -> None:
+    page = browser.new_page()
+    page.route("**/static/hints.js", lambda route: route.abort())
+    page.goto(address + "viewer/")
+    expect(page.locator("html")).not_to_have_attribute("data-kb-cover", "light", timeout=WAIT)
+    page.wait_for_timeout(2000)
+    expect(page.locator("#kb-failed")).to_have_count(0)
+    page.close()

@@ -63,6 +63,7 @@ _UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
 
 # A tab's memory, and what viser's page lacks. Relative, so that it holds behind any path prefix.
 _SCRIPTS = (
+    b"start",  # says so if one of the others fails
     b"viser_page",  # the others call it
     b"viewer",
     b"input",

@@ -223,7 +223,9 @@ def test_every_built_in_arm_has_a_thumbnail():
 
 def test_the_stored_state_is_loaded_before_the_script_of_viser(client):
     html = client.get("/viewer/").text
-    ours = re.findall(r'(?:src|href)="\.\./(static/[a-z]+\.(?:js|css))"', html)
+    ours = re.findall(r'(?:src|href)="\.\./(static/[a-z_]+\.(?:js|css))"', html)
+    scripts = [file for file in ours if file.endswith(".js")]
+    assert scripts[0] == "static/start.js", "it says so if another one fails"
     assert {
         "static/viewer.js",
         "static/layout.js",
