@@ -71,7 +71,7 @@ from kin.motion import (
     program_to_dict,
 )
 from kin.notebook import show
-from kin.path import PathGap, PathJump, PathResult, solve_path
+from kin.path import PathGap, PathJump, PathPostures, PathResult, path_postures, solve_path
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
 from kin.transforms import from_position_wxyz, rotation_from_wxyz, wxyz_from_rotation
@@ -127,6 +127,7 @@ __all__ = [
     "Obstacle",
     "PathGap",
     "PathJump",
+    "PathPostures",
     "PathResult",
     "Peak",
     "PoseTarget",
@@ -186,6 +187,7 @@ __all__ = [
     "obstacle_from_dict",
     "parse_program",
     "parse_robot",
+    "path_postures",
     "plan_motion",
     "program_from_dict",
     "program_to_dict",

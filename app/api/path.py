@@ -15,10 +15,12 @@ from app.api.options import OptionsBody, Target
 from app.api.problems import FieldError, invalid
 from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
 from app.api.work import Deadline, computed
-from app.shared.answers.path import PathAnswer, path_answer
+from app.shared.answers.path import PathAnswer, PosturesAnswer, path_answer, postures_answer
 from app.shared.settings import Settings
-from kin import Robot
+from kin import Robot, path_postures
+from kin.ik.options import IKOptions
 from kin.path import solve
+from kin.transforms import Array
 
 router = versioned("kinematics")
 
@@ -89,7 +91,40 @@ async def path_inverse_kinematics(request: Request, robot: Robot, body: PathRequ
     return await computed(request, partial(_solve, robot, body, settings_of(request)))
 
 
+@operation(
+    router,
+    "ik/path/postures",
+    examples=EXAMPLES,
+    summary="Postures along a path",
+    response_model=PosturesAnswer,
+    responses=POST_REFUSALS,
+)
+async def postures_along_path(request: Request, robot: Robot, body: PathRequest) -> Response:
+    """At each waypoint and in each posture of the arm what is in the way, and how far it gets without a jump.
+
+    It tells why a path flips or stops, and from which posture at its start it would not.
+    """
+    return await computed(request, partial(_postures, robot, body, settings_of(request)))
+
+
 def _solve(robot: Robot, body: PathRequest, settings: Settings, deadline: Deadline) -> Response:
+    poses, options, q_start, roundings = _read(robot, body, settings)
+    return reply(path_answer(solve(robot, poses, options, q_start, body.max_step, deadline.check, roundings)))
+
+
+def _postures(robot: Robot, body: PathRequest, settings: Settings, deadline: Deadline) -> Response:
+    poses, options, q_start, roundings = _read(robot, body, settings)
+    found = path_postures(
+        robot, poses, options=options, q_start=q_start, max_step=body.max_step, stop=deadline.check,
+        roundings=roundings,
+    )  # fmt: skip
+    return reply(postures_answer(found))
+
+
+def _read(
+    robot: Robot, body: PathRequest, settings: Settings
+) -> tuple[list[Array], IKOptions, Array | None, list[float]]:
+    """The poses of a request, its options, where the arm is, and how rounded the poses are."""
     schemas.check_batch("targets", len(body.targets), settings, settings.max_path)
     q_start = None
     if body.q_start is not None:
@@ -102,5 +137,4 @@ def _solve(robot: Robot, body: PathRequest, settings: Settings, deadline: Deadli
             value = f"a target for task {goal.task}"
             raise invalid(FieldError(field=f"targets[{i}]", value=value, expected=expected))
     poses, roundings = [goal.T for goal in targets], [goal.rounding for goal in targets]
-    options = body.options(task)
-    return reply(path_answer(solve(robot, poses, options, q_start, body.max_step, deadline.check, roundings)))
+    return poses, body.options(task), q_start, roundings

@@ -13,7 +13,7 @@ the whole path is chosen at once, as the shortest path through layers:
 3. :mod:`kin.path.search` repairs what samples miss, and :mod:`kin.path.smoothing` straightens their staircase.
 4. :mod:`kin.path.gaps` fills in the waypoints that cannot be met.
 5. :mod:`kin.path.causes` finds out why each jump is forced, :mod:`kin.path.report` assembles the result, and
-   :mod:`kin.path.messages` words it.
+   :mod:`kin.path.messages` words it. :mod:`kin.path.postures` shows all postures along the path beside it.
 
 Where layers are numeric continuations instead of samples of a closed form, the number of jumps is the smallest
 *found*.
@@ -37,14 +37,24 @@ from kin.named import robot_of
 from kin.path.details import JumpCause
 from kin.path.gaps import fill_gaps
 from kin.path.layers import layered
+from kin.path.postures import PathPostures, postures_along
 from kin.path.report import report
 from kin.path.results import PathGap, PathJump, PathResult
 from kin.path.search import DeadEnd, best_path
-from kin.path.waypoints import LayerSequence, PathSettings
+from kin.path.waypoints import LayerSequence, PathSettings, Waypoint
 from kin.robot import Robot
 from kin.transforms import Array
 
-__all__ = ["JumpCause", "PathGap", "PathJump", "PathResult", "solve", "solve_path"]
+__all__ = [
+    "JumpCause",
+    "PathGap",
+    "PathJump",
+    "PathPostures",
+    "PathResult",
+    "path_postures",
+    "solve",
+    "solve_path",
+]
 
 MAX_STEP = 0.5
 
@@ -116,7 +126,46 @@ def solve(
 
     `roundings` are one per target, each as in `kin.ik.solve`.
     """
-    robot = robot_of(robot)
+    settings, waypoints = _layers(robot_of(robot), targets, options, q_start, max_step, stop, roundings)
+    return _chosen(settings, waypoints)
+
+
+def path_postures(
+    robot: Robot | str,
+    targets: Sequence[ArrayLike] | Array,
+    *,
+    options: IKOptions | None = None,
+    q_start: ArrayLike | None = None,
+    max_step: float = MAX_STEP,
+    stop: Callable[[], None] = never_cancel,
+    roundings: Sequence[float] | None = None,
+) -> PathPostures:
+    """At each target and in each posture of the arm what is in the way, and how far it gets without a jump.
+
+    Args:
+        robot, targets, q_start, max_step, stop: as in `solve_path`.
+        options: as in `solve_path`. With `avoid_self_collision` or `obstacles`, configurations that touch
+            something are in the way.
+        roundings: one per target, each as in `kin.ik.solve`.
+
+    Raises:
+        InputError: as `solve_path`.
+    """
+    wanted = IKOptions.of(options)
+    settings, waypoints = _layers(robot_of(robot), targets, wanted, q_start, max_step, stop, roundings)
+    return postures_along(settings, waypoints, _chosen(settings, waypoints))
+
+
+def _layers(
+    robot: Robot,
+    targets: Sequence[ArrayLike] | Array,
+    options: IKOptions,
+    q_start: ArrayLike | None,
+    max_step: float,
+    stop: Callable[[], None],
+    roundings: Sequence[float] | None,
+) -> tuple[PathSettings, list[Waypoint]]:
+    """The waypoints with their layers, and what is constant along the path."""
     if q_start is not None and robot.check_q(q_start, "q_start").ndim != 1:
         raise InputError("q_start", q_start, f"one configuration of {robot.n} values")
     problem = replace(IKProblem.of(robot, np.eye(4), options, q_start), stop=stop)
@@ -128,9 +177,13 @@ def solve(
         replace(problem, T=T, target_error=error + rounding)
         for (T, error), rounding in zip(poses, more, strict=True)
     ]
-    waypoints = layered(problems, settings.grid)
+    return settings, layered(problems, settings.grid)
+
+
+def _chosen(settings: PathSettings, waypoints: list[Waypoint]) -> PathResult:
+    """The best path through the layers."""
     sequence = LayerSequence.of(settings, waypoints)
-    q = np.full((len(waypoints), robot.n), math.nan)
+    q = np.full((len(waypoints), settings.problem.robot.n), math.nan)
     ends: list[DeadEnd] = []
     if sequence.waypoints:
         q[sequence.at], ends = best_path(sequence)

@@ -20,7 +20,7 @@ from kin.transforms import Array
 
 
 @jit
-def _first_from(values: Array, least: float) -> int:
+def first_from(values: Array, least: float) -> int:
     """The index of the first of the sorted values ``(m,)`` that is not below `least`, m if there is none."""
     a, b = 0, values.shape[0]
     while a < b:
@@ -91,8 +91,8 @@ def _advance(before: _Layer, step: _Step, q: Array, best: _Best) -> None:
         first, last = 0, m
         if key >= 0:
             reach = step.allowed / weight[key] * (1.0 + 1e-9)
-            first = _first_from(before.sorted_key, q[j, key] - reach)
-            last = _first_from(before.sorted_key, q[j, key] + reach)
+            first = first_from(before.sorted_key, q[j, key] - reach)
+            last = first_from(before.sorted_key, q[j, key] + reach)
         tie = 0.0
         for jump in range(2):
             if jump == 1:

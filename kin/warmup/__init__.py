@@ -31,7 +31,7 @@ from kin.ik.candidates import unchecked
 from kin.kernels.cache import is_cached
 from kin.kernels.fk import fk_one
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion
-from kin.path import solve_path
+from kin.path import path_postures, solve_path
 from kin.robot import Robot
 from kin.solvers import closed_form_of, general6, general7
 from kin.solvers.contract import POSE, ClosedForm, SolverInput
@@ -227,6 +227,7 @@ def _plan(robot: Robot) -> None:
     there, back = JointTarget(tuple((robot.q_home + 0.05).tolist())), PoseTarget.of(fk(robot, robot.q_home))
     motion = plan_motion(robot, [Ptp(target), Ptp(there, blend=0.01), Lin(target), Lin(back)])
     motion.sample([0.0, motion.duration])
+    path_postures(robot, [fk(robot, robot.q_home)] * 2)
 
 
 def _solve_generally(robot: Robot) -> None:

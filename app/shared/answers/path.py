@@ -10,8 +10,9 @@ from app.shared.answers.answer import Answer, From
 from app.shared.answers.details import ContactAnswer, IkDetails, JumpDetailsAnswer, jump_details_answer
 from app.shared.answers.fk import Matrix
 from app.shared.answers.ik import Tolerances, tolerances_answer
-from kin import PathResult
+from kin import PathPostures, PathResult
 from kin.ik.results import Cause
+from kin.path.postures import STATES, State
 
 GapStatus = Literal["approximate", "limits", "orientation", "unreachable", "collision"]
 
@@ -95,4 +96,57 @@ def path_answer(result: PathResult) -> PathAnswer:
         jumps=[JumpAnswer.of(jump, details=jump_details_answer(jump)) for jump in result.jumps],
         contacts=[TouchAnswer.of(touch) for touch in result.contacts] if result.avoids else UNSET,
         tolerances=tolerances_answer(result),
+    )
+
+
+class StretchAnswer(Answer):
+    """Neighbouring waypoints of one posture with the same state."""
+
+    posture: int
+    """Which of `postures`."""
+    first: int
+    """Its first waypoint, counted from 0."""
+    last: int
+    """Its last waypoint."""
+    state: State
+    """"free", "near limit", "near singularity": can be driven. "outside" the limits, "touches": in the way.
+    "none": the pose cannot be met in this posture."""
+    joined: bool
+    """Whether the arm can go on in this posture from the last waypoint to the next one."""
+    reason: str
+    """What is near or in the way in the middle of the stretch; empty if free."""
+
+
+class PosturesAnswer(Answer):
+    """The postures of the arm along a path: a table of waypoints and postures."""
+
+    postures: list[str]
+    """Their names; numbers where the arm's postures have none."""
+    through: list[int]
+    """From which postures at the first waypoint the arm gets through the whole path without a jump."""
+    states: list[list[State]]
+    """By waypoint and posture: the state, as in `stretches`."""
+    reach: Annotated[list[list[int]], From(lambda found: found.reach.tolist())]
+    """By waypoint and posture: the last waypoint to which the arm can go on without a jump; −1 where there is no
+    configuration that can be driven."""
+    q: list[list[list[float | None]]]
+    """By waypoint and posture: a configuration, of those that can be driven the one that leads farthest; nulls
+    where there is none."""
+    stretches: list[StretchAnswer]
+    """The same table, posture by posture, in stretches."""
+    rows: Annotated[list[int], From(lambda found: found.rows.tolist())]
+    """The posture of `best` at each waypoint; −1 in a gap."""
+    best: PathAnswer
+    """The path that `ik/path` gives."""
+    reason: str
+    """From which postures the arm gets through, in a sentence for people."""
+
+
+def postures_answer(found: PathPostures) -> PosturesAnswer:
+    """One result of `kin.path_postures`."""
+    return PosturesAnswer.of(
+        found,
+        through=list(found.through),
+        states=[[STATES[state] for state in row] for row in found.states.tolist()],
+        best=path_answer(found.best),
     )

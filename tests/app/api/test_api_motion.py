@@ -301,3 +301,23 @@ def test_a_line_that_arrives_otherwise_and_the_part_of_a_refused_program_are_ans
     assert whole["part"] is None
     assert whole["segments"][1]["arrival"]["q"] == pytest.approx(arrival["q"])
     assert whole["segments"][1]["end"] == pytest.approx(part["segments"][1]["end"])
+
+
+def test_postures_along_a_path_are_those_of_the_core(client):
+    T = np.repeat(kin.fk(UR5, UR5.q_home)[None], 12, axis=0)
+    T[:, :3, 3] += np.linspace(0.0, 1.0, 12)[:, None] * (0.55, 0.0, 0.0)
+    body = {"targets": [{"matrix": pose.tolist()} for pose in T], "max_step": 2.0}
+    response = client.post("/api/v1/robots/ur5/ik/path/postures", json=body)
+    assert response.status_code == 200, response.text
+    answer, found = response.json(), kin.path_postures(UR5, T, max_step=2.0)
+    assert answer["postures"] == list(found.postures)
+    assert answer["through"] == list(found.through)
+    assert answer["reach"] == found.reach.tolist()
+    assert answer["reason"] == found.reason
+    assert len(answer["stretches"]) == len(found.stretches)
+    q = np.array(answer["q"], dtype=float)
+    assert np.allclose(q, found.q, atol=1e-9, equal_nan=True)
+    assert {state for row in answer["states"] for state in row} == {each.state for each in found.stretches}
+    assert np.allclose(answer["best"]["q"], found.best.q)
+    refused = client.post("/api/v1/robots/ur5/ik/path/postures", json={**body, "max_step": 0})
+    assert refused.status_code == 422
