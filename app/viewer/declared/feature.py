@@ -44,8 +44,10 @@ class DeclaredFeature(Feature, Generic[S, F]):
         settings_of, facts_of: the classes of settings and facts.
         undo: what undo calls an event, by the method that it calls, if not by the feature's title.
         pace: the panel follows a moving arm at this interval (s): nobody reads faster, and HTML is long.
-        facts: what is known of settings and arm now, made by `look`; the same object as long as both are.
+        facts: what is known of settings and arm now, made by `look`; the same object as long as both are. While an
+            event is handled, they are those before it.
         read: the facts that the panel shows. Drawings that change no faster than the panel use these.
+        shown_at: when the panel was last made to show them (`time.perf_counter`).
     """
 
     settings_of: ClassVar[type[Settings]]
@@ -63,7 +65,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.settings: S = cast(S, self.settings_of.fresh(stage.now.robot))
         self._panel = PanelView(stage.client.gui, self.post)
         self._scene = SceneView(stage.client.scene, self.key, self.post)
-        self._shown_at = 0.0
+        self.shown_at = 0.0
         self._write = self._stale = False
         self._seen: tuple[object, ...] = ()
         self.facts: F
@@ -115,10 +117,14 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self._stale = self._stale or seconds == 0.0
         self.due = seconds if self.due is None else min(self.due, seconds)
 
+    def spec(self, path: str) -> Any:
+        """What the field at this path declares, to be narrowed with `dataclasses.replace` by facts."""
+        return self.settings_of.spec(path)
+
     def refresh(self) -> None:
         """Show what is declared now."""
-        self._shown_at, self.due, self._stale = time.perf_counter(), None, False
-        self._look()
+        self.shown_at, self.due, self._stale = time.perf_counter(), None, False
+        self.look_again()
         self.read = self.facts
         stage = self.stage
         self._panel.show(self.panel(), self.settings, stage.now.robot, stage.units, self._write)
@@ -127,7 +133,8 @@ class DeclaredFeature(Feature, Generic[S, F]):
         if (words := self.legend()) is not None:
             stage.show_legend(words)
 
-    def _look(self) -> None:
+    def look_again(self) -> None:
+        """Make `facts` anew if settings or arm have changed."""
         arm = self.stage.now
         target = None if arm.target is None else arm.target.tobytes()
         places = (arm.q.tobytes(), arm.goal.tobytes(), target)
@@ -138,6 +145,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
     # Feature
 
     def handle(self, key: Hashable, value: object) -> None:
+        self.look_again()
         self.wake()  # shown once, after all events that wait, and after errors
         match key:
             case ("at", str(path), int(serial)):
@@ -172,16 +180,16 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.refresh()
 
     def on_pose(self, T_base_tool: Array) -> None:
-        self._look()
+        self.look_again()
         self._scene.show(self.scene())
-        self.due = max(0.0, self.pace - (time.perf_counter() - self._shown_at))
+        self.due = max(0.0, self.pace - (time.perf_counter() - self.shown_at))
 
     def on_style(self) -> None:
         self.refresh()
 
     def tick(self, now: float) -> None:
         again = self.advance(now)
-        wait = self.pace - (now - self._shown_at)
+        wait = self.pace - (now - self.shown_at)
         if wait <= 0.0 or self._stale:
             self.refresh()
             wait = self.pace

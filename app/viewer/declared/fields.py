@@ -25,6 +25,7 @@ from kin.units import Unit, Units
 Options = Mapping[str, object]
 Measure = Literal["", "length", "angle"]
 _NONE = Unit("", 1.0, 0)
+LONGEST = 100  # characters of a text in a link
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,12 +113,14 @@ class Text(Spec):
 class Choice(Spec):
     """A drop-down list; `options` are values by their labels, or a function of the robot that gives them.
 
-    `none` is the entry of a link for the value None, `old` are entries of earlier links.
+    `none` is the entry of a link for the value None, `old` are entries of earlier links. `anything`: the options
+    follow from facts, so a link may hold any text.
     """
 
     options: Options | Callable[[Robot], Options] = field(default_factory=dict)
     none: object = None
     old: Mapping[str, object] = field(default_factory=dict)
+    anything: bool = False
     kind = "dropdown"
 
     def offered(self, robot: Robot) -> Options:
@@ -141,6 +144,8 @@ class Choice(Spec):
 
     def unpack(self, name: str, entry: object, robot: Robot) -> Any:
         entry = self.old.get(entry, entry) if isinstance(entry, str) else entry
+        if self.anything and isinstance(entry, str) and len(entry) <= LONGEST:
+            return entry
         for value in self.offered(robot).values():
             if type(entry) is type(self.pack(value)) and entry == self.pack(value):
                 return value

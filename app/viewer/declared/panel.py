@@ -54,6 +54,7 @@ class Control:
     Attributes:
         label, hint: in place of those of the field.
         spec: what is valid here, in place of the field's own, where it depends on facts: options, limits.
+        value: what it shows in place of the setting, where this is only what the visitor has asked for.
         of: another one makes a new control, so that late events of the old one are void.
     """
 
@@ -63,6 +64,7 @@ class Control:
     key: str = ""
     label: str | None = None
     spec: Spec | None = None
+    value: Any = None
     of: Hashable = None
 
 
@@ -204,6 +206,9 @@ class PanelView:
     def _spec(self, node: Control) -> Spec:
         return node.spec or self._settings.spec(node.path)
 
+    def _value(self, node: Control) -> Any:
+        return self._settings.at(node.path) if node.value is None else node.value
+
     def _identity(self, node: Node) -> Hashable:
         """A control of another identity is made anew."""
         match node:
@@ -255,7 +260,7 @@ class PanelView:
             case Folder(open=is_open):
                 one.handle = gui.add_folder(**props, expand_by_default=is_open, order=order)
             case Control(path=path):
-                spec, one.known = self._spec(node), self._settings.at(path)
+                spec, one.known = self._spec(node), self._value(node)
                 shown = spec.shown(one.known, self._robot, self._units)
                 fixed = spec.fixed(self._robot, self._units)
                 one.handle = getattr(gui, f"add_{spec.kind}")(initial_value=shown, order=order, **props, **fixed)
@@ -295,7 +300,7 @@ class PanelView:
             show_value(one.handle, node.value)
         elif isinstance(node, Control):
             one.spec = spec = self._spec(node)
-            value = self._settings.at(node.path)
+            value = self._value(node)
             if self._write or value != one.known:
                 one.known = value
                 show_value(one.handle, spec.shown(value, self._robot, self._units))

@@ -99,9 +99,10 @@ def mesh(key: str, solid: Solid, color: Color, scale: Any = 1.0, **more: Any) ->
     return Node("mesh_simple", key, {**props, **more}, position, wxyz)
 
 
-def label(key: str, text: str, position: Vector, size: float = 1.0) -> Node:
-    """A text in front of everything."""
-    return Node("label", key, {"text": text, "scale": size, "anchor": "center-center"}, position)
+def label(key: str, text: str, position: Vector, size: float = 1.0, anchor: str | None = "center-center") -> Node:
+    """A text in front of everything; without an anchor, viser's own is used."""
+    props = {"text": text, "scale": size, **({"anchor": anchor} if anchor else {})}
+    return Node("label", key, props, position)
 
 
 def handle(key: str, position: Vector, scale: float, drag: tuple[Hashable, ...]) -> Node:

@@ -35,7 +35,16 @@ STATES: dict[str, list[dict[str, object]]] = {
     "rotations": [
         {"convention": "zxz-moving", "angles": [0.1, 0.0, 0.2], "chained": False, "turn": 1.0, "shift": 0.1},
         {"chained": True, "chain": [[True, 0, 0.5, True], [False, 2, 0.1, False]], "motion": "Shift along x"},
-        {"convention": 5, "angles": [1, 2], "chain": "x", "motion": [], "own": 3, "turn": 99.0, "shift": "far"},
+        {
+            "convention": 5,
+            "angles": [1, 2],
+            "chain": "x",
+            "motion": [],
+            "own": 3,
+            "turn": 99.0,
+            "shift": "far",
+            "chained": False,
+        },
         {"chained": True, "own": False, "motion": "Turn about y"},
     ],
     "numeric": [

@@ -301,7 +301,7 @@ def test_the_end_of_the_range_names_the_joint(tab: FakeBrowser) -> None:
 
 def test_the_ring_is_drawn_with_its_ends_and_removed_with_the_lesson(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
-    tab.wait(lambda: any("/feasible-" in n for n in tab.nodes))
+    tab.wait(lambda: any(n.endswith("/feasible") for n in tab.nodes))
     tab.wait(lambda: sum("/end-" in n and n.endswith("-name") for n in tab.nodes) == 2)
     circle = elbow_circle(SRS, SRS.q_home)
     (free,) = self_motion.redundancy_at(SRS, home(SRS), kin.IKOptions(), SRS.q_home)
