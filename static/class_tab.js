@@ -1,23 +1,127 @@
 "use strict";
-// Runs in viser's page of a member of a room (app/viewer/room): opens a tab of the panel when the server says so, and
-// writes this service's address below the join code, and the page's where it can be copied.
+// Runs in viser's page of a member of a room (app/viewer/room): opens a tab of the panel when the server says so, writes
+// this service's address below the join code and the page's where it can be copied, and sees to it that nothing of a
+// student's work is lost with the connection.
 (() => {
+  const $ = (selector) => document.querySelector(selector);
   let opened = "";
   function follow() {
-    const bar = document.querySelector("[data-class-open]");
-    if (bar && bar.dataset.classSerial !== opened) {
-      if (viserPage.openTab(bar.dataset.classOpen)) opened = bar.dataset.classSerial;
+    const bar = $("[data-class-open]");
+    if (bar && bar.dataset.classSerial !== opened && viserPage.openTab(bar.dataset.classOpen)) {
+      opened = bar.dataset.classSerial;
+      dispatchEvent(new CustomEvent("kinboard-tab", { detail: bar.dataset.classOpen })); // for the next reload
     }
-    const address = document.querySelector("[data-class-address]");
+    const address = $("[data-class-address]");
     const room = new URL("../room", location.href).href.replace(/^https?:\/\//, "");
     if (address && address.textContent !== room) address.textContent = room;
+    for (const node of document.querySelectorAll("[data-class-hidden-in]")) {
+      node.hidden = viserPage.openTitles().includes(node.dataset.classHiddenIn);
+    }
   }
   // The page's address is its link. static/viewer.js copies it.
   document.addEventListener("click", (event) => {
     const button = event.target instanceof Element ? event.target.closest("[data-class-here]") : null;
     if (button) button.parentElement.querySelector("code").textContent = location.href;
   }, true);
+
+  // A student's answers: kept in the tab until the service has taken them, and sent again over a new connection. What is
+  // typed and not yet sent is kept too, and is there again when the page is.
+
+  const ANSWERS = "kinboard-answers";
+  const DRAFT = "kinboard-draft";
+  const read = (name, none) => { try { return JSON.parse(sessionStorage.getItem(name)) ?? none; } catch { return none; } };
+  const keep = (name, value) => { try { sessionStorage.setItem(name, JSON.stringify(value)); } catch { /* only this page has it */ } };
+  let answers = read(ANSWERS, []); // { id, place, kind, value, since }
+  let draft = read(DRAFT, { place: "", cells: {} });
+  let sent = new Set(); // ids of answers that were sent over this connection
+  let filled = null; // the block of the question that has the draft
+  const student = () => $("[data-class-bar]:not([data-class-bar=teacher], [data-class-bar=closed])");
+  /** The exercise on show and its numbers. */
+  function place() {
+    const task = $("[data-exercise]");
+    return task ? `${task.dataset.exercise} ${task.dataset.variant}` : "";
+  }
+  function deliver() {
+    for (const one of answers) {
+      if (sent.has(one.id) || one.place !== place() || !student() || !viserPage.messageField()) continue;
+      sent.add(one.id);
+      viserPage.send("feature", ["exercises", [one.kind, one.id, Date.now()], one.value], () => {
+        answers = answers.filter((each) => each !== one);
+        keep(ANSWERS, answers);
+        tell();
+      });
+    }
+  }
+  addEventListener("kinboard-answer", (event) => {
+    if (!student()) return;
+    event.preventDefault();
+    const { kind, value } = event.detail;
+    if (answers.some((one) => one.place === place())) return; // a second press while the first is on its way
+    const id = [...crypto.getRandomValues(new Uint8Array(8))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+    answers.push({ id, place: place(), kind, value, since: Date.now() });
+    keep(ANSWERS, answers);
+    deliver();
+    setTimeout(tell, WAITING);
+  });
+  addEventListener("input", (event) => {
+    const cell = event.target.closest?.("[data-exercises=question] [data-cell]");
+    if (!cell || !student()) return;
+    if (draft.place !== place()) draft = { place: place(), cells: {} };
+    draft.cells[cell.dataset.cell] = cell.value;
+    draft.base = cell.defaultValue;
+    keep(DRAFT, draft);
+  });
+  function fill() {
+    const block = $("[data-exercises=question]");
+    if (!block || block === filled || draft.place !== place() || !student()) return;
+    filled = block;
+    if (block.dataset.form === "frame" && block.querySelector("[data-cell]")?.defaultValue !== draft.base) return; // the ghost was dragged meanwhile
+    for (const cell of block.querySelectorAll("[data-cell]:not([readonly])")) {
+      const text = draft.cells[cell.dataset.cell];
+      if (text !== undefined && text !== cell.value) cell.value = text;
+    }
+  }
+
+  // The connection: asked for every second, so that a page never looks ready when nothing it does arrives.
+
+  const EVERY = 1000; // ms
+  const PATIENCE = 1800; // ms for an answer of the service
+  const WAITING = 2500; // ms after which it is said that an answer waits
+  let online = true;
+  const note = document.createElement("div");
+  note.className = "kb-class-offline";
+  note.role = "status";
+  function tell() {
+    const late = answers.filter((one) => Date.now() - one.since >= WAITING).length;
+    const waits = answers.length && (late || !online) ? "Your answer is waiting, and is sent when the connection is back." : "";
+    const words = online ? waits : `No connection. ${waits || "What you typed and opened is kept."}`;
+    const shown = student() ? words : "";
+    document.documentElement.toggleAttribute("data-kb-offline", Boolean(shown) && !online);
+    if (note.textContent !== shown) note.textContent = shown;
+    note.hidden = !shown;
+    if (!note.isConnected && document.body) document.body.append(note);
+  }
+  function become(state) {
+    online = state;
+    tell();
+  }
+  async function ask() {
+    if (student() && !document.hidden) {
+      try {
+        await fetch("../livez", { cache: "no-store", signal: AbortSignal.timeout(PATIENCE) });
+        become(true);
+      } catch {
+        become(false);
+      }
+    }
+    setTimeout(ask, EVERY);
+  }
+  addEventListener("offline", () => become(false));
+  addEventListener("online", () => tell());
+  setTimeout(ask, EVERY);
+
   // A new connection counts from the beginning.
-  addEventListener("kinboard-connect", () => { opened = ""; });
+  addEventListener("kinboard-connect", () => { opened = ""; sent = new Set(); filled = null; });
   viserPage.watch(follow);
+  viserPage.watch(() => { fill(); deliver(); });
 })();

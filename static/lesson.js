@@ -3,10 +3,16 @@
 // (app/viewer/courses). It sends what is pressed and typed there.
 (() => {
   let serial = 0; // each press is a step of its own in the history
+  const ANSWERS = ["answer", "fields", "posture", "place"];
   // A block with data-feature belongs to that lesson, others to the block that all lessons have.
-  const send = (node, kind, value, ...rest) => viserPage.send(
-    "feature", [node.closest("[data-feature]")?.dataset.feature ?? "guide", [kind, ...rest, ++serial], value],
-  );
+  function send(node, kind, value, ...rest) {
+    const feature = node.closest("[data-feature]")?.dataset.feature ?? "guide";
+    // In a room, static/class_tab.js sends answers, and again until they have arrived.
+    const detail = { kind, value };
+    if (feature === "exercises" && ANSWERS.includes(kind)
+      && !dispatchEvent(new CustomEvent("kinboard-answer", { detail, cancelable: true }))) return;
+    viserPage.send("feature", [feature, [kind, ...rest, ++serial], value]);
+  }
 
   function press(button) {
     if (button.ariaDisabled === "true") return;

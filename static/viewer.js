@@ -111,6 +111,12 @@
       show();
     }, 100);
   }
+  // A tab that was opened for the visitor.
+  addEventListener("kinboard-tab", (event) => {
+    tab = event.detail;
+    keep(TAB, tab);
+    show();
+  });
   addEventListener("click", noteTab);
   addEventListener("keyup", noteTab);
 

@@ -56,9 +56,12 @@ class LiveRooms(Protocol):
 class Attendance:
     """One page in a room. Methods for the teacher raise `PermissionError` for a student, and the reverse."""
 
-    def __init__(self, hub: LiveRooms, ticket: Ticket, changed: Callable[[], None]) -> None:
+    def __init__(
+        self, hub: LiveRooms, ticket: Ticket, changed: Callable[[], None], silence: Callable[[], float]
+    ) -> None:
         self.ticket = ticket
         self.changed = changed
+        self.silence = silence  # for how many seconds nothing has come from the page's browser
         self.stamp: Hashable = None  # of what the page was last notified of
         self._hub = hub
         self._page = ""  # the teacher's, also while nobody follows

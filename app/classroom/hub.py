@@ -54,6 +54,8 @@ logger = logging.getLogger("kinboard.classroom")
 DATABASE_FILE = "classroom.db"
 TICK = 0.03  # seconds between two looks at the database
 BEAT = 2.0  # seconds between two signs that somebody is there
+LOOK = 0.5  # seconds between two looks whose connection is silent
+SILENT = 5.0  # seconds without a sign of a page's browser, which is asked for one every two seconds
 SEAT_PAGE_EVERY = 0.2  # seconds between two states of the students' pages
 RETRY = 0.5  # seconds after an error of the database
 LINGER = 5.0  # seconds that the thread waits for the next page after the last has left
@@ -80,7 +82,7 @@ class Hub:
         self._attendances: dict[str, list[Attendance]] = {}
         self._thread: threading.Thread | None = None
         self._stopping, self._wake = threading.Event(), threading.Event()
-        self._beat_at = 0.0
+        self._beat_at = self._looked_at = 0.0
         self.on_attempt: Callable[[str], None] | None = None  # called with the seat of each stored attempt
 
     @classmethod
@@ -170,13 +172,20 @@ class Hub:
             raise UnknownRoomError(NO_ROOM, "code")
         return self.rooms.join(code, alias, known)
 
-    def attend(self, ticket: Ticket, changed: Callable[[], None]) -> Attendance:
-        """Take part from now on; `changed` is called after each change, from any thread."""
-        attendance = Attendance(self, ticket, changed)
+    def attend(
+        self, ticket: Ticket, changed: Callable[[], None], silence: Callable[[], float] = lambda: 0.0
+    ) -> Attendance:
+        """Take part from now on.
+
+        Args:
+            changed: called after each change, from any thread.
+            silence: for how many seconds nothing has come from the page's browser; who is silent is away.
+        """
+        attendance = Attendance(self, ticket, changed, silence)
         with self._lock:
             live = self._lives.setdefault(ticket.room, LiveRoom(ticket.room))
             self._attendances.setdefault(ticket.room, []).append(attendance)
-            live.here = self._here(ticket.room)
+            self._look_who_is_here(live)
             self._beat_at = 0.0
             if self._thread is None and not self._stopping.is_set():
                 self._thread = threading.Thread(target=self._run, name="kinboard-classroom", daemon=True)
@@ -249,10 +258,12 @@ class Hub:
         room = page.ticket.room
         with self._lock, contextlib.suppress(ValueError):
             self._attendances.get(room, []).remove(page)
-            self._lives[room].here = self._here(room)
+            self._look_who_is_here(self._lives[room])
 
-    def _here(self, room: str) -> set[str]:
-        return {each.ticket.seat for each in self._attendances.get(room, ())}
+    def _look_who_is_here(self, live: LiveRoom) -> None:
+        pages = self._attendances.get(live.id, ())
+        live.here = {each.ticket.seat for each in pages if each.silence() < SILENT}
+        live.silent = {each.ticket.seat for each in pages} - live.here
 
     def _notify(self, rooms: Iterable[str]) -> None:
         """Let those pages know for whom something has changed."""
@@ -302,6 +313,10 @@ class Hub:
         if beat:
             self._beat_at = steady()
         with self._lock:
+            if steady() - self._looked_at >= LOOK:
+                self._looked_at = steady()
+                for live in self._lives.values():
+                    self._look_who_is_here(live)
             changed = [live.id for live in self._lives.values() if live.take_pages(SEAT_PAGE_EVERY)]
         self._notify(changed)
         if not self._flush(beat):
@@ -346,6 +361,7 @@ class Hub:
             for room, version in versions.items():
                 live = self._lives[room]
                 live.flying = Pending()
+                live.note_beats(news[room][1])
                 if version is not None and version <= live.version:  # read meanwhile, below what was on its way
                     live.row["version"] = version - 1
                 elif version == live.version + 1:  # nobody else has written: there is nothing to read

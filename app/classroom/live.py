@@ -14,6 +14,7 @@ from app.classroom.clock import steady
 from app.classroom.views import Poll, RoomView, SeatView, Shown, Task, Ticket
 
 AWAY = 7.0  # seconds without a beat after which nobody is assumed to be there
+SILENT_AWAY = 2.5  # the same where a page is connected and silent: the beats of other processes come every 2 s
 REMOVED = "The teacher has removed you."
 _UNSEEN = {"beat", "version", "tries"}  # columns that no page shows
 _PAGE = {"page"}
@@ -61,6 +62,7 @@ class LiveRoom:
         self._seen_by_all = self._seen_by_teacher = 0  # counts of changes
         self.heard = steady()  # when the teacher's beat was last seen to grow
         self.here: set[str] = set()  # seats with a page in this process; the teacher's is ""
+        self.silent: set[str] = set()  # seats whose pages in this process are connected and say nothing
         self.away: frozenset[str] = frozenset()
         self.closed = ""
         self.problem = ""
@@ -130,6 +132,13 @@ class LiveRoom:
             self.pending.seats.setdefault(seat, {}).update(values)
             self._note(seat, set(values))
 
+    def note_beats(self, seats: Set[str]) -> None:
+        """These have a page in this process, and the database knows."""
+        for seat in seats & self.seats.keys():
+            self.seats[seat].heard = steady()
+        if "" in seats:
+            self.heard = steady()
+
     def take_pages(self, every: float) -> bool:
         """Take the students' pages if it is time, all together; returns whether there were any."""
         time = steady()
@@ -143,10 +152,13 @@ class LiveRoom:
 
     def note_absence(self) -> bool:
         """Find out who is away; returns whether that has changed."""
-        late = steady() - AWAY
-        away = {seat for seat, live in self.seats.items() if live.heard < late and seat not in self.here}
-        if self.heard < late and "" not in self.here:
-            away.add("")
+        time = steady()
+        heard = {"": self.heard, **{seat: live.heard for seat, live in self.seats.items()}}
+        away = {
+            seat
+            for seat, last in heard.items()
+            if seat not in self.here and last < time - (SILENT_AWAY if seat in self.silent else AWAY)
+        }
         changed = away != self.away
         self.away = frozenset(away)
         self._seen_by_all += changed

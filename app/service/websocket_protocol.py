@@ -12,6 +12,7 @@ import asyncio
 import contextlib
 import struct
 import sys
+import time
 from typing import Any, Final
 
 from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
@@ -21,9 +22,11 @@ from websockets.frames import CloseCode, Frame
 from websockets.http11 import Request
 
 from app.api.problems import ProblemError
+from app.classroom import COOKIE
 from app.service.guard import Outflow
 from app.service.http_protocol import GuardedConfig, raw_answer, require_shape
 from app.service.web.inspection import BURST, RATE, MessageLimit
+from app.shared.connection import SILENCE
 
 if sys.platform == "linux":
     import fcntl
@@ -32,6 +35,7 @@ if sys.platform == "linux":
 CONTROL_COST: Final = 8.0  # of a frame that is no whole message, in messages
 PIECE: Final = 512  # bytes parsed before frames are counted: at most 85 frames
 MAX_FRAGMENTS: Final = 64  # of one message
+ROOM_PING: Final = 2.0  # seconds from an answer to the next ping, of a browser in a room: who is away is soon seen
 LINGER: Final = 5.0  # seconds between two looks whether a line is still slow
 
 
@@ -59,6 +63,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         self._resting: asyncio.TimerHandle | None = None  # until there is budget again
         self._resumed = False
         self._queued = 0
+        self._heard = time.monotonic()
 
     # the connection
 
@@ -90,6 +95,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
     # what the client sends
 
     def data_received(self, data: bytes) -> None:
+        self._heard = time.monotonic()
         self._unread += data
         self._parse_more()
 
@@ -141,6 +147,14 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             self._reject("The address and the subprotocols of a websocket are ASCII.")
         else:
             super().handle_connect(event)
+            if self.response.status_code == 101:
+                self.scope["state"][SILENCE] = self._silence
+                if any(COOKIE in value for value in event.headers.get_all("Cookie")):
+                    self.ping_interval = min(ROOM_PING, self.ping_interval or ROOM_PING)
+
+    def _silence(self) -> float:
+        """For how many seconds the client has sent nothing, not even an answer to a ping. Thread-safe."""
+        return time.monotonic() - self._heard
 
     def _reject(self, why: str) -> None:
         """Answer 400 to a handshake."""

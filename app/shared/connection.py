@@ -5,9 +5,17 @@ Messages pass between both by function calls in one event loop; there is no seco
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 from app.shared.security import Rights
+
+SILENCE = "kinboard.silence"  # what a websocket's scope has `Connection.silence` as, in its state
+
+
+def never_silent() -> float:
+    """The silence of a connection of which nothing is known."""
+    return 0.0
 
 
 class ConnectionEnded(Exception):  # noqa: N818 - not an error
@@ -25,6 +33,7 @@ class Connection(Protocol):
     subprotocol: str | None
     rights: Rights
     client: str  # as `app.shared.clients` names it
+    silence: Callable[[], float]  # for how many seconds nothing has come, not even an answer to a ping
     room_token: str  # of a classroom, as the browser's cookie has it; not verified; empty: none
 
     async def receive(self) -> bytes:

@@ -13,7 +13,7 @@ from app.classroom import ClassroomUnavailable, Hub, Ticket
 from app.classroom.courses import Courses
 from app.exercises import Exercises
 from app.shared.clouds import Clouds
-from app.shared.connection import Connection, ConnectionEnded
+from app.shared.connection import Connection, ConnectionEnded, never_silent
 from app.shared.maps import Maps
 from app.shared.security import Rights
 from app.shared.settings import Settings
@@ -154,7 +154,12 @@ class ViewerServer:
             rights,
             self._connections.clients.get(client.client_id, ""),
         )
-        page = VisitorPage(*arguments) if ticket is None else ClassroomPage(*arguments, ticket=ticket)
+        silence = self._connections.silences.get(client.client_id, never_silent)
+        page = (
+            VisitorPage(*arguments)
+            if ticket is None
+            else ClassroomPage(*arguments, ticket=ticket, silence=silence)
+        )
         with self._lock:
             if client.client_id not in self._connections.rights:
                 return  # the visitor has left: nobody would end the page

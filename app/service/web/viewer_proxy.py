@@ -17,7 +17,7 @@ import contextlib
 import gzip
 import hashlib
 import logging
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
@@ -30,7 +30,7 @@ from app.service.web.embedding import discovery
 from app.service.web.inspection import MalformedMessageError, admitted
 from app.service.web.negotiation import accepts_gzip, is_current
 from app.shared.clients import client_of
-from app.shared.connection import ConnectionEnded, Viewer
+from app.shared.connection import SILENCE, ConnectionEnded, Viewer, never_silent
 from app.shared.metrics import DROPPED, STREAMED, VISITORS
 from app.shared.places import Place, Places
 from app.shared.security import VIEWER_POLICY, origin_allowed
@@ -157,6 +157,7 @@ class VisitorConnection:
         self._visitor = visitor
         self.rights = rights_of(visitor.scope)
         self.client = client_of(visitor.scope)
+        self.silence: Callable[[], float] = visitor.scope.get("state", {}).get(SILENCE, never_silent)
         self.room_token: str = visitor.cookies.get(ROOM_COOKIE, "")
         self._streamed = STREAMED.labels("viewer")
 

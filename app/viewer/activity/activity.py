@@ -22,13 +22,18 @@ EXERCISES: Final = "exercises"  # the key under which the exercises are opened
 
 
 class Judged(NamedTuple):
-    """An answer that was judged: the seed of its numbers, the answer as plain data, and how long (s) it took."""
+    """An answer that was judged: the seed of its numbers, the answer as plain data, and how long (s) it took.
+
+    Attributes:
+        sending: names the sending of the answer by the page, which may repeat it; empty: it does not.
+    """
 
     exercise: Exercise
     seed: int
     answer: object
     verdict: Verdict
     seconds: float
+    sending: str = ""
 
 
 class GivenUp(NamedTuple):
@@ -64,6 +69,7 @@ class Activity:
         sent: the course that the teacher of the room sent.
         task: the exercise that the teacher of the room sent.
         note: a sentence below the verdict: whether the answer is stored.
+        news: grows when other pages of the seat have answered.
     """
 
     def __init__(self, courses: Courses, secret: Callable[[], bytes], changed: Callable[[], None]) -> None:
@@ -75,6 +81,7 @@ class Activity:
         self.sent: Course | None = None
         self.task: Exercise | None = None
         self.note = ""
+        self.news = 0
         self._seat: Seat | None = None
 
     # What is open
@@ -132,16 +139,23 @@ class Activity:
 
     # Answers
 
-    def know(self, work: Mapping[str, Work]) -> None:
-        """Take what is stored of this seat, by exercise: answers on other pages of the seat count here too."""
-        if self.practice.know(work):
+    def know(self, work: Mapping[str, Work], waiting: bool) -> None:
+        """Take what is stored of this seat, by exercise: answers on other pages of the seat count here too.
+
+        Args:
+            waiting: whether answers of this page are not stored yet.
+        """
+        if self.practice.know(work, waiting):
+            self.news += 1
             self.changed()
 
-    def answer(self, exercise: Exercise, given: object, verdict: Verdict, seconds: float) -> None:
-        """An answer was judged while the right one was not on show."""
+    def answer(
+        self, exercise: Exercise, given: object, verdict: Verdict, seconds: float, sending: str = ""
+    ) -> None:
+        """An answer was judged while the right one was not on show; `sending` as in `Judged`."""
         self.practice.take(exercise, verdict, seconds)
         if self._seat is not None:
-            self._seat.submit(Judged(exercise, self.practice.seed_of(exercise), given, verdict, seconds))
+            self._seat.submit(Judged(exercise, self.practice.seed_of(exercise), given, verdict, seconds, sending))
 
     def give_up(self, exercise: Exercise, seconds: float) -> bool:
         """The answer is to be shown; False: in a room, only when it is stored that it was."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, get_args
 
-from app.classroom.standing import Numbers, Settled, Work
+from app.classroom.standing import Settled, Work
 from app.exercises import Exercise, Exercises, Variant, Verdict
 from app.viewer.activity.places import LABEL, Place
 from kin import InputError
@@ -73,7 +73,7 @@ class Practice:
         self._place: Place | None = None
         self._elsewhere: dict[str, dict[str, Record]] = {}  # records of this page in other places, by label
         self._claims: dict[str, Claim] = {}  # what was restored for other places
-        self._known: dict[tuple[str, int], Numbers] = {}  # what was taken of the seat, by id and seed
+        self._work: Mapping[str, Work] = {}  # what is stored of the seat
         self._settled: dict[tuple[str, int], Record] = {}  # answers that this page has shown, by id and seed
 
     def enter(self, place: Place | None) -> None:
@@ -149,18 +149,24 @@ class Practice:
     def _settle(self, exercise: Exercise) -> None:
         self._settled[exercise.id, self.seed_of(exercise)] = self.record(exercise)
 
-    def know(self, work: Mapping[str, Work]) -> bool:
-        """Take what is stored of the seat, which may be of other pages; returns whether it is news."""
+    def know(self, work: Mapping[str, Work], waiting: bool) -> bool:
+        """Take what is stored of the seat, which may be of other pages; returns whether it is news.
+
+        Args:
+            waiting: whether answers of this page are not stored yet.
+        """
+        self._work = work
         before = {key: replace(record) for key, record in self.records.items()}
         for exercise_id, done in work.items():
             exercise = self._exercises.get(exercise_id)
             numbers = None if exercise is None else done.numbers.get(self.seed_of(exercise))
-            place = exercise_id, 0 if exercise is None else self.seed_of(exercise)
-            if exercise is None or numbers is None or self._known.get(place) == numbers:
+            if exercise is None or numbers is None:
                 continue
-            self._known[place] = numbers
             record, known = self.record(exercise), MARK_OF[numbers.settled]
-            record.attempts = min(max(record.attempts, numbers.tries), MOST)
+            if record.variant and not exercise.vary:
+                continue  # begun anew with the same numbers, which do not count any more
+            tries = max(record.attempts, numbers.tries) if waiting else numbers.tries
+            record.attempts = min(tries, MOST)
             record.credit = max(record.credit, round(100 * numbers.credit))
             if not record.closed:
                 record.mark = known if known != "open" or not numbers.tries else "wrong"
@@ -211,6 +217,7 @@ class Practice:
             exercise = self._exercises.get(exercise_id)
             if exercise is not None and self.seed_of(exercise) == seed:
                 self.records[exercise_id] = record
+        self.know(self._work, waiting=True)
 
 
 def _claim(seed: object, done: object) -> str:

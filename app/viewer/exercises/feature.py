@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Hashable
+from dataclasses import replace
 
 import numpy as np
 import viser
@@ -12,6 +13,7 @@ import kin
 from app.exercises import Asked, Exercise, Variant, VariantError
 from app.exercises.typed import EntryError
 from app.viewer.activity.activity import EXERCISES
+from app.viewer.activity.practice import Record
 from app.viewer.exercises import views
 from app.viewer.exercises.drawing import GHOST, SIZE, Drawing
 from app.viewer.exercises.sheet import Sheet
@@ -21,6 +23,8 @@ from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import round_points
 from kin import InputError
 from kin.transforms import Array, from_position_wxyz
+
+LONGEST_SENDING = 40  # characters
 
 
 class Practising(Feature):
@@ -43,6 +47,8 @@ class Practising(Feature):
         self._variant: Variant | None = None
         self._seed = 0  # of the numbers on show
         self._note = ""  # on show
+        self._news = 0  # known
+        self._shown = Record()  # of the exercise, as it is on show
         self._since = 0.0
         self._box: viser.GuiFolderHandle | None = None
         self._blocks: list[viser.GuiHtmlHandle] = []
@@ -121,7 +127,9 @@ class Practising(Feature):
                 self._sheet.pick(value, len(self._asked.labels))
             case ("answer" | "fields" | "posture" | "place", int()) if not record.closed:
                 self._answer(str(key[0]), value)
-            case (str(), int()) if record.closed:
+            case ("answer" | "fields" | "posture" | "place", str(sending), int()) if not record.closed:
+                self._answer(str(key[0]), value, sending[:LONGEST_SENDING])
+            case (str(), int()) | (str(), str(), int()) if record.closed:
                 pass  # a late click
             case _:
                 raise InputError("exercise", key, "a control of the exercise")
@@ -142,6 +150,12 @@ class Practising(Feature):
             return
         if self._practice.seed_of(exercise) != self._seed:  # another place was entered
             self._begin(exercise, move=False)
+            self._update()
+        elif self.stage.activity.news != self._news:
+            self._news = self.stage.activity.news
+            if self._practice.record(exercise).closed and not self._shown.closed:
+                self._sheet.verdict, self._sheet.error = None, ""
+                self._show_answer()
             self._update()
         elif self.stage.activity.note != self._note:
             self._update()
@@ -233,8 +247,8 @@ class Practising(Feature):
                 self._sheet.drag(from_position_wxyz(position, np.array(wxyz)), self.stage.units)
                 self._update()
 
-    def _answer(self, how: str, value: object) -> None:
-        """Judge an answer."""
+    def _answer(self, how: str, value: object, sending: str = "") -> None:
+        """Judge an answer; `sending` as in `Judged`."""
         exercise, variant, sheet, form = self._now, self._variant, self._sheet, self._asked.form
         assert variant is not None
         sheet.error, sheet.verdict = "", None
@@ -255,7 +269,7 @@ class Practising(Feature):
             return
         sheet.verdict = verdict
         seconds, self._since = time.perf_counter() - self._since, time.perf_counter()
-        self.stage.activity.answer(exercise, given, verdict, seconds)
+        self.stage.activity.answer(exercise, given, verdict, seconds, sending)
         if verdict.right:
             self._show_answer()
 
@@ -291,9 +305,12 @@ class Practising(Feature):
         if exercise is None or self._variant is None:
             contents = [views.list_html(activity.exercises, practice), "", ""]
         else:
-            variant, closed = self._variant, practice.record(exercise).closed
+            self._shown = replace(practice.record(exercise))
+            variant, closed = self._variant, self._shown.closed
             contents = [
-                views.task_html(exercise, variant, units, self.stage.now.robot == exercise.robot),
+                views.task_html(
+                    exercise, variant, units, self.stage.now.robot == exercise.robot, self._shown.variant
+                ),
                 views.question_html(self._asked, self._sheet, closed),
                 views.foot_html(exercise, variant, units, self._sheet, activity),
             ]

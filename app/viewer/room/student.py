@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Hashable
+from dataclasses import replace
 from typing import NamedTuple
 
 from app.classroom.clock import now
@@ -63,7 +65,7 @@ class Student(Member):
             return
         task, activity = self.activity.task, self.activity
         if self.room.seat is not None:
-            activity.know(self.room.seat.work)
+            activity.know(self.room.seat.work, bool(self._submissions.waiting))
         activity.task = None if self.room.task is None else activity.exercises.get(self.room.task.exercise)
         self._set_course(task if self.room.task is None else None)
         self._set_task()
@@ -142,9 +144,12 @@ class Student(Member):
         over = "" if replaced is None else f". The task “{replaced.title}” is over; your answers stay stored."
         self.page.status.show(Notice("hand", "A course from your teacher", views.course_title(self.room) + over))
 
-    def _open_task(self) -> None:
+    def _open_task(self, again: bool = False) -> None:
+        """Open the task; `again`: where it is open already, only show it."""
         task, lessons = self.room.task, self.page.lessons
-        if task is not None:
+        if task is not None and again and self.activity.exercise == self.activity.task:
+            self._open_tab += 1
+        elif task is not None:
             if self.activity.lesson != EXERCISES:
                 lessons.open(EXERCISES)
             self.activity.leave_item()
@@ -157,12 +162,14 @@ class Student(Member):
     def submit(self, judged: Judged) -> None:
         verdict = judged.verdict
         self._answered = judged.exercise.id, judged.seed
-        self._submissions.add(
-            NewAttempt(
-                exercise=judged.exercise.id, seed=judged.seed, answer=judged.answer, verdict=verdict.reason,
-                score=1.0 if verdict.right else min(max(verdict.credit, 0.0), 1.0), started=now() - judged.seconds,
-            )
+        attempt = NewAttempt(
+            exercise=judged.exercise.id, seed=judged.seed, answer=judged.answer, verdict=verdict.reason,
+            score=1.0 if verdict.right else min(max(verdict.credit, 0.0), 1.0), started=now() - judged.seconds,
         )  # fmt: skip
+        if judged.sending:  # sent again after a lost connection, it is the same attempt
+            name = f"{self.attendance.ticket.seat} {judged.exercise.id} {judged.seed} {judged.sending}"
+            attempt = replace(attempt, id=hashlib.sha256(name.encode()).hexdigest()[:16])
+        self._submissions.add(attempt)
         self.activity.say("Storing the answer …")
 
     def give_up(self, one: GivenUp) -> bool:
@@ -241,7 +248,7 @@ class Student(Member):
             case "task" if not self.frozen:
                 self.free()
                 self._gone = True
-                self._open_task()
+                self._open_task(again=True)
 
     def refresh(self) -> None:
         self.attendance.tell_gone(self._gone and self.leader == "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pkgutil
 import sqlite3
 import subprocess
 import sys
@@ -577,6 +578,33 @@ def test_what_is_on_its_way_is_not_undone_by_what_is_read_meanwhile(hubs, monkey
     assert teacher.room.seats[0].work
     with hub.database.read() as connection:
         assert connection.scalar(select(Room.state))["task"]["exercise"] == "swing"
+
+
+@pytest.mark.parametrize("second", [False, True])
+def test_a_page_that_is_connected_and_silent_is_away_within_ten_seconds(hubs, monkeypatch, second):
+    """A phone in a dead spot: its connection stays, and nothing comes. Times are a quarter of the real ones."""
+    for name in ("hub.BEAT", "hub.LOOK", "hub.SILENT", "live.AWAY", "live.SILENT_AWAY"):
+        path = f"app.classroom.{name}"
+        monkeypatch.setattr(path, pkgutil.resolve_name(path) / 4)
+    hub, other = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    seat = hub.rooms.join(room.code, "Ann")
+    lost: list[float] = []
+    hub.attend(seat, nothing, lambda: time.monotonic() - lost[0] if lost else 0.0)
+    if second:
+        other.attend(seat, nothing)
+    teachers = [each.attend(hub.ticket(room.token), nothing) for each in hubs]
+    time.sleep(2.5)
+    assert [teacher.room.seats[0].away for teacher in teachers] == [False, False]
+    lost.append(time.monotonic())
+    if second:
+        time.sleep(2.5)
+        assert [teacher.room.seats[0].away for teacher in teachers] == [False, False], "the other tab is there"
+        return
+    until(lambda: all(teacher.room.seats[0].away for teacher in teachers))
+    assert time.monotonic() - lost[0] < 10 / 4 + 1, "with a second for a busy machine"
+    lost.clear()
+    until(lambda: not any(teacher.room.seats[0].away for teacher in teachers))
 
 
 def test_who_follows_is_known_to_the_teacher(hubs):

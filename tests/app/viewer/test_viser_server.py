@@ -19,7 +19,7 @@ from viser import _messages as messages
 from viser import infra
 from viser.infra import _infra
 
-from app.shared.connection import ConnectionEnded
+from app.shared.connection import ConnectionEnded, never_silent
 from app.shared.security import Rights
 from app.viewer.viser_patches import drag_gizmo, keep_private
 from app.viewer.viser_server import PROTOCOL, PortlessServer, missing_names, start_viser
@@ -50,6 +50,7 @@ class Visit:
         self.rights = Rights.FULL
         self.client = "10.0.0.1"
         self.room_token = ""
+        self.silence = never_silent
         self.sent = 0
         self._messages = list(messages)
         self._stays = stays
