@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Hashable, Iterable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from app.classroom.clock import now
 from app.classroom.live import LiveRoom
 from app.classroom.tokens import Tokens
 from app.classroom.views import Confirmed, NewAttempt, RefusedError, RoomView, Ticket
+
+if TYPE_CHECKING:
+    from app.classroom.rooms import Swept
 
 LONGEST_PAGE = 16_000  # characters, as `app.viewer.session.state` has it
 LONGEST_QUESTION, LONGEST_CHOICE, MOST_CHOICES = 200, 80, 8
@@ -25,9 +28,9 @@ class StoredRooms(Protocol):
 
     def remove_seat(self, room: str, seat: str) -> None: ...
 
-    def remove_unseen(self, room: str) -> int: ...
+    def remove_unseen(self, room: str) -> Swept: ...
 
-    def rename_seat(self, room: str, seat: str, alias: str) -> None: ...
+    def rename_seat(self, room: str, seat: str, alias: str) -> str: ...
 
     def end(self, room: str) -> bool: ...
 
@@ -210,18 +213,22 @@ class Attendance:
         self._hub.rooms.remove_seat(self.ticket.room, seat)
         self._hub.refresh(self.ticket.room)
 
-    def remove_unseen(self) -> int:
-        """Remove who has joined a while ago without ever opening a page; returns how many."""
+    def remove_unseen(self) -> Swept:
+        """Remove who has joined a while ago without ever opening a page; returns how many, and who stays."""
         self._only_teacher()
-        count = self._hub.rooms.remove_unseen(self.ticket.room)
+        swept = self._hub.rooms.remove_unseen(self.ticket.room)
         self._hub.refresh(self.ticket.room)
-        return count
+        return swept
 
-    def rename_seat(self, seat: str, alias: str) -> None:
-        """Give a student another alias; raises `RefusedError` or `ClassroomUnavailable`."""
+    def rename_seat(self, seat: str, alias: str) -> str:
+        """Give a student another alias; returns it, which may have got a number.
+
+        Raises `RefusedError` or `ClassroomUnavailable`.
+        """
         self._only_teacher()
-        self._hub.rooms.rename_seat(self.ticket.room, seat, alias)
+        given = self._hub.rooms.rename_seat(self.ticket.room, seat, alias)
         self._hub.refresh(self.ticket.room)
+        return given
 
     def end_room(self) -> None:
         """End the room for all and erase everything in it; raises `ClassroomUnavailable`."""

@@ -26,6 +26,7 @@ from app.classroom.views import (
     RefusedError,
     Ticket,
     UnknownRoomError,
+    in_one_line,
 )
 from app.shared.clients import share_of
 
@@ -44,6 +45,7 @@ class OpenRoom:
 
     Attributes:
         token: the signed token of the teacher's link.
+        alias: of the student who asks; empty for the teacher.
     """
 
     id: str
@@ -53,6 +55,29 @@ class OpenRoom:
     ends: float
     token: str
     students: int = 0
+    alias: str = ""
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What became of those whose page has never come.
+
+    Attributes:
+        count: how many were removed.
+        new: aliases of those who stay because they have joined within the last minute.
+        answered: aliases of those who stay because answers of theirs are stored.
+    """
+
+    count: int
+    new: tuple[str, ...] = ()
+    answered: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """Who stays and why; empty: nobody does."""
+        new, answered = (", ".join(names) for names in (self.new, self.answered))
+        said = f"{new}: joined less than a minute ago; press again later." if new else ""
+        return " ".join(filter(None, (said, f"{answered}: answers are stored." if answered else "")))
 
 
 class Rooms:
@@ -115,6 +140,8 @@ class Rooms:
     def join(self, code: str, alias: str, known: Ticket | None = None) -> Ticket:
         """Take a seat; who has one in this room already (`known`) keeps it, under the new alias.
 
+        An alias that another student has gets a number; `find` says which one it is.
+
         Raises:
             UnknownRoomError: no room has this code.
             RefusedError: the alias is invalid, or the room is full.
@@ -127,9 +154,11 @@ class Rooms:
                 raise UnknownRoomError(NO_ROOM, "code")
             alias = clean_name(alias, LONGEST_ALIAS, "alias")
             version = next_version(connection, room)
+            mine = known.seat if known is not None and known.room == room else ""
+            alias = _free_alias(connection, room, alias, mine)
             if known is not None and known.room == room and known.seat:
-                mine = update(Seat).where(Seat.id == known.seat, Seat.room_id == room, Seat.removed.is_(False))
-                if connection.execute(mine.values(alias=alias, version=version)).rowcount:
+                same = update(Seat).where(Seat.id == known.seat, Seat.room_id == room, Seat.removed.is_(False))
+                if connection.execute(same.values(alias=alias, version=version)).rowcount:
                     erasure.note(connection)  # of the alias before
                     return known
             taken = select(func.count()).where(Seat.room_id == room, Seat.removed.is_(False))
@@ -151,14 +180,15 @@ class Rooms:
             room = connection.execute(select(Room).where(Room.id == ticket.room, Room.ends > now())).one_or_none()
             if room is None:
                 return None
-            seats = select(Seat.id).where(Seat.room_id == room.id, Seat.removed.is_(False))
-            ids = connection.scalars(seats).all()
-        if ticket.seat and ticket.seat not in ids:
+            seats = select(Seat.id, Seat.alias).where(Seat.room_id == room.id, Seat.removed.is_(False))
+            aliases = {seat.id: seat.alias for seat in connection.execute(seats)}
+        if ticket.seat and ticket.seat not in aliases:
             return None
         token = self.tokens.sign(Ticket(room.id))
         return OpenRoom(
-            room.id, room.code, room.title, room.created, room.ends, "" if ticket.seat else token, len(ids)
-        )
+            room.id, room.code, room.title, room.created, room.ends, "" if ticket.seat else token,
+            len(aliases), aliases.get(ticket.seat, ""),
+        )  # fmt: skip
 
     def is_open(self, ticket: Ticket) -> bool:
         """Whether the room of a ticket goes on, and its seat was not removed."""
@@ -212,22 +242,30 @@ class Rooms:
                 erasure.note(connection)
         self.erase()
 
-    def remove_unseen(self, room: str) -> int:
-        """Remove who has joined a while ago and whose page has never come; returns how many."""
+    def remove_unseen(self, room: str) -> Swept:
+        """Remove who has joined a while ago and whose page has never come; returns how many, and who stays."""
+        left = select(Seat.alias, Seat.tries).where(Seat.room_id == room, Seat.removed.is_(False), Seat.beat == 0)
         with self._database.write() as connection:
             removed = _remove_unseen(connection, room, next_version(connection, room))
+            stay = connection.execute(left.order_by(Seat.joined)).all()
         self.erase()
-        return removed
+        return Swept(
+            removed,
+            new=tuple(seat.alias for seat in stay if not seat.tries),
+            answered=tuple(seat.alias for seat in stay if seat.tries),
+        )
 
-    def rename_seat(self, room: str, seat: str, alias: str) -> None:
-        """Give a seat another alias; raises `RefusedError`."""
+    def rename_seat(self, room: str, seat: str, alias: str) -> str:
+        """Give a seat another alias; returns it, numbered if another student has it. Raises `RefusedError`."""
         alias = clean_name(alias, LONGEST_ALIAS, "alias")
         with self._database.write() as connection:
             version = next_version(connection, room)
+            alias = _free_alias(connection, room, alias, seat)
             one = update(Seat).where(Seat.id == seat, Seat.room_id == room, Seat.removed.is_(False))
             connection.execute(one.values(alias=alias, version=version))
             erasure.note(connection)
         self.erase()
+        return alias
 
     def submit(self, ticket: Ticket, attempt: NewAttempt) -> Confirmed:
         """Store an attempt; the same attempt again is stored once. Raises `RefusedError` if the seat is gone."""
@@ -297,14 +335,30 @@ def _remove_unseen(connection: Connection, room: str, version: int | None) -> in
 
 def clean_name(text: str, longest: int, field: str) -> str:
     """An alias or a title in one line, without control characters; raises `RefusedError`."""
-    text = unicodedata.normalize("NFC", text)
-    kept = "".join(letter if unicodedata.category(letter)[0] not in "CZ" else " " for letter in text)
-    kept = " ".join(kept.split())
+    kept = in_one_line(text)
     if not kept:
         raise RefusedError(f"The {field} is empty. Choose 1 to {longest} characters.", field)
+    if all(unicodedata.category(letter)[0] in "MZ" for letter in kept):
+        raise RefusedError(f"The {field} has marks alone, and no letter, digit or sign to carry them.", field)
     if len(kept) > longest:
         raise RefusedError(f"The {field} has {len(kept)} characters; at most {longest} are allowed.", field)
     return kept
+
+
+def _free_alias(connection: Connection, room: str, alias: str, seat: str) -> str:
+    """An alias that no other student of a room has, in capitals or not: ``Bob 2`` where there is a Bob."""
+    others = select(Seat.alias).where(Seat.room_id == room, Seat.id != seat, Seat.removed.is_(False))
+    taken = {_folded(other) for other in connection.scalars(others)}
+    found, number = alias, 1
+    while _folded(found) in taken:
+        number += 1
+        end = f" {number}"
+        found = alias[: LONGEST_ALIAS - len(end)].rstrip() + end
+    return found
+
+
+def _folded(alias: str) -> str:
+    return unicodedata.normalize("NFKC", alias).casefold()
 
 
 def next_version(connection: Connection, room: str) -> int | None:

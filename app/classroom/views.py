@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -208,3 +209,10 @@ class Confirmed:
 
     id: str
     at: float
+
+
+def in_one_line(text: str) -> str:
+    """A name in one line, without control characters, as rooms keep it."""
+    text = unicodedata.normalize("NFC", text)
+    kept = "".join(letter if unicodedata.category(letter)[0] not in "CZ" else " " for letter in text)
+    return " ".join(kept.split())

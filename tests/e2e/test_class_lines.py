@@ -1,4 +1,4 @@
-"""A class on a school's network: reloads, lost lines and two tabs; all that is shown says the same of each student."""
+"""A class on a school's network: reloads, lost lines, two tabs. All that is shown says the same of each student."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ RIGHT, WRONG = 2, 0  # choices of this exercise
 
 @dataclass(frozen=True)
 class Truth:
-    """What is true of a student: where, how far with the task, after how many answers, with a raised hand or not."""
+    """What is true of a student: where, how far with the task, after how many answers, and whether a hand is up."""
 
     presence: str = "by themselves"
     progress: str = "not begun"
@@ -83,12 +83,11 @@ class Class:
             wrong = self._list() or self._chips() or self._bar() or self._table() or self._file()
 
     def _list(self) -> str:
-        rows = self.teacher.page.locator(".kb-class-list li button")
-        texts = {row.splitlines()[-2 if "“" in row else -1] if False else row for row in rows.all_inner_texts()}
+        texts = self.teacher.page.locator(".kb-class-list li button").all_inner_texts()
         for alias, true in self.truth.items():
             row = next((" ".join(text.split()) for text in texts if alias in text.split()), "")
             words = row.partition(alias)[2].partition("“")[0].strip()
-            expected = [] if true.presence == "by themselves" or true.presence == "following" else [true.presence]
+            expected = [true.presence] if true.presence == "away" else []
             expected += ["hand up"] if true.hand else []
             expected += [true.progress]
             expected += [f"{true.tries} {'try' if true.tries == 1 else 'tries'}"] if true.tries else []

@@ -48,6 +48,11 @@ class Progress:
         return self._courses.exercises
 
     @property
+    def seated(self) -> bool:
+        """Whether this is a student's page in a room, which edits no course and stores its answers there."""
+        return self._practice.seated
+
+    @property
     def item(self) -> Item | None:
         """The item on show."""
         return None if self.course is None or self.at is None else self.course.items[self.at]

@@ -81,6 +81,7 @@ def course_html(progress: Progress, desk: Desk) -> str:
     return render(
         "course/follow", course=course, rows=rows, done=done, desk=desk, link=link, code=code,
         alias=progress.alias, begun=any(row["mark"]["symbol"] for row in rows), outcome=progress.outcome(),  # type: ignore[index]
+        seated=progress.seated,
     )  # fmt: skip
 
 

@@ -95,6 +95,7 @@ def foot_html(
         more_hints=len(exercise.hints) - record.hints, record=record, time=_time(record.seconds),
         solution=exercise.solution(variant, units) if record.closed else "", following=following,
         varies=bool(exercise.vary), may_reveal=activity.reveals(exercise), note=activity.note,
+        seated=activity.practice.seated,
     )  # fmt: skip
 
 

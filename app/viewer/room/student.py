@@ -37,7 +37,7 @@ class Lead(NamedTuple):
 class Student(Member):
     """A student's page."""
 
-    messages = frozenset({"go", "back", "hand", "vote", "task"})
+    messages = frozenset({"go", "back", "hand", "vote", "read", "task"})
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
@@ -51,8 +51,10 @@ class Student(Member):
         self._task_at: float | None = None
         self._over = False  # it was said that this page is no longer in the room
         self._first = True
+        self._paused = False  # the task was open when the teacher began to lead
         self._course: tuple[str, float] | None = None  # the room's, and when it was sent; None: not known yet
         self._open_tab = 0
+        self._read = ""  # the question whose result was read
         self._answered: tuple[str, int] | None = None  # exercise and seed of the last answer
         self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, STORED)))
         ticket = self.attendance.ticket
@@ -77,11 +79,13 @@ class Student(Member):
                 self.page.status.show(frozen if self.frozen else alone)
             self.free()
             self._leader_before, self._gone = "", False
+            self._resume_task()
             return
         if lead.leader != self._leader_before or self.frozen:
             self._gone = False
         self._leader_before = lead.leader
         if not self._gone:
+            self._pause_task()
             self.follow(lead.leader, lead.page, "What the class shows")
 
     def _end(self) -> None:
@@ -122,6 +126,19 @@ class Student(Member):
         self._gone = True
         self._open_task()
         self.page.status.show(Notice("hand", "A task from your teacher", exercise.title))
+
+    def _pause_task(self) -> None:
+        """While somebody leads, no exercise stands beside another arm."""
+        task = self.activity.task
+        if task is not None and self.activity.exercise == task:
+            self._paused = True
+            self.page.lessons.open(None)
+
+    def _resume_task(self) -> None:
+        """Nobody leads any more: open the task again."""
+        paused, self._paused = self._paused, False
+        if paused and self.activity.task is not None:
+            self._open_task()
 
     def _set_course(self, replaced: Exercise | None) -> None:
         """Open a course that is new.
@@ -245,6 +262,8 @@ class Student(Member):
                 self.try_to(lambda: self.attendance.raise_hand(wanted(value, bool(room.seat and room.seat.hand))))
             case "vote" if type(value) is int:
                 self.try_to(lambda: self.attendance.vote(value))
+            case "read" if room.poll is not None and not room.poll.open:
+                self._read = room.poll.id
             case "task" if not self.frozen:
                 self.free()
                 self._gone = True
@@ -262,7 +281,7 @@ class Student(Member):
 
     def bar(self) -> str:
         away = self.activity.task is not None and self.activity.exercise != self.activity.task
-        return views.student_bar(self.room, self.mode, self._open_tab, self.activity.task, away)
+        return views.student_bar(self.room, self.mode, self._open_tab, self.activity.task, away, self._read)
 
     @property
     def mode(self) -> views.Mode:

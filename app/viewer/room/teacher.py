@@ -8,7 +8,8 @@ from dataclasses import replace
 from app.classroom.clock import now
 from app.classroom.courses import Course, to_data
 from app.classroom.standing import standing
-from app.classroom.views import RoomView, SeatView
+from app.classroom.views import RoomView, SeatView, in_one_line
+from app.exercises import Exercise
 from app.viewer.feature import Stage
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
@@ -33,7 +34,7 @@ class Teacher(Member):
     messages = frozenset(
         {
             *("follow", "freeze", "fields", "untask", "uncourse", "close", "unask", "look", "return", "show"),
-            *("hide", "pick", "find", "remove", "sweep", "lower", "wall", "end"),
+            *("hide", "pick", "set", "find", "remove", "sweep", "lower", "wall", "end"),
         }
     )
 
@@ -59,6 +60,7 @@ class Teacher(Member):
         self._end = gui.add_html("")
         self._picked = ""  # the student whose details are open
         self._open_tab = 0
+        self._chosen: Exercise | None = None  # the exercise in the form of the task
         self._wall: Wall | None = None
         self._curtain: Curtain | None = None  # before all but the wall
         self._before: PageState | None = None  # the own page while a student's is on show, or the wall
@@ -88,6 +90,8 @@ class Teacher(Member):
                 attendance.set_frozen(wanted(value, room.frozen))
             case "task":
                 self._send_task(_texts(value))
+            case "set" if name == "task":
+                self._chosen = self.page.activity.exercises.get(value)
             case "untask":
                 attendance.send_task(None)
             case "course":
@@ -108,7 +112,7 @@ class Teacher(Member):
                     attendance.show_seat(None)
                 self._return()
             case "sweep" if self.twice("sweep"):
-                self.try_to(attendance.remove_unseen)
+                self.try_to(self._sweep)
             case "end" if self.twice("end"):
                 self.try_to(attendance.end_room)
             case "rename":
@@ -138,16 +142,30 @@ class Teacher(Member):
             case "lower":
                 attendance.lower_hand(seat)
             case "rename":
-                self.try_to(lambda: attendance.rename_seat(seat, _texts(value)[0]))
+                self.try_to(lambda: self._rename(seat, in_one_line(_texts(value)[0])))
             case "remove" if self.twice(("remove", seat)):
                 if self.try_to(lambda: attendance.remove_seat(seat)):
                     self._picked = ""
+
+    def _sweep(self) -> None:
+        """Remove who has never come, and say who stays and why."""
+        swept = self.attendance.remove_unseen()
+        removed = f"{views.students(swept.count)} removed" if swept.count else "Nobody is removed"
+        stay = f"Stay: {swept.words}" if swept.words else "Everybody else has come."
+        self.page.status.show(Notice("hand" if swept.count else "advice", removed, stay))
+
+    def _rename(self, seat: str, alias: str) -> None:
+        """Give another alias, and say so if it got a number."""
+        given = self.attendance.rename_seat(seat, alias)
+        if given != alias:
+            self.page.status.show(Notice("hand", f"Renamed to {given}", f"Another student is {alias}."))
 
     def _send_task(self, texts: list[str]) -> None:
         """Let all work on an exercise by themselves."""
         exercise = self.page.activity.exercises.get(texts[0])
         if exercise is None:
             raise InputError("task", texts[0], "the id of an exercise")
+        self._chosen = exercise
         self.attendance.send_task(exercise.id)
         self.page.status.show(Notice("hand", f"Sent: {exercise.title}", "All work on it by themselves now."))
 
@@ -292,7 +310,7 @@ class Teacher(Member):
         update_html(self._list, above)
         update_html(self._one, views.seat_html(room, seat, self.leader, armed, exercises))
         update_html(self._rest, below)
-        update_html(self._task, views.task_html(room, task, exercises))
+        update_html(self._task, views.task_html(room, task, exercises, self._chosen, self.page.units))
         update_html(self._course, views.course_html(room, self._offered, task))
         update_html(self._ask, views.ask_html(room, QUESTION, CHOICES))
         update_html(self._tally, views.poll_html(room.poll, teacher=True))

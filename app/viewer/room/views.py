@@ -5,17 +5,20 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 from app.classroom.courses import Course
 from app.classroom.standing import URGENCY, Presence, Progress, Standing, standing
 from app.classroom.tokens import show_code
 from app.classroom.views import Poll, RoomView, SeatView
-from app.exercises import Exercise, Exercises
+from app.exercises import Exercise, Exercises, VariantError
 from app.exercises.said import answer_in_words
 from app.viewer.room.submissions import Submissions
 from app.viewer.views.templates import render
+from kin.units import Units
 
+UNITS = Units()
 Mode = Literal["free", "led", "gone", "shown", "frozen", "paused", "closed"]
 MANY = 3  # students who have never come, from which on they can be removed together
 # Symbol, headline, sentence and colour of who leads a student's page.
@@ -87,14 +90,17 @@ def _own_mark(room: RoomView) -> tuple[str, str]:
     return words.get(progress, tries(found.work.tries)), PROGRESS[progress][1]
 
 
-def student_bar(room: RoomView, mode: Mode, open_tab: int, task: Exercise | None, away: bool) -> str:
+def student_bar(
+    room: RoomView, mode: Mode, open_tab: int, task: Exercise | None, away: bool, read: str = ""
+) -> str:
     """What a student must see whatever tab is open.
 
     Args:
         open_tab: grows when the tab Learn is to be opened.
         away: whether the page shows something else than the task that was set.
+        read: the question whose result was read.
     """
-    poll = room.poll if room.poll is not None and room.poll.open and room.poll.chosen is None else None
+    poll = room.poll if room.poll is not None and room.poll.id != read else None
     quiet = mode == "free" and poll is None and not room.problem
     return render(
         "room/student_bar", room=room, mode=mode, lead=_mode(room, mode, guest=True), poll=poll, quiet=quiet,
@@ -255,13 +261,34 @@ class Class:
         return [fact for fact in facts if fact[1]]
 
 
-def task_html(room: RoomView, task: Exercise | None, exercises: Exercises) -> str:
-    """The form to send an exercise, and how many have solved the present one."""
+def task_html(
+    room: RoomView,
+    task: Exercise | None,
+    exercises: Exercises,
+    chosen: Exercise | None = None,
+    units: Units = UNITS,
+) -> str:
+    """The form to send an exercise, and how many have solved the present one.
+
+    Args:
+        chosen: the exercise in the form; None: the first one.
+        units: of the numbers in its text, which are those of a student who does not exist.
+    """
+    chosen = chosen or next((one for _, members in exercises.topics() for one in members), None)
     members = Class.of(room)
     return render(
         "room/task", room=room, task=task, topics=exercises.topics(), solved=members.at("solved"),
-        count=members.came,
+        count=members.came, chosen=chosen, preview="" if chosen is None else _preview(chosen, units),
     )  # fmt: skip
+
+
+@lru_cache(maxsize=256)
+def _preview(exercise: Exercise, units: Units) -> str:
+    """The text of an exercise with some numbers; empty if it has none that are valid."""
+    try:
+        return exercise.variant(0).text(exercise.text, units)
+    except VariantError:
+        return ""
 
 
 def course_title(room: RoomView) -> str:

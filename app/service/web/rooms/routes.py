@@ -7,6 +7,7 @@ cookie is not sent with requests that other sites make, and forms are only accep
 from __future__ import annotations
 
 from functools import partial
+from typing import TYPE_CHECKING
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -17,7 +18,7 @@ from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError, Role, Ticket, UnknownRoomError
 from app.classroom.clock import now
 from app.classroom.tokens import LONGEST_TOKEN, read_code, show_code
-from app.classroom.views import ERASING
+from app.classroom.views import ERASING, in_one_line
 from app.service.web.access import forget_guest, form_of, may_open, pass_guest
 from app.service.web.rooms.limits import Limits
 from app.service.web.rooms.page import ends_at, ends_in_words, join_address, qr_svg, room_page
@@ -26,6 +27,9 @@ from app.shared.clients import client_of
 from app.shared.security import origin_allowed, set_cookie
 from app.shared.settings import Settings
 from app.shared.store import Store
+
+if TYPE_CHECKING:
+    from app.classroom.rooms import OpenRoom
 
 ASK_ERASED = 3  # seconds until the page asks again whether an ended room is erased
 
@@ -74,12 +78,16 @@ class _Pages:
             return answer
         if code and read_code(code) != room.code:
             return room_page(request, code=code, may_open=may_open(request.scope))  # an invitation to another room
-        teacher = ticket.role is Role.TEACHER
+        return self._room_of(request, room, teacher=ticket.role is Role.TEACHER)
+
+    def _room_of(self, request: Request, room: OpenRoom, message: str = "", teacher: bool = False) -> Response:
+        """The page of a room, for who is in it."""
         return room_page(
             request,
             room=room,
             code=show_code(room.code),
             teacher=teacher,
+            message=message,
             join=join_address(request, room.code),
             teach=f"{str(request.base_url).rstrip('/')}/room/teach/{room.token}" if teacher else "",
             ends=ends_in_words(room.ends - now()),
@@ -133,7 +141,10 @@ class _Pages:
             return again(error.status_code, message=error.problem.detail)
         except ClassroomUnavailable as error:
             return again(503, message=str(error))
-        answer = RedirectResponse("../viewer/", 303)
+        answer: Response = RedirectResponse("../viewer/", 303)
+        if room is not None and room.alias != in_one_line(alias):
+            words = f"Another student has this alias: you are “{room.alias}” here."
+            answer = self._room_of(request, room, words)
         await self._remember(request, answer, ticket, now() if room is None else room.ends)
         return answer
 
