@@ -82,10 +82,10 @@
     }
   }
 
-  // The connection: asked for every second, so that a page never looks ready when nothing it does arrives.
+  // The connection: asked for all the time, so that a page never looks ready when nothing it does arrives.
 
-  const EVERY = 1000; // ms
-  const PATIENCE = 1800; // ms for an answer of the service
+  const EVERY = 800; // ms
+  const PATIENCE = 1500; // ms for an answer of the service
   const WAITING = 2500; // ms after which it is said that an answer waits
   let online = true;
   const note = document.createElement("div");

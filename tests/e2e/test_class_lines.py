@@ -1,4 +1,4 @@
-"""A class on a school's network: reloads, lost lines, two tabs. All that is shown says the same of each student."""
+"""A class on a school's network: reloads, lost lines, two tabs. What is shown says the same of each student."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ pytestmark = pytest.mark.browser
 EXERCISE = "which-joint-goes-down"
 TITLE = Exercises().get(EXERCISE).title
 RIGHT, WRONG = 2, 0  # choices of this exercise
+BUSY = 3.0  # s that four pages drawn in software on a busy machine may be late
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What is true of a student: where, how far with the task, after how many answers, and whether a hand is up."""
+    """What is true of a student: where, how far with the task, after how many answers, whether a hand is up."""
 
     presence: str = "by themselves"
     progress: str = "not begun"
@@ -175,7 +176,7 @@ def offline(lesson: Class, student: Student, seconds: float, anew: bool) -> None
     expect(page.locator(".kb-class-offline")).to_be_hidden()
     student.sees_task(f"{tries} {'try' if tries == 1 else 'tries'}")
     print(f"offline for {seconds:.0f} s: said after {told:.1f} s, away after {away}")
-    assert told < 3.0 + 1.0, "within three seconds, and one for a busy machine"
+    assert told < 3.0 + BUSY, "within three seconds"
     assert away is None or away < 10.0 + 3.0, (
         "within ten seconds, and three for the reading of all that is compared"
     )

@@ -580,6 +580,38 @@ def test_what_is_on_its_way_is_not_undone_by_what_is_read_meanwhile(hubs, monkey
         assert connection.scalar(select(Room.state))["task"]["exercise"] == "swing"
 
 
+def test_no_two_students_have_the_same_alias(hubs):
+    hub, other = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+
+    def alias(ticket):
+        return other.rooms.find(ticket).alias
+
+    bob, second, third = (each.rooms.join(room.code, "Bob") for each in (hub, other, hub))
+    assert [alias(each) for each in (bob, second, third)] == ["Bob", "Bob 2", "Bob 3"]
+    assert alias(hub.rooms.join(room.code, "  bOB ")) == "bOB 4"
+    assert alias(hub.rooms.join(room.code, "Ｂob 2")) == "Ｂob 2 2", "letters of another width look the same"
+    long = "x" * 32
+    assert [alias(hub.rooms.join(room.code, long)) for _ in range(2)] == [long, "x" * 30 + " 2"]
+    ann = hub.rooms.join(room.code, "Ann")
+    assert hub.rooms.rename_seat(room.id, ann.seat, "Bob") == "Bob 5" == alias(ann)
+    assert hub.rooms.rename_seat(room.id, ann.seat, "bob 5") == "bob 5", "it is the student's own"
+    assert hub.rooms.join(room.code, "Bob", known=bob) == bob
+    assert alias(bob) == "Bob"
+    hub.rooms.remove_seat(room.id, second.seat)
+    assert alias(hub.rooms.join(room.code, "Bob 2")) == "Bob 2"
+
+
+@pytest.mark.parametrize("alias", ["\u0301", " \u0301\u20dd ", "\u200d\u0301"])
+def test_an_alias_of_marks_alone_is_refused(hubs, alias):
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    with pytest.raises(RefusedError, match="marks alone") as refused:
+        hub.rooms.join(room.code, alias)
+    assert refused.value.field == "alias"
+    assert hub.rooms.find(hub.rooms.join(room.code, "e\u0301")).alias == "é"
+
+
 @pytest.mark.parametrize("second", [False, True])
 def test_a_page_that_is_connected_and_silent_is_away_within_ten_seconds(hubs, monkeypatch, second):
     """A phone in a dead spot: its connection stays, and nothing comes. Times are a quarter of the real ones."""
@@ -684,7 +716,12 @@ def test_seats_that_nobody_takes_keep_no_student_out(hubs, monkeypatch):
     monkeypatch.setattr("app.classroom.rooms.UNSEEN", 0.0)
     bob = hub.rooms.join(room.code, "Bob")
     assert [hub.rooms.is_open(seat) for seat in (ada, eve, *ghosts, bob)] == [True, True, False, False, True]
-    assert hub.rooms.remove_unseen(room.id) == 1
+    monkeypatch.setattr("app.classroom.rooms.UNSEEN", 60.0)
+    swept = hub.rooms.remove_unseen(room.id)
+    assert swept.words == "Bob: joined less than a minute ago; press again later. Eve: answers are stored."
+    monkeypatch.setattr("app.classroom.rooms.UNSEEN", 0.0)
+    swept = hub.rooms.remove_unseen(room.id)
+    assert (swept.count, swept.words) == (1, "Eve: answers are stored.")
     assert [hub.rooms.is_open(seat) for seat in (ada, eve, bob)] == [True, True, False]
 
 

@@ -248,6 +248,54 @@ def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
     assert "1 of 1 solved" in teacher.html
 
 
+def test_two_tabs_and_a_repeated_answer_are_one_student(room: Class) -> None:
+    teacher, student, ticket, _ = lead(room)
+    press(teacher, "fields", "task", value=[[EXERCISE]])
+    second = room.student(ticket)
+    for tab in (student, second):
+        tab.wait(lambda tab=tab: f'data-exercise="{EXERCISE}"' in tab.html)
+        tab.wait(lambda tab=tab: "</b>, not begun" in tab.html)
+    for tab in (student, second):  # the tab has sent it again, over a new connection
+        tab.say("feature", ["exercises", ["answer", "0123456789abcdef", 1], 0])
+        tab.wait(lambda tab=tab: "</b>, 1 try" in tab.html)
+        tab.wait(lambda tab=tab: "1 attempt," in tab.html)
+    teacher.wait(lambda: "at it · 1 try" in teacher.html)
+    second.say("feature", ["exercises", ["answer", "fedcba9876543210", 2], 2])
+    for tab in (student, second):
+        tab.wait(lambda tab=tab: "</b>, solved" in tab.html)
+        tab.wait(lambda tab=tab: "data-exercises-solution" in tab.html and "2 attempts," in tab.html)
+    teacher.wait(lambda: "solved · 2 tries" in teacher.html)
+    again = room.student(ticket)  # after a reload that has lost what the browser stored
+    again.wait(lambda: "</b>, solved" in again.html)
+
+
+def test_a_lead_pauses_the_task_and_returns_to_it(room: Class) -> None:
+    teacher, student, _, q = lead(room)
+    press(teacher, "fields", "task", value=[[EXERCISE]])
+    student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
+    assert "your teacher sees that you did" in student.html
+    press(teacher, "follow")
+    mode(student, "led")
+    student.wait(lambda: f'data-exercise="{EXERCISE}"' not in student.html)
+    assert "data-class-paused" in student.html
+    at(student, q)
+    teacher.wait(lambda: 'You lead</b> <span data-class-led="1">1 of 1 student' in teacher.html)
+    press(teacher, "follow")
+    mode(student, "free")
+    student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
+    assert "data-class-paused" not in student.html
+
+
+def test_the_picker_keeps_its_place_and_shows_the_exercise(room: Class) -> None:
+    teacher = room.teacher()
+    teacher.say("feature", ["class", ["set", "task", 1], "which-joint-moved"])
+    teacher.wait(lambda: 'data-class-preview="which-joint-moved"' in teacher.html)
+    assert '<option value="which-joint-moved" selected>' in teacher.html
+    press(teacher, "fields", "task", value=[[EXERCISE]])
+    teacher.wait(lambda: f'<option value="{EXERCISE}" selected>' in teacher.html)
+    assert f'data-class-preview="{EXERCISE}"' in teacher.html
+
+
 def test_a_task_ends_the_obstacles_of_who_was_followed(room: Class) -> None:
     def shown(tab: FakeBrowser, shape: str) -> bool:
         return f'dir="auto">{shape}' in tab.html
@@ -324,9 +372,18 @@ def test_a_question_is_asked_and_counted(room: Class) -> None:
     teacher.wait(lambda: "2 votes" in teacher.html)
     assert "width: 100%" in teacher.html
     assert "2 votes" not in ann.html
+    ann.wait(lambda: "Vote counted: Down" in ann.html)
+    assert "data-class-result" not in ann.html
     press(teacher, "close")
-    bob.wait(lambda: 'data-class-poll="closed"' in bob.html)
+    for student in (ann, bob):
+        student.wait(lambda student=student: 'data-class-poll="closed"' in student.html)
+        student.wait(
+            lambda student=student: "Down (yours): <b>2</b>" in student.html.partition("data-class-result")[2]
+        )
     assert "width: 100%" in bob.html
+    press(ann, "read")
+    ann.wait(lambda: "data-class-result" not in ann.html)
+    assert "data-class-result" in bob.html
 
 
 def test_a_students_arm_is_shown_to_all(room: Class) -> None:
