@@ -274,16 +274,17 @@ def test_a_lead_pauses_the_task_and_returns_to_it(room: Class) -> None:
     press(teacher, "fields", "task", value=[[EXERCISE]])
     student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
     assert "your teacher sees that you did" in student.html
+    mode(student, "free")
     press(teacher, "follow")
-    mode(student, "led")
+    student.wait(lambda: "data-class-paused" in student.html)
+    assert bar(student) == "led"
     student.wait(lambda: f'data-exercise="{EXERCISE}"' not in student.html)
-    assert "data-class-paused" in student.html
     at(student, q)
     teacher.wait(lambda: 'You lead</b> <span data-class-led="1">1 of 1 student' in teacher.html)
     press(teacher, "follow")
     mode(student, "free")
     student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
-    assert "data-class-paused" not in student.html
+    student.wait(lambda: "data-class-paused" not in student.html)
 
 
 def test_the_picker_keeps_its_place_and_shows_the_exercise(room: Class) -> None:
