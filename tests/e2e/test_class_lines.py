@@ -212,7 +212,8 @@ def test_nothing_is_lost_and_all_that_is_shown_agrees(lesson: Class, times: tupl
     save_picture(teacher.page, "class-list")
 
     # Two tabs of Ann agree, and she goes on when she has solved it.
-    second = ann.page.context.new_page()
+    context = ann.page.context.browser.new_context(storage_state=ann.page.context.storage_state())
+    second = context.new_page()
     second.goto(ann.line.address + "viewer/")
     expect(second.locator(f"[data-exercise={EXERCISE}]")).to_be_visible()
     expect(second.locator("[data-class-bar=free] .kb-class-words")).to_contain_text("1 try")
@@ -220,7 +221,7 @@ def test_nothing_is_lost_and_all_that_is_shown_agrees(lesson: Class, times: tupl
     lesson.agrees(Ann=Truth(progress="solved", tries=2))
     expect(second.locator("[data-exercises-solution]")).to_be_visible()
     expect(second.locator("[data-exercises-attempts]")).to_contain_text("2 attempts")
-    second.close()
+    context.close()
     ann.do("hand")
     lesson.agrees(Ann=Truth(progress="solved", tries=2, hand=True))
 
