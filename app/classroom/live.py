@@ -95,8 +95,8 @@ class LiveRoom:
         """Take over what the database says; what is pending or on its way is newer."""
         if self.row and row["beat"] != self.row["beat"]:
             self.heard = steady()
-        told = self.pending.page is not None or self.flying.page is not None
-        page = self.row.get("page", "") if told else row["page"]
+        newer = self.pending.page is not None or self.flying.page is not None
+        page = self.row.get("page", "") if newer else row["page"]
         before = self.row, self.state
         self.row = {**row, "page": page}
         self.state = {**row["state"], **self.flying.state, **self.pending.state}

@@ -12,7 +12,6 @@ from sqlalchemy import Connection, Text, cast, delete, func, insert, select, upd
 from app.classroom import erasure, marks
 from app.classroom.clock import now
 from app.classroom.database import Database
-from app.classroom.standing import ANSWER_SHOWN
 from app.classroom.tables import TOKEN_BYTES, Attempt, LtiSeat, Room, Seat
 from app.classroom.tokens import Tokens, new_code, read_code
 from app.classroom.views import (
@@ -28,6 +27,7 @@ from app.classroom.views import (
     UnknownRoomError,
     in_one_line,
 )
+from app.classroom.work import ANSWER_SHOWN
 from app.shared.clients import share_of
 
 LONGEST_ALIAS, LONGEST_TITLE = 32, 80  # characters
@@ -45,7 +45,7 @@ class OpenRoom:
 
     Attributes:
         token: the signed token of the teacher's link.
-        alias: of the student who asks; empty for the teacher.
+        alias: of the seat of the ticket; empty for the teacher.
     """
 
     id: str

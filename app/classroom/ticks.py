@@ -12,9 +12,9 @@ from sqlalchemy import cast as cast_to
 from app.classroom.clock import now
 from app.classroom.live import Pending
 from app.classroom.rooms import next_version
-from app.classroom.standing import SHOWN_ANSWER, Attempt, works
 from app.classroom.tables import Attempt as Stored
 from app.classroom.tables import Room, Seat
+from app.classroom.work import SHOWN_ANSWER, Attempt, works
 
 _ROOM, _SEAT = cast(Table, Room.__table__), cast(Table, Seat.__table__)
 # Statements are built once: a process asks the first of them thirty times a second.

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
-from app.classroom.standing import ANSWER_SHOWN, Work
+from app.classroom.work import ANSWER_SHOWN, Work
 
 NO_ROOM = "No room has this code. Ask your teacher; rooms end after a while."
 # What can be said of a room that has ended.

@@ -10,9 +10,9 @@ from sqlalchemy import Text, cast, func, literal, select, tuple_
 
 from app.classroom.database import Database
 from app.classroom.results.table import Member
-from app.classroom.standing import SHOWN_ANSWER, Attempt
 from app.classroom.tables import Attempt as Stored
 from app.classroom.tables import Room, Seat
+from app.classroom.work import SHOWN_ANSWER, Attempt
 
 PAGE = 100  # attempts that are read at a time; each has up to 20 000 characters of an answer
 SHORT_PAGE = 5000  # the same without answers

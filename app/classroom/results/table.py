@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from app.classroom.standing import NOTHING, URGENCY, Attempt, Work, works
+from app.classroom.work import NOTHING, URGENCY, Attempt, Work, works
 from app.shared.spreadsheets import cell
 
 COLUMNS = (

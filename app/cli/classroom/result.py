@@ -12,8 +12,8 @@ from app.classroom import ClassroomUnavailable, Hub
 from app.classroom.results.check import check_code, facts
 from app.classroom.results.store import pages_of
 from app.classroom.results.table import csv_of
-from app.classroom.standing import Attempt
 from app.classroom.tokens import read_code
+from app.classroom.work import Attempt
 from app.cli.terminal import print_json
 from app.exercises import Exercises
 from app.shared.settings import Settings

@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import Final, NamedTuple, Protocol
 
 from app.classroom.courses import Course, Courses
-from app.classroom.standing import Work
+from app.classroom.work import Work
 from app.exercises import Exercise, Verdict
 from app.viewer.activity.places import Place
 from app.viewer.activity.practice import Practice

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, get_args
 
-from app.classroom.standing import Settled, Work
+from app.classroom.work import Settled, Work
 from app.exercises import Exercise, Exercises, Variant, Verdict
 from app.viewer.activity.places import LABEL, Place
 from kin import InputError

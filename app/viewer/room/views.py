@@ -9,9 +9,10 @@ from functools import lru_cache
 from typing import Literal
 
 from app.classroom.courses import Course
-from app.classroom.standing import URGENCY, Presence, Progress, Standing, standing
+from app.classroom.standing import Presence, Standing, standing
 from app.classroom.tokens import show_code
 from app.classroom.views import Poll, RoomView, SeatView
+from app.classroom.work import URGENCY, Progress
 from app.exercises import Exercise, Exercises, VariantError
 from app.exercises.said import answer_in_words
 from app.viewer.room.submissions import Submissions

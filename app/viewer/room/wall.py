@@ -17,7 +17,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.classroom.standing import Progress
+from app.classroom.work import Progress
 from app.viewer.labels import add_label
 from app.viewer.scene.camera import DIRECTION
 from app.viewer.scene.meshes import Body, body

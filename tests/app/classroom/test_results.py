@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from app.classroom.results import ForgedCodeError, MistypedCodeError, Outcome, codes, read_code, write_code
 from app.classroom.results.table import COLUMNS, Member, csv_of, rows
-from app.classroom.standing import ANSWER_SHOWN, Attempt
+from app.classroom.work import ANSWER_SHOWN, Attempt
 from kin import InputError
 
 KEY, OTHER = b"k" * 32, b"o" * 32

@@ -26,7 +26,7 @@ from app.classroom.lti.seats import Column
 from app.classroom.results import Outcome, write_code
 from app.classroom.results.check import check_code
 from app.classroom.results.table import csv_of
-from app.classroom.standing import Attempt
+from app.classroom.work import Attempt
 from app.service.main import create_app
 from app.service.web.rooms import limits, sweeping
 from app.shared.settings import Settings

@@ -17,7 +17,7 @@ from sqlalchemy import insert
 from app.classroom import COOKIE, ClassroomUnavailable, NewAttempt, Ticket, tables
 from app.classroom.results import store
 from app.classroom.rooms import OpenRoom, Rooms
-from app.classroom.standing import SHOWN_ANSWER, Attempt
+from app.classroom.work import SHOWN_ANSWER, Attempt
 from app.service.main import create_app
 from app.service.web.rooms import results
 from app.shared.settings import Settings

@@ -18,7 +18,7 @@ from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, Role
 from app.classroom.clock import now
 from app.classroom.results.table import Row, csv_of, rows
-from app.classroom.standing import Attempt
+from app.classroom.work import Attempt
 from app.service.web.rooms.page import results_page
 from app.shared.settings import Settings
 from app.shared.store import Store

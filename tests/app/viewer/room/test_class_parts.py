@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.classroom import ClassroomUnavailable, Confirmed, NewAttempt, RefusedError, RoomView, SeatView, Task
-from app.classroom.standing import ANSWER_SHOWN, Attempt, Work, standing, works
+from app.classroom.standing import standing
+from app.classroom.work import ANSWER_SHOWN, Attempt, Work, works
 from app.exercises import Exercises
 from app.viewer.exercises.feature import Practising
 from app.viewer.room import submissions, views

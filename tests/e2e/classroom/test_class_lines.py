@@ -160,7 +160,7 @@ def offline(lesson: Class, student: Student, seconds: float, anew: bool) -> None
     student.line.cut()
     began = time.monotonic()
     expect(page.locator(".kb-class-offline")).to_contain_text("No connection", timeout=8000)
-    told = time.monotonic() - began
+    said_after = time.monotonic() - began
     student.option.nth(WRONG).click()
     expect(page.locator(".kb-class-offline")).to_contain_text("Your answer is waiting")
     assert not page.locator("[data-status]").is_visible(), "the page does not look ready"
@@ -175,8 +175,8 @@ def offline(lesson: Class, student: Student, seconds: float, anew: bool) -> None
     lesson.agrees(**{student.alias: Truth("by themselves", progress, tries, before.hand)})
     expect(page.locator(".kb-class-offline")).to_be_hidden()
     student.sees_task(f"{tries} {'try' if tries == 1 else 'tries'}")
-    print(f"offline for {seconds:.0f} s: said after {told:.1f} s, away after {away}")
-    assert told < 3.0 + BUSY, "within three seconds"
+    print(f"offline for {seconds:.0f} s: said after {said_after:.1f} s, away after {away}")
+    assert said_after < 3.0 + BUSY, "within three seconds"
     assert away is None or away < 10.0 + 3.0, (
         "within ten seconds, and three for the reading of all that is compared"
     )
