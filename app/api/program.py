@@ -120,7 +120,9 @@ class ProgramBody(_Described):
     segments: list[Segment] = Field(
         min_length=1, max_length=MOST_SEGMENTS, description="In order. Errors count them from 0, sentences from 1."
     )
-    units: ProgramUnits = Field(ProgramUnits(), description="By default metres and radians.")
+    units: ProgramUnits = Field(
+        default_factory=lambda: ProgramUnits(length="m", angle="rad"), description="By default metres and radians."
+    )
     name: Name = Field("", description="For people.")
     task: Literal["pose", "approach", "position"] | None = Field(
         None, description="What the tool keeps of poses; by default as much as the joints of the arm can keep."

@@ -70,7 +70,7 @@ class Doctor:
         try:
             self.found, self._source = examine_urdf(source.text, tip=tip, file=name, files=meshes), source
         except RobotFileError:
-            return  # whoever opens the file says so
+            return  # opening the file reports it
 
     def close(self) -> None:
         """Forget the report."""

@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 
 pytestmark = pytest.mark.browser
 
-UR5 = Path(__file__).parents[1] / "data" / "urdf" / "ur5.urdf"
+UR5 = Path(__file__).parents[2] / "data" / "urdf" / "ur5.urdf"
 
 
 def test_a_refused_urdf_is_mended_by_a_click(tab: Tab, tmp_path: Path) -> None:
