@@ -128,6 +128,8 @@ class Robot:
         home: one value per moving joint, inside the limits.
         base, tool: constant transforms before the first and after the last row, as nested tuples.
         units: the length unit of the robot file ("mm", "cm" or "m"), used when the table is displayed.
+        maker: who builds or built the arm, "" if it is nobody's product.
+        payload, mass: what it may carry and what it weighs (kg), None where they are not known.
         capsules: the bodies of the links as its file states them, none where they are not known.
         capsules_source: where they are from.
 
@@ -144,6 +146,9 @@ class Robot:
     home: tuple[float, ...]
     description: str = ""
     units: str = "m"
+    maker: str = ""
+    payload: float | None = None
+    mass: float | None = None
     base: Matrix = field(default=IDENTITY, repr=False)
     tool: Matrix = field(default=IDENTITY, repr=False)
     capsules: tuple[Capsule, ...] = field(default=(), repr=False)
@@ -166,6 +171,11 @@ class Robot:
         if home.ndim != 1:
             raise InputError("home", f"shape {home.shape}", f"one configuration of {self.n} values")
         object.__setattr__(self, "home", tuple(home.tolist()))
+        for key in ("payload", "mass"):
+            if (value := getattr(self, key)) is not None:
+                if not (weight := _number(key, value)) > 0.0:
+                    raise InputError(key, value, "a positive number of kg, or None if it is not known")
+                object.__setattr__(self, key, weight)
         for key in ("base", "tool"):
             T = getattr(self, key)
             if T is not IDENTITY:

@@ -19,7 +19,7 @@ import scipy.spatial
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from app.viewer.scene.bodies.drawing import FOLDER, MM, _loft
-from kin import builtin_robots, link_frames
+from kin import classic_robots, link_frames
 from kin.axes import inverse
 
 OUT = 0.008  # m
@@ -29,7 +29,7 @@ ROBOTS = Path(__file__).parents[1] / "kin" / "robots"
 
 def surfaces(robot_id: str) -> dict[int, np.ndarray]:
     """Points of the drawn surface of each link, in the frame of its DH row, without those inside other parts."""
-    robot = builtin_robots()[robot_id]
+    robot = classic_robots()[robot_id]
     data = tomllib.loads((FOLDER / f"{robot_id}.toml").read_text("utf-8"))
     q = np.array(data["pose"], float) * np.where(robot.revolute, np.pi / 180.0, MM)
     frames = [robot.T_world_base, *(link_frames(robot, q)[row] for row in robot.joint_rows)]
@@ -113,7 +113,7 @@ def fitted(points: np.ndarray, count: int) -> np.ndarray:
 
 def main() -> None:
     for robot_id in sys.argv[1:] or sorted(path.stem for path in FOLDER.glob("*.toml")):
-        robot, lines, worst, fat = builtin_robots()[robot_id], [], 0.0, []
+        robot, lines, worst, fat = classic_robots()[robot_id], [], 0.0, []
         for link, points in surfaces(robot_id).items():
             for count in (1, 2, 3):
                 x = np.round(fitted(points, count), 3)

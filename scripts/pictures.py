@@ -1,4 +1,6 @@
-"""Pictures of the built-in arms for the landing page, ``static/robots/*.webp``: ``python scripts/pictures.py``.
+"""Pictures of the built-in arms: ``python scripts/pictures.py``, or with the ids of some of them.
+
+Those for the landing page are ``static/robots/*.webp``, smaller ones for the docs ``docs/images/arms/*.webp``.
 
 Each arm is drawn by the viewer itself, at home, on nothing: the background is transparent, so one picture serves
 light and dark pages. Needs what the browser tests need: playwright, Chromium (KINBOARD_TEST_CHROMIUM) and pillow.
@@ -7,6 +9,7 @@ light and dark pages. Needs what the browser tests need: playwright, Chromium (K
 from __future__ import annotations
 
 import os
+import sys
 import threading
 from pathlib import Path
 
@@ -19,10 +22,13 @@ from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.camera import view
 from app.viewer.scene.lights import light_scene
 from app.viewer.scene.viewpoints import FOV
-from kin import Robot, builtin_robots
+from kin import Robot, builtin_robots, get_robot
 
-FOLDER = Path(__file__).parents[1] / "static" / "robots"
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "static" / "robots"
+SMALL_FOLDER = ROOT / "docs" / "images" / "arms"
 SIZE = (320, 240)
+SMALL = (160, 120)
 FINER = 3  # drawn so many times larger: smooth edges
 MARGIN = 10
 
@@ -57,17 +63,22 @@ def draw(client: viser.ClientHandle, robot: Robot) -> Image.Image:
 
 
 def main() -> None:
-    """Draw all arms."""
-    FOLDER.mkdir(exist_ok=True)
+    """Draw all arms, or those that are named."""
+    robots = [get_robot(name) for name in sys.argv[1:]] or list(builtin_robots().values())
+    for folder in (FOLDER, SMALL_FOLDER):
+        folder.mkdir(exist_ok=True)
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     light_scene(server.scene)
     done = threading.Event()
 
     @server.on_client_connect
     def _(client: viser.ClientHandle) -> None:
-        for robot in builtin_robots().values():
+        for robot in robots:
             file = FOLDER / f"{robot.id}.webp"
-            draw(client, robot).save(file, quality=82, method=6)
+            picture = draw(client, robot)
+            picture.save(file, quality=82, method=6)
+            small = picture.resize(SMALL, Image.Resampling.LANCZOS)
+            small.save(SMALL_FOLDER / file.name, quality=75, method=6)
             print(f"{file.name}: {file.stat().st_size} bytes", flush=True)
         done.set()
 

@@ -1,7 +1,8 @@
 """Names of built-in arms, arms with reversed joints, and random parts for made-up arms.
 
-Laws that hold for any arm are tested on all of `kin.builtin_robots()`; closed forms, equations, singular curves
-and golden inverse kinematics on the arms of the chapter.
+Laws that hold for any arm are tested on the classics; closed forms, equations, singular curves and golden inverse
+kinematics on the arms of the chapter. Every arm of the library is tested by ``tests/kin/test_library.py``, and it
+opens in the page: a test that runs over all of them has to be cheap.
 """
 
 import math
@@ -9,10 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from kin import Joint, Robot
+from kin import Joint, Robot, classic_robots
 from kin.ik import IKOptions, IKProblem, JointConstraints
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])  # Rx(π)
+CLASSICS = tuple(classic_robots().values())  # expensive tests run over these, cheap ones over the whole library
 CHAPTER_ARMS = ("pioneer5", "redundant7", "redundant7-craig")
 
 

@@ -153,26 +153,27 @@ def test_the_programs_can_be_driven():
 
 
 def test_the_built_in_arms_are_named():
-    robots = kin.builtin_robots()
     rows = [
         (robot_id, row[1])
         for row in table(PAGES["docs/robot-files.md"], "arm")
         for robot_id in re.findall(r"`(.+?)`", row[0])
     ]
-    assert sorted(rows) == sorted((robot.id, str(robot.n)) for robot in robots.values())
-    words = {
-        3: "Three",
-        4: "Four",
-        5: "Five",
-        6: "Six",
-        7: "Seven",
-        8: "Eight",
-        9: "Nine",
-        10: "Ten",
-        12: "Twelve",
-    }
-    assert f"{words[len(robots)]} arms are built in" in PAGES["docs/robot-files.md"]
-    assert f"**{words[len(robots)]} arms**" in README
+    classics = kin.classic_robots()
+    assert sorted(rows) == sorted((robot.id, str(robot.n)) for robot in classics.values())
+    assert len(classics) == 12
+    assert "Twelve are classics" in PAGES["docs/robot-files.md"]
+    assert f"**{len(kin.builtin_robots())} arms**" in README
+
+
+def test_the_page_of_arms_is_the_one_that_its_script_writes():
+    done = subprocess.run(
+        [sys.executable, "-c", "from scripts.arms_page import page; print(page(), end='')"],
+        cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUTF8": "1"}, capture_output=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.decode() == PAGES["docs/arms.md"], "python scripts/arms_page.py writes it anew"
+    pictures = {file.stem: file for file in (ROOT / "docs/images/arms").iterdir()}
+    assert set(pictures) == set(kin.builtin_robots())
+    assert max(file.stat().st_size for file in pictures.values()) < 6_000
 
 
 def test_every_lesson_has_its_section():

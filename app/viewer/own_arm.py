@@ -26,6 +26,7 @@ MY_ARM = "My arm"
 NAME, ROW_NAME, SOURCE, DESCRIPTION, CAPSULES_SOURCE = 60, 40, 200, 400, 400  # characters
 SMALLEST, LARGEST = 1e-3, 1000.0  # m: reach of an arm that can be shown
 LONGEST = 10_000  # characters of the compact form; a link holds 12 000 in all
+OF_MAKER = ("maker", "payload", "mass")  # fields that an own arm has not: nobody has built or weighed it
 _KINDS = {"revolute": "", "prismatic": "p", "fixed": "f"}
 _ROW = ("theta", "d", "a", "alpha", "limits", "kind", "name", "velocity", "effort", "acceleration", "jerk")
 _TOP = {"n": "name", "s": "source", "i": "description", "c": "convention", "b": "base", "t": "tool"}
@@ -48,12 +49,14 @@ class OwnArm:
 def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
     """An arm described by the fields of a robot file; its id is replaced.
 
-    Capsules are left out if the arm is too long with them; its bodies are then assumed.
+    What its maker says of it is left out. Capsules are left out if the arm is too long with them; its bodies are
+    then assumed.
 
     Raises:
         kin.KinematicsError: naming the field, the value and what would be valid.
     """
-    fields = {**data, "id": KEY, "source": clean(data.get("source"), SOURCE) or "a visitor's table"}
+    fields = {name: value for name, value in data.items() if name not in OF_MAKER}
+    fields |= {"id": KEY, "source": clean(data.get("source"), SOURCE) or "a visitor's table"}
     fields["name"] = clean(data.get("name"), NAME) or MY_ARM
     fields["description"] = clean(data.get("description", ""), DESCRIPTION)
     if "capsules_source" in fields:

@@ -32,7 +32,7 @@ The same fields as a dict (:func:`robot_from_dict`, :func:`robot_to_dict`) are w
 An error raises `RobotFileError` with the file, the field, the value and what would be valid.
 """
 
-from kin.files.builtin import builtin_robots, get_robot
+from kin.files.builtin import builtin_robots, classic_robots, get_robot
 from kin.files.read import load_folder, load_robot, parse_robot, robot_from_dict
 from kin.files.urdf.doctor.examine import examine_urdf
 from kin.files.urdf.doctor.findings import UrdfExamination, UrdfFinding
@@ -46,6 +46,7 @@ __all__ = [
     "UrdfReport",
     "UrdfRobot",
     "builtin_robots",
+    "classic_robots",
     "examine_urdf",
     "get_robot",
     "load_folder",

@@ -1,4 +1,8 @@
-"""The robots that come with the package."""
+"""The robots that come with the package: the classics, and the library of makers' arms.
+
+The files of the classics are in ``kin/robots`` itself, those of the library in its folders. Lessons, exercises and
+docs are written for the classics; a service warms up their families of closed forms alone.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +19,22 @@ FIRST = ("pioneer5", "redundant7", "redundant7-craig")  # the chapter's arms com
 
 
 @lru_cache(maxsize=1)
-def builtin_robots() -> dict[str, Robot]:
-    """The built-in robots by id: the chapter's first, then in alphabetical order."""
+def classic_robots() -> dict[str, Robot]:
+    """The classics by id: the chapter's first, then in alphabetical order."""
     robots = load_folder(BUILTIN)
     return {robot_id: robots[robot_id] for robot_id in dict.fromkeys((*FIRST, *robots))}
+
+
+@lru_cache(maxsize=1)
+def builtin_robots() -> dict[str, Robot]:
+    """The built-in robots by id: the classics first, then the library by maker and name."""
+    robots = dict(classic_robots())
+    library = [robot for folder in BUILTIN.iterdir() if folder.is_dir() for robot in load_folder(folder).values()]
+    for robot in sorted(library, key=lambda each: (not each.maker, each.maker.lower(), each.id)):
+        if robot.id in robots:
+            raise ValueError(f"two built-in robots have the id {robot.id}")
+        robots[robot.id] = robot
+    return robots
 
 
 @finds_robots

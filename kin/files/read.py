@@ -36,7 +36,7 @@ MAX_ROWS, MAX_CAPSULES = 32, 64
 MAX_REACH = 1e5  # metres; targets may have coordinates up to 1e6 m
 _TOP = {
     *("id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"),
-    *("capsules", "capsules_source"),
+    *("capsules", "capsules_source", "maker", "payload", "mass"),
 }
 _CAPSULE = {"row", "start", "end", "radius", "assumed"}
 _ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", *PEAK_FIELDS}
@@ -161,6 +161,9 @@ class Reader:
             rows=rows,
             home=self.home(data, joints),
             units=length,
+            maker=self.text(data, "maker", ""),
+            payload=self.weight(data, "payload"),
+            mass=self.weight(data, "mass"),
             base=self.transform(data, "base"),
             tool=self.transform(data, "tool"),
             capsules=self.capsules(data, rows),
@@ -220,6 +223,15 @@ class Reader:
             value = (self.length_of if slides else self.angle_of)(where + key, given, PER[key])
         if not value > 0.0:
             raise self.refuse(where + key, given, "a positive number")
+        return value
+
+    def weight(self, data: dict[str, Any], key: str) -> float | None:
+        """A number of kilograms, if it is stated."""
+        if key not in data:
+            return None
+        value = self.number(key, data[key])
+        if not value > 0.0:
+            raise self.refuse(key, data[key], "a positive number of kg")
         return value
 
     def home(self, data: dict[str, Any], joints: list[Joint]) -> tuple[float, ...]:

@@ -96,6 +96,9 @@ class _Writer:
         data: dict[str, Any] = {"id": robot.id, "name": robot.name}
         if robot.description:
             data["description"] = robot.description
+        if robot.maker:
+            data["maker"] = robot.maker
+        data |= {key: _plain(weight) for key in ("payload", "mass") if (weight := getattr(robot, key)) is not None}
         data |= {"source": robot.source, "convention": robot.convention, "units": self.units}
         for key, T in (("base", robot.base), ("tool", robot.tool)):
             if T != IDENTITY:

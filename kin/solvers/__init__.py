@@ -51,6 +51,7 @@ UNDIRECTED: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     pair2.match,
     turned.match,
 )
+NUMERIC = "numeric"  # the family of arms without a closed form
 # Radians, shares of the arm's size.
 FAR = 2e-5
 # For arms that fit no family.
@@ -71,6 +72,12 @@ def closed_form_of(robot: Robot) -> ClosedForm | None:
     from it, a general solver takes the arm.
     """
     return _closed_form(robot, GENERAL)
+
+
+def family_of(robot: Robot) -> str:
+    """The name of the family of a robot, `NUMERIC` for one without a closed form."""
+    form = closed_form_of(robot)
+    return NUMERIC if form is None else form.name
 
 
 def _closed_form(robot: Robot, solvers: tuple[Callable[[Robot], ClosedForm | None], ...]) -> ClosedForm | None:

@@ -24,7 +24,7 @@ from kin.collision import Obstacle, clearance, nearest_links, self_distance
 from kin.collision.contacts import surroundings
 from kin.collision.sweep import touches_along
 from kin.differential.task import Task
-from kin.files import builtin_robots
+from kin.files import classic_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
 from kin.ik import solve_ik
 from kin.ik.candidates import unchecked
@@ -33,7 +33,7 @@ from kin.kernels.fk import fk_one
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion
 from kin.path import path_postures, solve_path
 from kin.robot import Robot
-from kin.solvers import closed_form_of, general6, general7
+from kin.solvers import closed_form_of, family_of, general6, general7
 from kin.solvers.contract import POSE, ClosedForm, SolverInput
 from kin.solvers.rounded import Rounded7
 from kin.transforms import Array
@@ -51,7 +51,6 @@ from kin.workspace.capability.kernels import raise_best
 TASKS: tuple[Task, ...] = ("pose", "approach")
 # Families of `made_up_arms`, in their order: to match a general arm compiles kernels for many seconds.
 MADE_UP = ("parallel5", "planar4", "general5", "pair2", "turned3", "slides3", "slides2")
-NUMERIC = "numeric"  # the family of arms without a closed form
 # Parts that do not belong to a family of arms.
 COLLISIONS, MOTIONS, CLOUDS, CAPABILITY = "collisions", "motions", "clouds", "capability"
 ALL = "all"
@@ -120,12 +119,6 @@ def parts() -> Mapping[str, tuple[Step, ...]]:
     return MappingProxyType({name: tuple(steps) for name, steps in found.items()})
 
 
-def family_of(robot: Robot) -> str:
-    """The name of the family of a robot, which may be one that `parts` does not have."""
-    form = closed_form_of(robot)
-    return NUMERIC if form is None else form.name
-
-
 def first_family() -> str:
     """The family of the first arm, which `warm_up_first` moves."""
     return family_of(_first())
@@ -139,7 +132,7 @@ def all_of(family: str) -> str:
 def one_of_each_family() -> tuple[Robot, ...]:
     """The first built-in arm of each closed form, and the first without one."""
     families: dict[str, Robot] = {}
-    for robot in builtin_robots().values():
+    for robot in classic_robots().values():
         families.setdefault(family_of(robot), robot)
     return tuple(families.values())
 
@@ -162,7 +155,7 @@ def made_up_arms() -> tuple[Robot, ...]:
 
 
 def _first() -> Robot:
-    return next(iter(builtin_robots().values()))
+    return next(iter(classic_robots().values()))
 
 
 def _move(robot: Robot) -> None:

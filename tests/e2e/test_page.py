@@ -19,7 +19,7 @@ from app.viewer.session.state import decode
 
 pytestmark = pytest.mark.browser
 
-ROBOTS = tuple(kin.builtin_robots().values())
+ROBOTS = tuple(kin.classic_robots().values())
 
 PUMA = kin.get_robot("puma560")
 ILLEGIBLE = """() => {

@@ -157,11 +157,11 @@ def test_two_files_with_the_same_id(tmp_path):
 
 
 def test_built_in_files_are_named_after_their_robots():
-    ids = list(kin.builtin_robots())
+    ids = list(kin.classic_robots())
     assert sorted(path.stem for path in BUILTIN.glob("*.toml")) == sorted(ids)
     assert ids[:3] == list(CHAPTER_ARMS)  # these come first in every list
     assert ids[3:] == sorted(ids[3:])
-    for robot in kin.builtin_robots().values():
+    for robot in kin.classic_robots().values():
         assert robot.in_limits(robot.q_home)
         assert robot.source
         assert robot.description
@@ -191,7 +191,7 @@ def test_random_configurations_are_inside_the_limits():
 
 
 def test_reach_bounds_every_pose_and_is_infinite_without_limits():
-    for robot in (*kin.builtin_robots().values(), kin.parse_robot(GOOD)):
+    for robot in (*kin.classic_robots().values(), kin.parse_robot(GOOD)):
         q = robot.random_q(np.random.default_rng(1), 5000)
         origin = robot.T_world_base[:3, 3]
         assert np.linalg.norm(kin.fk(robot, q)[:, :3, 3] - origin, axis=-1).max() <= robot.reach
@@ -210,7 +210,7 @@ def read_again(robot, **units):
     return by_json
 
 
-@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
 def test_writing_and_reading_gives_an_equal_robot(robot, tmp_path):
     assert read_again(robot) == robot
     kin.save_robot(robot, tmp_path / "arm.toml")

@@ -403,7 +403,7 @@ def test_manufacturers_files(name, tip, family, same_as):
         assert np.abs(kin.fk(ours, q) - kin.fk(robot, q)).max() < 1e-9
 
 
-@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
 def test_a_built_in_arm_written_and_read(robot):
     again, report = kin.read_urdf(kin.to_urdf(robot))
     q = robot.random_q(np.random.default_rng(0), 100)

@@ -133,6 +133,9 @@ _SCHEMA: dict[str, Any] = {
         "name": {**_TEXT, "description": "Display name."},
         "source": {**_TEXT, "description": "Source of the numbers."},
         "description": {"type": "string", "maxLength": 4000, "description": "Short description of the arm."},
+        "maker": {"type": "string", "maxLength": 4000, "description": "Who builds the arm."},
+        "payload": {"type": "number", "exclusiveMinimum": 0, "description": "What it may carry, in kg."},
+        "mass": {"type": "number", "exclusiveMinimum": 0, "description": "What it weighs, in kg."},
         "convention": {
             "enum": ["standard", "modified"],
             "description": "standard: Rz(θ) Tz(d) Tx(a) Rx(α). modified (Craig): Rx(α) Tx(a) Rz(θ) Tz(d).",

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
-from fastapi import Request, Response
+from typing import Annotated
+
+from fastapi import Query, Request, Response
 
 from app.api.body import versioned
 from app.api.schemas import RobotId, refusals, reply, robot_of, store_of
 from app.shared.answers.answer import Answer
 from app.shared.answers.robots import RobotAnswer, robot_answer
+from app.shared.finding import FIELDS, LONGEST, find_robots
 
 router = versioned("robots")
+
+Find = Annotated[
+    str,
+    Query(
+        max_length=LONGEST,
+        description="Only robots that all these words fit, of their id, name, maker or solver, or: "
+        + "; ".join(FIELDS.values())
+        + ".",
+        examples=["kuka joints:7"],
+    ),
+]
 
 
 class RobotList(Answer):
@@ -19,10 +33,11 @@ class RobotList(Answer):
     """In the order they are offered."""
 
 
-@router.get("/robots", summary="List the robots", response_model=RobotList, responses=refusals(500))
-async def list_robots(request: Request) -> Response:
+@router.get("/robots", summary="List the robots", response_model=RobotList, responses=refusals(422, 500))
+async def list_robots(request: Request, find: Find = "") -> Response:
     """Every arm with its DH table, joints and limits. Its `id` goes into the other addresses."""
-    return reply({"robots": [robot_answer(robot) for robot in store_of(request).robots]})
+    found = find_robots(store_of(request).robots, find)
+    return reply({"robots": [robot_answer(robot) for robot in found]})
 
 
 @router.get(

@@ -152,6 +152,13 @@ def add_robots(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         commands, "robots", "list the robots, or describe one", parents.robots, parents.output, takes_robot=False
     )
     parser.add_argument("robot", nargs="?", metavar="ROBOT", help="id of the robot to describe")
+    parser.add_argument(
+        "--find",
+        metavar="WORDS",
+        default="",
+        help="list only robots that all words fit: a part of id, name, maker or solver, joints:6, reach:0.5..1.2, "
+        "maker:kuka, solver:wrist6",
+    )
     return parser
 
 

@@ -16,7 +16,7 @@ from kin import Robot, jacobian
 from kin.axes import Pair, generic_q, pairs, parallel_groups, size, spherical_groups
 from kin.collision.bodies import bodies_of
 from kin.files.home import candidates, margins
-from kin.solvers import closed_form_of
+from kin.solvers import closed_form_of, family_of
 
 NEAR_SINGULAR, SINGULAR = 0.1, 1e-6  # of the best margin among the candidates for a home pose
 LONG, SHORT = 100.0, 0.01  # m; a reach beyond these suggests a wrong unit
@@ -120,7 +120,7 @@ def inspect(robot: Robot, taken: bool = False) -> InspectionAnswer:
         redundancy=robot.n - count,
         home_margin=margin,
         singular_at_home=margin < SINGULAR,
-        solver="numeric" if match is None else match.name,
+        solver=family_of(robot),
         reason="none of Kinboard's closed forms fits this arm's axes" if match is None else match.reason,
         warnings=[*_odd_table(robot, taken), *_odd_axes(robot, between), *_odd_motion(robot, count, margin)],
         bodies=_bodies(robot),

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.fk import Matrix
 from kin import Joint, Robot, branch_meanings, branch_names
+from kin.solvers import family_of
 
 
 class JointAnswer(Answer):
@@ -64,8 +65,16 @@ class RobotAnswer(Answer):
     """Display name."""
     description: str
     """Short description of the arm."""
+    maker: str
+    """Who builds or built the arm; empty for an arm of textbooks."""
+    payload: float | None
+    """What it may carry, in kg; null if it is not known."""
+    mass: float | None
+    """What it weighs, in kg; null if it is not known."""
     n: int
     """Number of moving joints, the length of q."""
+    solver: str
+    """The family of closed forms that solves its inverse kinematics, or numeric."""
     branches: list[str]
     """Names of the arm's inverse-kinematics branches; empty for an arm without a closed form."""
     branch_meanings: dict[str, str]
@@ -95,6 +104,7 @@ def robot_answer(robot: Robot) -> RobotAnswer:
     """Everything that defines an arm."""
     return RobotAnswer.of(
         robot,
+        solver=family_of(robot),
         branches=list(branch_names(robot)),
         branch_meanings=branch_meanings(robot),
         joints=[_joint(i, joint, robot.home[i]) for i, joint in enumerate(robot.joints)],

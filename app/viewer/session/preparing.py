@@ -16,7 +16,8 @@ from app.viewer.session.lessons import lesson_titled, lesson_with_key
 from app.viewer.session.parts import Page
 from app.viewer.session.state import PageState
 from kin import InputError, Robot
-from kin.warmup import ALL, COLLISIONS, all_of, family_of
+from kin.solvers import family_of
+from kin.warmup import ALL, COLLISIONS, all_of
 from kin.warmup.preparation import Preparation
 
 LOOK_AGAIN: Final = 0.2  # s

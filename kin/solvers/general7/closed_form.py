@@ -165,8 +165,8 @@ class General7(ClosedForm):
 
     def _outside(self, problem: SolverInput, q: Array) -> Array:
         """How far configurations ``(..., 7)`` are outside the limits, in all; ∞ for those that do not exist."""
-        half, middle = 0.5 * (problem.upper - problem.lower), 0.5 * (problem.upper + problem.lower)
-        middle = np.where(np.isfinite(middle), middle, 0.0)
+        half = 0.5 * (problem.upper - problem.lower)
+        middle = np.add(problem.lower, half, where=np.isfinite(half), out=np.zeros_like(half))
         off = np.abs((q - middle + math.pi) % TURN - math.pi) - half - TOLERANCES.limit
         total = np.maximum(off, 0.0).sum(axis=-1)
         return np.where(np.isnan(total), math.inf, total)

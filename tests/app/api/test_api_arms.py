@@ -50,7 +50,7 @@ def schema(app):
     return jsonschema_rs.validator_for(app.openapi()["components"]["schemas"]["RobotDescription"])
 
 
-@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
 def test_what_is_written_fits_the_schema(schema, robot):
     other = kin.convert(robot, "modified" if robot.convention == "standard" else "standard")
     for arm in (robot, other):
@@ -254,7 +254,7 @@ def test_base_and_tool_frames(client):
 
 
 def test_what_an_arm_is(client):
-    for robot in kin.builtin_robots().values():
+    for robot in kin.classic_robots().values():
         found = client.get(f"/api/v1/robots/{robot.id}/inspect").json()
         assert found["motions"] + found["redundancy"] == robot.n
         assert not found["singular_at_home"]

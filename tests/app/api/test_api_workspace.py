@@ -106,7 +106,7 @@ def test_defaults_give_the_plain_cloud(client, app):
 
 
 def test_all_strategies_and_all_arms(client):
-    for robot in kin.builtin_robots().values():
+    for robot in kin.classic_robots().values():
         answer = client.get(f"{API}/{robot.id}/workspace?n=100&format=csv&q=true")
         assert answer.text.count("\n") == 101
     answers = {s: client.get(WORKSPACE, params={"n": 50, "strategy": s}).content for s in kin.workspace.STRATEGIES}

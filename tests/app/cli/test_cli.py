@@ -440,7 +440,7 @@ def test_check_tells_what_an_arm_is(capsys):
 
 
 def test_check_names_the_solver_and_why(capsys):
-    for robot in kin.builtin_robots().values():
+    for robot in kin.classic_robots().values():
         got = answer(capsys, "check", ROOT / "kin" / "robots" / f"{robot.id}.toml")
         match = closed_form_of(robot)
         assert got["solver"] == ("numeric" if match is None else match.name)

@@ -19,7 +19,7 @@ from app.service.main import create_app
 from app.shared.settings import Settings
 from kin import Joint, Robot
 
-ARMS = list(kin.builtin_robots().values())
+ARMS = list(kin.classic_robots().values())
 
 
 def moment(robot: Robot, **changes: object) -> Moment:

@@ -20,7 +20,7 @@ from app.viewer.session.state import decode
 from app.viewer.shown import ShownArms
 
 PIONEER = kin.get_robot("pioneer5")
-ROBOTS = tuple(kin.builtin_robots().values())
+ROBOTS = tuple(kin.classic_robots().values())
 
 
 class Service:

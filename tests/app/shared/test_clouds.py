@@ -11,9 +11,9 @@ import pytest
 
 from app.shared.clouds import FIRST, SAMPLED, Cloud, Clouds
 from app.shared.threads import NICENESS
-from kin import InputError, builtin_robots, sample_workspace
+from kin import InputError, classic_robots, sample_workspace
 
-ARM = builtin_robots()["pioneer5"]
+ARM = classic_robots()["pioneer5"]
 
 
 @pytest.fixture

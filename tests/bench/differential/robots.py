@@ -15,7 +15,7 @@ _SHARES = {"panda": 3.0, "gen3": 2.0, "xarm7": 2.0, "sawyer": 0.1}
 
 def all_robots() -> dict[str, Any]:
     """Every built-in arm, arms of other makers, and arms whose tables count some joints the other way."""
-    built_in = kin.builtin_robots()
+    built_in = kin.classic_robots()
     others = (GEN3, XARM7, SAWYER, reversed_at(built_in["ur5"], (1, 3)), reversed_at(built_in["panda"], (0, 3, 5)))
     return dict(built_in) | {robot.id: robot for robot in others}
 

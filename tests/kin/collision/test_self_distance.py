@@ -19,7 +19,7 @@ from kin.collision.kernels import segment_distance
 from kin.kernels.compile import jit
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "data" / "golden-clearance.json").read_text("utf-8"))
-ROBOTS = list(kin.builtin_robots().values())
+ROBOTS = list(kin.classic_robots().values())
 
 
 @jit

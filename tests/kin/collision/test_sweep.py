@@ -19,7 +19,7 @@ OBSTACLES = (
 
 
 def robots() -> list[kin.Robot]:
-    return [kin.get_robot(name) for name in kin.builtin_robots()]
+    return [kin.get_robot(name) for name in kin.classic_robots()]
 
 
 @pytest.mark.parametrize("robot", robots(), ids=lambda r: r.id)

@@ -18,7 +18,7 @@ from kin.robot import Joint, Robot
 from kin.transforms import from_position_wxyz
 from kin.units import Units
 
-ARMS = list(kin.builtin_robots().values())
+ARMS = list(kin.classic_robots().values())
 HALF = 0.5 * math.pi
 
 

@@ -20,7 +20,7 @@ EXACT = 1e-12
 OTHER = {"standard": "modified", "modified": "standard"}
 
 
-@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
 def test_both_conventions_describe_the_same_arm(robot):
     other = kin.convert(robot, OTHER[robot.convention])
     assert other.convention != robot.convention

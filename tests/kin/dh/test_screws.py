@@ -35,7 +35,7 @@ def product(S, M, q):
     return T @ M
 
 
-@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
 def test_the_formula_is_the_arm_and_comes_back(robot):
     rng = np.random.default_rng(1)
     S, M = kin.screws(robot)
@@ -56,7 +56,7 @@ def test_the_formula_is_the_arm_and_comes_back(robot):
         assert max(np.abs(again.S - S).max(), np.abs(again.M - M).max()) < 1e-13
 
 
-@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
 def test_space_and_body_form_are_forward_kinematics(robot):
     rng = np.random.default_rng(2)
     q = robot.random_q(rng, 20)

@@ -17,7 +17,7 @@ from kin.transforms import rotation_angle, vector_angle
 TASKS: tuple[Task, ...] = ("pose", "approach", "position")
 TURN = math.pi / 2
 EIGHT = Robot.from_dh([(0, 0.2, 0.1, TURN), (0, 0, 0.2, -TURN)] * 4, home=[0.3, 0.4, -0.5, 0.6] * 2)
-ROBOTS = [kin.get_robot(name) for name in kin.builtin_robots()]
+ROBOTS = [kin.get_robot(name) for name in kin.classic_robots()]
 CASES = [(robot, task) for robot in [*ROBOTS, EIGHT] for task in TASKS]
 
 

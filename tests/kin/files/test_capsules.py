@@ -7,7 +7,7 @@ import pytest
 
 import kin
 
-WITH = [robot for robot in kin.builtin_robots().values() if robot.capsules]
+WITH = [robot for robot in kin.classic_robots().values() if robot.capsules]
 
 
 @pytest.mark.parametrize("robot", WITH, ids=lambda robot: robot.id)

@@ -10,7 +10,7 @@ from kin.motion.geometry.curves import natural
 from kin.motion.geometry.splines import parted
 from kin.motion.timing.timed import JointPath, TimedPath, finer_ends, timed
 
-ARMS = tuple(kin.builtin_robots())
+ARMS = tuple(kin.classic_robots())
 
 # Paths on which other programs failed (problem_suite_1.yaml of toppra, MIT): waypoints, velocity, acceleration.
 HARD = [

@@ -12,7 +12,7 @@ import kin
 from kin.motion.geometry.curves import arc_through, poses, rotations, turning
 from kin.transforms import rotation_vector
 
-ARMS = tuple(kin.builtin_robots())
+ARMS = tuple(kin.classic_robots())
 
 
 def by(*offset):

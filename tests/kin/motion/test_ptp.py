@@ -15,7 +15,7 @@ from kin.motion.pieces import JointMotion
 from kin.motion.tasks import most_kept, motion_dimension
 
 CASES = json.loads((Path(__file__).parents[2] / "data/motion-times.json").read_text(encoding="utf-8"))
-ARMS = tuple(kin.builtin_robots())
+ARMS = tuple(kin.classic_robots())
 positive = st.floats(1e-2, 1e3)
 
 

@@ -11,7 +11,7 @@ import kin
 from kin.motion.planning import zones
 from kin.motion.planning.plan import RefusedError
 
-ARMS = tuple(kin.builtin_robots())
+ARMS = tuple(kin.classic_robots())
 LONGER = 0.01  # the timing of a path is within this part of the best
 
 

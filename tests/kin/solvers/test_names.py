@@ -20,7 +20,7 @@ PI = math.pi
 # The names of pair2 are tested in test_pair2.py.
 BUILT_IN = tuple(
     robot
-    for robot in kin.builtin_robots().values()
+    for robot in kin.classic_robots().values()
     if (form := closed_form_of(robot)) is not None and form.name != "pair2"
 )
 CEILING = np.diag([1.0, -1.0, -1.0, 1.0])

@@ -5,8 +5,9 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from kin import builtin_robots
-from kin.warmup import MADE_UP, MOTIONS, NUMERIC, all_of, family_of, first_family, made_up_arms, parts
+from kin import classic_robots
+from kin.solvers import NUMERIC, family_of
+from kin.warmup import MADE_UP, MOTIONS, all_of, first_family, made_up_arms, parts
 from kin.warmup.preparation import ROOM, SIZE, Preparation
 
 
@@ -22,7 +23,7 @@ def finish_part(preparation: Preparation, name: str) -> None:
 
 
 def test_every_family_has_its_parts_and_all_fit_into_the_memory():
-    for robot in builtin_robots().values():
+    for robot in classic_robots().values():
         assert (family_of(robot) in parts()) == (family_of(robot) != first_family())
         assert all_of(family_of(robot)) in parts()
     assert len(parts()) <= ROOM

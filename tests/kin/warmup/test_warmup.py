@@ -26,7 +26,7 @@ kin.warm_up()
 kin.warm_up_rest()
 before = compilations()
 assert len(before) > 40, before
-for robot in kin.builtin_robots().values():
+for robot in kin.classic_robots().values():
     T = kin.fk(robot, robot.home)
     kin.jacobian(robot, robot.home)
     for task in ("pose", "approach", "position"):
@@ -45,7 +45,7 @@ obstacles = [
     kin.Obstacle("cylinder", (-0.5, 0.3, 0.2), radius=0.1, height=0.4),
     kin.Obstacle("table", (0.0, 0.0, -0.3), size=(1.0, 1.0, 0.05)),
 ]
-for robot in (*kin.builtin_robots().values(), *random_arms(8)):
+for robot in (*kin.classic_robots().values(), *random_arms(8)):
     for q in (robot.q_home, robot.q_home + 0.01, [robot.home] * 3):
         kin.self_distance(robot, q)
         kin.clearance(robot, q, obstacles)
@@ -62,7 +62,7 @@ for strategy in ("uniform", "quasi", "boundary", "volume"):
 kin.section(arm, ((0.0, 0.0, 0.1), (0.0, 1.0, 1.0)), resolution=8, locked=locked)
 kin.section(arm, resolution=8, locked=locked)
 kin.workspace_facts(arm, effort=2, locked=locked)
-for robot in kin.builtin_robots().values():
+for robot in kin.classic_robots().values():
     end = kin.JointTarget(robot.q_home + 0.05)
     back = kin.JointTarget(robot.home)
     moves = [kin.Lin(end, blend=0.01), kin.Lin(back, tool_speed=0.1), kin.Ptp(end, blend=0.01), kin.Ptp(back)]

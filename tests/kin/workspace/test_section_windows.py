@@ -17,7 +17,7 @@ OVERSHOOTING = (
     pytest.param("panda", 400, marks=pytest.mark.slow),
     pytest.param("iiwa14", 350, marks=pytest.mark.slow),
 )
-ROBOTS = tuple(kin.builtin_robots())
+ROBOTS = tuple(kin.classic_robots())
 PER_REGION = 20
 
 

@@ -63,7 +63,7 @@ def test_the_pioneer_reaches_less_far_behind_its_axis():
     assert np.concatenate(plain.curves)[:, 0].min() >= -1e-12
 
 
-@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
 def test_joint_1_faces_to_the_side_of_the_bases_x_axis(robot):
     ahead = faced(robot, np.array([0.0, 0.0, 1.0]))
     assert np.allclose(ahead, [1.0, 0.0, 0.0], atol=1e-12)

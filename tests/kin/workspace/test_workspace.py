@@ -20,7 +20,7 @@ from kin.workspace.search.cells import cell_map
 from kin.workspace.search.probes import ALIKE, TRIES, probe_cells
 from kin.workspace.volume import from_probes
 
-ALL = tuple(kin.builtin_robots())
+ALL = tuple(kin.classic_robots())
 # x, y, z, distance from joint 1's axis, distance from the shoulder: least and largest, inside the printed limits.
 REFERENCE = {
     "pioneer5": (

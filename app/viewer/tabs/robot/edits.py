@@ -12,7 +12,7 @@ from typing import Any
 
 import kin
 from app.viewer.meshes.links import capsules_for
-from app.viewer.own_arm import NAME, OwnArm, own_arm
+from app.viewer.own_arm import NAME, OF_MAKER, OwnArm, own_arm
 from app.viewer.panel.entry import read_cell
 from app.viewer.panel.readout import roll_pitch_yaw
 from kin import InputError, KinematicsError, Robot, RobotFileError
@@ -232,5 +232,6 @@ def part_of(cell: Cell) -> str:
 
 def alike(one: Robot, other: Robot, named: bool) -> bool:
     """Whether two robots have the same table and, if `named`, the same name."""
-    unnamed = replace(other, id=one.id, name=one.name, source=one.source, description=one.description)
+    about = {key: getattr(one, key) for key in ("id", "name", "source", "description", *OF_MAKER)}
+    unnamed = replace(other, **about)
     return one == unnamed and (not named or one.name == other.name)

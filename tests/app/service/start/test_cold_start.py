@@ -15,7 +15,8 @@ from fake_browser import FakeBrowser
 from live_server import wait_for
 
 import kin
-from kin.warmup import family_of, first_family
+from kin.solvers import family_of
+from kin.warmup import first_family
 
 ROOT = Path(__file__).parents[4]
 UR5 = kin.get_robot("ur5")

@@ -24,7 +24,7 @@ from app.viewer.activity.places import Place
 from app.viewer.activity.practice import Practice
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
-from kin import builtin_robots, get_robot
+from kin import classic_robots, get_robot
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -135,7 +135,7 @@ def _decoded(text: str) -> str:
 
 
 def builtin_list() -> list[object]:
-    return [get_robot(robot_id) for robot_id in builtin_robots()]
+    return [get_robot(robot_id) for robot_id in classic_robots()]
 
 
 def test_marks_that_were_written_into_a_link_do_not_count(server: int) -> None:

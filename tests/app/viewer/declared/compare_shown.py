@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from arms import CLASSICS
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from bare_page import STORE, bare_page
+from bare_page import bare_page
 
 from kin.units import DEFAULT_UNITS, Units
 
@@ -75,9 +76,9 @@ def record(key: str) -> dict[str, Any]:
     feature = next(lesson for lesson in LESSONS if lesson.key == key)
     found: dict[str, Any] = {}
     rng = np.random.default_rng(12)
-    with bare_page(STORE.robots[0]) as page:
+    with bare_page(CLASSICS[0]) as page:
         shown = page.open(feature)
-        for robot in STORE.robots:
+        for robot in CLASSICS:
             if robot is not page.now.robot:
                 page.change(robot)
 

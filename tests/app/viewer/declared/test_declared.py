@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from bare_page import STORE, BarePage, bare_page
 
 from app.viewer.declared.facts import Facts
@@ -77,7 +78,7 @@ def leaves(settings_of: type[Settings], prefix: str = "") -> Iterator[tuple[str,
 
 @pytest.mark.parametrize("settings_of", CLASSES, ids=lambda each: each.__name__)
 def test_links_give_back_the_settings_and_ignore_what_they_do_not_know(settings_of: type[Settings]) -> None:
-    for robot in STORE.robots:
+    for robot in CLASSICS:
         fresh = settings_of.fresh(robot)
         state = json.loads(json.dumps(fresh.state(), allow_nan=False))
         assert fresh.restored(state, robot) == fresh
@@ -93,7 +94,7 @@ def test_links_give_back_the_settings_and_ignore_what_they_do_not_know(settings_
 
 @pytest.mark.parametrize("settings_of", CLASSES, ids=lambda each: each.__name__)
 def test_controls_read_what_they_show_and_refuse_the_rest(settings_of: type[Settings]) -> None:
-    for robot in STORE.robots:
+    for robot in CLASSICS:
         fresh = settings_of.fresh(robot)
         for path, spec in leaves(settings_of):
             for units in UNITS:
@@ -339,8 +340,8 @@ def test_every_kind_of_field_is_tried() -> None:
 
 @pytest.mark.parametrize("lesson", DECLARED, ids=lambda each: each.key)
 def test_panels_of_all_arms_name_fields_that_exist(lesson: type[Lesson]) -> None:
-    with bare_page(STORE.robots[0]) as page:
+    with bare_page(CLASSICS[0]) as page:
         page.open(lesson)
-        for robot in STORE.robots[1:]:
+        for robot in CLASSICS[1:]:
             page.change(robot)
             assert page.panel()

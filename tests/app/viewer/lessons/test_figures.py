@@ -137,7 +137,7 @@ def test_a_line_without_a_name_has_no_empty_label(figure: Figure) -> None:
     assert line.label.visible
 
 
-@pytest.mark.parametrize("robot", [*kin.builtin_robots().values()], ids=lambda r: r.id)
+@pytest.mark.parametrize("robot", [*kin.classic_robots().values()], ids=lambda r: r.id)
 def test_labels_are_clear_of_the_links_that_they_measure(scene: viser.SceneApi, robot: kin.Robot) -> None:
     size = body(robot).size
     figure = Figure(scene, f"/clear-{robot.id}", size)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 from hypothesis import given
 from hypothesis import strategies as st
@@ -58,7 +59,7 @@ from kin.units import Units
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 STORE = Store()
-ROBOTS = STORE.robots
+ROBOTS = CLASSICS
 DEGREES, RADIANS = Units(), Units(degrees=False, length="m")
 PAIRS = [(robot, lesson) for robot in ROBOTS for lesson in LESSONS]
 ANGLE = Number("θ?", math.pi / 2, DEGREES.angles, math.radians(1.0), "Add.", (Mistake(0.0, "Forgot it."),), True)

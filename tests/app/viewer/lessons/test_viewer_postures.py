@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from arms import eight_joints
+from arms import CLASSICS, eight_joints
 from fake_browser import FakeBrowser
 
 import kin
@@ -136,7 +136,7 @@ def test_the_row_of_the_list_is_escaped_and_marked() -> None:
 # Ghosts
 
 
-@pytest.mark.parametrize("robot", STORE.robots, ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", CLASSICS, ids=lambda robot: robot.id)
 def test_ghosts_are_posed_as_the_arm_would_be(robot: kin.Robot) -> None:
     q = robot.random_q(np.random.default_rng(3), 4)
     frames = link_poses(robot, q)
@@ -223,7 +223,7 @@ def test_the_cone_contains_the_directions_that_the_solver_reaches() -> None:
     assert np.allclose(np.linalg.norm(vertices, axis=1), 1.0)
     assert faces.max() == len(vertices) - 1
     assert len(patch(np.zeros_like(mask))[1]) == 0
-    assert [robot.id for robot in STORE.robots if has_cone(robot)] == ["pioneer5"]
+    assert [robot.id for robot in CLASSICS if has_cone(robot)] == ["pioneer5"]
 
 
 # In the page

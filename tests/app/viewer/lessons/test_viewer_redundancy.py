@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from arms import GEN3, SAWYER, eight_joints
+from arms import CLASSICS, GEN3, SAWYER, eight_joints
 from fake_browser import ANSWER, FakeBrowser
 
 import kin
@@ -144,7 +144,7 @@ def test_the_arcs_of_the_ring_end_where_the_ranges_end() -> None:
 
 
 def test_coaxial_joints_are_found_and_a_trade_keeps_their_sum() -> None:
-    assert [robot.id for robot in STORE.robots if coaxial(robot)] == ["redundant7"]
+    assert [robot.id for robot in CLASSICS if coaxial(robot)] == ["redundant7"]
     q = PRINTED.q_home.copy()
     traded = q.copy()
     traded[0] += 0.7
@@ -157,7 +157,7 @@ def test_coaxial_joints_are_found_and_a_trade_keeps_their_sum() -> None:
     assert np.allclose(views.frame_origins(PRINTED, q), views.frame_origins(PRINTED, traded), atol=1e-12)
 
 
-@pytest.mark.parametrize("robot", STORE.robots, ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", CLASSICS, ids=lambda robot: robot.id)
 def test_a_joint_turns_the_tool_about_its_joint_axis(robot: kin.Robot) -> None:
     q = robot.random_q(np.random.default_rng(6))
     J = kin.jacobian(robot, q)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
@@ -34,7 +35,7 @@ UNITS = Units()
 BOTH: tuple[Form, Form] = ("space", "body")
 
 
-@pytest.fixture(params=STORE.robots, ids=[robot.id for robot in STORE.robots])
+@pytest.fixture(params=CLASSICS, ids=[robot.id for robot in CLASSICS])
 def robot(request: pytest.FixtureRequest) -> kin.Robot:
     found: kin.Robot = request.param
     return found
@@ -182,7 +183,7 @@ def server() -> Iterator[int]:
 
 
 def test_the_controls_change_table_product_and_scene(server: int) -> None:
-    pioneer = STORE.robots[0]
+    pioneer = CLASSICS[0]
     zero = kin.screws(pioneer)
     with FakeBrowser(server) as tab:
         tab.settle()

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from bare_page import bare_page
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
@@ -32,7 +33,7 @@ from kin.units import Units
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 STORE = Store()
-ROBOTS = STORE.robots
+ROBOTS = CLASSICS
 KINDS = ("velocity", "turning", "force", "moment")
 
 
@@ -314,7 +315,7 @@ def shown(tab: FakeBrowser, J: np.ndarray, decimals: int) -> bool:
 
 
 def test_the_matrix_shows_the_current_jacobian_in_either_frame(tab: FakeBrowser) -> None:
-    robot = STORE.robots[0]
+    robot = CLASSICS[0]
     q = robot.q_home.copy()
     q[0] = math.radians(35.0)
     tab.set("1 rotating base", 35.0)
@@ -429,7 +430,7 @@ def test_a_column_is_drawn_and_removed(tab: FakeBrowser) -> None:
 
 
 def test_every_arm_can_be_shown(tab: FakeBrowser) -> None:
-    for robot in STORE.robots:
+    for robot in CLASSICS:
         use(tab, robot)
         tab.wait(lambda robot=robot: shown(tab, kin.jacobian(robot, robot.q_home), 3 if robot.n < 6 else 2))  # type: ignore[misc]
     assert 'data-status="error"' not in tab.html

@@ -282,7 +282,7 @@ def test_a_detailed_body_is_where_the_urdf_of_its_package_has_it(name: str) -> N
 
 def test_the_library_loads_a_body_once_and_says_when(reader: MeshReader) -> None:
     library = Library(reader)
-    offered = {robot.id for robot in library.offered(tuple(kin.builtin_robots().values()))}
+    offered = {robot.id for robot in library.offered(tuple(kin.classic_robots().values()))}
     assert offered == set(DETAILED)
     puma = kin.get_robot("puma560")
     loaded: list[str] = []

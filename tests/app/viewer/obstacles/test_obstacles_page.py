@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 
 import kin
-from app.shared.store import Store
 from app.viewer.obstacles.feature import ObstaclesFeature
 from app.viewer.panel.entry import read_pose
 from app.viewer.panel.joints import label
@@ -23,7 +23,7 @@ from kin.units import DEFAULT_UNITS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
-ROBOTS = Store().robots
+ROBOTS = CLASSICS
 UR5 = kin.get_robot("ur5")
 AVOID = "Avoid collisions"
 WALL = kin.Obstacle("box", (0.0, 0.35, 0.5), size=(1.5, 0.1, 1.5), name="wall")

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 
 import kin
-from app.shared.store import Store
 from app.viewer.obstacles import placed
 from app.viewer.obstacles.words import sentence
 from app.viewer.session.state import MAX_TEXT, PageState, decode, encode
@@ -16,7 +16,7 @@ from kin.collision.contacts import surroundings
 from kin.collision.obstacles import MOST_OBSTACLES, SHAPES
 from kin.units import DEFAULT_UNITS
 
-ROBOTS = Store().robots
+ROBOTS = CLASSICS
 UR5 = kin.get_robot("ur5")
 
 

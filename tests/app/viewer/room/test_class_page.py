@@ -29,7 +29,7 @@ from app.viewer.session.worker.crew import BUILDS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
-ROBOT = kin.builtin_robots()["pioneer5"]
+ROBOT = kin.classic_robots()["pioneer5"]
 EXERCISE = "which-joint-goes-down"
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 
 import kin
-from app.shared.store import Store
 from app.viewer.scene.bodies.drawing import drawing
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.clearance import clearance
@@ -15,7 +15,7 @@ from app.viewer.scene.meshes import body
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
-ROBOTS = list(Store().robots)
+ROBOTS = list(CLASSICS)
 SOLID = ("link", "housing", "body-")
 
 

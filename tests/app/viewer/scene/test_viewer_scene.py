@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 import viser
+from arms import CLASSICS
 
 import kin
 from app.shared.store import Store
@@ -63,8 +64,8 @@ AWKWARD = {
         "standard", ("1", "revolute", 0, 0.3, 0, 0), ("x", "fixed", 0, -0.2, 0, 0), ("2", "revolute", 0, 0, 0.2, 0)
     ),
 }
-ROBOTS = [*Store().robots, *AWKWARD.values()]
-IDS = [*(r.id for r in Store().robots), *AWKWARD]
+ROBOTS = [*CLASSICS, *AWKWARD.values()]
+IDS = [*(r.id for r in CLASSICS), *AWKWARD]
 
 
 def world(scene: viser.SceneApi, name: str) -> np.ndarray:
@@ -227,7 +228,7 @@ def test_a_body_is_made_once_for_all_visitors() -> None:
     assert body(robot) is body(kin.get_robot("pioneer5"))
 
 
-@pytest.mark.parametrize("robot", Store().robots, ids=[r.id for r in Store().robots])
+@pytest.mark.parametrize("robot", CLASSICS, ids=[r.id for r in CLASSICS])
 def test_joints_at_one_point_look_different(robot: kin.Robot) -> None:
     """Housings of joints that share an origin differ in size or place, and neighbours differ in colour."""
     made = body(robot)
@@ -261,7 +262,7 @@ def test_surfaces_of_tubes_face_outward() -> None:
 
 
 @pytest.mark.parametrize("aspect", [0.46, 0.9, 1.0, 956 / 720, 2.2])
-@pytest.mark.parametrize("robot", Store().robots, ids=[r.id for r in Store().robots])
+@pytest.mark.parametrize("robot", CLASSICS, ids=[r.id for r in CLASSICS])
 def test_the_default_view_holds_the_arm(robot: kin.Robot, aspect: float) -> None:
     position, look_at = camera.view(body(robot), aspect)
     forward = (look_at - position) / np.linalg.norm(look_at - position)

@@ -18,7 +18,8 @@ from app.viewer.arm import Arm
 from app.viewer.server import ViewerServer
 from app.viewer.session.preparing import HELD, Preparing
 from app.viewer.session.state import PageState, encode
-from kin.warmup import COLLISIONS, MOTIONS, all_of, family_of, parts
+from kin.solvers import family_of
+from kin.warmup import COLLISIONS, MOTIONS, all_of, parts
 from kin.warmup.preparation import Preparation
 
 STORE = Store()

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
@@ -37,7 +38,7 @@ from kin.units import DEFAULT_UNITS, Units
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 STORE = Store()
-ROBOTS = STORE.robots
+ROBOTS = CLASSICS
 PUMA, PIONEER = STORE.get("puma560"), STORE.get("pioneer5")
 RADIANS_CM = Units(degrees=False, length="cm")
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 
 import kin
@@ -110,7 +111,7 @@ def test_hostile_lock_events_are_ignored(port: int) -> None:
 
 def test_what_each_arm_can_follow() -> None:
     every, none = (True,) * 3, (False,) * 3
-    for robot in STORE.robots:
+    for robot in CLASSICS:
         flat = robot.id.startswith("planar")
         assert gizmo_axes(robot, "pose").arrows == (True, True, not flat)
         assert gizmo_axes(robot, "position").rings == none

@@ -197,7 +197,7 @@ def test_hostile_choices_are_refused_and_the_session_lives(port: int) -> None:
         assert np.allclose(tab.tool_pose(), kin.fk(SRS, SRS.q_home), atol=1e-9)
 
 
-@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda r: r.id)
+@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda r: r.id)
 def test_the_answer_to_a_pose_tells_what_asking_again_where_it_leads_would_tell(robot: kin.Robot) -> None:
     """So that a drag need not ask twice."""
     rng = np.random.default_rng(5)

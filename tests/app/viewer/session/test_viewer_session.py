@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 from websockets.exceptions import ConnectionClosed
@@ -226,7 +227,7 @@ def test_random_keeps_locked_joints_and_clear_of_the_pedestal(port: int) -> None
 def test_every_robot_can_be_chosen_and_left_again(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
-        for robot in [*STORE.robots[1:], PIONEER]:
+        for robot in [*CLASSICS[1:], PIONEER]:
             tab.choose(robot.name)
             arrives(tab, kin.fk(robot, robot.q_home), 1e-9)
             assert tab.sliders_in("Joints") == [label(robot, i) for i in range(robot.n)]

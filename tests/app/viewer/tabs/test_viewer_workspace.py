@@ -15,6 +15,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 from PIL import Image
@@ -61,7 +62,7 @@ def test_values_outside_a_scale_have_its_end_colours():
     assert np.array_equal(painted, table[[0, 0, 127, 255, 255]])
 
 
-@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda r: r.id)
+@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda r: r.id)
 @pytest.mark.parametrize("by", [b for b in colours.BY.values() if b != "one"])
 def test_a_scale_covers_nearly_all_points(robot, by):
     chunk = Cloud(robot, 5000, seed=8, measures=colours.measures(by)).slice(0, 5000)
@@ -273,7 +274,7 @@ def test_progress_in_words():
 
 
 def test_points_are_about_two_pixels():
-    sizes_ = [default_size(r) for r in STORE.robots]
+    sizes_ = [default_size(r) for r in CLASSICS]
     assert all(0.0005 <= s <= 0.02 for s in sizes_)
     assert sizes_[0] < max(sizes_)
 
@@ -682,7 +683,7 @@ def test_a_figure_of_the_chapter_is_one_click(tab):
     tab.wait(lambda: not any("(mm)" in m["props"].get("text", "") for m in tab.nodes.values()))
 
 
-@pytest.mark.parametrize("robot", kin.builtin_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
 def test_the_box_of_the_axes_contains_the_workspace(robot):
     low, high = axes.box_of(robot)
     points = kin.fk_positions(robot, robot.random_q(np.random.default_rng(3), 500))

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,7 +31,7 @@ from kin.units import Units
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 STORE = Store()
-ROBOTS = STORE.robots
+ROBOTS = CLASSICS
 PLANAR, PIONEER, UR5, PANDA, SCARA, PUMA = (
     STORE.get(name) for name in ("planar2r", "pioneer5", "ur5", "panda", "scara", "puma560")
 )

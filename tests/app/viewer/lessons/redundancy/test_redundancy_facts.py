@@ -7,6 +7,7 @@ import math
 import numpy as np
 import numpy_arm
 import pytest
+from arms import CLASSICS
 from bare_page import STORE
 
 import kin
@@ -15,7 +16,7 @@ from app.viewer.lessons.redundancy.facts import RedundancyFacts
 from app.viewer.lessons.redundancy.settings import RedundancySettings
 from app.viewer.lessons.redundancy.views import frame_origins
 
-ARMS = pytest.mark.parametrize("robot", STORE.robots, ids=[robot.id for robot in STORE.robots])
+ARMS = pytest.mark.parametrize("robot", CLASSICS, ids=[robot.id for robot in CLASSICS])
 TASKS: tuple[kin.Task, ...] = ("pose", "approach", "position")
 
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -35,7 +36,7 @@ from kin.units import Units
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 STORE = Store()
-ROBOTS = STORE.robots
+ROBOTS = CLASSICS
 DEGREES, RADIANS = Units(), Units(degrees=False, length="m")
 ANGLE = st.floats(-math.pi, math.pi)
 TRIPLES = st.tuples(ANGLE, ANGLE, ANGLE)

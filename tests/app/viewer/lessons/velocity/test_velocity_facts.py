@@ -7,6 +7,7 @@ import math
 import numpy as np
 import numpy_arm
 import pytest
+from arms import CLASSICS
 from bare_page import STORE, bare_page
 
 import kin
@@ -16,7 +17,7 @@ from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.lessons.velocity.settings import SPEEDS, Statics, VelocitySettings
 
 NEAR = 2e-8  # of differences of poses
-ARMS = pytest.mark.parametrize("robot", STORE.robots, ids=[robot.id for robot in STORE.robots])
+ARMS = pytest.mark.parametrize("robot", CLASSICS, ids=[robot.id for robot in CLASSICS])
 
 
 def facts(robot: kin.Robot, seed: int, **settings: object) -> VelocityFacts:

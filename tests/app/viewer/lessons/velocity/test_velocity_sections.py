@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
@@ -33,7 +34,7 @@ STORE = Store()
 UNITS = Units()
 
 
-@pytest.fixture(params=STORE.robots, ids=[robot.id for robot in STORE.robots])
+@pytest.fixture(params=CLASSICS, ids=[robot.id for robot in CLASSICS])
 def robot(request: pytest.FixtureRequest) -> kin.Robot:
     found: kin.Robot = request.param
     return found
@@ -145,7 +146,7 @@ def server() -> Iterator[int]:
 
 
 def test_a_force_is_typed_dragged_and_turned(server: int) -> None:
-    pioneer = STORE.robots[0]
+    pioneer = CLASSICS[0]
     J = kin.jacobian(pioneer, pioneer.q_home)
     with FakeBrowser(server) as tab:
         tab.settle()
@@ -229,7 +230,7 @@ def test_a_line_is_plotted(server: int) -> None:
         tab.wait(lambda: "Plot the line" in str(tab.gui))
         tab.set("Plot the line", True)
         tab.wait(lambda: "Start and end are the same" in tab.html)
-        tab.set(label(STORE.robots[0], 0), 20.0)
+        tab.set(label(CLASSICS[0], 0), 20.0)
         tab.settle()
         tab.set("Plot the line", True)
         tab.wait(lambda: "kb-motion-curve" in tab.html and "Smallest σ_min" in tab.html)

@@ -1,0 +1,181 @@
+"""Every arm of the library against what others publish of it.
+
+``tests/data/library`` holds one file per maker's arm: origins, axes and limits of the joints as a published
+description has them, with its source and licence. Where there are two descriptions, it is not the one that the
+arm's own numbers are from. Forward kinematics is multiplied out here, by nothing of Kinboard's.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kin
+from kin.files.builtin import BUILTIN
+from kin.files.home import margins
+from kin.solvers import family_of
+
+PUBLISHED = {
+    file.stem: json.loads(file.read_text(encoding="utf-8"))
+    for file in sorted((Path(__file__).parents[1] / "data" / "library").glob("*.json"))
+}
+LIBRARY = {name: robot for name, robot in kin.builtin_robots().items() if name not in kin.classic_robots()}
+FAMILIES = {
+    "ur3 ur10 ur3e ur5e ur10e ur16e ur20 z1": "parallel6",
+    "so100 so101 vx300 wx250": "parallel5",
+    "kr6 tx2-60 lrmate200id gp8 vx300s wx250s jaco2s": "wrist6",
+    "crx10ia gofa jaco2 xarm6 cylindrical": "general6",
+    "fr3 xarm7": "offset7",
+    "iiwa7": "srs7",
+    "gen3 sawyer baxter": "general7",
+    "gantry": "slides3",
+    "rrp prr": "general5",
+    "rpp": "slides2",
+}
+FAMILY = {name: family for names, family in FAMILIES.items() for name in names.split()}
+TASKS = {3: "position", 5: "approach"}  # by the number of joints; six and more meet a pose
+each_arm = pytest.mark.parametrize("robot", LIBRARY.values(), ids=list(LIBRARY))
+
+
+def turn(axis, angle):
+    """Rodrigues' formula ``(3, 3)``."""
+    x, y, z = np.array(axis) / np.linalg.norm(axis)
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + math.sin(angle) * K + (1 - math.cos(angle)) * K @ K
+
+
+def placed(origin):
+    """The transform of xyz and rpy, as URDF means them."""
+    T = np.eye(4)
+    roll, pitch, yaw = origin["rpy"]
+    T[:3, :3] = turn([0, 0, 1], yaw) @ turn([0, 1, 0], pitch) @ turn([1, 0, 0], roll)
+    T[:3, 3] = origin["xyz"]
+    return T
+
+
+def published_pose(about, q):
+    """The pose of the tool from origins and axes, joint by joint."""
+    T = placed(about["before"]) if "before" in about else np.eye(4)
+    values = iter(q)
+    for joint in about["joints"]:
+        T = T @ placed(joint)
+        if joint["type"] != "fixed":
+            moved = np.eye(4)
+            moved[:3, :3] = turn(joint["axis"], next(values))
+            T = T @ moved
+    assert next(values, None) is None
+    return T
+
+
+def anywhere(robot, count, seed=0):
+    """Joint values within the limits; a joint without limits turns once."""
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -math.pi)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, math.pi)
+    return np.random.default_rng(seed).uniform(lower, upper, (count, robot.n))
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_the_tool_is_where_a_published_description_has_it(name):
+    robot, about = LIBRARY[name], PUBLISHED[name]
+    q = anywhere(robot, 100)
+    expected = np.array([published_pose(about, each) for each in q])
+    found = kin.fk(robot, q)
+    assert np.linalg.norm(found[:, :3, 3] - expected[:, :3, 3], axis=1).max() < 1e-4  # m
+    assert np.abs(found[:, :3, :3] - expected[:, :3, :3]).max() < 1e-4
+
+
+def differing_limits(name):
+    """The joints whose limits or speeds are not the published ones."""
+    moving = [joint for joint in PUBLISHED[name]["joints"] if joint["type"] != "fixed"]
+    for ours, theirs in zip(LIBRARY[name].joints, moving, strict=True):
+        if "limits" not in theirs or theirs["type"] == "continuous":
+            same = ours.limits is None
+        else:
+            same = ours.limits == pytest.approx(theirs["limits"], abs=2e-3)
+        speed = theirs.get("velocity")
+        if not same or (speed and ours.velocity and ours.velocity != pytest.approx(speed, rel=2e-3)):
+            yield ours.name
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_joint_limits_are_the_published_ones_or_it_says_why_not(name):
+    assert bool(list(differing_limits(name))) == ("other_limits" in PUBLISHED[name])
+
+
+def test_every_makers_arm_is_checked_and_every_check_names_its_source():
+    assert {name for name, robot in LIBRARY.items() if robot.maker} == set(PUBLISHED)
+    assert len(LIBRARY) >= 25
+    for about in PUBLISHED.values():
+        assert about["source"]
+        assert about["licence"]
+        assert "before" not in about or about["before"]["why"]
+
+
+@each_arm
+def test_a_file_states_where_its_numbers_are_from(robot):
+    (file,) = BUILTIN.rglob(f"{robot.id}.toml")
+    data = tomllib.loads(file.read_text(encoding="utf-8"))
+    assert len(data["source"]) > 60
+    assert data["description"].endswith(".")
+    assert ("maker" in data) == (file.parent.name != "textbook")
+    assert "payload" not in data or "payload" in data["source"]
+    assert "mass" not in data or "mass" in data["source"]
+    for row in data["rows"]:
+        assert row.get("kind") == "fixed" or "limits" in row, row["name"]
+    assert kin.parse_robot(kin.robot_to_toml(robot)) == robot
+
+
+@each_arm
+def test_home_is_inside_the_limits_and_not_singular(robot):
+    q = robot.q_home
+    assert (q >= robot.lower).all()
+    assert (q <= robot.upper).all()
+    assert margins(robot, np.array([q]))[0] > 0.01
+
+
+@each_arm
+def test_inverse_kinematics_finds_the_way_back(robot):
+    assert family_of(robot) == FAMILY[robot.id]
+    for q in anywhere(robot, 3, seed=4):
+        T = kin.fk(robot, q)
+        task = TASKS.get(robot.n, "pose")
+        result = kin.solve_ik(robot, T, q_seed=q, task=task)
+        assert result.status == "solved", result.message
+        for solution in result.solutions:
+            found = kin.fk(robot, solution.q)
+            assert np.abs(found[:3, 3] - T[:3, 3]).max() < 1e-6
+            across = slice(2, 3) if task == "approach" else slice(0, 3 if task == "pose" else 0)
+            assert np.abs(found[:3, across] - T[:3, across]).max(initial=0.0) < 1e-6
+
+
+FORMULAS = {
+    "rpp": lambda q: (-q[2] * math.sin(q[0]), q[2] * math.cos(q[0]), 0.3 + q[1]),
+    "rrp": lambda q: (
+        q[2] * math.cos(q[0]) * math.sin(q[1]),
+        q[2] * math.sin(q[0]) * math.sin(q[1]),
+        0.5 + q[2] * math.cos(q[1]),
+    ),
+    "prr": lambda q: (
+        0.4 * math.cos(q[1]) + 0.3 * math.cos(q[1] + q[2]),
+        0.4 * math.sin(q[1]) + 0.3 * math.sin(q[1] + q[2]),
+        q[0],
+    ),
+    # The hand of the last two reaches 120 and 150 mm past the wrist's point.
+    "cylindrical": lambda q: (-q[2] * math.sin(q[0]), q[2] * math.cos(q[0]), 0.3 + q[1]),
+    "gantry": lambda q: (-q[2], q[1], q[0]),
+}
+
+
+def test_the_arms_of_textbooks_are_where_their_coordinates_say():
+    assert {name for name, robot in LIBRARY.items() if not robot.maker} == set(FORMULAS)
+    for name, formula in FORMULAS.items():
+        robot = LIBRARY[name]
+        hand = {"cylindrical": 0.12, "gantry": 0.15}.get(name, 0.0)
+        for q in anywhere(robot, 20):
+            T = kin.fk(robot, q)
+            assert T[:3, 3] - hand * T[:3, 2] == pytest.approx(np.array(formula(q)), abs=1e-12)
