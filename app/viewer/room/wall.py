@@ -39,7 +39,8 @@ LINK, JOINT, AWAY = (86, 140, 190), (44, 62, 80), (165, 170, 175)
 MOST = 40  # arms on the wall
 WIDTH = 4.4  # of the wall, in radii of the sphere around the arm on show
 SIZE = 0.42  # radius of a small arm, in distances between two of them
-LABEL = 0.46  # height of a name below the middle of its arm, in the same
+LABEL = 0.06  # height of a name below the pad of its arm, in the same
+LETTERS = (1.0, 1.8, 9.0)  # smallest and largest size of names, in the usual one, and that size times columns
 ROOM = 0.52  # room above and below the middle of an arm, in the same
 PAD = (0.26, 0.03)  # radius and thickness of a pad, in the same
 COLUMN = 0.05  # radius of the column below a base, in the same
@@ -163,9 +164,13 @@ class Wall:
             self._add(f"{root}/pads", feet, pads, 1),
         ]
         out = 0.3 * self._pitch * DIRECTION / np.linalg.norm(DIRECTION) - [0.0, 0.0, LABEL * self._pitch]
+        smallest, largest, share = LETTERS
+        scale = float(np.clip(share / columns, smallest, largest))
         self._labels = [
-            add_label(self._scene, f"{root}/name/{i}", arm.label, position=cell + out, anchor="top-center")
-            for i, (arm, cell) in enumerate(zip(arms, self._cells, strict=True))
+            add_label(
+                self._scene, f"{root}/name/{i}", arm.label, scale=scale, position=foot + out, anchor="top-center"
+            )
+            for i, (arm, foot) in enumerate(zip(arms, feet[:count], strict=True))
         ]
 
     def _pads(self, arms: Sequence[SmallArm]) -> tuple[Array, Array]:

@@ -24,6 +24,7 @@ from app.viewer.room.following import decoded
 from app.viewer.room.member import SURE, Member
 from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
+from app.viewer.room.wall import PADS
 from app.viewer.server import ViewerServer
 from app.viewer.session.worker.crew import BUILDS
 
@@ -447,6 +448,36 @@ def test_the_wall_sends_one_list_of_poses_for_all(room: Class) -> None:
     teacher.wait(lambda: 'The arm of <span dir="auto">Student 2</span>' in teacher.html)
     teacher.wait(lambda: not any("/wall-" in name for name in teacher.nodes))
     assert teacher.visible[teacher.gizmo] is True
+
+
+def test_the_wall_says_what_the_list_says(room: Class) -> None:
+    def names() -> list[str]:
+        found = {name: node["props"]["text"] for name, node in teacher.nodes.items() if "/name/" in name}
+        return [found[name] for name in sorted(found)]
+
+    teacher = room.teacher()
+    tabs, tickets = zip(*(room.join(alias) for alias in ("Ann", "Bob", "Eve")), strict=True)
+    press(teacher, "fields", "task", value=[[EXERCISE]])
+    for tab in tabs:
+        tab.wait(lambda tab=tab: f'data-exercise="{EXERCISE}"' in tab.html)
+    press(teacher, "wall")
+    teacher.wait(lambda: names() == ["○ Ann · not begun", "○ Bob · not begun", "○ Eve · not begun"])
+    tabs[0].say("feature", ["exercises", ["answer", 1], 2])
+    for option in range(3):
+        tabs[1].say("feature", ["exercises", ["answer", f"{option}", option], 0])
+    press(tabs[0], "hand")
+    press(tabs[1], "hand")
+    teacher.wait(lambda: names() == ["☝ ✓ Ann · solved", "☝ ! Bob · stuck", "○ Eve · not begun"])
+    colours = [
+        tuple(np.ravel(teacher.nodes[name]["props"]["batched_colors"])[:3])
+        for name in teacher.nodes
+        if name.endswith("/pads")
+    ]
+    assert colours == [PADS["solved"]]
+    room.hub.rooms.remove_seat(room.room.id, tickets[2].seat)
+    teacher.wait(lambda: names() == ["☝ ✓ Ann · solved", "☝ ! Bob · stuck"])
+    room.hub.rooms.end(room.room.id)
+    teacher.wait(lambda: names() == [])
 
 
 def test_the_wall_shows_arms_only(room: Class) -> None:
