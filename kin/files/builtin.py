@@ -20,7 +20,16 @@ FIRST = ("pioneer5", "redundant7", "redundant7-craig")  # the chapter's arms com
 
 @lru_cache(maxsize=1)
 def classic_robots() -> dict[str, Robot]:
-    """The classics by id: the chapter's first, then in alphabetical order."""
+    """The classics by id: the chapter's first, then in alphabetical order.
+
+    Returns:
+        The twelve arms for which lessons and exercises are written; `builtin_robots` has those of the library too.
+
+    Examples:
+        >>> import kin
+        >>> len(kin.classic_robots()), "ur3e" in kin.classic_robots(), "ur3e" in kin.builtin_robots()
+        (12, False, True)
+    """
     robots = load_folder(BUILTIN)
     return {robot_id: robots[robot_id] for robot_id in dict.fromkeys((*FIRST, *robots))}
 
