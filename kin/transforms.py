@@ -187,6 +187,12 @@ def _one_wxyz(
     return w / norm, x / norm, y / norm, z / norm
 
 
+def rotation_about(axis: Array, angle: float) -> Array:
+    """The rotation ``(3, 3)`` about an axis ``(3,)`` of any length, by an angle in radians."""
+    xyz = math.sin(angle / 2) * axis / np.linalg.norm(axis)
+    return rotation_from_wxyz(np.array([math.cos(angle / 2), *xyz]))
+
+
 def rotation_angle(R_a: Array, R_b: Array) -> float:
     """Angle in radians between two rotations ``(3, 3)``, accurate from 0 to π.
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from html import escape
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -88,6 +89,20 @@ def ticks(low: float, high: float) -> list[float]:
     power = 10.0 ** math.floor(math.log10(rough))
     step = next(power * k for k in (1, 2, 5, 10) if power * k >= rough)
     return [k * step for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
+
+
+def chart(width: float, height: float, label: str, content: str) -> Markup:
+    """A chart of the panel, as wide as the panel is.
+
+    Args:
+        width, height: of what is drawn, in its own units.
+        label: what it shows, for a screen reader.
+        content: SVG.
+    """
+    return Markup(
+        f'<svg class="kb-plot" viewBox="0 0 {width:.0f} {height:.0f}" width="100%" role="img" '
+        f'aria-label="{escape(label)}">{content}</svg>'
+    )
 
 
 def tick_labels(low: float, high: float, unit: float) -> list[tuple[float, str]]:

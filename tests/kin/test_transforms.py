@@ -15,6 +15,7 @@ from kin.transforms import (
     as_transform,
     frame_from_approach,
     from_position_wxyz,
+    rotation_about,
     rotation_angle,
     rotation_from_wxyz,
     vector_angle,
@@ -130,3 +131,12 @@ def test_what_is_no_quaternion_is_refused(wxyz, field):
     with pytest.raises(kin.InputError) as caught:
         kin.rotation_from_wxyz(wxyz)
     assert caught.value.field == field
+
+
+@pytest.mark.parametrize("length", [1.0, 0.01, 70.0])
+def test_a_rotation_about_an_axis_turns_what_is_perpendicular_to_it_by_the_angle(length: float) -> None:
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    R = rotation_about(length * axis, 0.7)
+    assert np.allclose(R @ axis, axis, atol=1e-15)
+    side = np.array([1.0, 2.0, 0.0]) / math.sqrt(5.0)
+    assert np.allclose(R @ side, math.cos(0.7) * side + math.sin(0.7) * np.cross(axis, side), atol=1e-15)

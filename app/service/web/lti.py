@@ -27,6 +27,7 @@ from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError, Ticke
 from app.classroom.clock import now
 from app.classroom.courses import Courses
 from app.service.web.access import pass_guest
+from app.service.web.short_page import short_page
 from app.shared.security import PAGE_POLICY, set_cookie
 from app.shared.settings import Settings
 
@@ -45,10 +46,6 @@ THREADS, MOST_WAITING = 6, 200
 PATIENCE = 4.0  # s that a launch waits for a thread
 P = ParamSpec("P")
 T = TypeVar("T")
-_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
-<meta name="color-scheme" content="light dark"><title>{title}</title>
-<link rel="stylesheet" href="../static/lti.css">
-<main><h1>{title}</h1>{body}</main></html>"""
 
 
 def lti_routes(hub: Hub, settings: Settings, courses: Callable[[], Courses]) -> list[BaseRoute]:
@@ -250,7 +247,7 @@ class _Pages:
             f"<fieldset><legend>Single exercises</legend>{rows('exercise')}</fieldset>"
             "<button>Add to the course</button></form>"
         )
-        return HTMLResponse(_PAGE.format(title="Kinboard for your course", body=body))
+        return HTMLResponse(short_page("Kinboard for your course", body))
 
     async def choose(self, request: Request) -> Response:
         """The signed answer with what was chosen, which the browser takes back to the platform."""
@@ -280,7 +277,7 @@ class _Pages:
             "<button>Back to the course</button></form>"
         )
         policy = PAGE_POLICY.replace("form-action 'self'", f"form-action {origin_of(back)}")
-        page = _PAGE.format(title="Kinboard for your course", body=body_html)
+        page = short_page("Kinboard for your course", body_html)
         return HTMLResponse(page, headers={"content-security-policy": policy, "cache-control": "no-store"})
 
     def _signer(self) -> URLSafeTimedSerializer:
@@ -307,7 +304,7 @@ async def _form(request: Request) -> dict[str, list[str]]:
 def refused(words: str, status: int, wait: float = 0.0) -> Response:
     """A page that says why, and when it is worth another try."""
     again = f"<p>Try again in {ceil(wait)} seconds.</p>" if wait else ""
-    page = _PAGE.format(title="Kinboard could not be opened", body=f"<p>{html.escape(words)}</p>{again}")
+    page = short_page("Kinboard could not be opened", f"<p>{html.escape(words)}</p>{again}")
     headers = {"cache-control": "no-store"} | ({"retry-after": str(ceil(wait))} if wait else {})
     return HTMLResponse(page, status, headers=headers)
 

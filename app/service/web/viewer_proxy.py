@@ -29,6 +29,7 @@ from app.service.web.access import rights_of
 from app.service.web.embedding import discovery
 from app.service.web.inspection import MalformedMessageError, admitted
 from app.service.web.negotiation import accepts_gzip, is_current
+from app.service.web.short_page import short_page
 from app.shared.clients import client_of
 from app.shared.connection import SILENCE, ConnectionEnded, Viewer, never_silent
 from app.shared.metrics import DROPPED, STREAMED, VISITORS
@@ -37,23 +38,13 @@ from app.shared.security import VIEWER_POLICY, origin_allowed
 
 logger = logging.getLogger("kinboard.bridge")
 
-_PAGE = (
-    '<!doctype html><html lang="en"><meta charset="utf-8">'
-    # A refresh would not load the page again where its address has a fragment, as links have.
-    '<script src="../static/again.js" data-after="{again}"></script>'
-    '<meta name="viewport" content="width=device-width"><meta name="color-scheme" content="light dark">'
-    "<title>{title}</title><style>body{{display:grid;place-items:center;min-height:90vh;margin:1rem;"
-    "font:1.05rem/1.6 system-ui,sans-serif;text-align:center}}</style><p>{words}</p></html>"
+_WARMING_PAGE = short_page(
+    "Kinboard is warming up", "<p>The viewer is warming up and will appear here in a moment.</p>", again=1
 )
-_WARMING_PAGE = _PAGE.format(
-    again=1,
-    title="Kinboard is warming up",
-    words="The viewer is warming up and will appear here in a moment.",
-)
-_FULL_PAGE = _PAGE.format(
+_FULL_PAGE = short_page(
+    "Kinboard is full",
+    "<p>All places in the viewer are taken. This page looks again every ten seconds.</p>",
     again=10,
-    title="Kinboard is full",
-    words="All places in the viewer are taken. This page looks again every ten seconds.",
 )
 
 ADDRESSES = 8  # of the service, for which a page with an address of its own is kept

@@ -15,7 +15,7 @@ import numpy as np
 
 from app.exercises.typed import EntryError
 from app.viewer.panel.readout import ANGLES
-from kin import InputError, KinematicsError, Task
+from kin import InputError, KinematicsError, Task, from_xyz_rpy
 from kin.transforms import Array, as_transform, frame_from_approach, rotation_from_wxyz
 from kin.typed import ReadError, cut, elements, example, interpret, read, read_element, unit_at_end
 from kin.units import LENGTH_UNITS, PLAIN, Unit, Units, general
@@ -121,7 +121,7 @@ def _pose(kind: PoseKind, text: str, units: Units, pose: Array) -> tuple[Array, 
     if len(words) != count:
         raise EntryError(f"{count} numbers are needed here", f"Found {len(words)}. Valid: {_valid(kind, units)}.")
     if kind == "angles":
-        pose[:3, :3] = rotation_from_angles(*_values(words, angles))
+        pose[:3, :3] = from_xyz_rpy(np.zeros(3), _values(words, angles))[:3, :3]
         return pose, "pose"
     if kind == "quaternion":
         pose[:3, :3] = _rotation(_values(words, [PLAIN] * 4))
@@ -132,7 +132,7 @@ def _pose(kind: PoseKind, text: str, units: Units, pose: Array) -> tuple[Array, 
             return pose, "position" if kind == "pose" else "pose"
         case 6:
             values = _values(words, lengths + angles)
-            pose[:3, :3] = rotation_from_angles(*values[3:])
+            pose[:3, :3] = from_xyz_rpy(np.zeros(3), values[3:])[:3, :3]
         case 7:
             values = _values(words, [*lengths, *[PLAIN] * 4])
             pose[:3, :3] = _rotation(values[3:])
@@ -165,18 +165,6 @@ def _values(words: Sequence[str], units: Sequence[Unit]) -> list[float]:
             shown = " or ".join(f"“{reading}”" for reading in readings)
             raise ReadError(f"“{name}” after the last number may hold for all; type {shown}", readings)
     return values
-
-
-def rotation_from_angles(roll: float, pitch: float, yaw: float) -> Array:
-    """The rotation ``(3, 3)`` ``Rz(yaw) Ry(pitch) Rx(roll)`` of angles in radians."""
-    (cr, cp, cy), (sr, sp, sy) = ([f(a) for a in (roll, pitch, yaw)] for f in (math.cos, math.sin))
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
 
 
 def _approach(point: list[str], along: list[str], lengths: list[Unit], pose: Array) -> Array:

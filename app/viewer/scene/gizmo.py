@@ -9,7 +9,7 @@ import numpy as np
 import viser
 
 from app.viewer.panel import Post
-from kin.transforms import Array, rotation_angle, rotation_from_wxyz, wxyz_from_rotation
+from kin.transforms import Array, rotation_about, rotation_angle, wxyz_from_rotation
 
 # Steps of the target: of a drag with Shift, and of one press of a key (with Shift: a tenth and a fifth).
 STEP, TURN = 0.01, math.radians(5.0)  # m, rad
@@ -64,9 +64,3 @@ def nudged(T: Array, axis: int, turn: bool, amount: float, in_base: bool) -> Arr
     else:
         out[:3, 3] += amount * direction
     return out
-
-
-def rotation_about(axis: Array, angle: float) -> Array:
-    """The rotation ``(3, 3)`` about an axis ``(3,)`` of any length."""
-    xyz = math.sin(angle / 2) * axis / np.linalg.norm(axis)
-    return rotation_from_wxyz(np.array([math.cos(angle / 2), *xyz]))

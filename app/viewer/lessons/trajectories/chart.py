@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from markupsafe import Markup, escape
 
+from app.exports import svg
 from app.exports.svg import few, joint_colour, tick_labels
 from kin.transforms import Array
 from kin.units import general, raised
@@ -69,11 +70,8 @@ def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: st
             )
     name = Markup('<span class="kb-chart-name"><i style="background:{}"></i>{}</span> ')
     legend = Markup("").join(name.format(joint_colour(i), curve.name) for i, curve in enumerate(curves))
-    svg = Markup(
-        f'<svg class="kb-plot" viewBox="0 0 {WIDTH:.0f} {bottom + BOTTOM:.0f}" width="100%" role="img" '
-        f'aria-label="{escape(label)}">{"".join(parts)}</svg>'
-    )
-    return Markup('<span class="kb-chart">') + svg + legend + Markup("</span>")
+    drawn = svg.chart(WIDTH, bottom + BOTTOM, label, "".join(parts))
+    return Markup('<span class="kb-chart">') + drawn + legend + Markup("</span>")
 
 
 def _row(row: Row, k: int, curves: tuple[Curve, ...], ends: tuple[float, float]) -> list[str]:

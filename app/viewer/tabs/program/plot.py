@@ -11,9 +11,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from markupsafe import Markup
 
-from app.exports.svg import few, joint_colour, tick_labels
+from app.exports.svg import chart, few, joint_colour, tick_labels
 from app.viewer.views.templates import render
 from kin import Robot
 from kin.motion import Dwell, Motion
@@ -70,11 +69,8 @@ def plot_html(motion: Motion, joint: int | None, units: Units, other: Motion | N
     parts = [_panel(panel, courses, i, span, TOP + i * (HIGH + GAP)) for i, panel in enumerate(panels)]
     parts.append(_time_axis(span, bottom))
     words = "all joints in percent of their limits" if joint is None else f"joint {joint + 1}"
-    svg = Markup(
-        f'<svg class="kb-plot" viewBox="0 0 {WIDTH:.0f} {bottom + BOTTOM:.0f}" width="100%" role="img" '
-        f'aria-label="Position, velocity and acceleration over time: {words}; speed of the tool">'
-        f"{''.join(parts)}</svg>"
-    )
+    label = f"Position, velocity and acceleration over time: {words}; speed of the tool"
+    svg = chart(WIDTH, bottom + BOTTOM, label, "".join(parts))
     joints = [
         {"index": i, "name": each.name, "colour": joint_colour(i), "on": i == joint}
         for i, each in enumerate(robot.joints)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import kin
 from app.exercises.typed import EntryError
-from app.viewer.panel.entry import read_pose, read_value, rotation_from_angles
+from app.viewer.panel.entry import read_pose, read_value
 from app.viewer.panel.fields import shown
 from app.viewer.panel.readout import roll_pitch_yaw
 from kin.transforms import wxyz_from_rotation
@@ -76,7 +76,7 @@ angles = st.floats(-math.pi, math.pi)
 
 @given(angles, st.floats(-1.5, 1.5), angles)
 def test_angles_are_those_of_the_readout(roll: float, pitch: float, yaw: float) -> None:
-    R = rotation_from_angles(roll, pitch, yaw)
+    R = read_pose("angles", f"{roll!r} {pitch!r} {yaw!r}", Units(degrees=False), np.eye(4))[0][:3, :3]
     again = roll_pitch_yaw(R)
     assert np.abs(np.exp(1j * np.array(again)) - np.exp(1j * np.array([roll, pitch, yaw]))).max() < 1e-9
 

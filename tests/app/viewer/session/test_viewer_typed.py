@@ -13,8 +13,9 @@ from fake_browser import FakeBrowser
 import kin
 from app.shared.store import Store
 from app.viewer.panel.joints import label
-from app.viewer.scene.gizmo import STEP, TURN, rotation_about, snapped
+from app.viewer.scene.gizmo import STEP, TURN, snapped
 from app.viewer.scene.gizmo_axes import gizmo_axes
+from kin.transforms import rotation_about
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 

@@ -13,7 +13,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from app.exports.svg import AxisStyle, Plot, axes, joint_colour, png_url
+from app.exports.svg import AxisStyle, Plot, axes, chart, joint_colour, png_url
 from app.viewer.tabs.workspace.colours import radius_and_height
 from app.viewer.views.templates import render
 from kin import Robot, Section
@@ -101,10 +101,7 @@ def image(density: Density) -> str:
 
 def _svg(frame: Plot, content: str) -> Markup:
     label = "section of the workspace: distance from joint 1's axis and height"
-    return Markup(
-        f'<svg class="kb-plot" viewBox="0 0 {WIDTH:.0f} {frame.bottom + BOTTOM:.0f}" width="100%" role="img" '
-        f'aria-label="{label}">{content}</svg>'
-    )
+    return chart(WIDTH, frame.bottom + BOTTOM, label, content)
 
 
 def _axes(frame: Plot, unit: Unit) -> str:
