@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from html import escape
 
 import numpy as np
-from markupsafe import Markup
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -91,7 +90,7 @@ def ticks(low: float, high: float) -> list[float]:
     return [k * step for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
 
 
-def chart(width: float, height: float, label: str, content: str) -> Markup:
+def chart(width: float, height: float, label: str, content: str) -> str:
     """A chart of the panel, as wide as the panel is.
 
     Args:
@@ -99,7 +98,7 @@ def chart(width: float, height: float, label: str, content: str) -> Markup:
         label: what it shows, for a screen reader.
         content: SVG.
     """
-    return Markup(
+    return (
         f'<svg class="kb-plot" viewBox="0 0 {width:.0f} {height:.0f}" width="100%" role="img" '
         f'aria-label="{escape(label)}">{content}</svg>'
     )

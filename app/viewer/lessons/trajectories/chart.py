@@ -70,7 +70,7 @@ def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: st
             )
     name = Markup('<span class="kb-chart-name"><i style="background:{}"></i>{}</span> ')
     legend = Markup("").join(name.format(joint_colour(i), curve.name) for i, curve in enumerate(curves))
-    drawn = svg.chart(WIDTH, bottom + BOTTOM, label, "".join(parts))
+    drawn = Markup(svg.chart(WIDTH, bottom + BOTTOM, label, "".join(parts)))
     return Markup('<span class="kb-chart">') + drawn + legend + Markup("</span>")
 
 

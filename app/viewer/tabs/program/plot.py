@@ -70,7 +70,7 @@ def plot_html(motion: Motion, joint: int | None, units: Units, other: Motion | N
     parts.append(_time_axis(span, bottom))
     words = "all joints in percent of their limits" if joint is None else f"joint {joint + 1}"
     label = f"Position, velocity and acceleration over time: {words}; speed of the tool"
-    svg = chart(WIDTH, bottom + BOTTOM, label, "".join(parts))
+    svg = Markup(chart(WIDTH, bottom + BOTTOM, label, "".join(parts)))
     joints = [
         {"index": i, "name": each.name, "colour": joint_colour(i), "on": i == joint}
         for i, each in enumerate(robot.joints)

@@ -101,7 +101,7 @@ def image(density: Density) -> str:
 
 def _svg(frame: Plot, content: str) -> Markup:
     label = "section of the workspace: distance from joint 1's axis and height"
-    return chart(WIDTH, frame.bottom + BOTTOM, label, content)
+    return Markup(chart(WIDTH, frame.bottom + BOTTOM, label, content))
 
 
 def _axes(frame: Plot, unit: Unit) -> str:
