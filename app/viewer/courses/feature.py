@@ -254,6 +254,6 @@ class CourseFeature(Feature):
         if self._page is None:
             return
         if self._progress.course is None:
-            update_html(self._page, views.chooser_html(self._courses, self._desk))
+            update_html(self._page, views.chooser_html(self._courses, self._desk, self._progress.seated))
         else:
             update_html(self._page, views.course_html(self._progress, self._desk))

@@ -51,10 +51,11 @@ def bar_html(progress: Progress) -> str:
     )  # fmt: skip
 
 
-def chooser_html(courses: Courses, desk: Desk) -> str:
-    """All courses, and a field for a code."""
+def chooser_html(courses: Courses, desk: Desk, seated: bool) -> str:
+    """All courses, and, but for a student in a room (`seated`), what is for teachers: own courses, codes."""
     return render(
         "course/choose", courses=courses.all, desk=desk, most=MOST_IN_FILE, said=said(desk.checked, courses),
+        seated=seated,
     )  # fmt: skip
 
 

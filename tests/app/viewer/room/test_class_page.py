@@ -327,6 +327,13 @@ def test_a_course_opens_on_every_page(room: Class) -> None:
     mode(student, "free")
     title = teacher.html.split("data-class-course>Course: <b>")[1].split("<")[0]
     student.wait(lambda: title in student.html)
+    student.wait(lambda: 'data-course="follow"' in student.html)
+    for words in ("Make a result code", "For teachers", 'data-guide-do="edit"'):
+        assert words not in student.html, words
+    student.say("feature", ["course", ["close", 1], None])
+    student.wait(lambda: 'data-course="choose"' in student.html)
+    assert "Check a result code" not in student.html
+    assert "New course" not in student.html
     press(teacher, "uncourse")
     teacher.wait(lambda: "data-class-course" not in teacher.html)
 
@@ -478,6 +485,7 @@ def test_the_wall_says_what_the_list_says(room: Class) -> None:
     teacher.wait(lambda: names() == ["☝ ✓ Ann · solved", "☝ ! Bob · stuck"])
     room.hub.rooms.end(room.room.id)
     teacher.wait(lambda: names() == [])
+    teacher.wait(lambda: "Close the wall" not in teacher.html)
 
 
 def test_the_wall_shows_arms_only(room: Class) -> None:
