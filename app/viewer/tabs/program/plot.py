@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from markupsafe import Markup
 
 from app.exports.svg import chart, few, joint_colour, tick_labels
 from app.viewer.views.templates import render
