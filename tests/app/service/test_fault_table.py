@@ -18,9 +18,22 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+import httpx2
 import pytest
-from attacks import ROOT
-from faulty_machine import MANNERS, SEEDS, SILENCE, Asking, Machine, launches, misbehave, running_machine, strain
+from attacks import ROOT, victim
+from faulty_machine import (
+    APART,
+    MANNERS,
+    SEEDS,
+    SILENCE,
+    Asking,
+    Machine,
+    can_mount,
+    launches,
+    misbehave,
+    running_machine,
+    strain,
+)  # fmt: skip
 from live_server import wait_for
 
 from app.service.handover import SUPPORTED, Role
@@ -207,6 +220,20 @@ def test_the_service_holds(fault: Fault, request: pytest.FixtureRequest) -> None
     assert service.kept() >= service.confirmed
     with service.student() as page:
         service.answer(page)
+
+
+@pytest.mark.skipif(not can_mount(), reason="needs filesystems of its own")
+def test_the_service_starts_beside_a_read_only_and_a_full_folder(tmp_path: Path) -> None:
+    """`/dev/shm` is read-only, and the folder for temporary files has no byte free."""
+    mounts = (
+        'mount -t tmpfs -o ro tmpfs /dev/shm && mount -t tmpfs -o size=64k tmpfs "$TMPDIR" || exit 1\n'
+        'cat /dev/zero > "$TMPDIR/junk" 2> /dev/null\nexec "$@"'
+    )
+    with victim(before=(*APART, "sh", "-c", mounts, "sh"), TMPDIR=str(tmp_path)) as service:
+        answer = httpx2.get(f"{service.url}/api/v1/robots/pioneer5", trust_env=False, timeout=60)
+        assert answer.status_code == 200
+        assert service.metric('kinboard_requests_total{method="GET",route="/livez",status="200"}') > 0
+        assert "Traceback" not in service.log
 
 
 # -- what the table must contain -------------------------------------------------------------------------------

@@ -38,7 +38,9 @@ def main() -> int:
         help="numbers of visitors, of points, of rounds; names of requests, of attacks",
     )
     parser.add_argument(
-        "--minutes", type=int, help="how long the siege lasts; the soak: of a steady load, which stays"
+        "--minutes",
+        type=int,
+        help="how long the siege lasts, four at least; the soak: of a steady load, which stays",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write everything measured to this file")
     arguments = parser.parse_args()
