@@ -49,6 +49,7 @@ from kin import get_robot
 
 MOST = 8 << 20  # bytes of each folder, besides compiled kernels
 SILENCE = 10.0  # s: KINBOARD_WORKER_TIMEOUT
+PATIENCE = 120.0  # s for what is not measured
 EXERCISE = "which-joint-goes-down"
 ASKED = (
     ("POST", "/api/v1/robots/pioneer5/ik", {"target": {"position": [0.045, 0.191, -0.211]}}),
@@ -201,7 +202,16 @@ class Machine:
             self.cookie = f"{COOKIE}={student.cookies[COOKIE]}"
 
     def student(self) -> FakeBrowser:
-        """A page of the student, at an exercise."""
+        """A page of the student, at an exercise. It is tried again while kernels are compiled."""
+        end = time.monotonic() + PATIENCE
+        while True:
+            try:
+                return self._student()
+            except AssertionError:
+                if time.monotonic() > end:
+                    raise
+
+    def _student(self) -> FakeBrowser:
         memory = json.dumps({"address": "http://127.0.0.1/", "state": encode(PageState(lesson="exercises"))})
         tab = FakeBrowser(
             self.service.port, memory=memory, additional_headers={"Cookie": self.cookie}, close_timeout=0.1
@@ -220,7 +230,7 @@ class Machine:
         """Let the student give an answer, and wait until the page says that it is stored."""
         before = stored(tab)
         tab.say("feature", ["exercises", ["answer", 100 + self.confirmed], 0])
-        tab.wait(lambda: stored(tab) > before)
+        tab.wait(lambda: stored(tab) > before, timeout=PATIENCE)
         self.confirmed += 1
 
     def kept(self) -> int:
@@ -353,10 +363,10 @@ class Asking(threading.Thread):
 
     def __exit__(self, *_: object) -> None:
         self._ended.set()
-        self.join(60)
+        self.join(PATIENCE)
 
     def run(self) -> None:
-        options: dict[str, Any] = {"trust_env": False, "timeout": 60, "verify": False}
+        options: dict[str, Any] = {"trust_env": False, "timeout": PATIENCE, "verify": False}
         for method, path, body in itertools.cycle(ASKED):
             if self._ended.wait(0.02):
                 return

@@ -362,9 +362,12 @@ async def _keep_on(attacker: Attacker, attack: Attack) -> None:
         await asyncio.sleep(attack.pause)
 
 
-def attack(port: int, token: str, seconds: float, report: Connection, names: list[str] | None = None) -> None:
-    """A process of attackers, which ends by itself: sends what `besiege` returns."""
-    os.nice(19)
+def attack(
+    port: int, token: str, seconds: float, report: Connection, names: list[str] | None, niceness: int
+) -> None:
+    """A process of attackers, which ends by itself: sends None when they begin, and what `besiege` returns."""
+    os.nice(niceness)
+    report.send(None)
     began = time.monotonic()
     found = asyncio.run(besiege(port, token, seconds, names))
     report.send((time.monotonic() - began, found))

@@ -50,11 +50,8 @@ async def _phase(siege: Siege, name: str, seconds: float) -> dict[str, float]:
     }
 
 
-async def measure(
-    service: Service, groups: list[list[str]], attacked: float, quiet: float
-) -> list[dict[str, Any]]:
+async def measure(siege: Siege, groups: list[list[str]], attacked: float, quiet: float) -> list[dict[str, Any]]:
     """Each group of attacks at once, one group after the other."""
-    siege = Siege(service)
     await siege.connect()
     rows = []
     for names in groups:
@@ -76,6 +73,6 @@ def run(quick: bool, workers: int, only: list[str] | None = None) -> dict[str, A
         raise SystemExit(f"no attack is called {only}; there are: {', '.join(names)}")
     seconds = ATTACKED / 3 if quick else ATTACKED
     with serve(workers, token=TOKEN, read_only="1") as service:
-        rows = asyncio.run(measure(service, [[name] for name in chosen], seconds, QUIET))
+        rows = asyncio.run(measure(Siege(service), [[name] for name in chosen], seconds, QUIET))
     print("\n" + table(f"attacks: {seconds:g} s each, {workers} worker(s)", rows))
     return {"rows": rows, "seconds": seconds}
