@@ -17,7 +17,7 @@ import sys
 import tempfile
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 from fastapi import FastAPI
@@ -100,12 +100,14 @@ def create_app(
     member: Member | None = None,
     on_ready: Callable[[], None] | None = None,
     bench: Path | None = None,
+    courses: Courses | None = None,
 ) -> FastAPI:
     """The whole service as one ASGI application; `on_ready` is called when it has warmed up.
 
     Args:
         member: what its process is among those of the service.
         bench: folder that these share for runs of the benchmark; None: one of its own.
+        courses: those of the operator, and exercises, which all processes share; None: they are read when needed.
 
     Raises:
         RobotFileError: a file in the operator's folder of robots is invalid.
@@ -118,7 +120,8 @@ def create_app(
     work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share, memory)
     scoreboard = Scoreboard(settings, bench)
     classroom = Hub.of(settings)
-    startup = Startup(settings, store, clouds, maps, summaries, classroom, bridge, member, on_ready)
+    known = cache(lambda: courses or _courses(settings, store))
+    startup = Startup(settings, store, clouds, maps, summaries, classroom, known, bridge, member, on_ready)
 
     def idle() -> bool:
         return not (bridge.places.taken or work.used or state.streams.open or summaries.pending or maps.pending)
@@ -144,15 +147,15 @@ def create_app(
     install_problem_handlers(app)
     complete_document(app, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
-    app.router.routes.extend([*room_routes(classroom, settings, store), *scoreboard.routes()])
-    app.router.routes.extend(lti_routes(classroom, settings, partial(_courses, settings, store)))
+    app.router.routes.extend([*room_routes(classroom, settings, known), *scoreboard.routes()])
+    app.router.routes.extend(lti_routes(classroom, settings, known))
     app.include_router(status.router)
     _add_middleware(app, settings, Guests(classroom))
     return app
 
 
 def _courses(settings: Settings, store: Store) -> Courses:
-    """The courses and exercises that a learning platform may link to."""
+    """The courses and exercises, read; raises `ExerciseFileError`."""
     return Courses(Exercises(settings.exercises, store.get), settings.courses, store.get)
 
 
@@ -214,8 +217,8 @@ def run(settings: Settings, open_browser: bool = False) -> int:
             stack.enter_context(listener)
         try:
             store = Store(settings.robots)
-            exercises = Exercises(settings.exercises, store.get)  # each process reads them again; errors show here
-            _ = Courses(exercises, settings.courses, store.get).all
+            courses = _courses(settings, store)
+            _ = courses.all  # now: processes that start later must not depend on the files
             check_platforms(settings)
         except (InputError, RobotFileError, ExerciseFileError, PlatformsRefused) as error:
             print(f"kinboard: {error}", file=sys.stderr)
@@ -242,10 +245,11 @@ def run(settings: Settings, open_browser: bool = False) -> int:
                 stack.enter_context(link)
         settings, bench = _with_bench_folder(settings, stack)
         if len(parts) == 1:
-            return _serve(settings, parts[0], store=store, greeting=greeting, bench=bench)
+            return _serve(settings, parts[0], store=store, courses=courses, greeting=greeting, bench=bench)
+        processor = random.randrange(1024)
         return supervise(
-            # One reading of the robots for all processes, also for those that start later.
-            partial(_serve, settings, store=store, bench=bench, processor=random.randrange(1024)),
+            # One reading of the operator's files for all processes, also for those that start later.
+            partial(_serve, settings, store=store, courses=courses, bench=bench, processor=processor),
             parts,
             grace=settings.drain + STOP_TIMEOUT + 1.0,
             silence=settings.worker_timeout,
@@ -276,6 +280,7 @@ def _serve(
     member: Member,
     line: socket.socket | None = None,
     store: Store | None = None,
+    courses: Courses | None = None,
     greeting: Greeting | None = None,
     processor: int = 0,
     bench: Path | None = None,
@@ -284,6 +289,7 @@ def _serve(
 
     Args:
         line: connection to the supervisor, if there are several processes.
+        store, courses: read by the supervisor; None: they are read here.
         bench: folder for runs of the benchmark, if there are any.
         processor: on which the first of several processes is kept, and the others on those that follow.
     """
@@ -298,7 +304,8 @@ def _serve(
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.set_threshold(*COLLECTIONS)
     # Kernels and routes live as long as the process: one collection among them would stop all visitors for 50 ms.
-    server = Server(create_app(settings, store, member, gc.freeze, bench), settings, member, greeting, line)
+    app = create_app(settings, store, member, gc.freeze, bench, courses)
+    server = Server(app, settings, member, greeting, line)
     # uvicorn shuts down in order and then raises the signal again, which is the expected end here.
     before = signal.signal(signal.SIGTERM, server.handle_exit)
     try:

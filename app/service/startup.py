@@ -17,6 +17,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 from app.classroom import Hub
+from app.classroom.courses import Courses
 from app.service.compiler import STEP, PartsCompiler, compile_first
 from app.service.handover import Member, Phase, Role
 from app.service.web.viewer_proxy import ViewerBridge
@@ -41,6 +42,7 @@ class Startup:
     """Starts the viewer and compiles the kernels in a thread; ``/readyz`` reports `status`.
 
     Args:
+        courses: those that pages offer, and their exercises.
         member: what this process is among those of the service.
         on_ready: called by that thread when everything is ready, just before `status` says so.
 
@@ -56,6 +58,7 @@ class Startup:
         maps: Maps,
         summaries: Summaries,
         classroom: Hub,
+        courses: Callable[[], Courses],
         bridge: ViewerBridge,
         member: Member | None = None,
         on_ready: Callable[[], None] | None = None,
@@ -69,6 +72,7 @@ class Startup:
         self._maps = maps
         self._summaries = summaries
         self._classroom = classroom
+        self._courses = courses
         self._bridge = bridge
         self._on_ready = on_ready
         self._viewer: ViewerServer | None = None
@@ -178,7 +182,8 @@ class Startup:
             from app.viewer.server import ViewerServer
 
             caches = self._clouds, self._maps, self._summaries
-            viewer = ViewerServer(self._store, self._settings, *caches, self._classroom, self.preparation)
+            shared = self._classroom, self.preparation, self._courses()
+            viewer = ViewerServer(self._store, self._settings, *caches, *shared)
             viewer.start(self._loop)
             self._viewer = self._bridge.viewer = viewer
         finally:

@@ -49,6 +49,7 @@ class ViewerServer:
     Args:
         maps, summaries, classroom: shared with REST; None: the viewer creates and closes its own.
         preparation: which kernels are compiled; None: all are.
+        courses: shared with REST, as are the exercises in them; None: the viewer reads both.
     """
 
     def __init__(
@@ -60,15 +61,15 @@ class ViewerServer:
         summaries: Summaries | None = None,
         classroom: Hub | None = None,
         preparation: Preparation | None = None,
+        courses: Courses | None = None,
     ) -> None:
-        exercises = Exercises(settings.exercises, store.get)
-        courses = Courses(exercises, settings.courses, store.get)
+        known = courses or Courses(Exercises(settings.exercises, store.get), settings.courses, store.get)
         meshes = MeshReader(settings.mesh_memory, settings.client_share, settings.receive_timeout)
         hub = classroom or Hub.of(settings)
         caches = clouds, maps or Maps(), summaries or Summaries()
         readers = meshes, Library(meshes)
         kernels = preparation or Preparation()
-        self._services = Services(store, *caches, *readers, Pace(), courses, hub, kernels)
+        self._services = Services(store, *caches, *readers, Pace(), known, hub, kernels)
         self._owns_maps = maps is None
         self._owns_summaries = summaries is None
         self._owns_classroom = classroom is None

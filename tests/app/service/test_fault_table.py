@@ -118,7 +118,7 @@ def platform(manner: str) -> Act:
 
 
 SIGNALS = ("SIGTERM", "SIGKILL", "SIGINT", "SIGHUP", "SIGSEGV", "SIGSTOP")
-SAMPLED = {("rest", "SIGTERM"), ("viewer", "SIGKILL")}
+SAMPLED = {("rest", "SIGTERM"), ("viewer", "SIGKILL"), ("temp", "full"), ("temp", "gone"), ("exercises", "gone")}
 PROCESSES = [
     Fault(
         role, name, send(role, signal.Signals[name]), (role, name) in SAMPLED,
@@ -130,7 +130,7 @@ PROCESSES = [
 
 FOLDERS = [
     Fault(
-        name, how, and_replace_all(act), name == "temp" and how != "read-only", lost=2,
+        name, how, and_replace_all(act), (name, how) in SAMPLED, lost=2,
         work=COMPILING if name == "cache" and how in ("damaged", "gone") else 0.0,
     )
     for name in ("temp", "shm", "data", "cache", *SEEDS)

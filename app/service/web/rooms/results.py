@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import codecs
 import logging
-from collections.abc import Iterable, Iterator
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 from typing import TYPE_CHECKING
 
@@ -17,15 +16,13 @@ from starlette.types import Send
 from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, Role
 from app.classroom.clock import now
+from app.classroom.courses import Courses
 from app.classroom.results.table import Row, csv_of, rows
 from app.classroom.work import Attempt
 from app.service.web.rooms.page import results_page
-from app.shared.settings import Settings
-from app.shared.store import Store
 
 if TYPE_CHECKING:
     from app.classroom.rooms import OpenRoom
-    from app.exercises import Exercises
 
 logger = logging.getLogger("kinboard.classroom")
 
@@ -35,8 +32,8 @@ MOST = 400  # rows on the screen; the file has all attempts
 class Results:
     """The pages of the attempts of a room; only for its teacher."""
 
-    def __init__(self, hub: Hub, settings: Settings, store: Store) -> None:
-        self._hub, self._settings, self._store = hub, settings, store
+    def __init__(self, hub: Hub, courses: Callable[[], Courses]) -> None:
+        self._hub, self._courses = hub, courses
 
     async def show(self, request: Request) -> Response:
         """The table; its script asks for this page again and again."""
@@ -54,7 +51,7 @@ class Results:
 
     def _shown(self, row: Row) -> dict[str, object]:
         """A row as the page has it."""
-        exercise, work = self._exercises.get(row.exercise), row.work
+        exercise, work = self._courses().exercises.get(row.exercise), row.work
         said = str(work.answer or "")
         if exercise is not None and work.tries:
             from app.exercises.said import answer_in_words
@@ -104,15 +101,9 @@ class Results:
             )
         return room
 
-    @cached_property
-    def _exercises(self) -> Exercises:
-        from app.exercises import Exercises  # with the first page: the start need not wait
-
-        return Exercises(self._settings.exercises, self._store.get)
-
     @property
     def _titles(self) -> dict[str, str]:
-        return {one.id: one.title for one in self._exercises.all}
+        return {one.id: one.title for one in self._courses().exercises.all}
 
 
 class _Download(StreamingResponse):

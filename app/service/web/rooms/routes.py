@@ -6,6 +6,7 @@ cookie is not sent with requests that other sites make, and forms are only accep
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from starlette.routing import BaseRoute, Route
 from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, RefusedError, Role, Ticket, UnknownRoomError
 from app.classroom.clock import now
+from app.classroom.courses import Courses
 from app.classroom.tokens import LONGEST_TOKEN, read_code, show_code
 from app.classroom.views import ERASING, in_one_line
 from app.service.web.access import forget_guest, form_of, may_open, pass_guest
@@ -26,7 +28,6 @@ from app.service.web.rooms.results import Results
 from app.shared.clients import client_of
 from app.shared.security import origin_allowed, set_cookie
 from app.shared.settings import Settings
-from app.shared.store import Store
 
 if TYPE_CHECKING:
     from app.classroom.rooms import OpenRoom
@@ -34,9 +35,9 @@ if TYPE_CHECKING:
 ASK_ERASED = 3  # seconds until the page asks again whether an ended room is erased
 
 
-def room_routes(hub: Hub, settings: Settings, store: Store) -> list[BaseRoute]:
-    """The pages of rooms."""
-    results = Results(hub, settings, store)
+def room_routes(hub: Hub, settings: Settings, courses: Callable[[], Courses]) -> list[BaseRoute]:
+    """The pages of rooms; `courses` has the exercises that they name."""
+    results = Results(hub, courses)
     pages = _Pages(hub, settings.allowed_origins, bool(settings.frame_ancestors))
     return [
         Route("/room", pages.show, methods=["GET"], name="room"),
