@@ -1,6 +1,8 @@
 """Calls for many targets.
 
-`solve_ik_many` answers each target of a stack as :func:`kin.solve_ik` does: limits, ranges, order, a sentence.
+`solve_ik_many` answers each target of a stack as :func:`kin.solve_ik` does: limits, ranges, order, a sentence. The
+best solutions come from one compiled pass where the arm's family has one; results and sentences are made when they
+are asked for.
 `ik_branches` returns joint values at the rate of a control loop, or for a million targets: all branches of a
 closed form as a plain array, without limits, order or verification. It calls the batch kernels of the arm's closed
 form (`kin.solvers.contract.BatchKernels`).
@@ -10,7 +12,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import NamedTuple, overload
 
 import numpy as np
@@ -20,17 +23,19 @@ from kin.collision import Obstacle
 from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.answers import answer
+from kin.ik.candidates import nearest_rows
 from kin.ik.options import Frame, IKOptions, Images, Limits, Locks, Preference, Solver, Values
-from kin.ik.problem import listed, prepare, read_poses, read_seed
+from kin.ik.problem import FAR, IKProblem, listed, prepare, read_poses, read_seed
 from kin.ik.results import IKResult, Status
 from kin.kernels import fk as fk_kernels
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.solvers.contract import Many, One
+from kin.solvers.contract import POSE, Many, One
 from kin.transforms import Array, finite_array, is_plain
 
 _POSE = (4, 4)
+_AT_ONCE = 1024  # targets of one compiled call
 _CACHE = "_batch"
 _empty, _isinf, _ndarray = np.empty, math.isinf, np.ndarray
 
@@ -38,20 +43,28 @@ _empty, _isinf, _ndarray = np.empty, math.isinf, np.ndarray
 class IKResults(Sequence[IKResult]):
     """The answers to a stack of targets: a sequence of `IKResult`, with the best solutions as one array.
 
+    A result is made when it is first asked for, and kept.
+
     Attributes:
         q: ``(k, n)`` the best solution for each target, NaN where there is no exact one; read-only.
         solved: ``(k,)`` whether there is an exact one.
         status: of each answer.
     """
 
-    def __init__(self, results: Sequence[IKResult], n: int) -> None:
-        self._results = tuple(results)
-        self.status: tuple[Status, ...] = tuple(result.status for result in self._results)
-        self.solved: NDArray[np.bool_] = np.array([status is Status.SOLVED for status in self.status], dtype=bool)
-        self.q: Array = np.full((len(self._results), n), math.nan)
-        for i in np.flatnonzero(self.solved).tolist():
-            self.q[i] = self._results[i].solutions[0].q
+    def __init__(self, problem_at: Callable[[int], IKProblem], q: Array) -> None:
+        """The answers to the problems of `problem_at`; rows of q ``(k, n)`` that are NaN are solved here."""
+        self._problem_at, self.q = problem_at, q
+        self._made: dict[int, IKResult] = {}
+        for i in np.flatnonzero(np.isnan(q[:, 0])).tolist():
+            if self[i].status is Status.SOLVED:
+                q[i] = self[i].solutions[0].q
+        self.solved: NDArray[np.bool_] = ~np.isnan(q[:, 0])
         self.q.flags.writeable = self.solved.flags.writeable = False
+
+    @cached_property
+    def status(self) -> tuple[Status, ...]:
+        """Of each answer."""
+        return tuple(Status.SOLVED if done else self[i].status for i, done in enumerate(self.solved.tolist()))
 
     @overload
     def __getitem__(self, index: int) -> IKResult: ...
@@ -60,15 +73,33 @@ class IKResults(Sequence[IKResult]):
     def __getitem__(self, index: slice) -> tuple[IKResult, ...]: ...
 
     def __getitem__(self, index: int | slice) -> IKResult | tuple[IKResult, ...]:
-        return self._results[index]
+        if isinstance(index, slice):
+            return tuple(self[i] for i in range(len(self))[index])
+        index = range(len(self))[index]
+        found = self._made.get(index)
+        if found is None:
+            found = self._made[index] = answer(self._problem_at(index))
+        return found
 
     def __len__(self) -> int:
-        return len(self._results)
+        return len(self.q)
 
     def __repr__(self) -> str:
         """How many targets have each status."""
         counts = Counter(status.value for status in self.status)
         return f"IKResults({len(self)} targets: {', '.join(f'{n} {status}' for status, n in counts.items())})"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Copies and pickles have all results."""
+        return _with_results, (self.q, tuple(self))
+
+
+def _with_results(q: Array, results: tuple[IKResult, ...]) -> IKResults:
+    """Answers that are made already."""
+    copy = IKResults.__new__(IKResults)
+    copy.q, copy.solved = q, ~np.isnan(q[:, 0])
+    copy._made = dict(enumerate(results))
+    return copy
 
 
 def solve_ik_many(
@@ -131,21 +162,52 @@ def solve_ik_many(
         obstacles=obstacles,
     )
     given, prepared = listed(targets), prepare(robot, wanted)
-    poses = read_poses(given, prepared.code, always=robot.n < 6)
-    seeds = [prepared.seed] * len(given) if q_seed is None else _seeds(robot, q_seed, len(given))
-    found = [answer(prepared.at(*pose, seed)) for pose, seed in zip(poses, seeds, strict=True)]
-    return IKResults(found, robot.n)
+    poses, errors = read_poses(given, prepared.code, always=robot.n < 6)
+    seeds = prepared.seed[None] if q_seed is None else _seeds(robot, q_seed, len(given))
+    last = len(seeds) - 1
+
+    def problem_at(i: int) -> IKProblem:
+        return prepared.at(poses[i], float(errors[i]), seeds[min(i, last)])
+
+    return IKResults(problem_at, _nearest(prepared, poses, errors, seeds))
 
 
-def _seeds(robot: Robot, q_seed: ArrayLike, count: int) -> list[Array]:
-    """One seed ``(n,)`` for each target, of one for all ``(n,)`` or of one for each ``(k, n)``."""
+def _nearest(prepared: IKProblem, poses: Array, errors: Array, seeds: Array) -> Array:
+    """The best solution of each target ``(k, n)``, NaN where it takes more than one compiled pass to find it.
+
+    The pass serves poses of arms whose family has a kernel for many, inside the limits, with all branches, nearest
+    to the seed first.
+    """
+    q = np.full((len(poses), prepared.robot.n), math.nan)
+    options, form = prepared.options, prepared.closed_form
+    plain = options.prefer == options.images == "nearest" and options.respect_limits and not options.avoids
+    if form is None or not plain or prepared.code != POSE or prepared.branches is not None or prepared.requested:
+        return q
+    exact = np.flatnonzero(errors == 0.0)
+    for start in range(0, len(exact), _AT_ONCE):
+        some = exact[start : start + _AT_ONCE]
+        T, near = np.ascontiguousarray(poses[some]), seeds if len(seeds) == 1 else seeds[some]
+        found = np.empty((len(some), q.shape[1]))
+        rows = np.empty((len(some), len(form.branches), q.shape[1]))
+        if not form.solve_many(T, near, prepared.lower, prepared.upper, rows):
+            break
+        nearest_rows(prepared.requirement, T, near, rows, found)
+        q[some] = found
+    return q
+
+
+def _seeds(robot: Robot, q_seed: ArrayLike, count: int) -> Array:
+    """The seeds ``(k, n)``, or one for all targets ``(1, n)``."""
     rows = robot.check_q(q_seed, "q_seed")
     if rows.shape not in (robot.q_shape, (count, robot.n)):
         expected = f"one configuration of {robot.n} values, or one for each of the {count} targets"
         raise InputError("q_seed", f"shape {rows.shape}", expected)
     if rows.ndim == 1:
-        return [read_seed(robot, rows)] * count
-    return [read_seed(robot, row, f"q_seed[{i}]") for i, row in enumerate(rows)]
+        return read_seed(robot, rows)[None]
+    far = np.abs(rows) > FAR
+    for i in np.flatnonzero(far.any(axis=1)).tolist():
+        read_seed(robot, rows[i], f"q_seed[{i}]")
+    return np.array(rows)
 
 
 class _Prepared(NamedTuple):

@@ -108,6 +108,32 @@ def residuals(T: Array, target: Array, task: int, mask: Array, e: Array) -> tupl
 
 
 @jit
+def to_image(requirement: Requirement, near: Array, seed: Array, q: Array) -> tuple[float, float]:
+    """Bring q ``(n,)`` to its best image, in place: (distance to the seed, sum of what is outside the limits)."""
+    lower, upper, turns = requirement.lower, requirement.upper, requirement.turns
+    distance = 0.0
+    overrun = 0.0
+    for i in range(q.shape[0]):
+        x = q[i]
+        low, high = (lower[i], upper[i]) if requirement.respect else (-math.inf, math.inf)
+        if turns[i] > 0.0:
+            x = nearest_image(x, near[i], low, high)
+        if x < lower[i]:
+            if lower[i] - x <= _LIMIT:
+                x = lower[i]
+            else:
+                overrun += lower[i] - x
+        elif x > upper[i]:
+            if x - upper[i] <= _LIMIT:
+                x = upper[i]
+            else:
+                overrun += x - upper[i]
+        q[i] = x
+        distance += (x - seed[i]) ** 2
+    return math.sqrt(distance), overrun
+
+
+@jit
 def measure_rows(
     requirement: Requirement, target: Array, near: Array, seed: Array, q: Array, stats: Array
 ) -> None:
@@ -115,7 +141,6 @@ def measure_rows(
 
     The best image is inside the limits and nearest to `near`; the distance is that to `seed`.
     """
-    lower, upper, turns = requirement.lower, requirement.upper, requirement.turns
     T = np.empty((4, 4))
     e = np.empty(6)
     for k in range(q.shape[0]):
@@ -123,29 +148,9 @@ def measure_rows(
             for i in range(stats.shape[1]):
                 stats[k, i] = math.nan
             continue
-        distance = 0.0
-        overrun = 0.0
-        for i in range(q.shape[1]):
-            x = q[k, i]
-            low, high = (lower[i], upper[i]) if requirement.respect else (-math.inf, math.inf)
-            if turns[i] > 0.0:
-                x = nearest_image(x, near[i], low, high)
-            if x < lower[i]:
-                if lower[i] - x <= _LIMIT:
-                    x = lower[i]
-                else:
-                    overrun += lower[i] - x
-            elif x > upper[i]:
-                if x - upper[i] <= _LIMIT:
-                    x = upper[i]
-                else:
-                    overrun += x - upper[i]
-            q[k, i] = x
-            distance += (x - seed[i]) ** 2
+        stats[k, 2], stats[k, 3] = to_image(requirement, near, seed, q[k])
         fk_into(requirement.model, q[k], T)
         stats[k, 0], stats[k, 1], stats[k, 4] = residuals(T, target, requirement.task, requirement.mask, e)
-        stats[k, 2] = math.sqrt(distance)
-        stats[k, 3] = overrun
 
 
 @jit
@@ -258,6 +263,41 @@ def measure_and_sort(requirement: Requirement, target: Array, near: Array, seed:
     for k in range(count):
         rows.order[k] = kept[k]
     return count
+
+
+@jit
+def nearest_rows(requirement: Requirement, T: Array, seeds: Array, rows: Array, q: Array) -> None:
+    """q ``(N, n)`` ← of the rows ``(N, k, n)`` of each target the one that `measure_and_sort` puts first, or NaN.
+
+    Only rows that may be the one are measured by forward kinematics. seeds ``(N, n)``, or ``(1, n)`` for all; rows
+    are brought to their best images.
+    """
+    at, e, key = np.empty((4, 4)), np.empty(6), np.empty(rows.shape[1])
+    last = seeds.shape[0] - 1
+    for i in range(T.shape[0]):
+        seed = seeds[min(i, last)]
+        for j in range(q.shape[1]):
+            q[i, j] = math.nan
+        for k in range(rows.shape[1]):
+            key[k] = math.inf
+            if not math.isnan(rows[i, k, 0]):
+                distance, overrun = to_image(requirement, seed, seed, rows[i, k])
+                if overrun == 0.0 or not requirement.respect:
+                    key[k] = distance
+        for _ in range(rows.shape[1]):
+            best = 0
+            for k in range(1, rows.shape[1]):
+                if key[k] < key[best]:
+                    best = k
+            if key[best] == math.inf:
+                break
+            fk_into(requirement.model, rows[i, best], at)
+            close, turned, _ = residuals(at, T[i], requirement.task, requirement.mask, e)
+            if close <= requirement.position and turned <= requirement.rotation:
+                for j in range(q.shape[1]):
+                    q[i, j] = rows[i, best, j]
+                break
+            key[best] = math.inf
 
 
 @cache

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from kin.errors import InputError
 from kin.ik.candidates import Requirement, Whole
 from kin.ik.options import IKOptions, shape_of
-from kin.kernels.checks import straighten
+from kin.kernels.checks import straighten, straighten_many
 from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers.common import TURN
@@ -259,20 +259,34 @@ def _straighten() -> Callable[[Array, float, Array], float]:
     return direct(straighten, _POSE, float, _POSE)
 
 
-def listed(targets: object) -> list[ArrayLike]:
-    """Several targets as a list; raises `InputError` for anything else, and for none."""
-    if isinstance(targets, np.ndarray):
-        targets = list(targets) if targets.ndim else None
-    if not isinstance(targets, Sequence) or isinstance(targets, str | bytes):
+def listed(targets: object) -> list[ArrayLike] | Array:
+    """Several targets as a list or an array; raises `InputError` for anything else, and for none."""
+    several = targets.ndim > 0 if isinstance(targets, np.ndarray) else isinstance(targets, Sequence)
+    if not several or isinstance(targets, str | bytes):
         raise InputError("targets", targets, "a sequence of poses (k, 4, 4)")
-    if not targets:
+    found: list[ArrayLike] | Array = targets if isinstance(targets, np.ndarray) else list(targets)  # type: ignore[call-overload]  # a sequence
+    if not len(found):
         raise InputError("targets", targets, "at least one pose")
-    return list(targets)
+    return found
 
 
-def read_poses(targets: Sequence[ArrayLike], code: int, always: bool = False) -> list[tuple[Array, float]]:
-    """`read_pose` of each target; an `InputError` names ``targets[i]``."""
-    return [read_pose(target, code, f"targets[{i}]", always) for i, target in enumerate(targets)]
+def read_poses(targets: Sequence[ArrayLike] | Array, code: int, always: bool = False) -> tuple[Array, Array]:
+    """`read_pose` of each target: poses ``(k, 4, 4)`` and how rounded they are ``(k,)``.
+
+    An `InputError` names ``targets[i]``. Plain arrays are read in one compiled call, but for targets that are not
+    exact.
+    """
+    count = len(targets)
+    poses, errors = np.empty((count, *_POSE)), np.full(count, -1.0)
+    if isinstance(targets, np.ndarray) and targets.shape[1:] == _POSE and targets.dtype is _FLOAT:
+        straighten_many(np.ascontiguousarray(targets), FAR, poses, errors)
+    exact = errors >= 0.0
+    if always:
+        exact &= errors <= 0.5 * _DOUBLE
+    errors[exact] = 0.0
+    for i in np.flatnonzero(~exact).tolist():
+        poses[i], errors[i] = read_pose(targets[i], code, f"targets[{i}]", always)
+    return poses, errors
 
 
 def _nearest_pose(target: ArrayLike, field: str, always: bool) -> tuple[Array, float]:

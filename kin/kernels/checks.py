@@ -47,3 +47,10 @@ def straighten(T: Array, far: float, out: Array) -> float:
     y = out[1, 0] * out[2, 2] - out[2, 0] * out[1, 2]
     z = out[1, 0] * out[2, 1] - out[2, 0] * out[1, 1]
     return error if out[0, 0] * x - out[0, 1] * y + out[0, 2] * z > 0.0 else -1.0
+
+
+@jit
+def straighten_many(T: Array, far: float, out: Array, errors: Array) -> None:
+    """`straighten` of each of the targets T ``(N, 4, 4)``: errors ``(N,)`` ← what it returns."""
+    for i in range(T.shape[0]):
+        errors[i] = straighten(T[i], far, out[i])

@@ -170,12 +170,11 @@ def _layers(
         raise InputError("q_start", q_start, f"one configuration of {robot.n} values")
     problem = replace(IKProblem.of(robot, np.eye(4), options, q_start), stop=stop)
     step = _checked_step(max_step)
-    poses = read_poses(listed(targets), problem.code, always=robot.n < 6)
+    poses, errors = read_poses(listed(targets), problem.code, always=robot.n < 6)
     settings = PathSettings.of(problem, step, q_start is not None, len(poses))
-    more = [0.0] * len(poses) if roundings is None else roundings
+    more = np.zeros(len(poses)) if roundings is None else np.asarray(roundings)
     problems = [
-        replace(problem, T=T, target_error=error + rounding)
-        for (T, error), rounding in zip(poses, more, strict=True)
+        replace(problem, T=T, target_error=error) for T, error in zip(poses, (errors + more).tolist(), strict=True)
     ]
     return settings, layered(problems, settings.grid)
 

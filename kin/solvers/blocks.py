@@ -39,6 +39,26 @@ Entries = tuple[float, float, float, float, float, float, float, float, float, f
 
 
 @joined
+def solve_each(
+    solve: Callable[..., object], request: object, layout: tuple[int, int], params: Array, T: Array, seeds: Array,
+    limits: tuple[Array, Array], out: Array,
+) -> None:  # fmt: skip
+    """out ``(N, branches, n)`` ← what a family's kernel `solve` finds of each of the targets T ``(N, 4, 4)``.
+
+    request: its argument before the seed. layout: most arcs, columns of its rows. seeds ``(N, n)``, or ``(1, n)``
+    for all; limits: lower, upper ``(n,)``.
+    """
+    arcs, rows = np.empty((layout[0], 3)), np.empty((out.shape[1], layout[1]))
+    lower, upper = limits
+    last = seeds.shape[0] - 1
+    for i in range(T.shape[0]):
+        solve(params, T[i], request, seeds[min(i, last)], lower, upper, arcs, rows)
+        for r in range(out.shape[1]):
+            for c in range(out.shape[2]):
+                out[i, r, c] = rows[r, c]
+
+
+@joined
 def each(
     pairs: Pairs, angles: Angles, store: Store, careful: Careful, layout: tuple[int, int], params: Array, T: Array,
     request: tuple[Array, Array], out: Array,

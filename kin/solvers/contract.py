@@ -202,6 +202,17 @@ class ClosedForm(ABC):
     def solve(self, problem: SolverInput) -> Candidates:
         """All branches of a target, each with its redundancy parameters as near the seed as the limits allow."""
 
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+        """q ``(N, branches, n)`` ← what `solve` finds of many poses ``(N, 4, 4)``, with no value requested.
+
+        Bit-identical, in one compiled call. False, with q as it was, if the family has none.
+
+        Args:
+            seeds: one for each target ``(N, n)``, or one for all ``(1, n)``.
+            lower, upper: ``(n,)`` joint limits, which count.
+        """
+        return False
+
     def add_missing(self, T: Array, near: Array, q: Array) -> Completeness:
         """Add to solutions ``(branches, n)`` of the batch kernels what they miss; how complete they are then."""
         return "proved"

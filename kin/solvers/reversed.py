@@ -171,6 +171,15 @@ class ReversedJoints(ClosedForm):
         arcs = [x if sign > 0.0 else _opposite(x) for x, sign in zip(found.arcs, signs, strict=True)]
         return replace(found, q=found.q * self.signs, values=found.values * signs, arcs=tuple(arcs))
 
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+        """The branches of many poses, in the arm's own joint values."""
+        reversed_ = self.signs < 0.0
+        low, high = np.where(reversed_, -upper, lower), np.where(reversed_, -lower, upper)
+        if not self.form.solve_many(T, seeds * self.signs, low, high, q):
+            return False
+        q *= self.signs
+        return True
+
     def branch_of(self, q: Array) -> int:
         """The branch a configuration ``(n,)`` is on."""
         return self.form.branch_of(q * self.signs)

@@ -12,7 +12,7 @@ import numpy as np
 
 from kin.kernels.compile import jit
 from kin.kernels.simd import atan2
-from kin.solvers.blocks import Entries
+from kin.solvers.blocks import Entries, solve_each
 from kin.solvers.canonical import canonical, signed_box
 from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row, wrap
 from kin.solvers.parallel6.geometry import A1, A2, A3, A4, BESIDE, COS_TWIST, D5, OFFSET, SIGN, SIN_TWIST
@@ -257,3 +257,12 @@ def _folded(total: float, box: Array) -> float:
     angles = np.empty(4)
     planar_angles((0.0, 0.0, 0.0, 0.0, 1.0, 1.0), (1.0, 0.0, 0.0), total + math.pi, box, angles)
     return float(angles[0])
+
+
+@jit
+def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 8, 6)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
+
+    seeds ``(N, 6)``, or ``(1, 6)`` for all; lower, upper ``(6,)``: joint limits.
+    """
+    solve_each(solve, math.nan, (128, 7), params, T, seeds, (lower, upper), out)

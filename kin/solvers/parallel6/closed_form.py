@@ -22,7 +22,7 @@ from kin.solvers.contract import (
 )
 from kin.solvers.names import Names, bent, eight, flipped, front_or_back, left_or_right, names_of, stance_of
 from kin.solvers.parallel6.batch import branches_many, branches_one
-from kin.solvers.parallel6.branches import solve
+from kin.solvers.parallel6.branches import solve, solve_many
 from kin.solvers.parallel6.geometry import BASE, COS_TWIST, TOOL, Geometry, geometry_of
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.tolerances import TOLERANCES
@@ -107,6 +107,11 @@ class Parallel6(ClosedForm):
         return float(
             g.a1 + g.a2 * math.cos(t[1]) + g.a3 * math.cos(t[1] + t[2]) + g.a4 * math.cos(A) - g.d5 * math.sin(A)
         )
+
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+        """The branches of many poses."""
+        solve_many(self.kernels.params, T, seeds, lower, upper, q)
+        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the arm's side of axis 1, and the signs of x s3 and of s5."""

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.solvers.blocks import solve_each
 from kin.solvers.canonical import OFFSET, UPPER_ARM, canonical_box, canonical_pose
 from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, excess, nearest_image, wrap
 from kin.solvers.srs7.geometry import FITS, SHAPE, STAY, angles_at, rotations, seed_arm_angle, sign_of, triangle_of
@@ -92,3 +93,12 @@ def solve(
         for branch in (0, 1, 4, 5):
             copy_row(out, branch, branch + 2)
     return FITS, 0.0, found
+
+
+@jit
+def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 8, 7)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
+
+    seeds ``(N, 7)``, or ``(1, 7)`` for all; lower, upper ``(7,)``: joint limits.
+    """
+    solve_each(solve, (math.nan, True, False), (256, 8), params, T, seeds, (lower, upper), out)

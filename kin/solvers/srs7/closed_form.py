@@ -22,7 +22,7 @@ from kin.solvers.contract import (
 from kin.solvers.names import Names, bent, eight, flipped, front_or_back, names_of, stance_of
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, off_perpendicular, those_within
 from kin.solvers.srs7.batch import branches_many, branches_one
-from kin.solvers.srs7.branches import solve
+from kin.solvers.srs7.branches import solve, solve_many
 from kin.solvers.srs7.geometry import TOO_FAR, TOO_NEAR
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -102,6 +102,11 @@ class Srs7(ClosedForm):
         elif code == TOO_NEAR:
             obstacle = Obstacle("wrist centre too near to the shoulder", abs(g.d3 - g.d5))
         return Candidates(out[:, :7], values, tuple(all_arcs), gap, obstacle)
+
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+        """The branches of many poses."""
+        solve_many(self.kernels.params, T, seeds, lower, upper, q)
+        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of s2, s4 and s6."""

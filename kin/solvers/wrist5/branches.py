@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.solvers.blocks import solve_each
 from kin.solvers.canonical import canonical_box
 from kin.solvers.common import clear, copy_row, merged, wrap
 from kin.solvers.wrist5.geometry import A1, A2, D4, D6, OFFSET, REACH, SINGULAR, wrist_angles
@@ -83,3 +84,12 @@ def solve(
         for branch in range(4):
             copy_row(out, branch, branch + 4)
     return gap, found
+
+
+@jit
+def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 8, 5)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
+
+    seeds ``(N, 5)``, or ``(1, 5)`` for all; lower, upper ``(5,)``: joint limits.
+    """
+    solve_each(solve, math.nan, (128, 6), params, T, seeds, (lower, upper), out)

@@ -23,7 +23,7 @@ from kin.solvers.names import Names, bent, eight, flipped, front_or_back, names_
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.solvers.wrist5 import point
 from kin.solvers.wrist5.batch import branches_many, branches_one
-from kin.solvers.wrist5.branches import solve
+from kin.solvers.wrist5.branches import solve, solve_many
 from kin.solvers.wrist5.geometry import OFFSET, REACH, Geometry
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -113,6 +113,11 @@ class Wrist5(ClosedForm):
             arcs[:, 1:] -= arm[OFFSET]
         obstacle = None if gap <= REACH else Obstacle("approach direction")
         return Candidates(out[:, :5], out[:, 5:], (arcs,), max(gap, 0.0), obstacle)
+
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+        """The branches of many poses."""
+        solve_many(self.kernels.params, T, seeds, lower, upper, q)
+        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of the wrist centre's x, of s3 and of s5."""

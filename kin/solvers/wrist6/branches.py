@@ -8,7 +8,7 @@ import numpy as np
 
 from kin.kernels.compile import jit
 from kin.kernels.simd import atan2
-from kin.solvers.blocks import Entries
+from kin.solvers.blocks import Entries, solve_each
 from kin.solvers.canonical import canonical, signed_box
 from kin.solvers.common import (
     HIGH,
@@ -279,3 +279,12 @@ def _affine_wrist(params: Array, M: Entries, t23: tuple[float, float], parts: Ar
         parts[0, 0, j], parts[0, 1, j], parts[0, 2, j] = _seen(params, g, s, 0.0, 0.0, z)
         parts[1, 0, j], parts[1, 1, j], parts[1, 2, j] = _seen(params, g, s, x, y, 0.0)
         parts[2, 0, j], parts[2, 1, j], parts[2, 2, j] = _seen(params, g, s, y, -x, 0.0)
+
+
+@jit
+def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 8, 6)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
+
+    seeds ``(N, 6)``, or ``(1, 6)`` for all; lower, upper ``(6,)``: joint limits.
+    """
+    solve_each(solve, math.nan, (128, 6), params, T, seeds, (lower, upper), out)

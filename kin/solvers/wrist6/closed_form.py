@@ -34,7 +34,7 @@ from kin.solvers.names import (
 )
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.solvers.wrist6.batch import branches_many, branches_one
-from kin.solvers.wrist6.branches import solve
+from kin.solvers.wrist6.branches import solve, solve_many
 from kin.solvers.wrist6.geometry import BASE, TOOL, Geometry, geometry_of
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -129,6 +129,11 @@ class Wrist6(ClosedForm):
         """X of the wrist centre: how far it is before axis 1 in the arm's own plane, metres."""
         g = self.geometry
         return float(g.a1 + g.a2 * math.cos(t[1]) + g.f * math.cos(t[1] + t[2]))
+
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+        """The branches of many poses."""
+        solve_many(self.kernels.params, T, seeds, lower, upper, q)
+        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of X, of X s3 and of s5."""

@@ -15,7 +15,8 @@ from numba import njit
 
 import kin
 from kin import InputError
-from kin.ik import problem
+from kin.ik import batch, problem
+from kin.ik.answers import answer
 from kin.kernels import simd
 from kin.robot import Joint, Robot
 from kin.solvers import closed_form_of
@@ -426,3 +427,45 @@ def test_each_target_of_a_stack_is_read_once(monkeypatch):
 def test_a_stack_given_to_solve_ik_is_refused_with_what_takes_it():
     with pytest.raises(InputError, match=r"kin\.solve_ik_many takes several"):
         kin.solve_ik("ur5", targets(kin.get_robot("ur5"), 2))
+
+
+@pytest.mark.parametrize("name", ["pioneer5", "puma560", "ur5", "irb120", "stanford", "iiwa14", "scara", "panda"])
+@pytest.mark.parametrize("more", [{}, {"respect_limits": False}, {"locked": True}], ids=["limits", "none", "lock"])
+def test_the_best_of_many_is_that_of_one_bit_for_bit(name, more):
+    """At regular and singular targets, inside and outside the limits, with a seed for each."""
+    robot, rng = kin.get_robot(name), np.random.default_rng(7)
+    q = robot.random_q(rng, 24)
+    q[::3] = robot.q_home
+    q[::4, 4:] = 0.0
+    q[::5] *= 1.5
+    T, seeds = kin.fk(robot, q), robot.random_q(rng, 24)
+    T[7, :3, 3] = 9.0
+    if more == {"locked": True}:
+        more = {"locked": [0.2, *[None] * (robot.n - 1)]}
+    found = kin.solve_ik_many(robot, T, q_seed=seeds, **more)
+    for i, (each, seed) in enumerate(zip(T, seeds, strict=True)):
+        alone = kin.solve_ik(robot, each, q_seed=seed, **more)
+        assert found.status[i] is alone.status
+        expected = alone.solutions[0].q if alone.status is kin.Status.SOLVED else np.full(robot.n, math.nan)
+        assert np.array_equal(found.q[i], expected, equal_nan=True)
+        assert repr(found[i]) == repr(alone)
+
+
+def test_results_are_made_when_they_are_asked_for(monkeypatch):
+    made = []
+    monkeypatch.setattr(batch, "answer", lambda given: made.append(given) or answer(given))
+    robot = kin.get_robot("ur5")
+    T = targets(robot, 5)
+    T[3, :3, 3] = 9.0
+    found = kin.solve_ik_many(robot, T)
+    assert len(made) == 1  # the one that is out of reach
+    assert found.solved.tolist() == [True, True, True, False, True]
+    assert len(made) == 1
+    assert found[-1] is found[4]
+    assert len(made) == 2
+    again = pickle.loads(pickle.dumps(found))
+    assert np.array_equal(again.q, found.q, equal_nan=True)
+    assert list(map(repr, again)) == list(map(repr, found))
+    assert again.status == found.status
+    with pytest.raises(IndexError):
+        found[5]

@@ -462,6 +462,7 @@ def test_an_arm_without_a_closed_form_is_solved_numerically():
       { name = "4", d = 0.2, alpha = 70 },
       { name = "5", a = 0.05, alpha = -60 },
       { name = "6", d = 0.1, alpha = 95 },
+      { name = "7", a = 0.1, alpha = 40 },
     ]
     """
     robot = kin.parse_robot(text)

@@ -623,7 +623,7 @@ def test_the_same_problem_has_the_same_path(robot_id):
     assert first.reason == second.reason
 
 
-def test_an_arm_without_a_closed_form():
+def test_an_arm_with_a_slide_that_fits_no_family():
     text = """
     id = "odd"
     name = "odd"
@@ -646,7 +646,7 @@ def test_an_arm_without_a_closed_form():
     targets = kin.fk(robot, path)
     result = solve_path(robot, targets)
     assert_exact(robot, targets, result)
-    assert result.solver == "numeric"
+    assert result.solver == "general6"
     assert result.continuous
     assert result.gaps == ()
     # A metre of joint 3 counts as 4 radians: a slide of 0.2 m in one step is a jump.
