@@ -1,8 +1,8 @@
 """Names of built-in arms, arms with reversed joints, and random parts for made-up arms.
 
 Laws that hold for any arm are tested on the classics; closed forms, equations, singular curves and golden inverse
-kinematics on the arms of the chapter. Every arm of the library is tested by ``tests/kin/test_arm_library.py``, and it
-opens in the page: a test that runs over all of them has to be cheap.
+kinematics on the arms of the chapter. ``tests/kin/test_arm_library.py`` tests every arm of the library; a test of
+all of them has to be cheap.
 """
 
 import math

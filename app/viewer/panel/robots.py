@@ -1,4 +1,4 @@
-"""The menu of robots: those of the service, and the visitor's own arm."""
+"""The menu of robots, those of the service and the visitor's own arm, and a field that shortens it."""
 
 from __future__ import annotations
 
@@ -6,13 +6,19 @@ from collections.abc import Sequence
 
 import viser
 
+from app.shared.finding import find_robots
 from app.viewer.own_arm import OwnArm, label
 from app.viewer.panel import Post, assign, listen
 from kin import InputError, Robot
 
+FIND_HINT = (
+    "Shortens the menu Robot to arms that all words fit: a part of id, name, maker or solver, joints:6, "
+    "reach:0.5..1.2 (metres), maker:kuka, solver:wrist6"
+)
+
 
 class RobotMenu:
-    """Posts ``"robot"``."""
+    """Posts ``"robot"`` and ``"find"``."""
 
     def __init__(
         self, gui: viser.GuiApi, robots: Sequence[Robot], own: OwnArm | None, robot: Robot, post: Post
@@ -20,20 +26,42 @@ class RobotMenu:
         self._robots = tuple(robots)
         self._options = self._named(own)
         self._shown = robot
+        self._query = ""
         self._menu = gui.add_dropdown("Robot", tuple(self._options), initial_value=self._name(robot))
+        self._field = gui.add_text("Find", "", hint=FIND_HINT)
         listen(self._menu, post, "robot")
+        listen(self._field, post, "find")
 
     def hide(self) -> None:
         """Offer no other robot."""
-        self._menu.visible = False
+        self._menu.visible = self._field.visible = False
+
+    def find(self, query: object) -> int:
+        """Offer the robots that all words of a query fit, and the one on show; returns how many fit.
+
+        Raises:
+            kin.InputError: naming a word that cannot be read; the menu stays as it is.
+        """
+        text = query if isinstance(query, str) else ""
+        count = len(find_robots(self._options.values(), text))
+        self._query = text
+        assign(self._field, text)
+        self._offer()
+        return count
+
+    def _offer(self) -> None:
+        """Put the names of the robots that fit into the menu."""
+        fit = {robot.id for robot in find_robots(self._options.values(), self._query)} | {self._shown.id}
+        # The menu keeps the name that it shows: without it, viser would choose another.
+        names = tuple(name for name, robot in self._options.items() if robot.id in fit or name == self._menu.value)
+        if names != tuple(self._menu.options):
+            self._menu.options = names
 
     def show(self, robot: Robot, own: OwnArm | None) -> None:
         """Show this robot, and offer this arm of the visitor's own besides those of the service."""
         self._shown = robot
-        options = self._named(own)
-        if tuple(options) != tuple(self._options):
-            self._menu.options = tuple(options)
-        self._options = options
+        self._options = self._named(own)
+        self._offer()
         assign(self._menu, self._name(robot))
 
     def read(self, value: object) -> Robot:

@@ -52,6 +52,7 @@ RULES: Final[dict[str, Rule]] = {
     "lock": Rule("Lock", act=True),
     "branch": Rule("Posture", act=True),
     "robot": Rule("Robot", act=True, replaces=True),
+    "find": Rule(step=False),
     "task": Rule("Target must match", act=True),
     "home": Rule("Home", act=True),
     "random": Rule("Random", act=True),

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import kin
-from app.viewer.panel.status import introduction
+from app.viewer.panel.status import Notice, introduction
 from app.viewer.panel.target import DEFAULT_TASK, TASKS
 from app.viewer.session.actions.typed import BY_HAND, TypedInput
 from app.viewer.session.parts import Page
@@ -36,6 +36,7 @@ class ArmControls:
             "lock": self._on_lock,
             "branch": self._on_branch_choice,
             "robot": self._on_robot_choice,
+            "find": self._on_find,
             "task": self._on_task,
             "home": lambda _: self._move_into_view(arm.move_home, "Home configuration"),
             "random": lambda _: self._move_into_view(arm.move_to_random, "Random configuration"),
@@ -116,6 +117,21 @@ class ArmControls:
         page.status.show(introduction(robot))
         if left is not None:
             self._restore_arm(left)
+
+    def _on_find(self, value: object) -> None:
+        """Shorten the menu of robots. It is called while words are typed: one that is not complete is no error."""
+        page = self._page
+        try:
+            count = page.panel.robots.find(value)
+        except kin.InputError as error:
+            detail = f"Not yet a query: {error.value!r}. Expected {error.expected}."
+            page.status.show(Notice("hand", "Find", detail))
+            return
+        if not value:
+            page.status.show(Notice("hand", "Find", "The menu Robot offers all arms."))
+            return
+        words = {0: "No arm fits", 1: "One arm fits"}.get(count, f"{count} arms fit")
+        page.status.show(Notice("hand", words, "The menu Robot offers what fits, and the arm on show."))
 
     def _on_task(self, value: object) -> None:
         page = self._page

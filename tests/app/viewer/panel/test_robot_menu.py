@@ -1,0 +1,63 @@
+"""The menu of robots in the page, and the field that shortens it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from fake_browser import FakeBrowser
+from live_server import serve_viewer
+
+import kin
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.server import ViewerServer
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE = Store()
+PIONEER = STORE.robots[0]
+
+
+@pytest.fixture(scope="module")
+def port() -> Iterator[int]:
+    kin.warm_up()
+    with serve_viewer(ViewerServer(STORE, Settings(), Clouds())) as served:
+        yield served
+
+
+def offered(tab: FakeBrowser) -> set[str]:
+    return set(tab.gui[tab.element("Robot")]["props"]["options"])
+
+
+def test_words_shorten_the_menu_and_the_arm_on_show_stays(port: int) -> None:
+    sevens = {robot.name for robot in STORE.robots if robot.n == 7 and "KUKA" in robot.maker}
+    assert len(sevens) == 2
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        everything = offered(tab)
+        assert everything == {robot.name for robot in STORE.robots}
+        tab.set("Find", "kuka joints:7")
+        tab.wait(lambda: offered(tab) == {PIONEER.name, *sevens})
+        assert tab.value("Robot") == PIONEER.name
+        tab.set("Find", "kuka joints:")
+        tab.wait(lambda: "Not yet a query" in tab.html)
+        assert offered(tab) == {PIONEER.name, *sevens}, "an incomplete word changes nothing"
+        tab.set("Find", "no-such-arm")
+        tab.wait(lambda: "No arm fits" in tab.html)
+        assert offered(tab) == {PIONEER.name}
+        tab.set("Find", "")
+        tab.wait(lambda: offered(tab) == everything)
+
+
+def test_an_arm_that_was_found_opens(port: int) -> None:
+    kr6 = STORE.get("kr6")
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.set("Find", "kr6")
+        tab.wait(lambda: kr6.name in offered(tab))
+        tab.choose(kr6.name)
+        tab.wait(lambda: tab.value("Robot") == kr6.name)
+        tab.settle()
+        assert tab.tool_pose() == pytest.approx(kin.fk(kr6, kr6.q_home), abs=1e-4)
