@@ -41,6 +41,7 @@ from kin.files import (
     robot_to_dict,
     robot_to_toml,
     save_robot,
+    to_mjcf,
     to_urdf,
     urdf_tips,
 )
@@ -209,6 +210,7 @@ __all__ = [
     "solve_ik",
     "solve_ik_many",
     "solve_path",
+    "to_mjcf",
     "to_urdf",
     "urdf_tips",
     "warm_up",

@@ -100,13 +100,15 @@ def run_check(arguments: Namespace) -> int:
             return check_course(path, arguments.robots, os.environ.get("KINBOARD_EXERCISES"), arguments.json)
         return _check_exercise(path, arguments.robots, arguments.json)
     lines: list[str] = []
-    if path.suffix in (".urdf", ".xacro"):
+    if path.suffix in (".urdf", ".xml", ".xacro"):
         robot, report = _read(arguments)
         lines = ["", *report_lines(report)]
     else:
         for option in ("base", "tip", "arg", "folder"):
             if given := getattr(arguments, option):
-                raise InputError(f"--{option}", given, "nothing: only URDF and xacro have links and arguments")
+                raise InputError(
+                    f"--{option}", given, "nothing: only URDF, MJCF and xacro have links and arguments"
+                )
         robot = load_robot(path)
     answer = inspect(robot, robot.id in builtin_robots() and path.resolve().parent != BUILTIN.resolve())
     if arguments.json:

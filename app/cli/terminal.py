@@ -50,7 +50,7 @@ def robot_of(arguments: Namespace) -> Robot:
 
 def named_robot(arguments: Namespace, named: str) -> Robot:
     """A robot by its id, or by the path of a file."""
-    if Path(named).suffix == ".urdf":
+    if Path(named).suffix in (".urdf", ".xml"):
         return load_urdf(Path(named))
     if Path(named).suffix == ".toml":
         return load_robot(named)

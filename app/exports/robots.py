@@ -1,10 +1,10 @@
-"""Arms as files: robot files in either convention, and URDF."""
+"""Arms as files: robot files in either convention, URDF and MJCF."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kin import Robot, convert, robot_to_toml, to_urdf
+from kin import Robot, convert, robot_to_toml, to_mjcf, to_urdf
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,7 @@ class RobotFormat:
 FORMATS = {
     "toml": RobotFormat("a robot file", ".toml", "application/toml"),
     "urdf": RobotFormat("URDF without bodies", ".urdf", "application/xml"),
+    "mjcf": RobotFormat("MJCF for MuJoCo, with capsules and assumed masses", ".xml", "application/xml"),
     "dh": RobotFormat("a robot file in the standard convention", "-standard.toml", "application/toml"),
     "mdh": RobotFormat("a robot file in the modified convention", "-modified.toml", "application/toml"),
 }
@@ -34,6 +35,8 @@ def robot_file(robot: Robot, name: str) -> str:
     """The text of a file in one of `FORMATS`; raises `InputError` for an arm that the format cannot describe."""
     if name == "urdf":
         return to_urdf(robot)
+    if name == "mjcf":
+        return to_mjcf(robot)
     if name == "toml":
         return robot_to_toml(robot)
     return robot_to_toml(convert(robot, "standard" if name == "dh" else "modified"))

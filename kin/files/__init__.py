@@ -33,6 +33,7 @@ An error raises `RobotFileError` with the file, the field, the value and what wo
 """
 
 from kin.files.builtin import builtin_robots, classic_robots, get_robot
+from kin.files.mjcf.write import to_mjcf
 from kin.files.read import load_folder, load_robot, parse_robot, robot_from_dict
 from kin.files.urdf.doctor.examine import examine_urdf
 from kin.files.urdf.doctor.findings import UrdfExamination, UrdfFinding
@@ -58,6 +59,7 @@ __all__ = [
     "robot_to_dict",
     "robot_to_toml",
     "save_robot",
+    "to_mjcf",
     "to_urdf",
     "urdf_tips",
 ]

@@ -78,7 +78,7 @@ class ImportRequest(schemas.Body):
     """A URDF and the part of it that is the arm."""
 
     urdf: str = Field(
-        description="The text of the URDF. Expand xacro first: `xacro FILE.xacro > FILE.urdf`.",
+        description="The text of a URDF, or of an MJCF file. Expand xacro first: `xacro FILE.xacro > FILE.urdf`.",
         min_length=1,
         max_length=MAX_BYTES,
     )
@@ -153,7 +153,7 @@ class ExportQuery(schemas.Body):
     },
 )
 async def export_robot(request: Request, robot: Robot, query: ExportQuery) -> Response:
-    """The arm as a robot file in its own or another convention, or as URDF without bodies."""
+    """The arm as a robot file in its own or another convention, as URDF without bodies, or as MJCF."""
     kind = FORMATS[query.format]
     try:
         text = await computed(request, lambda _: robot_file(robot, query.format))

@@ -261,8 +261,8 @@ def add_check(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 
 def add_import(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard import``."""
-    parser = _command(commands, "import", "read an arm from a URDF as a robot file", takes_robot=False)
-    parser.add_argument("file", metavar="FILE", help="URDF, or xacro (*.xacro, with kinboard[xacro])")
+    parser = _command(commands, "import", "read an arm from a URDF or MJCF as a robot file", takes_robot=False)
+    parser.add_argument("file", metavar="FILE", help="URDF, MJCF, or xacro (*.xacro, with kinboard[xacro])")
     _add_links(parser)
     parser.add_argument("-o", "--output", metavar="FILE", help="write the robot file and print a report")
     parser.add_argument("--json", action="store_true", help="print the arm and the report as JSON")
@@ -290,11 +290,11 @@ def _add_links(parser: argparse.ArgumentParser) -> None:
 
 def add_export(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard export``."""
-    parser = _command(commands, "export", "an arm as a robot file or URDF", parents.robots)
+    parser = _command(commands, "export", "an arm as a robot file, URDF or MJCF", parents.robots)
     parser.add_argument(
-        "--format", choices=("toml", "urdf", "dh", "mdh"), default="toml",
+        "--format", choices=("toml", "urdf", "mjcf", "dh", "mdh"), default="toml",
         help="toml: robot file (default); dh, mdh: the same in the standard or the modified convention; "
-        "urdf: URDF without bodies",
+        "urdf: URDF without bodies; mjcf: for MuJoCo, with capsules and assumed masses",
     )  # fmt: skip
     parser.add_argument("-o", "--output", metavar="FILE", help="write to this file (default: standard output)")
     return parser

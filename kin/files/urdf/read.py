@@ -20,6 +20,7 @@ from kin.axes import frame_of, inverse, perpendicular_to
 from kin.dh import SAMPLES, table_of_chain
 from kin.errors import InputError, RobotFileError
 from kin.files.home import default_home
+from kin.files.names import unused
 from kin.files.numbers import LARGEST
 from kin.files.read import MAX_REACH, MAX_ROWS
 from kin.files.urdf.collisions import (
@@ -31,7 +32,6 @@ from kin.files.urdf.collisions import (
     with_free_home,
     without_meshes,
 )
-from kin.files.urdf.names import unused
 from kin.files.urdf.poses import motion_of
 from kin.files.urdf.tree import Tip, UrdfJoint, UrdfTree, read_tree
 from kin.fk import fk
@@ -154,7 +154,7 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
     robot = Robot(
         id=re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40].strip("-") or "robot",
         name=name[:200].strip(),
-        source=f"URDF {_file_name(tree.file)}, from link {chain[0].parent} to link {chain[-1].child}",
+        source=f"{_source(tree)}, from link {chain[0].parent} to link {chain[-1].child}",
         convention="standard",
         rows=rows,
         home=tuple(0.5 * sum(joint.limits or (0.0,)) for joint in joints),
@@ -184,6 +184,12 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
         samples=SAMPLES,
     )
     return UrdfRobot(robot, report)
+
+
+def _source(tree: UrdfTree) -> str:
+    """The format and the name of the file, if it has one."""
+    name = _file_name(tree.file)
+    return tree.format if name == "URDF" and tree.format != "URDF" else f"{tree.format} {name}"
 
 
 def _file_name(file: str) -> str:

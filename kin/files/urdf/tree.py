@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 from xml.etree.ElementTree import Element
 
 from kin.errors import RobotFileError
+from kin.files.mjcf.convert import as_urdf
 from kin.files.numbers import LARGEST, number_of
 from kin.files.urdf.xml import parse_xml
 from kin.robot import Kind
@@ -156,6 +157,7 @@ class UrdfTree:
     Attributes:
         joints: those with a parent and a child.
         unread: what is wrong with links, joints, and joints that were left out.
+        format: of the file.
     """
 
     file: str
@@ -164,6 +166,7 @@ class UrdfTree:
     joints: tuple[UrdfJoint, ...]
     root: Element
     unread: tuple[Unread, ...] = ()
+    format: Literal["URDF", "MJCF"] = "URDF"
 
     @cached_property
     def parents(self) -> dict[str, UrdfJoint]:
@@ -302,9 +305,11 @@ def read_tree(text: bytes | str, file: str) -> UrdfTree:
 
 
 def tree_of(root: Element, file: str) -> UrdfTree:
-    """The links and joints below the root element of a URDF; raises `RobotFileError`."""
+    """The links and joints below the root element of a URDF, or of an MJCF file; raises `RobotFileError`."""
+    if root.tag == "mujoco":
+        return replace(tree_of(as_urdf(root, file), file), format="MJCF")
     if root.tag != "robot":
-        raise RobotFileError(file, "root element", root.tag, "<robot>, the root of a URDF")
+        raise RobotFileError(file, "root element", root.tag, "<robot>, the root of a URDF, or <mujoco>")
     if any(element.tag.startswith("xacro:") for element in root.iter()):
         expected = "plain URDF; `xacro FILE.xacro > FILE.urdf`, or `kinboard import FILE.xacro`, expands it"
         raise RobotFileError(file, "file", "xacro elements", expected)

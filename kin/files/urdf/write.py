@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import re
-from collections import Counter
 from collections.abc import Sequence
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from kin.axes import screw_x, screw_z
 from kin.errors import InputError
-from kin.files.urdf.names import unused
+from kin.files.names import distinct, quoted, unused
 from kin.files.write import rpy_of
 from kin.named import robot_of
 from kin.robot import Joint, Robot
 from kin.transforms import Array
 
 _UNKNOWN = 0.0  # velocity and effort are required by URDF
-_LONGEST = 180  # characters of a name, without its number; the reader takes 200
-_UNFIT = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def to_urdf(robot: Robot | str) -> str:
@@ -31,10 +26,10 @@ def to_urdf(robot: Robot | str) -> str:
         InputError: a slide without limits, which URDF cannot describe, or a joint whose limits leave no motion.
     """
     robot = robot_of(robot)
-    lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={_quoted(robot.id)}>"]
-    names = _distinct([row.name for row in robot.rows])
+    lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoted(robot.id)}>"]
+    names = distinct([row.name for row in robot.rows])
     links = ["base", *(f"link_{k + 1}" for k in range(len(robot.rows))), "tool"]
-    lines += [f"  <link name={_quoted(link)}/>" for link in links]
+    lines += [f"  <link name={quoted(link)}/>" for link in links]
     T = robot.T_world_base
     for k, (row, name) in enumerate(zip(robot.rows, names, strict=True)):
         x, z = screw_x(row.a, row.alpha), screw_z(row.theta, row.d)
@@ -49,9 +44,9 @@ def to_urdf(robot: Robot | str) -> str:
 def _joint(row: Joint, name: str, parent: str, child: str, T: Array) -> list[str]:
     kind = "continuous" if row.kind == "revolute" and row.limits is None else row.kind
     lines = [
-        f'  <joint name={_quoted(name)} type="{kind}">',
-        f"    <parent link={_quoted(parent)}/>",
-        f"    <child link={_quoted(child)}/>",
+        f'  <joint name={quoted(name)} type="{kind}">',
+        f"    <parent link={quoted(parent)}/>",
+        f"    <child link={quoted(child)}/>",
         f'    <origin xyz="{_numbers(T[:3, 3])}" rpy="{_numbers(rpy_of(T))}"/>',
     ]
     if row.kind != "fixed":
@@ -71,18 +66,3 @@ def _joint(row: Joint, name: str, parent: str, child: str, T: Array) -> list[str
 
 def _numbers(values: Sequence[float] | Array) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)
-
-
-def _distinct(names: list[str]) -> list[str]:
-    """The names as a URDF can hold them, those that occur more than once with the number of their row."""
-    fit = [_UNFIT.sub("_", name).strip()[:_LONGEST].strip() or "joint" for name in names]
-    counts, taken = Counter(fit), set(fit)
-    found = []
-    for k, name in enumerate(fit):
-        found.append(unused(name, taken, k + 1) if counts[name] > 1 else name)
-        taken.add(found[-1])
-    return found
-
-
-def _quoted(text: str) -> str:
-    return quoteattr(_UNFIT.sub("_", text))

@@ -325,6 +325,13 @@ def test_export(client):
         assert response.headers["content-type"].startswith("application/toml")
         assert response.headers["content-disposition"].endswith('.toml"')
         assert kin.parse_robot(response.text) == kin.convert(panda, convention)
+    response = client.get("/api/v1/robots/panda/export?format=mjcf")
+    assert response.headers["content-disposition"] == 'attachment; filename="panda.xml"'
+    again = post(client, "robots/import", {"urdf": response.text})
+    assert again["robot"]["source"].startswith("MJCF, from link world")
+    assert kin.fk(kin.parse_robot(again["toml"]), panda.home) == pytest.approx(
+        kin.fk(panda, panda.home), abs=1e-12
+    )
     response = client.get("/api/v1/robots/panda/export?format=urdf")
     assert response.headers["content-type"].startswith("application/xml")
     assert kin.load_urdf(response.text).n == 7

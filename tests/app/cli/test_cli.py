@@ -589,15 +589,15 @@ def test_import_offers_the_tips(capsys, tmp_path):
     assert "--output" in err
 
 
-@pytest.mark.parametrize("form", ["toml", "dh", "mdh", "urdf"])
+@pytest.mark.parametrize("form", ["toml", "dh", "mdh", "urdf", "mjcf"])
 def test_export_in_every_format(capsys, tmp_path, form):
     code, out, _ = run(capsys, "export", "puma560", "--format", form)
     assert code == 0
-    robot = kin.load_urdf(out) if form == "urdf" else kin.parse_robot(out)
+    robot = kin.load_urdf(out) if form in ("urdf", "mjcf") else kin.parse_robot(out)
     assert robot.convention == ("modified" if form == "mdh" else "standard")
     q = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
     assert kin.fk(robot, q) == pytest.approx(kin.fk(kin.get_robot("puma560"), q), abs=1e-12)
-    file = tmp_path / f"arm.{'urdf' if form == 'urdf' else 'toml'}"
+    file = tmp_path / f"arm.{ {'urdf': 'urdf', 'mjcf': 'xml'}.get(form, 'toml') }"
     assert run(capsys, "export", "puma560", "--format", form, "-o", file)[1].startswith(f"{file}: ")
     assert file.read_text(encoding="utf-8") == out
     assert run(capsys, "robots", file)[0] == 0
@@ -616,7 +616,7 @@ def test_check_of_a_urdf(capsys, tmp_path):
     file = ROOT / "kin" / "robots" / "ur5.toml"
     code, _, err = run(capsys, "check", file, "--tip", "ee_link")
     assert code == 2
-    assert "only URDF and xacro have links" in err
+    assert "only URDF, MJCF and xacro have links" in err
 
 
 # -- workspace -------------------------------------------------------------------------------------------------

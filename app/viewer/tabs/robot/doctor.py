@@ -8,7 +8,7 @@ import numpy as np
 
 from app.shared.answers.examination import TITLES, outcome
 from app.viewer.meshes.archive import MB, Archive, MeshError
-from app.viewer.tabs.robot.files import Source, is_urdf
+from app.viewer.tabs.robot.files import Source, is_mjcf, is_urdf
 from app.viewer.views.templates import render
 from kin import InputError, RobotFileError, UrdfExamination, examine_urdf
 from kin.files.urdf.doctor.findings import RANKS
@@ -61,9 +61,9 @@ class Doctor:
         self._source: Source | None = None
 
     def look(self, source: Source, tip: str | None = None) -> None:
-        """Examine a file; one that is no URDF has no report."""
+        """Examine a file; one that is no URDF has none."""
         self.close()
-        if not is_urdf(source.text):
+        if not is_urdf(source.text) or is_mjcf(source.text):
             return
         name = source.urdf or source.name
         meshes = None if source.archive is None else MeshesSent(source.archive, source.urdf)

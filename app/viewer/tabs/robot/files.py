@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import re
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,6 +21,8 @@ from kin.files.urdf.tree import Tip, read_tree
 from kin.typed import cut
 from kin.units import general
 
+# The root element after a declaration and comments.
+_MJCF = re.compile(r"[\ufeff\s]*(?:<\?[^>]*>\s*)?(?:<!--(?:(?!-->).)*-->\s*)*<mujoco\b", re.DOTALL)
 MOST = 300_000  # characters of a file that is text
 
 
@@ -220,14 +223,21 @@ def tips_of(name: str, text: str) -> tuple[Tip, ...]:
 
 
 def is_urdf(text: str) -> bool:
-    """Whether a text is XML rather than TOML."""
+    """Whether a text is XML, a URDF or MJCF, rather than TOML."""
     return text.lstrip("\ufeff \t\r\n").startswith("<")
 
 
+def is_mjcf(text: str) -> bool:
+    """Whether a text is XML whose root is `<mujoco>`."""
+    return is_urdf(text) and bool(_MJCF.match(text))
+
+
 def text_of(robot: Robot, kind: object) -> tuple[str, str]:
-    """Name and text of a file of this kind, ``"toml"`` or ``"urdf"``; raises `kin.KinematicsError`."""
+    """Name and text of a file of this kind, ``"toml"``, ``"urdf"`` or ``"mjcf"``; raises `kin.KinematicsError`."""
     if kind == "toml":
         return f"{robot.id}.toml", kin.robot_to_toml(robot)
     if kind == "urdf":
         return f"{robot.id}.urdf", kin.to_urdf(robot)
-    raise InputError("download", kind, "toml or urdf")
+    if kind == "mjcf":
+        return f"{robot.id}.xml", kin.to_mjcf(robot)
+    raise InputError("download", kind, "toml, urdf or mjcf")

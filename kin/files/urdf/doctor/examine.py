@@ -79,6 +79,8 @@ def _examined(text: str, base: str | None, tip: str | None, file: str, files: Me
     """One round; `mended` are the changes of this round only."""
     try:
         source = SourceText(text, file)
+        if source.root.tag == "mujoco":
+            raise RobotFileError(file, "root element", "mujoco", "<robot>: the doctor examines URDFs")
         tree = tree_of(source.root, file)
     except RobotFileError as error:
         return UrdfExamination(file, (), (_unreadable(error),), None, str(error))

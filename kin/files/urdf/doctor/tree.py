@@ -6,8 +6,8 @@ from difflib import get_close_matches
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
+from kin.files.names import unused
 from kin.files.urdf.doctor.notes import Notes, cut
-from kin.files.urdf.names import unused
 from kin.files.urdf.tree import Unread, UrdfTree
 
 LISTED = 6  # names in a sentence

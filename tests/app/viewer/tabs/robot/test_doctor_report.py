@@ -96,6 +96,18 @@ def test_what_the_buttons_do_not_send_changes_nothing(port: int, value: object) 
         assert report(tab) == before
 
 
+def test_mjcf_is_opened_without_a_report(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        upload(tab, LONG)
+        upload(tab, kin.to_mjcf(TWO), "two.xml")
+        shows(tab, TWO, TWO.q_home)
+        tab.wait(lambda: 'data-arm="doctor"' not in tab.html)
+        assert "MJCF" in tab.html
+        say(tab, "download", value="mjcf")
+        assert ".xml is saved" in tab.html
+
+
 def test_without_a_report_there_is_nothing_to_open() -> None:
     doctor = Doctor()
     with pytest.raises(kin.InputError, match="mended"):

@@ -1,0 +1,1 @@
+"""MJCF files, MuJoCo's own format: written with bodies and assumed masses, and read as serial arms."""

@@ -1,0 +1,142 @@
+"""`Robot` → MJCF: one body per joint, with its capsules, and masses that are assumed.
+
+A table says nothing about masses, and MuJoCo needs them. Each capsule has the density of water, and a link without
+one is a ball; a comment in the file says so. Replace them before simulating forces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from kin.axes import inverse, screw_x, screw_z
+from kin.collision.bodies import Bodies, bodies_of
+from kin.errors import InputError
+from kin.files.names import distinct, quoted, unused
+from kin.fk import link_frames
+from kin.named import robot_of
+from kin.robot import Joint, Robot
+from kin.transforms import Array, wxyz_from_rotation
+
+DENSITY = 1000.0  # kg/m³ of a capsule
+BALL = 0.1, 0.03  # kg and m of a link without a capsule
+ASSUMED = (
+    f"Masses and inertia are assumed: {DENSITY:g} kg/m3 in each capsule, and a ball of {BALL[0]:g} kg for a link "
+    "without one. Replace them before simulating forces."
+)
+_SHORTEST = 1e-9  # m: a shorter capsule is a sphere
+
+
+def to_mjcf(robot: Robot | str) -> str:
+    """The arm as MJCF, for MuJoCo: joints, limits, capsules, the tool as a site, the home as a keyframe.
+
+    The values of the joints are those of the arm. Links that are not compared for collisions here are
+    excluded from contacts. An effort limits the force of its joint.
+
+    Raises:
+        InputError: a joint whose limits leave no motion.
+    """
+    robot = robot_of(robot)
+    bodies = bodies_of(robot)
+    names = distinct([row.name for row in robot.joints])
+    taken = set(names)
+    base = unused("base", taken)
+    links = [base, *names]
+    lines = [
+        '<?xml version="1.0" encoding="utf-8"?>',
+        f"<mujoco model={quoted(robot.id)}>",
+        f"  <!-- {ASSUMED} -->",
+        '  <compiler angle="radian" autolimits="true"/>',
+        f'  <default><geom density="{DENSITY:g}"/></default>',
+        "  <worldbody>",
+        f"    <body name={quoted(base)}>",
+        *_geoms(robot, bodies, 0, robot.T_world_base, "      "),
+    ]
+    frames = _frames(robot)
+    before = np.eye(4)
+    for k, (joint, name) in enumerate(zip(robot.joints, names, strict=True), 1):
+        indent = "    " + "  " * k
+        lines += [
+            f"{indent}<body name={quoted(name)}{_placed(inverse(before) @ frames[k - 1])}>",
+            f"{indent}  {_joint(joint, name)}",
+            *_geoms(robot, bodies, k, frames[k - 1], indent + "  "),
+        ]
+        if not any(each.link == k for each in bodies.capsules):
+            mass, radius = BALL
+            moment = repr(0.4 * mass * radius**2)
+            diagonal = " ".join([moment] * 3)
+            lines.append(f'{indent}  <inertial pos="0 0 0" mass="{mass!r}" diaginertia="{diagonal}"/>')
+        before = frames[k - 1]
+    tool = link_frames(robot, np.zeros(robot.n))[-1] @ robot.T_last_tool
+    indent = "    " + "  " * (robot.n + 1)
+    lines.append(f'{indent}<site name="tool"{_placed(inverse(before) @ tool)}/>')
+    lines += ["    " + "  " * k + "</body>" for k in range(robot.n, -1, -1)]
+    lines += ["  </worldbody>", *_contacts(bodies, links), "  <keyframe>"]
+    lines.append(f'    <key name="home" qpos="{_numbers(robot.home)}"/>')
+    return "\n".join([*lines, "  </keyframe>", "</mujoco>", ""])
+
+
+def _frames(robot: Robot) -> list[Array]:
+    """The frames of the joints in the world ``(4, 4)`` at zero, each joint about or along z."""
+    found, T = [], robot.T_world_base
+    for row in robot.rows:
+        x, z = screw_x(row.a, row.alpha), screw_z(row.theta, row.d)
+        standard = robot.convention == "standard"
+        at = T @ z if standard else T @ x @ z
+        if row.kind != "fixed":
+            found.append(at)
+        T = at @ x if standard else at
+    return found
+
+
+def _joint(joint: Joint, name: str) -> str:
+    kind = "slide" if joint.kind == "prismatic" else "hinge"
+    text = f'<joint name={quoted(name)} type="{kind}" axis="0 0 1"'
+    if joint.limits is not None:
+        if not joint.limits[0] < joint.limits[1]:
+            raise InputError(
+                f"limits of {joint.name}", joint.limits, "lower below upper: MuJoCo takes no other range"
+            )
+        text += f' range="{_numbers(joint.limits)}"'
+    if joint.effort is not None:
+        text += f' actuatorfrcrange="{_numbers((-joint.effort, joint.effort))}"'
+    return text + "/>"
+
+
+def _geoms(robot: Robot, bodies: Bodies, link: int, T_world_body: Array, indent: str) -> Iterator[str]:
+    """The capsules of a link in the frame of its body."""
+    frames = link_frames(robot, np.zeros(robot.n))
+    for each in bodies.capsules:
+        if each.link != link:
+            continue
+        T = inverse(T_world_body) @ (robot.T_world_base if each.row < 0 else frames[each.row])
+        if link == 0:
+            T = T_world_body @ T  # the body of the base stands in the world
+        start, end = (T[:3, :3] @ np.array(point) + T[:3, 3] for point in (each.start, each.end))
+        if float(np.linalg.norm(end - start)) < _SHORTEST:
+            yield f'{indent}<geom type="sphere" pos="{_numbers(start)}" size="{each.radius!r}"/>'
+        else:
+            ends = _numbers([*start, *end])
+            yield f'{indent}<geom type="capsule" fromto="{ends}" size="{each.radius!r}"/>'
+
+
+def _contacts(bodies: Bodies, links: Sequence[str]) -> list[str]:
+    """Pairs of links that are not compared; those that share a joint, where MuJoCo would compare them."""
+    present = sorted({each.link for each in bodies.capsules})
+    compared = {(bodies.capsules[i].link, bodies.capsules[j].link) for i, j in bodies.pairs.tolist()}
+    lines = [
+        f"    <exclude body1={quoted(links[i])} body2={quoted(links[j])}/>"
+        for i in present
+        for j in present
+        if i < j and (i, j) not in compared and (j > i + 1 or i == 0)
+    ]
+    return ["  <contact>", *lines, "  </contact>"] if lines else []
+
+
+def _placed(T: Array) -> str:
+    return f' pos="{_numbers(T[:3, 3])}" quat="{_numbers(wxyz_from_rotation(T[:3, :3]))}"'
+
+
+def _numbers(values: Sequence[float] | Array) -> str:
+    return " ".join(repr(float(value) + 0.0) for value in values)

@@ -1,0 +1,215 @@
+"""MJCF against MuJoCo itself: written arms load and move as they should, and read ones move as in MuJoCo."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arms import CLASSICS, random_robot
+
+import kin
+from kin import InputError, Robot, RobotFileError
+
+mujoco = pytest.importorskip("mujoco")
+
+ARMS = list(kin.builtin_robots().values())
+NEAR = 1e-9  # of a pose; the tables are exact to 1e-12
+
+
+def loaded(text: str):
+    model = mujoco.MjModel.from_xml_string(text)
+    return model, mujoco.MjData(model)
+
+
+def pose(model, data, q: np.ndarray, site: str = "tool") -> np.ndarray:
+    """Where MuJoCo puts a site ``(4, 4)``."""
+    data.qpos[:] = q
+    mujoco.mj_kinematics(model, data)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = data.site(site).xmat.reshape(3, 3), data.site(site).xpos
+    return T
+
+
+def assert_moves_alike(robot: Robot, text: str, site: str = "tool") -> None:
+    model, data = loaded(text)
+    assert model.nq == robot.n
+    for q in robot.random_q(np.random.default_rng(2), 20):
+        assert np.abs(pose(model, data, q, site) - kin.fk(robot, q)).max() < NEAR * max(1.0, robot.reach)
+
+
+@pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
+def test_a_built_in_arm_is_loaded_by_mujoco_and_read_back(robot):
+    text = kin.to_mjcf(robot)
+    assert_moves_alike(robot, text)
+    model, _ = loaded(text)
+    assert model.jnt_range[model.jnt_limited == 1].tolist() == [
+        list(joint.limits) for joint in robot.joints if joint.limits is not None
+    ]
+    assert model.key("home").qpos.tolist() == list(robot.home)
+    back, report = kin.read_urdf(text)
+    assert report.difference < 1e-12
+    assert [joint.limits for joint in back.joints] == [joint.limits for joint in robot.joints]
+    assert [joint.effort for joint in back.joints] == [joint.effort for joint in robot.joints]
+    q = robot.random_q(np.random.default_rng(1), 50)
+    assert kin.fk(back, q) == pytest.approx(kin.fk(robot, q), abs=1e-11)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_any_arm_is_loaded_by_mujoco(seed):
+    robot = random_robot(np.random.default_rng(seed))
+    limited = [
+        replace(row, limits=row.limits or (-0.4, 0.4)) if row.kind == "prismatic" else row for row in robot.rows
+    ]
+    assert_moves_alike(replace(robot, rows=tuple(limited)), kin.to_mjcf(robot))
+
+
+@pytest.mark.parametrize("robot", CLASSICS, ids=lambda robot: robot.id)
+def test_capsules_are_where_the_arm_has_them_and_touch_where_it_says(robot):
+    """Contacts that MuJoCo finds are those of `kin.self_distance`: its capsules and pairs are the same."""
+    text = kin.to_mjcf(robot)
+    model, data = loaded(text)
+    assert model.ngeom == len(kin.capsules(robot))
+    assert sorted(model.geom_size[:, 0]) == pytest.approx(sorted(c.radius for c in kin.capsules(robot)))
+    touching = 0
+    for q in robot.random_q(np.random.default_rng(4), 150):
+        distance = float(kin.self_distance(robot, q))
+        if abs(distance) < 1e-4:
+            continue
+        data.qpos[:] = q
+        mujoco.mj_fwdPosition(model, data)
+        assert bool(data.ncon) == (distance < 0.0), q
+        touching += distance < 0.0
+    if robot.id in ("ur5", "puma560"):
+        assert touching > 3
+
+
+def test_masses_are_said_to_be_assumed():
+    text = kin.to_mjcf("ur5")
+    assert "Masses and inertia are assumed: 1000 kg/m3" in text
+    model, data = loaded(text)
+    assert (model.body_mass[2:] > 0.0).all(), "MuJoCo refuses a moving body without mass"
+    volume = sum(
+        math.pi * c.radius**2 * (math.dist(c.start, c.end) + 4.0 / 3.0 * c.radius) for c in kin.capsules("ur5")
+    )
+    assert model.body_mass.sum() == pytest.approx(1000.0 * volume)
+    mujoco.mj_step(model, data)
+    assert np.isfinite(data.qpos).all()
+
+
+def test_limits_that_leave_no_motion_are_refused():
+    arm = kin.get_robot("planar2r")
+    rows = (replace(arm.rows[0], limits=(0.5, 0.5)), *arm.rows[1:])
+    with pytest.raises(InputError, match="limits of"):
+        kin.to_mjcf(replace(arm, rows=rows, home=(0.5, 0.0)))
+
+
+# Everything that is written in another way than `to_mjcf` does.
+RICH = """<mujoco model="rich">
+  <compiler {compiler}/>
+  <default>
+    <joint axis="0 1 0" limited="auto"/>
+    <default class="big"><joint range="-100 120" damping="2"/><geom type="capsule" size="0.05 0.1"/></default>
+    <default class="slow"><joint type="slide" range="0 0.3"/></default>
+  </default>
+  <asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>
+  <worldbody>
+    <light pos="0 0 3"/><geom type="plane" size="1 1 0.1"/>
+    <body name="foot" pos="0.1 0.2 0.3" euler="10 20 30">
+      <geom type="box" size="0.1 0.1 0.1"/>
+      <body name="turret" pos="0 0 0.1" axisangle="1 2 3 40" childclass="big">
+        <joint name="pan" axis="0 0 2" pos="0.02 0 0" ref="25"/>
+        <joint name="tilt" pos="0 0.1 0.05" axis="1 1 0"/>
+        <geom pos="0 0 0.1" zaxis="1 0 1"/><geom type="mesh" mesh="m" contype="0" conaffinity="0"/>
+        <frame pos="0.1 0 0" xyaxes="0 1 0 -1 0 0.2">
+          <body name="boom" pos="0.3 0 0" quat="1 0.2 0.3 0">
+            <joint name="boom" class="slow" ref="0.1"/>
+            <geom type="capsule" size="0.03" fromto="0 0 0 0.2 0 0.1" contype="0" conaffinity="0"/>
+            <body zaxis="1 0.3 0.2"><joint name="roll" range="-3 3" limited="false"/>
+              <geom type="sphere" size="0.04"/>
+              <site name="tcp" pos="0.1 0 0.2" quat="0.5 0.5 0.5 -0.5"/>
+            </body>
+          </body>
+        </frame>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>"""
+
+
+@pytest.mark.parametrize(
+    "compiler",
+    ['angle="degree"', "", 'eulerseq="ZYX"', 'eulerseq="zxz" angle="degree"', 'eulerseq="xYz"'],
+)
+def test_what_is_read_moves_as_in_mujoco(compiler):
+    text = RICH.format(compiler=compiler)
+    robot, report = kin.read_urdf(text)
+    assert (report.base, report.tip, report.joints) == ("world", "tcp", ("pan", "tilt", "boom", "roll"))
+    assert robot.source.startswith("MJCF")
+    assert_moves_alike(robot, text, "tcp")
+    model, _ = loaded(text)
+    limits = [joint.limits for joint in robot.joints]
+    assert limits[3] is None
+    assert np.array(limits[:3]) == pytest.approx(model.jnt_range[:3])
+    assert report.bodies[1].names == ()
+    assert {name for body in report.bodies for name in body.names} >= {"foot", "turret"}
+
+
+def test_radians_are_read_as_such():
+    text = RICH.format(compiler='angle="radian"').replace("-100 120", "-2 2").replace('ref="25"', 'ref="0.4"')
+    text = text.replace("1 2 3 40", "1 2 3 0.7").replace("10 20 30", "0.1 0.2 0.3")
+    robot = kin.load_urdf(text)
+    assert robot.joints[0].limits == (-2.0, 2.0)
+    assert_moves_alike(robot, text, "tcp")
+
+
+def test_capsules_of_mjcf_are_those_of_the_arm():
+    arm = kin.get_robot("ur5")
+    back = kin.load_urdf(kin.to_mjcf(arm))
+    q = arm.random_q(np.random.default_rng(9), 40)
+    assert kin.self_distance(back, q) == pytest.approx(kin.self_distance(arm, q), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field"),
+    [
+        ("<worldbody>", '<include file="/etc/passwd"/><worldbody>', "<include>"),
+        ('euler="10 20 30"', 'euler="10 20"', "body foot: euler"),
+        ('euler="10 20 30"', 'euler="10 20 nan"', "body foot: euler"),
+        ('axis="1 1 0"', 'axis="0 0 0"', "joint tilt: axis"),
+        ('class="slow" ref', 'class="fast" ref', "joint boom: class"),
+        ('quat="1 0.2 0.3 0"', 'quat="0 0 0 0"', "body boom: quat"),
+        ('name="roll" range="-3 3"', 'name="roll" type="ball"', "joint roll: type"),
+        ('name="roll" range="-3 3"', 'name="roll" type="screw"', "joint roll: type"),
+        ('range="0 0.3"', 'range="0 0.3" limited="false"', "joint boom: limit"),
+        ('range="0 0.3"', 'range="0.3 0"', "joint boom: limit"),
+        ('<compiler angle="degree"/>', '<compiler eulerseq="abc"/>', "compiler eulerseq"),
+        ('<compiler angle="degree"/>', '<compiler coordinate="global"/>', "compiler coordinate"),
+        ("</worldbody>", '</worldbody><equality><joint joint1="roll" joint2="pan"/></equality>', "joint roll: mimic"),  # noqa: E501
+    ],
+)  # fmt: skip
+def test_what_is_no_serial_arm_is_refused_with_its_place(old, new, field):
+    text = RICH.format(compiler='angle="degree"')
+    assert old in text
+    with pytest.raises(RobotFileError) as caught:
+        kin.load_urdf(text.replace(old, new, 1))
+    assert caught.value.field == field
+
+
+def test_several_ends_are_offered():
+    text = RICH.format(compiler='angle="degree"').replace(
+        "</worldbody>", '<body name="cup"><freejoint/></body></worldbody>'
+    )
+    with pytest.raises(RobotFileError, match=r"tip: got .*tcp \(4 joints\)"):
+        kin.load_urdf(text)
+    assert kin.load_urdf(text, tip="tcp").n == 4
+
+
+def test_deep_and_large_files_are_bounded():
+    deep = "<mujoco><worldbody>" + "<body>" * 200 + "</body>" * 200 + "</worldbody></mujoco>"
+    with pytest.raises(RobotFileError, match="nested"):
+        kin.load_urdf(deep)
+    many = "<mujoco><worldbody>" + "<body><joint/></body>" * 6000 + "</worldbody></mujoco>"
+    with pytest.raises(RobotFileError, match="at most 5000 links"):
+        kin.load_urdf(many)
