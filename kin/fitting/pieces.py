@@ -55,7 +55,8 @@ def capsules_around(triangles: Array, balls: Array | None = None, most: int = MO
         return []
     halved = _halved(parts)
     groups = _groups(halved, most)
-    return [smallest(halved[group].reshape(-1, 4)) for group in groups]
+    # A plane chosen by some of the elements may have none of them on one side.
+    return [smallest(halved[group].reshape(-1, 4)) for group in groups if group.any()]
 
 
 def _elements(triangles: Array, balls: Array) -> Array:

@@ -34,8 +34,20 @@ def to_mjcf(robot: Robot | str) -> str:
     The values of the joints are those of the arm. Links that are not compared for collisions here are
     excluded from contacts. An effort limits the force of its joint.
 
+    Args:
+        robot: the arm, or the id of a built-in one.
+
+    Returns:
+        The text of the file.
+
     Raises:
         InputError: a joint whose limits leave no motion.
+        UnknownRobotError: an id that does not exist.
+
+    Examples:
+        >>> text = to_mjcf("planar2r")
+        >>> text.count("<joint ")
+        2
     """
     robot = robot_of(robot)
     bodies = bodies_of(robot)

@@ -45,9 +45,20 @@ def examine_urdf(
         file: the name used in messages.
         files: the meshes that came with it; without it, no mesh is looked at.
 
+    Returns:
+        What was read and found, and the text with all mends that need no decision.
+
     Raises:
         InputError: `source` is neither.
         RobotFileError: there is no such file, or it is no text.
+
+    Examples:
+        >>> from kin import to_urdf
+        >>> found = examine_urdf(to_urdf("planar2r").replace('xyz="0 0 1"', 'xyz="0 0 2"', 1))
+        >>> found.findings[0].text
+        'Its axis has the length 2, not 1; only the direction counts here.'
+        >>> found.mended_arm.robot.n
+        2
     """
     if not isinstance(source, str | Path):
         raise InputError("source", source, "the text of a URDF as str, or the Path of a file")
