@@ -3,8 +3,8 @@
 viser wakes the event loop once for each message outside of an atomic block, at the end of each block and for each
 flush. A generator, a timer and two tasks then wait for the next message. That cost more than posing the arm. An
 `Outbox` keeps viser's buffer, its culling of superseded messages and its format, and replaces how it is read: what
-is pushed within `in_one_frame` leaves in one frame, for which the loop is woken once; a `Bell` wakes it once for
-all visitors who are waiting.
+is pushed within `in_one_frame` leaves in one frame, for which the loop is woken once; a `LoopWaker` wakes it once
+for all visitors who are waiting.
 
 It relies on private names of viser, which `missing_names` lists; `app.viewer.viser_server.start_viser` refuses a
 version that lacks one. Tests compare the bytes with those of viser's own `_message_producer`. Upstream offers no
@@ -38,7 +38,7 @@ logger = logging.getLogger("kinboard.viewer")
 _encode = msgspec.msgpack.Encoder().encode
 
 
-class Bell:
+class LoopWaker:
     """Calls functions in the thread of an event loop, which is woken once for all calls that wait.
 
     Args:
@@ -48,19 +48,19 @@ class Bell:
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.loop = loop
         self._waiting: deque[Callable[[], None]] = deque()
-        self._rung = False
+        self._woken = False
 
-    def ring(self, call: Callable[[], None]) -> None:
-        """Have this called. Any thread may ring; nothing happens if the loop is closed."""
+    def call(self, act: Callable[[], None]) -> None:
+        """Have `act` called. Any thread may ask; nothing happens if the loop is closed."""
         # A call is appended before the flag is read, and the flag is cleared before calls are taken: none is lost.
-        self._waiting.append(call)
-        if not self._rung:
-            self._rung = True
+        self._waiting.append(act)
+        if not self._woken:
+            self._woken = True
             with contextlib.suppress(RuntimeError):  # closed: there is no visitor left
                 self.loop.call_soon_threadsafe(self._answer)
 
     def _answer(self) -> None:
-        self._rung = False
+        self._woken = False
         while self._waiting:
             self._waiting.popleft()()
 
@@ -90,18 +90,18 @@ class Outbox(AsyncMessageBuffer):
         visitor: viser's number of the connection.
     """
 
-    def __init__(self, visitor: int, bell: Bell, packer: Packer) -> None:
-        super().__init__(bell.loop, persistent_messages=False)
+    def __init__(self, visitor: int, waker: LoopWaker, packer: Packer) -> None:
+        super().__init__(waker.loop, persistent_messages=False)
         # viser sets its events in the pushing thread, and asks the loop to set them: both are calls here.
         self.message_event: Any = _Signal(self._pushed)
         self.flush_event: Any = _Signal(self._flushed)
         self.event_loop: Any = _Direct()
         self._visitor = visitor
-        self._bell = bell
+        self._waker = waker
         self._packer = packer
         self._holding = threading.Lock()
         self._holds = 0
-        self._asked: Callable[[], None] | None = None  # while it is held: what to ring for at the end
+        self._asked: Callable[[], None] | None = None  # while it is held: what to call at the end
         self._waiter: asyncio.Future[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
 
@@ -121,7 +121,7 @@ class Outbox(AsyncMessageBuffer):
                 if self._asked != self._send:
                     self._asked = call
                 return
-        self._bell.ring(call)
+        self._waker.call(call)
 
     @contextlib.contextmanager
     def hold(self) -> Iterator[None]:
@@ -135,7 +135,7 @@ class Outbox(AsyncMessageBuffer):
                 self._holds -= 1
                 call, self._asked = (None, self._asked) if self._holds else (self._asked, None)
             if call is not None:
-                self._bell.ring(call)
+                self._waker.call(call)
 
     # The event loop's thread
 
@@ -150,7 +150,7 @@ class Outbox(AsyncMessageBuffer):
         if self.done:
             self._send()
         elif self._timer is None:
-            self._timer = self._bell.loop.call_later(self.window_duration_sec, self._send)
+            self._timer = self._waker.loop.call_later(self.window_duration_sec, self._send)
 
     async def send_to(self, connection: Connection) -> None:
         """Send what is pushed, until the buffer is done or the connection ends; raises `ConnectionEnded`."""
@@ -159,7 +159,7 @@ class Outbox(AsyncMessageBuffer):
                 if window := self._take():
                     await connection.send(self._packer.pack(window))
                 else:
-                    self._waiter = self._bell.loop.create_future()
+                    self._waiter = self._waker.loop.create_future()
                     await self._waiter
         finally:
             if self._timer is not None:

@@ -17,8 +17,8 @@ scene and of the visitor's own. `drag_gizmo` does the same for a gizmo of the vi
 Pages: viser evaluates the type hints of a class for each of its objects, a quarter of the cost of a page.
 `cache_type_hints` caches them.
 
-Curtains: viser can hide one node or all of them. A `Curtain` hides all but some, also what is added meanwhile, and
-knows what to show again.
+Parts of a scene: viser can hide one node or all of them. A `SceneFilter` hides all but some, also what is added
+meanwhile, and knows what to show again.
 
 Wake-ups: messages from other threads than the event loop's wake their reader in an unsafe way; now and then a
 visitor's connection was lost. `set_events_in_their_loop` fixes that.
@@ -110,11 +110,11 @@ def is_removed(node: viser.SceneNodeHandle) -> bool:
     return bool(node._impl.removed)
 
 
-class Curtain:
-    """Hides all nodes of a visitor's scene but some, and lights without a place, until it is opened.
+class SceneFilter:
+    """Hides all nodes of a visitor's scene but some, and lights without a place, until `open`.
 
     What the nodes say of themselves (`visible`) goes on as if they were seen: what is added, shown or hidden
-    meanwhile is as its owner left it when the curtain opens.
+    meanwhile is as its owner left it when the filter ends.
 
     Args:
         kept: what the names of those begin with that stay, such as ``"/wall-"``.

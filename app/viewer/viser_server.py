@@ -35,7 +35,7 @@ from app.shared.connection import Connection, ConnectionEnded
 from app.shared.notes import Notes
 from app.shared.security import Rights
 from app.viewer import viser_outbox
-from app.viewer.viser_outbox import Bell, Outbox, Packer
+from app.viewer.viser_outbox import LoopWaker, Outbox, Packer
 from app.viewer.viser_patches import drag_gizmo
 
 log = logging.getLogger(__name__)
@@ -66,7 +66,7 @@ class PortlessServer(infra.WebsockServer):
         self.visitors: dict[int, viser.ClientHandle] = {}  # viser's own, by client id
         self._open = 0  # connections
         self._notes = Notes(log)
-        self._bell, self._packer = Bell(loop), Packer()
+        self._waker, self._packer = LoopWaker(loop), Packer()
         self._stopping: asyncio.Future[None]
         self._all_ended: asyncio.Event
 
@@ -108,7 +108,7 @@ class PortlessServer(infra.WebsockServer):
 
     async def _visit(self, connection: Connection) -> ConnectionEnded:
         number = infra.ClientId(next(self._ids))
-        buffer = Outbox(number, self._bell, self._packer)
+        buffer = Outbox(number, self._waker, self._packer)
         client = infra.WebsockClientConnection(number, _infra._ClientHandleState(buffer, self._loop))
         self._client_state_from_id[number] = client._state
         self.rights[number], self.clients[number] = connection.rights, connection.client
@@ -270,7 +270,7 @@ def missing_names() -> list[str]:
     found += [f"AsyncMessageBuffer.{name}" for name in ("generator_cursors", "done") if name not in fields]
     drags = ("_handle_transform_controls_updates", "_fire_transform_controls_callbacks")  # see `drag_gizmo`
     found += [f"SceneApi.{name}" for name in drags if not hasattr(viser.SceneApi, name)]
-    if not hasattr(viser.SceneApi, "_queue_scene_message"):  # see `Curtain`
+    if not hasattr(viser.SceneApi, "_queue_scene_message"):  # see `SceneFilter`
         found.append("SceneApi._queue_scene_message")
     return found + viser_outbox.missing_names()
 

@@ -21,7 +21,7 @@ from app.viewer.room.sharing import LEADER_EVERY
 from app.viewer.room.wall import MOST, SmallArm, Wall
 from app.viewer.room.wall import NAME as WALL
 from app.viewer.session.state import PageState
-from app.viewer.viser_patches import Curtain
+from app.viewer.viser_patches import SceneFilter
 from kin import InputError, Robot
 
 QUESTION = "Elbow up or down?"
@@ -62,7 +62,7 @@ class Teacher(Member):
         self._open_tab = 0
         self._chosen: Exercise | None = None  # the exercise in the form of the task
         self._wall: Wall | None = None
-        self._curtain: Curtain | None = None  # before all but the wall
+        self._filter: SceneFilter | None = None  # before all but the wall
         self._before: PageState | None = None  # the own page while a student's is on show, or the wall
 
     def take_news(self) -> None:
@@ -225,7 +225,7 @@ class Teacher(Member):
             camera.look()
             page.numbers.hide_target()
             self._before = page.snapshot()
-            self._curtain = Curtain(page.client.scene, WALL)
+            self._filter = SceneFilter(page.client.scene, WALL)
             image = page.client.camera
             aspect = image.image_width / max(image.image_height, 1) or 1.6
             self._wall = Wall(
@@ -236,9 +236,9 @@ class Teacher(Member):
             self._wall = None
             camera.fit(())
         if not on:
-            if self._curtain is not None:
-                self._curtain.open()
-                self._curtain = None
+            if self._filter is not None:
+                self._filter.open()
+                self._filter = None
             self._return()
 
     def on_robot(self) -> None:

@@ -22,7 +22,7 @@ from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.shared.connection import ConnectionEnded
 from app.viewer import viser_outbox
-from app.viewer.viser_outbox import Bell, Outbox, Packer, in_one_frame, missing_names
+from app.viewer.viser_outbox import LoopWaker, Outbox, Packer, in_one_frame, missing_names
 
 WAIT = 5.0  # s for what takes milliseconds
 
@@ -65,15 +65,15 @@ class Sending:
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.loop, self.line = loop, Line()
         self.wakes = 0
-        self.bell = Bell(loop)
-        ring = self.bell._answer
+        self.waker = LoopWaker(loop)
+        answer_all = self.waker._answer
 
         def answer() -> None:
             self.wakes += 1
-            ring()
+            answer_all()
 
-        self.bell._answer = answer  # type: ignore[method-assign]
-        self.box = Outbox(7, self.bell, Packer())
+        self.waker._answer = answer  # type: ignore[method-assign]
+        self.box = Outbox(7, self.waker, Packer())
         connection: Any = self.line
         self.sent = asyncio.run_coroutine_threadsafe(self.box.send_to(connection), loop)
         self.on_loop(lambda: None)
@@ -276,7 +276,7 @@ def test_a_buffer_that_is_done_ends_its_sender_even_while_it_is_held(sending: Se
 
 def test_a_closed_loop_takes_messages_and_sends_nothing() -> None:
     loop = asyncio.new_event_loop()
-    box = Outbox(7, Bell(loop), Packer())
+    box = Outbox(7, LoopWaker(loop), Packer())
     loop.close()
     box.push(turn("/a"))
     box.flush()

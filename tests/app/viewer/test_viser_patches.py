@@ -16,7 +16,7 @@ from viser._messages import SetPositionMessage, TransformControlsUpdateMessage
 from viser.infra import _async_message_buffer as buffers
 
 from app.viewer.viser_patches import (
-    Curtain,
+    SceneFilter,
     assign,
     cache_type_hints,
     keep_private,
@@ -221,7 +221,7 @@ def test_behind_a_curtain_nothing_is_seen_and_all_is_as_its_owner_left_it(wire):
         return {m["name"]: m["visible"] for m in found if m["name"].count("/") == 1}
 
     assert seen() == {"/shown": True, "/hidden": False, "/x": True, "/lamp": True}
-    curtain = Curtain(scene, "/wall-")
+    scene_filter = SceneFilter(scene, "/wall-")
     assert seen() == {"/shown": False, "/hidden": False, "/x": False, "/lamp": True}
     assert shown.visible
     gone.remove()
@@ -233,7 +233,7 @@ def test_behind_a_curtain_nothing_is_seen_and_all_is_as_its_owner_left_it(wire):
     }  # fmt: skip
     late.visible = False
     messages.clear()
-    curtain.open()
+    scene_filter.open()
     assert seen() == {"/shown": False, "/hidden": True, "/late": False}
     late.visible = True
     assert seen()["/late"] is True
