@@ -7,7 +7,7 @@ request bodies in ``uploads``, and the ``classroom``.
 
 from starlette.routing import BaseRoute
 
-from app.api import equations, fk, ik, jacobian, motion, path
+from app.api import equations, fk, ik, jacobian, motion, path, way
 from app.api.arms import compare, files, robots
 from app.api.body import UploadMemory
 from app.api.classroom import results
@@ -34,6 +34,7 @@ _MODULES = (
     ik,
     path,
     motion,
+    way,
     jacobian,
     equations,
     download,

@@ -181,6 +181,12 @@ def _load_move() -> Run:
     return run
 
 
+def _load_way() -> Run:
+    from app.cli.way import run
+
+    return run
+
+
 def _load_import() -> Run:
     from app.cli.files import run_import
 
@@ -228,6 +234,7 @@ COMMANDS = (
     Command(declare.add_fk, _load_fk, interpreted=True),
     Command(declare.add_ik, _load_ik),
     Command(declare.add_move, _load_move),
+    Command(declare.add_way, _load_way),
     Command(declare.add_robots, _load_robots, interpreted=True),
     Command(declare.add_workspace, _load_workspace),
     Command(add_room, _load_room),

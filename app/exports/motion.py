@@ -218,7 +218,7 @@ FORMATS = {
             "trajectory-json",
             ".trajectory.json",
             "the same as JSON, with arm, units and limits",
-            "application/json",
+            "application/x-joint-trajectory+json",
             trajectory_json,
         ),
         MotionFormat(

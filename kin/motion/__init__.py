@@ -28,7 +28,8 @@ from kin.motion.arrivals import Arrival
 from kin.motion.limits import MotionLimits, limits_of
 from kin.motion.planner import planned
 from kin.motion.planning.collisions import checked
-from kin.motion.planning.starts import start_as_recorded
+from kin.motion.planning.plan import task_of
+from kin.motion.planning.starts import segment_poses, start_as_recorded
 from kin.motion.program import Circ, Dwell, JointTarget, Lin, PoseTarget, Program, Ptp, Spline
 from kin.motion.reading import parse_program, program_from_dict, program_to_dict
 from kin.motion.results import Motion, MotionSample, Peak, Refusal, SegmentTimes
@@ -56,7 +57,9 @@ __all__ = [
     "plan_motion",
     "program_from_dict",
     "program_to_dict",
+    "segment_poses",
     "start_as_recorded",
+    "task_of",
 ]
 
 

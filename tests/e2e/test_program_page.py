@@ -139,39 +139,3 @@ def test_three_poses_are_recorded_played_saved_and_kept(program: Tab, tmp_path: 
     page.locator("[data-program-choice=language]").select_option("URScript")
     expect(page.locator("[data-program=files] code")).to_contain_text("six revolute joints")
     is_kept(program)
-
-
-UR5 = kin.get_robot("ur5")
-LINE = """
-units = { angle = "deg" }
-[[segments]]
-kind = "ptp"
-q = [215.70215832, -94.13277042, 106.01340862, -101.8806382, -90, 35.70215832]
-[[segments]]
-kind = "lin"
-q = [209.38701291, -192.42399488, 91.0728513, 11.35114358, -90, 29.38701291]
-[[segments]]
-kind = "ptp"
-q = [180, -110, 110, -90, -90, 0]
-[[segments]]
-kind = "lin"
-q = [0, -110, 110, -90, -90, 0]
-"""
-
-
-def test_a_line_that_arrives_in_another_posture_is_mended_by_a_button(program: Tab) -> None:
-    page = program.page
-    program.select(UR5)
-    program.open("Program")
-    file = {"name": "line.toml", "mimeType": "text/plain", "buffer": LINE.encode()}
-    page.locator("[data-program-file]").set_input_files(file)  # type: ignore[arg-type]
-    rows = page.locator("[data-program-item]")
-    expect(rows).to_have_count(4)
-    expect(rows.nth(1)).to_contain_text("Arrives in another posture")
-    expect(program.status).to_contain_text("The program ends on the way to 4 of 4")
-    rows.nth(1).locator("[data-program-do=choose]").click()
-    expect(rows.nth(1)).to_contain_text("149.3°")
-    program.screenshot("program-otherwise")
-    rows.nth(1).get_by_role("button", name="Start so that it arrives as recorded").click()
-    expect(rows.nth(1)).not_to_contain_text("Arrives in another posture")
-    expect(rows.nth(0)).not_to_contain_text("Arrives in another posture")

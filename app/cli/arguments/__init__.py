@@ -146,6 +146,24 @@ def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     return parser
 
 
+def add_way(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard way``."""
+    parser = _command(
+        commands, "way", "a way around obstacles: waypoints between which nothing touches",
+        parents.robots, parents.output,
+    )  # fmt: skip
+    parser.add_argument("--goal", nargs="+", metavar="Q", required=True, help=f"joint values; {UNITS_NOTE}")
+    parser.add_argument(
+        "--start", nargs="+", metavar="Q",
+        help=f"where the arm is (default: its home configuration); {UNITS_NOTE}",
+    )  # fmt: skip
+    parser.add_argument("--seed", default="0", help="of the random search (default 0)")
+    parser.add_argument("--time-limit", default="5", metavar="S", help="seconds for the search (default 5)")
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the program (TOML); - is standard output")
+    add_options(parser, ["avoid_self_collision", "obstacles"])
+    return parser
+
+
 def add_robots(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard robots``."""
     parser = _command(

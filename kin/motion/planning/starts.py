@@ -16,6 +16,7 @@ from kin.fk import fk
 from kin.ik.problem import never_cancel
 from kin.motion.arrivals import Arrival
 from kin.motion.geometry.chain import LostError, followed
+from kin.motion.geometry.curves import poses
 from kin.motion.geometry.splines import values
 from kin.motion.paths import NO_LENGTH, Layout, chained, curve_of
 from kin.motion.planning.plan import CODES, task_of
@@ -26,6 +27,20 @@ from kin.robot import Robot
 from kin.transforms import Array
 
 _LOOKS = 999  # places of a path at which the limits of the joints are looked at
+
+
+def segment_poses(motion: Motion, index: int, count: int) -> Array | None:
+    """Poses ``(count, 4, 4)`` at equal steps along the curve of a LIN or CIRC, from its start to its end.
+
+    None if the segment is another one, has no length or no arc, or it is not known where it starts.
+    """
+    robot, segment, before = motion.robot, motion.program.segments[index], motion.q_before(index)
+    if not isinstance(segment, Lin | Circ) or before is None:
+        return None
+    curve = curve_of(robot, segment, fk(robot, before), task_of(motion.program, robot) != "approach")
+    if curve is None or isinstance(curve, tuple) or curve.length < NO_LENGTH:
+        return None
+    return poses(curve, np.linspace(0.0, curve.length, count))
 
 
 def start_as_recorded(motion: Motion, index: int, stop: Callable[[], None] = never_cancel) -> Array | None:

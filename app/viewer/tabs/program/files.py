@@ -1,13 +1,11 @@
-"""A program as a file (TOML), which the command line and Python read too."""
+"""Files of the tab: programs that are opened, and motions over time that are saved."""
 
 from __future__ import annotations
-
-import json
 
 from app.exports.motion import FORMATS
 from app.viewer.own_arm import clean
 from kin import InputError, Robot
-from kin.motion import Motion, Program, parse_program, program_to_dict
+from kin.motion import Motion, Program, parse_program
 
 MOTIONS: dict[str, str] = {
     "csv-commented": "CSV", "trajectory-yaml": "ROS YAML", "trajectory-json": "ROS JSON", "mcap": "MCAP",
@@ -15,17 +13,6 @@ MOTIONS: dict[str, str] = {
 }  # fmt: skip
 RATE, MOST_SAMPLES = 100.0, 30_000  # samples per second, and in all: a longer motion has fewer per second
 LARGEST = 30_000  # bytes of a file: it comes in one message of the page
-
-
-def toml_of(program: Program, robot_name: str) -> str:
-    """The program in metres and radians, digit by digit; `kin.parse_program` reads it."""
-    data = program_to_dict(program)
-    segments = data.pop("segments")
-    lines = [f"# A program for {' '.join(robot_name.split())}", *_fields(data)]
-    lines.append('units = { length = "m", angle = "rad" }')
-    for segment in segments:
-        lines += ["", "[[segments]]", *_fields(segment)]
-    return "\n".join(lines) + "\n"
 
 
 def motion_file(motion: Motion, name: object) -> tuple[str, bytes, str]:
@@ -51,16 +38,3 @@ def read(value: object, robot: Robot) -> tuple[str, Program]:
         case [str(name), None]:
             raise InputError("file", clean(name, 60), f"a file of at most {LARGEST // 1000} kB")
     raise InputError("upload", value, "the name and the text of a file")
-
-
-def _fields(data: dict[str, object]) -> list[str]:
-    return [f"{key} = {_value(value)}" for key, value in data.items()]
-
-
-def _value(value: object) -> str:
-    """Strings and numbers are written in TOML as in JSON; points of a spline are tables."""
-    if isinstance(value, dict):
-        return "{ " + ", ".join(_fields(value)) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)

@@ -15,11 +15,12 @@ from app.viewer.tabs.program.items import Items
 from app.viewer.tabs.program.planning import Plan
 from app.viewer.tabs.program.playback import Playback
 from app.viewer.tabs.program.plot import plot_html
+from app.viewer.tabs.program.postures import Chart, html
 from app.viewer.tabs.program.typed import Fields
 from app.viewer.views.templates import render
 from kin.motion import Motion
 
-PARTS = ("player", "clock", "list", "plot", "summary", "compare", "files")
+PARTS = ("player", "clock", "list", "postures", "plot", "summary", "compare", "files")
 
 
 class Screen:
@@ -73,6 +74,10 @@ class Screen:
             "list",
             views.items_html(items, self.chosen, plan, fault, loop, self.fields, self.by_pose, self._revision),
         )
+
+    def postures(self, chart: Chart | None) -> None:
+        """The chart of postures on the way to a waypoint."""
+        self._show("postures", "" if chart is None else html(chart))
 
     def plot(self, motion: Motion | None, other: Motion | None) -> None:
         """The curves over time."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from app.exercises.typed import EntryError
 from app.exports.motion_snippets import SNIPPETS
+from app.exports.program_toml import toml_of
 from app.exports.snippets import named
 from app.viewer.feature import Feature, Stage
 from app.viewer.own_arm import KEY
@@ -22,13 +23,15 @@ from app.viewer.panel.status import Notice
 from app.viewer.tabs.program import items as changes
 from app.viewer.tabs.program.compare import CHOICES, ZONE, Choice, other_motion
 from app.viewer.tabs.program.faults import Fault, find_fault
-from app.viewer.tabs.program.files import motion_file, read, toml_of
+from app.viewer.tabs.program.files import motion_file, read
 from app.viewer.tabs.program.items import MOST, PAUSE, Item, Items
 from app.viewer.tabs.program.links import pack, unpack
 from app.viewer.tabs.program.planning import Plan, halfway, items_of, plan
 from app.viewer.tabs.program.playback import RATES, Playback
+from app.viewer.tabs.program.postures import Chart, compute
 from app.viewer.tabs.program.screen import Screen
 from app.viewer.tabs.program.views import KINDS
+from app.viewer.tabs.workspace.background import run_in_background
 from kin import InputError, KinematicsError
 from kin.motion import Motion
 from kin.warmup import MOTIONS
@@ -41,6 +44,7 @@ _LABELS = {
     "clear": "Clear the program", "upload": "Open a program", "loop": "Loop", "field": "Waypoint",
     "via": "Via point", "ptp": "PTP instead", "take": "Joints of arrival",
     "start": "Start in another posture",
+    "begin": "Start in another posture",
 }  # fmt: skip
 
 
@@ -61,6 +65,7 @@ class ProgramTab(Feature):
         self._fault: Fault | None = None
         self._compared: Choice | None = None
         self._zone = ZONE
+        self._chart: Chart | None = None
         self._stale: float | None = None  # when the motion is planned again, after the obstacles have changed
         self._other: Motion | None = None
         self._screen = Screen(stage)
@@ -178,6 +183,7 @@ class ProgramTab(Feature):
 
     def _refresh(self, anew: bool = False) -> None:
         """Plan the motion, and show everything; `anew`: what was typed into the fields is replaced."""
+        self._close_postures(None)
         arm = self.stage.now
         items, stage, loop = self._items, self.stage, self._player.loop
         self._plan, self._stale = plan(items, arm.robot, loop, arm.avoid, arm.obstacles), None
@@ -280,6 +286,50 @@ class ProgramTab(Feature):
         if found is not None:
             before, q = found
             self._use(changes.changed(self._items, before, q=changes.configuration(q)), self._screen.chosen)
+
+    # Postures along the way
+
+    def _show_postures(self, index: int, _: object) -> None:
+        """Compute the chart of the way to a waypoint, in the background."""
+        self._close_postures(None)
+        if self._plan is None:
+            return
+        arm, plan, chart = self.stage.now, self._plan, Chart(index)
+        self._chart = chart
+        self._screen.postures(chart)
+
+        def work() -> None:
+            compute(chart, plan, arm.avoid, arm.obstacles)
+            self.post(("charted",), chart)
+
+        run_in_background(work, "postures", lambda key, value: self.post((key,), value))
+
+    def _charted(self, chart: object) -> None:
+        if chart is self._chart:
+            self._screen.postures(self._chart)
+
+    def _failed(self, error: object) -> None:
+        self._close_postures(None)
+        if isinstance(error, BaseException):
+            raise error
+
+    def _close_postures(self, _: object) -> None:
+        if self._chart is not None:
+            self._chart.cancelled.set()
+            self._chart = None
+            self._screen.postures(None)
+
+    def _begin(self, index: int, row: object) -> None:
+        """Start in a posture of the chart: the waypoint before takes its joint values."""
+        chart = self._chart
+        found = None if chart is None or chart.index != index else chart.found
+        if found is None or not isinstance(row, str) or not row.isdecimal() or len(row) > 3:
+            return
+        before = max((i for i, item in enumerate(self._items[:index]) if item.q), default=None)
+        if int(row) >= len(found.postures) or found.reach[0, int(row)] < 0 or before is None:
+            return
+        q = changes.configuration(found.q[0, int(row)])
+        self._use(changes.changed(self._items, before, q=q), self._screen.chosen)
 
     def _type(self, index: int, value: object) -> None:
         item = self._items[index]
@@ -428,6 +478,8 @@ _ITEM_HANDLERS: dict[str, Callable[[ProgramTab, int, object], None]] = {
     "via": ProgramTab._set_via,
     "ptp": ProgramTab._use_ptp,
     "take": ProgramTab._take,
+    "postures": ProgramTab._show_postures,
+    "begin": ProgramTab._begin,
     "start": ProgramTab._start,
     "duplicate": lambda tab, index, _: tab._insert(index + 1, tab._items[index]),
     "up": lambda tab, index, _: tab._move(index, index - 1),
@@ -451,6 +503,10 @@ _HANDLERS: dict[str, Callable[[ProgramTab, object], None]] = {
     "language": ProgramTab._set_language,
     "download": ProgramTab._download,
     "save": ProgramTab._save,
+    "close-postures": ProgramTab._close_postures,
+    "charted": ProgramTab._charted,
+    "failed": ProgramTab._failed,
     "upload": ProgramTab._upload,
 }
-ProgramTab.messages = frozenset({*_ITEM_HANDLERS, *_HANDLERS})
+_OWN = {"charted", "failed"}  # posted by the tab itself, never sent by a page
+ProgramTab.messages = frozenset({*_ITEM_HANDLERS, *_HANDLERS} - _OWN)

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 import kin
 from app.exercises.typed import EntryError
+from app.exports.program_toml import toml_of
 from app.viewer.own_arm import clean
 from app.viewer.tabs.program import items as lists
 from app.viewer.tabs.program.compare import CHOICES, Choice, jerk_is_infinite, other_motion
 from app.viewer.tabs.program.drawing import shared
-from app.viewer.tabs.program.files import toml_of
 from app.viewer.tabs.program.items import Item
 from app.viewer.tabs.program.links import pack, unpack
 from app.viewer.tabs.program.planning import halfway, items_of, plan, program_of

@@ -20,6 +20,7 @@ from app.shared.store import Store
 from app.viewer.session.state import decode
 from app.viewer.tabs.program.files import MOTIONS
 from app.viewer.tabs.program.items import MOST
+from app.viewer.tabs.program.postures import PLACES
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -313,6 +314,34 @@ def test_a_file_is_opened_and_one_that_does_not_fit_is_refused(tab: FakeBrowser)
         press(tab, "upload", value=[name, content])
         tab.wait(lambda: "The file was not used" in tab.html)
         assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
+
+
+def test_postures_on_the_way_are_shown_and_a_click_starts_there(ur5: FakeBrowser) -> None:
+    line_of_the_ur5(ur5)
+    before, _ = recorded(ur5, 0), recorded(ur5, 1)
+    press(ur5, "postures", 1)
+    ur5.wait(lambda: "kb-posture-list" in part(ur5, "postures"))
+    shown = html.unescape(part(ur5, "postures"))
+    motion = kin.plan_motion(
+        UR5, kin.parse_program(f"[[segments]]\nkind='lin'\nq={np.radians(FAR).tolist()}"), before
+    )
+    found = kin.path_postures(UR5, kin.motion.segment_poses(motion, 0, PLACES), q_start=before)
+    assert shown.count("<li>") == len(found.postures)
+    assert f"gets through in {len(found.through)} of {len(found.postures)} postures" in shown
+    assert shown.count("<span>the whole way") == len(found.through)
+    row = next(row for row in found.through if row != int(found.rows[0]))
+    press(ur5, "begin", 1, value=str(row))
+    start = recorded(ur5, 0)
+    assert np.abs(start - found.q[0, row]).max() < 1e-4
+    assert kin.branch_of(UR5, start) == found.postures[row]
+    assert part(ur5, "postures") == "", "another program has another chart"
+    for value in ("x", "99", None, "-1"):
+        press(ur5, "begin", 1, value=value)
+    assert np.array_equal(recorded(ur5, 0), start)
+    press(ur5, "postures", 0)
+    ur5.wait(lambda: "There is no way to show" in html.unescape(part(ur5, "postures")))
+    press(ur5, "close-postures")
+    assert part(ur5, "postures") == ""
 
 
 def test_a_motion_over_time_is_saved_in_each_format(ur5: FakeBrowser) -> None:

@@ -1,0 +1,70 @@
+"""``kinboard way``: a way around obstacles."""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from dataclasses import replace
+from pathlib import Path
+
+from app.cli.terminal import Notation, configuration, obstacles_of, print_json, quantity, robot_of, table, units_of
+from app.exports.program_toml import toml_of
+from app.exports.progress import progress_bar
+from app.shared.answers.way import way_answer
+from kin import InputError
+from kin.motion import JointTarget, Ptp
+from kin.units import Unit
+from kin.way import find_way, way_program
+
+SECONDS = Unit("s", 1.0, 2)
+
+
+def run(arguments: Namespace) -> int:
+    """Search a way, print its waypoints, and write its program; 1 if none is found."""
+    robot, units = robot_of(arguments), units_of(arguments)
+    start = arguments.start
+    q_start = robot.q_home if start is None else configuration(robot, start, "--start", units)
+    q_goal = configuration(robot, arguments.goal, "--goal", units)
+    avoided = {"avoid_self_collision": arguments.avoid_self_collision, "obstacles": obstacles_of(arguments)}
+    if not arguments.seed.isdecimal():
+        raise InputError("--seed", arguments.seed, "a whole number from 0 to 4294967295")
+    seconds = quantity(arguments.time_limit, SECONDS, "--time-limit")
+    seen = [0.0]
+    with progress_bar(100, "%", sys.stderr.isatty() and not arguments.json) as advance:
+
+        def progress(part: float) -> None:
+            advance(int(100 * part) - int(100 * seen[0]))
+            seen[0] = part
+
+        way = find_way(
+            robot, q_start, q_goal, seed=int(arguments.seed), time_limit=seconds, progress=progress, **avoided
+        )
+    motion = way_program(way, **avoided) if way.found else None
+    if arguments.json:
+        print_json(way_answer(way, motion))
+    else:
+        print(way.explain(units))
+    if motion is None or way.q is None:
+        return 1
+    if not arguments.json:
+        notation = Notation(robot, arguments.rad)
+        rows = [
+            [str(k + 1), *(notation.joint(i, value) for i, value in enumerate(q))] for k, q in enumerate(way.q)
+        ]
+        print("\n" + table(["", *(joint.name for joint in robot.joints)], rows))
+        print("\nIts program: " + motion.explain(units))
+    if arguments.output is not None:
+        first = Ptp(JointTarget(tuple(q_start.tolist())))
+        program = replace(motion.program, segments=(first, *motion.program.segments))
+        _write(arguments.output, toml_of(program, robot.name))
+    return 0 if motion.planned else 1
+
+
+def _write(path: str, text: str) -> None:
+    if path == "-":
+        print(text, end="")
+        return
+    try:
+        Path(path).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError("--output", path, f"a file that can be written ({error})") from None

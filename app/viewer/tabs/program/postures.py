@@ -1,0 +1,140 @@
+"""The chart of postures along the way to a waypoint: which are free, what is in the way of others, and where.
+
+The way along the line or arc is the horizontal axis, each posture of the arm a row. A click on a row starts there:
+the waypoint before takes the joint values from which this posture leads farthest.
+"""
+
+from __future__ import annotations
+
+import threading
+from concurrent.futures import CancelledError
+from dataclasses import dataclass, field
+
+import numpy as np
+from markupsafe import Markup, escape
+
+import kin
+from app.viewer.panel.posture import short
+from app.viewer.tabs.program.planning import Plan
+from app.viewer.views.templates import render
+from kin import IKOptions, Obstacle, PathPostures
+from kin.motion import segment_poses
+from kin.path.postures import STATES, Reason, State
+
+PLACES = 80  # along the way
+WIDTH, LEFT, ROW, GAP, TOP, BOTTOM = 320.0, 8.0, 15.0, 4.0, 4.0, 18.0
+LEGEND: dict[State, str] = {
+    "free": "free", "near limit": "near a limit", "near singularity": "near a singularity",
+    "outside": "outside the limits", "touches": "touches something", "none": "no such posture",
+}  # fmt: skip
+
+
+@dataclass
+class Chart:
+    """The chart of one waypoint: being computed, done, or failed.
+
+    Attributes:
+        index: of the item.
+        found: the postures; None: not known yet.
+        words: why there is no chart.
+        cancelled: set when it is not wanted any more.
+    """
+
+    index: int
+    found: PathPostures | None = None
+    words: str = ""
+    cancelled: threading.Event = field(default_factory=threading.Event)
+
+    def check(self) -> None:
+        """Raise `CancelledError` if it is not wanted any more."""
+        if self.cancelled.is_set():
+            raise CancelledError
+
+
+def compute(chart: Chart, plan: Plan, avoid: bool, obstacles: tuple[Obstacle, ...]) -> None:
+    """Fill a chart; in a background thread."""
+    segment = plan.segments[chart.index]
+    poses = segment_poses(plan.motion, segment, PLACES)
+    before = plan.motion.q_before(segment)
+    if poses is None or before is None:
+        chart.words = "There is no way to show: the program ends before this waypoint, or it has no length."
+        return
+    options = IKOptions(
+        task=kin.motion.task_of(plan.motion.program, plan.motion.robot), avoid_self_collision=avoid,
+        obstacles=obstacles if avoid else (),
+    )  # fmt: skip
+    chart.found = kin.path_postures(plan.motion.robot, poses, options=options, q_start=before, stop=chart.check)
+
+
+def html(chart: Chart) -> str:
+    """The chart, or that it is being computed."""
+    found = chart.found
+    rows = [] if found is None else [_row(found, row) for row in range(len(found.postures))]
+    used = set() if found is None else {STATES[state] for state in np.unique(found.states).tolist()}
+    return render(
+        "program/postures",
+        index=chart.index,
+        words=chart.words if found is None else _words(found),
+        computing=found is None and not chart.words,
+        svg="" if found is None else _svg(found, chart.index),
+        rows=rows,
+        legend=[(state.replace(" ", "-"), words) for state, words in LEGEND.items() if state in used],
+    )
+
+
+def _words(found: PathPostures) -> str:
+    count, through = len(found.postures), len(found.through)
+    if through:
+        return f"The arm gets through in {through} of {count} postures. A click on one starts there."
+    return found.reason
+
+
+def _row(found: PathPostures, row: int) -> dict[str, object]:
+    """A posture in words: how far it leads, and what ends it."""
+    reach, last = int(found.reach[0, row]), len(found.reach) - 1
+    if reach < 0:
+        reason = found.reasons.get((0, row), Reason()).explain()
+        text = f"not at the start: {reason}" if reason else "not at the start: the pose cannot be met so"
+    elif reach == last:
+        text = "the whole way"
+    else:
+        reason = found.reasons.get((reach + 1, row), Reason()).explain()
+        text = f"to {100.0 * reach / max(last, 1):.0f} %" + (f": {reason}" if reason else "")
+    return {
+        "name": short(found.postures[row]), "text": text, "can": reach >= 0, "row": row,
+        "best": int(found.rows[0]) == row,
+    }  # fmt: skip
+
+
+def _svg(found: PathPostures, index: int) -> Markup:
+    count = len(found.postures)
+    step = (WIDTH - 2.0 * LEFT) / len(found.states)
+    bottom = TOP + count * (ROW + GAP)
+    parts = []
+    for stretch in found.stretches:
+        x = LEFT + stretch.first * step
+        width = (stretch.last - stretch.first + 1) * step - (0.0 if stretch.joined else 1.0)
+        y = TOP + stretch.posture * (ROW + GAP)
+        able = found.reach[0, stretch.posture] >= 0
+        does = f' data-program-do="begin" data-argument="{stretch.posture}" data-index="{index}"' if able else ""
+        name = LEGEND[stretch.state] + (f": {stretch.reason}" if stretch.reason else "")
+        parts.append(
+            f'<rect class="kb-posture kb-posture-{stretch.state.replace(" ", "-")}" x="{x:.2f}" y="{y:.1f}" '
+            f'width="{max(width, 0.5):.2f}" height="{ROW}"{does}><title>{escape(name)}</title></rect>'
+        )
+    points = [
+        f"{LEFT + (i + 0.5) * step:.2f} {TOP + row * (ROW + GAP) + 0.5 * ROW:.1f}"
+        for i, row in enumerate(found.rows.tolist())
+        if row >= 0
+    ]
+    if points:
+        parts.append(f'<path class="kb-posture-best" d="M{"L".join(points)}"><title>the best path</title></path>')
+    parts += [
+        f'<text class="kb-axis" x="{LEFT + share * (WIDTH - 2.0 * LEFT):.1f}" y="{bottom + 11:.1f}" '
+        f'text-anchor="{anchor}">{100 * share:.0f} %</text>'
+        for share, anchor in ((0.0, "start"), (0.5, "middle"), (1.0, "end"))
+    ]
+    return Markup(
+        f'<svg class="kb-plot" viewBox="0 0 {WIDTH:.0f} {bottom + BOTTOM:.0f}" width="100%" role="img" '
+        f'aria-label="Postures along the way: one row each, in the order of the list below">{"".join(parts)}</svg>'
+    )
