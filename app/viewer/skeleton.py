@@ -8,9 +8,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
+from app.viewer.declared.scene import Color, Node
 from app.viewer.scene.chain import chain, link_poses
 from app.viewer.scene.meshes import body
 from kin import Robot
@@ -94,3 +96,17 @@ def cylinder() -> tuple[Array, Array]:
             (SIDES + i, SIDES + j, 2 * SIDES + 1),
         ]
     return np.array(vertices), np.array(faces)
+
+
+def ghost(key: str, robot: Robot, q: Array, color: Color, opacity: float, **more: Any) -> Node:
+    """A translucent copy of the arm at q ``(n,)``: one node, of which a new posture takes a few hundred bytes."""
+    vertices, faces = cylinder()
+    positions, wxyz, _ = places(robot, q[None])
+    pieces = {"vertices": vertices, "faces": faces, "batched_scales": skeleton(robot).scales}
+    where = {
+        "batched_positions": positions[0].astype(np.float32),
+        "batched_wxyzs": wxyz[0].astype(np.float32),
+        "batched_colors": color,
+    }
+    looks = {"opacity": opacity, "lod": "off", "cast_shadow": False, "receive_shadow": False}
+    return Node("batched_meshes_simple", key, {**pieces, **where, **looks}, **more)

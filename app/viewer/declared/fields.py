@@ -161,6 +161,7 @@ class Number(Spec):
 
     Attributes:
         slider: the ends of the slider, if it is not a field.
+        within: the limits for a robot, and the ends of its slider, if they are not the same for all.
         marks: whether the slider shows its ends.
         named: whether the label ends with the unit.
     """
@@ -175,6 +176,14 @@ class Number(Spec):
     whole: bool = False
     marks: bool = False
     named: bool = True
+    within: Callable[[Robot], tuple[float, float]] | None = None
+
+    def of(self, robot: Robot) -> Number:
+        """What is valid for a robot."""
+        if self.within is None:
+            return self
+        ends = self.within(robot)
+        return replace(self, limits=ends, slider=ends if self.slider else None, within=None)
 
     @property
     def kind(self) -> str:  # type: ignore[override]
@@ -185,13 +194,13 @@ class Number(Spec):
         return {"length": units.lengths, "angle": units.angles, "": None}[self.measure]
 
     def shown(self, value: Any, robot: Robot, units: Units) -> Any:
-        if self.slider is not None:
-            value = min(max(value, self.slider[0]), self.slider[1])
+        if (slider := self.of(robot).slider) is not None:
+            value = min(max(value, slider[0]), slider[1])
         return value if self.whole else self._unit(units).shown(value, self.digits)
 
     def props(self, robot: Robot, units: Units) -> dict[str, Any]:
-        unit = self.unit(units)
-        low, high = self._ends(self.slider or self.limits, units)
+        unit, own = self.unit(units), self.of(robot)
+        low, high = self._ends(own.slider or own.limits, units)
         step = self.step
         if step is None:
             step = 1 if self.whole else self._unit(units).step(self.digits)
@@ -201,8 +210,8 @@ class Number(Spec):
         return {"marks": limit_marks(*self._ends(self.slider, units))} if self.marks and self.slider else {}
 
     def read(self, name: str, posted: object, robot: Robot, units: Units) -> Any:
-        if self.whole:
-            return self.unpack(name, posted, robot)
+        if self.whole or self.within is not None:
+            return self.of(robot).unpack(name, posted, robot)
         unit, (low, high) = self._unit(units), self._ends(self.limits, units)
         valid = "a finite number" if self.clip else f"a number from {low:g} to {high:g}"
         if not _is_number(posted):
@@ -212,7 +221,7 @@ class Number(Spec):
         return min(max(unit.read(float(posted)), self.limits[0]), self.limits[1])
 
     def unpack(self, name: str, entry: object, robot: Robot) -> Any:
-        low, high = self.limits
+        low, high = self.of(robot).limits
         expected = f"a number from {low:g} to {high:g}"
         if self.whole:
             expected = f"a whole number from {low:g} to {high:g}"

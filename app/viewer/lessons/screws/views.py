@@ -8,7 +8,6 @@ from markupsafe import Markup
 from app.viewer.lessons.figures import GREY
 from app.viewer.lessons.screws.drawing import GHOST, VELOCITY
 from app.viewer.lessons.screws.product import Form, foot, product
-from app.viewer.panel.joints import label
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.views import mathml as m
 from app.viewer.views.templates import render
@@ -20,11 +19,6 @@ MATRIX = 0.74  # em, as in the lesson on DH tables
 DIGITS = 5  # of the two products
 LETTER: dict[Form, str] = {"space": "S", "body": "B"}
 FRAME: dict[Form, str] = {"space": "world", "body": "tool"}
-
-
-def joint_names(robot: Robot) -> tuple[str, ...]:
-    """The joints to choose from."""
-    return tuple(label(robot, i) for i in range(robot.n))
 
 
 def table_html(robot: Robot, columns: Array, form: Form, now: bool, chosen: int) -> str:

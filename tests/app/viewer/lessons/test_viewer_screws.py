@@ -22,9 +22,9 @@ from app.viewer.lessons.axes import axes_at
 from app.viewer.lessons.guide.outline import Choice, Number
 from app.viewer.lessons.screws import views
 from app.viewer.lessons.screws.drawing import spread_tips
-from app.viewer.lessons.screws.lesson import FORMS, PLACES
 from app.viewer.lessons.screws.product import Form, foot, origin_of, partial, product, seen
 from app.viewer.lessons.screws.questions import far_joint, outline
+from app.viewer.lessons.screws.settings import FORMS, PLACES, joints
 from app.viewer.server import ViewerServer
 from kin.units import Units
 
@@ -199,7 +199,7 @@ def test_the_controls_change_table_product_and_scene(server: int) -> None:
         tab.set("Axes", next(iter(PLACES)))
         tab.set("Factors", 2)
         tab.wait(lambda: "The factors of the first 2 joints act on M" in tab.html)
-        tab.set("Joint", views.joint_names(pioneer)[3])
+        tab.set("Joint", list(joints(pioneer))[3])
         tab.wait(lambda: "v of joint 4, direction only" in tab.html and "after the factors" in tab.html)
         tab.wait(lambda: sum(name.startswith("/screws-") for name in tab.nodes) > 3 * pioneer.n)
         tab.wait(lambda: bool(tab.kept))
