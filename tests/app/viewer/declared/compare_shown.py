@@ -26,7 +26,7 @@ from kin.units import DEFAULT_UNITS, Units
 
 TOLERANCE = 2e-5
 # Fewer arms, by their ids, for a quick look: ARMS=ur5,scara
-ARMS = [STORE.get(name) for name in os.environ["ARMS"].split(",")] if "ARMS" in os.environ else CLASSICS
+ARMS = [robot for robot in CLASSICS if robot.id in os.environ.get("ARMS", robot.id).split(",")]
 STATES: dict[str, list[dict[str, object]]] = {
     "velocity": [
         {"frame": "tool", "ellipsoid": "moment", "joint": 2, "statics": {"on": True, "force": [1, -2, 3.5]}},

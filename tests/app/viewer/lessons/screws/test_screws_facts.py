@@ -7,14 +7,14 @@ import math
 import numpy as np
 import numpy_arm
 import pytest
-from bare_page import STORE
+from arms import CLASSICS
 
 import kin
 from app.viewer.arm import Arm
 from app.viewer.lessons.screws.facts import ScrewsFacts
 from app.viewer.lessons.screws.settings import ScrewsSettings
 
-ARMS = pytest.mark.parametrize("robot", STORE.robots, ids=[robot.id for robot in STORE.robots])
+ARMS = pytest.mark.parametrize("robot", CLASSICS, ids=[robot.id for robot in CLASSICS])
 
 
 def facts(robot: kin.Robot, q: np.ndarray, **settings: object) -> ScrewsFacts:
