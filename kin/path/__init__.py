@@ -148,8 +148,20 @@ def path_postures(
             something are in the way.
         roundings: one per target, each as in `kin.ik.solve`.
 
+    Returns:
+        The table of targets and postures, and the path of `solve_path` in it.
+
     Raises:
         InputError: as `solve_path`.
+
+    Examples:
+        >>> import kin
+        >>> arm = kin.get_robot("planar2r")
+        >>> reach = float(arm.reach)
+        >>> line = [[share * reach, 0.0, 0.0] for share in (0.5, 0.52, 0.54)]
+        >>> found = kin.path_postures(arm, line, options=kin.IKOptions(task="position"))
+        >>> len(found.postures), found.through
+        (2, (0, 1))
     """
     wanted = IKOptions.of(options)
     settings, waypoints = _layers(robot_of(robot), targets, wanted, q_start, max_step, stop, roundings)
