@@ -20,9 +20,16 @@ def joint_value(kind: str, value: float, units: Units) -> str:
 
 
 def need(violation: LimitViolation, units: Units) -> str:
-    """A joint value outside the limits, e.g. ``"joint 2 at 100.0° (limit 90.0°)"``."""
+    """A joint value outside the limits, e.g. ``"joint 2 at 100.0° (limit 90.0°)"``.
+
+    Where both would be written alike, how far apart they are: ``"joint 2 3.1e-03° from its limit 90.0°"``.
+    """
     bound = "locked at" if violation.locked else "limit"
     value, limit = (joint_value(violation.kind, x, units) for x in (violation.value, violation.limit))
+    if value == limit:
+        apart = joint_value(violation.kind, abs(violation.value - violation.limit), units)
+        place = "where it is locked," if violation.locked else "its limit"
+        return f"{joint(violation.joint, violation.name)} {apart} from {place} {limit}"
     return f"{joint(violation.joint, violation.name)} at {value} ({bound} {limit})"
 
 
