@@ -12,6 +12,7 @@ import pytest
 import kin
 from kin.axes import inverse, size
 from kin.comparison import Comparison, messages
+from kin.comparison.diagnosis import differences
 from kin.comparison.mistakes import Edit, edits, fewer_rows
 from kin.comparison.tables import Tables
 from kin.robot import Joint, Robot
@@ -69,6 +70,17 @@ def changed(arm: Robot, row: int, **cells: float) -> Robot:
     rows = list(arm.rows)
     rows[row] = replace(rows[row], **cells)
     return replace(arm, rows=tuple(rows))
+
+
+def test_differences_of_poses_are_distances_and_angles():
+    rng = np.random.default_rng(4)
+    one, turns = random_frame(rng), [0.0, 1e-9, 1e-5, 0.3, 2.0, 3.1]
+    other = np.array(
+        [one @ from_position_wxyz([0, 0, 0.2], [math.cos(t / 2), 0, math.sin(t / 2), 0]) for t in turns]
+    )
+    position, rotation = differences(np.tile(one, (6, 1, 1)), other)
+    assert position == pytest.approx([0.2] * 6)
+    assert rotation == pytest.approx(turns, rel=1e-6, abs=1e-15)
 
 
 @pytest.mark.parametrize("arm", ARMS, ids=ids)
