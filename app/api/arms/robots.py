@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated
 
 from fastapi import Query, Request, Response
+from starlette.concurrency import run_in_threadpool
 
 from app.api.body import versioned
 from app.api.schemas import RobotId, refusals, reply, robot_of, store_of
 from app.shared.answers.answer import Answer
 from app.shared.answers.robots import RobotAnswer, robot_answer
 from app.shared.finding import FIELDS, LONGEST, find_robots
+from kin import Robot
 
 router = versioned("robots")
 
@@ -36,8 +39,13 @@ class RobotList(Answer):
 @router.get("/robots", summary="List the robots", response_model=RobotList, responses=refusals(422, 500))
 async def list_robots(request: Request, find: Find = "") -> Response:
     """Every arm with its DH table, joints and limits. Its `id` goes into the other addresses."""
-    found = find_robots(store_of(request).robots, find)
-    return reply({"robots": [robot_answer(robot) for robot in found]})
+    # On a machine where no kernels are compiled yet, the solvers of general arms take seconds to be chosen.
+    found = await run_in_threadpool(_answers, store_of(request).robots, find)
+    return reply({"robots": found})
+
+
+def _answers(robots: Iterable[Robot], query: str) -> list[RobotAnswer]:
+    return [robot_answer(robot) for robot in find_robots(robots, query)]
 
 
 @router.get(
