@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from app.cli.arguments.options import flag_of
+from app.cli.targets import Question, solve_file
 from app.cli.terminal import (
     Notation,
     configuration,
@@ -23,7 +25,7 @@ from app.cli.terminal import (
 )
 from app.shared.answers.ik import Blocked, IkAnswer, Solution, ik_answer
 from app.shared.options import Option, declared
-from kin import IKOptions, InputError, Task
+from kin import IKOptions, InputError, Robot, Task
 from kin.frames import TOOL
 from kin.ik import solve
 from kin.ik.options import MASK_NAMES
@@ -35,6 +37,10 @@ def run(arguments: Namespace) -> int:
     """Print the solutions; 1 if there is no exact one."""
     robot = robot_of(arguments)
     units = units_of(arguments)
+    if arguments.targets is not None:
+        return _run_file(robot, arguments, units)
+    if arguments.output is not None:
+        raise InputError("--output", arguments.output, "--targets as well: without it, solutions are printed")
     wxyz = None if arguments.wxyz is None else _vector(arguments.wxyz, PLAIN, "--wxyz")
     T = from_position_wxyz(_vector(arguments.position, units.lengths, "--position"), wxyz)
     if arguments.approach is not None:
@@ -44,6 +50,44 @@ def run(arguments: Namespace) -> int:
     if arguments.frame == TOOL and q_seed is None:
         raise InputError("--frame", TOOL, "--seed as well, which says where the tool is")
     T = frame_of(robot, arguments, q_seed) @ T
+    options = _options(robot, arguments, units, task)
+    result = solve(robot, T, options, q_seed)
+    answer = ik_answer(result)
+    if arguments.json:
+        print_json(answer)
+    else:
+        print(result.explain(units).text + "\n")
+        _print(answer, Notation(robot, arguments.rad))
+        if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
+            print("note: --position is in millimetres; --rad makes it metres", file=sys.stderr)
+    return 0 if answer.status == "solved" else 1
+
+
+def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
+    """Solve a file of targets, and print how many have an exact solution; 1 if one has none."""
+    if arguments.wxyz is not None or arguments.approach is not None:
+        raise InputError("--targets", arguments.targets, "no --wxyz or --approach: the file has the orientations")
+    if arguments.output is None:
+        raise InputError("--targets", arguments.targets, "--output as well, the file that the joint values go to")
+    if arguments.frame == TOOL:
+        raise InputError("--frame", TOOL, "a frame that does not move, together with --targets")
+    q_seed = None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", units)
+    options = _options(robot, arguments, units, "pose" if arguments.mask else arguments.task or "pose")
+    question = Question(robot, options, frame_of(robot, arguments, q_seed), q_seed)
+    try:
+        count, solved = solve_file(question, Path(arguments.targets), Path(arguments.output))
+    except KeyboardInterrupt:
+        print("kinboard: interrupted; the same command goes on from here", file=sys.stderr)
+        return 130
+    if arguments.json:
+        print_json({"targets": count, "solved": solved})
+    else:
+        print(f"{arguments.output}: {solved} of {count} targets have an exact solution")
+    return 0 if solved == count else 1
+
+
+def _options(robot: Robot, arguments: Namespace, units: Units, task: Task) -> IKOptions:
+    """What was typed, but for target, seed and frame."""
     given = {name: _option(arguments, option, units) for name, option in declared().items()}
     constraints = joint_constraints(robot, arguments)
     given |= {
@@ -56,17 +100,7 @@ def run(arguments: Namespace) -> int:
         "max_solutions": None if arguments.all else arguments.max_solutions or 1,
         "obstacles": obstacles_of(arguments),
     }
-    options = IKOptions.of(None, **given)
-    result = solve(robot, T, options, q_seed)
-    answer = ik_answer(result)
-    if arguments.json:
-        print_json(answer)
-    else:
-        print(result.explain(units).text + "\n")
-        _print(answer, Notation(robot, arguments.rad))
-        if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
-            print("note: --position is in millimetres; --rad makes it metres", file=sys.stderr)
-    return 0 if answer.status == "solved" else 1
+    return IKOptions.of(None, **given)
 
 
 def _vector(texts: list[str], unit: Unit, field: str) -> list[float]:

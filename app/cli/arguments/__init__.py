@@ -82,9 +82,15 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         parents.output,
         parents.joints,
         parents.frames,
-        usage="kinboard ik ROBOT --position X Y Z [--wxyz W X Y Z | --approach X Y Z] [options]",
+        usage="kinboard ik ROBOT (--position X Y Z [--wxyz W X Y Z | --approach X Y Z] | --targets FILE -o FILE) "
+        "[options]",
     )
     _add_target(parser)
+    parser.add_argument(
+        "-o", "--output", metavar="FILE",
+        help="with --targets: write the best solutions to this file, .npy (NaN where there is none) or .csv (with "
+        "the status); radians and metres. A run that was interrupted is continued by the same command",
+    )  # fmt: skip
     parser.add_argument(
         "--seed", nargs="+", metavar="Q",
         help=f"prefer solutions near this configuration; {UNITS_NOTE}",
@@ -98,7 +104,13 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 
 def _add_target(parser: argparse.ArgumentParser) -> None:
     """The arguments of ``ik`` that say what the tool has to match."""
-    parser.add_argument("--position", nargs=3, required=True, metavar=XYZ, help="millimetres (--rad: metres)")
+    place = parser.add_mutually_exclusive_group(required=True)
+    place.add_argument("--position", nargs=3, metavar=XYZ, help="millimetres (--rad: metres)")
+    place.add_argument(
+        "--targets", metavar="FILE",
+        help="many targets: a .npy file of poses (k, 4, 4), or a .csv file with the columns x, y, z, qw, qx, qy, "
+        "qz; metres",
+    )  # fmt: skip
     turn = parser.add_mutually_exclusive_group()
     turn.add_argument("--wxyz", nargs=4, metavar=("W", *XYZ), help="orientation as a quaternion")
     turn.add_argument("--approach", nargs=3, metavar=XYZ, help="direction of the tool's z axis")

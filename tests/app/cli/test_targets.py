@@ -1,0 +1,140 @@
+"""``kinboard ik --targets``: a file of targets to a file of joint values."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+
+import numpy as np
+import pytest
+
+import kin
+from app.cli import targets
+from app.cli.parser import main
+
+
+def poses(count):
+    robot = kin.get_robot("ur5")
+    T = kin.fk(robot, robot.random_q(np.random.default_rng(3), count))
+    T[2, :3, 3] = 9.0
+    return T
+
+
+def wxyz(T):
+    """A quaternion of a rotation, by its largest part."""
+    K = np.array([
+        [T[0, 0] - T[1, 1] - T[2, 2], T[0, 1] + T[1, 0], T[0, 2] + T[2, 0], T[2, 1] - T[1, 2]],
+        [0, T[1, 1] - T[0, 0] - T[2, 2], T[1, 2] + T[2, 1], T[0, 2] - T[2, 0]],
+        [0, 0, T[2, 2] - T[0, 0] - T[1, 1], T[1, 0] - T[0, 1]],
+        [0, 0, 0, T[0, 0] + T[1, 1] + T[2, 2]],
+    ])  # fmt: skip
+    x, y, z, w = np.linalg.eigh(K, UPLO="U")[1][:, -1]
+    return [w, x, y, z]
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Pieces of four targets."""
+    monkeypatch.setattr(targets, "AT_ONCE", 4)
+
+
+@pytest.mark.usefixtures("small")
+def test_a_numpy_file_gets_what_solve_ik_many_gives(tmp_path, capsys):
+    T = poses(11)
+    np.save(tmp_path / "in.npy", T)
+    out = tmp_path / "out.npy"
+    assert main(["ik", "ur5", "--targets", str(tmp_path / "in.npy"), "-o", str(out)]) == 1
+    assert "10 of 11 targets have an exact solution" in capsys.readouterr().out
+    found = np.load(out)
+    assert np.array_equal(found, kin.solve_ik_many("ur5", T).q, equal_nan=True)
+    solved = np.delete(np.arange(11), 2)
+    assert np.abs(kin.fk("ur5", found[solved]) - T[solved]).max() < 1e-9
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["in.npy", "out.npy"]
+
+
+@pytest.mark.usefixtures("small")
+def test_a_csv_file_in_a_frame_gets_the_status_of_each(tmp_path, capsys):
+    T = poses(6)
+    with (tmp_path / "in.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(targets.COLUMNS)
+        writer.writerows([*map(float, each[:3, 3] - (0.1, 0.0, 0.2)), *map(float, wxyz(each))] for each in T)
+    out = tmp_path / "out.csv"
+    words = ["ik", "ur5", "--targets", str(tmp_path / "in.csv"), "-o", str(out), "--json"]
+    assert main([*words, "--frame", "table", "--workpiece", "table=100:0:200"]) == 1
+    assert json.loads(capsys.readouterr().out) == {"targets": 6, "solved": 5}
+    rows = list(csv.DictReader(out.read_text().splitlines()))
+    assert [row["status"] for row in rows] == ["solved"] * 2 + ["unreachable"] + ["solved"] * 3
+    assert rows[2]["q1"] == ""
+    q = [float(rows[4][f"q{i + 1}"]) for i in range(6)]
+    assert np.abs(kin.fk("ur5", q) - T[4]).max() < 1e-8
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("ending", ["npy", "csv"])
+def test_an_interrupted_run_goes_on_where_it_ended(tmp_path, monkeypatch, ending):
+    T = poses(18)
+    np.save(tmp_path / "in.npy", T)
+    words = ["ik", "ur5", "--targets", str(tmp_path / "in.npy"), "-o"]
+    whole = tmp_path / f"whole.{ending}"
+    main([*words, str(whole)])
+    asked = []
+
+    def interrupted(self, some, first):
+        if first == 8 and not asked.count(8):
+            asked.append(first)
+            raise KeyboardInterrupt
+        asked.append(first)
+        return answers(self, some, first)
+
+    answers = targets.Question.answers
+    monkeypatch.setattr(targets, "processors", lambda: 1)
+    monkeypatch.setattr(targets.Question, "answers", interrupted)
+    out = tmp_path / f"out.{ending}"
+    assert main([*words, str(out)]) == 130
+    assert not out.exists()
+    asked.clear()
+    asked.append(8)  # it does not happen again
+    assert main([*words, str(out)]) == 1
+    assert min(asked) == 8
+    assert out.read_bytes() == whole.read_bytes()
+    # Another question begins anew, whatever is left of the first.
+    (tmp_path / f"out.{ending}.part").write_bytes(b"left over")
+    (tmp_path / f"out.{ending}.state").write_text('{"key": "other", "done": 8, "solved": 8, "size": 4}')
+    asked.clear()
+    main([*words, str(out)])
+    assert min(asked) == 0
+    assert out.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("content", "words", "message"),
+    [
+        (np.eye(3), [], "a .npy file of poses"),
+        (np.empty((0, 4, 4)), [], "at least one target"),
+        (np.full((5, 4, 4), np.nan), [], r"--targets\[0\]"),
+        (np.stack([np.eye(4)] * 5 + [np.zeros((4, 4))]), [], r"--targets\[5\]"),
+        (np.eye(4)[None], ["--wxyz", "1", "0", "0", "0"], "no --wxyz or --approach"),
+        (np.eye(4)[None], ["--frame", "tool"], "a frame that does not move"),
+        ("a,b\n1,2\n", [], "the columns x, y, z"),
+        ("x,y,z,qw,qx,qy,qz\n0,0,0,1,0,0\n", [], "seven numbers"),
+    ],
+)
+@pytest.mark.usefixtures("small")
+def test_what_is_no_file_of_targets_is_refused_by_name(tmp_path, capsys, content, words, message):
+    source = tmp_path / ("in.csv" if isinstance(content, str) else "in.npy")
+    source.write_text(content) if isinstance(content, str) else np.save(source, content)
+    out = tmp_path / "out.npy"
+    assert main(["ik", "ur5", "--targets", str(source), "-o", str(out), *words]) == 2
+    assert re.search(message, capsys.readouterr().err)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("out", ["out.txt", "nowhere/out.npy"])
+def test_an_output_that_cannot_be_written_is_refused_first(tmp_path, capsys, out):
+    np.save(tmp_path / "in.npy", poses(3))
+    assert main(["ik", "ur5", "--targets", str(tmp_path / "in.npy"), "-o", str(tmp_path / out)]) == 2
+    assert "--output" in capsys.readouterr().err
+    assert main(["ik", "ur5", "--targets", str(tmp_path / "none.npy"), "-o", str(tmp_path / "out.npy")]) == 2
+    assert "none.npy" in capsys.readouterr().err
