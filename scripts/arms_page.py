@@ -1,9 +1,14 @@
-"""The page *Arms* of the docs: ``python scripts/arms_page.py`` writes ``docs/arms.md`` from the robot files."""
+"""Writes what follows from the robot files: ``python scripts/arms_page.py``.
+
+The page *Arms* of the docs, ``docs/arms.md``, and the names of solvers in ``kin/robots/solvers.json``.
+"""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+from app.shared.solver_names import FILE, computed_names
 from kin import Robot, builtin_robots, classic_robots
 from kin.solvers import family_of
 
@@ -65,3 +70,5 @@ def _kilograms(weight: float | None) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")
+    names = {key: computed_names(robot)._asdict() for key, robot in sorted(builtin_robots().items())}
+    FILE.write_text(json.dumps(names, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

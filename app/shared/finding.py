@@ -10,9 +10,9 @@ import math
 import re
 from collections.abc import Iterable
 
+from app.shared.solver_names import solver_names
 from kin import InputError, Robot
 from kin.files.numbers import NUMBER
-from kin.solvers import family_of
 
 FIELDS = {
     "joints": "joints:6, the number of moving joints, or a range of it such as joints:4..6",
@@ -44,14 +44,14 @@ def find_robots(robots: Iterable[Robot], query: str) -> list[Robot]:
         elif name == "maker" and value:
             found = [robot for robot in found if value in robot.maker.lower()]
         elif name == "solver" and value:
-            found = [robot for robot in found if value in family_of(robot)]
+            found = [robot for robot in found if value in solver_names(robot).solver]
         else:
             raise InputError("find", word, FORMS)
     return found
 
 
 def _text(robot: Robot) -> str:
-    return f"{robot.id} {robot.name} {robot.maker} {family_of(robot)}".lower()
+    return f"{robot.id} {robot.name} {robot.maker} {solver_names(robot).solver}".lower()
 
 
 def _range(word: str, text: str) -> tuple[float, float]:

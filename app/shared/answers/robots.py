@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.fk import Matrix
-from kin import Joint, Robot, branch_meanings, branch_names
-from kin.solvers import family_of
+from app.shared.solver_names import solver_names
+from kin import Joint, Robot
 
 
 class JointAnswer(Answer):
@@ -102,11 +102,12 @@ class RobotAnswer(Answer):
 
 def robot_answer(robot: Robot) -> RobotAnswer:
     """Everything that defines an arm."""
+    names = solver_names(robot)
     return RobotAnswer.of(
         robot,
-        solver=family_of(robot),
-        branches=list(branch_names(robot)),
-        branch_meanings=branch_meanings(robot),
+        solver=names.solver,
+        branches=names.branches,
+        branch_meanings=names.meanings,
         joints=[_joint(i, joint, robot.home[i]) for i, joint in enumerate(robot.joints)],
     )
 
