@@ -58,6 +58,23 @@ def fk(robot: Robot | str, q: ArrayLike) -> Array:
     """Pose of the tool, T_base_tool ``(..., 4, 4)``, for configurations ``(..., n)`` in radians (metres).
 
     Equation (2) of the chapter, ``T = A_1 … A_n``, for either convention.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: ``(n,)`` or any batch ``(..., n)`` of configurations, radians (metres for a slide).
+
+    Returns:
+        The poses, one for each configuration.
+
+    Raises:
+        InputError: q has another number of joints, or values that are not finite.
+
+    Examples:
+        >>> import kin
+        >>> kin.fk("planar2r", [0.0, 0.0])[:3, 3]
+        array([1.6, 0. , 0. ])
+        >>> kin.fk("ur5", [[0.0] * 6] * 100).shape
+        (100, 4, 4)
     """
     if not isinstance(robot, Robot):
         robot = robot_of(robot)
@@ -79,6 +96,21 @@ def fk_positions(robot: Robot | str, q: ArrayLike) -> Array:
     """Tool points ``(..., 3)`` in metres in the base frame, for configurations ``(..., n)``.
 
     The position column of `fk`, computed several times faster.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: ``(n,)`` or any batch ``(..., n)`` of configurations, radians (metres for a slide).
+
+    Returns:
+        The points, one for each configuration.
+
+    Raises:
+        InputError: as in `fk`.
+
+    Examples:
+        >>> import kin
+        >>> kin.fk_positions("planar2r", [0.0, 0.0])
+        array([1.6, 0. , 0. ])
     """
     robot = robot_of(robot)
     q = _batch(robot, q)
@@ -89,7 +121,23 @@ def fk_positions(robot: Robot | str, q: ArrayLike) -> Array:
 
 
 def link_frames(robot: Robot | str, q: ArrayLike) -> Array:
-    """Frame after every DH row, ``(..., rows, 4, 4)``: ``A_1``, ``A_1 A_2``, … in the base frame."""
+    """Frame after every DH row, ``(..., rows, 4, 4)``: ``A_1``, ``A_1 A_2``, … in the base frame.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: ``(n,)`` or any batch ``(..., n)`` of configurations, radians (metres for a slide).
+
+    Returns:
+        The frames; the last one is that of the last row, without the tool.
+
+    Raises:
+        InputError: as in `fk`.
+
+    Examples:
+        >>> import kin
+        >>> kin.link_frames("ur5", [0.0] * 6).shape
+        (6, 4, 4)
+    """
     robot = robot_of(robot)
     q = _writable(robot.check_q(q))
     frames = fk_kernels.frames_many(robot.model, q.reshape(-1, robot.n))
@@ -101,6 +149,23 @@ def jacobian(robot: Robot | str, q: ArrayLike, frame: Literal["base", "tool"] = 
 
     Rows 0–2 are the linear velocity of the tool point (m/s per rad/s or m/s), rows 3–5 the angular velocity,
     both expressed in the base frame, or in the tool's own frame with ``frame="tool"``.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: ``(n,)`` or any batch ``(..., n)`` of configurations, radians (metres for a slide).
+        frame: whose axes the twist is given in: ``"base"`` or ``"tool"``.
+
+    Returns:
+        The Jacobians, one for each configuration.
+
+    Raises:
+        InputError: as in `fk`, or an unknown frame.
+
+    Examples:
+        >>> import kin
+        >>> kin.jacobian("planar2r", [0.0, 0.0])[:2]
+        array([[0. , 0. ],
+               [1.6, 0.6]])
     """
     if not isinstance(robot, Robot):
         robot = robot_of(robot)
@@ -127,6 +192,22 @@ def manipulability(robot: Robot | str, q: ArrayLike, part: Part = "all") -> Arra
 
     √det(J Jᵀ) for six or more joints, √det(Jᵀ J) for fewer (Yoshikawa, Int. J. Robotics Research 4(2), 1985).
     ``part`` takes only the three linear (m) or angular rows. Zero at a singularity.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: ``(n,)`` or any batch ``(..., n)`` of configurations, radians (metres for a slide).
+        part: the rows that count: ``"all"``, ``"linear"`` or ``"angular"``.
+
+    Returns:
+        One value for each configuration.
+
+    Raises:
+        InputError: as in `fk`, or an unknown part.
+
+    Examples:
+        >>> import kin
+        >>> bool(kin.manipulability("ur5", [0.0] * 6) < 1e-9)  # stretched out: singular
+        True
     """
     if part not in tuple(_PARTS):
         raise InputError("part", part, "one of " + ", ".join(f'"{name}"' for name in _PARTS))

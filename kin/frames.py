@@ -34,7 +34,23 @@ def matrix_of(xyz: Sequence[float], rpy: Sequence[float]) -> Matrix:
 
 
 def from_xyz_rpy(xyz: ArrayLike, rpy: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
-    """Transform ``(4, 4)`` with a position in metres and the rotation Rz(yaw) Ry(pitch) Rx(roll) in radians."""
+    """Transform ``(4, 4)`` with a position in metres and the rotation Rz(yaw) Ry(pitch) Rx(roll) in radians.
+
+    Args:
+        xyz: ``(3,)`` position in metres.
+        rpy: ``(3,)`` roll, pitch and yaw in radians, about the fixed axes x, y and z in this order.
+
+    Returns:
+        The transform.
+
+    Raises:
+        InputError: numbers that are not finite, or another shape.
+
+    Examples:
+        >>> import kin, math
+        >>> kin.from_xyz_rpy([0.4, 0.0, 0.2], [0.0, 0.0, math.pi / 2])[:3, 0].round(9)
+        array([ 0.,  1., -0.])
+    """
     parts = [finite_array(name, value, (3,)) for name, value in (("xyz", xyz), ("rpy", rpy))]
     for name, part in zip(("xyz", "rpy"), parts, strict=True):
         if part.ndim != 1:
@@ -56,8 +72,17 @@ def frame_pose(
         workpieces: poses ``(4, 4)`` of workpiece frames in the world frame, by name.
         q: the present configuration ``(n,)``; needed for the frame of the tool.
 
+    Returns:
+        The pose of the frame.
+
     Raises:
         InputError: an unknown frame, the frame of the tool without a configuration, or a pose that is none.
+
+    Examples:
+        >>> import kin
+        >>> table = kin.from_xyz_rpy([0.5, 0.0, 0.1])
+        >>> kin.frame_pose("ur5", "table", {"table": table})[:3, 3]
+        array([0.5, 0. , 0.1])
     """
     robot = robot_of(robot)
     if workpieces is not None and not isinstance(workpieces, Mapping):

@@ -33,8 +33,21 @@ def singularities(robot: Robot | str, q: ArrayLike, within: float = math.inf) ->
     the whole pose. Only those `within` a distance are returned. An arm without a closed form has one entry of kind
     ``"jacobian"``, see `task_jacobian`.
 
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: one configuration ``(n,)``, radians (metres for a slide).
+        within: largest distance to report, radians (metres are divided by the reach).
+
+    Returns:
+        The singularities, the nearest first.
+
     Raises:
         InputError: q is not one configuration.
+
+    Examples:
+        >>> import kin
+        >>> kin.singularities("ur5", [0.0] * 6)[0].kind
+        'elbow'
     """
     robot = robot_of(robot)
     q = robot.check_q(q)

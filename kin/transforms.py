@@ -101,7 +101,22 @@ def as_transform(value: ArrayLike, field: str = "target") -> Array:
 def from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) -> Array:
     """Transform ``(4, 4)`` from a position ``(3,)`` in metres and a quaternion ``(4,)`` (scalar first).
 
-    The quaternion is normalised. Raises `InputError` for a zero or non-finite one.
+    The quaternion is normalised.
+
+    Args:
+        position: ``(3,)`` in metres.
+        wxyz: ``(4,)`` quaternion of any length, scalar first; None: no rotation.
+
+    Returns:
+        The transform.
+
+    Raises:
+        InputError: numbers that are not finite, another shape, or a quaternion of zeros.
+
+    Examples:
+        >>> import kin
+        >>> kin.from_position_wxyz([0.4, 0.0, 0.2], [0.0, 1.0, 0.0, 0.0])[:3, 2]  # upside down
+        array([ 0.,  0., -1.])
     """
     T = np.eye(4)
     p = finite_array("position", position, (3,))
@@ -116,8 +131,21 @@ def from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) -> Ar
 def rotation_from_wxyz(wxyz: ArrayLike) -> Array:
     """Rotation matrix ``(3, 3)`` of a quaternion ``(4,)`` of any length.
 
+    Args:
+        wxyz: scalar first.
+
+    Returns:
+        The rotation matrix.
+
     Raises:
         InputError: it is zero, not finite, or not four numbers.
+
+    Examples:
+        >>> import kin
+        >>> kin.rotation_from_wxyz([1.0, 0.0, 0.0, 0.0])
+        array([[1., 0., 0.],
+               [0., 1., 0.],
+               [0., 0., 1.]])
     """
     numbers = finite_array("wxyz", wxyz, (4,))
     if numbers.ndim != 1:
@@ -141,6 +169,17 @@ def wxyz_from_rotation(R: Array) -> Array:
     """Unit quaternions ``(..., 4)`` of rotations ``(..., 3, 3)``; the scalar comes first and is never negative.
 
     Shepperd's method starts from the largest of the four components, which avoids cancellation.
+
+    Args:
+        R: orthonormal; this is not checked.
+
+    Returns:
+        The quaternions.
+
+    Examples:
+        >>> import kin, numpy as np
+        >>> kin.wxyz_from_rotation(np.diag([1.0, -1.0, -1.0]))
+        array([0., 1., 0., 0.])
     """
     R = np.asarray(R, dtype=np.float64)
     if R.size == 9 and R.shape[-2:] == (3, 3):

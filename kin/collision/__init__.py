@@ -59,6 +59,21 @@ def self_distance(robot: Robot | str, q: ArrayLike) -> Array:
     """Least distance between links ``(...)`` in metres, for configurations ``(..., n)``.
 
     Negative where capsules overlap; infinite for an arm of which no two links could meet.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: ``(n,)`` or any batch ``(..., n)`` of configurations, radians (metres for a slide).
+
+    Returns:
+        One distance for each configuration.
+
+    Raises:
+        InputError: as in `fk`.
+
+    Examples:
+        >>> import kin
+        >>> bool(kin.self_distance("panda", kin.get_robot("panda").q_home) > 0.0)
+        True
     """
     return clearance(robot, q)
 
@@ -66,8 +81,20 @@ def self_distance(robot: Robot | str, q: ArrayLike) -> Array:
 def nearest_links(robot: Robot | str, q: ArrayLike) -> NearestLinks | None:
     """The two nearest links at one configuration ``(n,)``; None for an arm of which no two links could meet.
 
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: one configuration ``(n,)``, radians (metres for a slide).
+
+    Returns:
+        The two links, their distance and the nearest points; None as said above.
+
     Raises:
         InputError: q is not one configuration.
+
+    Examples:
+        >>> import kin
+        >>> kin.nearest_links("panda", kin.get_robot("panda").q_home).distance > 0.0
+        True
     """
     robot = robot_of(robot)
     q = robot.check_q(q)
@@ -92,6 +119,23 @@ def clearance(robot: Robot | str, q: ArrayLike, obstacles: Sequence[Obstacle] = 
     """Least distance of an arm to itself and to obstacles ``(...)`` in metres, for configurations ``(..., n)``.
 
     Negative where something touches; infinite if there is nothing to touch.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: ``(n,)`` or any batch ``(..., n)`` of configurations, radians (metres for a slide).
+        obstacles: bodies in the world frame.
+
+    Returns:
+        One distance for each configuration.
+
+    Raises:
+        InputError: as in `fk`, or a malformed obstacle (named ``obstacles[i]``).
+
+    Examples:
+        >>> import kin
+        >>> crate = kin.Obstacle("box", xyz=(2.0, 0.0, 0.5), size=(0.3, 0.3, 0.4))
+        >>> bool(kin.clearance("ur5", kin.get_robot("ur5").q_home, [crate]) > 0.0)
+        True
     """
     robot = robot_of(robot)
     q = robot.check_q(q)
@@ -102,8 +146,22 @@ def clearance(robot: Robot | str, q: ArrayLike, obstacles: Sequence[Obstacle] = 
 def nearest_contact(robot: Robot | str, q: ArrayLike, obstacles: Sequence[Obstacle] = ()) -> Contact | None:
     """What that distance is between, at one configuration ``(n,)``; None if there is nothing to touch.
 
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: one configuration ``(n,)``, radians (metres for a slide).
+        obstacles: bodies in the world frame.
+
+    Returns:
+        What is nearest or touches, and how deep.
+
     Raises:
         InputError: q is not one configuration, or an obstacle is malformed (named ``obstacles[i]``).
+
+    Examples:
+        >>> import kin
+        >>> crate = kin.Obstacle("box", xyz=(0.5, 0.0, 0.0), size=(2.0, 2.0, 2.0), name="crate")
+        >>> "crate" in kin.nearest_contact("ur5", kin.get_robot("ur5").q_home, [crate]).text
+        True
     """
     robot = robot_of(robot)
     q = robot.check_q(q)

@@ -51,7 +51,22 @@ class Bodies:
 
 
 def capsules(robot: Robot | str) -> tuple[Capsule, ...]:
-    """The capsules of an arm, base first: those of its robot file, else assumed ones."""
+    """The capsules of an arm, base first: those of its robot file, else assumed ones.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+
+    Returns:
+        The capsules; each says which link it stands for.
+
+    Raises:
+        UnknownRobotError: an id that does not exist.
+
+    Examples:
+        >>> import kin
+        >>> len(kin.capsules("ur5")) > 6
+        True
+    """
     return bodies_of(robot_of(robot)).capsules
 
 

@@ -124,7 +124,22 @@ class Obstacle:
 
 
 def obstacle_from_dict(data: object) -> Obstacle:
-    """An obstacle from plain data with the fields of `Obstacle`; raises `InputError` naming the field."""
+    """An obstacle from plain data with the fields of `Obstacle`; raises `InputError` naming the field.
+
+    Args:
+        data: the fields, plain values.
+
+    Returns:
+        The obstacle.
+
+    Raises:
+        InputError: naming the field, the value and what would be valid.
+
+    Examples:
+        >>> import kin
+        >>> kin.obstacle_from_dict({"shape": "sphere", "xyz": [0.5, 0.0, 0.2], "radius": 0.1}).shape
+        'sphere'
+    """
     known = [each.name for each in fields(Obstacle)]
     if not isinstance(data, Mapping):
         raise InputError("obstacle", data, "a table with the fields " + ", ".join(known))

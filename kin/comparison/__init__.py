@@ -78,6 +78,11 @@ def compare(
     Raises:
         InputError: an invalid argument, or an arm with more than 12 joints or 40 rows.
         UnknownRobotError: an id that does not exist.
+
+    Examples:
+        >>> import kin
+        >>> kin.compare("puma560", kin.convert("puma560", "modified")).verdict
+        'identical'
     """
     a, b = robot_of(a), robot_of(b)
     for name, arm in (("a", a), ("b", b)):

@@ -60,6 +60,21 @@ def exp_screw(S: ArrayLike, value: ArrayLike) -> Array:
 
     With |ω| = 1 a rotation by that angle about the axis; with a pitch h = ω·v, also a slide by h times the angle.
     With ω = 0 a translation by v times the value.
+
+    Args:
+        S: ``(6,)`` the screw (ω, v), rotation first.
+        value: ``(...)`` of the joint, radians (metres where ω = 0).
+
+    Returns:
+        Transforms ``(..., 4, 4)``.
+
+    Raises:
+        InputError: numbers that are not finite, or another shape.
+
+    Examples:
+        >>> import kin
+        >>> kin.exp_screw([0, 0, 0, 0, 0, 1], 0.2)[:3, 3]
+        array([0. , 0. , 0.2])
     """
     screw, angle = finite_array("S", S, (6,)), _values(value)
     if screw.ndim != 1:
@@ -88,8 +103,16 @@ def screws(robot: Robot | str, q: ArrayLike | None = None) -> Screws:
         q: ``(n,)`` the configuration at which the joints of the formula are zero; by default q = 0, so that they
             are the joints of the arm.
 
+    Returns:
+        The screws in space and body form, and the pose of the tool at zero.
+
     Raises:
         InputError: q is not one configuration.
+
+    Examples:
+        >>> import kin
+        >>> kin.screws("ur5").S.shape
+        (6, 6)
     """
     robot = robot_of(robot)
     zero = robot.check_q(np.zeros(robot.n) if q is None else q)
@@ -125,8 +148,18 @@ def robot_from_screws(
         convention: of the DH table that the robot gets.
         robot_id, name, source: as in a robot file.
 
+    Returns:
+        The arm; its table may have more rows than it has joints.
+
     Raises:
         InputError: a column that is no unit screw, or one with a pitch; a malformed argument.
+
+    Examples:
+        >>> import kin
+        >>> given = kin.screws("ur5")
+        >>> arm = kin.robot_from_screws(given.S, given.M)
+        >>> bool(abs(kin.fk(arm, [0.1] * 6) - kin.fk("ur5", [0.1] * 6)).max() < 1e-12)
+        True
     """
     columns = finite_array("S", S, (6, None))
     n = columns.shape[-1]

@@ -36,8 +36,22 @@ SAMPLES = 256
 def convert(robot: Robot | str, convention: Convention) -> Robot:
     """The same arm as a table in this convention: the same joints, limits and tool poses.
 
+    Args:
+        robot: the arm, or the id of a built-in one.
+        convention: ``"standard"`` or ``"modified"`` (Craig).
+
+    Returns:
+        The arm with its other table.
+
     Raises:
         InputError: an unknown convention.
+
+    Examples:
+        >>> import kin
+        >>> arm = kin.get_robot("puma560")
+        >>> craig = kin.convert(arm, "modified")
+        >>> bool(abs(kin.fk(craig, arm.q_home) - kin.fk(arm, arm.q_home)).max() < 1e-12)
+        True
     """
     if convention not in CONVENTIONS:
         raise InputError("convention", convention, "one of " + ", ".join(CONVENTIONS))

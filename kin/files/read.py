@@ -51,9 +51,22 @@ UNLIMITED = "none"
 def load_folder(folder: Path | str) -> dict[str, Robot]:
     """The robots of every ``*.toml`` file in a folder, by id.
 
+    Args:
+        folder: that contains the files; folders inside it are not read.
+
+    Returns:
+        A dict from id to arm, in the order of the file names.
+
     Raises:
         RobotFileError: a file is invalid, or two files have the same id.
         InputError: `folder` is no path, or a folder that cannot be read.
+
+    Examples:
+        >>> import kin, tempfile, pathlib
+        >>> folder = pathlib.Path(tempfile.mkdtemp())
+        >>> kin.save_robot("scara", folder / "scara.toml")
+        >>> list(kin.load_folder(folder))
+        ['scara']
     """
     robots: dict[str, Robot] = {}
     folder = _path("folder", folder)
@@ -72,9 +85,22 @@ def load_folder(folder: Path | str) -> dict[str, Robot]:
 def load_robot(path: Path | str) -> Robot:
     """The robot described by a TOML file.
 
+    Args:
+        path: of the file.
+
+    Returns:
+        The arm.
+
     Raises:
         RobotFileError: the file is invalid or cannot be read.
         InputError: `path` is no path.
+
+    Examples:
+        >>> import kin, tempfile, pathlib
+        >>> file = pathlib.Path(tempfile.mkdtemp()) / "mine.toml"
+        >>> kin.save_robot("scara", file)
+        >>> kin.load_robot(file) == kin.get_robot("scara")
+        True
     """
     path = _path("path", path)
     try:
@@ -87,9 +113,21 @@ def load_robot(path: Path | str) -> Robot:
 def parse_robot(text: str, file: str = "robot") -> Robot:
     """The robot described by TOML text; `file` is the name used in messages.
 
+    Args:
+        text: of a robot file (TOML).
+        file: name of the file, for messages.
+
+    Returns:
+        The arm.
+
     Raises:
         RobotFileError: the text is invalid.
         InputError: `text` is no text.
+
+    Examples:
+        >>> import kin
+        >>> kin.parse_robot(kin.robot_to_toml("planar2r")).name
+        'Planar 2R'
     """
     if not isinstance(text, str):
         raise InputError("text", text, "the text of a robot file as str; bytes are decoded first")
@@ -103,8 +141,21 @@ def parse_robot(text: str, file: str = "robot") -> Robot:
 def robot_from_dict(data: dict[str, Any], source: str = "robot") -> Robot:
     """The robot described by the fields of a robot file as plain data; `source` is the name used in messages.
 
+    Args:
+        data: the fields of a robot file.
+        source: name used in messages.
+
+    Returns:
+        The arm.
+
     Raises:
         RobotFileError: naming the field, e.g. ``rows[2].alpha``, the value and what would be valid.
+
+    Examples:
+        >>> import kin
+        >>> fields = kin.robot_to_dict("planar2r")
+        >>> kin.robot_from_dict(fields) == kin.get_robot("planar2r")
+        True
     """
     if not isinstance(data, dict):
         raise RobotFileError(source, "robot", data, "a table with the fields " + ", ".join(sorted(_TOP)))

@@ -37,9 +37,17 @@ def robot_to_dict(robot: Robot | str, length: Length | None = None, angle: Angle
         length: the unit of lengths; by default that of the robot. Read again, the robot has this unit.
         angle: the unit of angles.
 
+    Returns:
+        A dict of plain values, as TOML and JSON have them.
+
     Raises:
         InputError: an unknown unit, or an arm that no robot file may describe, such as one with a slide without
             limits or two rows of one name; the field is that of the file, e.g. ``rows[2].limits``.
+
+    Examples:
+        >>> import kin
+        >>> kin.robot_to_dict("ur5")["convention"]
+        'standard'
     """
     robot = robot_of(robot)
     length = length or robot.units  # type: ignore[assignment]  # checked by Robot
@@ -52,7 +60,24 @@ def robot_to_dict(robot: Robot | str, length: Length | None = None, angle: Angle
 
 
 def robot_to_toml(robot: Robot | str, length: Length | None = None, angle: Angle | None = None) -> str:
-    """The robot as the text of a robot file; see `robot_to_dict`. By default angles are in the shorter unit."""
+    """The robot as the text of a robot file; see `robot_to_dict`. By default angles are in the shorter unit.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        length: unit of lengths, ``"m"`` or ``"mm"``; by default that of the robot.
+        angle: unit of angles, ``"deg"`` or ``"rad"``; by default the one that needs fewer digits.
+
+    Returns:
+        The text; `parse_robot` reads it.
+
+    Raises:
+        InputError: as in `robot_to_dict`.
+
+    Examples:
+        >>> import kin
+        >>> print(kin.robot_to_toml("planar2r").splitlines()[0])
+        id = "planar2r"
+    """
     if angle is None:
         in_degrees, in_radians = (robot_to_toml(robot, length, unit) for unit in get_args(Angle))
         return in_degrees if len(in_degrees) <= len(in_radians) else in_radians
@@ -69,7 +94,20 @@ def robot_to_toml(robot: Robot | str, length: Length | None = None, angle: Angle
 
 
 def save_robot(robot: Robot | str, path: Path | str) -> None:
-    """Write a robot file; an existing file is replaced."""
+    """Write a robot file; an existing file is replaced.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        path: of the file to write.
+
+    Raises:
+        InputError: as in `robot_to_dict`, or `path` is no path.
+        OSError: the file cannot be written.
+
+    Examples:
+        >>> import kin, tempfile, pathlib
+        >>> kin.save_robot("scara", pathlib.Path(tempfile.mkdtemp()) / "scara.toml")
+    """
     Path(path).write_text(robot_to_toml(robot), encoding="utf-8")
 
 

@@ -76,9 +76,26 @@ def solve_ik(
             solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in `kin.IKOptions`,
             `limits` and `locked` as in `kin.JointConstraints`.
 
+    Returns:
+        Solutions, the best first, each with its branch and the error measured by FK; without one, the status, the
+        reason in words and numbers, and the closest configuration.
+
     Raises:
         InputError: a malformed target, seed or option; a keyword besides `options`. An unreachable target is not
             an error.
+
+    Examples:
+        >>> import kin
+        >>> arm = kin.get_robot("ur5")
+        >>> result = kin.solve_ik(arm, kin.fk(arm, arm.q_home))
+        >>> result.status.value, len(result.solutions), result.complete
+        ('solved', 8, True)
+        >>> far = kin.from_xyz_rpy([2.0, 0.0, 0.5])
+        >>> kin.solve_ik(arm, far).status.value
+        'unreachable'
+        >>> left = kin.solve_ik(arm, kin.fk(arm, arm.q_home), branch="shoulder left", prefer="limits")
+        >>> left.solutions[0].branch.startswith("shoulder left")
+        True
     """
     plain = (
         task, mask_frame, respect_limits, branch, images, prefer, max_solutions, solver, position_tolerance,
@@ -124,13 +141,43 @@ def solve(
 
 
 def branch_names(robot: Robot | str) -> tuple[str, ...]:
-    """The names of the arm's branches; none for an arm whose branches have no names."""
+    """The names of the arm's branches; none for an arm whose branches have no names.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+
+    Returns:
+        The names, in the order of `ik_branches`.
+
+    Raises:
+        UnknownRobotError: an id that does not exist.
+
+    Examples:
+        >>> import kin
+        >>> kin.branch_names("planar2r")
+        ('elbow positive', 'elbow negative')
+    """
     closed_form = closed_form_of(robot_of(robot))
     return closed_form.branches if closed_form is not None and closed_form.named else ()
 
 
 def branch_meanings(robot: Robot | str) -> dict[str, str]:
-    """What each part of the branch names says about a configuration: ``{"elbow up": "the elbow is above …"}``."""
+    """What each part of the branch names says about a configuration: ``{"elbow up": "the elbow is above …"}``.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+
+    Returns:
+        A dict from a part of a name to its meaning.
+
+    Raises:
+        UnknownRobotError: an id that does not exist.
+
+    Examples:
+        >>> import kin
+        >>> sorted(kin.branch_meanings("planar2r"))
+        ['elbow negative', 'elbow positive']
+    """
     closed_form = closed_form_of(robot_of(robot))
     return {} if closed_form is None else dict(closed_form.meanings)
 
@@ -138,7 +185,20 @@ def branch_meanings(robot: Robot | str) -> dict[str, str]:
 def branch_of(robot: Robot | str, q: ArrayLike) -> str:
     """Name of the branch of a configuration ``(n,)``; on the border of two, the one whose sine is not negative.
 
-    Raises `InputError` for an arm whose branches have no names.
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: one configuration ``(n,)``, radians (metres for a slide).
+
+    Returns:
+        The name, one of `branch_names`.
+
+    Raises:
+        InputError: an arm whose branches have no names, or q is not one configuration.
+
+    Examples:
+        >>> import kin
+        >>> kin.branch_of("planar2r", [0.3, 0.8])
+        'elbow positive'
     """
     robot = robot_of(robot)
     closed_form = closed_form_of(robot)

@@ -138,8 +138,18 @@ def solve_ik_many(
             solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in `kin.solve_ik`,
             for every target.
 
+    Returns:
+        The answers, one for each target, with the best solutions as one array.
+
     Raises:
         InputError: a malformed target (named ``targets[i]``), seed or option.
+
+    Examples:
+        >>> import kin, numpy as np
+        >>> arm = kin.get_robot("ur5")
+        >>> answers = kin.solve_ik_many(arm, kin.fk(arm, [arm.q_home, arm.q_home + 0.1]))
+        >>> answers.q.shape, bool(answers.solved.all())
+        ((2, 6), True)
     """
     robot = robot_of(robot)
     wanted = IKOptions.of(
@@ -240,9 +250,17 @@ def ik_branches(robot: Robot | str, target: ArrayLike, redundancy: ArrayLike = m
             ψ; radians), one for all targets or one for each; NaN keeps it near the home configuration.
             Joint values that a singular target leaves undetermined are also near that configuration.
 
+    Returns:
+        Configurations, NaN where a branch does not exist.
+
     Raises:
         InputError: an arm without a closed form; a target or redundancy that is not an array of finite numbers of
             that shape (a redundancy may be NaN).
+
+    Examples:
+        >>> import kin
+        >>> kin.ik_branches("ur5", kin.fk("ur5", [0.1, -1.0, 1.2, 0.3, 0.8, 0.0])).shape
+        (8, 6)
     """
     if not isinstance(robot, Robot):
         robot = robot_of(robot)

@@ -87,8 +87,18 @@ def plan_motion(
             touches itself or an obstacle. It is not led around them.
         stop: called now and then; cancels the computation by raising.
 
+    Returns:
+        The motion to sample, or the refusal with its place and joint.
+
     Raises:
         InputError: a malformed program or start. A program that cannot be driven is not an error.
+
+    Examples:
+        >>> import kin
+        >>> arm = kin.get_robot("ur5")
+        >>> motion = kin.plan_motion(arm, [kin.Ptp(kin.JointTarget(arm.q_home + 0.3))])
+        >>> motion.refusal is None, motion.sample(motion.duration).q.shape
+        (True, (6,))
     """
     robot = robot_of(robot)
     if isinstance(program, Mapping):

@@ -72,7 +72,19 @@ def _checked(key: str, values: ArrayLike, n: int, expected: str) -> Array:
 
 @lru_cache(maxsize=256)
 def limits_of(robot: Robot) -> MotionLimits:
-    """The limits of an arm: stated in its file, or assumed."""
+    """The limits of an arm: stated in its file, or assumed.
+
+    Args:
+        robot: the arm.
+
+    Returns:
+        Velocity, acceleration and jerk of each joint, and of the tool.
+
+    Examples:
+        >>> import kin
+        >>> len(kin.limits_of(kin.get_robot("ur5")).velocity)
+        6
+    """
     rows = [_of_joint(joint) for joint in robot.joints]
     velocity, acceleration, jerk, effort = np.array([row[:4] for row in rows]).T
     return MotionLimits(velocity, acceleration, jerk, effort, tuple(row[4] for row in rows))

@@ -56,7 +56,24 @@ _LENGTHS, _ANGLES = ("tool_speed", "blend"), ("tool_turn",)
 
 
 def parse_program(text: str, robot: Robot | str | None = None) -> Program:
-    """The program described by TOML text; see `program_from_dict`."""
+    r"""The program described by TOML text; see `program_from_dict`.
+
+    Args:
+        text: of a program file (TOML).
+        robot: the arm, or the id of a built-in one: it tells which joint values are lengths; without it all are
+            angles.
+
+    Returns:
+        The program.
+
+    Raises:
+        InputError: the text is no TOML, or naming the field, the value and what would be valid.
+
+    Examples:
+        >>> import kin
+        >>> len(kin.parse_program('[[segments]]\nkind = "dwell"\nseconds = 0.5').segments)
+        1
+    """
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -72,8 +89,16 @@ def program_from_dict(data: Mapping[str, Any], robot: Robot | str | None = None)
         robot: the arm, or the id of a built-in one: it tells which joint values are lengths; without it all are
             angles.
 
+    Returns:
+        The program.
+
     Raises:
         InputError: naming the field, the value and what would be valid.
+
+    Examples:
+        >>> import kin
+        >>> kin.program_from_dict({"segments": [{"kind": "dwell", "seconds": 0.5}]}).segments[0].seconds
+        0.5
     """
     if not isinstance(data, Mapping):
         raise InputError("program", data, "a table with the fields " + ", ".join(_TOP))
@@ -87,7 +112,19 @@ def program_from_dict(data: Mapping[str, Any], robot: Robot | str | None = None)
 
 
 def program_to_dict(program: Program) -> dict[str, Any]:
-    """The program as plain data in metres and radians; `program_from_dict` reads it. Defaults are left out."""
+    """The program as plain data in metres and radians; `program_from_dict` reads it. Defaults are left out.
+
+    Args:
+        program: whose segments are written.
+
+    Returns:
+        Plain values, as JSON has them.
+
+    Examples:
+        >>> import kin
+        >>> kin.program_to_dict(kin.Program((kin.Dwell(0.5),)))["segments"]
+        [{'kind': 'dwell', 'seconds': 0.5}]
+    """
     data: dict[str, Any] = {}
     if program.name:
         data["name"] = program.name

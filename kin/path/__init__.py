@@ -94,8 +94,19 @@ def solve_path(
         max_step: the most a joint may move between neighbouring waypoints: radians, or 4 per metre.
         stop: called now and then; cancels the computation by raising.
 
+    Returns:
+        The joint values at each waypoint, and where the path jumps or has a gap, with the cause.
+
     Raises:
         InputError: a malformed target (named ``targets[i]``) or option. An unreachable target is not an error.
+
+    Examples:
+        >>> import kin, numpy as np
+        >>> arm = kin.get_robot("ur5")
+        >>> line = kin.fk(arm, arm.q_home + np.linspace(0.0, 0.2, 5)[:, None])
+        >>> path = kin.solve_path(arm, line, q_start=arm.q_home)
+        >>> path.continuous, path.q.shape
+        (True, (5, 6))
     """
     wanted = IKOptions.of(
         options,

@@ -88,6 +88,10 @@ def warm_up_rest(stop: Callable[[], bool] = lambda: False, *, backwards: bool = 
     """Load or compile all remaining kernels; `stop` is checked before each step, which may take many seconds.
 
     Two processes that begin at opposite ends compile different kernels and load the others from the cache.
+
+    Args:
+        stop: returns True to end the compilation.
+        backwards: begin with the last kernels.
     """
     steps = [step for part in parts().values() for step in part]
     for step in reversed(steps) if backwards else steps:

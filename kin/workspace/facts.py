@@ -38,8 +38,16 @@ def workspace_facts(
         volume: whether to estimate volume and surface, which takes some seconds; the rest takes a tenth of one.
         stop: called now and then; raises to cancel the computation.
 
+    Returns:
+        The figures, each with its estimated error.
+
     Raises:
         InputError: naming the wrong argument, or a joint that slides without limits.
+
+    Examples:
+        >>> import kin
+        >>> round(kin.workspace_facts("planar2r", volume=False).reach.largest.value, 3)
+        1.6
     """
     robot, constraints = robot_of(robot), JointConstraints.of(limits, locked, constraints)
     region = Region.finite(robot, constraints)

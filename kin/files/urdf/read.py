@@ -85,7 +85,25 @@ class UrdfRobot(NamedTuple):
 
 
 def load_urdf(source: Path | str, base: str | None = None, tip: str | None = None) -> Robot:
-    """The robot that a URDF describes, by path or text; see `read_urdf`, which reports about it as well."""
+    """The robot that a URDF describes, by path or text; see `read_urdf`, which reports about it as well.
+
+    Args:
+        source: a `Path` of a file, or a `str`, which is the text itself and never a path.
+        base: the link the arm stands on; by default the root.
+        tip: the link that is the tool; needed if several are possible.
+
+    Returns:
+        The arm, as a standard DH table.
+
+    Raises:
+        RobotFileError: the file is invalid, or describes no serial arm.
+        InputError: `source` is neither a path nor a text.
+
+    Examples:
+        >>> import kin
+        >>> kin.load_urdf(kin.to_urdf("ur5")).n
+        6
+    """
     return read_urdf(source, base, tip).robot
 
 
@@ -108,10 +126,18 @@ def read_urdf(
         file: the name used in messages.
         fit: gives the capsules of each URDF link with collision bodies, for an arm with this reach (m).
 
+    Returns:
+        The arm, and a report of what was read, assumed and left out.
+
     Raises:
         RobotFileError: the file is invalid, or describes no serial arm; the message names the joint or link. Only
             the joints of the chain are judged.
         InputError: `source` is neither.
+
+    Examples:
+        >>> import kin
+        >>> kin.read_urdf(kin.to_urdf("ur5")).robot.n
+        6
     """
     tree = _tree(source, file)
     chain = tree.chain(base, tip)
@@ -122,7 +148,24 @@ def read_urdf(
 
 
 def urdf_tips(source: Path | str, file: str = "") -> tuple[Tip, ...]:
-    """The links of a URDF that can be the tip of an arm, those with the most joints first; see `read_urdf`."""
+    """The links of a URDF that can be the tip of an arm, those with the most joints first; see `read_urdf`.
+
+    Args:
+        source: a `Path` of a file, or a `str`, which is the text itself and never a path.
+        file: the name used in messages.
+
+    Returns:
+        The links, each with the number of its joints.
+
+    Raises:
+        RobotFileError: the file is invalid.
+        InputError: `source` is neither a path nor a text.
+
+    Examples:
+        >>> import kin
+        >>> kin.urdf_tips(kin.to_urdf("ur5"))[0].link
+        'tool'
+    """
     return _tree(source, file).tips
 
 

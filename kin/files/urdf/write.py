@@ -22,8 +22,19 @@ def to_urdf(robot: Robot | str) -> str:
 
     A velocity or effort that is not known is written as 0.
 
+    Args:
+        robot: the arm, or the id of a built-in one.
+
+    Returns:
+        The text of the URDF, in metres and radians.
+
     Raises:
         InputError: a slide without limits, which URDF cannot describe, or a joint whose limits leave no motion.
+
+    Examples:
+        >>> import kin
+        >>> kin.to_urdf("ur5").startswith("<?xml")
+        True
     """
     robot = robot_of(robot)
     lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoted(robot.id)}>"]

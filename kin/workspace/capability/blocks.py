@@ -168,8 +168,16 @@ def capability_grid(
         constraints: both as one value, instead of `limits` and `locked`.
         directions: 12, 24, 48 or 96, see `kin.workspace.capability.sphere.spherical_design`.
 
+    Returns:
+        The grid, whose blocks are computed one by one.
+
     Raises:
         InputError: naming the wrong argument; also a voxel so small that there would be more than 2²⁴.
+
+    Examples:
+        >>> import kin
+        >>> len(kin.capability_grid("planar2r", resolution=6, directions=12).blocks) > 0
+        True
     """
     spherical_design(directions)
     robot, allowed = robot_of(robot), JointConstraints.of(limits, locked, constraints)
@@ -199,6 +207,22 @@ def capability_block(grid: CapabilityGrid, block: int) -> CapabilityBlock:
     """The reachable voxels of one block, 0 to ``len(grid.blocks) − 1``.
 
     Pure: the same bits in every thread and process. The compiled part releases the GIL.
+
+    Args:
+        grid: from `capability_grid`.
+        block: index of the block.
+
+    Returns:
+        The voxels of the block.
+
+    Raises:
+        InputError: there is no such block.
+
+    Examples:
+        >>> import kin
+        >>> grid = kin.capability_grid("planar2r", resolution=6, directions=12)
+        >>> kin.capability_block(grid, 0).block
+        0
     """
     number = checked_integer(
         "block", block, 0, len(grid.blocks) - 1, f"a whole number from 0 to {len(grid.blocks) - 1}"
@@ -224,7 +248,22 @@ def capability_block(grid: CapabilityGrid, block: int) -> CapabilityBlock:
 
 
 def capability_join(grid: CapabilityGrid, blocks: Iterable[CapabilityBlock]) -> CapabilityMap:
-    """The map of a grid from its blocks, in any order; from some of the blocks, the map of these."""
+    """The map of a grid from its blocks, in any order; from some of the blocks, the map of these.
+
+    Args:
+        grid: from `capability_grid`.
+        blocks: from `capability_block` with this grid.
+
+    Returns:
+        The map.
+
+    Examples:
+        >>> import kin
+        >>> grid = kin.capability_grid("planar2r", resolution=6, directions=12)
+        >>> blocks = [kin.capability_block(grid, i) for i in range(len(grid.blocks))]
+        >>> bool(kin.capability_join(grid, blocks).share.max() > 0.0)
+        True
+    """
     found = sorted({part.block: part for part in blocks}.values(), key=lambda part: part.block)
     numbers = np.concatenate([np.empty(0, dtype=np.int64), *(part.numbers for part in found)])
     approachable = np.concatenate([np.empty((0, grid.count), dtype=bool), *(part.approachable for part in found)])
@@ -250,6 +289,21 @@ def capability_map(
     """The capability map of an arm, block after block; arguments and errors as of `capability_grid`.
 
     For threads, progress or several machines, compute the blocks of the grid one by one.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        voxel, resolution, limits, locked, constraints, directions: as in `kin.capability_grid`.
+
+    Returns:
+        The reachable voxels, and the share of directions that each allows.
+
+    Raises:
+        InputError: naming the wrong argument.
+
+    Examples:
+        >>> import kin
+        >>> bool(kin.capability_map("planar2r", resolution=6, directions=12).share.max() > 0.0)
+        True
     """
     allowed = JointConstraints.of(limits, locked, constraints)
     grid = capability_grid(robot, voxel=voxel, resolution=resolution, constraints=allowed, directions=directions)

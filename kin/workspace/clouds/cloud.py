@@ -63,8 +63,16 @@ def sample_workspace(
         measure: ``"manipulability"``, ``"limit_margin"``, or both.
         with_q: whether chunks carry their configurations.
 
+    Returns:
+        An iterator of chunks.
+
     Raises:
         InputError: naming the wrong argument, at the call, not when the first chunk is taken.
+
+    Examples:
+        >>> import kin
+        >>> sum(len(chunk.points) for chunk in kin.sample_workspace("ur5", 1000, chunk=400))
+        1000
     """
     total = _count("n", n)
     size = _count("chunk", chunk)
@@ -92,6 +100,24 @@ def workspace_slice(
     """Points start, …, stop − 1 of the cloud that `sample_workspace` with the same arguments gives, bit by bit.
 
     The kernels release the GIL: threads may compute slices in parallel.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        n: points of the whole cloud.
+        start: index of the first point.
+        stop: index after the last point.
+        seed, strategy, limits, locked, constraints, measure, with_q: as in `kin.sample_workspace`.
+
+    Returns:
+        The points, and what was asked for with them.
+
+    Raises:
+        InputError: naming the wrong argument.
+
+    Examples:
+        >>> import kin
+        >>> kin.workspace_slice("ur5", 1000, 100, 110, with_q=True).q.shape
+        (10, 6)
     """
     total = _count("n", n)
     first = checked_integer("start", start, 0, total - 1, f"a whole number from 0 to {total - 1}")
@@ -112,8 +138,21 @@ def configuration_at(
 ) -> Array:
     """The configurations ``(..., n)`` behind points of a cloud, by their indices ``(...)``: one, or any array.
 
+    Args:
+        robot: the arm, or the id of a built-in one.
+        index: of the points.
+        seed, strategy, limits, locked, constraints: as in `kin.sample_workspace`.
+
+    Returns:
+        The configurations.
+
     Raises:
         InputError: naming the wrong argument.
+
+    Examples:
+        >>> import kin
+        >>> kin.configuration_at("ur5", [0, 17]).shape
+        (2, 6)
     """
     robot = robot_of(robot)
     samples = _Samples.of(robot, seed, strategy, JointConstraints.of(limits, locked, constraints))

@@ -66,8 +66,16 @@ def section(
             than 90° from the direction in which joint 1 faces (`faced`).
         stop: called now and then; raises to cancel the computation.
 
+    Returns:
+        The boundary as curves, its exact arcs, and the area inside.
+
     Raises:
         InputError: naming the wrong argument.
+
+    Examples:
+        >>> import kin
+        >>> len(kin.section("scara", resolution=48).curves) > 0
+        True
     """
     region = Region.finite(robot_of(robot), JointConstraints.of(limits, locked, constraints))
     count = checked_integer("resolution", resolution, 8, 1000, "a whole number from 8 to 1000")

@@ -1,0 +1,87 @@
+"""The reference of `kin`: every public function says what it takes and gives, and has an example that runs."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import griffe
+import pytest
+
+import kin
+from scripts.reference import OneByOne, one_by_one
+
+ROOT = Path(__file__).parents[1]
+FUNCTIONS = sorted(name for name in kin.__all__ if inspect.isfunction(getattr(kin, name)))
+# What has no example that can run here: a notebook, and what only fills the cache of compiled kernels.
+NO_EXAMPLE = {"show", "warm_up", "warm_up_rest"}
+
+
+@pytest.fixture(scope="module")
+def read() -> griffe.Module:
+    """The core as the site's reference reads it."""
+    return griffe.load(
+        "kin",
+        search_paths=[ROOT],
+        extensions=griffe.load_extensions(OneByOne()),
+        docstring_parser="google",
+        resolve_aliases=True,
+    )
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_function_is_described(read, name):
+    function = read["fk.fk" if name == "fk" else name]  # the module `kin.fk` has the name of its function
+    function = function.final_target if function.is_alias else function
+    sections = {section.kind.value: section.value for section in function.docstring.parsed}
+    assert sections["text"].strip()
+    wanted = [each.name for each in function.parameters]
+    assert [each.name for each in sections.get("parameters", ())] == wanted
+    assert all(each.description.strip() for each in sections.get("parameters", ()))
+    assert str(function.returns) in ("None", "Any") or "returns" in sections
+    assert ("examples" in sections) != (name in NO_EXAMPLE)
+
+
+@pytest.mark.parametrize("name", [name for name in FUNCTIONS if name not in NO_EXAMPLE])
+def test_examples_run_and_give_what_is_shown(name):
+    (test,) = doctest.DocTestFinder(recurse=False).find(getattr(kin, name), name, globs={})
+    assert test.examples
+    told: list[str] = []
+    result = doctest.DocTestRunner().run(test, out=told.append)
+    assert result.failed == 0, "".join(told)
+
+
+def test_options_of_a_call_have_the_texts_of_the_class(read):
+    described = {
+        each.name: each.description for each in read["solve_ik_many"].final_target.docstring.parsed[1].value
+    }
+    assert described["prefer"].startswith("how to choose redundancy parameters")
+    assert described["locked"].startswith("joint values to keep, in radians (metres)")
+
+
+def test_several_parameters_of_one_entry_become_one_entry_each():
+    entries = "    a, b: numbers\n        that are added.\n    c: another.\n"
+    text = f"Title.\n\nArgs:\n{entries}\nRaises:\n    InputError: never."
+    assert one_by_one(text) == (
+        "Title.\n\nArgs:\n    a: numbers that are added.\n    b: numbers that are added.\n    c: another.\n\n"
+        "Raises:\n    InputError: never."
+    )
+
+
+def test_a_warning_of_mkdocs_fails_the_build(tmp_path):
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs/index.md").write_text("# Start\n\n[nowhere](gone.md)\n", encoding="utf-8")
+    (tmp_path / "mkdocs.yml").write_text("site_name: Broken\nstrict: true\n", encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert re.search("WARNING.*gone.md", done.stdout + done.stderr)
