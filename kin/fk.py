@@ -55,7 +55,7 @@ _compiled = _Compiled()
 
 
 def fk(robot: Robot | str, q: ArrayLike) -> Array:
-    """Pose of the tool, T_base_tool ``(..., 4, 4)``, for configurations ``(..., n)`` in radians (metres).
+    """Pose of the tool ``(..., 4, 4)``, T_base_tool, for configurations ``(..., n)`` in radians (metres).
 
     Equation (2) of the chapter, ``T = A_1 … A_n``, for either convention.
 
@@ -93,7 +93,7 @@ def fk(robot: Robot | str, q: ArrayLike) -> Array:
 
 
 def fk_positions(robot: Robot | str, q: ArrayLike) -> Array:
-    """Tool points ``(..., 3)`` in metres in the base frame, for configurations ``(..., n)``.
+    """Tool points ``(..., 3)`` in metres in the world frame, for configurations ``(..., n)``.
 
     The position column of `fk`, computed several times faster.
 
@@ -121,7 +121,7 @@ def fk_positions(robot: Robot | str, q: ArrayLike) -> Array:
 
 
 def link_frames(robot: Robot | str, q: ArrayLike) -> Array:
-    """Frame after every DH row, ``(..., rows, 4, 4)``: ``A_1``, ``A_1 A_2``, … in the base frame.
+    """Frame after every DH row, ``(..., rows, 4, 4)``: ``base A_1``, ``base A_1 A_2``, … in the world frame.
 
     Args:
         robot: the arm, or the id of a built-in one.
@@ -148,7 +148,7 @@ def jacobian(robot: Robot | str, q: ArrayLike, frame: Literal["base", "tool"] = 
     """Geometric Jacobian ``(..., 6, n)``: twist of the tool point = J q̇.
 
     Rows 0–2 are the linear velocity of the tool point (m/s per rad/s or m/s), rows 3–5 the angular velocity,
-    both expressed in the base frame, or in the tool's own frame with ``frame="tool"``.
+    both with the axes of the world frame (``"base"``: that of an arm without a base of its own), or of the tool.
 
     Args:
         robot: the arm, or the id of a built-in one.

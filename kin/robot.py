@@ -221,8 +221,15 @@ class Robot:
         return replace(self, base=as_transform(T_world_base, "T_world_base"))  # type: ignore[arg-type]
 
     def with_tool(self, T_last_tool: ArrayLike) -> Robot:
-        """The same arm with another transform ``(4, 4)`` after its last row."""
+        """The same arm with another transform ``(4, 4)`` after its last row: it replaces the tool of the arm."""
         return replace(self, tool=as_transform(T_last_tool, "T_last_tool"))  # type: ignore[arg-type]
+
+    def with_mounted(self, T_tool_mounted: ArrayLike) -> Robot:
+        """The same arm with a further tool on its tool, at the pose ``(4, 4)`` in the frame of that tool.
+
+        All poses are then those of what is mounted. This is what the field `tool` of REST requests means.
+        """
+        return self.with_tool(self.T_last_tool @ as_transform(T_tool_mounted, "T_tool_mounted"))
 
     @cached_property
     def _hash(self) -> int:

@@ -46,7 +46,7 @@ class NearestLinks:
     Attributes:
         distance: m, negative where their capsules overlap.
         links: 0 for the base, k for the link that joint k moves.
-        points: where the distance is, on the surfaces of both capsules ``(2, 3)``, m in the base frame; if their
+        points: where the distance is, on the surfaces of both capsules ``(2, 3)``, m in the world frame; if their
             axes cross, twice the crossing.
     """
 

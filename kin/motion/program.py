@@ -42,7 +42,7 @@ class PoseTarget:
     """A pose of the tool.
 
     Attributes:
-        position: the tool point in the base frame, metres.
+        position: the tool point in the world frame, metres.
         wxyz: unit quaternion of the orientation; None keeps the orientation at the start of the segment.
     """
 

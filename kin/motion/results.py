@@ -116,7 +116,7 @@ class MotionSample:
         t: seconds, ``(...)``.
         q, qd, qdd, qddd: joint values and their derivatives ``(..., n)``.
         T: tool poses ``(..., 4, 4)``.
-        twist: velocity of the tool point and angular velocity in the base frame ``(..., 6)``.
+        twist: velocity of the tool point and angular velocity ``(..., 6)``, both in the world frame.
     """
 
     t: Array

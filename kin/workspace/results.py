@@ -17,7 +17,7 @@ class WorkspaceChunk:
     """A slice of a cloud of tool points.
 
     Attributes:
-        points: ``(k, 3)`` float32, metres in the base frame. Single precision is the format of screens and point
+        points: ``(k, 3)`` float32, metres in the world frame. Single precision is the format of screens and point
             cloud files; a point is off by less than 1e-7 of the arm's size, its configuration is exact.
         q: ``(k, n)`` float64 configurations if requested, else None: `kin.configuration_at` recomputes any.
         measures: by name, ``(k,)`` float32: ``"manipulability"`` (`kin.manipulability`), ``"limit_margin"``: the
@@ -71,7 +71,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class WorkspaceFacts:
-    """Sizes of the set of points the tool reaches inside the limits; metres, base frame.
+    """Sizes of the set of points the tool reaches inside the limits; metres, world frame.
 
     Attributes:
         x, y, z: the bounding box, exact to rounding, as least and largest value with their configurations.

@@ -63,7 +63,8 @@ class FramesBody(schemas.Body):
     )
     tool: ConstantFrame | None = Field(
         None,
-        description="Pose of your tool (TCP) in the tool frame of the arm: all poses are those of your tool.",
+        description="Pose of your tool (TCP) in the tool frame of the arm, on which it is mounted: all poses are "
+        "those of your tool. A `tool` of the arm's own stays, and this one goes on it.",
     )
 
     @cached_property
@@ -78,7 +79,7 @@ class FramesBody(schemas.Body):
         if "base" in frames:
             robot = robot.with_base(frames["base"][0] @ robot.T_world_base)
         if "tool" in frames:
-            robot = robot.with_tool(robot.T_last_tool @ frames["tool"][0])
+            robot = robot.with_mounted(frames["tool"][0])
         return robot
 
 

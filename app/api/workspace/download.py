@@ -48,7 +48,7 @@ class DownloadQuery(CloudQuery):
     },
 )
 async def workspace(request: Request, robot: Robot, query: DownloadQuery) -> Response:
-    """A cloud of tool points in the base frame, in metres, computed while it is sent.
+    """A cloud of tool points in the world frame, in metres, computed while it is sent.
 
     Equal requests get equal bytes, and a larger cloud begins with the points of a smaller one. Columns are x, y,
     z, then the requested measures, then with `q` the joint values q1, q2, …. A `bin` file begins with

@@ -64,7 +64,7 @@ class CapabilityMapAnswer(Answer):
     summary: CapabilityAnswer
     """Figures of the map."""
     directions: Matrix
-    """The tested directions of the tool's z axis, unit vectors in the base frame."""
+    """The tested directions of the tool's z axis, unit vectors in the world frame."""
     voxels: VoxelAnswer
     """The reachable voxels; all others of the grid are unreachable."""
 

@@ -80,7 +80,7 @@ class SectionAnswer(Answer):
 
 
 class WorkspaceAnswer(Answer):
-    """Size of the set of points that the tool reaches inside the limits, in the base frame."""
+    """Size of the set of points that the tool reaches inside the limits, in the world frame."""
 
     x: SpanAnswer
     """The bounding box along x."""
