@@ -1,5 +1,6 @@
 #!/bin/sh
-# Check the scripts in static/ with ESLint, which is installed in .venv/lint once. Arguments go to it, e.g. --fix.
+# Check the scripts in static/ with ESLint. It is installed in .venv/lint once, with what tests make of the API document.
+# Arguments go to ESLint, e.g. --fix.
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 . "$root/scripts/venv.sh"
