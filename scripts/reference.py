@@ -21,6 +21,7 @@ SOURCES = {
     "kin.IKOptions": ("kin/ik/options.py", "IKOptions"),
     "kin.JointConstraints": ("kin/ik/options.py", "JointConstraints"),
     "kin.solve_ik": ("kin/ik/__init__.py", "solve_ik"),
+    "kin.solve_path": ("kin/path/__init__.py", "solve_path"),
 }
 SECTION = re.compile(r"^(Args|Attributes):\n((?:[ ]{4}.*\n|\n(?=[ ]{4}))+)", re.MULTILINE)
 ENTRY = re.compile(r"^    (\w+(?:,\s+\w+)*):((?:.*\n)(?:[ ]{8}.*\n|\n)*)", re.MULTILINE)
@@ -73,6 +74,7 @@ def _unwrapped(section: str) -> str:
 def _text(name: str, text: str) -> str:
     """The text of a parameter: that of the same parameter in the class or function that the entry names."""
     for source in NAMED.findall(text):
+        source = source if source.startswith("kin.") else f"kin.{source}"
         if (known := _texts(source).get(name)) is not None:
             return known
     return text

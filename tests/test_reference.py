@@ -39,8 +39,8 @@ def test_every_function_is_described(read, name):
     function = function.final_target if function.is_alias else function
     sections = {section.kind.value: section.value for section in function.docstring.parsed}
     assert sections["text"].strip()
-    wanted = [each.name for each in function.parameters]
-    assert [each.name for each in sections.get("parameters", ())] == wanted
+    wanted = sorted(each.name for each in function.parameters)
+    assert sorted(each.name for each in sections.get("parameters", ())) == wanted
     assert all(each.description.strip() for each in sections.get("parameters", ()))
     assert str(function.returns) in ("None", "Any") or "returns" in sections
     assert ("examples" in sections) != (name in NO_EXAMPLE)

@@ -36,7 +36,16 @@ def classic_robots() -> dict[str, Robot]:
 
 @lru_cache(maxsize=1)
 def builtin_robots() -> dict[str, Robot]:
-    """The built-in robots by id: the classics first, then the library by maker and name."""
+    """The built-in robots by id: the classics first, then the library by maker and name.
+
+    Returns:
+        A dict from id to arm.
+
+    Examples:
+        >>> import kin
+        >>> "panda" in kin.builtin_robots()
+        True
+    """
     robots = dict(classic_robots())
     library = [robot for folder in BUILTIN.iterdir() if folder.is_dir() for robot in load_folder(folder).values()]
     for robot in sorted(library, key=lambda each: (not each.maker, each.maker.lower(), each.id)):
@@ -48,7 +57,22 @@ def builtin_robots() -> dict[str, Robot]:
 
 @finds_robots
 def get_robot(robot_id: str) -> Robot:
-    """A built-in robot; raises `UnknownRobotError` listing the valid ids."""
+    """A built-in robot; raises `UnknownRobotError` listing the valid ids.
+
+    Args:
+        robot_id: such as ``"ur5"``; `builtin_robots` has them all.
+
+    Returns:
+        The arm, the same object each time.
+
+    Raises:
+        UnknownRobotError: no built-in robot has this id; the message lists the valid ones.
+
+    Examples:
+        >>> import kin
+        >>> kin.get_robot("ur5").n
+        6
+    """
     robots = builtin_robots()
     if robot_id not in robots:
         raise UnknownRobotError(robot_id, tuple(robots))
