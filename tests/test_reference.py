@@ -48,7 +48,7 @@ def test_every_function_is_described(read, name):
 
 @pytest.mark.parametrize("name", [name for name in FUNCTIONS if name not in NO_EXAMPLE])
 def test_examples_run_and_give_what_is_shown(name):
-    (test,) = doctest.DocTestFinder(recurse=False).find(getattr(kin, name), name, globs={})
+    (test,) = doctest.DocTestFinder(recurse=False).find(getattr(kin, name), name)
     assert test.examples
     told: list[str] = []
     result = doctest.DocTestRunner().run(test, out=told.append)
