@@ -67,6 +67,8 @@ def solve_ik(
 ) -> IKResult:
     """All configurations that bring the tool to `target`, or why there are none.
 
+    Long because every option is a keyword, for editors and type checkers.
+
     Args:
         robot: the arm, or the id of a built-in one.
         target: T_base_tool ``(4, 4)``; for ``task="position"`` also a point ``(3,)`` in metres.

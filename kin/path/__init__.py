@@ -80,6 +80,8 @@ def solve_path(
 ) -> PathResult:
     """One joint path through all `targets`: as few jumps as possible, then as little joint motion as possible.
 
+    Long because every option is a keyword, for editors and type checkers.
+
     Args:
         robot: the arm, or the id of a built-in one.
         targets: T_base_tool ``(k, 4, 4)``, k ≥ 1; for ``task="position"`` also points ``(k, 3)`` in metres.
