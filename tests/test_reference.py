@@ -50,9 +50,9 @@ def test_every_function_is_described(read, name):
 def test_examples_run_and_give_what_is_shown(name):
     (test,) = doctest.DocTestFinder(recurse=False).find(getattr(kin, name), name)
     assert test.examples
-    told: list[str] = []
-    result = doctest.DocTestRunner().run(test, out=told.append)
-    assert result.failed == 0, "".join(told)
+    output: list[str] = []
+    result = doctest.DocTestRunner().run(test, out=output.append)
+    assert result.failed == 0, "".join(output)
 
 
 def test_options_of_a_call_have_the_texts_of_the_class(read):

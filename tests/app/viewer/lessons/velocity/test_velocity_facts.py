@@ -118,7 +118,7 @@ def test_lost_directions_are_those_that_no_joint_moves(robot: kin.Robot) -> None
 
 
 # Messages of a frame without numbers, as many as before this lesson was declared.
-FRAMES = {"default": 4.0, "everything": 9.0, "nothing": 1.0}
+FRAMES = {"default": 4.0, "everything": 6.5, "nothing": 1.0}
 SETTINGS: dict[str, dict[str, object]] = {
     "default": {},
     "everything": {"joint": 2, "statics": {"on": True, "force": [1.0, 2.0, 3.0]}},
