@@ -89,12 +89,28 @@ function card(robot) {
   return item;
 }
 
+// The classics and the operator's own arms; the library follows on request.
+function showCards(cards, robots) {
+  const library = new Set(cards.dataset.library.split(" "));
+  const later = robots.filter((robot) => library.has(robot.id));
+  cards.replaceChildren(...robots.filter((robot) => !library.has(robot.id)).map(card));
+  const more = byId("more");
+  more.textContent = `Show ${later.length} more arms`;
+  more.hidden = later.length === 0;
+  more.addEventListener("click", () => {
+    const added = later.map(card);
+    cards.append(...added);
+    more.hidden = true;
+    added[0].querySelector("a").focus();
+  });
+}
+
 async function fillCards() {
   const cards = byId("cards");
   try {
     const answer = await fetch("api/v1/robots");
     if (!answer.ok) throw new Error(`the server answered ${answer.status}`);
-    cards.replaceChildren(...(await answer.json()).robots.map(card));
+    showCards(cards, (await answer.json()).robots);
   } catch (error) {
     cards.replaceChildren(element("li", `The robots could not be loaded: ${error.message}.`, "card quiet"));
   }

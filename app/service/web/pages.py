@@ -16,7 +16,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Message, Receive, Scope, Send
 
 from app.api.problems import ProblemError, respond
-from kin import __version__
+from kin import __version__, builtin_robots, classic_robots
 
 
 def static_folder() -> Path:
@@ -39,7 +39,8 @@ def page_routes() -> list[BaseRoute]:
 
 
 def _html_page(file: Path) -> Callable[[Request], Awaitable[Response]]:
-    body = file.read_text(encoding="utf-8").replace("{{version}}", __version__)
+    library = " ".join(sorted(builtin_robots().keys() - classic_robots().keys()))
+    body = file.read_text(encoding="utf-8").replace("{{version}}", __version__).replace("{{library}}", library)
 
     async def page(_: Request) -> Response:
         return HTMLResponse(body, headers={"cache-control": "no-cache"})

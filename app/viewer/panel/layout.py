@@ -76,6 +76,10 @@ class Panel:
         self.sheet = gui.add_html("")
         self.learn = group.add_tab("Learn")
         self.tabs = [group.add_tab(title) for title in tabs]
+        for title, tab in zip(tabs, self.tabs, strict=True):
+            if title == "Robot":
+                with tab:
+                    self.robots.add_field(gui, post)
         with group.add_tab("View"):
             self.units = UnitChoice(gui, units, post)
             self.colours.build(view.dark)

@@ -28,13 +28,17 @@ class RobotMenu:
         self._shown = robot
         self._query = ""
         self._menu = gui.add_dropdown("Robot", tuple(self._options), initial_value=self._name(robot))
-        self._field = gui.add_text("Find", "", hint=FIND_HINT)
+        self._field: viser.GuiInputHandle[str] | None = None
         listen(self._menu, post, "robot")
+
+    def add_field(self, gui: viser.GuiApi, post: Post) -> None:
+        """Add the field that shortens the menu, in the container that is open."""
+        self._field = gui.add_text("Find an arm", "", hint=FIND_HINT)
         listen(self._field, post, "find")
 
     def hide(self) -> None:
         """Offer no other robot."""
-        self._menu.visible = self._field.visible = False
+        self._menu.visible = False
 
     def find(self, query: object) -> int:
         """Offer the robots that all words of a query fit, and the one on show; returns how many fit.
@@ -45,7 +49,8 @@ class RobotMenu:
         text = query if isinstance(query, str) else ""
         count = len(find_robots(self._options.values(), text))
         self._query = text
-        assign(self._field, text)
+        if self._field is not None:
+            assign(self._field, text)
         self._offer()
         return count
 

@@ -38,16 +38,16 @@ def test_words_shorten_the_menu_and_the_arm_on_show_stays(port: int) -> None:
         tab.settle()
         everything = offered(tab)
         assert everything == {robot.name for robot in STORE.robots}
-        tab.set("Find", "kuka joints:7")
+        tab.set("Find an arm", "kuka joints:7")
         tab.wait(lambda: offered(tab) == {PIONEER.name, *sevens})
         assert tab.value("Robot") == PIONEER.name
-        tab.set("Find", "kuka joints:")
+        tab.set("Find an arm", "kuka joints:")
         tab.wait(lambda: "Not yet a query" in tab.html)
         assert offered(tab) == {PIONEER.name, *sevens}, "an incomplete word changes nothing"
-        tab.set("Find", "no-such-arm")
+        tab.set("Find an arm", "no-such-arm")
         tab.wait(lambda: "No arm fits" in tab.html)
         assert offered(tab) == {PIONEER.name}
-        tab.set("Find", "")
+        tab.set("Find an arm", "")
         tab.wait(lambda: offered(tab) == everything)
 
 
@@ -55,7 +55,7 @@ def test_an_arm_that_was_found_opens(port: int) -> None:
     kr6 = STORE.get("kr6")
     with FakeBrowser(port) as tab:
         tab.settle()
-        tab.set("Find", "kr6")
+        tab.set("Find an arm", "kr6")
         tab.wait(lambda: kr6.name in offered(tab))
         tab.choose(kr6.name)
         tab.wait(lambda: tab.value("Robot") == kr6.name)
