@@ -368,7 +368,7 @@ class Settings:
 
     @classmethod
     @cache
-    def specs(cls) -> tuple[tuple[str, Spec], ...]:
+    def specs(cls: type[Settings]) -> tuple[tuple[str, Spec], ...]:
         """What the fields declare, by their names."""
         return tuple((one.name, one.metadata["spec"]) for one in fields(cls) if "spec" in one.metadata)
 
@@ -379,7 +379,7 @@ class Settings:
 
     @classmethod
     @cache
-    def spec(cls, path: str) -> Spec:
+    def spec(cls: type[Settings], path: str) -> Spec:
         """What the field at a path declares."""
         name, _, rest = path.partition(".")
         spec: Spec = dict(cls.specs())[name]

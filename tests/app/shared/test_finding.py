@@ -86,5 +86,5 @@ def test_the_command_line_finds_the_same_robots(capsys):
 
 
 def test_the_facts_of_a_maker_are_printed(capsys):
-    assert main(["robots", "kr6"]) == 0
-    assert "maker: KUKA\npayload: 6 kg\n" in capsys.readouterr().out
+    assert main(["robots", "gen3"]) == 0
+    assert "maker: Kinova\npayload: 4 kg\n" in capsys.readouterr().out

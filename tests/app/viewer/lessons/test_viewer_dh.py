@@ -16,8 +16,8 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.lessons import dh
-from app.viewer.lessons.dh import drawing, steps, views
+from app.viewer.lessons.dh import drawing, player, steps, views
+from app.viewer.lessons.dh.lesson import DHLesson
 from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
 from kin.dh.tables import convert
@@ -343,17 +343,17 @@ def served() -> Iterator[tuple[ViewerServer, int]]:
 def tab(served: tuple[ViewerServer, int]) -> Iterator[FakeBrowser]:
     with FakeBrowser(served[1]) as opened:
         opened.settle()
-        opened.set("Lesson", dh.DHLesson.title)
+        opened.set("Lesson", DHLesson.title)
         opened.wait(lambda: "Row" in opened.sliders)
         opened.settle()
         yield opened
 
 
-def lesson_of(server: ViewerServer) -> dh.DHLesson:
+def lesson_of(server: ViewerServer) -> DHLesson:
     """The lesson of the newest visitor."""
     session = server._pages[max(server._pages)]
     shown = session.lessons.shown
-    assert isinstance(shown, dh.DHLesson)
+    assert isinstance(shown, DHLesson)
     return shown
 
 
@@ -402,8 +402,8 @@ def test_next_and_back_go_to_the_ends_of_motions(tab: FakeBrowser) -> None:
 
 
 def test_playing_goes_to_the_end_and_stops(tab: FakeBrowser, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dh.player, "MOTION_TIME", 0.05)
-    monkeypatch.setattr(dh.player, "REST", 0.01)
+    monkeypatch.setattr(player, "MOTION_TIME", 0.05)
+    monkeypatch.setattr(player, "REST", 0.01)
     tab.set("Motion", "Play")
     tab.wait(lambda: "Pause" in tab.gui[tab.element("Motion")]["props"]["options"])
     tab.wait(lambda: tab.value("Row") == 6.0)
@@ -411,7 +411,7 @@ def test_playing_goes_to_the_end_and_stops(tab: FakeBrowser, monkeypatch: pytest
     tab.wait(lambda: "Frame 6 (tool) is placed" in tab.html)
     tab.settle()
     assert "Play" in tab.gui[tab.element("Motion")]["props"]["options"]
-    monkeypatch.setattr(dh.player, "MOTION_TIME", 5.0)
+    monkeypatch.setattr(player, "MOTION_TIME", 5.0)
     tab.set("Motion", "Play")
     tab.wait(lambda: 0.0 < tab.value("Row") < 1.0)
     tab.set("Motion", "Pause")
@@ -469,7 +469,7 @@ def test_a_reopened_lesson_starts_at_the_base(tab: FakeBrowser) -> None:
     tab.wait(lambda: shows(tab, at(PIONEER, PIONEER.q_home, 12)))
     tab.set("Lesson", "None")
     tab.wait(lambda: "Row" not in tab.sliders)
-    tab.set("Lesson", dh.DHLesson.title)
+    tab.set("Lesson", DHLesson.title)
     tab.wait(lambda: "Row" in tab.sliders)
     tab.settle()
     assert shows(tab, np.eye(4)), "and does not take over the pose of a node of the same name"

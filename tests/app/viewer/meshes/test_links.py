@@ -310,7 +310,7 @@ def test_bodies_of_packages_have_room_of_their_own_and_say_why_they_cannot_be_re
             library.get(puma, said.append)  # not tried again, but said
             assert len(said) == 2
             assert expected in said[1]
-            monkeypatch.setattr("app.viewer.meshes.library.PAUSE", 0.0)
+            monkeypatch.setattr("app.viewer.meshes.library.library.PAUSE", 0.0)
         assert expected in said[0]
         assert bool(expected) == bool(said[0])
     assert library.get(puma, said.append) is not None

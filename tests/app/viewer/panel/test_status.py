@@ -112,8 +112,8 @@ def test_an_error_stays_until_the_next_action() -> None:
 
 def test_undo_names_the_action_and_not_its_lesson() -> None:
     velocity, postures = object.__new__(VelocityLesson), object.__new__(Postures)
-    assert velocity.step_name(("jog", 1, 2)) == "Jog"
-    assert velocity.step_name("frame") == "Velocity"
+    assert velocity.step_name(("do", ("on_jog", 1, 2), 0, True)) == "Jog"
+    assert velocity.step_name(("at", "frame", 0)) == "Velocity"
     assert postures.step_name(("go", 1)) == "Posture"
 
 

@@ -50,6 +50,11 @@ def numbers_in(text: str) -> Counter[float]:
     return Counter(float(found.replace("−", "-")) for found in NUMBER.findall(text))
 
 
+UUID = re.compile(
+    r"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}"
+)  # of a control: its digits are random
+
+
 def heard(messages: list[dict[str, Any]]) -> Heard:
     texts: list[str] = []
     sent: Counter[float] = Counter()
@@ -75,7 +80,7 @@ def heard(messages: list[dict[str, Any]]) -> Heard:
 
     walk(messages)
     text = html.unescape("\n".join(texts))
-    said = numbers_in(text)
+    said = numbers_in(UUID.sub(" ", text))
     return Heard(text, "", said, sent)
 
 
