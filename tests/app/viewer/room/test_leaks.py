@@ -50,9 +50,10 @@ def numbers_in(text: str) -> Counter[float]:
     return Counter(float(found.replace("−", "-")) for found in NUMBER.findall(text))
 
 
-UUID = re.compile(
-    r"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}"
-)  # of a control: its digits are random
+# What has digits by chance: names of controls, links in base64, outlines of icons.
+CHANCE = re.compile(
+    r"[0-9a-f]{8}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{4}-[0-9a-f]{12}|[A-Za-z0-9+/_=-]{40,}|\bd=\"[^\"]*\""
+)
 
 
 def heard(messages: list[dict[str, Any]]) -> Heard:
@@ -80,7 +81,7 @@ def heard(messages: list[dict[str, Any]]) -> Heard:
 
     walk(messages)
     text = html.unescape("\n".join(texts))
-    said = numbers_in(UUID.sub(" ", text))
+    said = numbers_in(CHANCE.sub(" ", text))
     return Heard(text, "", said, sent)
 
 
