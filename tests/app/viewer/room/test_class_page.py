@@ -581,7 +581,7 @@ def test_where_a_token_is_needed_who_was_removed_can_only_look(tmp_path: Path) -
         at(student, q)
         hub.rooms.end(ticket.room)
         mode(student, "closed")
-        assert "The room has ended." in student.html
+        student.wait(lambda: "The room has ended." in student.html)
         assert "go on by yourself" not in student.html
         student.set("1 rotating base", 80.0)
         student.wait(lambda: "Join a room to go on" in student.html)
