@@ -7,6 +7,7 @@ import contextlib
 import json
 import socket
 import threading
+import time
 from collections.abc import Iterator
 
 import httpx2
@@ -18,6 +19,7 @@ from live_server import wait_for
 from websockets.sync.client import connect
 
 from app.service.handover import AT_ONCE, LARGEST, SUPPORTED, Handover, Member, Phase, Role, members
+from app.service.web.access import TRIES, TRY_EVERY
 
 pytestmark = pytest.mark.skipif(not SUPPORTED, reason="one process on this system")
 
@@ -274,9 +276,14 @@ def test_limits_of_clients_are_counted_once():
     with victim(**limits) as service, contextlib.ExitStack() as stack:
         url = f"{service.url}{ARM}"
         wrong = {"authorization": "Bearer wrong"}
-        tries = [httpx2.get(url, headers=wrong, trust_env=False, timeout=60).status_code for _ in range(5)]
-        form = httpx2.post(f"{service.url}/login", data={"token": "wrong"}, trust_env=False, timeout=60)
-        assert [*tries, form.status_code] == [401] * 5 + [429]
+        began = time.monotonic()
+        tries = [httpx2.get(url, headers=wrong, trust_env=False, timeout=60).status_code for _ in range(TRIES)]
+        while tries[-1] == 401 and len(tries) < 2 * TRIES:
+            form = httpx2.post(f"{service.url}/login", data={"token": "wrong"}, trust_env=False, timeout=60)
+            tries.append(form.status_code)
+        allowed = TRIES + int((time.monotonic() - began) / TRY_EVERY)  # of a slow machine, some are forgotten
+        assert tries[-1] == 429
+        assert TRIES <= tries.count(401) <= allowed
         kept = [stack.enter_context(service.connection("127.0.0.2")) for _ in range(9)]
         for connection in kept:  # the share of one client, all handed over
             connection.sendall(get("/livez"))
