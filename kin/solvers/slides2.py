@@ -20,31 +20,27 @@ import math
 
 import numpy as np
 
-from kin.fk import fk, jacobian
+from kin.fk import jacobian
 from kin.kernels.compile import jit
 from kin.kernels.jacobian import jacobian_into
 from kin.robot import Robot
-from kin.solvers.common import TURN, clear, wrap
+from kin.solvers.common import clear, wrap
 from kin.solvers.contract import (
     APPROACH,
     POSE,
     POSITION,
     BatchKernels,
     Candidates,
-    ClosedForm,
     Obstacle,
-    RedundancyParameter,
     SolverInput,
 )
 from kin.solvers.singular import Singularity, by_jacobian, those_within
+from kin.solvers.slides import ALIKE, REGULAR, SlidesForm, dot, is_finite, triple
 from kin.transforms import Array
 
 NAME = "slides2"
 TITLE = "closed form, one turning and two sliding joints"
-BRANCHES = ("solution 1", "solution 2")
-_REGULAR = 1e-4  # smallest singular value of the Jacobian, of the largest
 _FLAT = 1e-14  # square of the sine between two slides that count as parallel
-_ALIKE = 1e-9  # how far beyond ±1 the cosine of an angle may be: rounding error
 _THIRD = 2.0 * math.pi / 3.0
 # Layout of the parameters: the indices of the turning and of the sliding joints, the arm's model.
 TURN_AT, SLIDES, MODEL = 0, 1, 3
@@ -56,7 +52,7 @@ def match(robot: Robot) -> Slides2 | None:
         return None
     J = jacobian(robot, np.random.default_rng(5).uniform(-1.0, 1.0, (4, 3)))[:, :3]
     J[..., robot.revolute] /= robot.reach if math.isfinite(robot.reach) else 1.0
-    return Slides2(robot) if np.linalg.matrix_rank(J, rtol=_REGULAR).max() == 3 else None
+    return Slides2(robot) if np.linalg.matrix_rank(J, rtol=REGULAR).max() == 3 else None
 
 
 @jit
@@ -69,12 +65,7 @@ def _at(params: Array, T: Array, angle: float, left: Array, axes: Array) -> floa
         left[i] = T[i, 3] - P[i, 3]
         for k in range(2):
             axes[k, i] = J[i, int(params[SLIDES + k])]
-    u, v = axes[0], axes[1]
-    return float(
-        left[0] * (u[1] * v[2] - u[2] * v[1])
-        + left[1] * (u[2] * v[0] - u[0] * v[2])
-        + left[2] * (u[0] * v[1] - u[1] * v[0])
-    )
+    return triple(left, axes[0], axes[1])
 
 
 @jit
@@ -90,7 +81,7 @@ def configurations(params: Array, T: Array, near: Array, out: Array) -> None:
     constant = (f[0] + f[1] + f[2]) / 3.0
     cosine, sine = (2.0 * f[0] - f[1] - f[2]) / 3.0, (f[1] - f[2]) / math.sqrt(3.0)
     size = math.sqrt(cosine * cosine + sine * sine)
-    if abs(constant) > size * (1.0 + _ALIKE):
+    if abs(constant) > size * (1.0 + ALIKE):
         return
     if size > 0.0:
         middle, half = math.atan2(sine, cosine), math.acos(min(max(-constant / size, -1.0), 1.0))
@@ -99,11 +90,7 @@ def configurations(params: Array, T: Array, near: Array, out: Array) -> None:
     for row in range(2):
         angle = middle + half if row == 0 else middle - half
         _at(params, T, angle, left, axes)
-        uv = ux = vx = 0.0
-        for i in range(3):
-            uv += axes[0, i] * axes[1, i]
-            ux += axes[0, i] * left[i]
-            vx += axes[1, i] * left[i]
+        uv, ux, vx = dot(axes[0], axes[1]), dot(axes[0], left), dot(axes[1], left)
         square = 1.0 - uv * uv
         if square < _FLAT:
             continue
@@ -118,11 +105,9 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 
     `value` is not used: a point leaves nothing free.
     """
-    for r in range(4):
-        for k in range(4):
-            if not math.isfinite(T[r, k]):
-                clear(out)
-                return False
+    if not is_finite(T):
+        clear(out)
+        return False
     configurations(params, T, near, out)
     return True
 
@@ -134,13 +119,11 @@ def branches_many(params: Array, T: Array, values: Array, near: Array, out: Arra
         branches_one(params, T[k], values[0], near, out[k])
 
 
-class Slides2(ClosedForm):
+class Slides2(SlidesForm):
     """The closed form of an arm with one turning and two sliding joints."""
 
-    name, title, branches = NAME, TITLE, BRANCHES
+    name, title = NAME, TITLE
     reason = "one of three joints turns and two slide"
-    lengths = ()
-    named = False
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -152,17 +135,13 @@ class Slides2(ClosedForm):
         """Points; of a pose or an approach direction the point is met, and the caller judges the rest."""
         return task in (POSE, APPROACH, POSITION)
 
-    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """None."""
-        return ()
-
     def solve(self, problem: SolverInput) -> Candidates:
         """Both configurations."""
         q = np.empty((2, 3))
         configurations(self.kernels.params, np.ascontiguousarray(problem.T), problem.seed, q)
         there = ~np.isnan(q[:, 0])
         obstacle = None if there.any() else Obstacle("point")
-        flat = bool((self._smallest(q[there]) < _REGULAR).any())
+        flat = bool((self._smallest(q[there]) < REGULAR).any())
         return Candidates(q, np.empty((2, 0)), (), 0.0, obstacle, "agreed" if flat else "proved")
 
     def _smallest(self, q: Array) -> Array:
@@ -170,16 +149,6 @@ class Slides2(ClosedForm):
         J = jacobian(self.robot, q)[:, :3]
         J[..., self.robot.revolute] /= self.robot.reach if math.isfinite(self.robot.reach) else 1.0
         return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1])
-
-    def branch_of(self, q: Array) -> int:
-        """The row of q ``(3,)`` among the configurations of its point."""
-        out, near = np.empty((2, 3)), np.array(q, dtype=np.float64)
-        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, near, out)
-        off = out - q
-        turns = self.robot.revolute
-        off[:, turns] = (off[:, turns] + math.pi) % TURN - math.pi
-        apart = np.abs(off).max(axis=1)
-        return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """The smallest singular value of the Jacobian of the point."""

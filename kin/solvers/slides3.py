@@ -26,27 +26,23 @@ from kin.fk import fk, jacobian
 from kin.kernels.compile import jit
 from kin.kernels.jacobian import jacobian_into
 from kin.robot import Robot
-from kin.solvers.common import TURN, clear, wrap
+from kin.solvers.common import clear, wrap
 from kin.solvers.contract import (
     POSE,
     BatchKernels,
     Candidates,
-    ClosedForm,
     Completeness,
-    RedundancyParameter,
     SolverInput,
 )
 from kin.solvers.singular import Singularity, by_jacobian, those_within
+from kin.solvers.slides import ALIKE, REGULAR, SlidesForm, dot, is_finite, triple
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "slides3"
 TITLE = "closed form, three turning and three sliding joints"
-BRANCHES = ("solution 1", "solution 2")
-_REGULAR = 1e-4  # smallest singular value of the Jacobian, of the largest
 _SINGULAR = TOLERANCES.singular
 _FLAT = 1e-7  # volume that the directions of three slides span, where they count as lying in one plane
-_ALIKE = 1e-9  # how far beyond ±1 the cosine of an angle may be: rounding error
 # Layout of the parameters: the indices of the turning and of the sliding joints, the axes of the former and the
 # orientation at zero, the arm's model.
 TURNS, SLIDES, AXES, ZERO, MODEL = 0, 3, 6, 15, 24
@@ -58,7 +54,7 @@ def match(robot: Robot) -> Slides3 | None:
         return None
     J = jacobian(robot, np.random.default_rng(5).uniform(-1.0, 1.0, (4, 6)))
     J[:, :3, robot.revolute] /= robot.reach or 1.0
-    return Slides3(robot) if np.linalg.matrix_rank(J, rtol=_REGULAR).max() == 6 else None
+    return Slides3(robot) if np.linalg.matrix_rank(J, rtol=REGULAR).max() == 6 else None
 
 
 @jit
@@ -73,26 +69,11 @@ def _turn(z: Array, angle: float, v: Array, out: Array) -> None:
 
 
 @jit
-def _dot(a: Array, b: Array) -> float:
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-@jit
-def _triple(a: Array, b: Array, c: Array) -> float:
-    """a · (b × c)."""
-    return float(
-        a[0] * (b[1] * c[2] - b[2] * c[1])
-        + a[1] * (b[2] * c[0] - b[0] * c[2])
-        + a[2] * (b[0] * c[1] - b[1] * c[0])
-    )
-
-
-@jit
 def _angle(z: Array, v: Array, w: Array) -> tuple[float, float]:
     """The angle about z from v to w, and how far v is off the axis."""
-    a, b = _dot(z, v), _dot(z, w)
-    off = math.sqrt(max(_dot(v, v) - a * a, 0.0))
-    return math.atan2(_triple(z, v, w), _dot(v, w) - a * b), off
+    a, b = dot(z, v), dot(z, w)
+    off = math.sqrt(max(dot(v, v) - a * a, 0.0))
+    return math.atan2(triple(z, v, w), dot(v, w) - a * b), off
 
 
 @jit
@@ -102,12 +83,12 @@ def _slide(params: Array, T: Array, q: Array) -> bool:
     jacobian_into(params[MODEL:], q, J, P, axes)
     first, second, third = int(params[SLIDES]), int(params[SLIDES + 1]), int(params[SLIDES + 2])
     a, b, c = J[:3, first], J[:3, second], J[:3, third]
-    volume = _triple(a, b, c)
+    volume = triple(a, b, c)
     if abs(volume) < _FLAT:
         return False
     for i in range(3):
         x[i] = T[i, 3] - P[i, 3]
-    q[first], q[second], q[third] = _triple(x, b, c) / volume, _triple(a, x, c) / volume, _triple(a, b, x) / volume
+    q[first], q[second], q[third] = triple(x, b, c) / volume, triple(a, x, c) / volume, triple(a, b, x) / volume
     return True
 
 
@@ -129,11 +110,11 @@ def configurations(params: Array, T: Array, near: Array, out: Array) -> bool:
     w, v, side, there = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for i in range(3):
         w[i] = M[i, 0] * z3[0] + M[i, 1] * z3[1] + M[i, 2] * z3[2]
-    constant = _dot(z1, z2) * _dot(z2, z3)
-    cosine, sine = _dot(z1, z3) - constant, _triple(z1, z2, z3)
+    constant = dot(z1, z2) * dot(z2, z3)
+    cosine, sine = dot(z1, z3) - constant, triple(z1, z2, z3)
     size = math.sqrt(cosine * cosine + sine * sine)
-    share = (_dot(z1, w) - constant) / size
-    if abs(share) > 1.0 + _ALIKE:
+    share = (dot(z1, w) - constant) / size
+    if abs(share) > 1.0 + ALIKE:
         return whole
     middle, half = math.atan2(sine, cosine), math.acos(min(max(share, -1.0), 1.0))
     # A direction across axis 3, which shows the rotation about it.
@@ -172,11 +153,9 @@ def branches_one(params: Array, T: Array, value: float, near: Array, out: Array)
 
     `value` is not used: a pose leaves nothing free.
     """
-    for r in range(4):
-        for k in range(4):
-            if not math.isfinite(T[r, k]):
-                clear(out)
-                return False
+    if not is_finite(T):
+        clear(out)
+        return False
     configurations(params, T, near, out)
     return True
 
@@ -188,13 +167,11 @@ def branches_many(params: Array, T: Array, values: Array, near: Array, out: Arra
         branches_one(params, T[k], values[0], near, out[k])
 
 
-class Slides3(ClosedForm):
+class Slides3(SlidesForm):
     """The closed form of an arm with three turning and three sliding joints."""
 
-    name, title, branches = NAME, TITLE, BRANCHES
+    name, title = NAME, TITLE
     reason = "three joints turn and three slide"
-    lengths = ()
-    named = False
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
@@ -208,10 +185,6 @@ class Slides3(ClosedForm):
         """Poses."""
         return task == POSE
 
-    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
-        """None."""
-        return ()
-
     def solve(self, problem: SolverInput) -> Candidates:
         """Both configurations."""
         q = np.empty((2, 6))
@@ -222,16 +195,6 @@ class Slides3(ClosedForm):
         """q ``(2, 6)`` ← all configurations; more may exist where the slides lie in one plane."""
         whole = configurations(self.kernels.params, np.ascontiguousarray(T), near, q)
         return "proved" if whole else "unknown"
-
-    def branch_of(self, q: Array) -> int:
-        """The row of q ``(6,)`` among the configurations of its pose."""
-        out, near = np.empty((2, 6)), np.array(q, dtype=np.float64)
-        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, near, out)
-        off = out - q
-        turns = self.robot.revolute
-        off[:, turns] = (off[:, turns] + math.pi) % TURN - math.pi
-        apart = np.abs(off).max(axis=1)
-        return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
         """The smallest singular value of the Jacobian."""

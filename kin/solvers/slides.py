@@ -1,0 +1,67 @@
+"""What the closed forms of arms with several slides share: products of directions, and all but their formulas."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from kin.fk import fk
+from kin.kernels.compile import jit
+from kin.robot import Robot
+from kin.solvers.common import TURN
+from kin.solvers.contract import ClosedForm, RedundancyParameter
+from kin.transforms import Array
+
+BRANCHES = ("solution 1", "solution 2")
+REGULAR = 1e-4  # smallest singular value of the Jacobian, of the largest
+ALIKE = 1e-9  # how far beyond ±1 the cosine of an angle may be: rounding error
+
+
+@jit
+def dot(a: Array, b: Array) -> float:
+    """a · b of two directions ``(3,)``."""
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@jit
+def triple(a: Array, b: Array, c: Array) -> float:
+    """a · (b × c)."""
+    return float(
+        a[0] * (b[1] * c[2] - b[2] * c[1])
+        + a[1] * (b[2] * c[0] - b[0] * c[2])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
+    )
+
+
+@jit
+def is_finite(T: Array) -> bool:
+    """Whether a target ``(4, 4)`` has no NaN and no infinity."""
+    for r in range(4):
+        for k in range(4):
+            if not math.isfinite(T[r, k]):
+                return False
+    return True
+
+
+class SlidesForm(ClosedForm):
+    """A closed form with two configurations that have no names and leave nothing free."""
+
+    robot: Robot
+    branches = BRANCHES
+    lengths = ()
+    named = False
+
+    def redundancies(self, task: int) -> tuple[RedundancyParameter, ...]:
+        """None."""
+        return ()
+
+    def branch_of(self, q: Array) -> int:
+        """The row of q ``(n,)`` among the configurations of its target."""
+        out, near = np.empty((2, self.robot.n)), np.array(q, dtype=np.float64)
+        self.kernels.one(self.kernels.params, fk(self.robot, q), math.nan, near, out)
+        off = out - q
+        turns = self.robot.revolute
+        off[:, turns] = (off[:, turns] + math.pi) % TURN - math.pi
+        apart = np.abs(off).max(axis=1)
+        return 0 if np.isnan(apart).all() else int(np.nanargmin(apart))
