@@ -273,7 +273,7 @@ def test_limits_of_clients_are_counted_once():
         "KINBOARD_TOKEN": "a long token",
         "KINBOARD_RECEIVE_TIMEOUT": "120",
     }
-    with victim(**limits) as service, contextlib.ExitStack() as stack:
+    with victim(ready=True, **limits) as service, contextlib.ExitStack() as stack:
         url = f"{service.url}{ARM}"
         wrong = {"authorization": "Bearer wrong"}
         began = time.monotonic()
