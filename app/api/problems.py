@@ -53,6 +53,7 @@ KINDS = {
     "not-running": "Nothing is under way",
     "wrong-host": "The request is for another host",
     "busy": "The service is busy",
+    "preparing": "What the request needs is being prepared",
     "too-slow": "The computation takes too long",
     "internal-error": "Internal error",
     "http-error": "The request was rejected",

@@ -122,7 +122,7 @@ _REFUSALS: dict[int, str] = {
     415: "The Content-Type of the body is not JSON.",
     422: "A value is invalid; the document names the field, the value and what is valid.",
     500: "Internal error.",
-    503: "Busy, or the computation takes too long; the header Retry-After says when to try again.",
+    503: "Busy, being prepared on a new machine, or too slow; the header Retry-After says when to try again.",
 }
 
 

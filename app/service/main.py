@@ -41,6 +41,7 @@ from app.service.handover import SUPPORTED, Member, Phase, Role, members
 from app.service.server import STOP_TIMEOUT, Greeting, Server, is_loopback, listen, url_of
 from app.service.startup import Startup
 from app.service.web.access import Access
+from app.service.web.compiling import Compiling
 from app.service.web.embedding import embedding_routes
 from app.service.web.failures import Failures
 from app.service.web.hosts import LOCAL_NAMES, Hosts
@@ -175,7 +176,8 @@ def _described(lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]])
 
 
 def _add_middleware(app: FastAPI, settings: Settings, guests: Guests) -> None:
-    """Access control innermost, the path prefix outermost."""
+    """What refuses to wait for the compiler innermost, the path prefix outermost."""
+    app.add_middleware(Compiling)
     app.add_middleware(
         Access,
         token=None if settings.token is None else settings.token.get_secret_value(),

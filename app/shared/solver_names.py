@@ -29,8 +29,12 @@ class SolverNames(NamedTuple):
 
 def solver_names(robot: Robot) -> SolverNames:
     """The names for an arm; without computation for a built-in one."""
-    known = _known().get(robot.id)
-    return known if known is not None and builtin_robots().get(robot.id) == robot else computed_names(robot)
+    return known_names(robot) or computed_names(robot)
+
+
+def known_names(robot: Robot) -> SolverNames | None:
+    """The names for a built-in arm; None for other arms."""
+    return _known().get(robot.id) if builtin_robots().get(robot.id) == robot else None
 
 
 def computed_names(robot: Robot) -> SolverNames:
