@@ -1,7 +1,7 @@
 "use strict";
 // Runs in viser's page: the table of the tab Robot (app/viewer/tabs/robot). It sends what is typed, cell by cell, and one
 // message at a time, so that a slow answer delays only itself. The server sends the table again when its rows change;
-// then the cell that had the focus gets it back.
+// then the cell that had the focus gets it back, and what was typed since the last answer stays and is sent.
 (() => {
   const PAUSE = 40; // ms after a key until a cell is sent
   const REST = 400; // the same where the arm on show has meshes: some megabytes are sent for each change
@@ -15,11 +15,12 @@
 
   // Typed cells
 
-  const typed = new Map(); // cell → its key and value, not sent yet
+  const typed = new Map(); // cell → revision and text, not sent yet
+  let sent = null; // the same of the message that waits for its answer
   let busy = 0; // the timer of the message that waits for its answer
   let pause = 0; // the timer of `push`
   let due = 0; // when it ends
-  addEventListener("kinboard-connect", () => { typed.clear(); clearTimeout(busy); busy = 0; });
+  addEventListener("kinboard-connect", () => { typed.clear(); sent = null; clearTimeout(busy); busy = 0; });
 
   function keyOf(name) {
     const [where, column] = name.split(" ");
@@ -31,7 +32,8 @@
     if (busy || !typed.size) return;
     const [[name, value]] = typed;
     typed.delete(name);
-    const next = () => { clearTimeout(busy); busy = 0; pushLater(); };
+    sent = [name, value];
+    const next = () => { clearTimeout(busy); busy = 0; sent = null; pushLater(); };
     busy = setTimeout(next, PATIENCE);
     send(keyOf(name), value, next);
   }
@@ -40,6 +42,16 @@
   function pushLater() {
     clearTimeout(pause);
     pause = setTimeout(push, Math.max(0, due - performance.now()));
+  }
+
+  /** Write what the server has not read yet into fields that it has written. Rows that moved are others: theirs is gone. */
+  function keepTyped() {
+    for (const [name, [rows, text]] of new Map([...(sent ? [sent] : []), ...typed])) {
+      const cell = document.querySelector(`[data-arm] input[data-cell="${name}"]`);
+      const same = rows === revision() || !/^\d/.test(name);
+      if (!same) typed.delete(name);
+      else if (cell && cell.value !== text) cell.value = text;
+    }
   }
 
   /** Send everything that was typed, before something else is sent. */
@@ -233,6 +245,7 @@
   viserPage.watch(showChoice);
   viserPage.watch(() => {
     if (!part("table")) return;
+    keepTyped();
     restore();
     mark();
     markWrong();

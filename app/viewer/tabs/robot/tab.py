@@ -55,8 +55,9 @@ class RobotTab(Feature):
         super().__init__(stage)
         self._wrong: dict[Cell, tuple[str, str]] = {}  # what was typed, and what is wrong with it
         self._texts = Texts()
-        self._revision = 0  # of the rows: a message about other rows is out of date
-        self._editing = ""  # the part of the tab in which the visitor types
+        self._revision = 0  # of the rows and units: a message about others is out of date
+        self._written = 0  # how often the table was sent: what a browser has typed over is sent again
+        self._editing = ""  # the part of the tab in which the visitor types; "kind": rows and units stay
         self._uploads = Uploads(stage, self.post, lambda own, words: self._beginnings.begin(own, words))
         self._beginnings = Beginnings(stage, lambda: self._uploads.last)
         self._stalled: float | None = None  # seconds until the next part of a file should have come
@@ -156,6 +157,7 @@ class RobotTab(Feature):
 
     def on_robot(self) -> None:
         self._uploads.waiting = None
+        self._revision += self._editing == ""
         self._refresh()
         self._comparing.start()
         self._plan()
@@ -164,6 +166,7 @@ class RobotTab(Feature):
         self._comparing.on_pose(self.stage.now.q)
 
     def on_style(self) -> None:
+        self._revision += 1
         self._refresh()
         self._comparing.refresh()
 
@@ -181,7 +184,7 @@ class RobotTab(Feature):
         self._withheld = self.stage.activity.withheld
         self._wrong = {cell: why for cell, why in self._wrong.items() if edits.part_of(cell) == self._editing}
         if self._editing != "table":
-            self._revision += 1
+            self._written += 1
             self._show("table", self._table())
         if self._editing != "frames":
             self._show("frames", views.frames(robot, units, self.stage.frames, self._texts))
@@ -198,7 +201,8 @@ class RobotTab(Feature):
     def _table(self) -> str:
         if self.stage.activity.withheld == "table":
             return views.withheld()
-        return views.table(self.stage.now.robot, self.stage.units, self._revision, self._texts)
+        robot, units = self.stage.now.robot, self.stage.units
+        return views.table(robot, units, self._revision, self._written, self._texts)
 
     def _show(self, name: str, html: str) -> None:
         update_html(self._html[name], html)
@@ -282,7 +286,7 @@ class RobotTab(Feature):
         before = {key: typed for key, typed in others.items() if key != cell}
         self._wrong.pop(cell, None)
         if column == "kind":
-            editing, before = "", {}
+            editing, before = "kind", {}
         for texts in ({**before, cell: text}, {cell: text}):
             try:
                 own = edits.typed(robot, self._own, texts, units)

@@ -60,14 +60,15 @@ def start(robot: Robot, chosen: str, mine: bool, robots: Sequence[Robot]) -> str
     )
 
 
-def table(robot: Robot, units: Units, revision: int, texts: Texts) -> str:
-    """The DH table with a field for each number."""
+def table(robot: Robot, units: Units, revision: int, written: int, texts: Texts) -> str:
+    """The DH table with a field for each number: of which rows and units, and how often it was written."""
     heads = []
     for column, (name, title) in _HEADS.items():
         unit = units.of(column in ANGLES).name if column in NUMBERS[:4] else ""
         heads.append({"name": name, "unit": unit, "title": title, "left": column in ("kind", "name")})
     rows = [[_cell(i, row, column, units, texts) for column in _HEADS] for i, row in enumerate(robot.rows)]
-    return render("robot/table", heads=heads, rows=rows, revision=revision, convention=robot.convention)
+    about = {"revision": revision, "written": written, "convention": robot.convention}
+    return render("robot/table", heads=heads, rows=rows, **about)
 
 
 def withheld() -> str:
