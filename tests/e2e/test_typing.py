@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import psutil
 import pytest
 from page import Tab
-from playwright.sync_api import Locator, expect
+from playwright.sync_api import expect
 
 pytestmark = pytest.mark.browser
 
@@ -46,9 +46,9 @@ def held_up(address: str) -> Iterator[None]:
         holding.join()
 
 
-def test_a_length_typed_right_after_the_kind_of_a_joint_stays(desktop: Tab, address: str) -> None:
-    page = desktop.page
-    desktop.open("Robot")
+def test_a_length_typed_right_after_the_kind_of_a_joint_stays(tab: Tab, address: str) -> None:
+    page = tab.page
+    tab.open("Robot")
     page.locator('[data-cell="start"]').select_option("ur5")
     length = page.locator('[data-cell="2 a"]')
     expect(length).to_have_value("−392.25")
@@ -56,10 +56,64 @@ def test_a_length_typed_right_after_the_kind_of_a_joint_stays(desktop: Tab, addr
         page.locator('[data-cell="2 kind"]').select_option("prismatic")
         length.click()
         page.keyboard.type("-120.5", delay=60)
-        expect(page.locator("[data-arm] tr[data-row=\"2\"] .kb-arm-variable [data-cell=\"2 d\"]")).to_be_visible()
+        expect(page.locator('[data-arm] tr[data-row="2"] .kb-arm-variable [data-cell="2 d"]')).to_be_visible()
         page.wait_for_timeout(1000)
         expect(length).to_have_value("-120.5")
         expect(length).to_be_focused()
     page.get_by_role("heading", name="Convert").click()
     expect(length).to_have_value("−120.5")
     expect(page.locator('[data-cell="2 kind"]')).to_have_value("prismatic")
+
+
+# Every field with text in sight, but for lists to choose from.
+FIELDS = ", ".join(
+    f"{kind}:visible:enabled:not([readonly], [aria-haspopup])"
+    for kind in ("input[type=text]", "input:not([type])", "textarea")
+)
+FOCUSED = "() => document.activeElement.value"
+
+
+def another(text: str) -> str:
+    """A text as valid as this one; whole, as some fields take no other numbers."""
+    try:
+        return str(int(float(text.replace("−", "-"))) + 1)
+    except ValueError:
+        return "ab"
+
+
+def type_slowly(tab: Tab, k: int, text: str, chance: random.Random) -> set[str]:
+    """Type into the field with this number, and return what it shows until a while after that."""
+    tab.page.locator(FIELDS).nth(k).click(force=True)
+    tab.page.keyboard.press("Control+a")
+    for letter in text:
+        tab.page.keyboard.type(letter)
+        tab.page.wait_for_timeout(chance.choice((0, 30, 120)))
+    shown = set()
+    for _ in range(8):
+        tab.page.wait_for_timeout(80)
+        shown.add(tab.page.evaluate(FOCUSED).replace("−", "-"))
+    return shown
+
+
+def type_everywhere(tab: Tab, address: str, title: str, most: int) -> None:
+    chance = random.Random(SEED)
+    tab.open(title)
+    expect(tab.page.get_by_role("tab", name=title)).to_have_attribute("aria-selected", "true")
+    found = tab.page.locator(FIELDS)
+    expect(found).not_to_have_count(0)
+    count = found.count()
+    with held_up(address):
+        for k in sorted(chance.sample(range(count), min(count, most))):
+            text = another(found.nth(k).input_value())
+            assert type_slowly(tab, k, text, chance) == {text}, f"field {k + 1} of {title}"
+
+
+def test_a_field_shows_what_was_typed_while_it_has_the_focus(tab: Tab, address: str) -> None:
+    type_everywhere(tab, address, "Move", 2)
+    type_everywhere(tab, address, "Robot", 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("title", ["Move", "Workspace", "Robot"])
+def test_each_field_shows_what_was_typed_while_it_has_the_focus(tab: Tab, address: str, title: str) -> None:
+    type_everywhere(tab, address, title, 1000)
