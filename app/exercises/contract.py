@@ -40,6 +40,7 @@ class Asked:
         rows: how many rows a table has.
         first: the number of the first one.
         start: a text or a pose to begin with.
+        cells: texts to begin with, of a table.
         goal: a pose ``(4, 4)`` that is drawn.
     """
 
@@ -50,6 +51,7 @@ class Asked:
     rows: int = 1
     first: int = 1
     start: str = ""
+    cells: tuple[tuple[str, ...], ...] = ()
     goal: Array | None = None
 
 

@@ -12,17 +12,27 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from app.exercises.typed import EntryError, read_number
+from kin import InputError
 from kin.axes import screw_x, screw_z
 from kin.robot import Convention
 from kin.transforms import Array
+from kin.typed import LONGEST
+from kin.units import Units
 
 Factor = Literal["theta", "d", "a", "alpha"]
 FACTORS: tuple[Factor, ...] = ("theta", "d", "a", "alpha")
 
 
+NAMES = ("θ", "d", "a", "α")
+
+
 def turns(factor: Factor) -> bool:
     """Whether a parameter is an angle, else a length."""
     return factor in ("theta", "alpha")
+
+
+ANGULAR = tuple(map(turns, FACTORS))
 
 
 class Accepted(NamedTuple):
@@ -84,3 +94,30 @@ class Miss(NamedTuple):
 def angle_between(one: Array, other: Array) -> float:
     """The angle between two directions ``(3,)``, 0 to π."""
     return math.atan2(float(np.linalg.norm(np.cross(one, other))), float(one @ other))
+
+
+def read_rows(given: object, count: int, first: int, units: Units) -> list[Row]:
+    """Typed rows; a number without a unit is in the reader's.
+
+    Args:
+        count: how many rows there have to be.
+        first: the index of the first one, for messages.
+
+    Raises:
+        InputError: not this many rows of four texts.
+        EntryError: a text is no number; it names the cell.
+    """
+    if not isinstance(given, list | tuple) or len(given) != count:
+        raise InputError("answer", given, f"{count} rows of the texts θ, d, a, α")
+    rows: list[Row] = []
+    for i, row in enumerate(given):
+        if not isinstance(row, list | tuple) or len(row) != 4 or not all(isinstance(x, str) for x in row):
+            raise InputError(f"answer[{i}]", row, "four texts θ, d, a, α")
+        values = []
+        for text, name, angular in zip(row, NAMES, ANGULAR, strict=True):
+            try:
+                values.append(read_number(text[: LONGEST + 1], units.of(angular)))
+            except EntryError as error:
+                raise EntryError(f"{name} of row {first + i + 1} was not read", error.detail) from None
+        rows.append(Row(*values))
+    return rows

@@ -13,14 +13,16 @@ from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
 
 _SYMBOLS = dict(zip(COLUMNS, ("θ", "d", "a", "α"), strict=True))
+Names = tuple[str, str]  # how a sentence calls the arms a and b
+NAMES: Names = ("a", "b")
 
 
-def verdict(found: Comparison, a: Robot, b: Robot, units: Units = DEFAULT_UNITS) -> str:
+def verdict(found: Comparison, a: Robot, b: Robot, units: Units = DEFAULT_UNITS, names: Names = NAMES) -> str:
     """The outcome in a sentence or two."""
     if found.verdict == "different":
         if found.first is None:
             return f"Different arms{_within(found, units)}."
-        return f"Different arms: {difference(found.first, a, b, units)}."
+        return f"Different arms: {difference(found.first, a, b, units, names)}."
     if found.verdict == "identical":
         return "Identical: equal joint values give equal poses."
     facts = mapping(found, a, units)
@@ -69,22 +71,24 @@ def _motion(T: Array, units: Units) -> str:
     return " and ".join(parts) or "another"
 
 
-def difference(found: Difference, a: Robot, b: Robot, units: Units = DEFAULT_UNITS) -> str:
+def difference(found: Difference, a: Robot, b: Robot, units: Units = DEFAULT_UNITS, names: Names = NAMES) -> str:
     """A quantity of the axes that differs, without a full stop."""
+    one, other = names
     if found.quantity == "count":
-        return f"a has {a.n} joints and b has {b.n}"
+        return f"{one} has {a.n} joints and {other} has {b.n}"
     if found.quantity == "kind":
-        return f"joint {found.joints[0] + 1} is {found.in_a} in a and {found.in_b} in b"
+        return f"joint {found.joints[0] + 1} is {found.in_a} in {one} and {found.in_b} in {other}"
     if found.quantity == "direction":
-        return f"the axis of joint {found.joints[0] + 1} lies otherwise to those before it"
+        return f"the axis of joint {found.joints[0] + 1} lies differently relative to those before it"
     unit = units.of(found.quantity == "twist")
     in_a, in_b = (unit.value(float(value or 0.0)) for value in (found.in_a, found.in_b))
     if found.quantity == "offset":
         joint = found.joints[0] + 1
-        return f"along the axis of joint {joint}, its two common normals are {in_a} apart in a and {in_b} in b"
+        normals = f"along the axis of joint {joint}, its two common normals"
+        return f"{normals} are {in_a} apart in {one} and {in_b} in {other}"
     first, second = (joint + 1 for joint in found.joints)
     what = "at an angle of" if found.quantity == "twist" else "at a distance of"
-    return f"the axes of joints {first} and {second} are {what} {in_a} in a and {in_b} in b"
+    return f"the axes of joints {first} and {second} are {what} {in_a} in {one} and {in_b} in {other}"
 
 
 def explanation(found: Explanation, a: Robot, b: Robot, units: Units = DEFAULT_UNITS) -> str:

@@ -6,6 +6,7 @@ from app.exercises.contract import Kind
 from app.exercises.kinds.choice import ChoiceKind
 from app.exercises.kinds.dh import DHKind
 from app.exercises.kinds.frame import FrameKind
+from app.exercises.kinds.mistake import MistakeKind
 from app.exercises.kinds.number import NumberKind
 from app.exercises.kinds.order import OrderKind
 from app.exercises.kinds.program import ProgramKind
@@ -20,6 +21,7 @@ KINDS: dict[str, type[Kind]] = {
         NumberKind,
         ChoiceKind,
         DHKind,
+        MistakeKind,
         ReachKind,
         SolutionsKind,
         SingularityKind,

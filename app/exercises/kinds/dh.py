@@ -13,17 +13,13 @@ import kin
 from app.exercises.contract import Asked, Kind, typed
 from app.exercises.fields import Fields
 from app.exercises.judging import Verdict
-from app.exercises.rows import FACTORS, Accepted, Line, Row, angle_between, turns
-from app.exercises.typed import EntryError, read_number
+from app.exercises.rows import ANGULAR, FACTORS, NAMES, Accepted, Line, Row, angle_between, read_rows
 from app.exercises.variant import Variant
-from kin import InputError, Robot
+from kin import Robot
 from kin.robot import CONVENTIONS, Convention
 from kin.transforms import Array
-from kin.typed import LONGEST
 from kin.units import DEGREES, Units
 
-NAMES = ("θ", "d", "a", "α")
-ANGULAR = tuple(map(turns, FACTORS))
 ACCEPTED = Accepted(math.radians(1.0), 2e-3)
 _WORDS: dict[Convention, str] = {"standard": "the standard convention", "modified": "Craig’s convention"}
 
@@ -74,7 +70,7 @@ class DHKind(Kind):
 
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
         arm, count = self._arm(variant), self.last - self.first + 1
-        rows = _read(given, count, self.first, units)
+        rows = read_rows(given, count, self.first, units)
         wrong = self._faults(arm, variant.q, rows)
         if not any(wrong):
             return Verdict(True, self._praise(variant, arm, rows))
@@ -155,23 +151,6 @@ class DHKind(Kind):
             for i, row in enumerate(rows)
         ]
         return f"{'; '.join(said)}."
-
-
-def _read(given: object, count: int, first: int, units: Units) -> list[Row]:
-    if not isinstance(given, list | tuple) or len(given) != count:
-        raise InputError("answer", given, f"{count} rows of the texts θ, d, a, α")
-    rows: list[Row] = []
-    for i, row in enumerate(given):
-        if not isinstance(row, list | tuple) or len(row) != 4 or not all(isinstance(x, str) for x in row):
-            raise InputError(f"answer[{i}]", row, "four texts θ, d, a, α")
-        values = []
-        for text, name, angular in zip(row, NAMES, ANGULAR, strict=True):
-            try:
-                values.append(read_number(text[: LONGEST + 1], units.of(angular)))
-            except EntryError as error:
-                raise EntryError(f"{name} of row {first + i + 1} was not read", error.detail) from None
-        rows.append(Row(*values))
-    return rows
 
 
 def _rows_at(arm: Robot, q: Array) -> list[Row]:

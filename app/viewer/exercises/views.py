@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from app.exercises import Asked, Exercise, Exercises, Variant
 from app.viewer.activity.activity import Activity
 from app.viewer.activity.practice import Mark, Practice, Record
@@ -55,9 +57,10 @@ def task_html(exercise: Exercise, variant: Variant, units: Units, at_home: bool,
 def question_html(asked: Asked, sheet: Sheet, closed: bool) -> str:
     """The fields, options or buttons of the answer."""
     columns = len(asked.labels)
+    begun: Sequence[Sequence[str]] = sheet.cells or asked.cells
     rows = [
         [cells[j] if j < len(cells) else "" for j in range(columns)]
-        for cells in (sheet.cells[i] if i < len(sheet.cells) else [] for i in range(asked.rows))
+        for cells in (begun[i] if i < len(begun) else () for i in range(asked.rows))
     ]
     text = sheet.cells[0][0] if sheet.cells and sheet.cells[0] else asked.start
     places = {option: place for place, option in enumerate(sheet.picked, 1)}

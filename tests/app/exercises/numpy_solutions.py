@@ -228,6 +228,29 @@ def stanford_craig(v: Numbers, labels: list[str]) -> object:
     return [[*deg(v["t1"]), *mm(v["h"], 0.0), "0"], [*deg(v["t2"]), *mm(v["s"], 0.0), "-90"]]
 
 
+def own_rows(robot: str) -> object:
+    """The table of the arm's file as it is typed."""
+    return [[*deg(row["theta"]), *mm(row["d"]), *mm(row["a"]), *deg(row["alpha"])] for row in rows_of(robot)[0]]
+
+
+@solves("mistake-scara")
+def mistake_scara(v: Numbers, labels: list[str]) -> object:
+    # All of the height in row 2: axes 1 and 2 are parallel.
+    rows: Any = own_rows("scara")
+    rows[0][1], rows[1][1] = "0", rows[0][1]
+    return rows
+
+
+@solves("mistake-puma")
+def mistake_puma(v: Numbers, labels: list[str]) -> object:
+    return own_rows("puma560")
+
+
+@solves("mistake-zeros")
+def mistake_zeros(v: Numbers, labels: list[str]) -> object:
+    return own_rows("irb120")
+
+
 @solves("other-way-round")
 def other_way_round(v: Numbers, labels: list[str]) -> object:
     T = slide("x", v["px"]) @ slide("y", v["py"]) @ turn("z", v["t"])

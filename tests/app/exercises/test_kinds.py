@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 import kin
 from app.exercises import Exercise, Variant, Verdict, parse_exercise
 from app.exercises.exercise import VariantError
+from app.exercises.fields import ExerciseFileError
 from app.exercises.judging import judge
 from app.exercises.kinds import KINDS
 from app.exercises.questions import Number, count
@@ -370,6 +372,125 @@ def test_orders_with_the_same_product_are_right() -> None:
     for given_ in ([a, b, c], [a, a, b, c], "abcd", [a, b, c, 9]):
         with pytest.raises(InputError):
             judged(ORDER, given_)
+
+
+# Mistakes in a table
+
+
+def mistaken(robot: str, *mistakes: str) -> Exercise:
+    return made(robot, "mistake", f"[answer]\nmistakes = {list(mistakes)}")[0]
+
+
+def shown_rows(exercise: Exercise, variant: Variant, units: Units = UNITS) -> list[list[str]]:
+    return [list(row) for row in exercise.asked(variant, units).cells]
+
+
+@pytest.mark.parametrize("units", [UNITS, RADIANS])
+def test_a_mistake_is_drawn_that_changes_the_poses(units: Units) -> None:
+    exercise = mistaken("puma560", "sign", "exchanged", "twist")
+    drawn = set()
+    for seed in range(20):
+        variant = exercise.variant(seed)
+        rows = shown_rows(exercise, variant, units)
+        drawn.add(str(rows))
+        values = np.array(rows, float) * np.where(
+            [True, False, False, True], 1.0 / units.angles.scale, 1.0 / units.lengths.scale
+        )
+        poses = [
+            kin.fk(_with_values(variant.robot, table), variant.q) for table in (values, _values(variant.robot))
+        ]
+        assert np.abs(poses[0] - poses[1]).max() > 1e-3, rows
+        verdict = exercise.judge(variant, rows, units)
+        assert not verdict.right
+        assert verdict.reason.startswith("This is still the table with its mistake.")
+    assert len(drawn) > 8
+    exercise.verify()
+
+
+def _values(robot: kin.Robot) -> np.ndarray:
+    return np.array([[row.theta, row.d, row.a, row.alpha] for row in robot.rows])
+
+
+def _with_values(robot: kin.Robot, values: np.ndarray) -> kin.Robot:
+    rows = [
+        replace(row, theta=theta, d=d, a=a, alpha=alpha)
+        for row, (theta, d, a, alpha) in zip(robot.rows, values.tolist(), strict=True)
+    ]
+    return replace(robot, rows=tuple(rows), capsules=(), capsules_source="")
+
+
+def test_what_changes_nothing_is_never_drawn() -> None:
+    exercise = mistaken("planar2r", "sign")  # α, d and θ are 0: only a can have another sign
+    for seed in range(20):
+        variant = exercise.variant(seed)
+        rows = shown_rows(exercise, variant)
+        assert any(row[2].startswith("-") for row in rows), rows
+    with pytest.raises(VariantError, match="none of the mistakes offset changes the poses of the arm"):
+        mistaken("planar2r", "offset").verify()
+
+
+def test_the_comparison_says_what_is_wrong_with_the_table_as_it_is_now() -> None:
+    exercise = mistaken("scara", "decimal point")
+    variant = exercise.variant(0)
+    right: Any = exercise.kind.answer(variant)
+    rows = [list(row) for row in right]
+    rows[0][1], rows[1][1] = "0", rows[0][1]  # the height a row later
+    verdict = exercise.judge(variant, rows, UNITS)
+    assert verdict.right
+    assert "though some rows are not the arm’s own" in verdict.reason
+    assert "has its decimal point in the wrong place" in verdict.reason
+
+    rows = [list(row) for row in right]
+    rows[1][2] = "200"
+    verdict = exercise.judge(variant, rows, UNITS)
+    assert not verdict.right
+    assert verdict.reason.endswith("One change would make it the arm.")
+    rows[0][3] = "90"
+    verdict = exercise.judge(variant, rows, UNITS)
+    assert "at an angle of 0.0° in the arm and 90.0° in your table" in verdict.reason
+    assert verdict.reason.endswith("Two changes would make it the arm.")
+    rows = [list(row) for row in right]
+    rows[0][0] = "90"
+    verdict = exercise.judge(variant, rows, UNITS)
+    assert (
+        "The same arm: joint 1 counts from −90.0°. Equal joint values have to give equal poses." in verdict.reason
+    )
+    rows[0][0] = "0.01"  # as a student may round
+    assert exercise.judge(variant, rows, UNITS).right
+
+
+def test_the_table_to_correct_is_on_the_page_and_its_exact_numbers_are_kept() -> None:
+    exercise = mistaken("panda", "sign")  # 1.5707963…, shown as 90 or 1.5708
+    variant = exercise.variant(1)
+    for units in (UNITS, RADIANS):
+        rows, right = shown_rows(exercise, variant, units), shown_rows_of(variant.robot, units)
+        assert f'value="{rows[2][1]}"' in question_html(exercise.asked(variant, units), Sheet(), False)
+        changed = [(i, j) for i, row in enumerate(rows) for j, text in enumerate(row) if text != right[i][j]]
+        assert changed
+        for i, j in changed:
+            rows[i][j] = right[i][j]
+        verdict = exercise.judge(variant, rows, units)
+        assert verdict.right, verdict
+    for given_ in ([], [["1"] * 4], rows[:-1], [*rows, rows[0]], "table", [[1.0] * 4] * len(rows)):
+        with pytest.raises(InputError):
+            exercise.judge(variant, given_, UNITS)
+    rows[3][2] = "a"
+    with pytest.raises(EntryError, match="a of row 4 was not read"):
+        exercise.judge(variant, rows, UNITS)
+
+
+def shown_rows_of(robot: kin.Robot, units: Units) -> list[list[str]]:
+    scales = [units.angles.scale, units.lengths.scale, units.lengths.scale, units.angles.scale]
+    return [
+        [f"{x * scale + 0.0:.6g}" for x, scale in zip(row, scales, strict=True)] for row in _values(robot).tolist()
+    ]
+
+
+def test_mistakes_of_a_file_are_checked() -> None:
+    with pytest.raises(ExerciseFileError, match=r"answer\.mistakes\[1\]: got .kind., expected one of .sign."):
+        mistaken("puma560", "sign", "kind")
+    with pytest.raises(ExerciseFileError, match="a list of 1 to 40 items"):
+        mistaken("puma560")
 
 
 # Terms and programs

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import lru_cache
+from typing import cast
 
 import numpy as np
 
-from app.exercises.rows import turns
+from app.exercises.rows import Factor, turns
 from app.viewer.lessons.dh.steps import MOVED, ORDERS, amount, axis_name, expression, low, symbol, value
 from app.viewer.lessons.guide.outline import (
     Choice,
@@ -21,14 +24,16 @@ from app.viewer.lessons.guide.outline import (
     two_percent,
 )
 from app.viewer.lessons.guide.poses import as_configuration, distance, moved
-from kin import Robot, fk, link_frames
+from kin import Comparison, Robot, compare, fk, link_frames
 from kin.axes import joint_axes, pairs
+from kin.comparison import messages
 from kin.transforms import Array
 from kin.units import Units
 
 GOAL = "You can read each row of a DH table as four motions, and say from its numbers where the next frame is."
 TURN = math.radians(30.0)
 SLIDE = 0.05
+_SKEW = 0.01  # sine of a twist that turns the next axis
 MOTIONS = {
     "theta": "turn by θ about z",
     "d": "slide by d along z",
@@ -85,6 +90,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             start=home,
             end=as_configuration(q),
         ),
+        *_mistyped(robot, units),
     )
     return Outline(GOAL, steps, _check(robot, units))
 
@@ -211,6 +217,70 @@ def _swing(robot: Robot, q: Array, units: Units) -> Number:
         mistakes,
     )
     return apart(question)
+
+
+@lru_cache(maxsize=64)
+def mistyped(robot: Robot) -> tuple[int, Factor, Robot, Comparison] | None:
+    """A row, the number of it that gets the wrong sign, the arm of that table, and what a comparison finds.
+
+    The sign of α that turns an axis, or else of the first length; None if the table has neither.
+    """
+    twists = [(row, "alpha") for row, joint in enumerate(robot.rows) if abs(math.sin(joint.alpha)) > _SKEW]
+    lengths = [
+        (row, factor) for factor in ("a", "d") for row, each in enumerate(robot.rows) if getattr(each, factor)
+    ]
+    for row, factor in [*twists[1:], *twists[:1], *lengths]:
+        rows = list(robot.rows)
+        rows[row] = replace(rows[row], **{factor: -getattr(rows[row], factor)})
+        typed = replace(robot, rows=tuple(rows), capsules=(), capsules_source="")
+        return row, cast(Factor, factor), typed, compare(robot, typed, explain=False)
+    return None
+
+
+def _mistyped(robot: Robot, units: Units) -> tuple[Step, ...]:
+    found = mistyped(robot)
+    if found is None:
+        return ()
+    row, factor, typed, comparison = found
+    name, right = symbol(robot, row, factor), float(getattr(robot.rows[row], factor))
+    was = amount(factor, -right, units)
+    verdict = messages.verdict(comparison, robot, typed, units, ("this arm", "the typed table"))
+    options = (
+        Option(
+            "Nothing: equal joint values still give equal poses.",
+            verdict if comparison.verdict == "identical" else "Some poses differ: try it with all joints bent.",
+            comparison.verdict == "identical",
+        ),
+        Option(
+            "It is the same arm, but it has another zero or sense of a joint, another base or another tool.",
+            {
+                "same": verdict,
+                "identical": "Neither a joint nor base or tool has changed.",
+            }.get(
+                comparison.verdict,
+                "Zeros, base and tool never change how an axis lies relative to those before it. Here one does.",
+            ),
+            comparison.verdict == "same",
+        ),
+        Option(
+            "It is another arm: no zeros, base and tool make up for it.",
+            verdict
+            if comparison.verdict == "different"
+            else "Each axis still lies as it did relative to its neighbours.",
+            comparison.verdict == "different",
+        ),
+    )
+    prompt = (
+        f"Somebody types {name} = {was} in row {row + 1}, with the wrong sign. What does the table then describe?"
+    )
+    step = Step(
+        "A mistake in the table",
+        "A wrong number need not make another arm. What counts is how each axis lies relative to those before it.",
+        Choice(prompt, options),
+        "So two tables that look different may be one arm, and nearly equal ones may not be.",
+        practice="Compare with…, in the tab Robot, finds such mistakes in a table of your own.",
+    )
+    return (step,)
 
 
 def _check(robot: Robot, units: Units) -> tuple[Number | Choice, ...]:

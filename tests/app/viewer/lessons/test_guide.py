@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -277,6 +278,29 @@ def test_dh_numbers(robot: Robot) -> None:
     # The last joint: the tool point moves exactly if the Jacobian says so.
     moves = np.linalg.norm(kin.jacobian(robot, robot.q_home)[:3, -1]) > 1e-9
     assert chosen["c4"] == ["Yes" if moves else "No"]
+
+
+def test_dh_mistake(robot: Robot) -> None:
+    """What the table with a wrong sign describes, by poses of that table."""
+    step = dh.outline(robot, DEGREES).steps[5]
+    assert isinstance(step.question, Choice)
+    row = int(step.question.prompt.split("in row ")[1].split(",")[0]) - 1
+    factor = {"α": "alpha", "a": "a"}[step.question.prompt.split()[2][0]]
+    rows = list(robot.rows)
+    rows[row] = replace(rows[row], **{factor: -getattr(rows[row], factor)})
+    typed = replace(robot, rows=tuple(rows))
+    q = robot.random_q(np.random.default_rng(1), 50)
+    chosen = [option.text.split()[0] for option in step.question.options if option.right]
+    equal = np.allclose(kin.fk(robot, q), kin.fk(typed, q), atol=1e-9)
+    assert (chosen == ["Nothing:"]) == equal
+    if robot.id == "puma560":
+        assert chosen == ["It"]
+        assert "another arm" in next(o.text for o in step.question.options if o.right)
+        return
+    mapping = kin.compare(robot, typed, explain=False).mapping
+    assert mapping is not None
+    assert np.allclose(mapping.base @ kin.fk(typed, mapping.to_b(q)) @ mapping.tool, kin.fk(robot, q), atol=1e-6)
+    assert "the same arm" in next(o.text for o in step.question.options if o.right)
 
 
 def test_dh_offsets(robot: Robot) -> None:

@@ -20,6 +20,7 @@ from kin.units import Units
 
 DECIMALS = 4  # of a degree or a millimetre
 MOST_DIFFERENCES = 4
+_NAMES = ("the other arm", "this arm")
 _COLOURS = {"identical": "kb-green", "same": "kb-green", "close": "kb-amber", "different": "kb-vermilion"}
 _SYMBOLS = {"identical": "✓", "same": "✓", "close": "≈", "different": "✕"}
 
@@ -51,9 +52,9 @@ def answer(
     listed = found.differences[1 : 1 + MOST_DIFFERENCES]
     return render(
         "robot/compared", **facts, found=found, colour=_COLOURS[found.verdict], symbol=_SYMBOLS[found.verdict],
-        words=messages.verdict(found, a, shown, units),
+        words=messages.verdict(found, a, shown, units, _NAMES),
         within=_proof(found.position, found.rotation, units) if found.is_same else "",
-        differences=[messages.difference(each, a, shown, units) for each in listed],
+        differences=[messages.difference(each, a, shown, units, _NAMES) for each in listed],
         more=max(0, len(found.differences) - 1 - MOST_DIFFERENCES),
         rows=_rows(found.mapping, a, units) if mapped and found.mapping is not None else (),
         frames=_frames(found.mapping, units) if mapped and found.mapping is not None else (),
@@ -66,7 +67,9 @@ def answer(
 def joint(found: Comparison, index: int, other: Robot, shown: Robot, units: Units) -> str:
     """What is marked in the scene."""
     differing = [
-        messages.difference(each, other, shown, units) for each in found.differences if index in each.joints
+        messages.difference(each, other, shown, units, _NAMES)
+        for each in found.differences
+        if index in each.joints
     ]
     first = found.first is not None and index == max(found.first.joints, default=min(other.n, shown.n))
     names = [robot.joints[index].name for robot in (shown, other) if index < robot.n]

@@ -86,7 +86,10 @@ def test_a_mistake_is_named_and_one_click_mends_it_in_one_step(port: int) -> Non
         type_in(tab, 1, "a", "-400")
         say(tab, "other", value="ur5")
         words = compared(tab)
-        assert "the axes of joints 2 and 3 are at a distance of 425.0 mm in a and 400.0 mm in b" in words
+        assert (
+            "the axes of joints 2 and 3 are at a distance of 425.0 mm in the other arm and 400.0 mm in this arm"
+            in words
+        )
         assert "a of row 2 is wrong (−425 mm, not −400 mm)" in words
         assert len(ghosts(tab)) == 1
         assert tab.value("Joint of both arms") == 3  # the first axis that lies otherwise
@@ -126,7 +129,7 @@ def test_a_pasted_table_is_compared_and_kept_in_the_link(port: int) -> None:
     assert kin.compare(again.robot, PANDA).verdict == "identical"
     with FakeBrowser(port, memory=json.dumps({"state": link})) as tab:
         assert "Identical" in compared(tab)
-        assert "a is the typed table" in part(tab, "compared")
+        assert "The other arm is the typed table" in part(tab, "compared")
 
 
 def test_frames_that_may_differ_are_a_choice(port: int) -> None:
@@ -156,7 +159,7 @@ def test_the_joint_slider_walks_along_both_arms(port: int) -> None:
     with FakeBrowser(port) as tab:
         open_arm(tab, "panda")
         say(tab, "other", value="ur5")
-        assert "a has 6 joints and b has 7" in compared(tab)
+        assert "the other arm has 6 joints and this arm has 7" in compared(tab)
         tab.wait(lambda: tab.value("Joint of both arms") == 7)
         assert "only one of the arms has it" in part(tab, "compared-joint")
         tab.set("Joint of both arms", 2)
