@@ -82,6 +82,10 @@ class DeclaredFeature(Feature, Generic[S, F]):
         """The facts of the present settings and arm."""
         return cast(F, self.facts_of(self.settings, self.stage.now))
 
+    def besides(self) -> tuple[object, ...]:
+        """What `look` depends on beside settings and arm, such as the last answer of long work."""
+        return ()
+
     def panel(self) -> Sequence[PanelNode]:
         """What the panel shows."""
         return ()
@@ -134,11 +138,21 @@ class DeclaredFeature(Feature, Generic[S, F]):
             stage.show_legend(words)
 
     def look_again(self) -> None:
-        """Make `facts` anew if settings or arm have changed."""
+        """Make `facts` anew if settings, arm, or what is `besides` have changed."""
         arm = self.stage.now
         target = None if arm.target is None else arm.target.tobytes()
         places = (arm.q.tobytes(), arm.goal.tobytes(), target)
-        seen = (self.settings, *places, arm.robot, arm.task, arm.branch, arm.locks, arm.obstacles, arm.avoid)
+        seen: tuple[object, ...] = (
+            self.settings,
+            *places,
+            arm.robot,
+            arm.task,
+            arm.branch,
+            arm.locks,
+            arm.obstacles,
+            arm.avoid,
+        )
+        seen += self.besides()
         if seen != self._seen:
             self._seen, self.facts = seen, self.look()
 
@@ -182,7 +196,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
     def on_pose(self, T_base_tool: Array) -> None:
         self.look_again()
         self._scene.show(self.scene())
-        self.due = max(0.0, self.pace - (time.perf_counter() - self.shown_at))
+        self.wake(max(0.0, self.pace - (time.perf_counter() - self.shown_at)))
 
     def on_style(self) -> None:
         self.refresh()

@@ -157,9 +157,10 @@ class Number(Spec):
     """A number within limits (radians, metres, or as it is) in a field or a slider; `clip`: limits cut it.
 
     Controls show its unit if it has a `measure`, otherwise `scale` of it, with `digits`; a step of the control is
-    one of the last digit.
+    `step`, or one of the last digit.
 
     Attributes:
+        coarse: the step is one of this digit instead.
         slider: the ends of the slider, if it is not a field.
         within: the limits for a robot, and the ends of its slider, if they are not the same for all.
         marks: whether the slider shows its ends.
@@ -171,6 +172,7 @@ class Number(Spec):
     digits: int = 1
     scale: float = 1.0
     step: float | None = None
+    coarse: int | None = None
     slider: tuple[float, float] | None = None
     clip: bool = False
     whole: bool = False
@@ -203,7 +205,8 @@ class Number(Spec):
         low, high = self._ends(own.slider or own.limits, units)
         step = self.step
         if step is None:
-            step = 1 if self.whole else self._unit(units).step(self.digits)
+            digits = self.digits if self.coarse is None else self.coarse
+            step = 1 if self.whole else self._unit(units).step(digits)
         return {"min": low, "max": high, "step": step, **({"unit": unit.name} if unit and self.named else {})}
 
     def fixed(self, robot: Robot, units: Units) -> dict[str, Any]:
@@ -312,6 +315,13 @@ def _is_number(value: object) -> TypeGuard[float]:
     return not isinstance(value, bool) and isinstance(value, int | float) and abs(value) <= sys.float_info.max
 
 
+def numbers(name: str, entry: object, count: int) -> tuple[float, ...]:
+    """An entry of a link that is a list of so many finite numbers; raises `InputError`."""
+    if not isinstance(entry, list) or len(entry) != count or not all(map(_is_number, entry)):
+        raise InputError(name, entry, f"{count} finite numbers")
+    return tuple(float(item) for item in entry)
+
+
 def _field(spec: Spec) -> Any:
     default = None if callable(spec.default) else spec.default
     return field(default=default, metadata={"spec": spec})
@@ -390,13 +400,13 @@ class Settings:
             return replace(spec.each, label=label, names=label.partition(",")[0], undo=spec.undo)
         return spec
 
-    def at(self, path: str) -> Any:
+    def value_at(self, path: str) -> Any:
         """The value at a path."""
         name, _, rest = path.partition(".")
         value = getattr(self, name)
         if not rest:
             return value
-        return value.at(rest) if isinstance(value, Settings) else value[int(rest)]
+        return value.value_at(rest) if isinstance(value, Settings) else value[int(rest)]
 
     def with_value(self, path: str, value: object) -> Self:
         """These settings with another value at a path."""

@@ -177,7 +177,8 @@ class PanelView:
         for order, node in enumerate(nodes, 1):
             kind = type(node)
             number = numbers[kind] = numbers.get(kind, 0) + 1
-            key: Hashable = node.key or (node.path if isinstance(node, Control) else (kind, number))
+            name = node.path if isinstance(node, Control) else number
+            key: Hashable = (kind, node.key or name)
             gone.discard(key)
             identity = self._identity(node)
             one = mounted.get(key)
@@ -207,7 +208,7 @@ class PanelView:
         return node.spec or self._settings.spec(node.path)
 
     def _value(self, node: Control) -> Any:
-        return self._settings.at(node.path) if node.value is None else node.value
+        return self._settings.value_at(node.path) if node.value is None else node.value
 
     def _identity(self, node: Node) -> Hashable:
         """A control of another identity is made anew."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import viser
 
-from app.viewer.lessons.figures import AMBER, BLUE, GREEN, Figure
-from app.viewer.scene.meshes import body
+from app.viewer.declared.scene import Node, axes, bars
+from app.viewer.lessons.figure_nodes import FigureNodes
+from app.viewer.lessons.figures import AMBER, BLUE, GREEN
+from app.viewer.lessons.numeric.facts import Iterated
 from app.viewer.skeleton import cylinder, places, skeleton
 from kin import Robot, fk
-from kin.transforms import Array, wxyz_from_rotation
+from kin.transforms import Array
 
 COPIES = 10  # ghosts at most, with the first and the last iterate among them
 POINTS = 128  # of the way of the tool
@@ -18,76 +19,54 @@ OPACITY = 0.45
 FIRST, LAST = np.array([105.0, 115.0, 130.0]), np.array([213.0, 94.0, 0.0])
 
 
-class Drawing:
-    """The iterates of one arm, below the node `root`; the visitor's worker calls it."""
+def scene(iterated: Iterated, at: int, figure: FigureNodes) -> list[Node]:
+    """The iterates up to one of them, and the target."""
+    robot, T, q = iterated.problem.robot, iterated.problem.T, iterated.run.q[: at + 1]
+    tools, size = fk(robot, q)[:, :3, 3], figure.size
+    with figure:
+        points = [*figure.point("aim", T[:3, 3], "target", GREEN), *figure.point("start", tools[0], "start", BLUE)]
+        if np.linalg.norm(tools[-1] - T[:3, 3]) > 4.0 * size and at:
+            points += figure.point("here", tools[-1], str(at), AMBER)
+    # Always as many, so that no node is made anew; those beyond the iterates have no length.
+    way = np.repeat(tools[-1][None, None], 2, axis=1).repeat(POINTS, axis=0)
+    recent = tools[-POINTS - 1 :]
+    way[: len(recent) - 1] = np.stack([recent[:-1], recent[1:]], axis=1)
+    return [
+        *points,
+        axes("axes", T, 5.0 * size, 0.25 * size),
+        bars("way", way, AMBER, 0.3 * size),
+        _ghosts(robot, q[chosen(len(q))]),
+    ]
 
-    def __init__(self, scene: viser.SceneApi, robot: Robot, root: str) -> None:
-        self._robot = robot
-        self._top = scene.add_frame(root, show_axes=False)
-        self._figure = Figure(scene, f"{root}/figure", body(robot).size)
-        self._marks = (
-            self._figure.point("start", BLUE),
-            self._figure.point("", AMBER),
-            self._figure.point("target", GREEN),
-        )
-        self._size = size = body(robot).size
-        self._aim = scene.add_frame(f"{root}/aim", axes_length=5.0 * size, axes_radius=0.25 * size)
-        self._way = scene.add_line_segments(
-            f"{root}/way", np.zeros((POINTS, 2, 3), np.float32), (230, 159, 0), thickness=0.3 * size
-        )
-        vertices, faces = cylinder()
-        self._scales = skeleton(robot).scales
-        count = COPIES * len(self._scales)
-        self._ghosts = scene.add_batched_meshes_simple(
-            f"{root}/ghosts",
-            vertices,
-            faces,
-            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-            batched_positions=np.zeros((count, 3)),
-            batched_scales=np.full((count, 3), 1e-6),
-            batched_colors=np.zeros((count, 3), np.uint8),
-            opacity=OPACITY,
-            lod="off",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
 
-    def show(self, T: Array, q: Array) -> None:
-        """Draw the target pose ``(4, 4)`` and the iterates ``(k, n)``."""
-        start, here, aim = self._marks
-        tools = fk(self._robot, q)[:, :3, 3]
-        aim.show(T[:3, 3])
-        self._aim.position, self._aim.wxyz = T[:3, 3], wxyz_from_rotation(T[:3, :3])
-        start.show(tools[0])
-        if np.linalg.norm(tools[-1] - T[:3, 3]) > 4.0 * self._size and len(q) > 1:
-            here.show(tools[-1], text=str(len(q) - 1))
-        else:
-            here.hide()
-        chords = np.repeat(tools[-1][None, None], 2, axis=1).repeat(POINTS, axis=0)
-        recent = tools[-POINTS - 1 :]
-        chords[: len(recent) - 1] = np.stack([recent[:-1], recent[1:]], axis=1)
-        self._way.points = chords.astype(np.float32)
-        self._show_ghosts(q[chosen(len(q))])
-
-    def _show_ghosts(self, q: Array) -> None:
-        pieces = len(self._scales)
-        positions, wxyz, _ = places(self._robot, q)
-        shape = (COPIES, pieces, 3)
-        everywhere, turned = np.zeros(shape), np.tile([1.0, 0.0, 0.0, 0.0], (COPIES, pieces, 1))
-        scales, colours = np.full(shape, 1e-6), np.zeros(shape)
-        k = len(q)
-        everywhere[:k], turned[:k], scales[:k] = positions, wxyz, self._scales
-        share = np.linspace(0.0, 1.0, k)[:, None, None] if k > 1 else np.ones((1, 1, 1))
-        colours[:k] = FIRST + share * (LAST - FIRST)
-        self._ghosts.batched_positions = everywhere.reshape(-1, 3).astype(np.float32)
-        self._ghosts.batched_wxyzs = turned.reshape(-1, 4).astype(np.float32)
-        self._ghosts.batched_scales = scales.reshape(-1, 3).astype(np.float32)
-        self._ghosts.batched_colors = colours.reshape(-1, 3).astype(np.uint8)
-
-    def remove(self) -> None:
-        """Remove everything from the scene."""
-        self._figure.remove()
-        self._top.remove()
+def _ghosts(robot: Robot, q: Array) -> Node:
+    """Copies of the arm at configurations ``(k, n)``."""
+    vertices, faces = cylinder()
+    sizes = skeleton(robot).scales
+    positions, wxyz, _ = places(robot, q)
+    shape = (COPIES, len(sizes), 3)
+    everywhere, turned = np.zeros(shape), np.tile([1.0, 0.0, 0.0, 0.0], (COPIES, len(sizes), 1))
+    scales, colours = np.full(shape, 1e-6), np.zeros(shape)
+    k = len(q)
+    everywhere[:k], turned[:k], scales[:k] = positions, wxyz, sizes
+    share = np.linspace(0.0, 1.0, k)[:, None, None] if k > 1 else np.ones((1, 1, 1))
+    colours[:k] = FIRST + share * (LAST - FIRST)
+    return Node(
+        "batched_meshes_simple",
+        "ghosts",
+        {
+            "vertices": vertices,
+            "faces": faces,
+            "batched_positions": everywhere.reshape(-1, 3).astype(np.float32),
+            "batched_wxyzs": turned.reshape(-1, 4).astype(np.float32),
+            "batched_scales": scales.reshape(-1, 3).astype(np.float32),
+            "batched_colors": colours.reshape(-1, 3).astype(np.uint8),
+            "opacity": OPACITY,
+            "lod": "off",
+            "cast_shadow": False,
+            "receive_shadow": False,
+        },
+    )
 
 
 def chosen(count: int) -> list[int]:

@@ -9,6 +9,7 @@ at random configurations, and in other units. Numbers may differ by `TOLERANCE`.
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -17,9 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from arms import CLASSICS
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
+from arms import CLASSICS
 from bare_page import bare_page
 
 from kin.units import DEFAULT_UNITS, Units
@@ -50,10 +52,15 @@ STATES: dict[str, list[dict[str, object]]] = {
         },
         {"chained": True, "own": False, "motion": "Turn about y"},
     ],
+    # All entries, as in every link: those that are missing or invalid stay as they are now.
     "numeric": [
-        {"method": "transpose", "damping": 0.2, "gain": 0.5, "longest": 0.3, "limits": True, "match": "point"},
-        {"method": "damped", "compare": True, "at": 2, "picture": True},
-        {"method": "guess", "damping": 99, "gain": "1", "longest": -1, "match": 3, "target": [1], "start": [1]},
+        {"method": "transpose", "damping": 0.2, "gain": 0.5, "longest": 0.3, "limits": True, "match": "point",
+         "start": None, "at": None, "compare": False, "picture": False},
+        {"method": "damped", "compare": True, "at": 2, "picture": True, "start": None},
+        {"method": "guess", "damping": 99, "gain": "1", "longest": -1, "match": 3, "target": [1], "start": None,
+         "at": None, "compare": False, "picture": False},
+        {"method": "newton", "limits": False, "longest": math.pi, "match": "pose", "start": None, "at": None,
+         "compare": True, "picture": False},
     ],
     "postures": [
         {"ghosts": False, "cone": True, "hidden": []},
@@ -68,7 +75,7 @@ STATES: dict[str, list[dict[str, object]]] = {
     ],
     "equations": [{"equation": "3.14"}, {"equation": 7}],
     "trajectories": [{"paths": True}, {"paths": 5}],
-}
+}  # fmt: skip
 
 
 def record(key: str) -> dict[str, Any]:

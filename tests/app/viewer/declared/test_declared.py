@@ -88,7 +88,7 @@ def test_links_give_back_the_settings_and_ignore_what_they_do_not_know(settings_
             for name, spec in settings_of.specs():
                 found = fresh.restored({name: junk}, robot)
                 if spec.link and not isinstance(spec, Part | Kept) and found != fresh:
-                    assert spec.unpack(name, junk, robot) == found.at(name)
+                    assert spec.unpack(name, junk, robot) == found.value_at(name)
                 assert json.loads(json.dumps(found.state(), allow_nan=False)) == found.state()
 
 
@@ -100,7 +100,7 @@ def test_controls_read_what_they_show_and_refuse_the_rest(settings_of: type[Sett
             for units in UNITS:
                 if not spec.kind:
                     continue
-                values = list(spec.offered(robot).values()) if isinstance(spec, Choice) else [fresh.at(path)]
+                values = list(spec.offered(robot).values()) if isinstance(spec, Choice) else [fresh.value_at(path)]
                 for value in values:
                     read = spec.read(path, spec.shown(value, robot, units), robot, units)
                     assert read == (pytest.approx(value, abs=1e-3) if isinstance(spec, Number) else value)
