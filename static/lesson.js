@@ -17,17 +17,12 @@
   function press(button) {
     if (button.ariaDisabled === "true") return;
     const { guideDo: kind, questionKey: key, argument } = button.dataset;
-    if (kind === "type") typed(document.querySelector(`input[data-guide-field="${key}"]`));
-    else if (kind === "check") check(button);
+    if (kind === "check") check(button);
     else if (kind === "fields") send(button, kind, cells(button.closest("fieldset")), ...(key === undefined ? [] : [key]));
     else send(button, kind, argument === undefined ? null : Number(argument), ...(key === undefined ? [] : [key]));
   }
   // The typed cells of an exercise, row by row.
   const cells = (block) => [...block.querySelectorAll("[data-row]")].map((row) => [...row.querySelectorAll("[data-cell]")].map((cell) => cell.value));
-  function typed(input) {
-    if (input.closest("[data-feature]")) check(input);
-    else if (!input.readOnly) send(input, "type", input.value, input.dataset.guideField);
-  }
   // All fields of a block together.
   function check(node) {
     const fields = node.closest("[data-feature]").querySelectorAll("input[data-guide-field]");
@@ -57,7 +52,7 @@
     if (event.key !== "Enter" || !event.target.matches?.("[data-guide-field], input[data-cell]")) return;
     event.preventDefault();
     event.stopImmediatePropagation();
-    if (event.target.dataset.cell === undefined) typed(event.target);
+    if (event.target.dataset.cell === undefined) check(event.target);
     else event.target.closest("fieldset").querySelector("[data-guide-do=fields]")?.click();
   }, true);
 

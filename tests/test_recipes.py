@@ -55,8 +55,8 @@ def _ply("""
 KIND = """
 from dataclasses import dataclass
 
-from app.exercises.contract import Asked, Kind, index
-from app.exercises.judging import Verdict
+from app.exercises.contract import Kind
+from app.exercises.questions import Asked, Verdict, index
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,11 @@ one of the `kinds`. What is asked holds nothing from which the answer could be r
 the verdict is, and leaves only in `Exercise.solution`.
 """
 
-from app.exercises.contract import Asked, Kind
+from app.exercises.contract import Kind
 from app.exercises.exercise import TOPICS, Exercise, VariantError
 from app.exercises.fields import ExerciseFileError
 from app.exercises.files import Exercises, builtin_exercises, load_exercise, load_folder, parse_exercise
-from app.exercises.judging import Verdict
+from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 
 __all__ = [

@@ -1,58 +1,27 @@
 """What a kind of exercise provides: it reads its fields, says what is asked, and judges an answer.
 
-Answers are plain data, as they come from a page or a program: see `Form`. An `Asked` holds nothing from which the
-answer could be read, so it may be sent to the browser.
+Answers are plain data, as they come from a page or a program: see `Asked`.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from app.exercises.fields import Fields
-from app.exercises.judging import Verdict
+from app.exercises.questions import Asked, Question, Verdict
 from app.exercises.variant import Variant
-from kin import InputError
+from kin import InputError, KinematicsError
 from kin.transforms import Array
-from kin.typed import LONGEST
-from kin.units import Unit, Units
+from kin.units import ANGLES, LENGTH_UNITS, Unit, Units
 
-Form = Literal["fields", "options", "order", "posture", "postures", "frame", "table", "program"]
 LONGEST_PROGRAM = 4000  # characters
-
-
-@dataclass(frozen=True, eq=False)
-class Asked:
-    """What the student sees of a question.
-
-    Attributes:
-        form: how it is answered. ``fields``: one text per label. ``options``: the index of a label. ``order``: the
-            indices of the labels, in order. ``posture``: a configuration ``(n,)``. ``postures``: rows of texts,
-            one per label. ``frame``: a pose as x, y, z and a quaternion w, x, y, z. ``table``: rows of texts, one
-            per label. ``program``: a text, as `kin.parse_program` reads it.
-        labels: of fields, options or columns.
-        units: of the fields or columns.
-        note: the accepted error, and what else an answer needs.
-        rows: how many rows a table has.
-        first: the number of the first one.
-        start: a text or a pose to begin with.
-        cells: texts to begin with, of a table.
-        goal: a pose ``(4, 4)`` that is drawn.
-    """
-
-    form: Form
-    labels: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    note: str = ""
-    rows: int = 1
-    first: int = 1
-    start: str = ""
-    cells: tuple[tuple[str, ...], ...] = ()
-    goal: Array | None = None
 
 
 class Kind(ABC):
@@ -62,13 +31,14 @@ class Kind(ABC):
         name: as in files.
         about: one sentence for the documentation.
         shows_posture: whether the arm may stand at the exercise's configuration before the answer.
-        withholds: what no tab shows while the question is open, because it is the answer: "table", or nothing.
+        withholds: facts that nothing in the page shows while the question is open, because they are the answer:
+            see `app.viewer.activity.activity.Activity.withheld`.
     """
 
     name: ClassVar[str]
     about: ClassVar[str]
     shows_posture: ClassVar[bool] = False
-    withholds: ClassVar[str] = ""
+    withholds: ClassVar[frozenset[str]] = frozenset()
 
     @classmethod
     @abstractmethod
@@ -96,6 +66,10 @@ class Kind(ABC):
     def solution(self, variant: Variant, units: Units) -> str:
         """The right answer in words."""
 
+    def ask(self, prompt: str, variant: Variant, units: Units) -> Question:
+        """The question of a variant, in the reader's units; what is no answer raises `kin.InputError`."""
+        return Posed(prompt, self, variant, units)
+
     def verify(self, variant: Variant) -> None:
         """Raise `ValueError` if the question makes no sense for this variant. Its own answer must be right."""
         verdict = self.judge(variant, self.answer(variant), PLAIN_UNITS)
@@ -104,6 +78,64 @@ class Kind(ABC):
 
 
 PLAIN_UNITS = Units(degrees=True, length="mm")
+
+
+@dataclass(frozen=True, eq=False)
+class Posed(Question):
+    """A question of a kind for a variant, in these units. Kept texts name their units."""
+
+    prompt: str
+    kind: Kind
+    variant: Variant
+    units: Units
+
+    def asked(self) -> Asked:
+        return self.kind.asked(self.variant, self.units)
+
+    def read(self, given: object) -> object:
+        self.judge(given)  # raises for what is no answer
+        return _named(given, self.asked())
+
+    def is_answer(self, answer: object) -> bool:
+        try:
+            self.judge(answer)
+        except KinematicsError:
+            return False
+        return True
+
+    def judge(self, answer: Any) -> Verdict:
+        return self.kind.judge(self.variant, answer, self.units)
+
+    def right(self) -> object:
+        return _named(self.kind.answer(self.variant), self.kind.asked(self.variant, PLAIN_UNITS))
+
+    def solution(self) -> str:
+        return self.kind.solution(self.variant, self.units)
+
+    def cells(self, answer: Any) -> list[list[str]]:
+        form = self.asked().form
+        if form in ("table", "postures"):
+            return [list(row) for row in answer]
+        return [list(answer)] if form == "fields" else [[answer]] if form == "program" else []
+
+
+_BARE = re.compile(r"\s*[-+−]?[\d.,]+(?:e[-+−]?\d+)?\s*")
+
+
+def _named(answer: Any, asked: Asked) -> object:
+    """An answer whose numbers without a unit are given that of their column."""
+    match answer:
+        case [[*_], *_] if asked.form in ("table", "postures"):
+            return [_with_units(row, asked.units) for row in answer]
+        case [*cells] if asked.form == "fields":
+            return _with_units(cells, asked.units)
+    return answer
+
+
+def _with_units(cells: Sequence[str], units: Sequence[str]) -> list[str]:
+    pairs = zip(cells, units, strict=True)
+    known = {*ANGLES, *LENGTH_UNITS}
+    return [f"{text} {unit}" if unit in known and _BARE.fullmatch(text) else text for text, unit in pairs]
 
 
 def numbers(given: object, count: int, what: str) -> Array:
@@ -115,20 +147,6 @@ def numbers(given: object, count: int, what: str) -> Array:
     ):
         raise InputError("answer", given, f"{count} numbers: {what}")
     return np.array([float(value) for value in given])
-
-
-def texts(given: object, count: int, what: str) -> list[str]:
-    """Typed texts, cut to a sensible length."""
-    if not isinstance(given, list | tuple) or len(given) != count or not all(isinstance(x, str) for x in given):
-        raise InputError("answer", given, f"{count} texts: {what}")
-    return [text[: LONGEST + 1] for text in given]  # still too long to be valid
-
-
-def index(given: object, count: int) -> int:
-    """The index of an option."""
-    if type(given) is not int or not 0 <= given < count:
-        raise InputError("answer", given, f"the index of an option, 0 to {count - 1}")
-    return given
 
 
 def typed(value: float, unit: Unit) -> str:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 import kin
-from app.exercises.contract import Asked, Kind
+from app.exercises.contract import Kind
 from app.exercises.expressions import Expression, ExpressionError, Function
-from app.exercises.judging import Verdict
+from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Facts, Joined, Quantity, Variant
 from kin import Robot
 from kin.transforms import Array, from_position_wxyz

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 from app.exercises.expressions import VALID, Expression, ExpressionError
@@ -13,6 +14,7 @@ from kin.errors import KinematicsError, shorten
 LONGEST_TEXT = 2000  # characters
 MOST_ITEMS = 40
 _PLACE = re.compile(r"\{([^{}]*)\}")
+ALWAYS = Expression("1")
 
 
 class ExerciseFileError(KinematicsError):
@@ -22,6 +24,13 @@ class ExerciseFileError(KinematicsError):
         self.file, self.field, self.expected = file, field, expected
         self.value = shorten(value)
         super().__init__(f"{file}: {field}: got {self.value}, expected {expected}")
+
+
+@dataclass(frozen=True)
+class Words:
+    """A text, or alternatives of which the first whose condition holds is taken; the last one always holds."""
+
+    alternatives: tuple[tuple[Expression, str], ...]
 
 
 class Fields:
@@ -79,6 +88,23 @@ class Fields:
                 known = ", ".join(sorted(self.names)) or "none, because nothing is drawn"
                 raise self.refuse(field, f"{{{name}}}", f"a name from [vary] or [let]: {known}")
         return text
+
+    def words(self, field: str, default: str | None = None) -> Words:
+        """A text, or a list of ``{ when = "…", text = "…" }`` that ends with a text."""
+        value = self.get(field)
+        if not isinstance(value, list):
+            return Words(((ALWAYS, self.text(field, default)),))
+        if not value or len(value) > MOST_ITEMS or not isinstance(value[-1], str):
+            raise self.refuse(field, value, f"a list of at most {MOST_ITEMS} alternatives, the last one a text")
+        found = []
+        for i, item in enumerate(value):
+            one = type(self)(
+                self.file, {"text": item} if i == len(value) - 1 else item, f"{self.prefix}{field}[{i}].",
+                self.names, self.found,
+            )  # fmt: skip
+            found.append((one.expression("when", "1" if i == len(value) - 1 else None), one.text("text")))
+            one.done()
+        return Words(tuple(found))
 
     def texts(self, field: str, least: int = 0) -> tuple[str, ...]:
         """A list of texts."""

@@ -1,4 +1,8 @@
-"""Questions with options or with a number: their answers, known mistakes and tolerances.
+"""Questions that are asked now: of one arm and in the reader's units, with the judge of their answers.
+
+Lessons and exercises share them. `Number` and `Choice` are made of values, by a lesson; a kind of exercise makes
+a question of a file and a variant (`app.exercises.contract.Kind.ask`). Whoever shows a question needs only
+`Question`: what is asked, how an answer is read and judged, and what is right.
 
 Values are in radians, metres and SI units.
 """
@@ -6,10 +10,124 @@ Values are in radians, metres and SI units.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, Literal
 
-from kin.units import PLAIN, Unit
+from app.exercises.typed import read_number
+from kin import InputError
+from kin.transforms import Array
+from kin.typed import LONGEST
+from kin.units import DEGREES, PLAIN, RADIANS, Unit, general
+
+Form = Literal["fields", "options", "order", "posture", "postures", "frame", "table", "program"]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether an answer is right, and why: never only "wrong".
+
+    Attributes:
+        credit: the part of the answer that is right, 0 to 1.
+        parts: what was asked in parts: whether each is right, and why.
+        way: how to find the answer, if `reason` only says what is wrong with this one.
+    """
+
+    right: bool
+    reason: str
+    credit: float = 0.0
+    parts: tuple[tuple[bool, str], ...] = ()
+    way: str = ""
+
+    def __post_init__(self) -> None:
+        """What is right has full credit."""
+        if self.right:
+            object.__setattr__(self, "credit", 1.0)
+
+    @property
+    def full(self) -> str:
+        """The reason and the way."""
+        return " ".join(filter(None, (self.reason, self.way)))
+
+    @classmethod
+    def of(cls, parts: Sequence[tuple[bool, str]], right: str = "") -> Verdict:
+        """The verdict on an answer in parts: right if all are; the reason is that of the first wrong one."""
+        wrong = [reason for fine, reason in parts if not fine]
+        share = 1.0 - len(wrong) / len(parts)
+        return cls(not wrong, wrong[0] if wrong else right or parts[-1][1], share, tuple(parts))
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What the student sees of a question; nothing in it gives the answer away, so it may be sent to the browser.
+
+    Attributes:
+        form: how it is answered. ``fields``: one text per label. ``options``: the index of a label. ``order``: the
+            indices of the labels, in order. ``posture``: a configuration ``(n,)``. ``postures``: rows of texts,
+            one per label. ``frame``: a pose as x, y, z and a quaternion w, x, y, z. ``table``: rows of texts, one
+            per label. ``program``: a text, as `kin.parse_program` reads it.
+        labels: of fields, options or columns.
+        units: of the fields or columns.
+        note: the accepted error, and what else an answer needs.
+        rows: how many rows a table has.
+        first: the number of the first one.
+        start: a text or a pose to begin with.
+        cells: texts to begin with, of a table.
+        goal: a pose ``(4, 4)`` that is drawn.
+    """
+
+    form: Form
+    labels: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    note: str = ""
+    rows: int = 1
+    first: int = 1
+    start: str = ""
+    cells: tuple[tuple[str, ...], ...] = ()
+    goal: Array | None = None
+
+
+class Question(ABC):
+    """One question, of one arm and in the reader's units.
+
+    An answer is plain data that means the same in all units, so that links may keep it.
+    """
+
+    prompt: str
+
+    @abstractmethod
+    def asked(self) -> Asked:
+        """What is asked."""
+
+    @abstractmethod
+    def read(self, given: object) -> object:
+        """The answer that the page sends, in the form of `asked`, as it is kept.
+
+        Raises:
+            InputError: not an answer in the right form; it says what is valid.
+            EntryError: a typed number cannot be read.
+        """
+
+    @abstractmethod
+    def is_answer(self, answer: object) -> bool:
+        """Whether something, from a link for example, can be a kept answer at all."""
+
+    @abstractmethod
+    def judge(self, answer: Any) -> Verdict:
+        """Judge a kept answer."""
+
+    @abstractmethod
+    def right(self) -> object:
+        """A right answer, as it is kept."""
+
+    @abstractmethod
+    def solution(self) -> str:
+        """The right answer and its reason in words, as they are shown on request."""
+
+    @abstractmethod
+    def cells(self, answer: Any) -> list[list[str]]:
+        """A kept answer as the typed rows of the form; empty if it is not typed."""
 
 
 @dataclass(frozen=True)
@@ -22,8 +140,8 @@ class Option:
 
 
 @dataclass(frozen=True)
-class Choice:
-    """A question with answers to choose from; more than one may be right."""
+class Choice(Question):
+    """A question with answers to choose from; more than one may be right. An answer is the index of an option."""
 
     prompt: str
     options: tuple[Option, ...]
@@ -35,6 +153,29 @@ class Choice:
             raise ValueError(
                 f"{self.prompt}: two or more different options are needed, at least one of them right"
             )
+
+    def asked(self) -> Asked:
+        return Asked("options", tuple(option.text for option in self.options))
+
+    def read(self, given: object) -> int:
+        return index(given, len(self.options))
+
+    def is_answer(self, answer: object) -> bool:
+        return type(answer) is int and 0 <= answer < len(self.options)
+
+    def judge(self, answer: int) -> Verdict:
+        option = self.options[answer]
+        return Verdict(option.right, option.reason)
+
+    def right(self) -> int:
+        return next(i for i, option in enumerate(self.options) if option.right)
+
+    def solution(self) -> str:
+        rights = (option for option in self.options if option.right)
+        return " ".join(f"{option.text.rstrip('.')}. {option.reason}" for option in rights)
+
+    def cells(self, answer: int) -> list[list[str]]:
+        return []
 
 
 @dataclass(frozen=True)
@@ -54,14 +195,14 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Number:
-    """A question whose answer is typed.
+class Number(Question):
+    """A question whose answer is typed; it is kept as a value in radians, metres or SI units.
 
     Attributes:
         answer: the right value, in radians, metres or SI units.
         unit: of typed numbers, unless another unit follows them.
         tolerance: the largest accepted error, as `answer`.
-        method: how to find the answer; the reason given for a wrong one that is no known mistake.
+        method: how to find the answer, for who has given a wrong one that is no known mistake.
         mistakes: known wrong values.
         whole_turns: whether values that differ by whole turns are equal.
         ways: further right values.
@@ -79,6 +220,116 @@ class Number:
     ways: tuple[Way, ...] = ()
     named: str = ""
     ordered: bool = True
+
+    def asked(self) -> Asked:
+        return Asked("fields", ("",), (self.unit.name,), self.tolerance_text)
+
+    def read(self, given: object) -> float:
+        return self.read_text(texts(given, 1, "the number that is asked")[0])
+
+    def read_text(self, text: str) -> float:
+        """A typed answer in radians, metres or SI units; raises `EntryError` with what is valid."""
+        return read_number(text, self.unit)
+
+    def is_answer(self, answer: object) -> bool:
+        return type(answer) in (int, float) and math.isfinite(answer)  # type: ignore[arg-type]
+
+    def judge(self, answer: float) -> Verdict:
+        if self._near(answer, self.answer):
+            return Verdict(True, " ".join(filter(None, (self._confirmed(), self.named))))
+        for way in self.ways:
+            if self._near(answer, way.value):
+                return Verdict(True, way.reason)
+        for mistake in self.mistakes:
+            if self._near(answer, mistake.value):
+                return Verdict(False, mistake.reason)
+        return Verdict(False, self._what_is_wrong(answer), way=self.method)
+
+    def right(self) -> float:
+        return self.answer
+
+    def solution(self) -> str:
+        return f"{self.value_text}. {self.method}"
+
+    def cells(self, answer: float) -> list[list[str]]:
+        return [[general(answer * self.unit.scale)]]
+
+    def way_of(self, answer: float) -> int:
+        """Which right value is given: 0 for the answer, 1 for the first of the other ways, −1 for none."""
+        rights = (self.answer, *(way.value for way in self.ways))
+        return next((i for i, right in enumerate(rights) if self._near(answer, right)), -1)
+
+    @property
+    def value_text(self) -> str:
+        """The right value, in decimals that the tolerance leaves meaningful."""
+        if self._is_count:
+            return f"{self.answer:.0f}"
+        return self.unit.text(self.answer, self._decimals - self.unit.finer).rstrip()
+
+    @property
+    def tolerance_text(self) -> str:
+        """The accepted error, such as ± 1°."""
+        return "a whole number" if self._is_count else f"± {self.unit.brief(self.tolerance)}".rstrip()
+
+    def _what_is_wrong(self, answer: float) -> str:
+        """What is wrong with an answer that is no known mistake."""
+        if (self._is_count or not self.ordered) and (answer < 0.0 or abs(answer - round(answer)) > WHOLE):
+            return "The answer is a whole number, and not negative."
+        if slip := self.slip(answer):
+            return slip
+        if self._near(-answer, self.answer):
+            return "The size is right, the sign is not."
+        if self.whole_turns or not self.ordered:
+            return ""
+        if answer * self.answer < 0.0:
+            return "The sign is not right."
+        size = "The size is too" if self.answer < 0.0 else "Too"
+        return f"{size} {'large' if abs(answer) > abs(self.answer) else 'small'}."
+
+    def slip(self, answer: float) -> str:
+        """What the typed number would be right in: another unit; "" if in none."""
+        typed_number = answer * self.unit.scale
+        for name, scale, words in _other_units(self.unit):
+            if typed_number and abs(typed_number / scale - self.answer) <= self.tolerance:
+                return f"This is the value in {words}. The unit is {_words(self.unit)}; or type {name} after it."
+        return ""
+
+    @property
+    def _is_count(self) -> bool:
+        return self.unit == PLAIN and self.tolerance == WHOLE
+
+    @property
+    def _decimals(self) -> int:
+        """Of the unit, as the tolerance leaves them meaningful."""
+        return max(0, -math.floor(math.log10(self.tolerance * self.unit.scale)))
+
+    def _confirmed(self) -> str:
+        """The right value, and whether it is rounded."""
+        if self._is_count:
+            return f"The value is {self.value_text}."
+        shown = self.answer * self.unit.scale
+        exact = math.isclose(shown, round(shown, self._decimals), rel_tol=1e-9, abs_tol=1e-9)
+        return f"The exact value is {self.value_text}." if exact else f"Rounded, it is {self.value_text}."
+
+    def _near(self, given: float, value: float) -> bool:
+        difference = given - value
+        if self.whole_turns:
+            difference = math.remainder(difference, 2.0 * math.pi)
+        return abs(difference) <= self.tolerance * (1.0 + 1e-9)
+
+
+def _other_units(unit: Unit) -> list[tuple[str, float, str]]:
+    """Name, how many make one SI unit, and words of the units that a number may have been meant in."""
+    angles = [("rad", RADIANS.scale, "radians"), ("°", DEGREES.scale, "degrees")]
+    lengths = [("m", 1.0, "metres"), ("cm", 1e2, "centimetres"), ("mm", 1e3, "millimetres")]
+    for family in (angles, lengths):
+        if unit.name in [name for name, *_ in family]:
+            return [row for row in family if row[0] != unit.name]
+    return []
+
+
+def _words(unit: Unit) -> str:
+    return {"°": "degrees", "rad": "radians", "mm": "millimetres", "cm": "centimetres", "m": "metres"}[unit.name]
 
 
 WHOLE = 0.1  # accepted error of a count
@@ -107,13 +358,17 @@ def apart(question: Number, least: float = LEAST) -> Number:
     return replace(question, tolerance=tolerance, mistakes=wrong)
 
 
+def share(answer: float, part: float) -> float:
+    """A tolerance that is a part of the answer, rounded down to two digits, as people write it."""
+    return _rounded_down(part * abs(answer))
+
+
 def two_percent(answer: float) -> float:
     """The usual tolerance of a measured value."""
-    return _rounded_down(0.02 * abs(answer))
+    return share(answer, 0.02)
 
 
 def _rounded_down(size: float) -> float:
-    """To two digits, as people write a tolerance."""
     if size == 0.0:
         return 0.0
     digit = math.floor(math.log10(size)) - 1
@@ -124,9 +379,6 @@ def _gap(question: Number, value: float) -> float:
     """The distance to the nearest right value."""
     gaps = [value - right for right in (question.answer, *(way.value for way in question.ways))]
     return min(abs(math.remainder(gap, 2.0 * math.pi) if question.whole_turns else gap) for gap in gaps)
-
-
-Question = Choice | Number
 
 
 def one_right(prompt: str, right: tuple[str, str], wrong: Sequence[tuple[str, str]], place: int) -> Choice:
@@ -140,3 +392,17 @@ def one_right(prompt: str, right: tuple[str, str], wrong: Sequence[tuple[str, st
             options.append(Option(text, reason))
     options.insert(min(place, len(options)), Option(*right, right=True))
     return Choice(prompt, tuple(options))
+
+
+def texts(given: object, count: int, what: str) -> list[str]:
+    """Typed texts, cut to a sensible length."""
+    if not isinstance(given, list | tuple) or len(given) != count or not all(isinstance(x, str) for x in given):
+        raise InputError("answer", given, f"{count} texts: {what}")
+    return [text[: LONGEST + 1] for text in given]  # still too long to be valid
+
+
+def index(given: object, count: int) -> int:
+    """The index of an option."""
+    if type(given) is not int or not 0 <= given < count:
+        raise InputError("answer", given, f"the index of an option, 0 to {count - 1}")
+    return given

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 import kin
 from app.exercises.expressions import Expression, Function
+from app.exercises.fields import Words
 from kin import Robot
 from kin.differential.task import rank, task_jacobian
 from kin.transforms import Array
@@ -111,6 +112,7 @@ class Variant:
         robot, q: the arm, and the configuration ``(n,)`` that the exercise is about.
         values: the numbers drawn, by name.
         target: the pose ``(4, 4)`` that the exercise is about, if it gives one.
+        functions, words: what expressions and texts may use besides.
     """
 
     name: str
@@ -118,12 +120,14 @@ class Variant:
     q: Array
     values: Mapping[str, Quantity] = field(default_factory=dict)
     target: Array | None = None
+    functions: Mapping[str, Function] = field(default_factory=dict)
+    words: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def scope(self) -> Mapping[str, float | Function]:
         """What expressions may use."""
         drawn = {name: quantity.value for name, quantity in self.values.items()}
-        return Joined(drawn, Facts(self.robot, self.q))
+        return Joined({**drawn, **self.functions}, Facts(self.robot, self.q))
 
     @cached_property
     def pose(self) -> Array:
@@ -142,8 +146,12 @@ class Variant:
         """The values of expressions as an array ``(n,)``."""
         return np.array([self.number(expression) for expression in expressions])
 
-    def text(self, template: str, units: Units) -> str:
+    def text(self, template: str | Words, units: Units) -> str:
         """A text of the file, with the drawn numbers in the reader's units."""
+        if isinstance(template, Words):
+            template = next(text for when, text in template.alternatives if self.number(when))
+        for name, word in self.words.items():
+            template = template.replace(f"{{{name}}}", word)
         for name, quantity in self.values.items():
             template = template.replace(f"{{{name}}}", quantity.text(units))
         return template
@@ -152,7 +160,7 @@ class Variant:
 class Joined(Mapping[str, "float | Function"]):
     """Drawn numbers before facts; a fact is computed when it is read."""
 
-    def __init__(self, drawn: Mapping[str, float], facts: Facts) -> None:
+    def __init__(self, drawn: Mapping[str, float | Function], facts: Facts) -> None:
         self._drawn, self._facts = drawn, facts
 
     def __getitem__(self, name: str) -> float | Function:

@@ -15,7 +15,6 @@ from number_cases import DEGREES, MM, READ, REFUSED
 
 import kin
 from app.cli.terminal import configuration, quantity, units_of
-from app.exercises.judging import read as read_answer
 from app.exercises.questions import Number
 from app.exercises.typed import EntryError
 from app.viewer.panel.entry import read_cell, read_pose, read_value
@@ -68,7 +67,7 @@ DOORS: dict[str, Callable[[str, Unit], float]] = {
     "cell": read_cell,
     "DH table": in_table,
     "program": in_program,
-    "answer": lambda text, unit: read_answer(Number("", 0.0, unit, 1.0, ""), text),
+    "answer": lambda text, unit: Number("", 0.0, unit, 1.0, "").read_text(text),
     "command": lambda text, unit: quantity(text, unit, "q[0]"),
 }
 QUANTITIES = ("DH table", "program", "joint field")  # angles and lengths alone

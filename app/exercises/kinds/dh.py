@@ -10,9 +10,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 import kin
-from app.exercises.contract import Asked, Kind, typed
+from app.exercises.contract import Kind, typed
 from app.exercises.fields import Fields
-from app.exercises.judging import Verdict
+from app.exercises.questions import Asked, Verdict
 from app.exercises.rows import ANGULAR, FACTORS, NAMES, Accepted, Line, Row, angle_between, read_rows
 from app.exercises.variant import Variant
 from kin import Robot
@@ -35,7 +35,7 @@ class DHKind(Kind):
     name: ClassVar[str] = "dh"
     about: ClassVar[str] = "Rows of a DH table are filled in; any legitimate choice of frames is right."
     shows_posture: ClassVar[bool] = True
-    withholds: ClassVar[str] = "table"
+    withholds: ClassVar[frozenset[str]] = frozenset({"table"})
 
     first: int
     last: int

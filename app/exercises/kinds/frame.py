@@ -10,10 +10,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 import kin
-from app.exercises.contract import Asked, Kind, numbers
+from app.exercises.contract import Kind, numbers
 from app.exercises.fields import Fields
-from app.exercises.judging import Verdict
 from app.exercises.poses import Elementary, as_numbers, errors, pose_text, product
+from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 from kin import InputError
 from kin.transforms import Array, from_position_wxyz

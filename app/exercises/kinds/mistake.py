@@ -10,9 +10,9 @@ from typing import ClassVar, Self, cast
 import numpy as np
 
 import kin
-from app.exercises.contract import Asked, Kind, typed
+from app.exercises.contract import Kind, typed
 from app.exercises.fields import Fields
-from app.exercises.judging import Verdict
+from app.exercises.questions import Asked, Verdict
 from app.exercises.rows import ANGULAR, FACTORS, NAMES, Accepted, Factor, Row, read_rows
 from app.exercises.variant import Variant
 from kin import Robot
@@ -58,7 +58,7 @@ class MistakeKind(Kind):
     name: ClassVar[str] = "mistake"
     about: ClassVar[str] = "A DH table has one mistake and is corrected; any table with the arm's poses is right."
     shows_posture: ClassVar[bool] = True
-    withholds: ClassVar[str] = "table"
+    withholds: ClassVar[frozenset[str]] = frozenset({"table"})
 
     mistakes: tuple[Mistake, ...]
 

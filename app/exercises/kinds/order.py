@@ -9,10 +9,10 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from app.exercises.contract import Asked, Kind
+from app.exercises.contract import Kind
 from app.exercises.fields import Fields
-from app.exercises.judging import Verdict
 from app.exercises.poses import Elementary, errors, pose_text, product
+from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 from kin import InputError
 from kin.transforms import Array

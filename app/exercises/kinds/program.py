@@ -8,10 +8,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 import kin
-from app.exercises.contract import LONGEST_PROGRAM, Asked, Kind
+from app.exercises.contract import LONGEST_PROGRAM, Kind
 from app.exercises.expressions import Expression
 from app.exercises.fields import Fields
-from app.exercises.judging import Verdict
+from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 from kin import InputError, Motion
 from kin.transforms import Array

@@ -9,10 +9,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 import kin
-from app.exercises.contract import Asked, Kind, listed, numbers
+from app.exercises.contract import Kind, listed, numbers
 from app.exercises.expressions import Expression
 from app.exercises.fields import Fields
-from app.exercises.judging import Verdict
+from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 from kin import IKOptions, JointConstraints, Robot, Task
 from kin.ik.options import TASKS

@@ -9,10 +9,9 @@ from typing import ClassVar, Self
 import numpy as np
 
 import kin
-from app.exercises.contract import Asked, Kind, index, texts
+from app.exercises.contract import Kind
 from app.exercises.fields import Fields
-from app.exercises.judging import Verdict
-from app.exercises.questions import Number
+from app.exercises.questions import Asked, Verdict, index, texts
 from app.exercises.typed import EntryError, read_number
 from app.exercises.variant import Variant
 from kin import Singularity
@@ -78,8 +77,7 @@ class SingularityKind(Kind):
         return Verdict(False, f"The arm is {distance} away from that singularity.{at}")
 
     def _judge_direction(self, variant: Variant, given: object, units: Units) -> Verdict:
-        question = Number("", 0.0, PLAIN, 1.0, "")
-        values = np.array([read_number(text, question.unit) for text in texts(given, 3, "x, y and z")])
+        values = np.array([read_number(text, PLAIN) for text in texts(given, 3, "x, y and z")])
         length = float(np.linalg.norm(values))
         if not 1e-6 < length < 1e6:
             raise EntryError(

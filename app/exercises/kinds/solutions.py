@@ -9,10 +9,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 import kin
-from app.exercises.contract import Asked, Kind, typed
+from app.exercises.contract import Kind, typed
 from app.exercises.fields import Fields
-from app.exercises.judging import Verdict
 from app.exercises.poses import errors
+from app.exercises.questions import Asked, Verdict
 from app.exercises.typed import EntryError, read_number
 from app.exercises.variant import Variant
 from kin import IKOptions, InputError, Task

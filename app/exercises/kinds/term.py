@@ -7,10 +7,10 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from app.exercises.contract import Asked, Kind, index
+from app.exercises.contract import Kind
 from app.exercises.expressions import Expression
 from app.exercises.fields import Fields
-from app.exercises.judging import Verdict
+from app.exercises.questions import Asked, Verdict, index
 from app.exercises.variant import Variant
 from kin.units import Units, general
 

@@ -20,6 +20,21 @@ from kin import KinematicsError
 
 EXERCISES: Final = "exercises"  # the key under which the exercises are opened
 
+# What questions may withhold, and what is then absent from panel, scene, read-out and messages.
+FACTS: Final = {
+    "table": "the table of the arm, in every form",
+    "position": "the position of the tool in the read-out",
+    "angles": "roll, pitch and yaw in the read-out",
+    "quaternion": "the quaternion in the read-out",
+    "jacobian": "the Jacobian, its columns and what follows from them",
+    "ellipsoid": "the ellipsoid, its semi-axes and the singular values",
+    "torques": "the joint torques of a force",
+    "singularities": "which singularities are near, and what is lost there",
+    "screws": "the six numbers of each joint axis, and the product",
+    "forms": "a rotation in its other forms",
+    "null space": "the self-motion, its parameter and what moves",
+}
+
 
 class Judged(NamedTuple):
     """An answer that was judged: the seed of its numbers, the answer as plain data, and how long (s) it took.
@@ -69,6 +84,7 @@ class Activity:
         sent: the course that the teacher of the room sent.
         task: the exercise that the teacher of the room sent.
         note: a sentence below the verdict: whether the answer is stored.
+        asked: what the open question of a lesson withholds.
         news: grows when other pages of the seat have answered.
     """
 
@@ -81,6 +97,7 @@ class Activity:
         self.sent: Course | None = None
         self.task: Exercise | None = None
         self.note = ""
+        self.asked: frozenset[str] = frozenset()
         self.news = 0
         self._seat: Seat | None = None
 
@@ -92,10 +109,12 @@ class Activity:
         return self.practice.at if self.lesson == EXERCISES else None
 
     @property
-    def withheld(self) -> str:
-        """What no tab shows now, because the open exercise asks for it: "table", or nothing."""
+    def withheld(self) -> frozenset[str]:
+        """The names of `FACTS` that nothing in the page shows now, because an open question asks for them."""
         exercise = self.exercise
-        return "" if exercise is None or self.practice.record(exercise).closed else exercise.kind.withholds
+        if exercise is None or self.practice.record(exercise).closed:
+            return self.asked
+        return self.asked | exercise.kind.withholds
 
     @property
     def offered(self) -> tuple[Course, ...]:

@@ -34,6 +34,11 @@ class Drawing:
         self._nodes.clear()
         self._ghost = None
 
+    @property
+    def has_ghost(self) -> bool:
+        """Whether there is a frame to drag."""
+        return self._ghost is not None
+
     def goal(self, T: Array, reach: float, label: str) -> None:
         """A frame with a label."""
         name, size = f"/exercise-{next(_NUMBERS)}", SIZE * reach

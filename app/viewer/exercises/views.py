@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from app.exercises import Asked, Exercise, Exercises, Variant
 from app.viewer.activity.activity import Activity
@@ -54,8 +55,35 @@ def task_html(exercise: Exercise, variant: Variant, units: Units, at_home: bool,
     )  # fmt: skip
 
 
-def question_html(asked: Asked, sheet: Sheet, closed: bool) -> str:
-    """The fields, options or buttons of the answer."""
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """What the template of an answer shows.
+
+    Attributes:
+        key: of the question in a lesson; "" in an exercise.
+        rows, text: typed cells, or the one text of a program or a pose.
+        places: the place of each motion that was put in order.
+        rights: the options that are marked as right.
+        complete: whether all motions have a place.
+        invalid: whether what was typed could not be read.
+    """
+
+    asked: Asked
+    key: str
+    rows: list[list[str]]
+    text: str
+    places: dict[int, int]
+    chosen: int | None
+    closed: bool
+    rights: frozenset[int]
+    complete: bool
+    invalid: bool
+
+
+def entry_of(
+    asked: Asked, sheet: Sheet, closed: bool, key: str = "", rights: frozenset[int] = frozenset()
+) -> Entry:
+    """A sheet as the template shows it."""
     columns = len(asked.labels)
     begun: Sequence[Sequence[str]] = sheet.cells or asked.cells
     rows = [
@@ -64,10 +92,13 @@ def question_html(asked: Asked, sheet: Sheet, closed: bool) -> str:
     ]
     text = sheet.cells[0][0] if sheet.cells and sheet.cells[0] else asked.start
     places = {option: place for place, option in enumerate(sheet.picked, 1)}
-    return render(
-        "exercises/question", asked=asked, rows=rows, text=text, places=places, chosen=sheet.chosen, closed=closed,
-        complete=len(sheet.picked) == columns, invalid=bool(sheet.error),
-    )  # fmt: skip
+    complete = len(sheet.picked) == columns
+    return Entry(asked, key, rows, text, places, sheet.chosen, closed, rights, complete, bool(sheet.error))
+
+
+def question_html(asked: Asked, sheet: Sheet, closed: bool) -> str:
+    """The fields, options or buttons of the answer."""
+    return render("exercises/question", entry=entry_of(asked, sheet, closed))
 
 
 def foot_html(

@@ -74,6 +74,11 @@ class LessonChoice:
         finally:
             self._stage.activity.changed()
 
+    def begin(self) -> None:
+        """The visitor has opened the lesson, not a link or a leader: the scene comes to its pose."""
+        if self.guide is not None:
+            self.guide.begin()
+
     def _show(self, chosen: type[Feature] | None) -> None:
         """Build what was chosen, in the container that is open; None: the overview."""
         activity, always = self._stage.activity, (self.exercises, self.courses)

@@ -199,7 +199,7 @@ class Persistence:
             arm.obstacles,
             avoid,
         )
-        self._share.show(f"{self._address}viewer/#s={self._saved}", moment, page.activity.withheld == "table")
+        self._share.show(f"{self._address}viewer/#s={self._saved}", moment, "table" in page.activity.withheld)
 
 
 def link_notice(saved: PageState) -> Notice | None:

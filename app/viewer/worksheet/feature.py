@@ -10,7 +10,6 @@ from collections.abc import Callable, Hashable
 
 import viser
 
-from app.exercises.judging import solution_text
 from app.exports.snippets import named
 from app.exports.worksheet import Part, Question, Sheet, csv_text, draw, latex
 from app.viewer.feature import Feature, Stage
@@ -74,7 +73,7 @@ class Worksheets(Feature):
 
     @property
     def _withheld(self) -> bool:
-        return self.stage.activity.withheld == "table"
+        return "table" in self.stage.activity.withheld
 
     def sheet(self) -> Sheet:
         """The worksheet for the arm as it is."""
@@ -103,7 +102,8 @@ def parts_of(outline: guide.Outline) -> tuple[Part, ...]:
 
 
 def _question(question: guide.Question, shown: str = "") -> Question:
-    solution = " ".join(filter(None, (solution_text(question), shown)))
-    if isinstance(question, guide.Choice):
-        return Question(question.prompt, solution, tuple(option.text for option in question.options))
-    return Question(question.prompt, solution, (), question.unit.name)
+    solution = " ".join(filter(None, (question.solution(), shown)))
+    asked = question.asked()
+    if asked.form in ("options", "order"):
+        return Question(question.prompt, solution, asked.labels)
+    return Question(question.prompt, solution, (), " ".join(asked.units))

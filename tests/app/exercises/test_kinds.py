@@ -15,7 +15,6 @@ import kin
 from app.exercises import Exercise, Variant, Verdict, parse_exercise
 from app.exercises.exercise import VariantError
 from app.exercises.fields import ExerciseFileError
-from app.exercises.judging import judge
 from app.exercises.kinds import KINDS
 from app.exercises.questions import Number, count
 from app.exercises.typed import EntryError
@@ -77,20 +76,20 @@ def test_the_value_is_called_exact_only_if_it_is() -> None:
     def number(answer: float, tolerance: float, unit: Unit = UNITS.lengths) -> Number:
         return Number("", answer, unit, tolerance, "Add.")
 
-    assert judge(number(0.135, 0.002), 0.1351).reason == "The exact value is 135 mm."
-    assert judge(number(0.134536, 0.002), 0.1351).reason == "Rounded, it is 135 mm."
+    assert number(0.135, 0.002).judge(0.1351).reason == "The exact value is 135 mm."
+    assert number(0.134536, 0.002).judge(0.1351).reason == "Rounded, it is 135 mm."
     assert (
-        judge(number(math.radians(-50.0), 0.02, UNITS.angles), math.radians(-50.1)).reason
+        number(math.radians(-50.0), 0.02, UNITS.angles).judge(math.radians(-50.1)).reason
         == "The exact value is −50°."
     )
-    assert judge(count("", 2, "Add."), 2.0).reason == "The value is 2."
+    assert count("", 2, "Add.").judge(2.0).reason == "The value is 2."
 
 
 @pytest.mark.parametrize("typed", [-2.0, 2.5, 0.35])
 def test_a_count_is_whole_and_not_negative(typed: float) -> None:
     for question in (count("", 2, "Look."), Number("", 2.0, PLAIN, 0.1, "Look.", ordered=False)):
-        assert judge(question, typed).reason == "The answer is a whole number, and not negative. Look."
-    assert judge(count("", 2, "Look."), 3.0).reason == "Too large. Look."
+        assert question.judge(typed).full == "The answer is a whole number, and not negative. Look."
+    assert count("", 2, "Look.").judge(3.0).full == "Too large. Look."
 
 
 @pytest.mark.parametrize("answer", [None, 3, ["1", "2"], [3.0], "30"])

@@ -9,8 +9,8 @@ import pytest
 from numpy_solutions import SOLVERS
 
 from app.exercises import TOPICS, Exercise, Exercises, Variant, builtin_exercises
-from app.exercises.contract import Asked
 from app.exercises.kinds import KINDS
+from app.exercises.questions import Asked
 from kin import Robot
 from kin.units import Units
 

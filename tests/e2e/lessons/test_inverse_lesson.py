@@ -39,7 +39,7 @@ def test_a_derivation_by_keyboard_and_mouse(desktop: Tab) -> None:
     expect(derivation.locator('[data-open="1"]')).to_have_count(0)
 
     # By keyboard: the first step, then the way over the back, then the other one again.
-    field = page.locator('[data-guide-field="1"]')
+    field = page.locator('[data-question="1"] input')
     field.fill("-90 mm")
     field.press("Enter")
     expect(page.locator('[data-derived="centre"]')).to_have_attribute("data-open", "1")
@@ -47,7 +47,7 @@ def test_a_derivation_by_keyboard_and_mouse(desktop: Tab) -> None:
         "(−0.0, 208.6, −90.0) mm"[-14:]
     )
     page.locator(".kb-guide-turn button").last.press("Enter")
-    field = page.locator('[data-guide-field="2"]')
+    field = page.locator('[data-question="2"] input')
     field.fill("0")
     field.press("Enter")
     expect(page.locator('[data-feedback="2"]')).to_contain_text("atan2 takes y first")
@@ -61,7 +61,7 @@ def test_a_derivation_by_keyboard_and_mouse(desktop: Tab) -> None:
     # By mouse: another branch in the tree, all numbers, and a dragged target.
     tab.row("Follow").get_by_role("button", name="1", exact=True).click()
     expect(derivation).to_have_attribute("data-derivation", given.followed.name)
-    expect(page.locator("[data-guide-field]")).to_be_visible()
+    expect(page.locator(".kb-question input")).to_be_visible()
     tab.check("All numbers")
     expect(page.locator("[data-derived-result=reached]")).to_contain_text("All joints are within their limits.")
     expect(page.locator('[data-tree="1"] [data-state="inside"]')).to_have_count(1)

@@ -7,7 +7,6 @@ from page import Tab
 from playwright.sync_api import Locator, expect
 
 import kin
-from app.exercises.judging import value_text
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Choice, Number, Question
@@ -21,7 +20,7 @@ PIONEER = kin.get_robot("pioneer5")
 def right(question: Question) -> str:
     """What to press or to type."""
     if isinstance(question, Number):
-        return value_text(question)
+        return question.value_text
     assert isinstance(question, Choice)
     return next(str(i) for i, option in enumerate(question.options) if option.right)
 
@@ -29,7 +28,7 @@ def right(question: Question) -> str:
 def answer(tab: Tab, key: str, question: Question, keyboard: bool) -> None:
     box = tab.page.locator(f'[data-question="{key}"]')
     if isinstance(question, Number):
-        field = box.locator("[data-guide-field]")
+        field = box.locator("input")
         field.fill(right(question))
         if keyboard:
             field.press("Enter")
@@ -92,7 +91,7 @@ def test_the_keyboard_keeps_its_place(desktop: Tab) -> None:
     tab.select(PIONEER)
     tab.choose_lesson("Equations")
     page.get_by_role("button", name="Step 2").press("Enter")
-    field = page.locator('[data-guide-field="2"]')
+    field = page.locator('[data-question="2"] input')
     field.fill("6")
     field.press("Enter")
     expect(page.locator('[data-feedback="2"]')).to_contain_text("Too small.")

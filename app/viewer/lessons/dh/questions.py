@@ -17,6 +17,7 @@ from app.viewer.lessons.guide.outline import (
     Number,
     Option,
     Outline,
+    Pose,
     Step,
     apart,
     count,
@@ -73,7 +74,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             f"Row {row + 1} has {_row_words(robot, row, units)}. Both lengths are at right angles to each other.",
             _origins(robot, row, units),
             f"The origin of frame {row + 1} is that far from frame {row}.",
-            start=home,
+            pose=Pose(home),
             practice="Walk through the row to see it.",
         ),
         Step(
@@ -87,12 +88,12 @@ def outline(robot: Robot, units: Units) -> Outline:
             f"A joint adds its value to one number of its row. Joint 1 moves by {first} from where it is at home.",
             _swing(robot, q, units),
             "Everything behind joint 1 has moved as one body; its rows are unchanged.",
-            start=home,
+            pose=Pose(home),
             end=as_configuration(q),
         ),
         *_mistyped(robot, units),
     )
-    return Outline(GOAL, steps, _check(robot, units))
+    return Outline(GOAL, steps, _check(robot, units), pose=Pose(home))
 
 
 def _telling_row(robot: Robot) -> int:

@@ -11,6 +11,7 @@ from app.viewer.lessons.guide.outline import (
     Number,
     Option,
     Outline,
+    Pose,
     Step,
     apart,
     one_right,
@@ -35,7 +36,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             "The pose is a matrix of four columns, n, o, a and p: the tool’s axes x, y and z, and the tool point.",
             _approach(T),
             "Each of the twelve entries is a formula of the joint values.",
-            start=home,
+            pose=Pose(home),
             practice="The menu Equation lists them.",
         ),
         Step(
@@ -43,14 +44,14 @@ def outline(robot: Robot, units: Units) -> Outline:
             f"At home, the equations of p give {_point(T, units)}.",
             _distance(T, units),
             "The length of p is the same in any turned base frame: a quick test of three equations.",
-            start=home,
+            pose=Pose(home),
         ),
         Step(
             "A column from two others",
             f"At home, n = {_vector(T[:3, 0])} and o = {_vector(T[:3, 1])}.",
             _cross(T),
             "So three of the equations are not needed. Books print them: that is where misprints hide.",
-            start=home,
+            pose=Pose(home),
         ),
         Step(
             "A test that needs no reference",
@@ -59,7 +60,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             "RᵀR − I is zero for a correct R. An entry that differs from zero names two columns to look at.",
         ),
     )
-    return Outline(GOAL, steps, _check(robot, T, units))
+    return Outline(GOAL, steps, _check(robot, T, units), pose=Pose(home))
 
 
 def _vector(column: Array) -> str:

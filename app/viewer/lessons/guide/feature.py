@@ -6,22 +6,24 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from typing import Any
 
 import numpy as np
 import viser
 
-from app.exercises.judging import read
 from app.exercises.typed import EntryError
+from app.viewer.exercises.drawing import GHOST, Drawing
+from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import views
 from app.viewer.lessons.guide.lesson import Lesson
-from app.viewer.lessons.guide.outline import Configuration, Number, Outline
+from app.viewer.lessons.guide.outline import Configuration, Outline
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.status import Notice
 from kin import InputError
-from kin.typed import LONGEST
+from kin.transforms import from_position_wxyz
 
 JOINTS_HINT = "The sliders of the tab Move, here as well. A target is typed with Type a target, above the tabs."
 
@@ -32,13 +34,14 @@ class Guide(Feature):
     key = "guide"
     title = "Lesson"
     shared = True
-    messages = frozenset({"go", "answer", "type", "reveal", "pose", "restart"})
+    messages = frozenset({"go", "answer", "fields", "posture", "pick", "reveal", "pose", "restart"})
 
     def __init__(self, stage: Stage, lesson: type[Lesson]) -> None:
         super().__init__(stage)
         self._lesson = lesson
-        self._errors: dict[str, tuple[str, str]] = {}
+        self._sheets: dict[str, Sheet] = {}
         self._progress = Progress(self._outline())
+        self._drawing = Drawing(stage.client.scene, self.post)
         gui = stage.client.gui
         self._goal = gui.add_html("")
         with gui.add_folder("Steps"):
@@ -56,28 +59,42 @@ class Guide(Feature):
         self._shown = lesson
         self._show()
 
+    def begin(self) -> None:
+        """The visitor has opened the lesson: the scene comes to the pose of the step on show."""
+        self._bring()
+
     def handle(self, key: Hashable, value: object) -> None:
         progress = self._progress
         match key:
             case ("go", int()):
                 progress.go(value)
-                self._errors.clear()
-            case ("answer", str(question), int()):
-                self._settle(question, value)
-            case ("type", str(question), int()):
-                self._type(question, value)
+                self._sheets.clear()
+                self._show()
+                self._bring()
+            case ("answer" | "fields" | "posture", str(question), int()):
+                self._answer(question, value, key[0] == "fields")
+            case ("pick", str(question), int()):
+                asked = progress.question(question).asked()
+                if not progress.is_closed(question):
+                    self._sheet(question).pick(value, len(asked.labels))
             case ("reveal", str(question), int()):
                 progress.reveal(question)
-                self._errors.pop(question, None)
+                self._sheets.pop(question, None)
+                self._show()
                 self._move_to_end(question)
             case ("pose", int()):
-                self._move("start")
+                self._bring()
             case ("restart", int()):
                 progress.restart()
-                self._errors.clear()
+                self._sheets.clear()
+                self._show()
+                self._bring()
             case "joints":
                 self._show_joints(bool(value))
                 return
+            case _ if key == GHOST and isinstance(value, list | tuple) and len(value) == 2:
+                T = from_position_wxyz(value[0], np.array(value[1]))
+                self._sheet(str(progress.at + 1)).drag(T, self.stage.units)
             case _:
                 raise InputError("lesson", key, "a control of its steps")
         self._show()
@@ -90,11 +107,12 @@ class Guide(Feature):
         at = self._progress.at
         self._progress = Progress(self._outline())
         self._progress.at = min(at, len(self._progress.outline.steps))
-        self._errors.clear()
+        self._sheets.clear()
         self._show()
 
     def on_style(self) -> None:
         self._progress.use(self._outline())
+        self._sheets.clear()
         self._show()
 
     def on_activity(self) -> None:
@@ -105,56 +123,110 @@ class Guide(Feature):
 
     def restore(self, state: dict[str, object]) -> None:
         self._progress.restore(state)
-        self._errors.clear()
+        self._sheets.clear()
         self._show()
         if isinstance(joints := state.get("joints"), bool):
             assign(self._joints_box, joints)
             self._show_joints(joints)
 
     def remove(self) -> None:
+        self._drawing.clear()
         self._show_joints(False)
+        self.stage.activity.asked = frozenset()
 
     def _outline(self) -> Outline:
         return self._lesson.outline(self.stage.now.robot, self.stage.units)
 
-    def _type(self, key: str, text: object) -> None:
-        question = self._progress.question(key)
-        if not isinstance(question, Number) or not isinstance(text, str):
-            raise InputError("answer", text, "a text, for a question with a field")
-        try:
-            given = read(question, text[: LONGEST + 1])
-        except EntryError as error:
-            self._errors[key] = (text[: LONGEST + 1], error.detail)
-        else:
-            self._settle(key, given)
+    # Answers
 
-    def _settle(self, key: str, given: object) -> None:
-        """Judge an answer; a right one reveals what it predicted."""
-        self._errors.pop(key, None)
-        closed = self._progress.is_closed(key)
-        verdict = self._progress.answer(key, given)
-        if verdict.right and not closed:
+    def _sheet(self, key: str) -> Sheet:
+        """What is entered for a question; at first, the last answer."""
+        if key not in self._sheets:
+            progress, sheet = self._progress, Sheet()
+            question = progress.question(key)
+            answer: Any = question.right() if key in progress.revealed else progress.given.get(key)
+            if answer is not None:
+                sheet.cells = question.cells(answer)
+                form = question.asked().form
+                if form == "options" and key not in progress.revealed:
+                    sheet.chosen = answer
+                elif form == "order":
+                    sheet.picked = list(answer)
+            self._sheets[key] = sheet
+        return self._sheets[key]
+
+    def _answer(self, key: str, value: object, typed: bool) -> None:
+        """Read and judge an answer; a right one reveals what it predicted."""
+        question, sheet, progress = self._progress.question(key), self._sheet(key), self._progress
+        if progress.is_closed(key):
+            return  # a late press
+        sheet.error = ""
+        if typed:
+            sheet.fill(value)
+        form = question.asked().form
+        try:
+            given = (
+                self.stage.now.goal.tolist() if form == "posture" else sheet.given(form, value, self.stage.units)
+            )
+            verdict = progress.answer(key, question.read(given))
+        except EntryError as error:
+            sheet.error = error.detail if error.title == "The answer was not read" else str(error)
+            return
+        if verdict.right:
+            self._show()
             self._move_to_end(key)
 
-    def _move_to_end(self, key: str) -> None:
-        if key == str(self._progress.at + 1):
-            self._move("end")
+    # The scene
 
-    def _move(self, where: str) -> None:
-        progress = self._progress
-        if progress.at == len(progress.outline.steps):
+    def _bring(self) -> None:
+        """Bring the scene to the pose of the step on show."""
+        progress, steps = self._progress, self._progress.outline.steps
+        pose = progress.outline.pose_of(progress.at)
+        if pose is None:
             return
-        step = progress.outline.steps[progress.at]
-        q: Configuration | None = step.start if where == "start" else step.end
+        if pose.drawing and self._shown is not None:
+            self._shown.restore(dict(pose.drawing))
+        title = "Check" if progress.at == len(steps) else f"Step {progress.at + 1}: {steps[progress.at].title}"
+        self.stage.move_to(np.array(pose.q), Notice("hand", title, "The arm is at the pose of this step."))
+        if pose.target is not None:
+            self.stage.set_target(from_position_wxyz(pose.target[:3], np.array(pose.target[3:])))
+
+    def _move_to_end(self, key: str) -> None:
+        """Let the arm show the answer to a question of the step on show."""
+        steps, at = self._progress.outline.steps, self._progress.at
+        if key != str(at + 1) or at == len(steps):
+            return
+        q: Configuration | None = steps[at].end
         if q is not None:
-            words = "The arm is at the pose of this step." if where == "start" else "The arm shows the answer."
-            self.stage.move_to(np.array(q), Notice("hand", f"Step {progress.at + 1}: {step.title}", words))
+            notice = Notice("hand", f"Step {at + 1}: {steps[at].title}", "The arm shows the answer.")
+            self.stage.move_to(np.array(q), notice)
 
     def _show(self) -> None:
         if self._shown is not None and (outline := self._shown.on_steps(self._progress)) is not None:
             self._progress.use(outline)
-        update_html(self._goal, views.goal_html(self._progress.outline.goal))
-        update_html(self._steps, views.steps_html(self._progress, self._errors))
+        progress, activity = self._progress, self.stage.activity
+        if activity.asked != progress.withheld:  # before anything is shown that would give it away
+            activity.asked = progress.withheld
+            activity.changed()
+        open_ = [key for key, _ in progress.outline.questions() if self._is_on_show(key)]
+        update_html(self._goal, views.goal_html(progress.outline.goal))
+        update_html(self._steps, views.steps_html(progress, {key: self._sheet(key) for key in open_}))
+        forms = {key: progress.question(key).asked() for key in open_ if not progress.is_closed(key)}
+        self._draw_ghost([key for key, asked in forms.items() if asked.form == "frame"])
+        if any(asked.form == "posture" for asked in forms.values()):
+            assign(self._joints_box, True)
+            self._show_joints(True)
+
+    def _is_on_show(self, key: str) -> bool:
+        at = self._progress.at
+        return key.startswith("c") if at == len(self._progress.outline.steps) else key == str(at + 1)
+
+    def _draw_ghost(self, keys: list[str]) -> None:
+        """The frame that is placed for the first of these questions."""
+        if not keys:
+            self._drawing.clear()
+        elif not self._drawing.has_ghost:
+            self._drawing.ghost(self._sheet(keys[0]).ghost, self.stage.now.robot.reach)
 
     def _show_joints(self, on: bool) -> None:
         if on == (self._joints is not None):

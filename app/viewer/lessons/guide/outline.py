@@ -6,8 +6,8 @@ in radians, metres and SI units.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
 from markupsafe import Markup
 
@@ -37,6 +37,7 @@ __all__ = [
     "Number",
     "Option",
     "Outline",
+    "Pose",
     "Question",
     "Step",
     "Way",
@@ -50,36 +51,66 @@ Configuration = tuple[float, ...]
 
 
 @dataclass(frozen=True)
+class Pose:
+    """What the scene shows while a step is open. All its numbers, in words, figures and questions, are of it.
+
+    Attributes:
+        q: the configuration ``(n,)``.
+        target: the target's position (m) and quaternion w, x, y, z; None: it follows the tool.
+        drawing: settings of the lesson, by their names in links; the others stay.
+    """
+
+    q: Configuration
+    target: tuple[float, ...] | None = None
+    drawing: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Step:
-    """One step of a lesson.
+    """One step of a lesson. Opening it brings the scene to its pose, as one step of undo.
 
     Attributes:
         text: what to do or to know.
         question: the prediction that is asked before `shown`.
         shown: what is revealed after a right answer, or on request; on paper too, among the solutions.
-        start: the configuration that the step is about; a button moves the arm there.
+        pose: what it is about; None: the pose of the outline.
         end: the configuration to which the arm moves when the answer is revealed.
         practice: what to see or to do on the page then, in words that follow `shown`.
         figure: a figure that belongs to `shown`.
+        withheld: facts that nothing in the page shows while the question is open:
+            names of `app.viewer.activity.activity.FACTS`.
     """
 
     title: str
     text: str
     question: Question | None = None
     shown: str = ""
-    start: Configuration | None = None
+    pose: Pose | None = None
     end: Configuration | None = None
     practice: str = ""
     figure: Markup | None = None
+    withheld: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
 class Outline:
-    """The goal of a lesson in one sentence, its steps in order, and the questions of its check."""
+    """The goal of a lesson in one sentence, its steps in order, and the questions of its check.
+
+    Attributes:
+        withheld: for each question of the check, as in `Step`; what is left out withholds nothing.
+        pose: what the scene shows during the check, and where a step has no pose of its own.
+    """
 
     goal: str
     steps: tuple[Step, ...]
     check: tuple[Question, ...]
+    withheld: tuple[frozenset[str], ...] = ()
+    pose: Pose | None = None
+
+    def pose_of(self, at: int) -> Pose | None:
+        """What the scene shows for the step of this index, or during the check if there is none."""
+        step = self.steps[at] if at < len(self.steps) else None
+        return self.pose if step is None or step.pose is None else step.pose
 
     def questions(self) -> Iterator[tuple[str, Question]]:
         """Every question with its key: the number of its step, or c and its number in the check."""

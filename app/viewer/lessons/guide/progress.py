@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from app.exercises.judging import Verdict, is_answer, judge
+from app.exercises.questions import Verdict
 from app.viewer.lessons.guide.outline import Outline, Question
 from kin import InputError
 
 Mark = Literal["open", "right", "wrong", "shown"]
+MOST_MISSES = 99
+WAY_AFTER = 2  # misses: before, a wrong answer is only told what is wrong with it
 
 
 class Progress:
@@ -16,20 +18,23 @@ class Progress:
 
     Attributes:
         at: index of the step on show; the number of steps for the check.
-        given: the last answer to each question, by its key.
+        given: the last answer to each question, by its key, as `Question.read` returns it.
         revealed: keys of the questions whose answers were requested before they were right.
+        misses: how many wrong answers each question got.
     """
 
     def __init__(self, outline: Outline) -> None:
         self.at = 0
-        self.given: dict[str, float] = {}
+        self.given: dict[str, Any] = {}
         self.revealed: set[str] = set()
+        self.misses: dict[str, int] = {}
         self.use(outline)
 
     def use(self, outline: Outline) -> None:
         """Go on with the same lesson in other units."""
         self.outline = outline
         self._questions = dict(outline.questions())
+        self._judged: dict[str, tuple[object, Verdict]] = {}
 
     def question(self, key: object) -> Question:
         """The question with this key; raises `kin.InputError` for another key."""
@@ -43,14 +48,16 @@ class Progress:
             raise InputError("step", at, f"an index from 0 to {len(self.outline.steps)}")
         self.at = at
 
-    def answer(self, key: object, given: object) -> Verdict:
+    def answer(self, key: object, answer: object) -> Verdict:
         """Judge an answer and keep it, unless the right one is on show; raises `kin.InputError`."""
         question = self.question(key)
-        if not is_answer(question, given):
-            raise InputError("answer", given, "the index of an option, or a finite number")
-        verdict = judge(question, given)  # type: ignore[arg-type]
-        if not self.is_closed(str(key)):
-            self.given[str(key)] = given  # type: ignore[assignment]
+        if not question.is_answer(answer):
+            raise InputError("answer", answer, "an answer in the form of the question")
+        verdict, name = question.judge(answer), str(key)
+        if not self.is_closed(name):
+            if not verdict.right and self.given.get(name) != answer:
+                self.misses[name] = min(self.misses.get(name, 0) + 1, MOST_MISSES)
+            self.given[name] = answer
         return verdict
 
     def reveal(self, key: object) -> None:
@@ -64,10 +71,25 @@ class Progress:
         self.at = 0
         self.given.clear()
         self.revealed.clear()
+        self.misses.clear()
 
     def verdict(self, key: str) -> Verdict | None:
         """The verdict on the last answer; None if there is none."""
-        return judge(self._questions[key], self.given[key]) if key in self.given else None
+        if key not in self.given:
+            return None
+        answer, before = self.given[key], self._judged.get(key)
+        if before is None or before[0] is not answer:
+            before = self._judged[key] = answer, self._questions[key].judge(answer)
+        return before[1]
+
+    def feedback(self, key: str) -> str:
+        """What is said about the last answer: what is wrong with it, and from the second miss on the way."""
+        verdict = self.verdict(key)
+        if verdict is None:
+            return ""
+        if verdict.right or self.misses.get(key, 0) >= WAY_AFTER:
+            return verdict.full
+        return verdict.reason or "Look again; after another answer, the way to it is shown."
 
     def mark(self, key: str) -> Mark:
         """What has become of a question."""
@@ -81,6 +103,17 @@ class Progress:
         return self.mark(key) in ("right", "shown")
 
     @property
+    def withheld(self) -> frozenset[str]:
+        """Facts that the page must not show now, because the open question asks for them."""
+        steps, key = self.outline.steps, str(self.at + 1)
+        if self.at < len(steps):
+            step = steps[self.at]
+            return frozenset() if step.question is None or self.is_closed(key) else step.withheld
+        return frozenset().union(
+            *(facts for number, facts in enumerate(self.outline.withheld, 1) if not self.is_closed(f"c{number}"))
+        )
+
+    @property
     def score(self) -> tuple[int, int]:
         """How many questions of the check were answered right, of how many."""
         keys = [key for key in self._questions if key.startswith("c")]
@@ -88,7 +121,8 @@ class Progress:
 
     def state(self) -> dict[str, object]:
         """As JSON."""
-        return {"step": self.at, "given": dict(self.given), "revealed": sorted(self.revealed)}
+        state = {"step": self.at, "given": dict(self.given), "revealed": sorted(self.revealed)}
+        return {**state, "misses": dict(self.misses)} if self.misses else state
 
     def restore(self, state: dict[str, object]) -> None:
         """Take what `state` returned; invalid entries are ignored, and answers are judged again."""
@@ -97,7 +131,13 @@ class Progress:
         self.given = {
             key: value
             for key, value in (given.items() if isinstance(given, dict) else ())
-            if key in self._questions and is_answer(self._questions[key], value)
+            if key in self._questions and self._questions[key].is_answer(value)
         }
         keys = revealed if isinstance(revealed, list) else []
         self.revealed = {key for key in keys if isinstance(key, str) and key in self._questions}
+        misses = state.get("misses")
+        self.misses = {
+            key: value
+            for key, value in (misses.items() if isinstance(misses, dict) else ())
+            if key in self._questions and type(value) is int and 0 < value <= MOST_MISSES
+        }

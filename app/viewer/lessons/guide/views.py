@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from app.exercises.judging import solution_text, tolerance_text, value_text
-from app.viewer.lessons.guide.outline import Choice, Number, Question
+from app.exercises.questions import Choice
+from app.viewer.exercises.sheet import Sheet
+from app.viewer.exercises.views import entry_of
+from app.viewer.lessons.guide.outline import Question
 from app.viewer.lessons.guide.progress import Mark, Progress
 from app.viewer.views.templates import render
-from kin.units import general
 
 # Symbol, words and colour of what has become of a question.
 MARKS: dict[Mark, tuple[str, str, str]] = {
@@ -22,11 +23,11 @@ def goal_html(goal: str) -> str:
     return render("guide/goal", goal=goal)
 
 
-def steps_html(progress: Progress, errors: dict[str, tuple[str, str]]) -> str:
+def steps_html(progress: Progress, sheets: dict[str, Sheet]) -> str:
     """The step on show, or the check.
 
     Args:
-        errors: typed text that could not be read, and why, by the key of the question.
+        sheets: what was entered, by the key of the question.
     """
     steps, at = progress.outline.steps, progress.at
     marks = []
@@ -38,7 +39,7 @@ def steps_html(progress: Progress, errors: dict[str, tuple[str, str]]) -> str:
     right, count = progress.score
     if at == len(steps):
         questions = [
-            _question(progress, key, question, errors)
+            _question(progress, key, question, sheets)
             for key, question in progress.outline.questions()
             if key.startswith("c")
         ]
@@ -52,43 +53,26 @@ def steps_html(progress: Progress, errors: dict[str, tuple[str, str]]) -> str:
         marks=marks,
         at=at,
         step=step,
-        question=None if step.question is None else _question(progress, key, step.question, errors),
+        question=None if step.question is None else _question(progress, key, step.question, sheets),
         open=step.question is None or progress.is_closed(key),
     )
 
 
-def _question(
-    progress: Progress, key: str, question: Question, errors: dict[str, tuple[str, str]]
-) -> dict[str, object]:
+def _question(progress: Progress, key: str, question: Question, sheets: dict[str, Sheet]) -> dict[str, object]:
     """The values of a question for its template."""
-    mark, verdict = progress.mark(key), progress.verdict(key)
-    closed = progress.is_closed(key)
-    typed, error = errors.get(key, ("", ""))
-    feedback = ""
-    if error:
-        symbol, title, color, feedback = "!", "Not read", "amber", error
+    mark, closed, sheet = progress.mark(key), progress.is_closed(key), sheets.get(key, Sheet())
+    symbol, title, color, feedback = "", "", "", ""
+    if sheet.error:
+        symbol, title, color, feedback = "!", "Not read", "amber", sheet.error
     elif mark == "shown":
-        symbol, title, color, feedback = "●", "The answer", "blue", solution_text(question)
-    elif verdict is not None:
+        symbol, title, color, feedback = "●", "The answer", "blue", question.solution()
+    elif mark != "open":
         symbol, _, color = MARKS[mark]
-        title, feedback = ("Right" if verdict.right else "Not quite"), verdict.reason
-    else:
-        symbol, title, color = "", "", ""
-    common = {"key": key, "prompt": question.prompt, "closed": closed, "feedback": feedback}
-    common |= {"symbol": symbol, "title": title, "color": f"kb-{color}"}
-    if isinstance(question, Choice):
-        options = [
-            {"text": option.text, "chosen": progress.given.get(key) == i, "right": closed and option.right}
-            for i, option in enumerate(question.options)
-        ]
-        return {**common, "options": options}
-    return {**common, "options": (), **_field(progress, key, question, typed, bool(error))}
-
-
-def _field(progress: Progress, key: str, question: Number, typed: str, invalid: bool) -> dict[str, object]:
-    given = progress.given.get(key)
-    shown = "" if given is None else general(given * question.unit.scale)
-    value = typed or (
-        value_text(question).removesuffix(question.unit.suffix) if key in progress.revealed else shown
-    )
-    return {"value": value, "unit": question.unit.name, "tolerance": tolerance_text(question), "invalid": invalid}
+        title, feedback = ("Right" if mark == "right" else "Not quite"), progress.feedback(key)
+    rights = frozenset[int]()
+    if closed and isinstance(question, Choice):
+        rights = frozenset(i for i, option in enumerate(question.options) if option.right)
+    return {
+        "key": key, "prompt": question.prompt, "closed": closed, "feedback": feedback, "symbol": symbol,
+        "title": title, "color": f"kb-{color}", "entry": entry_of(question.asked(), sheet, closed, key, rights),
+    }  # fmt: skip

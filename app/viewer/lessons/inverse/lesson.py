@@ -18,7 +18,6 @@ import numpy as np
 import viser
 
 import kin
-from app.exercises.judging import way_of
 from app.viewer.feature import Stage
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Number, Outline
@@ -191,7 +190,7 @@ class InverseLesson(Lesson):
         if number in progress.revealed or self._taken.get(number) == answer:
             return
         self._taken[number] = answer
-        if way_of(question, answer) <= 0:
+        if question.way_of(answer) <= 0:
             return
         step = given.followed.derivation.step(key)
         if step is not None and step.split >= 0:

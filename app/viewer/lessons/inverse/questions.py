@@ -11,6 +11,7 @@ from app.viewer.lessons.guide.outline import (
     Number,
     Option,
     Outline,
+    Pose,
     Question,
     Step,
     Way,
@@ -56,7 +57,8 @@ def keys_of(arm: Arm) -> tuple[StepKey, ...]:
 
 def outline_of(given: Exercise, units: Units) -> Outline:
     """The outline for a target and the branch that is followed."""
-    return Outline(GOAL, tuple(_step(given, key, units) for key in keys_of(given.arm)), _check(given, units))
+    steps = tuple(_step(given, key, units) for key in keys_of(given.arm))
+    return Outline(GOAL, steps, _check(given, units), pose=Pose(as_configuration(given.q)))
 
 
 def _step(given: Exercise, key: StepKey, units: Units) -> Step:
@@ -72,19 +74,21 @@ def _step(given: Exercise, key: StepKey, units: Units) -> Step:
             else None
         )
         shown = f"The numbers below lead to the branch {given.followed.name}. Choose another one with Follow."
-        return Step(words.title(arm, key), text, _limits(given), "", start, end, shown)
+        return Step(words.title(arm, key), text, _limits(given), "", Pose(start), end, shown)
     if found is None:
         failed = given.followed.derivation.failed
         where = "" if failed is None else f" It ends at the step “{words.title(given.arm, failed.key)}”."
-        return Step(words.title(arm, key), f"The branch that you follow does not get here.{where}", start=start)
+        return Step(
+            words.title(arm, key), f"The branch that you follow does not get here.{where}", pose=Pose(start)
+        )
     if found.failure is not None:
-        return Step(words.title(arm, key), f"{text} {words.failure_text(found, units)}", start=start)
+        return Step(words.title(arm, key), f"{text} {words.failure_text(found, units)}", pose=Pose(start))
     special = words.special_text(arm, found)
     return Step(
         words.title(arm, key),
         f"{text} {special}".rstrip(),
         _question(given, found, units),
-        start=start,
+        pose=Pose(start),
         practice=_shown(given, found),
     )
 
@@ -353,4 +357,5 @@ def _others(robot: Robot) -> Outline:
     rest = (
         "Arms without such a point are solved by elimination or by numeric steps. Postures shows their solutions."
     )
-    return Outline(GOAL, (first, Step("All other arms", rest)), (check, again))
+    home = Pose(as_configuration(robot.q_home))
+    return Outline(GOAL, (first, Step("All other arms", rest)), (check, again), pose=home)

@@ -13,6 +13,7 @@ from app.viewer.lessons.guide.outline import (
     Number,
     Option,
     Outline,
+    Pose,
     Step,
     apart,
     count,
@@ -52,7 +53,7 @@ def outline(robot: Robot, units: Units) -> Outline:
         _limits(),
         _basins(),
     )
-    return Outline(GOAL, steps, _check(units))
+    return Outline(GOAL, steps, _check(units), pose=Pose(as_configuration(known.start)))
 
 
 def _missing(known: Example, units: Units) -> Step:
@@ -76,7 +77,7 @@ def _missing(known: Example, units: Units) -> Step:
             )
         ),
         "An iteration makes e smaller step by step.",
-        start=as_configuration(known.start),
+        pose=Pose(as_configuration(known.start)),
         practice="“Target here” and a moved arm below make any error you like.",
     )
 
@@ -143,7 +144,7 @@ def _newton(known: Example, units: Units) -> Step:
         ),
         f"{run.count} iterations to {power(float(run.errors[-1]))}.",
         figure=error_chart(known.problem, [("newton", run)], units),
-        start=as_configuration(known.start),
+        pose=Pose(as_configuration(known.start)),
     )
 
 
@@ -175,7 +176,7 @@ def _transpose(known: Example, units: Units) -> Step:
         ),
         f"{words}; Newton needs {newton.count}. Directions with a small σ die out slowly.",
         figure=error_chart(known.problem, [("newton", newton), ("transpose", run)], units),
-        start=as_configuration(known.start),
+        pose=Pose(as_configuration(known.start)),
     )
 
 
@@ -211,7 +212,7 @@ def _damping(known: Example, units: Units) -> Step:
         f"A share of {1.0 - answer:.3f} remains after each step: linear convergence. λ = 0 would be Newton, a "
         "large λ the transpose with a small gain.",
         figure=error_chart(known.problem, [("newton", known.newton), ("damped", run)], units),
-        start=as_configuration(known.start),
+        pose=Pose(as_configuration(known.start)),
     )
 
 

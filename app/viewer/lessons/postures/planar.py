@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from app.viewer.lessons.guide.outline import Mistake, Number, Step, apart
+from app.viewer.lessons.guide.outline import Mistake, Number, Pose, Step, apart
 from app.viewer.lessons.guide.poses import as_configuration
 from kin import Robot
 from kin.robot import IDENTITY
@@ -76,14 +76,14 @@ def steps(robot: Robot, units: Units) -> tuple[Step, ...]:
             f"The links are {links}; {point} is at (x, y) = {at}, as it is at home.",
             triangle,
             "An arc cosine has two signs: two elbows.",
-            start=home,
+            pose=Pose(home),
         ),
         Step(
             "By hand: the other elbow",
             f"{point.capitalize()} stays at (x, y) = {at}. At home, θ₂ is {units.angles.text(float(q[1]))}.",
             elbow,
             f"The elbow is on the other side now. {turned}",
-            start=home,
+            pose=Pose(home),
             end=as_configuration(other),
         ),
     )

@@ -14,6 +14,7 @@ from app.viewer.lessons.guide.outline import (
     Number,
     Option,
     Outline,
+    Pose,
     Step,
     count,
     one_right,
@@ -91,14 +92,14 @@ def outline(robot: Robot, units: Units) -> Outline:
             "The posture of the arm",
             "Look at the arm at home: at its shoulder, its elbow and its wrist.",
             _posture(known),
-            start=home,
+            pose=Pose(home),
             practice="The list below marks the posture of the arm on show.",
         ),
         Step(
             "Within the limits",
             f"The target is the pose that the tool has at home. {_many(robot)}",
             _solutions(known),
-            start=home,
+            pose=Pose(home),
             end=known.other,
             practice="The arm has changed its posture, if it has another one there. The tool is where it was.",
         ),
@@ -110,7 +111,7 @@ def outline(robot: Robot, units: Units) -> Outline:
         ),
     )
     by_hand = planar.steps(robot, units) if planar.is_planar(robot) else ()
-    return Outline(GOAL, steps + by_hand, _check(robot, known, units))
+    return Outline(GOAL, steps + by_hand, _check(robot, known, units), pose=Pose(home))
 
 
 def _many(robot: Robot) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.viewer.lessons.guide.outline import PLAIN, Choice, Number, Option, Outline, Step, count, one_right
+from app.viewer.lessons.guide.outline import PLAIN, Choice, Number, Option, Outline, Pose, Step, count, one_right
 from app.viewer.lessons.guide.poses import as_configuration
 from kin import Robot, jacobian
 from kin.axes import NEARLY
@@ -55,11 +55,11 @@ def outline(robot: Robot, units: Units) -> Outline:
                 "Who moves",
                 "At home, the null space of J gives the joint speeds of the self-motion: " + _speeds(z) + ".",
                 _mover(robot, z),
-                start=home,
+                pose=Pose(home),
                 practice="Sweep the redundancy parameter: the joints move in this proportion at first.",
             )
         )
-    return Outline(GOAL, tuple(steps), _check(robot, free))
+    return Outline(GOAL, tuple(steps), _check(robot, free), pose=Pose(home))
 
 
 def _speeds(z: Array) -> str:

@@ -7,15 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.viewer.lessons.guide.outline import (
-    PLAIN,
-    Mistake,
-    Number,
-    Outline,
-    Step,
-    apart,
-    one_right,
-)
+from app.viewer.lessons.guide.outline import PLAIN, Mistake, Number, Outline, Pose, Step, apart, one_right
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.rotations.check import CHECK
 from app.viewer.lessons.rotations.conventions import PAGE, Convention, axis_angle
@@ -54,7 +46,7 @@ def outline(robot: Robot, units: Units) -> Outline:
         _inverse(T, start, units),
         _chain(),
     )
-    return Outline(GOAL, steps, CHECK)
+    return Outline(GOAL, steps, CHECK, pose=Pose(start))
 
 
 @lru_cache(maxsize=64)
@@ -85,7 +77,7 @@ def _columns(T: Array, start: tuple[float, ...]) -> Step:
             ENTRY / 2.0,
         ),
         "Each entry of R is such a cosine.",
-        start=start,
+        pose=Pose(start),
         practice="“From tool” below shows the tool’s frame beside the arm.",
     )
 
@@ -113,7 +105,7 @@ def _inverse_rotation(T: Array, start: tuple[float, ...]) -> Step:
             ENTRY / 2.0,
         ),
         "To turn back is to exchange rows and columns; nothing has to be solved.",
-        start=start,
+        pose=Pose(start),
     )
 
 
@@ -196,7 +188,7 @@ def _pitch(T: Array, start: tuple[float, ...], units: Units) -> Step:
             ANGLE / 2.0,
         ),
         "roll = atan2(r₃₂, r₃₃) and yaw = atan2(r₂₁, r₁₁).",
-        start=start,
+        pose=Pose(start),
         practice="The read-out above the tabs shows them.",
     )
 
@@ -219,7 +211,7 @@ def _other(T: Array, start: tuple[float, ...], units: Units) -> Step:
             ANGLE / 2.0,
         ),
         "The same rotation has other numbers in each convention: always say which one it is.",
-        start=start,
+        pose=Pose(start),
         practice="Try all of them below.",
     )
 
@@ -248,7 +240,7 @@ def _axis(T: Array, start: tuple[float, ...], units: Units) -> Step:
             ANGLE / 2.0,
         ),
         "The axis is the one direction that R leaves as it is.",
-        start=start,
+        pose=Pose(start),
         practice="“From tool” below draws it.",
     )
 
@@ -334,7 +326,7 @@ def _inverse(T: Array, start: tuple[float, ...], units: Units) -> Step:
             )
         ),
         "T⁻¹ needs no matrix inversion: transpose R, and turn −p.",
-        start=start,
+        pose=Pose(start),
     )
 
 

@@ -12,6 +12,7 @@ from app.viewer.lessons.guide.outline import (
     Mistake,
     Number,
     Outline,
+    Pose,
     Step,
     apart,
     count,
@@ -57,7 +58,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             "T = exp([S₁] θ₁) … exp([Sₙ] θₙ) M, with the screws and the pose M of the tool at zero. The screws "
             "stay as they are while the arm moves.",
             _order(robot),
-            start=home,
+            pose=Pose(home),
             practice="Move the slider Factors: the ghost shows what the factors give. At the end it is the arm.",
         ),
         Step(
@@ -68,7 +69,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             practice="Choose the form Body to see it, to the last digit shown.",
         ),
     ]
-    return Outline(GOAL, tuple(steps), _check(robot, units, found.S))
+    return Outline(GOAL, tuple(steps), _check(robot, units, found.S), pose=Pose(home))
 
 
 def far_joint(S: Array) -> int:

@@ -6,7 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.viewer.lessons.guide.outline import PLAIN, Choice, Mistake, Number, Outline, Step, one_right
+from app.viewer.lessons.guide.outline import PLAIN, Choice, Mistake, Number, Outline, Pose, Step, one_right
+from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from app.viewer.lessons.trajectories.motions import (
     Ways,
@@ -41,7 +42,7 @@ def outline(robot: Robot, units: Units) -> Outline:
     if found is not None:
         steps.append(_two_ways(found, units))
     steps += [_singularity(robot, units), _jerk(robot, units)]
-    return Outline(GOAL, tuple(steps), _check())
+    return Outline(GOAL, tuple(steps), _check(), pose=Pose(as_configuration(robot.q_home)))
 
 
 def _unit(robot: Robot, units: Units) -> Unit:
@@ -195,7 +196,7 @@ def _two_ways(found: Ways, units: Units) -> Step:
         f"{found.lin.duration:.2f} s: PTP is never slower between two given configurations, LIN goes where "
         f"you expect.",
         figure=chart(rows, curves, "PTP and LIN between the same two configurations"),
-        start=start,
+        pose=Pose(start),
         end=end,
     )
 

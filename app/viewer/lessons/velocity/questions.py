@@ -11,6 +11,7 @@ from app.viewer.lessons.guide.outline import (
     Number,
     Option,
     Outline,
+    Pose,
     Step,
     apart,
     count,
@@ -41,7 +42,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             "A column",
             "Column i of the Jacobian is the velocity of the tool if only joint i moves, at 1 rad/s or 1 m/s.",
             _column(robot, J),
-            start=home,
+            pose=Pose(home),
             practice="Press 1 under Column: the straight arrow is v, the round one ω.",
         ),
         Step(
@@ -49,14 +50,14 @@ def outline(robot: Robot, units: Units) -> Outline:
             "The lower three rows are ω, the angular velocity of the tool.",
             _omega(robot, robot.n - 1),
             "ω of a revolute joint is its axis as a unit vector, wherever the tool is.",
-            start=home,
+            pose=Pose(home),
         ),
         Step(
             "Torques from a force",
             f"A weight of {LOAD:g} N hangs on the tool. The joints hold it: τ = −Jᵀ f with f = (0, 0, −{LOAD:g}).",
             _torque(robot, J, k),
             "A column of J says what its joint does to the tool, and what a force does to its joint.",
-            start=home,
+            pose=Pose(home),
         ),
     ]
     if found is not None:
@@ -66,12 +67,12 @@ def outline(robot: Robot, units: Units) -> Outline:
                 "A singular configuration",
                 f"From home, the arm moves to a singularity: {short(near, units)}.",
                 _rank(robot, q),
-                start=home,
+                pose=Pose(home),
                 end=as_configuration(q),
                 practice="The ellipsoid is flat now, and the warning above names the motion that is lost.",
             )
         )
-    return Outline(GOAL, tuple(steps), _check(robot, J))
+    return Outline(GOAL, tuple(steps), _check(robot, J), pose=Pose(home))
 
 
 def singular(robot: Robot) -> tuple[Array, Singularity] | None:

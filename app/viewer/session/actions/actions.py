@@ -43,7 +43,7 @@ class Actions:
             "grab": self._on_grab,
             "feature": self._on_feature,
             "news": self._on_feature,
-            "lesson": lambda title: page.lessons.choose(title),
+            "lesson": self._choose_lesson,
             "axes": typed.use_axes,
             # Messages of the page's own script
             "undo": self._undo,
@@ -117,6 +117,11 @@ class Actions:
 
     def _undo(self, _: object) -> None:
         self._take("Undone", "Redo brings it back.", self.history.undo(self._page.snapshot()))
+
+    def _choose_lesson(self, title: object) -> None:
+        """Open a lesson at the pose of its step."""
+        self._page.lessons.choose(title)
+        self._page.lessons.begin()
 
     def _redo(self, _: object) -> None:
         self._take("Redone", "Undo takes it back again.", self.history.redo(self._page.snapshot()))

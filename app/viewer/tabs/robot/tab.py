@@ -199,7 +199,7 @@ class RobotTab(Feature):
         self._show_wrong()
 
     def _table(self) -> str:
-        if self.stage.activity.withheld == "table":
+        if "table" in self.stage.activity.withheld:
             return views.withheld()
         robot, units = self.stage.now.robot, self.stage.units
         return views.table(robot, units, self._revision, self._written, self._texts)
@@ -214,7 +214,7 @@ class RobotTab(Feature):
 
     def _show_conversion(self) -> None:
         robot = self.stage.now.robot
-        if self.stage.activity.withheld == "table":
+        if "table" in self.stage.activity.withheld:
             self._show("convert", "")
             return
         other = kin.convert(robot, OTHER[robot.convention]) if self._converting else None
@@ -376,7 +376,7 @@ class RobotTab(Feature):
     # Files
 
     def _download(self, kind: object) -> None:
-        if self.stage.activity.withheld == "table":
+        if "table" in self.stage.activity.withheld:
             words = "The file would contain the table that the open exercise asks for."
             self.stage.notify(Notice("advice", "Not now", words))
             return

@@ -14,7 +14,6 @@ from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 import kin
-from app.exercises.judging import judge, value_text, way_of
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -337,26 +336,26 @@ def test_either_way_is_right_and_named(robot: Robot) -> None:
     derivations = {branch.derivation.signs: branch.derivation for branch in given.branches}
     split = 0
     for asked in (asked for asked in numbers(given).values() if asked.named):
-        verdict = judge(asked, asked.answer)
+        verdict = asked.judge(asked.answer)
         assert verdict.right
         assert "This is “" in verdict.reason
         for way in asked.ways:
-            assert judge(asked, way.value + 0.3 * asked.tolerance).right
-            assert "this is the way “" in judge(asked, way.value).reason
-            assert way_of(asked, way.value) == 1
+            assert asked.judge(way.value + 0.3 * asked.tolerance).right
+            assert "this is the way “" in asked.judge(way.value).reason
+            assert asked.way_of(way.value) == 1
             assert any(
                 abs(math.remainder(way.value - float(value), 2.0 * math.pi)) < 1e-9
                 for found in derivations.values() for name, value in found.values.items() if name.startswith("θ")
             )  # fmt: skip
             split += 1
         for mistake in asked.mistakes:
-            assert not judge(asked, mistake.value).right
+            assert not asked.judge(mistake.value).right
     assert split == arm.splits or robot is PIONEER
     assert split
 
 
 def reason(asked: Number, value: float) -> str:
-    verdict = judge(asked, value)
+    verdict = asked.judge(value)
     assert not verdict.right
     return verdict.reason
 
@@ -438,7 +437,7 @@ def test_a_typed_way_is_followed_to_its_posture(port: int) -> None:
         assert followed(tab) == given.followed.name
         assert 'data-open="1"' not in tab.html, "no numbers before the first answer"
         say(tab, "pose", None)
-        say(tab, "type", value_text(asked["1"]), "1")
+        say(tab, "fields", [[asked["1"].value_text]], "1")
         tab.wait(lambda: 'data-derived="centre" data-open="1"' in tab.html)
         say(tab, "go", 1)
         other = given.beside(0)

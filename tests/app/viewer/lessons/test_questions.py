@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import kin
-from app.exercises.judging import judge, read, value_text, way_of
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.dh import questions as dh
 from app.viewer.lessons.equations import questions as equations
@@ -132,8 +131,8 @@ def test_a_vertical_axis_stays_vertical_when_it_is_typed(roll: float) -> None:
     torque = number(question(outline, "3"))
     assert (torque.answer, torque.mistakes) == (0.0, ())
     assert "no joint carries" in torque.method
-    assert judge(torque, 0.0).right
-    assert not judge(torque, 0.1).right
+    assert torque.judge(0.0).right
+    assert not torque.judge(0.1).right
 
 
 def test_a_tilted_axis_is_not_vertical() -> None:
@@ -160,10 +159,10 @@ def test_a_tolerance_keeps_off_mistakes_and_zero() -> None:
     assert apart(plain).tolerance == plain.tolerance == 0.011
     near = apart(replace(plain, mistakes=(Mistake(0.5995, "Not square."), Mistake(0.58051, "The same."))))
     assert [mistake.value for mistake in near.mistakes] == [0.5995]
-    assert judge(near, 0.5995).reason == "Not square."
-    assert judge(near, 0.583).right
-    assert not judge(apart(replace(plain, answer=0.0121)), 0.0).right
-    assert judge(apart(replace(plain, answer=1e-9)), 0.0).right
+    assert near.judge(0.5995).reason == "Not square."
+    assert near.judge(0.583).right
+    assert not apart(replace(plain, answer=0.0121)).judge(0.0).right
+    assert apart(replace(plain, answer=1e-9)).judge(0.0).right
     turn = Number("?", 3.1, UNITS.angles, 0.1, "Add.", (Mistake(-3.1, "The other side."),), whole_turns=True)
     assert apart(turn).tolerance < 0.5 * (2 * math.pi - 6.2)
 
@@ -178,14 +177,14 @@ def indistinct(outline: Outline) -> list[tuple[str, float, float]]:
     found = []
     for asked in (asked for _, asked in outline.questions() if isinstance(asked, Number)):
         seen = 0.02 if asked.unit.name in ("N", "N·m") else 0.0015
-        shown = value_text(asked)
-        assert judge(asked, read(asked, shown)).right, f"the shown answer is accepted: {shown}"
+        shown = asked.value_text
+        assert asked.judge(asked.read_text(shown)).right, f"the shown answer is accepted: {shown}"
         for wrong in (0.0, *(mistake.value for mistake in asked.mistakes)):
-            if way_of(asked, wrong) > 0:  # zero is one of the right values
+            if asked.way_of(wrong) > 0:  # zero is one of the right values
                 continue
             gap = wrong - asked.answer
             gap = math.remainder(gap, 2 * math.pi) if asked.whole_turns else gap
-            if abs(gap) > seen and judge(asked, wrong).right:
+            if abs(gap) > seen and asked.judge(wrong).right:
                 found.append((asked.prompt, asked.answer, wrong))
     return found
 

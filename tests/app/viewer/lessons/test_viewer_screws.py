@@ -14,7 +14,6 @@ from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 import kin
-from app.exercises.judging import judge
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -148,7 +147,7 @@ def test_the_questions_by_another_way(robot: kin.Robot) -> None:
     axis, joint = "xyz".index(first.prompt.split()[2]), int(first.prompt.split("joint ")[1].split(",")[0]) - 1
     assert first.answer == pytest.approx(line(joint)[1][axis], abs=1e-12)
     assert abs(first.answer) > 0.5
-    assert not judge(first, -first.answer).right
+    assert not first.judge(-first.answer).right
 
     far = asked["2"]
     assert isinstance(far, Number)

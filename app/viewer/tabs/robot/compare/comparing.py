@@ -114,7 +114,7 @@ class Comparing:
         self.leave()
         self._found, self._stopped = None, False
         self._hide()
-        if self._other is not None and self._stage.activity.withheld != "table":
+        if self._other is not None and "table" not in self._stage.activity.withheld:
             self._reader = self._stage.summaries.comparison(self._other.robot, self._stage.now.robot, self._frames)
         self.refresh()
 
@@ -214,7 +214,7 @@ class Comparing:
     def refresh(self) -> None:
         """Show everything in the present units."""
         stage, other = self._stage, self._other
-        if stage.activity.withheld == "table":
+        if "table" in stage.activity.withheld:
             for each in (self._form, self._answer, self._about):
                 update_html(each, "")
             return

@@ -1,0 +1,159 @@
+"""Steps own the scene: opening one brings arm and drawing to its pose, as one step of undo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from live_server import serve_viewer
+
+import kin
+from app.exercises import parse_exercise
+from app.exercises.questions import Question
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.lessons import LESSONS
+from app.viewer.lessons.guide.outline import Outline, Pose, Step
+from app.viewer.lessons.guide.progress import Progress
+from app.viewer.lessons.velocity.lesson import VelocityLesson
+from app.viewer.server import ViewerServer
+from kin import Robot
+from kin.units import Units
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE = Store()
+UR5 = STORE.get("ur5")
+DEGREES, RADIANS = Units(), Units(degrees=False, length="m")
+HEAD = 'id = "x"\ntitle = "X"\ntopic = "Velocity"\ntext = "?"\nrobot = "planar2r"\n'
+BODIES = {
+    "fields": 'kind = "number"\n[answer]\nvalue = [0.2, "30*deg"]\nlabels = ["x", "y"]\nunit = "deg"\n'
+    'tolerance = 1\nmethod = "Add."',
+    "options": 'kind = "choice"\n[answer]\noptions = [{text = "a", right = true, reason = "Yes."}, '
+    '{text = "b", reason = "No."}]',
+    "order": 'kind = "order"\n[answer]\nmotions = [{turn = "z", by = "30*deg"}, {slide = "x", by = 0.1}]',
+    "posture": 'kind = "reach"\n[target]\nq = ["20*deg", "40*deg"]\n[answer]\ntask = "position"',
+    "frame": 'kind = "frame"\n[answer]\nmotions = [{turn = "z", by = "90*deg"}]',
+    "table": 'kind = "dh"\n[answer]\nrows = [1, 2]',
+    "postures": 'kind = "solutions"\n[target]\nq = ["20*deg", "40*deg"]\n[answer]\ntask = "position"\nrows = 2',
+}
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[int]:
+    with serve_viewer(ViewerServer(STORE, Settings(), Clouds())) as port:
+        yield port
+
+
+def press(tab: FakeBrowser, key: list[object], value: object = None) -> None:
+    tab.say("feature", ["guide", key, value])
+
+
+def is_at(tab: FakeBrowser, robot: Robot, q: Any) -> bool:
+    return np.allclose(tab.tool_pose(), kin.fk(robot, np.array(q)), atol=1e-6)
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+def test_opening_a_step_brings_the_arm_to_its_pose(server: int, lesson: Any) -> None:
+    outline = lesson.outline(UR5, DEGREES)
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.set("Robot", UR5.name)
+        tab.set(next(name for name in tab.sliders if name.startswith("1 ")), 77.0)
+        tab.set("Lesson", lesson.title)
+        for number, step in enumerate(outline.steps):
+            press(tab, ["go", number], number)
+            tab.wait(lambda number=number, step=step: f"{number + 1}. {step.title}" in tab.html)
+            pose = outline.pose_of(number)
+            assert pose is not None
+            tab.wait(lambda pose=pose: is_at(tab, UR5, pose.q))
+
+
+def test_a_step_is_one_step_of_undo(server: int) -> None:
+    steps = VelocityLesson.outline(UR5, DEGREES).steps
+    assert steps[1].pose is not None
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.set("Robot", UR5.name)
+        tab.set("Lesson", "Velocity")
+        tab.wait(lambda: "1. A column" in tab.html and is_at(tab, UR5, UR5.q_home))
+        tab.set(next(name for name in tab.sliders if name.startswith("1 ")), 77.0)
+        q = np.concatenate([[np.radians(77.0)], UR5.q_home[1:]])
+        tab.wait(lambda: is_at(tab, UR5, q))
+        press(tab, ["go", 1], 1)
+        tab.wait(lambda: "2. Turning" in tab.html and is_at(tab, UR5, UR5.q_home))
+        tab.say("undo", None)
+        tab.wait(lambda: "1. A column" in tab.html and is_at(tab, UR5, q))
+
+
+def asked(form: str, units: Units) -> Question:
+    exercise = parse_exercise(HEAD + BODIES[form])
+    return exercise.kind.ask("?", exercise.variant(0), units)
+
+
+@pytest.mark.parametrize("form", BODIES)
+def test_a_step_may_be_answered_in_every_form(form: str) -> None:
+    question = asked(form, DEGREES)
+    assert question.asked().form == form
+    progress = Progress(Outline("You can.", (Step("A", "B.", question),), ()))
+    right = question.right()
+    assert progress.answer("1", right).right
+    # In a link, and in other units.
+    other = Progress(Outline("You can.", (Step("A", "B.", asked(form, RADIANS)),), ()))
+    other.restore(progress.state())
+    assert other.mark("1") == "right"
+    if form in ("fields", "table", "postures"):
+        assert question.cells(right)
+
+
+def test_typed_answers_keep_their_units() -> None:
+    question = asked("fields", DEGREES)
+    kept = question.read(["11.459", "30"])
+    assert kept == ["11.459 °", "30 °"]
+    assert asked("fields", RADIANS).judge(kept).right
+    assert not asked("fields", RADIANS).judge(["11.459", "30"]).right
+
+
+def test_the_way_is_shown_at_the_second_miss() -> None:
+    outline = VelocityLesson.outline(UR5, DEGREES)
+    progress, question = Progress(outline), dict(outline.questions())["1"]
+    far = 3.0 * question.right()  # type: ignore[operator]
+    progress.answer("1", far)
+    assert progress.feedback("1") == "Too large."
+    progress.answer("1", far)
+    assert progress.feedback("1") == "Too large.", "the same answer once more is not another miss"
+    progress.answer("1", 1.1 * far)
+    assert progress.feedback("1").startswith("Too large. On a circle")
+    again = Progress(outline)
+    again.restore(progress.state())
+    assert again.feedback("1") == progress.feedback("1")
+    again.restore({**progress.state(), "misses": {"1": -1, "9": 2, "c1": "x"}})
+    assert again.misses == {}
+
+
+def test_what_a_question_withholds_ends_with_the_answer() -> None:
+    outline = VelocityLesson.outline(UR5, DEGREES)
+    step = replace(outline.steps[0], withheld=frozenset({"jacobian"}))
+    outline = replace(outline, steps=(step, *outline.steps[1:]), withheld=(frozenset(), frozenset({"ellipsoid"})))
+    progress = Progress(outline)
+    assert progress.withheld == {"jacobian"}
+    progress.answer("1", 3.0)
+    assert progress.withheld == {"jacobian"}
+    progress.reveal("1")
+    assert progress.withheld == frozenset()
+    progress.go(len(outline.steps))
+    assert progress.withheld == {"ellipsoid"}
+    progress.reveal("c2")
+    assert progress.withheld == frozenset()
+
+
+def test_the_poses_of_steps_are_values() -> None:
+    pose = Pose((0.1, 0.2), drawing={"frame": "tool"})
+    assert pose == Pose((0.1, 0.2), drawing={"frame": "tool"})
+    with pytest.raises(AttributeError):
+        pose.q = (0.0,)  # type: ignore[misc]
