@@ -22,7 +22,7 @@ from app.api.problems import ClientLeftError, ProblemError
 from app.shared.clients import client_of
 from app.shared.memory.answers import AnswerMemory
 from app.shared.places import Place, Places
-from app.shared.threads.compiling import Hold, current_hold
+from app.shared.threads.compiling import queued
 from app.shared.threads.turns import MOST, Turn, Turns, offer
 
 T = TypeVar("T")
@@ -140,7 +140,7 @@ class ComputeSlots:
         try:
             async with asyncio.timeout(self.seconds) as waiting:
                 deadline.on_left = lambda: waiting.reschedule(0.0)
-                with (current_hold.get() or Hold()).queued():
+                with queued():
                     await places.wait(client)
         except TimeoutError:
             deadline.check_client()

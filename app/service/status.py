@@ -12,6 +12,7 @@ from starlette.responses import PlainTextResponse
 
 from app.classroom import Hub
 from app.service.startup import Status
+from app.service.web.compiling import told
 from app.shared.metrics import CONTENT_TYPE, exposition
 from kin.warmup.preparation import Preparation
 
@@ -42,7 +43,8 @@ class Readiness(BaseModel):
         description="Whether all kernels are compiled. Until then, first uses may take seconds."
     )
     kernels: Kernels | None = Field(
-        description="Those besides the first arm's, while they are compiled; null before that, and when all are."
+        description="Those besides the first arm's, while they are compiled; null before that, and when all are, "
+        "and while this process has to wait for the compiler to name them."
     )
     classrooms: Literal["ready", "off", "read-only", "missing", "newer-database"] = Field(
         description="Whether rooms can be opened: not if KINBOARD_MAX_ROOMS is 0 (off), if the folder "
@@ -76,8 +78,7 @@ async def readyz(request: Request, response: Response) -> Readiness:
     return Readiness(
         status=status,
         complete=startup.complete,
-        # In a thread: the first call of a process looks at all families of arms.
-        kernels=None if status != "ready" or done else await run_in_threadpool(_kernels, startup.preparation),
+        kernels=None if status != "ready" or done else await told(lambda: _kernels(startup.preparation)),
         classrooms=await run_in_threadpool(_classrooms, request),
     )
 

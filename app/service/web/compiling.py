@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import re
+from collections.abc import Callable
+from typing import TypeVar
 
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -21,9 +23,10 @@ from kin.warmup.preparation import Preparation
 
 PATIENCE = 4.0  # s in the compiler, after which a request is answered
 LOOK = 0.25  # s between two looks
-COUNTING = 0.5  # s that finding the number of the step may take
+COUNTING = 0.5  # s that it may take to find out what is prepared
 RETRY_AFTER = 5  # s
 
+T = TypeVar("T")
 _API = "/api/"
 _ROBOT = re.compile(r"/api/v\d+/robots/([^/]+)/")
 
@@ -67,11 +70,24 @@ class Compiling:
         token = current_hold.set(hold)
         try:
             await self.app(scope, receive, send_once)
+        except asyncio.CancelledError:  # the service is being stopped
+            if refusal is None:
+                raise
         finally:
             current_hold.reset(token)
             timer.cancel()
             if refusal is not None:
                 await refusal
+
+
+async def told(answer: Callable[[], T]) -> T | None:
+    """What `answer` says of the preparation, called in a thread; None if that takes long.
+
+    The first call in a process looks at all families of arms, for which it may have to wait for the compiler too.
+    """
+    waiting = asyncio.create_task(run_in_threadpool(answer))
+    await asyncio.wait((waiting,), timeout=COUNTING)
+    return waiting.result() if waiting.done() else None
 
 
 async def _problem(scope: Scope, path: str) -> ProblemError:
@@ -102,7 +118,4 @@ async def _step(robot: Robot | None, preparation: Preparation) -> str:
         done, of = preparation.steps(names)
         return f": step {min(done + 1, of)} of {of}" if of else ""
 
-    # The first call in a process looks at all families of arms, which may have to wait for the compiler too.
-    counting = asyncio.create_task(run_in_threadpool(count))
-    await asyncio.wait((counting,), timeout=COUNTING)
-    return counting.result() if counting.done() else ""
+    return await told(count) or ""

@@ -9,14 +9,14 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 
 from kin.kernels.compiler import observe_compiler
 
 
 class Hold:
-    """Of one request: how long its thread has been in the compiler, or how long it has waited for a place."""
+    """Of one request: how long its thread has been in the compiler, or has waited for a place or a turn."""
 
     def __init__(self) -> None:
         self._depth = 0
@@ -34,7 +34,7 @@ class Hold:
 
     @contextmanager
     def queued(self) -> Iterator[None]:
-        """Within the context the request waits for a place, which others may hold while they compile."""
+        """Within the context the request waits for what others may hold while they compile."""
         self._queued = time.monotonic()
         try:
             yield
@@ -77,3 +77,11 @@ class _Users:
 current_hold: ContextVar[Hold | None] = ContextVar("current_hold", default=None)
 _users = _Users()
 observe_compiler(_users)
+
+
+@contextmanager
+def queued() -> Iterator[None]:
+    """Within the context the request of this thread or task, if there is one, waits for a place or a turn."""
+    hold = current_hold.get()
+    with nullcontext() if hold is None else hold.queued():
+        yield

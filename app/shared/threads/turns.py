@@ -4,7 +4,8 @@ Only one thread at a time runs Python. With sixteen requests that compute, the e
 visitors would get a seventeenth of the interpreter: a drag would take half a second instead of some milliseconds.
 So a thread has a turn while it computes, and offers it to others between two steps. A short request is next soon,
 however many long ones there are. Computations wait while a visitor's event is answered and while the event loop is
-busy, as each of its calls to the system would have to wait for the interpreter again.
+busy, as each of its calls to the system would have to wait for the interpreter again. A thread that asks for the
+compiler of kernels has no turn until it leaves it, which may take a minute.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ import threading
 import time
 
 from app.shared.threads import background_threads
+from app.shared.threads.compiling import queued
+from kin.kernels.compiler import observe_compiler
 
 SLICE = 0.01  # seconds of a turn before it is offered to others
 AGING = 0.2  # seconds of computing that one second of waiting makes up for
@@ -80,8 +83,9 @@ class Turns:
         return mine
 
     def _wait(self, mine: threading.Event) -> None:
-        while not mine.wait(STUCK):
-            self._add_turn()
+        with queued():
+            while not mine.wait(STUCK):
+                self._add_turn()
 
     def _add_turn(self) -> None:
         with self._lock:
@@ -109,6 +113,7 @@ class Turn:
         self._since = 0.0
         self._waited = 0.0  # when it last waited for what is urgent
         self._pause = LEAST  # until it does so again
+        self._breaks = 0  # begun and not ended
 
     def __enter__(self) -> Turn:
         self._turns.take(self._used)
@@ -121,6 +126,20 @@ class Turn:
         _current.turn = None
         self._used += time.monotonic() - self._since
         self._turns.give()
+
+    def enter(self) -> None:
+        """The thread asks for the compiler: others have its turn."""
+        self._breaks += 1
+        if self._breaks == 1:
+            self._used += time.monotonic() - self._since
+            self._turns.give()
+
+    def leave(self) -> None:
+        """The thread has left the compiler: it waits for a turn."""
+        self._breaks -= 1
+        if not self._breaks:
+            self._turns.take(self._used)
+            self._since = time.monotonic()
 
     def offer(self) -> None:
         """Let what is urgent go first, and others run if it is their turn."""
@@ -180,8 +199,27 @@ urgent = Urgent()
 _current = threading.local()
 
 
+class _Breaks:
+    """Hears of the compiler in each thread."""
+
+    def enter(self) -> None:
+        if (turn := _turn_of_thread()) is not None:
+            turn.enter()
+
+    def leave(self) -> None:
+        if (turn := _turn_of_thread()) is not None:
+            turn.leave()
+
+
+observe_compiler(_Breaks())
+
+
+def _turn_of_thread() -> Turn | None:
+    turn: Turn | None = getattr(_current, "turn", None)
+    return turn
+
+
 def offer() -> None:
     """A point between two steps of a computation: let others run. Does nothing in a thread without a turn."""
-    turn: Turn | None = getattr(_current, "turn", None)
-    if turn is not None:
+    if (turn := _turn_of_thread()) is not None:
         turn.offer()

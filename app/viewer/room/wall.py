@@ -2,7 +2,8 @@
 
 All pieces of all arms are instances of one cylinder in one node, and the pads below them are another: a tick sends
 two lists of poses, however many students there are. The arms float in a plane that faces the default view, so that
-each is seen as in the view of one arm.
+each is seen as in the view of one arm. They and their names share the picture as evenly as its shape allows; names
+have a size in the scene, so that they keep to their cells in every window.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ import viser
 from numpy.typing import NDArray
 
 from app.classroom.work import Progress
-from app.viewer.labels import add_label
 from app.viewer.scene.camera import DIRECTION
 from app.viewer.scene.meshes import Body, body
 from app.viewer.skeleton import cylinder, places, skeleton
@@ -26,23 +26,38 @@ from kin import Robot
 from kin.transforms import Array
 
 State = Progress | Literal["away", "none"]
-# Colour of the pad, and symbol before the name.
+
+
+def _lit(*color: int) -> tuple[int, int, int]:
+    """What the scene must be given to show an sRGB colour: it takes colours of instances as amounts of light."""
+    r, g, b = (
+        round(255 * (c / 12.92 if (c := each / 255) <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4))
+        for each in color
+    )
+    return r, g, b
+
+
+# Colour of the pad, and symbol before the words.
 PADS: dict[State, tuple[int, int, int]] = {
-    "none": (118, 142, 166), "not begun": (118, 142, 166), "at it": (86, 140, 190), "stuck": (213, 94, 0),
-    "gave up": (204, 121, 167), "solved": (0, 158, 115), "away": (150, 150, 150),
+    "none": _lit(118, 142, 166), "not begun": _lit(118, 142, 166), "at it": _lit(86, 140, 190),
+    "stuck": _lit(213, 94, 0), "gave up": _lit(204, 121, 167), "solved": _lit(0, 158, 115),
+    "away": _lit(150, 150, 150),
 }  # fmt: skip
 SYMBOLS: dict[State, str] = {
     "none": "", "not begun": "○ ", "at it": "✎ ", "stuck": "! ", "gave up": "⚑ ", "solved": "✓ ", "away": "… ",
 }  # fmt: skip
-HAND, RAISED = "☝ ", (230, 159, 0)  # before the name, and colour of the pad's column
+HAND, RAISED = "☝ ", _lit(240, 190, 0)  # before the name, and colour of the pad's column
 LINK, JOINT, AWAY = (86, 140, 190), (44, 62, 80), (165, 170, 175)
 MOST = 40  # arms on the wall
-WIDTH = 4.4  # of the wall, in radii of the sphere around the arm on show
-SIZE = 0.42  # radius of a small arm, in distances between two of them
-LABEL = 0.06  # height of a name below the pad of its arm, in the same
-LETTERS = (1.0, 1.8, 9.0)  # smallest and largest size of names, in the usual one, and that size times columns
-ROOM = 0.52  # room above and below the middle of an arm, in the same
-PAD = (0.26, 0.03)  # radius and thickness of a pad, in the same
+WIDTH = 4.4  # of the wall, in radii of the sphere around the arm on show, which the picture shows as well
+HEIGHT = 2.4  # of the wall at least, in the same
+SIZE = 0.56  # radius of a small arm, in sides of the square for it: an arm seldom reaches as far as it could
+SMALLEST, LARGEST = 0.0255, 0.042  # height of a line of a name, in heights of the wall: 24 pixels or more of 1080
+LETTER = 0.55  # width of a letter, in these lines
+NARROW = 0.75  # of the width, instead of the height, in a narrow picture
+WORDS = 6.65  # width of a state in words, in these lines
+LINES = 2.6  # height of name and state with some space, in these lines
+PAD = (0.26, 0.03)  # radius and thickness of a pad, in sides of that square
 COLUMN = 0.05  # radius of the column below a base, in the same
 NAME = "/wall-"  # what the names of the nodes begin with
 _WALLS = itertools.count(1)
@@ -63,26 +78,66 @@ class SmallArm:
     state: State
     hand: bool = False
 
+    def label(self, letters: int) -> str:
+        """The name, cut to so many letters, and below it how the student is doing, in a symbol and words."""
+        name = self.name if len(self.name) <= letters else f"{self.name[: letters - 1]}…"
+        words = "" if self.state == "none" else f"{SYMBOLS[self.state]}{self.state}"
+        return f"{HAND if self.hand else ''}{name}\n{words}".rstrip()
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Cells of a wall, row by row from the top left, in one unit of length.
+
+    Attributes:
+        count, columns: number of cells, and how many of them stand in a row.
+        width, height: of a cell.
+        line: height of a line of text.
+        side: of the square for the arm, which stands above two lines of text.
+    """
+
+    count: int
+    columns: int
+    width: float
+    height: float
+    line: float
+
     @property
-    def label(self) -> str:
-        """The name, with how the student is doing in a symbol and a word."""
-        words = "" if self.state == "none" else f" · {self.state}"
-        return f"{HAND if self.hand else ''}{SYMBOLS[self.state]}{self.name}{words}"
+    def rows(self) -> int:
+        return math.ceil(self.count / self.columns)
+
+    @property
+    def side(self) -> float:
+        return min(self.width, self.height - LINES * self.line)
+
+    @property
+    def letters(self) -> int:
+        """How many letters of a name fit into a cell."""
+        return max(1, int(self.width / (LETTER * self.line)) - 1)
+
+    def middles(self) -> Array:
+        """Middles ``(count, 2)`` of the squares for the arms, to the right and up from the middle of the wall."""
+        places = np.arange(self.count)
+        x, y = places % self.columns - (self.columns - 1) / 2, (self.rows - 1) / 2 - places // self.columns
+        found: Array = np.column_stack([self.width * x, self.height * y + 0.5 * LINES * self.line])
+        return found
 
 
-def columns_of(count: int, aspect: float) -> int:
-    """How many arms stand in a row, in a picture of this aspect ratio."""
-    return max(1, min(count, math.ceil(math.sqrt(count * aspect * 0.9))))
+def layout_of(count: int, width: float, height: float) -> Layout:
+    """The layout in which the arms are as large as they can be, names being legible, for 1 or more arms."""
 
+    size = min(height, NARROW * width)
+    smallest, largest = SMALLEST * size, LARGEST * size
 
-def cells(count: int, columns: int, pitch: float, center: Array) -> Array:
-    """Middles ``(count, 3)`` of the cells, row by row from the top left. They face the default view."""
-    right, up, _ = _plane()
-    rows = math.ceil(count / columns)
-    places = np.arange(count)
-    x, y = places % columns - (columns - 1) / 2, (rows - 1) / 2 - places // columns
-    found: Array = center + pitch * (x[:, None] * right + y[:, None] * up)
-    return found
+    def with_columns(columns: int) -> Layout:
+        cell = width / columns
+        line = min(max(cell / (1.5 * WORDS), smallest), largest, cell / WORDS)
+        return Layout(count, columns, cell, height / math.ceil(count / columns), line)
+
+    def worth(layout: Layout) -> tuple[bool, float]:
+        return layout.line >= smallest, layout.side
+
+    return max(map(with_columns, range(1, count + 1)), key=worth)
 
 
 def _plane() -> Array:
@@ -103,24 +158,24 @@ class Wall:
 
     def __init__(self, scene: viser.SceneApi, around: Body, aspect: float, clicked: Callable[[str], None]) -> None:
         self._scene, self._around, self._aspect, self._clicked = scene, around, aspect, clicked
-        self._layout: tuple[tuple[str, Robot], ...] | None = None
+        self._arms: tuple[tuple[str, Robot], ...] | None = None  # seats and robots, by cell
         self._shown: list[bytes] = []
         self._states: tuple[tuple[State, bool], ...] = ()
         self._root: viser.SceneNodeHandle | None = None
         self._nodes: list[viser.BatchedMeshHandle] = []
         self._labels: list[viser.LabelHandle] = []
         self._owners: list[list[int]] = [[], []]  # index of the arm of each instance, by node
+        self._layout = Layout(1, 1, 1.0, 1.0, 0.03)
         self._cells = np.zeros((0, 3))
-        self._pitch = 1.0
         self.corners = np.zeros((0, 3))
 
     def show(self, arms: Sequence[SmallArm]) -> bool:
         """Draw these arms; returns whether their places are other ones. Unchanged arms are not computed again."""
         arms = arms[:MOST]
-        layout = tuple((arm.seat, arm.robot) for arm in arms)
-        fresh = layout != self._layout
+        shown = tuple((arm.seat, arm.robot) for arm in arms)
+        fresh = shown != self._arms
         if fresh:
-            self._build(arms, layout)
+            self._build(arms, shown)
         self._pose(arms)
         states = tuple((arm.state, arm.hand) for arm in arms)
         if self._nodes and (fresh or states != self._states):
@@ -130,29 +185,29 @@ class Wall:
             columns = [RAISED if hand else PADS[state] for state, hand in states]
             self._nodes[1].batched_colors = np.array(pads + columns, np.uint8)
         for label, arm in zip(self._labels, arms, strict=True):
-            if label.text != arm.label:
-                label.text = arm.label
+            if label.text != (text := arm.label(self._layout.letters)):
+                label.text = text
         return fresh
 
     def remove(self) -> None:
         """Remove everything from the scene."""
         if self._root is not None:
             self._root.remove()
-        self._nodes, self._labels, self._layout, self._root = [], [], None, None
+        self._nodes, self._labels, self._arms, self._root = [], [], None, None
 
-    def _build(self, arms: Sequence[SmallArm], layout: tuple[tuple[str, Robot], ...]) -> None:
+    def _build(self, arms: Sequence[SmallArm], shown: tuple[tuple[str, Robot], ...]) -> None:
         self.remove()
-        self._layout, self._shown = layout, [b""] * len(arms)
+        self._arms, self._shown = shown, [b""] * len(arms)
         count = len(arms)
         if not count:
             return
-        columns = columns_of(count, self._aspect)
-        self._pitch = WIDTH * self._around.radius / max(columns, 2)
-        self._cells = cells(count, columns, self._pitch, self._around.center)
-        room = self._pitch * np.array([SIZE, ROOM, SIZE])
-        self.corners = np.vstack(
-            [self._cells + (room * signs) @ _plane() for signs in itertools.product((-1, 1), repeat=3)]
-        )
+        width = max(WIDTH, HEIGHT * self._aspect) * self._around.radius
+        height = width / self._aspect
+        self._layout = layout = layout_of(count, width, height)
+        plane, center = _plane()[:2], self._around.center
+        middles = layout.middles()
+        self._cells = center + middles @ plane
+        self.corners = center + 0.5 * np.array([*itertools.product((-width, width), (-height, height))]) @ plane
         bones = [skeleton(arm.robot) for arm in arms]
         scales = [self._scale(arm.robot) * bone.scales for arm, bone in zip(arms, bones, strict=True)]
         root = f"{NAME}{next(_WALLS)}"
@@ -163,15 +218,17 @@ class Wall:
             self._add(f"{root}/arms", np.zeros((len(self._owners[0]), 3)), np.vstack(scales), 0),
             self._add(f"{root}/pads", feet, pads, 1),
         ]
-        out = 0.3 * self._pitch * DIRECTION / np.linalg.norm(DIRECTION) - [0.0, 0.0, LABEL * self._pitch]
-        smallest, largest, share = LETTERS
-        scale = float(np.clip(share / columns, smallest, largest))
+        # Below the pad, but within the cell.
+        low = (feet[:count] - center) @ plane[1] - 0.5 * PAD[0] * layout.side
+        low = np.maximum(low, middles[:, 1] - 0.5 * layout.side)
+        tops = center + np.column_stack([middles[:, 0], low]) @ plane
         self._labels = [
-            add_label(
-                self._scene, f"{root}/name/{i}", arm.label, scale=scale, position=foot + out, anchor="top-center"
+            self._scene.add_label(
+                f"{root}/name/{i}", arm.label(layout.letters), font_size_mode="scene",
+                font_scene_height=layout.line, position=top, anchor="top-center",
             )
-            for i, (arm, foot) in enumerate(zip(arms, feet[:count], strict=True))
-        ]
+            for i, (arm, top) in enumerate(zip(arms, tops, strict=True))
+        ]  # fmt: skip
 
     def _pads(self, arms: Sequence[SmallArm]) -> tuple[Array, Array]:
         """Scales and positions ``(2 * count, 3)`` of the pads, and of the columns below the arms' bases."""
@@ -184,9 +241,10 @@ class Wall:
             self._scale(arm.robot) * max(base[2] - foot[2], 0.0)
             for arm, base, foot in zip(arms, bases, feet, strict=True)
         ]
-        pads = np.tile(self._pitch * np.array([PAD[0], PAD[0], PAD[1]]), (len(arms), 1))
-        columns = np.array([[COLUMN * self._pitch, COLUMN * self._pitch, max(height, 1e-6)] for height in heights])
-        return np.vstack([pads, columns]), np.vstack([placed - [0.0, 0.0, self._pitch * PAD[1]], placed])
+        side = self._layout.side
+        pads = np.tile(side * np.array([PAD[0], PAD[0], PAD[1]]), (len(arms), 1))
+        columns = np.array([[COLUMN * side, COLUMN * side, max(height, 1e-6)] for height in heights])
+        return np.vstack([pads, columns]), np.vstack([placed - [0.0, 0.0, side * PAD[1]], placed])
 
     def _add(self, name: str, positions: Array, scales: Array, index: int) -> viser.BatchedMeshHandle:
         vertices, faces = cylinder()
@@ -196,7 +254,7 @@ class Wall:
             batched_colors=np.zeros((len(positions), 3), np.uint8), lod="off", cast_shadow=False,
             receive_shadow=False,
         )  # fmt: skip
-        owners, seats = self._owners[index], [seat for seat, _ in self._layout or ()]
+        owners, seats = self._owners[index], [seat for seat, _ in self._arms or ()]
 
         @node.on_click
         async def _(event: viser.SceneNodePointerEvent[viser.BatchedMeshHandle]) -> None:
@@ -207,7 +265,7 @@ class Wall:
         return node
 
     def _scale(self, robot: Robot) -> float:
-        return SIZE * self._pitch / body(robot).radius
+        return SIZE * self._layout.side / body(robot).radius
 
     def _place(self, i: int, robot: Robot, points: Array) -> Array:
         """Points ``(…, 3)`` of an arm where its small copy has them."""

@@ -14,9 +14,11 @@ from live_server import serve, wait_for
 from numba.core.compiler_lock import global_compiler_lock
 
 from app.api import ik
+from app.service import status
 from app.service.main import create_app
 from app.service.web import compiling
 from app.shared.settings import Settings
+from app.shared.threads.turns import MOST
 from kin.solvers import family_of
 from kin.warmup import all_of, parts
 
@@ -104,6 +106,25 @@ def test_one_that_waits_for_the_place_of_such_a_request_is_answered_in_time_too(
     wait_for(lambda: app.state.compute.used == 0, 20)
 
 
+def test_those_that_wait_for_the_compiler_take_no_turn_from_others(
+    served: tuple[Any, httpx2.Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """More of them than there are turns, also beyond the usual number."""
+    app, client = served
+    monkeypatch.setattr(compiling, "PATIENCE", PATIENCE)
+    monkeypatch.setattr(app.state.compute._places, "most", 100)
+    monkeypatch.setattr(app.state.compute._places, "most_of_one", 100)
+    solve, waiting = ik.solve, 2 * MOST + 1
+    with Compiler(), ThreadPoolExecutor(waiting) as callers:
+        monkeypatch.setattr(ik, "solve", after_compiling(solve))
+        for answer in callers.map(lambda _: client.post(f"{UR5}/ik", json=BODY), range(waiting)):
+            assert answer.json()["type"] == "urn:kinboard:problem:preparing"
+        assert app.state.compute.used == waiting
+        monkeypatch.setattr(ik, "solve", solve)
+        assert client.post(f"{UR5}/ik", json=BODY).status_code == 200
+    wait_for(lambda: app.state.compute.used == 0, 20)
+
+
 def test_a_request_that_computes_beside_the_compiler_is_not_refused(
     served: tuple[Any, httpx2.Client], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -132,3 +153,19 @@ def test_on_a_new_machine_the_step_is_said_and_the_arm_comes_first(live: tuple[A
         assert detail == f"The UR5 is being prepared for the first time on this machine: step 1 of {steps}."
         assert preparation.next()[0] == family
     preparation.finish()
+
+
+def test_readyz_does_not_wait_for_the_compiler(
+    served: tuple[Any, httpx2.Client], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, client = served
+    monkeypatch.setattr(status, "_kernels", after_compiling(status._kernels))
+    app.state.startup.preparation.begin()
+    try:
+        assert client.get("/readyz").json()["kernels"]["waiting"]
+        with Compiler():
+            began = time.monotonic()
+            assert client.get("/readyz").json()["kernels"] is None
+            assert time.monotonic() - began < 3.0
+    finally:
+        app.state.startup.preparation.finish()

@@ -475,13 +475,13 @@ def test_the_wall_says_what_the_list_says(room: Class) -> None:
     for tab in tabs:
         tab.wait(lambda tab=tab: f'data-exercise="{EXERCISE}"' in tab.html)
     press(teacher, "wall")
-    teacher.wait(lambda: names() == ["○ Ann · not begun", "○ Bob · not begun", "○ Eve · not begun"])
+    teacher.wait(lambda: names() == ["Ann\n○ not begun", "Bob\n○ not begun", "Eve\n○ not begun"])
     tabs[0].say("feature", ["exercises", ["answer", 1], 2])
     for option in range(3):
         tabs[1].say("feature", ["exercises", ["answer", f"{option}", option], 0])
     press(tabs[0], "hand")
     press(tabs[1], "hand")
-    teacher.wait(lambda: names() == ["☝ ✓ Ann · solved", "☝ ! Bob · stuck", "○ Eve · not begun"])
+    teacher.wait(lambda: names() == ["☝ Ann\n✓ solved", "☝ Bob\n! stuck", "Eve\n○ not begun"])
     colours = [
         tuple(np.ravel(teacher.nodes[name]["props"]["batched_colors"])[:3])
         for name in teacher.nodes
@@ -489,7 +489,7 @@ def test_the_wall_says_what_the_list_says(room: Class) -> None:
     ]
     assert colours == [PADS["solved"]]
     room.hub.rooms.remove_seat(room.room.id, tickets[2].seat)
-    teacher.wait(lambda: names() == ["☝ ✓ Ann · solved", "☝ ! Bob · stuck"])
+    teacher.wait(lambda: names() == ["☝ Ann\n✓ solved", "☝ Bob\n! stuck"])
     room.hub.rooms.end(room.room.id)
     teacher.wait(lambda: names() == [])
     teacher.wait(lambda: "Close the wall" not in teacher.html)

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import kin
 from app.classroom import ClassroomUnavailable, Confirmed, NewAttempt, RefusedError, RoomView, SeatView, Task
 from app.classroom.standing import standing
 from app.classroom.work import ANSWER_SHOWN, Attempt, Work, works
@@ -22,8 +23,7 @@ from app.viewer.room.member import act_of
 from app.viewer.room.sharing import REST, Sharing
 from app.viewer.room.student import Student
 from app.viewer.room.submissions import Submissions
-from app.viewer.room.wall import MOST, cells, columns_of
-from app.viewer.scene.camera import DIRECTION
+from app.viewer.room.wall import LETTER, LINES, MOST, PADS, SYMBOLS, SmallArm, layout_of
 from app.viewer.session.state import PageState
 from app.viewer.worksheet.feature import Worksheets
 
@@ -31,15 +31,41 @@ EXERCISES = Exercises()
 ATTEMPT = NewAttempt("swing", 1, [1], "Yes.", 1.0, 0.0)
 
 
-@given(st.integers(1, MOST), st.floats(0.4, 2.5), st.floats(0.1, 10.0))
-def test_cells_are_apart_and_face_the_default_view(count: int, aspect: float, pitch: float) -> None:
-    columns = columns_of(count, aspect)
-    assert 1 <= columns <= count
-    found = cells(count, columns, pitch, np.array([1.0, 2.0, 3.0]))
-    assert found.shape == (count, 3)
-    np.testing.assert_allclose((found - [1.0, 2.0, 3.0]) @ DIRECTION, 0.0, atol=1e-9 * (1 + pitch * count))
-    apart = np.linalg.norm(found[:, None] - found[None], axis=2) + 1e9 * np.eye(count)
-    assert apart.min() >= pitch * (1 - 1e-9)
+SHOWN = 0.88  # share of the picture that the wall takes at most
+
+
+@given(st.integers(1, MOST), st.floats(0.4, 2.5))
+def test_arms_and_names_of_a_wall_keep_to_their_cells(count: int, aspect: float) -> None:
+    layout = layout_of(count, aspect, 1.0)
+    assert 1 <= layout.columns <= count
+    assert layout.columns * layout.width == pytest.approx(aspect)
+    assert layout.rows * layout.height == pytest.approx(1.0)
+    assert layout.side > 0.0
+    middles = layout.middles()
+    above, below = middles[:, 1] + 0.5 * layout.side, middles[:, 1] - 0.5 * layout.side - LINES * layout.line
+    assert above.max() <= 0.5 + 1e-9
+    assert below.min() >= -0.5 - 1e-9
+    assert (np.abs(middles[:, 0]) + 0.5 * layout.width).max() <= 0.5 * aspect + 1e-9
+    apart = np.abs(middles[:, None] - middles[None]) / [layout.width, layout.height]
+    assert (apart.max(axis=2) + np.eye(count)).min() >= 1.0 - 1e-9
+    longest = max(len(SYMBOLS[state] + state) for state in PADS)
+    assert longest * LETTER * layout.line <= layout.width * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("count", range(1, MOST + 1))
+def test_names_are_legible_at_1920_by_1080_and_the_arms_take_the_space(count: int) -> None:
+    height = 1080
+    width = 1470  # beside the panel
+    layout = layout_of(count, width, height)
+    assert SHOWN * layout.line >= 24.0
+    assert count * layout.side * (layout.side + LINES * layout.line) >= 0.44 * width * height
+
+
+def test_a_long_name_is_cut_and_a_state_is_not() -> None:
+    robot = kin.get_robot("pioneer5")
+    arm = SmallArm("1", "Bartholomew Featherstone", robot, robot.q_home, "not begun", hand=True)
+    assert arm.label(12) == "☝ Bartholomew…\n○ not begun"
+    assert SmallArm("1", "Ada", robot, robot.q_home, "none").label(12) == "Ada"
 
 
 def test_a_state_is_sent_at_most_so_often_and_only_if_it_changed() -> None:
