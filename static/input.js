@@ -271,6 +271,56 @@
     input.focus();
   });
 
+  // Jog: one step when a button is pressed, more while it is held
+
+  const HELD = 400, AGAIN = 120; // ms until the second step, and between two
+  const jogged = { "kb-pad-frame": null, "kb-pad-step": null }; // what the visitor has chosen
+  let held = null; // the button
+  let jogging = 0; // the timer of its next step
+  const chosen = (name) => document.querySelector(`input[name="${name}"]:checked`)?.value;
+  function jog(button) {
+    const [axis, sign] = button.dataset.pad.split(" ").map(Number);
+    send("jog", [chosen("kb-pad-frame"), axis, sign, Number(chosen("kb-pad-step"))]);
+  }
+  function jogAgain(pause) {
+    jogging = setTimeout(() => {
+      // On a page that is slow, the button may have been released meanwhile: such events come before the next frame.
+      requestAnimationFrame(() => {
+        if (!held?.isConnected) return;
+        jog(held);
+        jogAgain(AGAIN);
+      });
+    }, pause);
+  }
+  function stopJog() { // what was done until then is one step of the history
+    clearTimeout(jogging);
+    if (held) send("released");
+    held = null;
+  }
+  addEventListener("pointerdown", (event) => {
+    const button = event.target.closest?.("[data-pad]");
+    if (!button || event.button !== 0) return;
+    stopJog();
+    held = button;
+    jog(button);
+    jogAgain(HELD);
+  });
+  for (const kind of ["pointerup", "pointercancel", "blur"]) addEventListener(kind, stopJog);
+  addEventListener("contextmenu", (event) => { if (event.target.closest?.("[data-pad]")) event.preventDefault(); }); // a long touch
+  addEventListener("click", (event) => {
+    const button = event.target.closest?.("[data-pad]");
+    if (!button || event.detail !== 0) return;
+    jog(button); // by a key
+    send("released");
+  });
+  addEventListener("change", (event) => { if (event.target.name in jogged) jogged[event.target.name] = event.target.value; });
+  function keepJog() { // the pad is written again for another robot
+    for (const [name, value] of Object.entries(jogged)) {
+      const radio = value && document.querySelector(`input[name="${name}"][value="${value}"]`);
+      if (radio && !radio.checked) radio.checked = true;
+    }
+  }
+
   // Keys of the page
 
   /** A key pressed while no control has the focus. */
@@ -321,6 +371,7 @@
   function follow() {
     readAnswers();
     readFields();
+    keepJog();
     pressLocks();
     alignTracks();
   }

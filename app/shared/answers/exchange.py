@@ -12,7 +12,7 @@ from kin.robot import Convention
 
 
 class ConvertAnswer(Answer):
-    """The same arm in the other convention, with the proof."""
+    """The same arm in the other convention, with what a check found."""
 
     robot: RobotAnswer
     """The arm as a table in the requested convention."""
@@ -91,7 +91,7 @@ class ImportAnswer(Answer):
     toml: str
     """The same as the text of a robot file."""
     report: UrdfReportAnswer
-    """What became of the file, and the proof."""
+    """What became of the file, and what a check found."""
 
 
 def convert_answer(robot: Robot, convention: Convention) -> ConvertAnswer:

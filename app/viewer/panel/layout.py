@@ -8,6 +8,7 @@ import viser
 
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post
+from app.viewer.panel.jog import JogPad
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.robots import RobotMenu
@@ -35,6 +36,7 @@ class Panel:
 
     Attributes:
         script: the connection to the page's own script.
+        jog: buttons that move the arm in steps.
         joints, posture: folders that are filled for each robot.
         obstacles: the folder of the obstacles, closed, so that the rest fits a small window.
         learn: the tab for lessons.
@@ -69,6 +71,7 @@ class Panel:
             self.joints = gui.add_folder("Joints")
             go_to_buttons(gui, post)
             self.target = TargetChoice(gui, DEFAULT_TASK, post)
+            self.jog = JogPad(gui, robot)
             self.posture = gui.add_folder("Posture and redundancy")
             self.obstacles = gui.add_folder("Obstacles", expand_by_default=False)
         self.legend = gui.add_html("")
@@ -96,4 +99,4 @@ class Panel:
         if small:
             self.robots.hide()
             self.target.hide()
-            self.posture.visible = self.obstacles.visible = False
+            self.jog.folder.visible = self.posture.visible = self.obstacles.visible = False

@@ -34,7 +34,7 @@ from app.viewer.scene.motion import Motion, Pace
 from app.viewer.session.listener import ArmListener
 from kin import Obstacle, Robot, Task
 from kin.ik import solve
-from kin.transforms import Array, rotation_from_wxyz
+from kin.transforms import Array, rotation_angle, rotation_from_wxyz
 
 # A node name is never used twice: browsers keep the poses of removed nodes.
 _ARMS = itertools.count(1)
@@ -44,6 +44,14 @@ PRISMATIC_WEIGHT = 4.0
 RANDOM_DRAWS = 50
 # A target closer to the tool than this (m) gets no connecting line.
 _GAP = 5e-4
+_NOT_FOLLOWED = 0.9  # of a step: if the tool is so far behind, it has not followed
+
+
+def _gap(one: Array, other: Array, turned: bool) -> float:
+    """The distance (m) of two poses ``(4, 4)`` or, if `turned`, the angle (rad) between them."""
+    if turned:
+        return rotation_angle(one[:3, :3], other[:3, :3])
+    return float(np.linalg.norm(one[:3, 3] - other[:3, 3]))
 
 
 class ArmController:
@@ -247,6 +255,20 @@ class ArmController:
         """Move the target along (m), or turn it about (rad), one axis of the gizmo."""
         T = self.now.aim
         self.set_target(gizmo.nudged(T, axis, turn, amount, self._in_base))
+
+    def jog(self, axis: int, turn: bool, amount: float, in_base: bool) -> bool:
+        """Move the target along (m), or turn it about (rad), one axis of its own or of the base.
+
+        Returns:
+            False where nothing was done: the tool did not follow the step before, and would not follow this one.
+        """
+        T, tool = self.now.aim, self.now.T_goal
+        wanted = gizmo.nudged(T, axis, turn, amount, in_base)
+        before, after = (_gap(each, tool, turn) for each in (T, wanted))
+        if min(before, after - before) > _NOT_FOLLOWED * abs(amount):
+            return False
+        self.set_target(wanted)
+        return True
 
     def use_base_axes(self, in_base: bool) -> None:
         """Align the gizmo with the base, or with the tool."""

@@ -62,6 +62,7 @@ RULES: Final[dict[str, Rule]] = {
     "field": Rule("Typed value", message=True, answered=True, act=True),
     "target": Rule("Typed target", message=True, answered=True, act=True),
     "nudge": Rule("Target moved by keys", gradual=SHORT_PAUSE, message=True, act=True),
+    "jog": Rule("Jog", gradual=LONG_PAUSE, message=True, act=True),
     "snap": Rule(step=False, message=True),
     "released": Rule(step=False, message=True),
     # The looks of the page, and the camera

@@ -366,6 +366,7 @@ class VisitorPage(ShownArm, Worker):
         self.numbers.use_frames()
         self.panel.target.show(self.arm.task)
         self.sliders = self._make_sliders()
+        self.panel.jog.use_robot(robot)
         self.posture.use_robot()
         self.looks.apply()
         self.arm.scene.size_gizmo(self.camera.small)

@@ -52,6 +52,7 @@ class Actions:
             "released": self._on_release,
             "snap": typed.snap,
             "nudge": typed.nudge,
+            "jog": typed.jog,
             "field": typed.set_field,
             "target": typed.set_target,
         }

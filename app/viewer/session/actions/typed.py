@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import kin
 from app.exercises.typed import EntryError
 from app.viewer.panel.entry import PoseKind, read_pose
+from app.viewer.panel.jog import STEPS
 from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice
 from app.viewer.panel.view import AXES
@@ -14,10 +16,17 @@ from app.viewer.scene.gizmo import FINE_STEP, FINE_TURN, STEP, TURN
 from app.viewer.session.parts import Page
 from kin.axes import inverse
 
+_NO_FURTHER = Notice("unreachable", "No further in this direction", "The tool does not follow the target there.")
+_AT_LIMIT = Notice("limits", "The joint is at its limit", "It goes no further in this direction.")
 BY_HAND = Notice("hand", "Joints moved by hand", "The target follows the tool.")
 
 
 LONGEST_LABEL = 40  # characters
+
+
+def _amount(step: int, turn: bool) -> float:
+    """A step of so many degrees or millimetres, in rad or m."""
+    return math.radians(step) if turn else step / 1000.0
 
 
 def _label(reading: str) -> str:
@@ -93,6 +102,29 @@ class TypedInput:
                 self._page.arm.nudge(axis, turn, sign * (angle if turn else step))
             case _:
                 raise kin.InputError("nudge", value, "an axis, whether to turn, a sign, whether it is a fine step")
+
+    def jog(self, value: object) -> None:
+        """Move the tool, or one joint, by one step of so many millimetres or degrees."""
+        arm, robot = self._page.arm, self._page.now.robot
+        match value:
+            case [("tool" | "base") as frame, (0 | 1 | 2 | 3 | 4 | 5) as axis, (-1 | 1) as sign, int(step)]:
+                self._check_step(step)
+                turn = axis >= 3
+                if not arm.jog(axis % 3, turn, sign * _amount(step, turn), frame == "base"):
+                    self._page.status.show(_NO_FURTHER)
+            case ["joints", int(joint), (-1 | 1) as sign, int(step)] if 0 <= joint < robot.n:
+                self._check_step(step)
+                moved = arm.goal.copy()
+                moved[joint] += sign * _amount(step, bool(robot.revolute[joint]))
+                within = robot.clip(moved)[joint]
+                arm.move_joint(joint, float(within), held=False)
+                self._page.status.show(BY_HAND if within == moved[joint] else _AT_LIMIT)
+            case _:
+                raise kin.InputError("jog", value, "tool, base or joints, an axis or a joint, a sign and a step")
+
+    def _check_step(self, step: int) -> None:
+        if step not in STEPS:
+            raise kin.InputError("jog", step, "a step of " + ", ".join(map(str, STEPS)))
 
     def use_axes(self, value: object) -> None:
         """Align the gizmo with the base or the tool; without a value, with the other one."""

@@ -179,7 +179,7 @@ def _solver(found: InspectionAnswer) -> dict[str, str]:
         words = f"a search from several starts: {found.reason}. It may miss solutions."
         return _fact("Inverse kinematics", words, "numeric:", "kb-amber")
     count = len(found.robot.branches)
-    postures = f", up to {count} postures" if count else ""
+    postures = f", up to {count} posture{'s' * (count > 1)}" if count else ""
     return _fact("Inverse kinematics", f"solver {found.solver}{postures}: {found.reason}.", "exact:")
 
 
@@ -285,8 +285,8 @@ def conversion(robot: Robot, other: Robot | None, units: Units) -> str:
     frames = [(frame.capitalize(), _frame_words(other, robot, frame, units)) for frame in FRAMES]
     difference, samples = largest_difference(robot, other), SAMPLES
     differ = f"differ by at most {power(difference, 1)} m" if difference else "are equal, digit by digit,"
-    proof = f"the tool poses of both tables {differ} in {samples} random configurations."
-    return render("robot/convert", convention=convention, heads=heads, rows=rows, frames=frames, proof=proof)
+    check = f"the tool poses of both tables {differ} in {samples} random configurations."
+    return render("robot/convert", convention=convention, heads=heads, rows=rows, frames=frames, check=check)
 
 
 def _frame_words(other: Robot, robot: Robot, frame: str, units: Units) -> str:

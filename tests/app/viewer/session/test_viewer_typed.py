@@ -168,6 +168,75 @@ def test_keys_move_the_target_along_tool_and_base_axes(port: int) -> None:
         assert np.allclose(tab.gizmo_pose(), gizmo, atol=1e-6)
 
 
+def test_jog_moves_the_tool_along_its_own_axes_and_those_of_the_base(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.choose(UR5.name)
+        tab.say("jog", ["tool", 2, 1, 10])
+        T = HOME.copy()
+        T[:3, 3] += 0.01 * HOME[:3, 2]
+        arrives(tab, T)
+        tab.say("jog", ["base", 0, -1, 5])
+        T[0, 3] -= 0.005
+        arrives(tab, T)
+        tab.say("jog", ["tool", 3, 1, 1])
+        T[:3, :3] = T[:3, :3] @ rotation_about(np.array([1.0, 0.0, 0.0]), math.radians(1.0))
+        arrives(tab, T)
+        tab.say("jog", ["base", 5, 1, 10])
+        T[:3, :3] = rotation_about(np.array([0.0, 0.0, 1.0]), math.radians(10.0)) @ T[:3, :3]
+        arrives(tab, T)
+
+
+def test_jog_moves_a_joint_as_far_as_its_limit(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.choose(SCARA.name)
+        q = SCARA.q_home.copy()
+        for joint, step in ((0, math.radians(5.0)), (2, 0.005)):
+            tab.say("jog", ["joints", joint, 1, 5])
+            q[joint] += step
+            arrives(tab, kin.fk(SCARA, q))
+        for _ in range(80):
+            tab.say("jog", ["joints", 2, 1, 10])
+        q[2] = SCARA.upper[2]
+        arrives(tab, kin.fk(SCARA, q))
+        assert "The joint is at its limit" in tab.html
+
+
+def test_a_target_that_is_jogged_out_of_reach_waits_beside_the_tool(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.choose(UR5.name)
+        for _ in range(120):  # 1200 mm; the arm is stretched before
+            tab.say("jog", ["base", 2, 1, 10])
+        tab.wait(lambda: "No further in this direction" in tab.html)
+        tab.settle()
+        assert 0.009 < np.linalg.norm(tab.gizmo_pose()[:3, 3] - tab.tool_pose()[:3, 3]) < 0.02
+        highest = tab.tool_pose()[2, 3]
+        for _ in range(3):
+            tab.say("jog", ["base", 2, -1, 10])
+        tab.wait(lambda: tab.tool_pose()[2, 3] < highest - 0.009)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        None,
+        ["tool", 6, 1, 5],
+        ["tool", 0, 0, 5],
+        ["world", 0, 1, 5],
+        ["joints", 6, 1, 5],
+        ["joints", -1, 1, 5],
+        ["tool", 0, 1, 7],
+    ],
+)
+def test_a_jog_that_no_button_sends_changes_nothing(port: int, value: object) -> None:
+    with FakeBrowser(port) as tab:
+        tab.choose(UR5.name)
+        tab.say("jog", value)
+        tab.say("jog", ["base", 0, 1, 1])
+        T = HOME.copy()
+        T[0, 3] += 0.001
+        arrives(tab, T)
+
+
 def test_a_gizmo_along_the_base_turns_the_target_about_the_base(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(UR5.name)
