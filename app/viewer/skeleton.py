@@ -100,12 +100,19 @@ def cylinder() -> tuple[Array, Array]:
 
 def ghost(key: str, robot: Robot, q: Array, color: Color, opacity: float, **more: Any) -> Node:
     """A translucent copy of the arm at q ``(n,)``: one node, of which a new posture takes a few hundred bytes."""
-    vertices, faces = cylinder()
     positions, wxyz, _ = places(robot, q[None])
+    return placed(key, robot, positions[0], wxyz[0], color, opacity, **more)
+
+
+def placed(
+    key: str, robot: Robot, positions: Array, wxyz: Array, color: Color, opacity: float, **more: Any
+) -> Node:
+    """The same of pieces at `positions` ``(m, 3)`` with `wxyz` ``(m, 4)``, see `places`."""
+    vertices, faces = cylinder()
     pieces = {"vertices": vertices, "faces": faces, "batched_scales": skeleton(robot).scales}
     where = {
-        "batched_positions": positions[0].astype(np.float32),
-        "batched_wxyzs": wxyz[0].astype(np.float32),
+        "batched_positions": positions.astype(np.float32),
+        "batched_wxyzs": wxyz.astype(np.float32),
         "batched_colors": color,
     }
     looks = {"opacity": opacity, "lod": "off", "cast_shadow": False, "receive_shadow": False}

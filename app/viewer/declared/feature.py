@@ -71,7 +71,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.facts: F
         self.read: F
         self.started()
-        self.refresh()
+        self._begin()
 
     # To be overridden
 
@@ -156,6 +156,12 @@ class DeclaredFeature(Feature, Generic[S, F]):
         if seen != self._seen:
             self._seen, self.facts = seen, self.look()
 
+    def _begin(self) -> None:
+        """Show what is declared, and ask for `advance` if there is anything to continue."""
+        self.refresh()
+        if type(self).advance is not DeclaredFeature.advance:
+            self.due = 0.0
+
     # Feature
 
     def handle(self, key: Hashable, value: object) -> None:
@@ -191,7 +197,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self._scene.remove()
         self.settings = self.settings.for_robot(self.stage.now.robot)
         self.started()
-        self.refresh()
+        self._begin()
 
     def on_pose(self, T_base_tool: Array) -> None:
         self.look_again()
@@ -199,7 +205,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.wake(max(0.0, self.pace - (time.perf_counter() - self.shown_at)))
 
     def on_style(self) -> None:
-        self.refresh()
+        self._begin()
 
     def tick(self, now: float) -> None:
         again = self.advance(now)
@@ -218,7 +224,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
     def restore(self, state: dict[str, object]) -> None:
         self.settings = self.settings.restored(state, self.stage.now.robot)
         self._write = True
-        self.refresh()
+        self._begin()
 
     def remove(self) -> None:
         if self.legend() is not None:

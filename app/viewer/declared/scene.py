@@ -24,6 +24,7 @@ from kin.transforms import Array, wxyz_from_rotation
 Color = tuple[int, int, int]
 Vector = Array | Sequence[float]
 Post = Callable[[Hashable, object], None]
+COLORS = frozenset({"colors", "batched_colors"})  # properties
 _ROOTS = count(1)
 
 
@@ -203,7 +204,7 @@ class SceneView:
         for name, value in node.props.items():
             if value is not before[name] and (type(value) is np.ndarray or value != before[name]):
                 # viser makes nodes with a tuple as colour, but later takes only arrays, which it compares itself.
-                setattr(one.handle, name, np.array(value, np.uint8) if name == "colors" else value)
+                setattr(one.handle, name, np.array(value, np.uint8) if name in COLORS else value)
         one.props = node.props
         if not one.held:
             assign(one.handle, node.position, node.wxyz)

@@ -66,11 +66,6 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
     def look(self) -> NumericFacts:
         return NumericFacts(self.settings, self.stage.now, self._iterated, self._picture.found)
 
-    def refresh(self) -> None:
-        super().refresh()
-        if self._ask() != self._asked:
-            self.due = 0.0
-
     def remove(self) -> None:
         super().remove()
         self.stage.fit_view(())
@@ -164,7 +159,7 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
 
     def advance(self, now: float) -> float | None:
         self.look_again()
-        wait = self._begin(now)
+        wait = self._renew(now)
         if self._work is not None:
             if (found := next(self._work)) is not None:
                 self._finish(found)
@@ -184,7 +179,7 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
     def _ask(self) -> tuple[object, ...]:
         return self.facts.problem, self.facts.options, self.settings.compare, self.settings.picture
 
-    def _begin(self, now: float) -> float | None:
+    def _renew(self, now: float) -> float | None:
         """Iterate anew for other settings or another start; returns in how many seconds, if not yet."""
         f, asked = self.facts, self._ask()
         if asked == self._asked:

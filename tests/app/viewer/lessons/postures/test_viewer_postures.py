@@ -257,7 +257,9 @@ def ghosts(tab: FakeBrowser) -> dict[str, str]:
 
 
 def shown(tab: FakeBrowser) -> set[str]:
-    return {number for number, name in ghosts(tab).items() if tab.visible.get(name)}
+    """The numbers of the ghosts that are seen: they are below a node that is hidden with all of them."""
+    found = ghosts(tab).items()
+    return {number for number, name in found if tab.visible.get(name) and tab.visible[name.rpartition("/")[0]]}
 
 
 def grab_to(tab: FakeBrowser, T: np.ndarray) -> None:
