@@ -28,6 +28,17 @@ class InputError(KinematicsError):
         self.expected = expected
         super().__init__(f"{field}: got {self.value}, expected {expected}")
 
+    def renamed(self, field: str) -> InputError:
+        """The same error under another field."""
+        made = InputError(field, None, self.expected)
+        made.value = self.value
+        made.args = (f"{field}: got {self.value}, expected {self.expected}",)
+        return made
+
+    def within(self, place: str) -> InputError:
+        """The same error with its field as a part of `place`."""
+        return self.renamed(f"{place}{self.field}" if self.field.startswith("[") else f"{place}.{self.field}")
+
 
 class RobotFileError(KinematicsError):
     """A robot file is invalid; the message names the file, the field, the value and what would be valid."""

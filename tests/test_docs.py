@@ -18,6 +18,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 import kin
+from app.cli.parser import subcommands
 from app.exercises.kinds import KINDS
 from app.exports.formats import FORMATS
 from app.service.main import create_app
@@ -70,18 +71,40 @@ def test_python_examples_run(code):
     exec(compile(code, "example", "exec"), {})
 
 
+@pytest.fixture(scope="module")
+def shell(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """An environment in which `kinboard` is the command line of this checkout."""
+    folder = tmp_path_factory.mktemp("bin")
+    program = folder / "kinboard"
+    program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m app.cli "$@"\n')
+    program.chmod(0o755)
+    return {**os.environ, "PATH": f"{folder}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
+
+
 @pytest.mark.parametrize(("command", "shown"), commands(), ids=[command for command, _ in commands()])
-def test_command_line_examples_run_and_print_what_is_shown(command, shown):
-    program, *arguments = shlex.split(command)
-    assert program == "kinboard"
-    done = subprocess.run(
-        [sys.executable, "-m", "app.cli", *arguments], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+def test_command_line_examples_run_and_print_what_is_shown(shell, command, shown):
+    assert "kinboard " in command
+    words = ["bash", "-o", "pipefail", "-c", command]
+    done = subprocess.run(words, cwd=ROOT, env=shell, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
+    assert "error" not in done.stderr
     printed = {" ".join(line.split()) for line in done.stdout.splitlines()}
     for line in shown:
         assert " ".join(line.split()) in printed
+
+
+def test_the_page_of_the_command_line_has_every_command_and_no_other_option():
+    page = PAGES["docs/cli.md"]
+    helps = {name: command.format_help() for name, command in subcommands().items()}
+    for name in helps:
+        known = "".join(text for other, text in helps.items() if f"{other} ".startswith(f"{name} "))
+        assert re.search(rf"`kinboard {name}[ `]|^## .*\b{name}\b", page, re.MULTILINE), name
+        for text in re.findall(rf"kinboard {name}\b([^`|\n]*)", page):
+            for option in re.findall(r"(?<!\S)--[a-z][a-z-]*", text):
+                assert option in known, f"{name} {option}"
+    for option in re.findall(r"(?<![\w-])--[a-z][a-z-]*", page):
+        assert option in "".join(helps.values()), option
 
 
 def test_rest_examples_are_answered():

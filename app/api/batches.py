@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from fastapi import Response
 from starlette.types import Receive, Scope, Send
 
-from app.api.problems import FieldError, ProblemError
+from app.api.problems import ProblemError
 from app.api.work import Deadline, busy
 from app.shared.answers.answer import as_json
 from app.shared.memory.answers import SMALL, AnswerMemory, AnswerTooLargeError, MemoryFullError, Reservation
+from app.shared.problems import FieldError
 
 MEDIA_TYPE = "application/json"
 MOST_AT_ONCE = 256  # items between two checks of the deadline

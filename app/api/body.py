@@ -22,9 +22,10 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 from pydantic_core import from_json
 
-from app.api.problems import ProblemError, show
+from app.api.problems import ProblemError
 from app.api.work import busy, compute_slots
 from app.shared.clients import client_of, share_of
+from app.shared.problems import show
 
 LARGE = 16 * 1024  # bytes of a body that takes the event loop longer than a drag
 # One of these stands before each value but the first, and one after each name. Those in texts count too.

@@ -7,7 +7,7 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from app.api.problems import MEDIA_TYPE
+from app.shared.problems import MEDIA_TYPE
 from app.shared.settings import Settings
 
 _PROBLEM = {"$ref": "#/components/schemas/Problem"}

@@ -14,7 +14,7 @@ from app.api import schemas
 from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
-from app.api.problems import FieldError, invalid
+from app.api.problems import invalid
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
@@ -28,6 +28,7 @@ from app.equations import Book, DerivationError, Equation, Symbol, book_later, t
 from app.equations.expression import Expression
 from app.shared.answers.answer import Answer
 from app.shared.computations import TooManyPendingError
+from app.shared.problems import FieldError
 from kin import Robot
 from kin.transforms import Array
 

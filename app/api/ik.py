@@ -14,7 +14,7 @@ from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
 from app.api.options import Goal, OptionsBody, Target, single_or_list, takes
-from app.api.problems import FieldError, invalid
+from app.api.problems import invalid
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
@@ -25,6 +25,7 @@ from app.api.work import Deadline, computed
 from app.shared.answers.answer import Answer
 from app.shared.answers.ik import IkAnswer, ik_answer
 from app.shared.metrics import SOLVE_SECONDS
+from app.shared.problems import FieldError
 from app.shared.settings import Settings
 from kin import IKOptions, Robot
 from kin.ik import branch_names, solve

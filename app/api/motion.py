@@ -15,13 +15,14 @@ from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
 from app.api.options import AvoidingBody
-from app.api.problems import FieldError, from_input_error, invalid
+from app.api.problems import invalid
 from app.api.program import DescribedBy, ProgramBody
 from app.api.schemas import POST_REFUSALS, Configuration, example, settings_of
 from app.api.work import Deadline, computed
 from app.api.workspace.streaming import ComputedResponse
 from app.exports.motion import FORMATS
 from app.shared.answers.motion import MotionAnswer, motion_answer
+from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
 from app.shared.threads.turns import Turn
 from kin import InputError, Motion, Robot, plan_motion

@@ -19,9 +19,10 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model
 
 from app.api import schemas
 from app.api.arms.frames import FrameName, FramesBody, WorkpiecesBody
-from app.api.problems import FieldError, from_input_error, invalid
+from app.api.problems import invalid
 from app.api.schemas import Number, Vector3, Vector4, integral, numbers
 from app.shared.options import declared
+from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
 from app.shared.threads.turns import offer
 from kin import IKOptions, InputError, Robot, Task, solve_path

@@ -12,10 +12,11 @@ from app.api import schemas
 from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.options import OptionsBody, Target
-from app.api.problems import FieldError, invalid
+from app.api.problems import invalid
 from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
 from app.api.work import Deadline, computed
 from app.shared.answers.path import PathAnswer, PosturesAnswer, path_answer, postures_answer
+from app.shared.problems import FieldError
 from app.shared.settings import Settings
 from kin import Robot, path_postures
 from kin.ik.options import IKOptions

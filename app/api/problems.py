@@ -1,99 +1,41 @@
-"""Error responses: RFC 9457 problem documents, ``application/problem+json``.
+"""Error responses: problem documents of :mod:`app.shared.problems`, ``application/problem+json``.
 
-``type`` is a stable name for programs, ``detail`` a sentence to show, ``hint`` says what to do about it, and
-``errors`` lists the invalid fields. A target out of reach is an answer, not a problem (see `app.api.ik`).
-
-Each kind of problem is one row of `KINDS`. Routes raise `ProblemError`; `install_problem_handlers` turns it,
-errors of the framework and input errors of the core into documents.
+A target out of reach is an answer, not a problem (see `app.api.ik`). Routes raise `ProblemError`;
+`install_problem_handlers` turns it, errors of the framework and input errors of the core into documents.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import HTTPException, RequestValidationError
-from pydantic import BaseModel, ConfigDict, Field
 from pydantic_core import to_json
 from starlette.exceptions import HTTPException as StarletteHTTPException
 from starlette.responses import Response
 from starlette.routing import Match, Route
 
+from app.shared.problems import (
+    DOCS_HINT,
+    MEDIA_TYPE,
+    FieldError,
+    Problem,
+    from_input_error,
+    invalid_input,
+    problem,
+    shorten_text,
+    show,
+)
+from app.shared.problems import unknown_robot as no_such_robot
 from kin import InputError, UnknownRobotError
-from kin.errors import shorten
 
-MEDIA_TYPE = "application/problem+json"
 TAGS = {"one", "many"}  # names of union members, which pydantic puts into error locations
-SHOWN = 10  # maximum number of field errors in a document
-DOCS_HINT = "The /docs page shows the schema of every request, with an example that works."
-
-# kind → title; the kind is the last part of `type`.
-KINDS = {
-    "bad-request": "The request cannot be read",
-    "malformed-json": "The body is not valid JSON",
-    "unknown-robot": "There is no such robot",
-    "not-found": "There is nothing at this address",
-    "method-not-allowed": "The method is not allowed at this address",
-    "unauthorized": "An access token is required",
-    "forbidden": "This is not allowed",
-    "read-only": "The service is read-only",
-    "too-many-requests": "Too many requests",
-    "body-too-large": "The request body is too large",
-    "batch-too-large": "The request contains too many items",
-    "answer-too-large": "The answer would be too large",
-    "unsupported-media-type": "The body must be JSON",
-    "invalid-input": "The request contains an invalid value",
-    "request-timeout": "The request did not arrive in time",
-    "head-too-large": "The head of the request is too large",
-    "bad-range": "The requested range is invalid",
-    "not-allowed": "This is not allowed here",
-    "not-running": "Nothing is under way",
-    "wrong-host": "The request is for another host",
-    "busy": "The service is busy",
-    "preparing": "What the request needs is being prepared",
-    "too-slow": "The computation takes too long",
-    "internal-error": "Internal error",
-    "http-error": "The request was rejected",
-}
 
 
 class ClientLeftError(Exception):
     """The client has left, so nobody waits for the answer."""
-
-
-class FieldError(BaseModel):
-    """One invalid value."""
-
-    field: str = Field(description="Its place in the request, e.g. `q[2]` or `target.wxyz`.", examples=["q[2]"])
-    value: str = Field(description="What was given, shortened.", examples=['"ninety"'])
-    expected: str = Field(description="What would be valid.", examples=["a valid number"])
-
-
-class Problem(BaseModel):
-    """Why a request was rejected (RFC 9457)."""
-
-    model_config = ConfigDict(
-        json_schema_extra={
-            "example": {
-                "type": "urn:kinboard:problem:invalid-input",
-                "title": KINDS["invalid-input"],
-                "status": 422,
-                "detail": 'q[2]: got "ninety", expected a valid number',
-                "hint": DOCS_HINT,
-                "errors": [{"field": "q[2]", "value": '"ninety"', "expected": "a valid number"}],
-            }
-        }
-    )
-
-    type: str = Field(description="Stable identifier of the kind of problem, for programs.")
-    title: str = Field(description="The kind of problem in words.")
-    status: int = Field(description="The HTTP status code.")
-    detail: str = Field(description="What was wrong with this request, in one sentence.")
-    hint: str = Field(description="What to do about it.")
-    errors: list[FieldError] = Field(description="The invalid values; empty for other kinds of problems.")
 
 
 class ProblemError(HTTPException):
@@ -109,31 +51,23 @@ class ProblemError(HTTPException):
         headers: dict[str, str] | None = None,
     ) -> None:
         super().__init__(status, detail, headers)
-        self.problem = Problem(
-            type=f"urn:kinboard:problem:{kind}",
-            title=KINDS[kind],
-            status=status,
-            detail=detail,
-            hint=hint,
-            errors=list(errors),
-        )
+        self.problem = problem(status, kind, detail, hint, errors)
+
+
+def _error(document: Problem) -> ProblemError:
+    """The document as an error."""
+    kind = document.type.rpartition(":")[2]
+    return ProblemError(document.status, kind, document.detail, document.hint, document.errors)
 
 
 def invalid(*errors: FieldError, hint: str = DOCS_HINT) -> ProblemError:
-    """422: the first error in the detail, all of them (up to `SHOWN`) in `errors`."""
-    first = errors[0]
-    more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-    detail = f"{first.field}: got {first.value}, expected {first.expected}{more}"
-    return ProblemError(422, "invalid-input", detail, hint, errors[:SHOWN])
+    """422: the first error in the detail, all of them in `errors`."""
+    return _error(invalid_input(*errors, hint=hint))
 
 
 def unknown_robot(error: UnknownRobotError) -> ProblemError:
     """404 with the ids of all robots."""
-    robot_ids = ", ".join(error.robot_ids)
-    field = FieldError(field="robot_id", value=show(error.robot_id), expected=f"one of {robot_ids}")
-    detail = f"There is no robot {field.value}."
-    hint = f"Robots: {robot_ids}. GET /api/v1/robots describes them."
-    return ProblemError(404, "unknown-robot", detail, hint, [field])
+    return _error(no_such_robot(error))
 
 
 def install_problem_handlers(app: FastAPI) -> None:
@@ -144,24 +78,6 @@ def install_problem_handlers(app: FastAPI) -> None:
     app.add_exception_handler(InputError, _input_error)
     app.add_exception_handler(ClientLeftError, _client_left)
     app.add_exception_handler(Exception, _internal_error)
-
-
-def show(value: object) -> str:
-    """A value as JSON, shortened; of long lists the length, of objects the keys."""
-    if isinstance(value, list | tuple):
-        if len(value) <= 8 and not any(isinstance(item, list | dict) for item in value):
-            return "[" + ", ".join(show(item) for item in value) + "]"
-        return f"a list of {len(value)}"
-    if isinstance(value, dict):
-        return "an object with " + (shorten_text(", ".join(list(map(str, value))[:10])) or "nothing in it")
-    if value is None or isinstance(value, str | bool | int | float):
-        return shorten_text(json.dumps(value, ensure_ascii=False))
-    return shorten(value)
-
-
-def shorten_text(text: str, length: int = 80) -> str:
-    """Text cut to `length` characters."""
-    return text if len(text) <= length else text[: length - 1] + "…"
 
 
 def respond(error: ProblemError) -> Response:
@@ -233,11 +149,6 @@ def internal_error() -> ProblemError:
     detail = "The request was understood, but answering it failed."
     hint = "Please report it with the request you sent; the log of the server has the cause."
     return ProblemError(500, "internal-error", detail, hint)
-
-
-def from_input_error(error: InputError, prefix: str = "") -> FieldError:
-    """An input error of the core as a field error."""
-    return FieldError(field=prefix + error.field, value=error.value, expected=error.expected)
 
 
 def field_error(item: dict[str, Any]) -> FieldError:

@@ -10,8 +10,9 @@ from fastapi import Path, Request, Response
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import CoreSchema, core_schema
 
-from app.api.problems import FieldError, Problem, ProblemError, invalid, show
+from app.api.problems import ProblemError, invalid
 from app.shared.answers.answer import as_json
+from app.shared.problems import FieldError, Problem, show
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.threads.turns import offer

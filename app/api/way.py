@@ -11,10 +11,11 @@ from app.api import schemas
 from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.options import AvoidingBody
-from app.api.problems import from_input_error, invalid
+from app.api.problems import invalid
 from app.api.schemas import POST_REFUSALS, Configuration, example, reply, settings_of
 from app.api.work import Deadline, computed
 from app.shared.answers.way import WayAnswer, way_answer
+from app.shared.problems import from_input_error
 from app.shared.settings import Settings
 from kin import InputError, Robot
 from kin.transforms import Array

@@ -4,19 +4,42 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from app.cli.terminal import Notation, clean, configuration, frame_of, print_json, robot_of, table, units_of
+import numpy as np
+
+from app.cli.pipes.columns import POSE
+from app.cli.pipes.sink import Sink, form_of, opened_sink
+from app.cli.pipes.source import opened_source
+from app.cli.terminal import (
+    Notation,
+    clean,
+    configuration,
+    frame_of,
+    mounted_robot_of,
+    print_json,
+    table,
+    units_of,
+)
 from app.shared.answers.fk import fk_answers
-from kin import InputError
+from kin import InputError, Robot, fk
+from kin.axes import inverse
 from kin.frames import TOOL, WORLD
+from kin.transforms import Array, wxyz_from_rotation
 
 
 def run(arguments: Namespace) -> int:
     """Print the pose of the tool."""
-    robot = robot_of(arguments)
-    q = configuration(robot, arguments.q, "q", units_of(arguments))
+    robot = mounted_robot_of(arguments)
     if arguments.frame == TOOL:
         raise InputError("--frame", TOOL, "world, base or a workpiece")
     T = None if arguments.frame == WORLD else frame_of(robot, arguments)
+    if arguments.configurations is not None:
+        return _run_many(robot, arguments, T)
+    for option in ("output", "format"):
+        if getattr(arguments, option) is not None:
+            raise InputError(f"--{option}", getattr(arguments, option), "--configurations FILE as well")
+    if not arguments.q:
+        raise InputError("q", "nothing", f"{robot.n} joint values, or --configurations FILE")
+    q = configuration(robot, arguments.q, "q", units_of(arguments))
     answer = fk_answers(robot, q[None], arguments.frames, arguments.frame, T)[0]
     if arguments.json:
         return print_json(answer)
@@ -41,3 +64,38 @@ def run(arguments: Namespace) -> int:
         print(f"\nin the frame {arguments.frame}:", end="")
     print("\n" + table(["frame", *(f"{axis} {units.of_length}" for axis in "xyz"), *"wxyz"], rows))
     return 0
+
+
+def _run_many(robot: Robot, arguments: Namespace, T_world_frame: Array | None) -> int:
+    """Write the poses for the rows of a file, or of standard input."""
+    if arguments.q:
+        raise InputError("q", arguments.q, "no joint values besides --configurations")
+    output = arguments.output or "-"
+    with opened_source(arguments.configurations, "--configurations") as source:
+        form = form_of(output, arguments.format, source.form)
+        pieces = source.configurations(robot)
+        first = next(pieces)  # what is wrong at once leaves no file
+        with opened_sink(output, form, [*POSE, "in_limits"]) as sink:
+            _put(sink, robot, first, arguments, T_world_frame)
+            for q in pieces:
+                _put(sink, robot, q, arguments, T_world_frame)
+    return 0
+
+
+def _put(sink: Sink, robot: Robot, q: Array, arguments: Namespace, T_world_frame: Array | None) -> None:
+    """Write the poses for configurations ``(m, n)``; rows of NaN get none."""
+    present = [not any(row) for row in np.isnan(q).tolist()]
+    if sink.form == "ndjson":
+        found = iter(fk_answers(robot, q[present], arguments.frames, arguments.frame, T_world_frame))
+        sink.answers(next(found) if there else None for there in present)
+        return
+    T = np.full((len(q), 4, 4), np.nan)
+    T[present] = fk(robot, q[present]) if T_world_frame is None else inverse(T_world_frame) @ fk(robot, q[present])
+    if sink.form == "npy":
+        sink.array(T)
+        return
+    numbers = np.full((len(q), 7), np.nan)
+    numbers[present, :3], numbers[present, 3:] = T[present, :3, 3], wxyz_from_rotation(T[present, :3, :3])
+    inside = robot.in_limits(q)
+    within = [bool(inside[i]) if there else "" for i, there in enumerate(present)]
+    sink.rows([*row, each] for row, each in zip(numbers.tolist(), within, strict=True))

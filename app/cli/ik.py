@@ -4,22 +4,24 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from app.cli.arguments.options import flag_of
+from app.cli.pipes.ik import RowsQuestion, solve_rows
 from app.cli.targets import Question, solve_file
 from app.cli.terminal import (
     Notation,
     configuration,
     frame_of,
     joint_constraints,
+    mounted_robot_of,
     obstacles_of,
     print_json,
     quantity,
-    robot_of,
     table,
     units_of,
 )
@@ -29,18 +31,19 @@ from kin import IKOptions, InputError, Robot, Task
 from kin.frames import TOOL
 from kin.ik import solve
 from kin.ik.options import MASK_NAMES
-from kin.transforms import frame_from_approach, from_position_wxyz
+from kin.transforms import Array, frame_from_approach, from_position_wxyz
 from kin.units import PLAIN, Unit, Units
 
 
 def run(arguments: Namespace) -> int:
     """Print the solutions; 1 if there is no exact one."""
-    robot = robot_of(arguments)
+    robot = mounted_robot_of(arguments)
     units = units_of(arguments)
     if arguments.targets is not None:
         return _run_file(robot, arguments, units)
-    if arguments.output is not None:
-        raise InputError("--output", arguments.output, "--targets as well: without it, solutions are printed")
+    for option in ("output", "format"):
+        if getattr(arguments, option) is not None:
+            raise InputError(f"--{option}", getattr(arguments, option), "--targets FILE as well")
     wxyz = None if arguments.wxyz is None else _vector(arguments.wxyz, PLAIN, "--wxyz")
     T = from_position_wxyz(_vector(arguments.position, units.lengths, "--position"), wxyz)
     if arguments.approach is not None:
@@ -50,7 +53,7 @@ def run(arguments: Namespace) -> int:
     if arguments.frame == TOOL and q_seed is None:
         raise InputError("--frame", TOOL, "--seed as well, which says where the tool is")
     T = frame_of(robot, arguments, q_seed) @ T
-    options = _options(robot, arguments, units, task)
+    options = _options(robot, arguments, units, task, shown=None if arguments.json else 1)
     result = solve(robot, T, options, q_seed)
     answer = ik_answer(result)
     if arguments.json:
@@ -64,14 +67,14 @@ def run(arguments: Namespace) -> int:
 
 
 def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
-    """Solve a file of targets, and print how many have an exact solution; 1 if one has none."""
+    """Solve a file of targets, and say how many have an exact solution; 1 if one has none."""
     if arguments.wxyz is not None or arguments.approach is not None:
         raise InputError("--targets", arguments.targets, "no --wxyz or --approach: the file has the orientations")
-    if arguments.output is None:
-        raise InputError("--targets", arguments.targets, "--output as well, the file that the joint values go to")
     if arguments.frame == TOOL:
         raise InputError("--frame", TOOL, "a frame that does not move, together with --targets")
     q_seed = None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", units)
+    if _is_piped(arguments):
+        return _run_rows(robot, arguments, units, q_seed)
     options = _options(robot, arguments, units, "pose" if arguments.mask else arguments.task or "pose")
     question = Question(robot, options, frame_of(robot, arguments, q_seed), q_seed)
     try:
@@ -86,8 +89,33 @@ def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
     return 0 if solved == count else 1
 
 
-def _options(robot: Robot, arguments: Namespace, units: Units, task: Task) -> IKOptions:
-    """What was typed, but for target, seed and frame."""
+def _is_piped(arguments: Namespace) -> bool:
+    """Whether targets or solutions come or go as lines, rather than from one large file to another."""
+    ends = (arguments.targets, arguments.output or "-")
+    return arguments.format is not None or any(end == "-" or end.endswith((".ndjson", ".jsonl")) for end in ends)
+
+
+def _run_rows(robot: Robot, arguments: Namespace, units: Units, q_seed: Array | None) -> int:
+    """Solve targets as they arrive; 1 if one has no exact solution."""
+    given: Task | None = "pose" if arguments.mask else arguments.task
+
+    def options(implied: Task, shown: int | None) -> IKOptions:
+        return _options(robot, arguments, units, given or implied, shown)
+
+    def frame(name: str | None) -> Array:
+        if name == TOOL:
+            raise InputError("--targets", TOOL, "frames that do not move")
+        return frame_of(robot, arguments, q_seed, name)
+
+    question = RowsQuestion(robot, q_seed, cache(options), cache(frame))
+    count, solved = solve_rows(question, arguments.targets, arguments.output or "-", arguments.format)
+    if arguments.output not in (None, "-"):
+        print(f"{arguments.output}: {solved} of {count} targets have an exact solution")
+    return 0 if solved == count else 1
+
+
+def _options(robot: Robot, arguments: Namespace, units: Units, task: Task, shown: int | None = 1) -> IKOptions:
+    """What was typed, but for target, seed and frame; `shown`: how many solutions by default, None for all."""
     given = {name: _option(arguments, option, units) for name, option in declared().items()}
     constraints = joint_constraints(robot, arguments)
     given |= {
@@ -97,7 +125,7 @@ def _options(robot: Robot, arguments: Namespace, units: Units, task: Task) -> IK
         "locked": constraints.locked,
         "respect_limits": not arguments.ignore_limits,
         "redundancy": _redundancy(arguments, units),
-        "max_solutions": None if arguments.all else arguments.max_solutions or 1,
+        "max_solutions": None if arguments.all else arguments.max_solutions or shown,
         "obstacles": obstacles_of(arguments),
     }
     return IKOptions.of(None, **given)

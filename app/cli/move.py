@@ -7,14 +7,16 @@ from argparse import Namespace
 from contextlib import closing
 from pathlib import Path
 
+from app.cli.pipes.sink import opened_sink
+from app.cli.pipes.source import opened_source
 from app.cli.terminal import (
     Notation,
     clean,
     configuration,
+    mounted_robot_of,
     obstacles_of,
     print_json,
     quantity,
-    robot_of,
     table,
     units_of,
 )
@@ -22,8 +24,9 @@ from app.exports.motion import FORMATS, MotionFormat
 from app.exports.motion_plot import motion_plot
 from app.exports.save import opened
 from app.shared.answers.motion import motion_answer
-from kin import InputError, Motion, plan_motion
+from kin import InputError, Motion, Program, Robot, plan_motion, program_from_dict
 from kin.motion import parse_program
+from kin.transforms import Array
 from kin.units import Unit
 
 PER_SECOND = Unit("Hz", 1.0, 2)
@@ -33,25 +36,22 @@ _UNITS = {"velocity": "/s", "acceleration": "/s²", "jerk": "/s³", "tool_speed"
 
 def run(arguments: Namespace) -> int:
     """Plan the motion, print what it is, and write files; 1 if the program cannot be driven."""
-    robot = robot_of(arguments)
-    kind = _format(arguments)
+    robot = mounted_robot_of(arguments)
+    if (arguments.program is None) is (arguments.programs is None):
+        raise InputError("PROGRAM", arguments.program, "either a program or --programs")
     rate = quantity(arguments.rate, PER_SECOND, "--rate")
     if not LEAST_RATE <= rate <= MOST_RATE:
         raise InputError("--rate", rate, f"{LEAST_RATE:g} to {MOST_RATE:g} samples per second")
+    sampled = None if arguments.no_samples else rate
+    if arguments.programs is not None:
+        return _run_many(robot, arguments, sampled)
+    kind = _format(arguments)
     if arguments.picture is not None and Path(arguments.picture).suffix.lower() != ".svg":
         raise InputError("--picture", arguments.picture, "a name that ends in .svg")
-    start = arguments.start
-    q_start = None if start is None else configuration(robot, start, "--start", units_of(arguments))
-    motion = plan_motion(
-        robot,
-        parse_program(_text(arguments.program), robot),
-        q_start,
-        avoid_self_collision=arguments.avoid_self_collision,
-        obstacles=obstacles_of(arguments),
-    )
-    if arguments.json:
-        print_json(motion_answer(motion))
-    elif arguments.output != "-":
+    motion = _planned(robot, parse_program(_text(arguments.program), robot), _start(robot, arguments), arguments)
+    if arguments.json and arguments.output != "-":
+        print_json(motion_answer(motion, sampled))
+    elif arguments.output != "-" and not arguments.json:
         print(motion.explain(units_of(arguments)))
         if motion.part is not None:
             print(f"\nUp to there: {motion.part.explain(units_of(arguments))}")
@@ -63,6 +63,41 @@ def run(arguments: Namespace) -> int:
     if driven is not None:
         _write_files(arguments, driven, kind, rate)
     return 0 if motion.planned else 1
+
+
+def _start(robot: Robot, arguments: Namespace) -> Array | None:
+    texts = arguments.start
+    return None if texts is None else configuration(robot, texts, "--start", units_of(arguments))
+
+
+def _planned(robot: Robot, program: Program, q_start: Array | None, arguments: Namespace) -> Motion:
+    return plan_motion(
+        robot,
+        program,
+        q_start,
+        avoid_self_collision=arguments.avoid_self_collision,
+        obstacles=obstacles_of(arguments),
+    )
+
+
+def _run_many(robot: Robot, arguments: Namespace, rate: float | None) -> int:
+    """Answer each line that holds a program as it arrives; 1 if one cannot be driven."""
+    for option in ("format", "picture"):
+        if getattr(arguments, option) is not None:
+            raise InputError(f"--{option}", getattr(arguments, option), f"no --{option} besides --programs")
+    q_start, refused = _start(robot, arguments), False
+    with (
+        opened_source(arguments.programs, "--programs") as source,
+        opened_sink(arguments.output or "-", "ndjson", ()) as sink,
+    ):
+        for place, data in enumerate(source.objects()):
+            try:
+                motion = _planned(robot, program_from_dict(data, robot), q_start, arguments)
+            except InputError as error:
+                raise error.within(f"--programs[{place}]") from None
+            sink.answers([motion_answer(motion, rate)])
+            refused = refused or not motion.planned
+    return 1 if refused else 0
 
 
 def _write_files(arguments: Namespace, motion: Motion, kind: MotionFormat | None, rate: float) -> None:

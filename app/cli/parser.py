@@ -1,8 +1,8 @@
 """The command line. ``kinboard`` alone serves the dashboard; the other commands need no server.
 
-Input and output are in degrees and millimetres, with ``--rad`` in radians and metres; ``--json`` always prints
-radians and metres, in the shapes of the REST answers. Exit codes: 0 success, 1 no exact solution (``ik``) or the
-service could not start, 2 invalid input, 130 interrupted.
+Input and output are in degrees and millimetres, with ``--rad`` in radians and metres; ``--json`` prints what REST
+answers, problem documents included, and files of rows are in radians and metres. Exit codes: 0 success, 1 no exact
+solution (``ik``) or the service could not start, 2 invalid input, 130 interrupted.
 
 A command is a row of `COMMANDS`: its arguments (:mod:`app.cli.arguments`) and the module that runs it, which is
 imported when the arguments have been parsed.
@@ -16,7 +16,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from app.cli import arguments as declare
 from app.cli.arguments.shared import Parents
@@ -45,11 +45,13 @@ class Command(NamedTuple):
         load: imports the function that runs it and returns the exit code.
         interpreted: whether its kernels run as plain Python. One pose takes a tenth of a millisecond that way;
             numba needs half a second to load compiled code.
+        compiled_with: an argument with which they are compiled all the same, as there is much to compute.
     """
 
     declare: Callable[[Any, Parents], argparse.ArgumentParser]
     load: Callable[[], Run]
     interpreted: bool = False
+    compiled_with: str = ""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -60,9 +62,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # for terminals that cannot print θ or ·
     try:
-        arguments = _parser().parse_args([_not_an_option(word) for word in words])
-    except SystemExit as stop:  # argparse has printed its message, or the help
+        arguments, unknown = _parser().parse_known_args([_not_an_option(word) for word in words])
+        if unknown:
+            arguments.parser.error("unrecognized arguments: " + " ".join(unknown))
+    except SystemExit as stop:  # argparse has printed the help
         return stop.code if isinstance(stop.code, int) else 2
+    except _UsageError as error:
+        if "--json" in words and words[0] != "bench":  # of which it is the name of a file
+            from app.cli.refusals import print_usage_error
+
+            return print_usage_error(str(error), error.parser.prog)
+        error.parser.print_usage(sys.stderr)
+        print(f"{error.parser.prog}: error: {error}", file=sys.stderr)
+        return 2
     try:
         code = _run(arguments.command, arguments)
         sys.stdout.flush()
@@ -73,7 +85,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(command: Command, arguments: argparse.Namespace) -> int:
-    if command.interpreted:
+    if command.interpreted and not (command.compiled_with and getattr(arguments, command.compiled_with)):
         disable_compiler()
     with no_collections():
         run = command.load()
@@ -84,12 +96,43 @@ def _run(command: Command, arguments: argparse.Namespace) -> int:
 
         if not isinstance(error, KinematicsError):
             raise
+        if getattr(arguments, "json", False) is True:
+            from app.cli.refusals import print_error
+
+            return print_error(error, arguments.parser.prog)
         print(f"kinboard: {error}", file=sys.stderr)
         return 2
 
 
+def subcommands(
+    parser: argparse.ArgumentParser | None = None, name: str = ""
+) -> dict[str, argparse.ArgumentParser]:
+    """The parsers of all commands by name, those of actions (``room open``) included."""
+    found: dict[str, argparse.ArgumentParser] = {}
+    for each in (parser or _parser())._actions:
+        if isinstance(each, argparse._SubParsersAction):
+            for word, below in each.choices.items():
+                found |= {f"{name}{word}": below} | subcommands(below, f"{name}{word} ")
+    return found
+
+
+class _UsageError(Exception):
+    """Arguments that cannot be read."""
+
+    def __init__(self, parser: argparse.ArgumentParser, message: str) -> None:
+        super().__init__(message)
+        self.parser = parser
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that raises instead of printing."""
+
+    def error(self, message: str) -> NoReturn:
+        raise _UsageError(self, message)
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="kinboard",
         description=DESCRIPTION,
         epilog=EPILOG,
@@ -99,7 +142,8 @@ def _parser() -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     parents = Parents()
     for command in COMMANDS:
-        command.declare(subparsers, parents).set_defaults(command=command)
+        declared = command.declare(subparsers, parents)
+        declared.set_defaults(command=command, parser=declared)
     return parser
 
 
@@ -231,7 +275,7 @@ def _load_lti() -> Run:
 
 COMMANDS = (
     Command(declare.add_serve, _load_serve),
-    Command(declare.add_fk, _load_fk, interpreted=True),
+    Command(declare.add_fk, _load_fk, interpreted=True, compiled_with="configurations"),
     Command(declare.add_ik, _load_ik),
     Command(declare.add_move, _load_move),
     Command(declare.add_way, _load_way),

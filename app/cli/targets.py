@@ -57,7 +57,7 @@ class Question:
             place, _, rest = error.field.removeprefix("targets[").partition("]")
             if not place.isdigit():
                 raise
-            raise InputError(f"{_FIELD}[{first + int(place)}]{rest}", error.value, error.expected) from None
+            raise error.renamed(f"{_FIELD}[{first + int(place)}]{rest}") from None
 
     def key(self, source: Path, output: Path) -> str:
         """A digest of the question, the file of targets and the kind of output."""

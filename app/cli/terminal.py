@@ -5,7 +5,6 @@ Text is in degrees and millimetres, or with ``--rad`` in radians and metres; ``-
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import tomllib
@@ -15,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from app.shared.answers.answer import as_plain
+from app.shared.answers.answer import as_json
 from app.shared.store import Store
 from kin import (
     InputError,
@@ -55,6 +54,22 @@ def named_robot(arguments: Namespace, named: str) -> Robot:
     if Path(named).suffix == ".toml":
         return load_robot(named)
     return store_of(arguments).get(named)
+
+
+def mounted_robot_of(arguments: Namespace) -> Robot:
+    """The robot of the argument ``ROBOT`` with the base and the tool of ``--base`` and ``--tool``, as in REST."""
+    robot, units = robot_of(arguments), units_of(arguments)
+    if arguments.base is not None:
+        robot = robot.with_base(_pose(arguments.base, "--base", units) @ robot.T_world_base)
+    if arguments.tool is not None:
+        robot = robot.with_mounted(_pose(arguments.tool, "--tool", units))
+    return robot
+
+
+def _pose(texts: list[str], field: str, units: Units) -> Array:
+    """X, Y, Z, ROLL, PITCH, YAW as a transform ``(4, 4)``."""
+    values = [quantity(text, units.of(k >= 3), field) for k, text in enumerate(texts)]
+    return from_xyz_rpy(values[:3], values[3:])
 
 
 def joint_constraints(robot: Robot, arguments: Namespace) -> JointConstraints:
@@ -123,21 +138,23 @@ def obstacles_of(arguments: Namespace) -> tuple[Obstacle, ...]:
     return checked_obstacles(data["obstacles"])
 
 
-def frame_of(robot: Robot, arguments: Namespace, q: Array | None = None) -> Array:
-    """T_world_frame ``(4, 4)`` of the frame of ``--frame``, with those of ``--workpiece``; raises `InputError`.
+def frame_of(robot: Robot, arguments: Namespace, q: Array | None = None, name: str | None = None) -> Array:
+    """T_world_frame ``(4, 4)`` of a frame, with those of ``--workpiece``; raises `InputError`.
 
-    `q`: where the arm is, for the frame of the tool.
+    Args:
+        q: where the arm is, for the frame of the tool.
+        name: of the frame; None: the one of ``--frame``.
     """
+    frame = arguments.frame if name is None else name
     units = units_of(arguments)
     workpieces: dict[str, Array] = {}
     for name, texts in arguments.workpiece:
         if name in workpieces or name in FRAMES:
             raise InputError("--workpiece", name, f"names other than {', '.join(FRAMES)}, each once")
-        values = [quantity(text, units.of(k >= 3), f"--workpiece {name}") for k, text in enumerate(texts)]
-        workpieces[name] = from_xyz_rpy(values[:3], values[3:])
-    if arguments.frame not in (*FRAMES, *workpieces):
-        raise InputError("--frame", arguments.frame, "one of " + ", ".join([*FRAMES, *workpieces]))
-    return frame_pose(robot, arguments.frame, workpieces, q)
+        workpieces[name] = _pose(texts, f"--workpiece {name}", units)
+    if frame not in (*FRAMES, *workpieces):
+        raise InputError("--frame", frame, "one of " + ", ".join([*FRAMES, *workpieces]))
+    return frame_pose(robot, frame, workpieces, q)
 
 
 class Notation:
@@ -183,6 +200,6 @@ def clean(value: float, digits: int) -> str:
 
 
 def print_json(answer: object) -> int:
-    """Print an answer on one line; returns the exit code 0."""
-    print(json.dumps(as_plain(answer), ensure_ascii=False, allow_nan=False))
+    """Print an answer on one line, in the bytes that REST answers; returns the exit code 0."""
+    print(as_json(answer).decode())
     return 0

@@ -7,7 +7,16 @@ from argparse import Namespace
 from dataclasses import replace
 from pathlib import Path
 
-from app.cli.terminal import Notation, configuration, obstacles_of, print_json, quantity, robot_of, table, units_of
+from app.cli.terminal import (
+    Notation,
+    configuration,
+    mounted_robot_of,
+    obstacles_of,
+    print_json,
+    quantity,
+    table,
+    units_of,
+)
 from app.exports.program_toml import toml_of
 from app.exports.progress import progress_bar
 from app.shared.answers.way import way_answer
@@ -21,7 +30,7 @@ SECONDS = Unit("s", 1.0, 2)
 
 def run(arguments: Namespace) -> int:
     """Search a way, print its waypoints, and write its program; 1 if none is found."""
-    robot, units = robot_of(arguments), units_of(arguments)
+    robot, units = mounted_robot_of(arguments), units_of(arguments)
     start = arguments.start
     q_start = robot.q_home if start is None else configuration(robot, start, "--start", units)
     q_goal = configuration(robot, arguments.goal, "--goal", units)
@@ -40,13 +49,14 @@ def run(arguments: Namespace) -> int:
             robot, q_start, q_goal, seed=int(arguments.seed), time_limit=seconds, progress=progress, **avoided
         )
     motion = way_program(way, **avoided) if way.found else None
-    if arguments.json:
+    is_piped = arguments.output == "-"  # then standard output has the program alone
+    if arguments.json and not is_piped:
         print_json(way_answer(way, motion))
-    else:
-        print(way.explain(units))
+    elif not arguments.json:
+        print(way.explain(units), file=sys.stderr if is_piped else sys.stdout)
     if motion is None or way.q is None:
         return 1
-    if not arguments.json:
+    if not arguments.json and not is_piped:
         notation = Notation(robot, arguments.rad)
         rows = [
             [str(k + 1), *(notation.joint(i, value) for i, value in enumerate(q))] for k, q in enumerate(way.q)

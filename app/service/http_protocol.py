@@ -21,9 +21,10 @@ from starlette.types import Message, Receive, Scope, Send
 from uvicorn.protocols.http.flow_control import FlowControl
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol, RequestResponseCycle
 
-from app.api.problems import MEDIA_TYPE, ProblemError
+from app.api.problems import ProblemError
 from app.service.guard import Guard, Outflow
 from app.service.handover import LARGEST, Handover
+from app.shared.problems import MEDIA_TYPE
 from app.shared.threads.turns import urgent
 
 if TYPE_CHECKING:

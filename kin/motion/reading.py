@@ -1,4 +1,4 @@
-"""Programs as plain data: TOML text or a dict → `Program`, and back.
+"""Programs as plain data: TOML or JSON text, or a dict → `Program`, and back.
 
 ```toml
 units = { length = "mm", angle = "deg" }   # by default metres and radians
@@ -20,9 +20,10 @@ A target is `q`, or `position` with or without `wxyz`, or `pose`, a 4×4 matrix.
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Mapping
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
@@ -56,10 +57,10 @@ _LENGTHS, _ANGLES = ("tool_speed", "blend"), ("tool_turn",)
 
 
 def parse_program(text: str, robot: Robot | str | None = None) -> Program:
-    r"""The program described by TOML text; see `program_from_dict`.
+    r"""The program described by TOML or JSON text; see `program_from_dict`.
 
     Args:
-        text: of a program file (TOML).
+        text: of a program file: JSON if it begins with a brace, else TOML.
         robot: the arm, or the id of a built-in one: it tells which joint values are lengths; without it all are
             angles.
 
@@ -67,17 +68,18 @@ def parse_program(text: str, robot: Robot | str | None = None) -> Program:
         The program.
 
     Raises:
-        InputError: the text is no TOML, or naming the field, the value and what would be valid.
+        InputError: the text is neither, or naming the field, the value and what would be valid.
 
     Examples:
         >>> import kin
         >>> len(kin.parse_program('[[segments]]\nkind = "dwell"\nseconds = 0.5').segments)
         1
     """
+    is_json = text.lstrip("\ufeff \t\r\n").startswith("{")  # no TOML begins so
     try:
-        data = tomllib.loads(text)
+        data = json.loads(text.lstrip("\ufeff")) if is_json else tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError("program", str(error), "valid TOML") from None
+        raise InputError("program", str(error), "valid JSON" if is_json else "valid TOML") from None
     return program_from_dict(data, robot)
 
 
@@ -197,7 +199,7 @@ class _Reader:
         try:
             made: Segment = cls(**given)
         except InputError as error:
-            _rename(error, where)
+            raise error.within(where) from None
         return made
 
     def scaled(self, key: str, value: object, where: str) -> object:
@@ -231,7 +233,7 @@ class _Reader:
                 return PoseTarget.of(T)
             read = PoseTarget(data["position"], data.get("wxyz"))
         except InputError as error:
-            _rename(error, where)
+            raise error.within(where) from None
         return PoseTarget(_times(read.position, self.length), read.wxyz)
 
     def joints(self, target: JointTarget) -> JointTarget:
@@ -269,11 +271,3 @@ def _only(data: Mapping[Any, Any], known: tuple[str, ...], where: str) -> None:
         if key not in known:
             name = key if isinstance(key, str) and key.isprintable() and len(key) <= 80 else shorten(key)
             raise InputError(where + name, data[key], "only the fields " + ", ".join(known))
-
-
-def _rename(error: InputError, where: str) -> NoReturn:
-    """The same error with the place in its field."""
-    renamed = InputError(f"{where}.{error.field}", None, error.expected)
-    renamed.value = error.value
-    renamed.args = (f"{renamed.field}: got {error.value}, expected {error.expected}",)
-    raise renamed from None

@@ -7,7 +7,8 @@ from typing import Any
 
 from pydantic import ConfigDict, Field, RootModel
 
-from app.api.problems import FieldError, ProblemError, invalid
+from app.api.problems import ProblemError, invalid
+from app.shared.problems import FieldError
 from kin import Robot, RobotFileError, robot_from_dict
 from kin.files.numbers import LARGEST
 from kin.files.read import ANGLES, MAX_CAPSULES, MAX_ROWS

@@ -11,13 +11,14 @@ from app.api import schemas
 from app.api.arms.description import invalid_file
 from app.api.arms.operation import operation
 from app.api.body import versioned
-from app.api.problems import from_input_error, invalid
+from app.api.problems import invalid
 from app.api.schemas import POST_REFUSALS, example, refusals, reply
 from app.api.work import computed
 from app.exports.robots import FORMATS, robot_file
 from app.shared.answers.examination import ExaminationAnswer, examination_answer
 from app.shared.answers.exchange import ConvertAnswer, ImportAnswer, convert_answer, import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
+from app.shared.problems import from_input_error
 from kin import InputError, Robot, RobotFileError, UrdfRobot, examine_urdf, read_urdf
 from kin.files.urdf.xml import MAX_BYTES
 

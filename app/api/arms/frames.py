@@ -9,8 +9,9 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from app.api import schemas
-from app.api.problems import FieldError, from_input_error, invalid, show
+from app.api.problems import invalid
 from app.api.schemas import Vector3, Vector4, numbers
+from app.shared.problems import FieldError, from_input_error, show
 from kin import InputError, Robot, frame_pose
 from kin.frames import BASE, FRAMES, TOOL, matrix_of
 from kin.ik.options import MOST_METRES

@@ -11,13 +11,14 @@ from starlette.concurrency import run_in_threadpool
 from app.api.arms.operation import operation
 from app.api.batches import Batch, held_json
 from app.api.body import versioned
-from app.api.problems import FieldError, invalid
+from app.api.problems import invalid
 from app.api.schemas import refusals, settings_of
 from app.api.work import ADVICE, TooSlowError, compute_slots
 from app.api.workspace.query import RegionQuery
 from app.shared.answers.capability import CapabilityMapAnswer, capability_map_answer
 from app.shared.clients import client_of
 from app.shared.maps import MapRequest, Maps, MapTimeError
+from app.shared.problems import FieldError
 from kin import Robot
 
 router = versioned("workspace")

@@ -10,9 +10,10 @@ from typing import Annotated, Any, TypeVar, get_origin
 from pydantic import BeforeValidator, Field, ValidationError, WithJsonSchema
 from starlette.datastructures import QueryParams
 
-from app.api.problems import FieldError, field_error, from_input_error, invalid, show
+from app.api.problems import field_error, invalid
 from app.api.schemas import LARGEST, Body
 from app.shared.clouds import Cloud
+from app.shared.problems import FieldError, from_input_error, show
 from app.shared.settings import Settings
 from kin import InputError, JointConstraints, Robot
 from kin.workspace import Measure, Strategy

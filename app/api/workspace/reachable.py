@@ -15,12 +15,13 @@ from pydantic_core import to_json
 from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.options import Goal, OptionsBody, Target, single_or_list
-from app.api.problems import Problem, ProblemError
+from app.api.problems import ProblemError
 from app.api.schemas import POST_REFUSALS, example, reply, settings_of
 from app.api.work import Deadline, DeadlineDep
 from app.api.workspace.streaming import ComputedResponse
 from app.shared.answers.answer import Answer, as_json
 from app.shared.answers.ik import ReachableAnswer, reachable_answer
+from app.shared.problems import Problem
 from kin import Robot
 from kin.ik import solve
 

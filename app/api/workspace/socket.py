@@ -20,7 +20,7 @@ from starlette.websockets import WebSocketDisconnect, WebSocketState
 
 from app.api.arms.operation import with_robot
 from app.api.body import parsed, versioned
-from app.api.problems import FieldError, Problem, ProblemError, invalid, unknown_robot
+from app.api.problems import ProblemError, invalid, unknown_robot
 from app.api.work import Deadline
 from app.api.workspace.query import CloudQuery, read_cloud_query, validated
 from app.api.workspace.streaming import ThreadedGenerator
@@ -29,6 +29,7 @@ from app.shared.clients import client_of
 from app.shared.clouds import Cloud
 from app.shared.metrics import STREAMED
 from app.shared.places import Place
+from app.shared.problems import FieldError, Problem
 from app.shared.security import origin_allowed
 from kin import Robot, UnknownRobotError
 

@@ -12,12 +12,13 @@ from pydantic import Field
 
 from app.api.arms.operation import operation
 from app.api.body import versioned
-from app.api.problems import FieldError, invalid, show
+from app.api.problems import invalid
 from app.api.schemas import refusals, reply
 from app.api.work import TooSlowError, busy, compute_slots
 from app.api.workspace.query import NUMBER, RegionQuery, form_of, listed, numbers_of
 from app.shared.answers.workspace import WorkspaceAnswer, workspace_answer
 from app.shared.computations import TooManyPendingError
+from app.shared.problems import FieldError, show
 from app.shared.summaries import Plane, Summaries
 from kin import Robot
 

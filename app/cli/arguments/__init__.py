@@ -63,7 +63,15 @@ def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         parents.output,
         parents.frames,
     )
-    parser.add_argument("q", nargs="+", metavar="Q", help=f"joint values, {UNITS_NOTE}")
+    q = parser.add_argument("q", nargs="+", metavar="Q", help=f"joint values, {UNITS_NOTE}")
+    q.required = False  # with nargs="*", argparse would take no values where options stand before them
+    _add_rows(
+        parser,
+        "--configurations",
+        "many configurations, in radians (metres): a table with the columns q1, q2, …, a .npy array (k, n), or "
+        "JSON lines",
+        "the poses: x, y, z, qw, qx, qy, qz in metres, an array (k, 4, 4), or answers of REST",
+    )
     parser.add_argument("--frames", action="store_true", help="also print the frame after every DH row")
     parser.add_argument(
         "--frame", default="world", metavar="NAME",
@@ -82,15 +90,10 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         parents.output,
         parents.joints,
         parents.frames,
-        usage="kinboard ik ROBOT (--position X Y Z [--wxyz W X Y Z | --approach X Y Z] | --targets FILE -o FILE) "
-        "[options]",
+        usage="kinboard ik ROBOT (--position X Y Z [--wxyz W X Y Z | --approach X Y Z] | --targets FILE "
+        "[-o FILE]) [options]",
     )
     _add_target(parser)
-    parser.add_argument(
-        "-o", "--output", metavar="FILE",
-        help="with --targets: write the best solutions to this file, .npy (NaN where there is none) or .csv (with "
-        "the status); radians and metres. A run that was interrupted is continued by the same command",
-    )  # fmt: skip
     parser.add_argument(
         "--seed", nargs="+", metavar="Q",
         help=f"prefer solutions near this configuration; {UNITS_NOTE}",
@@ -106,11 +109,16 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
     """The arguments of ``ik`` that say what the tool has to match."""
     place = parser.add_mutually_exclusive_group(required=True)
     place.add_argument("--position", nargs=3, metavar=XYZ, help="millimetres (--rad: metres)")
-    place.add_argument(
-        "--targets", metavar="FILE",
-        help="many targets: a .npy file of poses (k, 4, 4), or a .csv file with the columns x, y, z, qw, qx, qy, "
-        "qz; metres",
-    )  # fmt: skip
+    _add_rows(
+        parser,
+        "--targets",
+        "many targets, in metres: a table with the columns x, y, z, qw, qx, qy, qz, a .npy array of poses "
+        "(k, 4, 4), or JSON lines with targets of REST",
+        "the best solutions in radians (metres): a table with the status, an array (k, n) with NaN where there is "
+        "none, or answers of REST. A run from a .csv or .npy file to another that was interrupted is continued by "
+        "the same command",
+        place,
+    )
     turn = parser.add_mutually_exclusive_group()
     turn.add_argument("--wxyz", nargs=4, metavar=("W", *XYZ), help="orientation as a quaternion")
     turn.add_argument("--approach", nargs=3, metavar=XYZ, help="direction of the tool's z axis")
@@ -122,6 +130,18 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
     add_options(parser, ["task", "mask", "mask_frame"], task=None)
 
 
+def _add_rows(parser: argparse.ArgumentParser, flag: str, read: str, written: str, group: Any = None) -> None:
+    """The arguments for many rows at once: where they are read from, and where the answers go."""
+    (group or parser).add_argument(flag, metavar="FILE", help=f"{read}; - is standard input")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help=f"with {flag}: write {written}; - is standard output (default)"
+    )
+    parser.add_argument(
+        "--format", choices=("csv", "npy", "ndjson"),
+        help=f"with {flag}: what is written (default: by the name of the file; for -, what is read)",
+    )  # fmt: skip
+
+
 def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard move``."""
     parser = _command(
@@ -130,9 +150,16 @@ def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "motion of a program: timed joint values along PTP, LIN and CIRC segments",
         parents.robots,
         parents.output,
+        parents.mounts,
     )
+    program = parser.add_argument(
+        "program", metavar="PROGRAM", help="program (TOML or JSON), with its own units; - is standard input"
+    )
+    program.required = False  # there may be --programs
     parser.add_argument(
-        "program", metavar="PROGRAM", help="program (TOML), with its own units; - is standard input"
+        "--programs",
+        metavar="FILE",
+        help="many programs: JSON lines; the answers of REST are written as JSON lines; - is standard input",
     )
     parser.add_argument(
         "--start", nargs="+", metavar="Q",
@@ -153,6 +180,7 @@ def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         help="if the program cannot be driven, write its beginning that can; the exit code stays 1",
     )  # fmt: skip
     parser.add_argument("--rate", default="100", help="samples per second (default 100)")
+    parser.add_argument("--no-samples", action="store_true", help="with --json, --programs: leave out the samples")
     parser.add_argument("--picture", metavar="FILE", help="draw joint values and speeds over time (SVG)")
     add_options(parser, ["avoid_self_collision", "obstacles"])
     return parser
@@ -162,7 +190,7 @@ def add_way(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard way``."""
     parser = _command(
         commands, "way", "a way around obstacles: waypoints between which nothing touches",
-        parents.robots, parents.output,
+        parents.robots, parents.output, parents.mounts,
     )  # fmt: skip
     parser.add_argument("--goal", nargs="+", metavar="Q", required=True, help=f"joint values; {UNITS_NOTE}")
     parser.add_argument(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from app.cli.arguments.options import UNITS_NOTE, add_options
-from app.cli.arguments.values import workpiece
+from app.cli.arguments.values import frame, workpiece
 
 
 class Parents:
@@ -15,7 +15,8 @@ class Parents:
         robots: ``--robots``, the folder of further robot files.
         output: ``--json`` and the units.
         joints: ``--lock`` and ``--limit``.
-        frames: ``--workpiece``.
+        mounts: ``--base`` and ``--tool``.
+        frames: these and ``--workpiece``.
     """
 
     def __init__(self) -> None:
@@ -35,7 +36,18 @@ class Parents:
         )  # fmt: skip
         self.joints = argparse.ArgumentParser(add_help=False)
         add_options(self.joints, ["limits", "locked"])
-        self.frames = argparse.ArgumentParser(add_help=False)
+        self.mounts = argparse.ArgumentParser(add_help=False)
+        for flag, about in (
+            (
+                "--tool",
+                "your tool (TCP), in the tool frame of the arm on which it is mounted: poses are its own",
+            ),
+            ("--base", "where the arm stands in a world frame of your own: poses are in that frame"),
+        ):
+            self.mounts.add_argument(
+                flag, type=frame, metavar="X:Y:Z[:ROLL:PITCH:YAW]", help=f"{about}; {UNITS_NOTE}"
+            )
+        self.frames = argparse.ArgumentParser(add_help=False, parents=[self.mounts])
         self.frames.add_argument(
             "--workpiece", type=workpiece, action="append", metavar="NAME=X:Y:Z[:ROLL:PITCH:YAW]", default=[],
             help="a frame of your own, such as a table, with its pose in the world frame; --frame may name it; "

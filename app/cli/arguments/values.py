@@ -29,10 +29,18 @@ def named(text: str) -> tuple[str, list[str]]:
 
 def workpiece(text: str) -> tuple[str, list[str]]:
     """``NAME=X:Y:Z`` or ``NAME=X:Y:Z:ROLL:PITCH:YAW``."""
-    name, values = named(text)
-    if not name or len(values) not in (3, 6):
+    name, _, values = text.rpartition("=")
+    if not name.strip() or len(values.split(":")) not in (3, 6):
         raise argparse.ArgumentTypeError(f"{text!r} is not NAME=X:Y:Z or NAME=X:Y:Z:ROLL:PITCH:YAW")
-    return name, [*values, "0", "0", "0"][:6]
+    return name.strip(), frame(values)
+
+
+def frame(text: str) -> list[str]:
+    """``X:Y:Z`` or ``X:Y:Z:ROLL:PITCH:YAW``, as six texts."""
+    values = text.split(":")
+    if len(values) not in (3, 6):
+        raise argparse.ArgumentTypeError(f"{text!r} is not X:Y:Z or X:Y:Z:ROLL:PITCH:YAW")
+    return [*values, "0", "0", "0"][:6]
 
 
 # argparse reports "invalid <name> value".

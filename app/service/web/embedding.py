@@ -17,8 +17,9 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from app.api.problems import ProblemError, respond, shorten_text
+from app.api.problems import ProblemError, respond
 from app.shared.answers.frames import HEIGHT, MODES, WIDTH, frame
+from app.shared.problems import shorten_text
 from app.shared.security import origin_allowed
 
 LEAST, MOST = 200, 4096  # pixels that may be asked for

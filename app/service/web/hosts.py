@@ -15,8 +15,9 @@ from functools import lru_cache
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
-from app.api.problems import ProblemError, respond, shorten_text
+from app.api.problems import ProblemError, respond
 from app.shared.clients import client_of
+from app.shared.problems import shorten_text
 
 logger = logging.getLogger("kinboard.connections")
 

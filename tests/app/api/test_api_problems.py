@@ -8,8 +8,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.api import body as body_module
-from app.api.problems import KINDS, Problem
 from app.service.main import create_app
+from app.shared.problems import KINDS, Problem
 from app.shared.settings import Settings
 
 ARM = "/api/v1/robots/pioneer5"

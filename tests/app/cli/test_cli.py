@@ -175,7 +175,7 @@ def test_ik_with_options_asks_the_core_the_same(capsys):
     code, out, _ = run(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options)
     assert code == 0
     assert f"{result.redundancy[0].label} = -20.000°" in out
-    one = answer(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options[:-2])
+    one = answer(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options[:-2], "--max-solutions", 1)
     assert len(one["solutions"]) == 1
 
 
@@ -270,7 +270,7 @@ def test_robots_lists_all_and_describes_one(capsys, client):
         (("fk", "pioneer5", 1, 2, 3, 4, "1e308"), "too large"),
         (("fk", "pioneer5", 1, 2, 3, 4, "5mm"), "is not a unit of an angle"),
         (("ik", "pioneer5", "--position", "1,300", 2, 3), "--position: “1,300” may be written with thousands"),
-        (("fk", "pioneer5"), "required"),
+        (("fk", "pioneer5"), "5 joint values, or --configurations FILE"),
         (("ik", "pioneer5"), "--position"),
         (("ik", "pioneer5", "--position", 1, 2), "expected 3 arguments"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--wxyz", 0, 0, 0, 0), "not zero"),

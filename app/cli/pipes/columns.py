@@ -1,0 +1,56 @@
+"""Tables of numbers: which cells of a row are meant, by the names in the heading."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kin import InputError
+
+POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Where the named numbers are in the rows of a table.
+
+    Attributes:
+        names: in the order in which they are returned.
+        places: of their cells.
+        has_heading: whether the first row names the columns; if not, the rows have these numbers and no others.
+    """
+
+    names: tuple[str, ...]
+    places: tuple[int, ...]
+    has_heading: bool
+
+    @classmethod
+    def of(cls, first: Sequence[str], names: Sequence[str], field: str) -> Columns:
+        """The columns of a table with this first row; raises `InputError` if one is missing."""
+        head = [cell.strip().lower() for cell in first]
+        if all(name in head for name in names):
+            return cls(tuple(names), tuple(map(head.index, names)), True)
+        if len(head) != len(names) or not all(map(_is_number, head)):
+            expected = f"a heading with the columns {', '.join(names)}, or rows of {len(names)} numbers"
+            raise InputError(field, list(first), expected)
+        return cls(tuple(names), tuple(range(len(names))), False)
+
+    def numbers(self, row: Sequence[str], field: str) -> list[float]:
+        """The numbers of a row; not-a-number if all cells are empty. Raises `InputError` with the row."""
+        try:
+            cells = [row[place] for place in self.places]
+            if not any(map(str.strip, cells)):
+                return [math.nan] * len(cells)
+            return [float(cell) for cell in cells]
+        except (ValueError, IndexError):
+            expected = f"{len(self.names)} numbers: " + ", ".join(self.names)
+            raise InputError(field, ",".join(row), expected) from None
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return not cell  # an empty row stands for what was not solved
+    return True

@@ -1,0 +1,327 @@
+"""Rows from files and standard input, their answers, and JSON that is what REST answers."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import kin
+from app.cli import parser
+from app.cli.pipes import source
+from app.shared.problems import Problem
+
+ROOT = Path(__file__).parents[3]
+UR5 = kin.get_robot("ur5")
+TARGETS = [
+    {"position": [0.4, 0.1, 0.3], "wxyz": [0.0, 1.0, 0.0, 0.0]},
+    {"position": [9.0, 0.0, 0.0]},
+    {"position": [0.3, -0.2, 0.4], "approach": [0.0, 0.0, -2.0]},
+    {"matrix": kin.from_position_wxyz([0.2, 0.4, 0.3], [0.3, 0.9, 0.1, 0.2]).tolist()},
+]
+
+
+def wxyz(T):
+    return kin.wxyz_from_rotation(T[:3, :3]).tolist()
+
+
+@pytest.fixture
+def run(capsysbinary, monkeypatch):
+    """Runs one command with bytes as standard input: exit code, standard output and standard error."""
+
+    def command(*words, given=b""):
+        text = given if isinstance(given, bytes) else given.encode()
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text)))
+        code = parser.main([str(word) for word in words])
+        out, err = capsysbinary.readouterr()
+        return code, out, err.decode()
+
+    return command
+
+
+def lines(values):
+    return "".join(json.dumps(value) + "\n" for value in values)
+
+
+def array(values):
+    file = io.BytesIO()
+    np.save(file, values)
+    return file.getvalue()
+
+
+# -- rows ------------------------------------------------------------------------------------------------------
+
+
+def test_targets_as_json_lines_get_the_answers_of_rest(run, client):
+    code, out, err = run("ik", "ur5", "--targets", "-", given=lines(TARGETS))
+    assert (code, err) == (1, "")
+    found = [json.loads(line) for line in out.splitlines()]
+    assert found == client.post("/api/v1/robots/ur5/ik", json={"target": TARGETS}).json()["results"]
+    assert [len(each["solutions"]) for each in found][:2] == [8, 0]
+
+
+@pytest.mark.parametrize("task", ["position", "approach"])
+def test_a_task_that_is_named_holds_for_all_lines(run, client, task):
+    some = [TARGETS[0], TARGETS[3]]
+    _, out, _ = run("ik", "ur5", "--targets", "-", "--task", task, "--max-solutions", 2, given=lines(some))
+    asked = {"target": some, "task": task, "max_solutions": 2}
+    assert [json.loads(line) for line in out.splitlines()] == client.post(
+        "/api/v1/robots/ur5/ik", json=asked
+    ).json()["results"]
+
+
+def test_lines_in_frames_of_their_own_are_those_of_rest(run, client):
+    rounded = np.round(kin.from_position_wxyz([0.1, 0.0, 0.2], [0.3, 0.9, 0.1, 0.2]), 5).tolist()
+    some = [{**TARGETS[0], "frame": "table"}, TARGETS[0], {"matrix": rounded, "frame": "table"}]
+    words = ("--workpiece", "table=100:0:50:0:0:90", "--tool", "0:0:120", "--base", "0:0:10:0:0:45")
+    _, out, _ = run("ik", "ur5", "--targets", "-", *words, given=lines(some))
+    asked = {
+        "target": some,
+        "workpieces": {"table": {"xyz": [0.1, 0, 0.05], "rpy": [0, 0, np.pi / 2]}},
+        "tool": {"xyz": [0, 0, 0.12]},
+        "base": {"xyz": [0, 0, 0.01], "rpy": [0, 0, np.pi / 4]},
+    }
+    assert [json.loads(line) for line in out.splitlines()] == client.post(
+        "/api/v1/robots/ur5/ik", json=asked
+    ).json()["results"]
+    framed = UR5.with_base(kin.from_xyz_rpy([0, 0, 0.01], [0, 0, np.pi / 4])).with_mounted(
+        kin.from_xyz_rpy([0, 0, 0.12])
+    )
+    table = kin.from_xyz_rpy([0.1, 0, 0.05], [0, 0, np.pi / 2])
+    first = json.loads(out.splitlines()[0])["solutions"][0]["q"]
+    expected = table @ kin.from_position_wxyz(TARGETS[0]["position"], TARGETS[0]["wxyz"])
+    assert np.abs(kin.fk(framed, first) - expected).max() < 1e-9
+
+
+@pytest.mark.parametrize("form", ["csv", "npy", "ndjson"])
+def test_what_one_command_writes_the_other_reads(run, form):
+    q = UR5.random_q(np.random.default_rng(5), 9)
+    rows = "q6,q5,note,q4,q3,q2,q1\n" + "".join(
+        ",".join([*map(repr, each[:3:-1].tolist()), "x", *map(repr, each[3::-1].tolist())]) + "\n" for each in q
+    )
+    given = {"csv": rows, "npy": array(q), "ndjson": lines(q.tolist())}[form]
+    code, poses, _ = run("fk", "ur5", "--configurations", "-", given=given)
+    assert code == 0
+    code, solved, err = run("ik", "ur5", "--targets", "-", given=poses)
+    assert (code, err) == (0, "")
+    code, again, _ = run("fk", "ur5", "--configurations", "-", "--format", "npy", given=solved)
+    assert code == 0
+    assert np.abs(np.load(io.BytesIO(again)) - kin.fk(UR5, q)).max() < 1e-9
+
+
+def test_what_was_not_solved_has_no_pose(run):
+    _, solved, _ = run("ik", "ur5", "--targets", "-", "--format", "csv", given=lines(TARGETS))
+    rows = list(csv.DictReader(solved.decode().splitlines()))
+    assert [row["status"] for row in rows] == ["solved", "unreachable", "solved", "solved"]
+    assert rows[1]["q1"] == ""
+    _, poses, _ = run("fk", "ur5", "--configurations", "-", given=solved)
+    found = list(csv.DictReader(poses.decode().splitlines()))
+    assert found[1] == dict.fromkeys(found[1], "")
+    assert [float(found[2][axis]) for axis in "xyz"] == pytest.approx(TARGETS[2]["position"])
+    _, poses, _ = run("fk", "ur5", "--configurations", "-", "--format", "ndjson", given=solved)
+    assert json.loads(poses.splitlines()[1]) is None
+
+
+def test_rows_without_a_heading_are_numbers_in_order(run, client):
+    q = [[0.1, -1.0, 1.2, 0.3, 1.1, 0.2], [9.0, 0, 0, 0, 0, 0]]
+    given = "".join(",".join(map(str, each)) + "\r\n" for each in q)
+    _, out, _ = run("fk", "ur5", "--configurations", "-", "--format", "ndjson", "--frames", given=given)
+    asked = {"q": q, "frames": True}
+    assert [json.loads(line) for line in out.splitlines()] == client.post(
+        "/api/v1/robots/ur5/fk", json=asked
+    ).json()["results"]
+
+
+def test_the_form_of_a_file_is_seen_from_its_content_and_written_when_complete(run, tmp_path):
+    (tmp_path / "in.txt").write_text(lines(TARGETS[:1]) * 3)
+    out = tmp_path / "out.npy"
+    code, said, _ = run("ik", "ur5", "--targets", tmp_path / "in.txt", "-o", out, "--format", "npy")
+    assert (code, said.decode()) == (0, f"{out}: 3 of 3 targets have an exact solution\n")
+    T = kin.fk(UR5, np.load(out))
+    assert np.abs(T[:, :3, 3] - TARGETS[0]["position"]).max() < 1e-9
+    (tmp_path / "in.txt").write_text(lines([TARGETS[0], {"position": [0, "a", 0]}]))
+    kept = out.read_bytes()
+    assert run("ik", "ur5", "--targets", tmp_path / "in.txt", "-o", out, "--format", "npy")[0] == 2
+    assert out.read_bytes() == kept
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["in.txt", "out.npy"]
+
+
+def test_more_rows_than_one_piece_are_answered_in_order(run, monkeypatch):
+    monkeypatch.setattr(source, "AT_ONCE", 4)
+    monkeypatch.setattr(source, "_CHUNK", 100)
+    q = UR5.random_q(np.random.default_rng(6), 23)
+    given = "q1,q2,q3,q4,q5,q6\n" + "".join(",".join(map(repr, each)) + "\n" for each in q.tolist())
+    _, out, _ = run("fk", "ur5", "--configurations", "-", "--format", "npy", given=given)
+    assert np.array_equal(np.load(io.BytesIO(out)), kin.fk(UR5, q))
+
+
+def test_each_line_is_answered_before_the_next_one_is_sent():
+    words = [sys.executable, "-m", "app.cli", "fk", "ur5", "--configurations", "-"]
+    with subprocess.Popen(
+        words, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(ROOT)}
+    ) as process:
+        for q in UR5.random_q(np.random.default_rng(7), 3).tolist():
+            process.stdin.write(json.dumps(q).encode() + b"\n")
+            process.stdin.flush()
+            found = json.loads(process.stdout.readline())
+            assert found["pose"]["matrix"] == kin.fk(UR5, q).tolist()
+        process.stdin.close()
+        assert process.wait(30) == 0
+
+
+@pytest.mark.parametrize(
+    ("command", "given", "said"),
+    [
+        ("ik", "", "at least one row"),
+        ("ik", "x,y,z,qw,qx,qy,qz\n", "at least one row"),
+        ("ik", "a,b\n1,2\n", "a heading with the columns x, y, z, qw, qx, qy, qz"),
+        ("ik", "0.4,0.1,0.3,0,1,0,0\n0.4,0.1,0.3,0,1,0,b\n", r"--targets\[1\]"),
+        ("ik", "0.4,0.1,0.3,0,0,0,0\n", r"--targets\[0\].*seven numbers"),
+        ("ik", "0.4,0.1,nan,0,1,0,0\n", r"--targets\[0\].*seven numbers"),
+        ("ik", lines([TARGETS[0], {"position": [1, 2]}]), r"--targets\[1\]\.position"),
+        ("ik", lines([TARGETS[0], [1, 2]]), r"--targets\[1\]: .*a target such as"),
+        ("ik", lines([{"position": [1, 2, 3], "pose": 1}]), r"--targets\[0\]\.pose"),
+        ("ik", lines([{"position": [1, 2, 3], "frame": "moon"}]), "moon"),
+        ("ik", lines([{"wxyz": [1, 0, 0, 0]}]), "position, with wxyz"),
+        ("ik", lines([{"matrix": [[1, 0], [0, 1]]}]), r"--targets\[0\]\.matrix"),
+        ("ik", lines([{"position": [1e999, 0, 0]}]), r"--targets\[0\]\.position"),
+        ("ik", '{"position": [0.4, 0.1', "a line of JSON"),
+        ("ik", "[" * 100_000, "a line of JSON"),
+        ("ik", b"\xff\xfe\x00{", "text in UTF-8"),
+        ("ik", array(np.eye(4)), "an array of poses"),
+        ("ik", array(np.array([object()])), "a broken .npy file"),
+        ("ik", b"\x93NUMPY\x01\x00", "a broken .npy file"),
+        ("fk", lines([[1, 2, 3]]), "6 joint values"),
+        ("fk", lines([[[1, 2, 3, 4, 5, 6]]]), "a list of 6 joint values"),
+        ("fk", lines([{"x": 1}]), "a list of 6 joint values"),
+        ("fk", "1,2,3,4,5,inf\n", r"--configurations\[0\]"),
+        ("fk", array(np.array([[1, 2, 3, 4, 5, 6], [np.nan, 0, 0, 0, 0, 0]])), r"--configurations\[1\]"),
+        ("fk", array(np.zeros((0, 6))), "at least one row"),
+        ("fk", "x" * (1 << 21), "shorter lines"),
+    ],
+)
+def test_a_row_that_is_none_is_named(run, command, given, said):
+    option = {"ik": "--targets", "fk": "--configurations"}[command]
+    code, _, err = run(command, "ur5", option, "-", given=given)
+    assert code == 2
+    assert re.search(said, err), err
+    assert len(err) < 400
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("fk", "ur5", "0", "--configurations", "-"), "no joint values besides"),
+        (("fk", "ur5", "0", "-o", "x.csv"), "--configurations FILE as well"),
+        (("fk", "ur5", "--configurations", "none.csv"), "a file that can be read"),
+        (("fk", "ur5", "--configurations", "-", "-o", "out.txt"), "a name that ends in"),
+        (("ik", "ur5", "--position", "1", "2", "3", "--format", "csv"), "--targets FILE as well"),
+        (("ik", "ur5", "--targets", "-", "--frame", "tool"), "a frame that does not move"),
+        (("ik", "ur5", "--targets", "-", "--tool", "1:2"), "is not X:Y:Z"),
+        (("move", "ur5"), "either a program or --programs"),
+        (("move", "ur5", "a.toml", "--programs", "-"), "either a program or --programs"),
+        (("move", "ur5", "--programs", "-", "--format", "csv"), "no --format besides"),
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(run, words, said):
+    code, _, err = run(*words, given=lines([TARGETS[0]]) if words[0] == "ik" else lines([[0.0] * 6]))
+    assert (code, said in err) == (2, True), err
+
+
+# -- programs --------------------------------------------------------------------------------------------------
+
+PROGRAM = {"units": {"angle": "deg"}, "segments": [{"kind": "ptp", "q": [30, -80, 80, 10, 70, 20]}]}
+
+
+def test_a_program_may_be_json_and_its_answer_is_that_of_rest(run, client, tmp_path):
+    file = tmp_path / "program.json"
+    file.write_text("\ufeff " + json.dumps(PROGRAM, indent=2), encoding="utf-8")
+    _, out, _ = run("move", "ur5", file, "--json", "--rate", 10)
+    expected = client.post("/api/v1/robots/ur5/motion", json={"program": PROGRAM, "rate": 10.0}).json()
+    assert json.loads(out) == expected
+    assert len(expected["samples"]["t"]) > 5
+    _, out, _ = run("move", "ur5", "-", "--json", "--no-samples", given=json.dumps(PROGRAM))
+    assert json.loads(out) == {key: value for key, value in expected.items() if key != "samples"}
+
+
+def test_many_programs_are_answered_line_by_line(run, client):
+    programs = [PROGRAM, {"segments": [{"kind": "ptp", "q": [9, 0, 0, 0, 0, 0]}]}, PROGRAM]
+    code, out, _ = run("move", "ur5", "--programs", "-", "--tool", "0:0:50", given=lines(programs))
+    assert code == 1
+    found = [json.loads(line) for line in out.splitlines()]
+    assert [each["planned"] for each in found] == [True, False, True]
+    asked = {"program": PROGRAM, "tool": {"xyz": [0, 0, 0.05]}}
+    assert found[2] == client.post("/api/v1/robots/ur5/motion", json=asked).json()
+    broken = {"segments": [{"kind": "ptp", "q": [9]}]}
+    code, out, err = run("move", "ur5", "--programs", "-", given=lines([PROGRAM, broken]))
+    assert (code, len(out.splitlines())) == (2, 1)
+    assert "--programs[1].segments[0].q" in err
+
+
+@pytest.mark.parametrize(("text", "said"), [("{", "valid JSON"), ("x = ", "valid TOML"), ("[]", "valid TOML")])
+def test_a_program_that_is_neither_is_refused(run, text, said):
+    code, _, err = run("move", "ur5", "-", given=text)
+    assert (code, said in err) == (2, True), err
+
+
+# -- JSON ------------------------------------------------------------------------------------------------------
+
+
+def test_json_lists_all_solutions_as_rest_does(run, client):
+    words = ("ik", "ur5", "--position", 400, 100, 300, "--wxyz", 0, 1, 0, 0, "--tool", "0:0:120:0:0:90")
+    code, out, _ = run(*words, "--json")
+    asked = {"target": TARGETS[0], "tool": {"xyz": [0, 0, 0.12], "rpy": [0, 0, np.pi / 2]}}
+    assert code == 0
+    assert json.loads(out) == client.post("/api/v1/robots/ur5/ik", json=asked).json()
+    assert len(json.loads(out)["solutions"]) == 8
+
+
+@pytest.mark.parametrize(
+    ("words", "kind", "field"),
+    [
+        (("ik", "ur5", "--position", "a", "2", "3"), "invalid-input", None),
+        (("ik", "nobody", "--position", "1", "2", "3"), "unknown-robot", "robot_id"),
+        (("fk", "ur5", "1"), "invalid-input", "q"),
+        (("fk", "ur5", "--configurations", "-"), "invalid-input", "--configurations[0]"),
+        (("move", "ur5", "none.toml"), "invalid-input", "PROGRAM"),
+        (("ik", "ur5"), "bad-request", None),
+        (("ik", "ur5", "--nonsense", "1", "--position", "1", "2", "3"), "bad-request", None),
+        (("workspace", "ur5", "--strategy", "nonsense"), "bad-request", None),
+    ],
+)
+def test_errors_in_json_are_problem_documents(run, words, kind, field):
+    code, out, err = run(*words, "--json", given="[1]")
+    assert (code, err) == (2, "")
+    document = json.loads(out)
+    assert Problem.model_validate(document, strict=True, extra="forbid").model_dump() == document
+    assert document["type"] == f"urn:kinboard:problem:{kind}"
+    assert document["hint"].startswith("Robots: " if kind == "unknown-robot" else f"`kinboard {words[0]} --help`")
+    assert [each["field"] for each in document["errors"]] == ([field] if field else [])
+    code, out, err = run(*words, given="[1]")
+    assert (code, out) == (2, b"")
+    assert document["detail"] in err or kind == "unknown-robot"
+
+
+def test_an_unknown_robot_is_refused_as_in_rest(run, client):
+    document = json.loads(run("robots", "nobody", "--json")[1])
+    rest = client.get("/api/v1/robots/nobody").json()
+    assert {**document, "hint": ""} == {**rest, "hint": ""}
+
+
+def test_a_way_is_piped_to_the_motion_of_its_program(run):
+    pytest.importorskip("ompl")
+    words = ("way", "ur5", "--start", 0, -90, 90, 0, 90, 0, "--goal", 60, -90, 90, 0, 90, 0, "-o", "-")
+    code, program, err = run(*words)
+    assert code == 0
+    assert "A way was found" in err
+    _, out, _ = run("move", "ur5", "-", "--json", "--start", 0, -90, 90, 0, 90, 0, given=program)
+    assert json.loads(out)["samples"]["q"][-1] == pytest.approx(np.radians([60, -90, 90, 0, 90, 0]).tolist())
