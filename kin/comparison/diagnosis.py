@@ -12,19 +12,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from kin.axes import generic_q
-from kin.comparison.frames import Mapping, no_mapping, plainest
+from kin.comparison.frames import FRAME, LEAST, Mapping, no_mapping, plainest
 from kin.comparison.matching import Tolerance
 from kin.comparison.mistakes import Edit, edits, fewer_rows, more_rows, own_numbers, value_edit
 from kin.comparison.results import Change, Explanation
-from kin.comparison.tables import ALPHA, THETA, A, Chain, D, Invariants, Tables, chain, invariants
+from kin.comparison.tables import ALPHA, THETA, A, Chain, D, Ends, Invariants, Tables, chain, invariants
 from kin.fk import fk
-from kin.robot import Robot
+from kin.robot import KIND_CODES, Robot
 from kin.transforms import Array
 
 PER_CHANGE = 3.0  # cost of any change: fewer changes come first
@@ -59,12 +59,14 @@ class Search:
         self, a: Robot, b: Robot, fixed: bool, tolerance: Tolerance, deadline: float, stop: Callable[[], None]
     ) -> None:
         self._a, self._b, self._fixed = a, b, fixed
+        self._share = 1.0 if fixed else FREE_FRAMES  # of the cost of frames and zeros
         self._tolerance, self._deadline, self._stop = tolerance, deadline, stop
         self._probes = _probes(a)
         self._poses = fk(a, self._probes)
         table = Tables.of(a)
         self._kinds = table.kinds[0, table.joint_rows]
         self._invariants = invariants(table)
+        self._ends = Ends.of(table)
         self._found: dict[bytes, Explanation] = {}
         self._limit = math.inf  # cost up to which an explanation that leaves frames or zeros open is worth having
         self.complete = True
@@ -78,11 +80,14 @@ class Search:
         self._limit = unchanged - _BETTER
         start = _Level(Tables.of(self._b), [()], np.zeros(1))
         levels = list(self._changed_once(start))
-        self._solve(start)
+        # Whether a change that leaves frames or zeros open can be worth having at all.
+        frames = PER_CHANGE + self._share * LEAST < self._limit
+        if self._fixed or frames:
+            self._solve(start)
         for level in levels:
-            self._judge(level, frames=True)
+            self._judge(level, frames)
         if self._least() >= LIKELY and unchanged == math.inf:
-            self._pairs(levels)
+            self._pairs([*levels, *self._uneven(start)])
         return sorted(self._found.values(), key=lambda e: (e.cost, len(e.changes)))[:most]
 
     def _least(self) -> float:
@@ -97,11 +102,21 @@ class Search:
         if n == self._a.n:
             several = [*edits(single.rows, self._a, self._fixed), *own_numbers(single.rows, self._a)]
             yield _distinct([(e, e.apply(single)) for e in several], start)
-        rows = [each for each in fewer_rows(single) if n > self._a.n or each[0].mistake == "typed twice"]
-        if n >= self._a.n and rows:
-            yield _distinct(rows, start)
-        if n <= self._a.n:
-            yield _distinct(list(more_rows(single, self._a)), start)
+            # A fixed row that was typed twice or left out.
+            if single.rows > n:
+                yield from _levels([e for e in _typed_twice(single) if len(e[1].joint_rows) == n], start)
+            if len(self._a.rows) > n:
+                yield from _levels([e for e in more_rows(single, self._a) if len(e[1].joint_rows) == n], start)
+        else:
+            yield from _levels(fewer_rows(single) if n > self._a.n else more_rows(single, self._a), start)
+
+    def _uneven(self, start: _Level) -> Iterator[_Level]:
+        """Half of two changes: tables with another number of joints than a, where b has as many."""
+        single = start.tables
+        n = len(single.joint_rows)
+        if n == self._a.n:
+            for changed in (_typed_twice(single), more_rows(single, self._a)):
+                yield from _levels([each for each in changed if len(each[1].joint_rows) != n], start)
 
     def _pairs(self, levels: list[_Level]) -> None:
         """Tables with two changes: every change of every changed table, likely ones first."""
@@ -140,11 +155,11 @@ class Search:
             if len(single.joint_rows) > self._a.n:
                 changed = list(fewer_rows(single))
                 if self._b.n == self._a.n:  # one row is missing, and another was typed twice
-                    changed = [each for each in changed if each[0].mistake == "typed twice"]
+                    changed = _typed_twice(single)
             else:
                 changed = list(more_rows(single, self._a))
-            if changed:
-                self._judge(_distinct(changed, start), frames=True)
+            for changed_twice in _levels(changed, start):
+                self._judge(changed_twice, frames=True)
 
     # -- judging -----------------------------------------------------------------------------------------------
 
@@ -168,19 +183,30 @@ class Search:
             self._invariants, 10.0 * self._tolerance.length, 10.0 * self._tolerance.angle
         )
         fits = rest[wrong == 0]
-        for i in fits[np.argsort(level.cost[fits], kind="stable")][:_MOST_MATCHES]:
-            if level.cost[i] >= min(self._least(), self._limit) or time.monotonic() > self._deadline:
+        if not fits.size:
+            return
+        least = level.cost[fits] + self._share * np.maximum(LEAST, FRAME * self._frames_needed(tables.take(fits)))
+        for k in np.argsort(least, kind="stable")[:_MOST_MATCHES]:
+            i = fits[k]
+            if least[k] >= min(self._least(), self._limit) or time.monotonic() > self._deadline:
                 break
             self._stop()
             found = plainest(self._a, tables.robot(int(i), self._b), self._tolerance)
             if not isinstance(found, int):
                 self._keep(level, int(i), found[0])
 
+    def _frames_needed(self, tables: Tables) -> Array:
+        """How many of base and tool every mapping of each table onto a has at least ``(N,)``.
+
+        Without a base the first axes are one line; without a tool the last ones are, seen from the tool.
+        """
+        return np.asarray(sum(~same for same in self._ends.agree(Ends.of(tables), self._tolerance)))
+
     def _keep(self, level: _Level, i: int, mapping: Mapping) -> None:
         """Keep an explanation that forward kinematics confirms."""
         cost = float(level.cost[i])
         if not mapping.is_trivial:
-            cost += mapping.cost(self._tolerance) * (1.0 if self._fixed else FREE_FRAMES)
+            cost += mapping.cost(self._tolerance) * self._share
             if cost >= self._limit:
                 return
         robot = level.tables.robot(i, self._b)
@@ -232,35 +258,44 @@ class Search:
         near = np.flatnonzero(invariants(tables).agree(wanted, length, angle) <= _NEAR)
         m = tables.rows
         tried: list[tuple[int, int, int, float]] = []
-        for k in near:
-            single = tables.take(np.array([k]))
-            now = invariants(single)
+        if not near.size:
+            return
+        # Every length of every near table, a metre longer.
+        lengths = [(row, column) for row in range(m) for column in (A, D)]
+        longer = tables.take(near).repeated(len(lengths))
+        cells = longer.cells.copy()
+        rows, columns = (np.tile(part, len(near)) for part in zip(*lengths, strict=True))
+        cells[np.arange(len(cells)), rows, columns] += 1.0
+        now, moved = invariants(tables.take(near)), invariants(longer.with_cells(cells))
+        twists = wanted.twist[0].tolist()
+        values = sorted({round(x, 12) for t in twists for x in (t, -t, math.pi - t, t - math.pi)})
+        for i, k in enumerate(near.tolist()):
+            for j, (row, column) in enumerate(lengths):
+                tried += [
+                    (k, row, column, change) for change in _linear(now, i, moved, i * len(lengths) + j, wanted)
+                ]
             for row in range(m):
-                for column in (A, D):
-                    moved = invariants(
-                        value_edit(row, column, float(single.cells[0, row, column]) + 1.0, 0.0).apply(single)
-                    )
-                    tried += [(int(k), row, column, change) for change in _linear(now, moved, wanted)]
-                twists = wanted.twist[0].tolist()
-                values = sorted({round(x, 12) for t in twists for x in (t, -t, math.pi - t, t - math.pi)})
-                tried += [(int(k), row, ALPHA, x - float(single.cells[0, row, ALPHA])) for x in values]
+                tried += [(k, row, ALPHA, x - float(tables.cells[k, row, ALPHA])) for x in values]
         if not tried:
             return
-        changed = Tables.joined([tables.take(np.array([k for k, *_ in tried]))])
+        changed = tables.take(np.array([k for k, *_ in tried]))
         cells = changed.cells.copy()
         where = np.arange(len(tried))
         cells[where, [t[1] for t in tried], [t[2] for t in tried]] += [t[3] for t in tried]
-        changed = Tables(cells, changed.kinds, changed.modified, changed.base, changed.tool)
-        fits = invariants(changed).agree(wanted, length, angle) == 0
+        fits = invariants(changed.with_cells(cells)).agree(wanted, length, angle) == 0
         yield from (
             each for each, fit in zip(tried, fits, strict=True) if fit and abs(each[3]) > self._tolerance.length
         )
 
 
-def _linear(now: Invariants, moved: Invariants, wanted: Invariants) -> Iterator[float]:
-    """Changes of a length that make a wrong distance or offset right; `moved` is after a change of one metre."""
+def _linear(now: Invariants, i: int, moved: Invariants, j: int, wanted: Invariants) -> Iterator[float]:
+    """Changes of a length of table i that make a wrong distance or offset right.
+
+    Args:
+        moved: row j is that table after a change of one metre.
+    """
     for here, there, goal in zip(now[1:], moved[1:], wanted[1:], strict=True):
-        for value, after, size in zip(*(np.ravel(each).tolist() for each in (here, there, goal)), strict=True):
+        for value, after, size in zip(here[i].tolist(), there[j].tolist(), goal[0].tolist(), strict=True):
             slope = after - value
             if abs(slope) > 1e-3 and abs(abs(value) - abs(size)) > 1e-9:
                 yield from ((sign * abs(size) - value) / slope for sign in (1.0, -1.0))
@@ -307,31 +342,42 @@ def _from_poses(lines: Chain, goal: Array, tolerance: Tolerance) -> Iterator[tup
             yield int(k), int(row), angle, float(turned[k, row])
 
 
+def _typed_twice(tables: Tables) -> list[tuple[Edit, Tables]]:
+    """A single table without one of two equal rows."""
+    return [each for each in fewer_rows(tables) if each[0].mistake == "typed twice"]
+
+
+def _levels(changed: Iterable[tuple[Edit, Tables]], start: _Level) -> Iterator[_Level]:
+    """Changed tables, each once, under the cheapest name; those with fixed rows elsewhere apart."""
+    alike: dict[bytes, list[tuple[Edit, Tables]]] = {}
+    for each in changed:
+        alike.setdefault((each[1].kinds[0] == KIND_CODES["fixed"]).tobytes(), []).append(each)
+    for several in alike.values():
+        yield _distinct(several, start)
+
+
 def _distinct(changed: list[tuple[Edit, Tables]], start: _Level) -> _Level:
-    """Changed tables of one number of rows, each once, under the cheapest name."""
+    """Changed tables with the same fixed rows, each once, under the cheapest name."""
     (before,), base_cost = start.history, float(start.cost[0])
-    seen: set[bytes] = {_key(start.tables)}
-    tables, history, cost = [], [], []
-    for edit, table in sorted(changed, key=lambda each: each[0].cost):
-        if (key := _key(table)) not in seen:
+    changed = sorted(changed, key=lambda each: each[0].cost)
+    tables = Tables.joined([table for _, table in changed])
+    seen = set(_keys(start.tables))
+    index = []
+    for i, key in enumerate(_keys(tables)):
+        if key not in seen:
             seen.add(key)
-            tables.append(table)
-            history.append((*before, edit))
-            cost.append(base_cost + edit.cost + PER_CHANGE)
-    if not tables:
-        return _Level(start.tables.take(np.array([], dtype=np.intp)), [], np.empty(0))
-    return _Level(Tables.joined(tables), history, np.array(cost))
+            index.append(i)
+    edits = [changed[i][0] for i in index]
+    cost = np.array([base_cost + edit.cost + PER_CHANGE for edit in edits])
+    return _Level(tables.take(np.array(index, dtype=np.intp)), [(*before, edit) for edit in edits], cost)
 
 
-def _key(table: Tables) -> bytes:
-    parts = [
-        np.round(table.cells, 10).ravel() + 0.0,
-        table.kinds.ravel(),
-        table.modified,
-        table.base.ravel(),
-        table.tool.ravel(),
-    ]
-    return np.concatenate(parts).tobytes()
+def _keys(tables: Tables) -> list[bytes]:
+    """What tells each table from others."""
+    N = len(tables)
+    parts = [np.round(tables.cells, 10) + 0.0, tables.kinds, tables.modified, tables.base, tables.tool]
+    together = np.concatenate([np.reshape(part, (N, -1)) for part in parts], axis=1)
+    return [row.tobytes() for row in together]
 
 
 def _changes(table: Tables, history: tuple[Edit, ...]) -> tuple[Change, ...]:

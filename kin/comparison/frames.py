@@ -16,14 +16,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from kin.axes import inverse
-from kin.comparison.matching import NOBODY, Axis, Match, Tolerance, axes_of, matches
-from kin.dh.exponentials import exp_screw, screws
+from kin.comparison.matching import NOBODY, Axis, Match, Tolerance, axes_of, cross, matches
+from kin.dh.exponentials import screws
 from kin.fk import fk
 from kin.robot import Robot
-from kin.transforms import Array, rotation_angle
+from kin.transforms import Array
 
 # What makes a mapping less plain; only the order of sums matters.
-_FRAME, _FLIP, _QUARTER, _OFFSET = 4.6, 2.2, 2.0, 2.9
+FRAME, _FLIP, _QUARTER, _OFFSET = 4.6, 2.2, 2.0, 2.9
+LEAST = _QUARTER  # cost of any mapping that is not trivial
+_NO_TURN = np.eye(3)
+_LAST = (0.0, 0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +56,7 @@ class Mapping:
         """How far this is from no mapping at all."""
         total = 0.0
         for T in (self.base, self.tool):
-            total += 0.0 if is_identity(T, tolerance) else _FRAME
+            total += 0.0 if is_identity(T, tolerance) else FRAME
         total += _FLIP * float(np.count_nonzero(self.signs < 0.0))
         for offset in self.offsets.tolist():
             if abs(offset) > tolerance.angle:
@@ -75,9 +78,11 @@ def no_mapping(n: int) -> Mapping:
 
 def is_identity(T: Array, tolerance: Tolerance) -> bool:
     """Whether a transform ``(4, 4)`` is the identity within a tolerance."""
-    return bool(
-        np.linalg.norm(T[:3, 3]) <= tolerance.length and rotation_angle(np.eye(3), T[:3, :3]) <= tolerance.angle
-    )
+    if math.hypot(*T[:3, 3].tolist()) > tolerance.length:
+        return False
+    # ‖R − I‖ = √8 sin(θ/2)
+    chord = math.hypot(*(T[:3, :3] - _NO_TURN).ravel().tolist())
+    return chord <= math.sqrt(8.0) * math.sin(0.5 * min(math.pi, tolerance.angle))
 
 
 def plainest(a: Robot, b: Robot, tolerance: Tolerance) -> tuple[Mapping, int] | int:
@@ -87,15 +92,19 @@ def plainest(a: Robot, b: Robot, tolerance: Tolerance) -> tuple[Mapping, int] | 
         the mapping and the number of vectors of signs with which there is one; without any, the first joint (from
         0) whose axis cannot be matched.
     """
-    axes_a = axes_of(a)
-    found, furthest = matches(axes_a, axes_of(b), tolerance)
+    axes_a, axes_b = axes_of(a), axes_of(b)
+    found, furthest = matches(axes_a, axes_b, tolerance)
     if furthest is not None:
         return furthest.joint
     zero_a, zero_b = fk(a, np.zeros(a.n)), fk(b, np.zeros(b.n))
     S = screws(b).S
     best, least = None, math.inf
+    frames = FRAME * (
+        (not _same_line(axes_a[0], axes_b[0], tolerance))
+        + (not _same_line(_seen_from(zero_a, axes_a[-1]), _seen_from(zero_b, axes_b[-1]), tolerance))
+    )
     for match in sorted(found, key=lambda match: match.signs.count(-1)):
-        if _FLIP * match.signs.count(-1) >= least:
+        if frames + _FLIP * match.signs.count(-1) >= least:
             break
         for mapping in _candidates(match, axes_a, S, zero_a, zero_b, tolerance):
             if (cost := mapping.cost(tolerance)) < least:
@@ -104,26 +113,40 @@ def plainest(a: Robot, b: Robot, tolerance: Tolerance) -> tuple[Mapping, int] | 
     return best, len(found)
 
 
+def _seen_from(T: Array, axis: Axis) -> Axis:
+    """An axis in the coordinates of a frame."""
+    R = T[:3, :3].T
+    return Axis(tuple((R @ axis.z).tolist()), tuple((R @ (axis.p - T[:3, 3])).tolist()), axis.slides)
+
+
+def _same_line(one: Axis, other: Axis, tolerance: Tolerance) -> bool:
+    """Whether two axes may be one line; of slides, only the direction counts. Without it a frame is needed."""
+    turned = math.hypot(*cross(one.z, other.z)) > 10.0 * tolerance.angle
+    apart = cross((other.p[0] - one.p[0], other.p[1] - one.p[1], other.p[2] - one.p[2]), one.z)
+    return not turned and (one.slides or math.hypot(*apart) <= 10.0 * tolerance.length)
+
+
 def _candidates(
     match: Match, axes_a: Sequence[Axis], S: Array, zero_a: Array, zero_b: Array, tolerance: Tolerance
 ) -> Iterator[Mapping]:
     """Mappings of one vector of signs: with or without an offset of the first joint, and of the last ones."""
     signs = np.array(match.signs, dtype=float)
-    M = match.M.matrix()
+    M, columns = match.M.matrix(), S.T.tolist()
     ends = [(M, np.array(match.offsets))]
     if (closed := _closing(match, M, zero_a, zero_b, tolerance)) is not None:
         ends.append(closed)
     for M_n, offsets in ends:
         product = np.eye(4)  # exp(S_1 o_1) … exp(S_n o_n)
-        for column, offset in zip(S.T, offsets.tolist(), strict=True):
-            product = product @ (exp_screw(column, offset) if offset else np.eye(4))
+        for column, offset in zip(columns, offsets.tolist(), strict=True):
+            if offset:
+                product = product @ _exp(column, offset)
         B = M_n @ inverse(product)
         E = inverse(M_n @ zero_b) @ zero_a
         for first in {float(offsets[0]), 0.0, _first_offset(axes_a[0], signs[0], B, offsets[0], tolerance)}:
             chosen = offsets.copy()
             chosen[0] = first
             # B exp(S_1 o_1) stays what it is.
-            moved = B @ exp_screw(S[:, 0], offsets[0] - first)
+            moved = B @ _exp(columns[0], float(offsets[0]) - first)
             yield Mapping(
                 _clean(moved, tolerance), _clean(E, tolerance), signs, _clean_offsets(chosen, S, tolerance)
             )
@@ -149,7 +172,7 @@ def _closing(
     turn, slides = match.free
     offsets = np.array(match.offsets)
     angle = 0.0
-    if not np.allclose(D[:3, :3], np.eye(3), rtol=0.0, atol=tolerance.angle):
+    if np.abs(D[:3, :3] - _NO_TURN).max() > tolerance.angle:
         found = None if turn is None else _turn_about(D[:3, :3], np.array(turn.z), tolerance)
         if turn is None or found is None:
             return None
@@ -158,8 +181,7 @@ def _closing(
             offsets[turn.joint] += match.signs[turn.joint] * angle
     turned = np.eye(4)
     if turn is not None:
-        z, p = np.array(turn.z), np.array(turn.p)
-        turned = exp_screw(np.concatenate([z, np.cross(p, z)]), angle)
+        turned = _exp([*turn.z, *cross(turn.p, turn.z)], angle)
     left = (D @ inverse(turned))[:3, 3]
     if np.linalg.norm(left) > tolerance.length:
         if not slides:
@@ -170,6 +192,26 @@ def _closing(
             return None
         offsets += np.array(match.signs) * (shares @ np.array([s.weights for s in slides]))
     return D @ M, offsets
+
+
+def _exp(S: Sequence[float], value: float) -> Array:
+    """The motion ``(4, 4)`` along a unit screw (ω, v) without pitch: `exp_screw` of one value, in few steps."""
+    (x, y, z), (u, v, w) = S[:3], S[3:]
+    if x == y == z == 0.0:
+        return np.array(
+            [[1.0, 0.0, 0.0, value * u], [0.0, 1.0, 0.0, value * v], [0.0, 0.0, 1.0, value * w], _LAST]
+        )
+    s, k = math.sin(value), 1.0 - math.cos(value)
+    c = 1.0 - k
+    # With v = p × ω, p − R p = sin θ v + (1 − cos θ) ω × v.
+    return np.array(
+        [
+            [c + k * x * x, k * x * y - s * z, k * x * z + s * y, s * u + k * (y * w - z * v)],
+            [k * x * y + s * z, c + k * y * y, k * y * z - s * x, s * v + k * (z * u - x * w)],
+            [k * x * z - s * y, k * y * z + s * x, c + k * z * z, s * w + k * (x * v - y * u)],
+            _LAST,
+        ]
+    )
 
 
 def _turn_about(R: Array, z: Array, tolerance: Tolerance) -> float | None:
@@ -233,5 +275,14 @@ def _groups(null: Array, free: list[int]) -> tuple[tuple[int, ...], ...]:
 
 def _ad(S: Array) -> Array:
     """The matrix of the Lie bracket ``[S, ·]`` ``(6, 6)`` for screws (ω, v)."""
-    W, V = np.cross(np.eye(3), S[:3]), np.cross(np.eye(3), S[3:])
-    return np.block([[W, np.zeros((3, 3))], [V, W]])
+    a, b, c, u, v, w = S.tolist()
+    return np.array(
+        [
+            [0.0, -c, b, 0.0, 0.0, 0.0],
+            [c, 0.0, -a, 0.0, 0.0, 0.0],
+            [-b, a, 0.0, 0.0, 0.0, 0.0],
+            [0.0, -w, v, 0.0, -c, b],
+            [w, 0.0, -u, c, 0.0, -a],
+            [-v, u, 0.0, -b, a, 0.0],
+        ]
+    )

@@ -274,7 +274,8 @@ def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _cross(a: Vector, b: Vector) -> Vector:
+def cross(a: Vector, b: Vector) -> Vector:
+    """a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -300,12 +301,12 @@ def _across(a: Vector, z: Vector) -> Vector:
 
 
 def _parallel(a: Vector, b: Vector, tolerance: float) -> bool:
-    return _norm(_cross(a, b)) <= tolerance
+    return _norm(cross(a, b)) <= tolerance
 
 
 def _angle(a: Vector, b: Vector, z: Vector) -> float:
     """The turn about z that takes the direction of a to that of b, both perpendicular to z."""
-    return math.atan2(_dot(_cross(a, b), z), _dot(a, b))
+    return math.atan2(_dot(cross(a, b), z), _dot(a, b))
 
 
 def _rotate(R: Rotation, a: Vector) -> Vector:
@@ -330,7 +331,7 @@ def _about(z: Vector, angle: float) -> Rotation:
 
 def _between(a: Vector, b: Vector) -> Rotation:
     """A rotation that takes one unit vector to another: by the smaller angle, half a turn about any normal."""
-    normal = _cross(a, b)
+    normal = cross(a, b)
     sine = _norm(normal)
     if sine > 1e-9:
         return _about(_scaled(normal, 1.0 / sine), math.atan2(sine, _dot(a, b)))

@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
 from kin.comparison.tables import ALPHA, COLUMNS, THETA, A, D, Tables
 from kin.dh.tables import convert
-from kin.robot import CONVENTIONS, KIND_CODES, Robot
+from kin.robot import CONVENTIONS, KIND_CODES, Convention, Robot
 from kin.transforms import Array
 
 Mistake = Literal[
@@ -63,6 +64,12 @@ class Edit:
     apply: Callable[[Tables], Tables]
 
 
+@lru_cache(maxsize=16)
+def table_in(reference: Robot, convention: Convention) -> Tables:
+    """The table of the reference in a convention; not to be written to."""
+    return Tables.of(convert(replace(reference, capsules=(), capsules_source=""), convention))
+
+
 def edits(m: int, reference: Robot, frames_too: bool) -> Iterator[Edit]:
     """Changes of tables with m rows that keep the number of rows.
 
@@ -97,7 +104,7 @@ def on_cells(
         cells = tables.cells.copy()
         for column in columns:
             cells[:, chosen, column] = change(cells[:, chosen, column])
-        return replace(tables, cells=cells)
+        return tables.with_cells(cells)
 
     return apply
 
@@ -172,7 +179,7 @@ def _exchanges(m: int) -> Iterator[Edit]:
                     t.cells[:, chosen, pair[1]],
                     t.cells[:, chosen, pair[0]],
                 )
-                return replace(t, cells=cells)
+                return t.with_cells(cells)
 
             yield Edit("exchanged", rows, _names(first, second), cost + 0.1 * (not rows), exchange)
     for i in range(m):
@@ -192,7 +199,7 @@ def _shifts(m: int, reference: Robot) -> Iterator[Edit]:
     """Columns typed a row too early or too late; the row that is left open gets the reference's number."""
     fills = [np.zeros((m, 4))]
     if m == len(reference.rows):
-        fills += [Tables.of(convert(reference, convention)).cells[0] for convention in CONVENTIONS]
+        fills += [table_in(reference, convention).cells[0] for convention in CONVENTIONS]
     for columns in ((A, ALPHA), (A,), (ALPHA,), (THETA, D), (D,), (THETA,)):
         for step in (1, -1):
             for fill in fills:
@@ -203,7 +210,7 @@ def _shifts(m: int, reference: Robot) -> Iterator[Edit]:
                     cells, opened, chosen = t.cells.copy(), 0 if step > 0 else -1, list(columns)
                     cells[:, :, chosen] = np.roll(t.cells[:, :, chosen], step, axis=1)
                     cells[:, opened, chosen] = fill[opened, chosen]
-                    return replace(t, cells=cells)
+                    return t.with_cells(cells)
 
                 yield Edit("shifted", (), _names(*columns), 1.2, shift)
 
@@ -254,7 +261,7 @@ def fewer_rows(tables: Tables) -> Iterator[tuple[Edit, Tables]]:
 def more_rows(tables: Tables, reference: Robot) -> Iterator[tuple[Edit, Tables]]:
     """A single table with a row of the reference, which was left out, in either convention."""
     for convention in CONVENTIONS:
-        rows = Tables.of(convert(reference, convention))
+        rows = table_in(reference, convention)
         for i in range(min(rows.rows, tables.rows + 1)):
 
             def with_row(t: Tables, i: int = i, rows: Tables = rows) -> Tables:
@@ -270,7 +277,7 @@ def own_numbers(m: int, reference: Robot) -> Iterator[Edit]:
     if m != len(reference.rows):
         return
     for convention in CONVENTIONS:
-        cells = Tables.of(convert(reference, convention)).cells[0]
+        cells = table_in(reference, convention).cells[0]
         for i in range(m):
             for column in range(4):
                 yield value_edit(i, column, float(cells[i, column]), 2.2)

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from kin.comparison.matching import Tolerance
 from kin.robot import KIND_CODES, Joint, Kind, Robot
 from kin.transforms import Array
 
@@ -74,6 +75,10 @@ class Tables:
         return Tables(
             self.cells[index], self.kinds[index], self.modified[index], self.base[index], self.tool[index]
         )
+
+    def with_cells(self, cells: Array) -> Tables:
+        """The same with other cells ``(N, m, 4)``."""
+        return Tables(cells, self.kinds, self.modified, self.base, self.tool)
 
     def repeated(self, times: int) -> Tables:
         """Each of them `times` times in a row."""
@@ -194,7 +199,7 @@ def invariants(tables: Tables, parallel: float = _PARALLEL) -> Invariants:
     lines = chain(tables, np.zeros((1, n)))
     z, p = lines.z[:, 0, rows], lines.z_point[:, 0, rows]
     slides = tables.kinds[:, rows] == KIND_CODES["prismatic"]
-    w = np.cross(z[:, :-1], z[:, 1:])
+    w = _cross(z[:, :-1], z[:, 1:])
     sine = np.linalg.norm(w, axis=-1)
     cosine = np.abs((z[:, :-1] * z[:, 1:]).sum(axis=-1))
     twist = np.arctan2(sine, cosine)
@@ -205,8 +210,8 @@ def invariants(tables: Tables, parallel: float = _PARALLEL) -> Invariants:
     distance = np.where(lies, across, (e * w).sum(axis=-1) / safe)
     distance = np.where(slides[:, :-1] | slides[:, 1:], math.nan, distance)
     # Feet of the common normal of each link on its two axes, as lengths from the points p.
-    near = (np.cross(e, z[:, 1:]) * w).sum(axis=-1) / safe**2
-    far = (np.cross(e, z[:, :-1]) * w).sum(axis=-1) / safe**2
+    near = (_cross(e, z[:, 1:]) * w).sum(axis=-1) / safe**2
+    far = (_cross(e, z[:, :-1]) * w).sum(axis=-1) / safe**2
     feet = ~lies & ~slides[:, :-1] & ~slides[:, 1:]
     offset = np.full((len(tables), n), math.nan)
     start = np.full((len(tables), 3), math.nan)  # the last foot, carried along a run of parallel axes
@@ -219,3 +224,41 @@ def invariants(tables: Tables, parallel: float = _PARALLEL) -> Invariants:
             length = ((leaves - start) * z[:, i]).sum(axis=-1)
             offset[:, i] = np.where(feet[:, i], length, math.nan)
     return Invariants(twist, distance, offset)
+
+
+class Ends(NamedTuple):
+    """The first axis in the world, and the last one seen from the tool: what no zeros or signs can alter.
+
+    Attributes:
+        z, p: ``(N, 2, 3)`` direction and a point of both.
+        slides: ``(N, 2)`` whether only the direction counts.
+    """
+
+    z: Array
+    p: Array
+    slides: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, tables: Tables) -> Ends:
+        """Those of each table."""
+        rows = tables.joint_rows[[0, -1]]
+        lines = chain(tables, np.zeros((1, len(tables.joint_rows))))
+        z, p = lines.z[:, 0, rows].copy(), lines.z_point[:, 0, rows].copy()
+        R, t = lines.T[:, 0, :3, :3], lines.T[:, 0, :3, 3]
+        z[:, 1] = np.einsum("nji,nj->ni", R, z[:, 1])
+        p[:, 1] = np.einsum("nji,nj->ni", R, p[:, 1] - t)
+        return cls(z, p, tables.kinds[:, rows] == KIND_CODES["prismatic"])
+
+    def agree(self, others: Ends, tolerance: Tolerance) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether first and last axis of each of the others may lie where those of this single table do."""
+        turned = np.linalg.norm(_cross(self.z, others.z), axis=-1) <= 10.0 * tolerance.angle
+        apart = np.linalg.norm(_cross(others.p - self.p, self.z), axis=-1) <= 10.0 * tolerance.length
+        same = turned & (apart | others.slides)
+        return same[:, 0], same[:, 1]
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """a × b of vectors ``(..., 3)``, without the checks of `numpy.cross`."""
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    u, v, w = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)

@@ -314,3 +314,17 @@ def test_the_senses_of_many_joints_are_counted_in_time():
     """Axes through one point, each perpendicular to the next: every vector of signs is an answer."""
     arm = Robot.from_dh([{"alpha": HALF}] * 8)
     assert kin.compare(arm, arm).sign_choices == 2**8
+
+
+@pytest.mark.parametrize("place", [0, 2, 4, 7, 8])
+@pytest.mark.parametrize("name", ["spacer", "flange"])
+def test_a_fixed_row_of_several_that_was_left_out_is_named(place: int, name: str):
+    panda = kin.get_robot("panda")
+    spacer = Joint("spacer", kind="fixed", d=0.05, a=0.02, alpha=0.3)
+    a = replace(panda, rows=(*panda.rows[:place], spacer, *panda.rows[place:]), capsules=(), capsules_source="")
+    b = replace(a, rows=tuple(row for row in a.rows if row.name != name))
+    first = kin.compare(a, b).explanations[0]
+    missing = next(i for i, row in enumerate(a.rows) if row.name == name)
+    assert [(change.mistake, change.rows) for change in first.changes] == [("missing row", (missing,))]
+    q = a.random_q(np.random.default_rng(1), 30)
+    assert np.allclose(kin.fk(first.robot, q), kin.fk(a, q), atol=1e-9)
