@@ -95,11 +95,21 @@
 
   // Buttons, choices, fields
 
+  const OPENS = { postures: "postures", way: "way" }; // the part of the tab that a button opens, below the list
+  let awaited = ""; // it comes into view as soon as it is complete
+  function reveal() {
+    const shown = awaited && part(awaited);
+    if (!shown || !("ready" in shown.dataset)) return;
+    awaited = "";
+    shown.scrollIntoView({ block: "start" });
+  }
+
   addEventListener("click", (event) => {
     const target = event.target instanceof Element ? event.target : document.body;
     const button = target.closest("[data-program-do]");
     if (button && button.ariaDisabled !== "true") {
       const index = button.dataset.index === undefined ? [] : [Number(button.dataset.index)];
+      awaited = OPENS[button.dataset.programDo] ?? "";
       act(button.dataset.programDo, button.dataset.argument ?? null, ...index);
     }
     if (target.closest("[data-program-upload]")) document.querySelector("[data-program-file]").click();
@@ -162,6 +172,7 @@
     if (!part("clock")) return;
     restore();
     reopen();
+    reveal();
     showClock();
   }
   viserPage.watch(follow, { on: ["childList", "data-time", "data-playing", "data-at", "data-duration"] });

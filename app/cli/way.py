@@ -23,7 +23,7 @@ from app.shared.answers.way import way_answer
 from kin import InputError
 from kin.motion import JointTarget, Ptp
 from kin.units import Unit
-from kin.way import find_way, way_program
+from kin.way import MOST_SEED, find_way, way_program
 
 SECONDS = Unit("s", 1.0, 2)
 
@@ -36,7 +36,7 @@ def run(arguments: Namespace) -> int:
     q_goal = configuration(robot, arguments.goal, "--goal", units)
     avoided = {"avoid_self_collision": arguments.avoid_self_collision, "obstacles": obstacles_of(arguments)}
     if not arguments.seed.isdecimal():
-        raise InputError("--seed", arguments.seed, "a whole number from 0 to 4294967295")
+        raise InputError("--seed", arguments.seed, f"a whole number from 0 to {MOST_SEED}")
     seconds = quantity(arguments.time_limit, SECONDS, "--time-limit")
     seen = [0.0]
     with progress_bar(100, "%", sys.stderr.isatty() and not arguments.json) as advance:

@@ -33,12 +33,12 @@ from kin.transforms import Array, as_transform
 from kin.way.free import Space
 from kin.way.programs import way_program
 from kin.way.results import Way, WayCause
-from kin.way.search import connect
+from kin.way.search import alone, connect, is_installed
 from kin.way.shortening import shortened
 
-__all__ = ["Way", "find_way", "way_program"]
+__all__ = ["LONGEST", "MOST_SEED", "Way", "find_way", "is_installed", "way_program"]
 
-LONGEST = 600.0  # seconds
+LONGEST, MOST_SEED = 600.0, 2**32 - 1  # seconds
 _SHARE = 0.2  # of the time limit, at least, that may be used to shorten the way
 
 
@@ -62,7 +62,8 @@ def find_way(
         goal: ``(n,)`` joint values, or T_base_tool ``(4, 4)``: then any of its postures may be the end.
         obstacles, avoid_self_collision: what must not be touched.
         seed: the same seed gives the same way, if it is found before the time is over.
-        time_limit: seconds, above 0 and at most 600, for the search; shortening may take a fifth of it more.
+        time_limit: seconds, above 0 and at most 600, for the search; shortening may take a fifth of it more. A
+            search that waits for another one of the same process does not count that.
         progress: called now and then with the part of the time that has passed, 0 to 1.
         stop: called now and then; cancels the search by raising.
 
@@ -73,12 +74,13 @@ def find_way(
     """
     robot = robot_of(robot)
     start, seconds = _checked(robot, q_start, seed, time_limit)
-    began = time.monotonic()
     space = Space.of(robot, surroundings(robot, tuple(obstacles), avoid_self_collision), stop)
     goals, refused = _goals(robot, start, goal, space)
     refused = space.refusal(start, "start") or refused
     if refused is not None:
         return Way(robot, None, refused, seed, seconds, 0.0)
+
+    began = time.monotonic()
 
     def passed() -> float:
         part = (time.monotonic() - began) / seconds
@@ -88,7 +90,11 @@ def find_way(
         return part
 
     straight = next((q for q in goals if space.is_free(start, q)), None)
-    found = np.array([start, straight]) if straight is not None else connect(space, start, goals, seed, passed)
+    found = None if straight is None else np.array([start, straight])
+    if found is None:
+        with alone(stop):
+            began = time.monotonic()  # now it searches
+            found = connect(space, start, goals, seed, passed)
     searched = time.monotonic() - began
     if found is None:
         return Way(robot, None, WayCause("time"), seed, seconds, searched)
@@ -106,8 +112,8 @@ def _checked(robot: Robot, q_start: ArrayLike, seed: int, time_limit: float) -> 
     seconds = finite_number("time_limit", time_limit, f"seconds, above 0 and at most {LONGEST:g}")
     if not 0.0 < seconds <= LONGEST:
         raise InputError("time_limit", time_limit, f"seconds, above 0 and at most {LONGEST:g}")
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**32:
-        raise InputError("seed", seed, "a whole number from 0 to 4294967295")
+    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= MOST_SEED:
+        raise InputError("seed", seed, f"a whole number from 0 to {MOST_SEED}")
     return start, seconds
 
 

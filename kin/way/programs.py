@@ -8,6 +8,7 @@ then a waypoint is put in the middle of the straight line, which the motion cann
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,19 +27,27 @@ def way_program(
     obstacles: Sequence[Obstacle] = (),
     avoid_self_collision: bool = True,
     stop: Callable[[], None] = never_cancel,
+    like: Ptp | None = None,
 ) -> Motion:
     """The motion through the waypoints of a way, proven free; its `program` starts at the start of the way.
+
+    Args:
+        way: that was found.
+        obstacles, avoid_self_collision: what must not be touched.
+        stop: called now and then; cancels by raising.
+        like: its segments have the speed, acceleration and limits of the tool of this one.
 
     Raises:
         InputError: no way was found.
     """
     if way.q is None:
         raise InputError("way", way.reason, "a way that was found")
+    like = like or Ptp(JointTarget(tuple(way.q[-1].tolist())))
     q = list(way.q)
     zones = [0] * len(q)
     for _ in range(_ROUNDS):
         segments = [
-            Ptp(JointTarget(tuple(row.tolist())), blend=ZONES[zone] if i < len(q) - 2 else 0.0)
+            replace(like, target=JointTarget(tuple(row.tolist())), blend=ZONES[zone] if i < len(q) - 2 else 0.0)
             for i, (row, zone) in enumerate(zip(q[1:], zones[1:], strict=True))
         ]
         motion = plan_motion(

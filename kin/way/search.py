@@ -6,8 +6,10 @@ time would change what the other finds.
 
 from __future__ import annotations
 
+import importlib.util
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
@@ -20,6 +22,23 @@ from kin.way.results import weights
 
 STEP = 0.8  # the longest motion that a tree grows by, weighted as in `kin.way.results.weights`
 _ONE = threading.Lock()
+_LOOK = 0.05  # seconds between two looks whether a search that waits for another one is cancelled
+
+
+def is_installed() -> bool:
+    """Whether the package that searches is there."""
+    return importlib.util.find_spec("ompl") is not None
+
+
+@contextmanager
+def alone(stop: Callable[[], None]) -> Iterator[None]:
+    """Wait until no other search runs; `stop` cancels by raising."""
+    while not _ONE.acquire(timeout=_LOOK):
+        stop()
+    try:
+        yield
+    finally:
+        _ONE.release()
 
 
 def connect(
@@ -27,7 +46,7 @@ def connect(
 ) -> Array | None:
     """Waypoints ``(k, n)`` from the start to one of the goals, all ``(n,)``; None if the time is over before.
 
-    `passed` is the part of the time that has passed; it may cancel by raising.
+    `passed` is the part of the time that has passed; it may cancel by raising. Call it within `alone`.
     """
     base, geometric, util = _ompl()
     weight = weights(space.robot)
@@ -42,35 +61,34 @@ def connect(
             """Whether a motion between two states is free."""
             return space.is_free(read(first), read(second))
 
-    with _ONE:
-        util.noOutputHandler()  # it reports each new seed as an error
-        util.RNG.setSeed(seed + 1)  # 0 would take the time
-        states = base.RealVectorStateSpace(len(weight))
-        bounds = base.RealVectorBounds(len(weight))
-        for i, (low, high) in enumerate(zip(space.lower * weight, space.upper * weight, strict=True)):
-            bounds.setLow(i, float(low))
-            bounds.setHigh(i, float(high))
-        states.setBounds(bounds)
-        information = base.SpaceInformation(states)
-        information.setStateValidityChecker(lambda state: space.is_free_at(read(state)))
-        motions = Motions(information)
-        information.setMotionValidator(motions)
-        information.setup()
-        problem = base.ProblemDefinition(information)
-        problem.addStartState(_state(states, start * weight))
-        ends = base.GoalStates(information)
-        for goal in goals:
-            ends.addState(_state(states, goal * weight))
-        problem.setGoal(ends)
-        planner = geometric.RRTConnect(information)
-        planner.setRange(STEP)
-        planner.setProblemDefinition(problem)
-        planner.setup()
-        planner.solve(base.PlannerTerminationCondition(lambda: passed() >= 1.0))
-        if not problem.hasExactSolution():
-            return None
-        path = problem.getSolutionPath()
-        rows = np.array([read(path.getState(i)) for i in range(path.getStateCount())])
+    util.noOutputHandler()  # it reports each new seed as an error
+    util.RNG.setSeed(seed + 1)  # 0 would take the time
+    states = base.RealVectorStateSpace(len(weight))
+    bounds = base.RealVectorBounds(len(weight))
+    for i, (low, high) in enumerate(zip(space.lower * weight, space.upper * weight, strict=True)):
+        bounds.setLow(i, float(low))
+        bounds.setHigh(i, float(high))
+    states.setBounds(bounds)
+    information = base.SpaceInformation(states)
+    information.setStateValidityChecker(lambda state: space.is_free_at(read(state)))
+    motions = Motions(information)
+    information.setMotionValidator(motions)
+    information.setup()
+    problem = base.ProblemDefinition(information)
+    problem.addStartState(_state(states, start * weight))
+    ends = base.GoalStates(information)
+    for goal in goals:
+        ends.addState(_state(states, goal * weight))
+    problem.setGoal(ends)
+    planner = geometric.RRTConnect(information)
+    planner.setRange(STEP)
+    planner.setProblemDefinition(problem)
+    planner.setup()
+    planner.solve(base.PlannerTerminationCondition(lambda: passed() >= 1.0))
+    if not problem.hasExactSolution():
+        return None
+    path = problem.getSolutionPath()
+    rows = np.array([read(path.getState(i)) for i in range(path.getStateCount())])
     rows[0] = start
     rows[-1] = min(goals, key=lambda goal: float(np.abs(goal - rows[-1]).max()))
     return rows

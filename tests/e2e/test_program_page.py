@@ -1,4 +1,7 @@
-"""The tab *Program* in a browser: record three poses, play, scrub, read the plot, save, rename, reload."""
+"""The tab *Program* in a browser: record three poses, play, scrub, read the plot, save, rename, reload.
+
+Programs are opened from files, the chart of postures is clicked, and a way is found around an obstacle.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from page import Tab
-from playwright.sync_api import expect
+from playwright.sync_api import FilePayload, Locator, expect
 
 import kin
+from app.viewer.obstacles import placed
+from app.viewer.panel.posture import short
 
 pytestmark = pytest.mark.browser
 
-PIONEER = kin.get_robot("pioneer5")
+PIONEER, UR5 = kin.get_robot("pioneer5"), kin.get_robot("ur5")
 ANGLES = (90.0, 140.0, 60.0)  # of joint 1, degrees
 
 
@@ -139,3 +144,84 @@ def test_three_poses_are_recorded_played_saved_and_kept(program: Tab, tmp_path: 
     page.locator("[data-program-choice=language]").select_option("URScript")
     expect(page.locator("[data-program=files] code")).to_contain_text("six revolute joints")
     is_kept(program)
+
+
+# A line of the UR5 that arrives in another posture than recorded, degrees.
+LINE = (
+    ("ptp", [215.70215832, -94.13277042, 106.01340862, -101.8806382, -90.0, 35.70215832]),
+    ("lin", [209.38701291, -192.42399488, 91.0728513, 11.35114358, -90.0, 29.38701291]),
+)
+
+
+def open_file(tab: Tab, rows: list[tuple[str, list[float]]]) -> Locator:
+    """Open a program with the button *Open…*; returns the rows of the list."""
+    text = "units = { angle = 'deg' }\n"
+    text += "".join(f"[[segments]]\nkind = '{kind}'\nq = {q}\n" for kind, q in rows)
+    tab.open("Program")
+    with tab.page.expect_file_chooser() as chooser:
+        tab.page.get_by_role("button", name="Open…").click()
+    chooser.value.set_files(FilePayload(name="new.toml", mimeType="application/toml", buffer=text.encode()))
+    found = tab.page.locator("[data-program-item]")
+    expect(found).to_have_count(len(rows))
+    return found
+
+
+@pytest.fixture
+def ur5(desktop: Tab) -> Iterator[Tab]:
+    desktop.show(UR5)
+    yield desktop
+    desktop.open("Program")
+    desktop.page.locator("[data-program-do=clear]").click()
+    expect(desktop.page.locator("[data-program-item]")).to_have_count(0)
+
+
+def test_a_click_in_the_chart_of_postures_starts_there(ur5: Tab) -> None:
+    rows = open_file(ur5, list(LINE))
+    page = ur5.page
+    expect(rows.nth(1)).to_contain_text("Arrives in another posture")
+    rows.nth(1).locator("[data-program-do=choose]").click()
+    page.get_by_role("button", name="Postures…").click()
+    chart = page.locator("[data-program=postures]")
+    expect(chart.get_by_role("heading")).to_be_in_viewport()
+    wanted = chart.locator("li").filter(has_text=short(kin.branch_of(UR5, np.radians(LINE[1][1]))))
+    expect(wanted).to_contain_text("the whole way")
+    row = wanted.get_by_role("button").get_attribute("data-argument")
+    chart.locator(f"rect[data-argument='{row}']").first.click()
+    expect(chart).to_have_count(0)
+    expect(rows.nth(1)).not_to_contain_text("Arrives")
+    page.get_by_role("button", name="Undo").click()
+    expect(rows.nth(1)).to_contain_text("Arrives in another posture")
+
+
+def test_a_way_around_an_obstacle_is_put_into_the_program(ur5: Tab) -> None:
+    (sphere,) = placed.added((), "sphere", UR5, UR5.q_home)
+    T = kin.fk(UR5, UR5.q_home)
+    T[:3, 3] = sphere.xyz
+    middle = np.degrees(kin.solve_ik(UR5, T, q_seed=UR5.q_home).solutions[0].q)
+    swing = [("ptp", [middle[0] + turn, *middle[1:]]) for turn in (-50.0, 50.0)]
+    rows = open_file(ur5, [(kind, [float(value) for value in q]) for kind, q in swing])
+    page = ur5.page
+    ur5.open("Move")
+    folder = page.get_by_text("Obstacles", exact=True)
+    folder.click()
+    page.get_by_role("button", name="Add a sphere").click()
+    expect(page.get_by_role("button", name="Remove sphere")).to_be_visible()
+    ur5.open("Program")
+    page.get_by_role("button", name="Find a way to 2…").click()
+    form = page.locator("[data-program=way]")
+    expect(form.get_by_role("heading")).to_be_in_viewport()
+    limit = form.get_by_label("Time limit")
+    limit.fill("60")
+    limit.press("Enter")
+    expect(limit).to_have_value("60")
+    form.get_by_role("button", name="Find a way").click()
+    expect(form).to_have_count(0)
+    expect(rows).not_to_have_count(2)
+    expect(page.locator("[data-program=summary]")).not_to_contain_text("Touches")
+    page.get_by_role("button", name="Undo").click()
+    expect(rows).to_have_count(2)
+
+    ur5.open("Move")
+    page.get_by_role("button", name="Remove sphere").click()
+    folder.click()
+    expect(page.get_by_role("button", name="Add a sphere")).to_be_hidden()

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import sys
 from itertools import pairwise
+from threading import Thread
 
 import numpy as np
 import pytest
 
 import kin
 from kin.way import find_way, way_program
+from kin.way.search import alone
 
 UR5, PANDA, IIWA = (kin.get_robot(name) for name in ("ur5", "panda", "iiwa14"))
 
@@ -114,6 +116,42 @@ def test_none_found_in_time_is_not_called_none_and_a_search_reports_and_is_cance
     find_way(UR5, start, goal, obstacles=[obstacle], time_limit=60.0, progress=parts.append)
     assert parts
     assert parts[-1] >= parts[0] >= 0.0
+
+
+def test_a_search_that_waits_for_another_one_keeps_its_time_and_is_cancelled():
+    start, goal, obstacle = scene(UR5)
+
+    def stop() -> None:
+        raise KeyboardInterrupt
+
+    found = []
+    with alone(lambda: None):
+        waiting = Thread(
+            target=lambda: found.append(find_way(UR5, start, goal, obstacles=[obstacle], seed=3, time_limit=60.0))
+        )
+        waiting.start()
+        with pytest.raises(KeyboardInterrupt), alone(stop):
+            pass
+        waiting.join(0.3)
+        assert waiting.is_alive()
+    waiting.join()
+    assert found[0].found
+    assert found[0].seconds < 60.0
+
+
+def test_a_program_has_the_speeds_that_are_asked_for_and_stays_free_with_them():
+    start, goal, obstacle = scene(UR5)
+    way = find_way(UR5, start, goal, obstacles=[obstacle], seed=3, time_limit=60.0)
+    like = kin.motion.Ptp(kin.motion.JointTarget(tuple(goal)), speed=0.3, acceleration=0.2, tool_speed=0.4)
+    motion = way_program(way, [obstacle], like=like)
+    assert motion.planned
+    assert {(each.speed, each.acceleration, each.tool_speed) for each in motion.program.segments} == {
+        (0.3, 0.2, 0.4)
+    }
+    assert motion.program.segments[-1].target.q == pytest.approx(goal)
+    sample = motion.sample(np.linspace(0.0, motion.duration, 2000))
+    assert sample.tool_speed.max() < 0.4 * (1 + 1e-3)
+    assert kin.clearance(UR5, sample.q, [obstacle]).min() > -1e-9
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 
 import kin
 from app.viewer.feature import Stage
-from app.viewer.tabs.program.items import Item, Items, Point, passed_through, point
+from app.viewer.tabs.program.items import Item, Items, Point, passed_through, point, start_of
 from app.viewer.tabs.program.planning import Plan
 from kin.motion import Motion
 
@@ -30,6 +30,7 @@ class Fault:
         place: where on it the arm cannot go on (m); None: at its end, or not known.
         whole: whether nothing can be played, as a locked joint would move; otherwise all before it can be.
         start: whether the item can be met from another posture at its start.
+        touches: whether something would be touched on the way to the item.
     """
 
     index: int
@@ -39,6 +40,7 @@ class Fault:
     place: Point | None = None
     whole: bool = False
     start: bool = False
+    touches: bool = False
 
 
 def find_fault(plan: Plan | None, stage: Stage) -> Fault | None:
@@ -65,16 +67,17 @@ def _refused(plan: Plan, stage: Stage) -> Fault:
     refusal, items = plan.motion.refusal, plan.items
     assert refusal is not None
     index = plan.item_of(refusal.segment)
+    touches = refusal.cause == "collision" and index < len(items) and items[index] is not start_of(items)
     helps = any(each.code == "ptp" for each in refusal.helps)
     if index >= len(items) or items[index].kind not in _TOOL:
-        return Fault(index, plan.explain(stage.units))
+        return Fault(index, plan.explain(stage.units), touches=touches)
     way = _way(items, index, stage)
     place = None
     if refusal.fraction is not None and items[index].kind == "lin" and len(way) == 2:
         start, end = np.array(way)
         place = point(start + refusal.fraction * (end - start))
     start = plan.start_as_recorded(index) is not None
-    return Fault(index, plan.explain(stage.units), helps, way, place, start=start)
+    return Fault(index, plan.explain(stage.units), helps, way, place, start=start, touches=touches)
 
 
 def _way(items: Items, index: int, stage: Stage) -> tuple[Point, ...]:

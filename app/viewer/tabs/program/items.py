@@ -68,6 +68,14 @@ def point(values: Array) -> Point:
     return x, y, z
 
 
+def counted(items: Items) -> str:
+    """How many waypoints and pauses there are, as a sentence."""
+    pauses = sum(item.kind == "pause" for item in items)
+    count = len(items) - pauses
+    words = f"{count} waypoint{'s' * (count != 1)}"
+    return f"{words} and {pauses} pause{'s' * (pauses != 1)}." if pauses else f"{words}."
+
+
 def start_of(items: Items) -> Item | None:
     """The first waypoint; None: there is none."""
     return next((item for item in items if item.q), None)

@@ -104,6 +104,14 @@ class Plan:
         """Index of the item at which a segment ends; that of the way back is the number of items."""
         return max((i for i, each in enumerate(self.segments) if each == segment), default=len(self.items))
 
+    @property
+    def touched_on_way_to(self) -> int | None:
+        """Index of the item on the way to which something is touched; None: nowhere, at the start, or way back."""
+        if self.touch is None:
+            return None
+        index = self.item_of(self.touch.segment)
+        return index if index < len(self.items) and self.items[index] is not start_of(self.items) else None
+
     def touches(self) -> str:
         """Where the motion touches something, with the number of the list; "" if nowhere is known."""
         if self.touch is None or not isinstance(self.touch.details, Collides):

@@ -22,7 +22,7 @@ from kin.motion import segment_poses
 from kin.path.postures import STATES, Reason, State
 
 PLACES = 80  # along the way
-WIDTH, LEFT, ROW, GAP, TOP, BOTTOM = 320.0, 8.0, 15.0, 4.0, 4.0, 18.0
+WIDTH, LEFT, RIGHT, ROW, GAP, TOP, BOTTOM = 320.0, 18.0, 4.0, 15.0, 4.0, 4.0, 18.0
 LEGEND: dict[State, str] = {
     "free": "free", "near limit": "near a limit", "near singularity": "near a singularity",
     "outside": "outside the limits", "touches": "touches something", "none": "no such posture",
@@ -108,9 +108,14 @@ def _row(found: PathPostures, row: int) -> dict[str, object]:
 
 def _svg(found: PathPostures, index: int) -> Markup:
     count = len(found.postures)
-    step = (WIDTH - 2.0 * LEFT) / len(found.states)
+    length = WIDTH - LEFT - RIGHT
+    step = length / len(found.states)
     bottom = TOP + count * (ROW + GAP)
-    parts = []
+    parts = [
+        f'<text class="kb-axis" x="{LEFT - 5.0:.0f}" y="{TOP + row * (ROW + GAP) + 0.75 * ROW:.1f}" '
+        f'text-anchor="end">{row + 1}</text>'
+        for row in range(count)
+    ]
     for stretch in found.stretches:
         x = LEFT + stretch.first * step
         width = (stretch.last - stretch.first + 1) * step - (0.0 if stretch.joined else 1.0)
@@ -130,7 +135,7 @@ def _svg(found: PathPostures, index: int) -> Markup:
     if points:
         parts.append(f'<path class="kb-posture-best" d="M{"L".join(points)}"><title>the best path</title></path>')
     parts += [
-        f'<text class="kb-axis" x="{LEFT + share * (WIDTH - 2.0 * LEFT):.1f}" y="{bottom + 11:.1f}" '
+        f'<text class="kb-axis" x="{LEFT + share * length:.1f}" y="{bottom + 11:.1f}" '
         f'text-anchor="{anchor}">{100 * share:.0f} %</text>'
         for share, anchor in ((0.0, "start"), (0.5, "middle"), (1.0, "end"))
     ]

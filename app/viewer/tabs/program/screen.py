@@ -6,7 +6,7 @@ from app.exports.motion_snippets import SNIPPETS
 from app.viewer.feature import Stage
 from app.viewer.panel import update_html
 from app.viewer.panel.share import box_html
-from app.viewer.tabs.program import views
+from app.viewer.tabs.program import views, ways
 from app.viewer.tabs.program.compare import Choice
 from app.viewer.tabs.program.drawing import Drawing, Shown
 from app.viewer.tabs.program.faults import Fault
@@ -17,10 +17,11 @@ from app.viewer.tabs.program.playback import Playback
 from app.viewer.tabs.program.plot import plot_html
 from app.viewer.tabs.program.postures import Chart, html
 from app.viewer.tabs.program.typed import Fields
+from app.viewer.tabs.program.ways import Search, Settings
 from app.viewer.views.templates import render
 from kin.motion import Motion
 
-PARTS = ("player", "clock", "list", "postures", "plot", "summary", "compare", "files")
+PARTS = ("player", "clock", "list", "postures", "way", "plot", "summary", "compare", "files")
 
 
 class Screen:
@@ -78,6 +79,10 @@ class Screen:
     def postures(self, chart: Chart | None) -> None:
         """The chart of postures on the way to a waypoint."""
         self._show("postures", "" if chart is None else html(chart))
+
+    def way(self, search: Search | None, settings: Settings) -> None:
+        """The form in which a way is searched, and how far the search is."""
+        self._show("way", "" if search is None else ways.html(search, settings))
 
     def plot(self, motion: Motion | None, other: Motion | None) -> None:
         """The curves over time."""

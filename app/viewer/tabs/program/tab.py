@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+import kin
 from app.exercises.typed import EntryError
 from app.exports.motion_snippets import SNIPPETS
 from app.exports.program_toml import toml_of
@@ -31,6 +32,7 @@ from app.viewer.tabs.program.playback import RATES, Playback
 from app.viewer.tabs.program.postures import Chart, compute
 from app.viewer.tabs.program.screen import Screen
 from app.viewer.tabs.program.views import KINDS
+from app.viewer.tabs.program.ways import Ways
 from app.viewer.tabs.workspace.background import run_in_background
 from kin import InputError, KinematicsError
 from kin.motion import Motion
@@ -44,7 +46,7 @@ _LABELS = {
     "clear": "Clear the program", "upload": "Open a program", "loop": "Loop", "field": "Waypoint",
     "via": "Via point", "ptp": "PTP instead", "take": "Joints of arrival",
     "start": "Start in another posture",
-    "begin": "Start in another posture",
+    "begin": "Start in another posture", "searched": "Find a way",
 }  # fmt: skip
 
 
@@ -69,6 +71,7 @@ class ProgramTab(Feature):
         self._stale: float | None = None  # when the motion is planned again, after the obstacles have changed
         self._other: Motion | None = None
         self._screen = Screen(stage)
+        self._ways = Ways(stage, self._screen.way, self.post)
         self._refresh()
 
     def handle(self, key: Hashable, value: object) -> None:
@@ -140,7 +143,13 @@ class ProgramTab(Feature):
         self._playback.stop()
         self._refresh()
 
+    def on_leave(self) -> None:
+        self._ways.cancel()
+        if self._chart is not None:
+            self._chart.cancelled.set()
+
     def remove(self) -> None:
+        self.on_leave()
         self._playback.stop()
         self._screen.remove()
 
@@ -185,6 +194,7 @@ class ProgramTab(Feature):
         """Plan the motion, and show everything; `anew`: what was typed into the fields is replaced."""
         self._close_postures(None)
         arm = self.stage.now
+        self._ways.keep(self._items)
         items, stage, loop = self._items, self.stage, self._player.loop
         self._plan, self._stale = plan(items, arm.robot, loop, arm.avoid, arm.obstacles), None
         self._fault = find_fault(self._plan, stage)
@@ -310,6 +320,7 @@ class ProgramTab(Feature):
 
     def _failed(self, error: object) -> None:
         self._close_postures(None)
+        self._ways.close()
         if isinstance(error, BaseException):
             raise error
 
@@ -328,8 +339,25 @@ class ProgramTab(Feature):
         before = max((i for i, item in enumerate(self._items[:index]) if item.q), default=None)
         if int(row) >= len(found.postures) or found.reach[0, int(row)] < 0 or before is None:
             return
-        q = changes.configuration(found.q[0, int(row)])
-        self._use(changes.changed(self._items, before, q=q), self._screen.chosen)
+        q = found.q[0, int(row)]
+        recorded = None if self._plan is None else self._plan.start_as_recorded(index)
+        if recorded is not None and kin.branch_of(found.robot, recorded[1]) == found.postures[int(row)]:
+            q = recorded[1]  # of this posture, the whole turns from which it arrives as recorded
+        self._use(changes.changed(self._items, before, q=changes.configuration(q)), self._screen.chosen)
+
+    # A way around obstacles
+
+    def _searched(self, search: object) -> None:
+        """Put the waypoints of a way into the list."""
+        found = self._ways.ended(search)
+        if found is None or found.found is None:
+            return
+        chosen = self._screen.chosen
+        self._use(found.found, chosen if chosen is None or chosen < found.index else chosen + found.count)
+        touched = None if self._plan is None else self._plan.touched_on_way_to
+        touched = touched if self._fault is None else self._fault.index
+        if self._items == found.found and (touched is None or not found.leads_by(touched)):
+            self.stage.notify(Notice("hand", *found.said()))
 
     def _type(self, index: int, value: object) -> None:
         item = self._items[index]
@@ -467,7 +495,7 @@ class ProgramTab(Feature):
         else:
             self._use(items, None)
             if self._fault is None:
-                self.stage.notify(Notice("hand", name, f"{len(items)} waypoints and pauses."))
+                self.stage.notify(Notice("hand", name, changes.counted(items)))
 
 
 _ITEM_HANDLERS: dict[str, Callable[[ProgramTab, int, object], None]] = {
@@ -479,6 +507,7 @@ _ITEM_HANDLERS: dict[str, Callable[[ProgramTab, int, object], None]] = {
     "ptp": ProgramTab._use_ptp,
     "take": ProgramTab._take,
     "postures": ProgramTab._show_postures,
+    "way": lambda tab, index, _: tab._ways.open(tab._plan, index),
     "begin": ProgramTab._begin,
     "start": ProgramTab._start,
     "duplicate": lambda tab, index, _: tab._insert(index + 1, tab._items[index]),
@@ -505,8 +534,14 @@ _HANDLERS: dict[str, Callable[[ProgramTab, object], None]] = {
     "save": ProgramTab._save,
     "close-postures": ProgramTab._close_postures,
     "charted": ProgramTab._charted,
+    "search": lambda tab, _: tab._ways.start(),
+    "searching": lambda tab, search: tab._ways.report(search),
+    "searched": ProgramTab._searched,
+    "way-seconds": lambda tab, text: tab._ways.type("seconds", text),
+    "way-seed": lambda tab, text: tab._ways.type("seed", text),
+    "close-way": lambda tab, _: tab._ways.close(),
     "failed": ProgramTab._failed,
     "upload": ProgramTab._upload,
 }
-_OWN = {"charted", "failed"}  # posted by the tab itself, never sent by a page
+_OWN = {"charted", "failed", "searching", "searched"}  # posted by the tab itself, never sent by a page
 ProgramTab.messages = frozenset({*_ITEM_HANDLERS, *_HANDLERS} - _OWN)

@@ -76,9 +76,9 @@ class Fields:
             case "name":
                 return {"name": clean(text, NAME)}
             case "speed" | "acceleration":
-                return {field: _number(text, PERCENT, 1.0, 100.0) / 100.0}
+                return {field: read_number(text, PERCENT, 1.0, 100.0) / 100.0}
             case "seconds":
-                return {"seconds": _number(text, SECONDS, 0.0, LONGEST_DWELL)}
+                return {"seconds": read_number(text, SECONDS, 0.0, LONGEST_DWELL)}
             case "blend":
                 return {"blend": self._size(text, "Zone", False, FARTHEST) or 0.0}
             case "tool_speed" | "tool_turn":
@@ -120,9 +120,17 @@ class Fields:
         return configuration(found.solutions[0].q, EXACT)
 
 
-def _number(text: str, unit: Unit, low: float, high: float) -> float:
+def read_number(text: object, unit: Unit, low: float, high: float) -> float:
+    """A number that a text in a field is, rounded to a thousandth.
+
+    Raises:
+        EntryError: with what would be valid.
+        InputError: no text.
+    """
+    if not isinstance(text, str):
+        raise InputError("field", text, "a text")
     title = "The field stays as it was"
-    valid = f"Valid: {low:g} to {high:g} {unit.name}."
+    valid = f"Valid: {low:.10g} to {high:.10g} {unit.name}".rstrip() + "."
     try:
         value = read(text, unit, (low, high))
     except ReadError as error:

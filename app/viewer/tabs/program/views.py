@@ -174,6 +174,7 @@ def summary(plan: Plan, robot: Robot, own: bool, units: Units) -> str:
         words=("" if plan.motion.planned else "Up to where the program ends: ") + _busiest(motion),
         notes=plan.notes(units),
         touches=plan.touches(),
+        touched=plan.touched_on_way_to,
         assumed=assumption(limits, own, units),
         heads=list(zip(QUANTITIES, heads, strict=True)),
         rows=rows,

@@ -1,0 +1,231 @@
+"""*Find a way* in a page: waypoints around an obstacle, cancelled, not found, refused, undone."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+
+import kin
+from app.shared.store import Store
+from app.viewer.session.state import PageState, decode, encode
+from app.viewer.tabs.program import ways
+from app.viewer.tabs.program.items import MOST, Item, waypoint
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+ROBOTS = Store().robots
+UR5, PLANAR = kin.get_robot("ur5"), kin.get_robot("planar2r")
+# The first link of the arm with two joints cannot leave the half between these posts.
+START, GOAL = (0.0, 0.3), (np.pi / 2, 0.3)
+POSTS = tuple(
+    kin.Obstacle("sphere", (0.3 * np.cos(a), 0.3 * np.sin(a), 0.0), radius=0.05, name="post")
+    for a in (np.pi / 4, -3 * np.pi / 4)
+)
+DURATION = 40.0  # s of a search that is cancelled: longer than anything here takes
+
+
+def opened(robot: kin.Robot, obstacles: tuple[kin.Obstacle, ...], rows: list[list[object]]) -> str:
+    """The memory of a page with obstacles and a program."""
+    program = {"programs": {robot.id: rows}}
+    state = PageState(robot.id, obstacles=obstacles, features={"program": program})
+    return json.dumps({"address": "http://a/", "state": encode(state)})
+
+
+def part(tab: FakeBrowser, name: str) -> str:
+    found = [
+        m["props"]["content"]
+        for m in tab.gui.values()
+        if f'data-program="{name}"' in m["props"].get("content", "")
+    ]
+    return html.unescape(found[0]) if found else ""
+
+
+def press(tab: FakeBrowser, name: str, *index: int, value: object = None) -> None:
+    tab.serial = getattr(tab, "serial", 0) + 1  # type: ignore[attr-defined]
+    number = tab.say("feature", ["program", [name, *index, tab.serial], value])  # type: ignore[attr-defined]
+    tab.wait(lambda: tab.script["reply"][0] >= number)
+
+
+def rows(tab: FakeBrowser) -> int:
+    return part(tab, "list").count("data-program-item")
+
+
+@pytest.fixture
+def blocked(port: int) -> Iterator[FakeBrowser]:
+    """A page whose program has no way to its second waypoint."""
+    with FakeBrowser(port, memory=opened(PLANAR, POSTS, [["p", START], ["p", GOAL]])) as tab:
+        tab.wait(lambda: rows(tab) == 2)
+        yield tab
+
+
+def around_a_post() -> tuple[np.ndarray, np.ndarray, kin.Obstacle]:
+    """Start, goal, and a post between them, for the UR5."""
+    start, goal = UR5.q_home.copy(), UR5.q_home.copy()
+    goal[0] += 2.2
+    x, y, z = kin.fk(UR5, 0.5 * (start + goal))[:3, 3].tolist()
+    return start, goal, kin.Obstacle("box", (x, y, z), size=(0.12, 0.12, 0.9), name="post")
+
+
+def test_a_way_around_a_post_is_put_into_the_program_in_one_step(port: int) -> None:
+    start, goal, post = around_a_post()
+    line = ["p", [round(value, 7) for value in goal.tolist()], "above", 0.5]
+    with FakeBrowser(port, memory=opened(UR5, (post,), [["p", start.tolist()], ["w", 0.5], line])) as tab:
+        tab.wait(lambda: rows(tab) == 3)
+        assert "touches post" in part(tab, "summary")
+        assert 'data-program-do="way" data-index="2"' in part(tab, "summary")
+        press(tab, "way", 2)
+        assert "Puts waypoints between 1 and 3, so that the arm does not touch itself or the obstacle" in part(
+            tab, "way"
+        )
+        press(tab, "way-seed", value="3")
+        press(tab, "way-seconds", value="60")
+        press(tab, "search")
+        tab.wait(lambda: rows(tab) > 3)
+        assert part(tab, "way") == ""
+        assert "touches" not in part(tab, "summary")
+        assert "A way to 3 was found" in html.unescape(tab.html)
+        tab.wait(lambda: bool(tab.kept) and len(programs(tab)) > 3)
+        found = programs(tab)
+        assert found[0][:2] == ["p", pytest.approx(start.tolist())]
+        assert found[1] == ["w", 0.5]
+        assert found[-1][:4] == ["p", pytest.approx(goal.tolist()), "above", 0.5]
+        assert all(row[3] == 0.5 for row in found[2:])
+        segments = [
+            kin.motion.Ptp(kin.motion.JointTarget(tuple(q)), speed=speed, blend=(more or [{}])[0].get("b", 0.0))
+            for _, q, _, speed, *more in found[2:]
+        ]
+        motion = kin.plan_motion(UR5, segments, start)
+        q = motion.derivatives(np.linspace(0.0, motion.duration, 2000))[0]
+        assert kin.clearance(UR5, q, [post]).min() > -1e-7
+        assert tab.script["undo"] == "Find a way"
+        tab.say("undo")
+        tab.wait(lambda: rows(tab) == 3)
+
+
+def programs(tab: FakeBrowser) -> list[list[object]]:
+    """The rows of the only program in the page's link."""
+    (found,) = decode(tab.kept[-1], ROBOTS).features["program"]["programs"].values()  # type: ignore[union-attr]
+    return found  # type: ignore[no-any-return]
+
+
+def test_none_found_in_time_is_not_called_none_and_loses_nothing(blocked: FakeBrowser) -> None:
+    press(blocked, "way", 1)
+    press(blocked, "way-seconds", value="0.1")
+    press(blocked, "search")
+    blocked.wait(lambda: "None was found in 0.1 s. That does not mean that there is none" in part(blocked, "way"))
+    assert rows(blocked) == 2
+    assert 'value="0.1"' in part(blocked, "way"), "it can be searched again"
+    press(blocked, "close-way")
+    assert part(blocked, "way") == ""
+
+
+def test_a_search_shows_its_progress_and_is_cancelled(blocked: FakeBrowser) -> None:
+    press(blocked, "way", 1)
+    press(blocked, "way-seconds", value=f"{DURATION:g}")
+    press(blocked, "search")
+    assert f"Searching for at most {DURATION:g} s" in part(blocked, "way")
+
+    def share() -> float:
+        return float(re.findall(r'<progress max="1" value="([\d.]+)"', part(blocked, "way"))[0])
+
+    blocked.wait(lambda: share() > 0.0)
+    press(blocked, "search")  # a second press does nothing
+    assert "Searching" in part(blocked, "way")
+    press(blocked, "close-way")
+    assert "<progress" not in part(blocked, "way")
+    assert "Find a way</button>" in part(blocked, "way")
+    press(blocked, "search")
+    assert share() < 0.5, "the next one begins at once"
+    press(blocked, "delete", 1)
+    assert part(blocked, "way") == "", "another program has another way"
+    assert rows(blocked) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "valid"),
+    [
+        ("way-seconds", "0", "Valid: 0.1 to 60 s"),
+        ("way-seconds", "nan", "Valid: 0.1 to 60 s"),
+        ("way-seconds", "1e9", "Valid: 0.1 to 60 s"),
+        ("way-seed", "-1", "Valid: 0 to 4294967295."),
+        ("way-seed", "1.5", "The seed is a whole number from 0 to 4294967295"),
+        ("way-seed", "x" * 5000, "Valid: 0 to 4294967295."),
+    ],
+)
+def test_what_cannot_be_a_time_limit_or_a_seed_is_refused(
+    blocked: FakeBrowser, name: str, text: str, valid: str
+) -> None:
+    press(blocked, "way", 1)
+    press(blocked, name, value=text)
+    blocked.wait(lambda: valid in html.unescape(blocked.html))
+    assert 'value="5"' in part(blocked, "way")
+    assert 'value="0"' in part(blocked, "way")
+
+
+def test_a_waypoint_inside_an_obstacle_and_a_start_that_touches_are_answers(port: int) -> None:
+    goal = UR5.q_home.copy()
+    goal[0] += 1.0
+    ball = kin.Obstacle("sphere", kin.fk(UR5, goal)[:3, 3].tolist(), radius=0.1, name="ball")
+    program = [["p", UR5.q_home.tolist()], ["p", goal.tolist()], ["p", UR5.q_home.tolist()]]
+    with FakeBrowser(port, memory=opened(UR5, (ball,), program)) as tab:
+        tab.wait(lambda: rows(tab) == 3)
+        for index, words in (
+            (1, "The goal touches something: link 6 touches ball."),
+            (2, "The start touches something"),
+        ):
+            press(tab, "way", index)
+            press(tab, "search")
+            tab.wait(lambda words=words: words in part(tab, "way"))  # type: ignore[misc]
+        press(tab, "way", 0)
+        assert part(tab, "way") == "", "nothing leads to the start"
+        assert rows(tab) == 3
+
+
+def test_where_the_search_is_not_installed_the_page_says_how_to_install_it(
+    blocked: FakeBrowser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ways, "is_installed", lambda: False)
+    press(blocked, "way", 1)
+    assert "The search needs the package ompl" in part(blocked, "way")
+    assert "<code>pip install 'kinboard[ways]'</code>" in part(blocked, "way")
+    press(blocked, "search")
+    assert "<progress" not in part(blocked, "way")
+
+
+def test_without_obstacles_there_is_nothing_to_go_around(port: int) -> None:
+    with FakeBrowser(port, memory=opened(PLANAR, (), [["p", START], ["p", GOAL]])) as tab:
+        tab.wait(lambda: rows(tab) == 2)
+        press(tab, "way", 1)
+        assert "There is nothing that the arm could touch" in part(tab, "way")
+        assert 'data-program-do="search" aria-disabled="true"' in part(tab, "way")
+
+
+def test_a_way_that_has_no_room_in_the_program_is_said(port: int) -> None:
+    start, goal, post = around_a_post()
+    program = [["p", start.tolist()]] * (MOST - 1) + [["p", goal.tolist()]]
+    with FakeBrowser(port, memory=opened(UR5, (post,), program)) as tab:
+        tab.wait(lambda: rows(tab) == MOST)
+        press(tab, "way", MOST - 1)
+        press(tab, "way-seconds", value="60")
+        press(tab, "search")
+        tab.wait(lambda: "The way has too many waypoints" in part(tab, "way"))
+        assert rows(tab) == MOST
+
+
+def test_a_line_to_the_end_of_a_way_becomes_a_ptp_and_the_arm_stops_at_both_ends() -> None:
+    a, b, c, d = (waypoint(np.array([k, 0.0])) for k in range(4))
+    items = (
+        a,
+        replace(b, blend=0.05),
+        Item("pause", seconds=1.0),
+        replace(c, kind="circ", via=(1.0, 0.0, 0.0), blend=0.1),
+    )
+    found = ways.with_way((*items, d), 1, 3, [d])
+    assert found == (a, b, items[2], d, c, d)
