@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, NoReturn
 
 from app.cli import arguments as declare
+from app.cli.arguments.completion import add_completion, script
 from app.cli.arguments.shared import Parents
 from app.cli.classroom.arguments import add_lti, add_result, add_results, add_room
 from app.cli.startup import disable_compiler, no_collections
@@ -231,6 +232,14 @@ def _load_way() -> Run:
     return run
 
 
+def _load_completion() -> Run:
+    def run(arguments: argparse.Namespace) -> int:
+        print(script(arguments.shell, _parser()), end="")
+        return 0
+
+    return run
+
+
 def _load_import() -> Run:
     from app.cli.files import run_import
 
@@ -292,4 +301,5 @@ COMMANDS = (
     Command(declare.add_capability, _load_capability),
     Command(declare.add_import, _load_import, interpreted=True),
     Command(declare.add_export, _load_export, interpreted=True),
+    Command(add_completion, _load_completion, interpreted=True),
 )

@@ -1,0 +1,110 @@
+"""Shells complete commands, options, their values and robots. Each is asked itself, where it is installed."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+import kin
+from app.cli import parser
+from app.cli.arguments import completion
+
+CASES = [
+    (["wor"], {"workspace"}),
+    (["fk", "pio"], {"pioneer5"}),
+    (["fk", "ur5", "--form"], {"--format"}),
+    (["fk", "ur5", "--format", ""], {"csv", "npy", "ndjson"}),
+    (["ik", "--redun"], {"--redundancy"}),
+    (["workspace", "--strategy", "u"], {"uniform"}),
+    (["room", "o"], {"open"}),
+    (["room", "open", "--ho"], {"--hours"}),
+    (["completion", ""], {"bash", "zsh", "fish"}),
+    (["compare", "panda", "stan"], {"stanford"}),
+]
+
+
+def shell(name):
+    return pytest.mark.skipif(shutil.which(name) is None, reason=f"{name} is not installed")
+
+
+@pytest.fixture
+def script(capsys, tmp_path):
+    """The file of the script for a shell."""
+
+    def write(name):
+        assert parser.main(["completion", name]) == 0
+        file = tmp_path / f"kinboard.{name}"
+        file.write_text(capsys.readouterr().out)
+        return file
+
+    return write
+
+
+def test_the_robots_are_those_of_the_core():
+    assert completion.robots() == tuple(sorted(kin.builtin_robots()))
+
+
+@shell("bash")
+@pytest.mark.parametrize(("words", "expected"), CASES)
+def test_bash_completes(script, words, expected):
+    asked = f"""
+        source {script("bash")}
+        COMP_WORDS=(kinboard {" ".join(word or "''" for word in words)}); COMP_CWORD={len(words)}
+        _kinboard; printf '%s\\n' "${{COMPREPLY[@]}}"
+    """
+    done = subprocess.run(["bash", "-euc", asked], capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) == expected
+
+
+@shell("bash")
+def test_bash_completes_files_where_nothing_else_fits(script):
+    asked = f"source {script('bash')}; COMP_WORDS=(kinboard fk ur5 -o ''); COMP_CWORD=4; _kinboard"
+    asked += '; complete -p kinboard; echo "${#COMPREPLY[@]}"'
+    done = subprocess.run(["bash", "-uc", asked], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["complete -o default -F _kinboard kinboard", "0"]
+
+
+@shell("fish")
+@pytest.mark.parametrize(("words", "expected"), CASES)
+def test_fish_completes(script, words, expected):
+    line = " ".join(["kinboard", *words])
+    asked = f"source {script('fish')}; complete -C '{line}'"
+    done = subprocess.run(["fish", "--no-config", "-c", asked], capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    found = {each.split("\t")[0] for each in done.stdout.splitlines()}
+    assert {each for each in found if not Path(each).exists()} == expected
+
+
+@shell("zsh")
+@pytest.mark.parametrize(("words", "expected"), CASES)
+def test_zsh_completes(script, words, expected):
+    """Typed at a terminal: zsh completes only there. A list is shown where there are several."""
+    file = script("zsh")
+    child, terminal = pty.fork()
+    if child == 0:
+        os.execvpe("zsh", ["zsh", "-f", "-i"], {"PATH": os.environ["PATH"], "TERM": "dumb", "PS1": "> "})
+    try:
+
+        def type_and_read(text, until):
+            os.write(terminal, text.encode())
+            shown, end = "", time.monotonic() + 20
+            while not all(each in shown for each in until):
+                assert time.monotonic() < end, shown
+                if select.select([terminal], [], [], 0.1)[0]:
+                    shown += os.read(terminal, 4096).decode(errors="replace")
+            return shown
+
+        setup = f"autoload -U compinit; compinit -u -D; source {file}; unsetopt list_beep; setopt auto_list"
+        type_and_read(setup + "; echo rea''dy\n", ["ready"])
+        type_and_read(" ".join(["kinboard", *words]) + "\t\t", expected)
+    finally:
+        os.kill(child, 9)
+        os.waitpid(child, 0)
+        os.close(terminal)
