@@ -165,6 +165,35 @@ def rotation_from_wxyz(wxyz: ArrayLike) -> Array:
     )
 
 
+def rotations_from_wxyz(wxyz: Array) -> Array | None:
+    """`rotation_from_wxyz` of each of finite quaternions ``(k, 4)``, bit for bit; None if one of them is zero."""
+    unit = _units(wxyz)
+    if unit is None:
+        return None
+    w, x, y, z = unit.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def _units(given: Array) -> Array | None:
+    """Finite vectors ``(k, m)`` divided by their lengths; None if one of them is zero."""
+    scale = np.abs(given).max(axis=1)
+    if not (scale > 1e-12).all():
+        return None
+    return _units_of_length(given / scale[:, None])
+
+
+def _units_of_length(given: Array) -> Array:
+    """Vectors ``(k, m)`` of moderate lengths divided by these."""
+    # As for single vectors: `math.hypot` rounds better than a root of squares.
+    scaled: Array = given / np.array([math.hypot(*row) for row in given.tolist()])[:, None]
+    return scaled
+
+
 def wxyz_from_rotation(R: Array) -> Array:
     """Unit quaternions ``(..., 4)`` of rotations ``(..., 3, 3)``; the scalar comes first and is never negative.
 
@@ -276,3 +305,16 @@ def frame_from_approach(approach: ArrayLike) -> Array:
     xx, xy, xz = xx / size, xy / size, xz / size
     rows = [xx, zy * xz - zz * xy, zx, xy, zz * xx - zx * xz, zy, xz, zx * xy - zy * xx, zz]
     return np.array(rows).reshape(3, 3)
+
+
+def frames_from_approaches(approaches: Array) -> Array | None:
+    """`frame_from_approach` of each of finite directions ``(k, 3)``, bit for bit; None if one of them is zero."""
+    z = _units(approaches)
+    if z is None:
+        return None
+    zx, zy, zz = z.T
+    zero, leans = np.zeros_like(zx), np.abs(zz) < 0.9
+    across = _units_of_length(np.where(leans, [-zy, zx, zero], [zz, zero, -zx]).T)
+    xx, xy, xz = across.T
+    rows = [[xx, zy * xz - zz * xy, zx], [xy, zz * xx - zx * xz, zy], [xz, zx * xy - zy * xx, zz]]
+    return np.moveaxis(np.array(rows), -1, 0)

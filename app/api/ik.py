@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
+import numpy as np
 from fastapi import Request, Response
 from pydantic import Discriminator, Field, Tag
 
@@ -13,6 +14,7 @@ from app.api import schemas
 from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
+from app.api.brief import BriefAnswers, Fields, brief, briefly, names_of, quick, size_of
 from app.api.options import Goal, OptionsBody, Target, single_or_list, takes
 from app.api.problems import invalid
 from app.api.schemas import (
@@ -23,11 +25,11 @@ from app.api.schemas import (
 )
 from app.api.work import Deadline, computed
 from app.shared.answers.answer import Answer
-from app.shared.answers.ik import IkAnswer, ik_answer
+from app.shared.answers.ik import Brief, IkAnswer, ik_answer
 from app.shared.metrics import SOLVE_SECONDS
 from app.shared.problems import FieldError
 from app.shared.settings import Settings
-from kin import IKOptions, Robot
+from kin import IKOptions, Robot, Task
 from kin.ik import branch_names, solve
 from kin.ik.options import DEFAULTS
 from kin.transforms import Array
@@ -109,38 +111,65 @@ class IkAnswers(Answer):
     name="ik",
     examples=EXAMPLES,
     summary="Inverse kinematics",
-    response_model=IkAnswer | IkAnswers,
+    response_model=IkAnswer | IkAnswers | BriefAnswers | Brief,
     responses=POST_REFUSALS,
 )
-async def inverse_kinematics(request: Request, robot: Robot, body: IkRequest) -> Response:
+async def inverse_kinematics(request: Request, robot: Robot, body: IkRequest, fields: Fields = None) -> Response:
     """Every configuration that brings the tool to a target, nearest to the seed first, or why there is none.
 
     A target that cannot be reached is answered with 200: `status` and `cause` are codes, `details` are the numbers
     behind them, `reason` is a sentence, `closest` is the closest configuration. One target gets one answer; a list
     gets `{"results": [...]}` in the same order. Each solution's errors are measured by forward kinematics.
     """
-    return await computed(request, partial(_solve, robot, body, settings_of(request)))
+    return await computed(request, partial(_solve, robot, body, names_of(fields), settings_of(request)))
 
 
-def _solve(robot: Robot, body: IkRequest, settings: Settings, deadline: Deadline) -> Response:
+def _solve(
+    robot: Robot, body: IkRequest, names: tuple[str, ...], settings: Settings, deadline: Deadline
+) -> Response:
     count = len(body.target) if isinstance(body.target, list) else 1
     schemas.check_batch("target", count, settings)
     seeds = _seeds(robot, body, count, settings)
+    together = body.poses_of_all(body.target) if quick(names) and isinstance(body.target, list) else None
+    if together is not None:
+        return _solve_together(robot, body, names, together, seeds, deadline)
     targets, single = body.resolve_all(robot, body.target, settings, seeds)
 
     options = {task: body.options(task) for task in {goal.task for goal in targets}}
 
-    def answer(goal: Goal, seed: Array | None) -> IkAnswer:
+    def answer(goal: Goal, seed: Array | None) -> IkAnswer | dict[str, Any]:
         deadline.check()
-        return ik_answer(solve(robot, goal.T, options[goal.task], seed, goal.rounding))
+        whole = ik_answer(solve(robot, goal.T, options[goal.task], seed, goal.rounding))
+        return brief(whole, names) if names else whole
 
-    def answers(some: slice) -> list[IkAnswer]:
+    def answers(some: slice) -> list[IkAnswer | dict[str, Any]]:
         return [answer(goal, seed) for goal, seed in zip(targets[some], seeds[some], strict=True)]
 
     with SOLVE_SECONDS.labels("rest").time():
         first = options[targets[0].task]
         batch = Batch("target", len(targets), single, _size(robot, first), _advice(first))
         return one_or_all(answers, batch, deadline)
+
+
+def _solve_together(
+    robot: Robot,
+    body: IkRequest,
+    names: tuple[str, ...],
+    goals: tuple[Task, Array],
+    seeds: list[Array | None],
+    deadline: Deadline,
+) -> Response:
+    """The fields of these names for poses ``(k, 4, 4)`` of one task, as far as possible by one compiled pass."""
+    task, T = goals
+    options = body.options(task)
+    given = None if body.q_seed is None else np.array(seeds)
+
+    def answers(some: slice) -> list[dict[str, Any]]:
+        near = None if given is None else given[some]
+        return briefly(robot, T[some], options, near, ik_answer, names, deadline.check)
+
+    with SOLVE_SECONDS.labels("rest").time():
+        return one_or_all(answers, Batch("target", len(T), False, size_of(robot, names)), deadline)
 
 
 def _size(robot: Robot, options: IKOptions) -> int:

@@ -29,12 +29,20 @@ from kin import IKOptions, InputError, Robot, Task, solve_path
 from kin.collision.obstacles import LONGEST_NAME, MOST_OBSTACLES, checked_obstacles
 from kin.frames import WORLD
 from kin.ik.options import DEFAULTS
-from kin.ik.problem import read_pose
+from kin.ik.problem import FAR, read_pose
+from kin.kernels.checks import straighten_many
 from kin.solvers.contract import POSE
-from kin.transforms import Array, frame_from_approach, from_position_wxyz
+from kin.transforms import (
+    Array,
+    frame_from_approach,
+    frames_from_approaches,
+    from_position_wxyz,
+    rotations_from_wxyz,
+)
 
 AGREEMENT = 1e-6  # metres, and matrix entries
 _IDENTITY = np.eye(4)
+_AT_ONCE = 512  # targets that are read between two offers to other threads
 FORMS = {
     "pose": "`position` and `wxyz`, or `matrix`",
     "approach": "`position` and `approach`, or `position` and `wxyz`, or `matrix`",
@@ -97,6 +105,11 @@ class Target(schemas.Body):
             prefix = "" if error.field.startswith(field) else f"{field}."
             raise invalid(from_input_error(error, prefix)) from None
 
+    @property
+    def form(self) -> tuple[bool, bool, bool, bool]:
+        """Which of position, wxyz, approach and matrix are given."""
+        return self.position is not None, self.wxyz is not None, self.approach is not None, self.matrix is not None
+
     def _is_point(self) -> bool:
         return self.position is not None and self.wxyz is None and self.matrix is None
 
@@ -121,6 +134,46 @@ class Target(schemas.Body):
             if np.abs(T[:3, :3] - R).max() > max(AGREEMENT, 2.0 * error):
                 raise _wrong(f"{field}.wxyz", str(self.wxyz), "the rotation the matrix has, or only one of them")
         return T
+
+
+def _placed(targets: list[Target], rotations: Array | None) -> Array | None:
+    """Poses ``(k, 4, 4)`` at the positions of targets with these rotations ``(k, 3, 3)``; None without them."""
+    offer()
+    if rotations is None:
+        return None
+    T = np.zeros((len(targets), 4, 4))
+    T[:, :3, :3], T[:, :3, 3], T[:, 3, 3] = rotations, [each.position for each in targets], 1.0
+    return T
+
+
+def _with_matrices(targets: list[Target]) -> Array | None:
+    """The matrices of targets ``(k, 4, 4)`` as they were sent; None if one of them is not exactly a pose."""
+    offer()
+    T = np.array([each.matrix for each in targets])
+    errors = np.empty(len(T))
+    straighten_many(T, FAR, np.empty_like(T), errors)
+    return T if (errors >= 0.0).all() else None
+
+
+# By the form of a target: the task it implies, the tasks it can have, and the poses of several.
+_TOGETHER: dict[tuple[bool, ...], tuple[Task, tuple[Task, ...], Callable[[list[Target]], Array | None]]] = {
+    (True, False, False, False): (
+        "position",
+        ("position",),
+        lambda targets: _placed(targets, np.broadcast_to(np.eye(3), (len(targets), 3, 3))),
+    ),
+    (True, True, False, False): (
+        "pose",
+        ("pose", "approach", "position"),
+        lambda targets: _placed(targets, rotations_from_wxyz(np.array([each.wxyz for each in targets]))),
+    ),
+    (True, False, True, False): (
+        "approach",
+        ("approach", "position"),
+        lambda targets: _placed(targets, frames_from_approaches(np.array([each.approach for each in targets]))),
+    ),
+    (False, False, False, True): ("pose", ("pose", "approach", "position"), _with_matrices),
+}
 
 
 def _wrong(field: str, value: str, expected: str) -> Exception:
@@ -265,6 +318,22 @@ class OptionsBody(AvoidingBody, WorkpiecesBody):
         present = cycle(q) if len(q) == 1 else q
         places = zip(target, present, range(len(target)), strict=False)
         return [self.resolve(robot, each, f"target[{i}]", at) for each, at, i in places], False
+
+    def poses_of_all(self, targets: list[Target]) -> tuple[Task, Array] | None:
+        """The task and the poses ``(k, 4, 4)`` of targets of one form in the world frame, all read at once.
+
+        They are those of `resolve_all`. None for others, and if one of them is invalid.
+        """
+        form = targets[0].form
+        if form not in _TOGETHER or self.constant_frames or self.keywords["mask"] is not None:
+            return None
+        implied, fits, poses = _TOGETHER[form]
+        task: Task = self.task or implied
+        if task not in fits or any(each.form != form or each.frame not in (None, WORLD) for each in targets):
+            return None
+        pieces = [poses(targets[k : k + _AT_ONCE]) for k in range(0, len(targets), _AT_ONCE)]
+        found = [piece for piece in pieces if piece is not None]
+        return (task, np.concatenate(found)) if len(found) == len(pieces) else None
 
     def resolve(self, robot: Robot, target: Target, field: str, q: Array | None = None) -> Goal:
         """The target in the world frame; raises `ProblemError` naming `field`."""

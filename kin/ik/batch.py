@@ -25,13 +25,13 @@ from kin.errors import InputError
 from kin.ik.answers import answer
 from kin.ik.candidates import nearest_rows
 from kin.ik.options import Frame, IKOptions, Images, Limits, Locks, Preference, Solver, Values
-from kin.ik.problem import FAR, IKProblem, listed, prepare, read_poses, read_seed
+from kin.ik.problem import FAR, IKProblem, listed, never_cancel, prepare, read_poses, read_seed
 from kin.ik.results import IKResult, Status
 from kin.kernels import fk as fk_kernels
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.solvers.contract import POSE, Many, One
+from kin.solvers.contract import Many, One
 from kin.transforms import Array, finite_array, is_plain
 
 _POSE = (4, 4)
@@ -171,12 +171,35 @@ def solve_ik_many(
         avoid_self_collision=avoid_self_collision,
         obstacles=obstacles,
     )
-    given, prepared = listed(targets), prepare(robot, wanted)
-    poses, errors = read_poses(given, prepared.code, always=robot.n < 6)
-    seeds = prepared.seed[None] if q_seed is None else _seeds(robot, q_seed, len(given))
+    return solve_many(robot, listed(targets), wanted, q_seed)
+
+
+def solve_many(
+    robot: Robot,
+    targets: Sequence[ArrayLike] | Array,
+    options: IKOptions,
+    q_seed: ArrayLike | None = None,
+    rounding: Array | None = None,
+    stop: Callable[[], None] = never_cancel,
+) -> IKResults:
+    """`solve_ik_many` for callers that have an `IKOptions`, rounded frames, or too little time.
+
+    Args:
+        rounding: ``(k,)`` for each target, as in `kin.ik.solve`.
+        stop: called before each target that takes more than the compiled pass; raises to cancel.
+
+    Raises:
+        InputError: a malformed target (named ``targets[i]``) or seed, or an option that does not fit the arm.
+    """
+    prepared = prepare(robot, options)
+    poses, errors = read_poses(targets, prepared.code, always=robot.n < 6)
+    if rounding is not None:
+        errors += rounding
+    seeds = prepared.seed[None] if q_seed is None else _seeds(robot, q_seed, len(targets))
     last = len(seeds) - 1
 
     def problem_at(i: int) -> IKProblem:
+        stop()
         return prepared.at(poses[i], float(errors[i]), seeds[min(i, last)])
 
     return IKResults(problem_at, _nearest(prepared, poses, errors, seeds))
@@ -185,13 +208,13 @@ def solve_ik_many(
 def _nearest(prepared: IKProblem, poses: Array, errors: Array, seeds: Array) -> Array:
     """The best solution of each target ``(k, n)``, NaN where it takes more than one compiled pass to find it.
 
-    The pass serves poses of arms whose family has a kernel for many, inside the limits, with all branches, nearest
-    to the seed first.
+    The pass serves tasks for which the arm's family has a kernel for many, inside the limits, with all branches,
+    nearest to the seed first.
     """
     q = np.full((len(poses), prepared.robot.n), math.nan)
     options, form = prepared.options, prepared.closed_form
     plain = options.prefer == options.images == "nearest" and options.respect_limits and not options.avoids
-    if form is None or not plain or prepared.code != POSE or prepared.branches is not None or prepared.requested:
+    if form is None or not plain or prepared.branches is not None or prepared.requested:
         return q
     exact = np.flatnonzero(errors == 0.0)
     for start in range(0, len(exact), _AT_ONCE):
@@ -199,7 +222,7 @@ def _nearest(prepared: IKProblem, poses: Array, errors: Array, seeds: Array) -> 
         T, near = np.ascontiguousarray(poses[some]), seeds if len(seeds) == 1 else seeds[some]
         found = np.empty((len(some), q.shape[1]))
         rows = np.empty((len(some), len(form.branches), q.shape[1]))
-        if not form.solve_many(T, near, prepared.lower, prepared.upper, rows):
+        if not form.solve_many(T, prepared.code, near, prepared.lower, prepared.upper, rows):
             break
         nearest_rows(prepared.requirement, T, near, rows, found)
         q[some] = found

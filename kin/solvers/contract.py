@@ -202,10 +202,10 @@ class ClosedForm(ABC):
     def solve(self, problem: SolverInput) -> Candidates:
         """All branches of a target, each with its redundancy parameters as near the seed as the limits allow."""
 
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
-        """q ``(N, branches, n)`` ← what `solve` finds of many poses ``(N, 4, 4)``, with no value requested.
+    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+        """q ``(N, branches, n)`` ← what `solve` finds of many targets ``(N, 4, 4)``, with no value requested.
 
-        Bit-identical, in one compiled call. False, with q as it was, if the family has none.
+        Bit-identical, in one compiled call. False, with q as it was, if the family has none for this task.
 
         Args:
             seeds: one for each target ``(N, n)``, or one for all ``(1, n)``.

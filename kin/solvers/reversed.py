@@ -171,11 +171,11 @@ class ReversedJoints(ClosedForm):
         arcs = [x if sign > 0.0 else _opposite(x) for x, sign in zip(found.arcs, signs, strict=True)]
         return replace(found, q=found.q * self.signs, values=found.values * signs, arcs=tuple(arcs))
 
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
-        """The branches of many poses, in the arm's own joint values."""
+    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+        """The branches of many targets, in the arm's own joint values."""
         reversed_ = self.signs < 0.0
         low, high = np.where(reversed_, -upper, lower), np.where(reversed_, -lower, upper)
-        if not self.form.solve_many(T, seeds * self.signs, low, high, q):
+        if not self.form.solve_many(T, task, seeds * self.signs, low, high, q):
             return False
         q *= self.signs
         return True

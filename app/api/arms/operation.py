@@ -130,8 +130,11 @@ def _framed(robot: Robot, body: object) -> Robot:
 
 def _endpoint(call: Handler, handler: Handler, suffix: str, parameters: dict[str, Any]) -> Handler:
     """`call` with the name and documentation of the handler and these parameters, for FastAPI."""
-    keyword = inspect.Parameter.KEYWORD_ONLY
-    signature = inspect.Signature([inspect.Parameter(n, keyword, annotation=a) for n, a in parameters.items()])
+    keyword, own = inspect.Parameter.KEYWORD_ONLY, inspect.signature(handler).parameters
+    defaults = {name: own[name].default if name in own else inspect.Parameter.empty for name in parameters}
+    signature = inspect.Signature(
+        [inspect.Parameter(n, keyword, default=defaults[n], annotation=a) for n, a in parameters.items()]
+    )
     call.__name__, call.__doc__ = handler.__name__ + suffix, handler.__doc__
     call.__signature__ = signature  # type: ignore[attr-defined]
     return call

@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import Request, Response
 from msgspec import UNSET, UnsetType
 from pydantic import Discriminator, Field, Tag
 from pydantic_core import to_json
 
+from app.api import schemas
 from app.api.arms.operation import operation
+from app.api.batches import MOST_AT_ONCE
 from app.api.body import versioned
+from app.api.brief import BriefAnswers, Fields, brief, briefly, names_of, quick
 from app.api.options import Goal, OptionsBody, Target, single_or_list
 from app.api.problems import ProblemError
 from app.api.schemas import POST_REFUSALS, example, reply, settings_of
 from app.api.work import Deadline, DeadlineDep
 from app.api.workspace.streaming import ComputedResponse
 from app.shared.answers.answer import Answer, as_json
-from app.shared.answers.ik import ReachableAnswer, reachable_answer
+from app.shared.answers.ik import Brief, ReachableAnswer, reachable_answer
 from app.shared.problems import Problem
-from kin import Robot
+from kin import IKOptions, Robot, Task
 from kin.ik import solve
+from kin.transforms import Array
 
 router = versioned("workspace")
 
@@ -73,7 +78,7 @@ class ReachableAnswers(Answer):
     "reachable",
     examples=EXAMPLES,
     summary="Reachability of targets",
-    response_model=ReachableAnswer | ReachableAnswers,
+    response_model=ReachableAnswer | ReachableAnswers | BriefAnswers | Brief,
     responses=POST_REFUSALS,
 )
 def reachable(
@@ -81,6 +86,7 @@ def reachable(
     robot: Robot,
     deadline: DeadlineDep,
     body: ReachableRequest,
+    fields: Fields = None,
 ) -> Response:
     """Whether each target can be reached inside the limits; if not, why, by how much, and what comes closest.
 
@@ -88,33 +94,62 @@ def reachable(
     takes a tenth of a millisecond, others some milliseconds. The answer to a list is sent while it is computed,
     and the computation ends when the client leaves.
     """
+    names, settings = names_of(fields), settings_of(request)
+    together = None
     with deadline.turn:
-        targets, single = body.resolve_all(robot, body.target, settings_of(request))
-        if single:
-            return reply(_answers(robot, body, targets)[0])
+        if quick(names) and isinstance(body.target, list):
+            schemas.check_batch("target", len(body.target), settings)
+            together = body.poses_of_all(body.target)
+        if together is None:
+            targets, single = body.resolve_all(robot, body.target, settings)
+            if single:
+                return reply(_answers(robot, body, names, targets)[0])
+    if together is None:
+        pieces = _pieces(partial(_answers, robot, body, names), targets, AT_ONCE, deadline)
+    else:
+        task, T = together
+        answers = partial(_answers_together, robot, body, names, task, deadline)
+        pieces = _pieces(answers, T, MOST_AT_ONCE, deadline)
     # Invalid options show in the first piece, while the status of the response can still be set.
-    pieces = _pieces(robot, body, targets, deadline)
     pieces = _resumed(next(pieces), pieces)
     return ComputedResponse(pieces, "reachable", "application/json", place=deadline.place)
 
 
-def _answers(robot: Robot, body: ReachableRequest, targets: list[Goal]) -> list[ReachableAnswer]:
-    options = {goal.task: replace(body.options(goal.task), max_solutions=1) for goal in targets}
-    return [reachable_answer(solve(robot, goal.T, options[goal.task], rounding=goal.rounding)) for goal in targets]
+def _options(body: ReachableRequest, task: Task) -> IKOptions:
+    return replace(body.options(task), max_solutions=1)
 
 
-def _pieces(robot: Robot, body: ReachableRequest, targets: list[Goal], deadline: Deadline) -> Generator[bytes]:
+def _answers(
+    robot: Robot, body: ReachableRequest, names: tuple[str, ...], targets: list[Goal]
+) -> list[ReachableAnswer | dict[str, Any]]:
+    options = {task: _options(body, task) for task in {goal.task for goal in targets}}
+    whole = [
+        reachable_answer(solve(robot, goal.T, options[goal.task], rounding=goal.rounding)) for goal in targets
+    ]
+    return [brief(each, names) for each in whole] if names else [*whole]
+
+
+def _answers_together(
+    robot: Robot, body: ReachableRequest, names: tuple[str, ...], task: Task, deadline: Deadline, T: Array
+) -> list[dict[str, Any]]:
+    """Of poses ``(k, 4, 4)`` of one task, as far as possible by one compiled pass."""
+    return briefly(robot, T, _options(body, task), None, reachable_answer, names, deadline.check)
+
+
+def _pieces(
+    answers: Callable[[Any], Sequence[object]], targets: Sequence[Goal] | Array, at_once: int, deadline: Deadline
+) -> Generator[bytes]:
     """``{"results": [...]}`` in pieces, with the problem if not all were computed in time."""
-    for start in range(0, len(targets), AT_ONCE):
+    for start in range(0, len(targets), at_once):
         try:
             deadline.check()
+            with deadline.turn:
+                piece = as_json(answers(targets[start : start + at_once]))[1:-1]
         except ProblemError as error:
             if not start:
                 raise
             yield b'],"problem":' + to_json(error.problem) + b"}"
             return
-        with deadline.turn:
-            piece = as_json(_answers(robot, body, targets[start : start + AT_ONCE]))[1:-1]
         yield (b"," if start else b'{"results":[') + piece
     yield b"]}"
 

@@ -182,3 +182,21 @@ def reachable_answer(result: IKResult) -> ReachableAnswer:
         position_error=None if best is None else best.position_error,
         rotation_error=None if best is None else best.rotation_error,
     )
+
+
+class Brief(Answer):
+    """What is asked for of an answer of `ik` or `reachable`, and nothing else."""
+
+    q: list[float] | UnsetType | None = UNSET
+    """Joint values in radians (metres): those of the first solution, of `reachable` those of the closest
+    configuration where there is none; null if there is no such configuration."""
+    status: StatusName | UnsetType = UNSET
+    """What kind of answer it is, as in whole answers."""
+    reachable: bool | UnsetType = UNSET
+    """Whether the arm meets the whole task exactly inside its limits: the status is "solved"."""
+    cause: Cause | UnsetType = UNSET
+    """Why it is not solved, as a code; empty when it is solved."""
+    reason: str | UnsetType = UNSET
+    """Status and cause in a sentence for people, in degrees and millimetres."""
+    distance: float | UnsetType = UNSET
+    """How far out of reach the target is, in metres; 0 within reach."""

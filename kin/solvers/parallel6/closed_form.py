@@ -108,8 +108,10 @@ class Parallel6(ClosedForm):
             g.a1 + g.a2 * math.cos(t[1]) + g.a3 * math.cos(t[1] + t[2]) + g.a4 * math.cos(A) - g.d5 * math.sin(A)
         )
 
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """The branches of many poses."""
+        if task != POSE:
+            return False
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
         return True
 

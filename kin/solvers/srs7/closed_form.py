@@ -103,8 +103,10 @@ class Srs7(ClosedForm):
             obstacle = Obstacle("wrist centre too near to the shoulder", abs(g.d3 - g.d5))
         return Candidates(out[:, :7], values, tuple(all_arcs), gap, obstacle)
 
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """The branches of many poses."""
+        if task != POSE:
+            return False
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
         return True
 

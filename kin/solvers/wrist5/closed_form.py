@@ -114,8 +114,10 @@ class Wrist5(ClosedForm):
         obstacle = None if gap <= REACH else Obstacle("approach direction")
         return Candidates(out[:, :5], out[:, 5:], (arcs,), max(gap, 0.0), obstacle)
 
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """The branches of many poses."""
+        if task == POSITION:
+            return False
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
         return True
 

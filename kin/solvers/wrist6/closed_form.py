@@ -130,8 +130,10 @@ class Wrist6(ClosedForm):
         g = self.geometry
         return float(g.a1 + g.a2 * math.cos(t[1]) + g.f * math.cos(t[1] + t[2]))
 
-    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """The branches of many poses."""
+        if task != POSE:
+            return False
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
         return True
 

@@ -7,7 +7,7 @@ import pytest
 
 from app.exports.formats import FORMATS
 from app.shared.answers.fk import FkAnswer
-from app.shared.answers.ik import IkAnswer, ReachableAnswer
+from app.shared.answers.ik import Brief, IkAnswer, ReachableAnswer
 from app.shared.answers.jacobian import JacobianAnswer
 from kin.motion.program import KINDS
 
@@ -115,9 +115,15 @@ def test_a_single_answer_and_a_list_are_both_in_the_schema(document):
     for what, kind in kinds.items():
         responses = document["paths"][f"/api/v1/robots/{{robot_id}}/{what}"]["post"]["responses"]
         options = responses["200"]["content"]["application/json"]["schema"]["anyOf"]
-        one, many = (document["components"]["schemas"][option["$ref"].rsplit("/", 1)[1]] for option in options)
+        one, many, *brief = (
+            document["components"]["schemas"][option["$ref"].rsplit("/", 1)[1]] for option in options
+        )
         assert set(one["properties"]) == set(kind.__annotations__)
         assert many["properties"]["results"]["items"] == options[0]
+        if what in ("ik", "reachable"):
+            several, single = brief
+            assert set(single["properties"]) == set(Brief.__annotations__)
+            assert several["properties"]["results"]["items"] == options[3]
 
 
 def test_every_example_request_works(client, document):

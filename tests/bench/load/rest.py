@@ -63,6 +63,7 @@ def cases() -> list[_Case]:
         _Case("fk of 1000", request("POST", post + "fk", body(q=q.tolist()))),
         _Case("ik", request("POST", post + "ik", body(target=targets[0]))),
         _Case("ik of 1000", request("POST", post + "ik", body(target=targets, max_solutions=1))),
+        _Case("ik of 1000, q and status", request("POST", post + "ik?fields=q,status", body(target=targets))),
     ]
 
 
