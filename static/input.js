@@ -202,7 +202,8 @@
     const rows = kind === "pose" ? ["position", "angles"] : [kind];
     const input = box.querySelector("textarea");
     box.querySelector("[data-typed-frame]").value = "";
-    input.value = rows.map((name) => numbersOf(document.querySelector(`tr[data-type="${name}"]`)).join("  ")).join("\n");
+    input.value = rows.map((name) => document.querySelector(`tr[data-type="${name}"]`)) // a row that a question asks for is not there
+      .map((row) => (row ? numbersOf(row).join("  ") : "")).join("\n").trim();
     input.setAttribute("aria-label", box.querySelector(`b[data-for="${kind}"]`).textContent);
     showError("");
     mark(true);

@@ -1,7 +1,7 @@
 """Questions that are asked now: of one arm and in the reader's units, with the judge of their answers.
 
 Lessons and exercises share them. `Number` and `Choice` are made of values, by a lesson; a kind of exercise makes
-a question of a file and a variant (`app.exercises.contract.Kind.ask`). Whoever shows a question needs only
+a question of a file and a variant (`app.exercises.contract.Kind.ask`). What shows a question needs only
 `Question`: what is asked, how an answer is read and judged, and what is right.
 
 Values are in radians, metres and SI units.

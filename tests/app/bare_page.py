@@ -48,7 +48,7 @@ class BarePage:
         self.events: list[tuple[Hashable, object]] = []
         self.feature: Feature | None = None
         self.targets: list[Array] = []
-        self.activity = SimpleNamespace(changed=lambda: None, lesson=None)
+        self.activity = SimpleNamespace(changed=lambda: None, lesson=None, withheld=frozenset())
         self.use(robot)
 
     def use(self, robot: kin.Robot, q: Array | None = None, **more: Any) -> None:

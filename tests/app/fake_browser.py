@@ -186,6 +186,16 @@ class FakeBrowser:
         self.wait(lambda: before not in self.nodes)
         self.settle()
 
+    def open_lesson(self, title: str) -> None:
+        """Choose a lesson, and have the answer to its first question shown, which withholds facts until then."""
+        self.set("Lesson", title)
+        self.wait(lambda: 'data-step="1"' in self.html)
+        self.reveal("1")
+
+    def reveal(self, question: str) -> None:
+        """Have the answer to a question of the lesson shown."""
+        self.say("feature", ["guide", ["reveal", question, len(self.log)], None])
+
     def grab(self) -> None:
         self.send("TransformControlsDragStartMessage", name=self.gizmo, owner=self.nodes[self.gizmo]["owner"])
 

@@ -30,9 +30,9 @@ FACTS: Final = {
     "ellipsoid": "the ellipsoid, its semi-axes and the singular values",
     "torques": "the joint torques of a force",
     "singularities": "which singularities are near, and what is lost there",
-    "screws": "the six numbers of each joint axis, and the product",
+    "screws": "the six numbers of each joint axis, and what is drawn of them",
     "forms": "a rotation in its other forms",
-    "null space": "the self-motion, its parameter and what moves",
+    "null space": "how many self-motions there are",
 }
 
 

@@ -23,11 +23,12 @@ from typing import Any, ClassVar, Generic, ParamSpec, TypeVar, cast
 
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.fields import Settings
-from app.viewer.declared.panel import Event, PanelView
+from app.viewer.declared.panel import Event, Html, PanelView
 from app.viewer.declared.panel import Node as PanelNode
 from app.viewer.declared.scene import Lazy, SceneView
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.feature import Feature, Stage
+from app.viewer.views.templates import render
 from kin import InputError
 from kin.transforms import Array
 
@@ -68,6 +69,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.shown_at = 0.0
         self._write = self._stale = False
         self._seen: tuple[object, ...] = ()
+        self._withheld = stage.activity.withheld
         self.facts: F
         self.read: F
         self.started()
@@ -121,6 +123,14 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self._stale = self._stale or seconds == 0.0
         self.due = seconds if self.due is None else min(self.due, seconds)
 
+    def hides(self, *facts: str) -> bool:
+        """Whether an open question asks for one of these facts (`app.viewer.activity.activity.FACTS`)."""
+        return not self.stage.activity.withheld.isdisjoint(facts)
+
+    def unless_asked(self, fact: str, *nodes: PanelNode) -> Sequence[PanelNode]:
+        """These nodes; while a question asks for the fact, a note in their place."""
+        return [Html(render, ("panel/asked",), key=f"asked {fact}")] if self.hides(fact) else nodes
+
     def spec(self, path: str) -> Any:
         """What the field at this path declares, to be narrowed with `dataclasses.replace` by facts."""
         return self.settings_of.spec(path)
@@ -128,6 +138,9 @@ class DeclaredFeature(Feature, Generic[S, F]):
     def refresh(self) -> None:
         """Show what is declared now."""
         self.shown_at, self.due, self._stale = time.perf_counter(), None, False
+        if self._withheld != self.stage.activity.withheld:
+            self._withheld = self.stage.activity.withheld
+            self._scene.remove()  # hidden nodes too: the browser has their data
         self.look_again()
         self.read = self.facts
         stage = self.stage
@@ -206,6 +219,10 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def on_style(self) -> None:
         self._begin()
+
+    def on_activity(self) -> None:
+        if self._withheld != self.stage.activity.withheld:
+            self.refresh()
 
     def tick(self, now: float) -> None:
         again = self.advance(now)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import viser
 
@@ -27,12 +27,16 @@ def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
     return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
 
 
-def html(T_frame_tool: Array, units: Units, T_frame_target: Array | None = None, frame: str = WORLD) -> str:
+def html(
+    T_frame_tool: Array, units: Units, T_frame_target: Array | None = None, frame: str = WORLD,
+    withheld: Collection[str] = (),
+) -> str:  # fmt: skip
     """Position, roll/pitch/yaw and quaternion of a pose ``(4, 4)`` as a small table.
 
     Args:
         T_frame_target: a target that the tool has missed, from which the form for a typed target starts.
         frame: name of the frame in which both are.
+        withheld: rows that an open question asks for: position, angles, quaternion.
     """
     lengths, angles = units.lengths, units.angles
     titles = (
@@ -43,7 +47,7 @@ def html(T_frame_tool: Array, units: Units, T_frame_target: Array | None = None,
     tool = _parts(T_frame_tool, units)
     target: Sequence[Sequence[str]] = ((),) * 3 if T_frame_target is None else _parts(T_frame_target, units)
     rows = [(*title, numbers, wanted) for title, numbers, wanted in zip(titles, tool, target, strict=True)]
-    return render("panel/readout", rows=rows, frame=frame)
+    return render("panel/readout", rows=rows, frame=frame, withheld=withheld)
 
 
 def _parts(T: Array, units: Units) -> tuple[list[str], list[str], list[str]]:
@@ -79,6 +83,9 @@ class PoseReadout:
         offered = [(name, TITLES.get(name, name)) for name in frames.names]
         update_html(self._choice, render("panel/frame", frames=offered, shown=frames.shown))
 
-    def show(self, T: Array, units: Units, target: Array | None = None, frame: str = WORLD) -> None:
+    def show(
+        self, T: Array, units: Units, target: Array | None = None, frame: str = WORLD,
+        withheld: Collection[str] = (),
+    ) -> None:  # fmt: skip
         """Replace the numbers; see `html`."""
-        show_content(self._html, html(T, units, target, frame))
+        show_content(self._html, html(T, units, target, frame, withheld))

@@ -12,6 +12,7 @@ from typing import Protocol
 import viser
 
 import kin
+from app.viewer.activity.activity import Activity
 from app.viewer.feature import Feature
 from app.viewer.frames import FrameAxes, Frames
 from app.viewer.obstacles.words import sentence
@@ -42,6 +43,7 @@ class NumbersPage(Protocol):
     status: StatusLine
     units: Units
     frames: Frames
+    activity: Activity
 
     def for_features(self, action: Callable[[Feature], None]) -> None:
         """Call every feature."""
@@ -131,4 +133,4 @@ class Numbers:
         if frames.shown != WORLD:
             T = inverse(frames.pose(page.arm.robot, page.arm.q))
             tool, target = T @ tool, None if target is None else T @ target
-        page.panel.readout.show(tool, page.units, target, frames.shown)
+        page.panel.readout.show(tool, page.units, target, frames.shown, page.activity.withheld)

@@ -105,7 +105,7 @@ class VisitorPage(ShownArm, Worker):
         self.activity = Activity(
             services.courses,
             partial(result_key, services.classroom),
-            lambda: self.for_features(lambda feature: feature.on_activity()),
+            self._activity_changed,
         )
         self.looks = Looks(self)
         self._actions = Actions(self)
@@ -220,6 +220,12 @@ class VisitorPage(ShownArm, Worker):
         """Call every feature; an error of one does not stop the others."""
         for feature in self.features:
             self._guard(lambda feature=feature: action(feature))  # type: ignore[misc]
+
+    def _activity_changed(self) -> None:
+        """Something else is open or withheld."""
+        self.for_features(lambda feature: feature.on_activity())
+        if self._tabs:
+            self.numbers.use_pose()
 
     # Reports of the arm's controller
 

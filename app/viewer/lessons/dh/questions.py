@@ -89,7 +89,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             _swing(robot, q, units),
             "Everything behind joint 1 has moved as one body; its rows are unchanged.",
             pose=Pose(home),
-            end=as_configuration(q),
+            end=Pose(as_configuration(q)),
         ),
         *_mistyped(robot, units),
     )

@@ -17,7 +17,7 @@ from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import views
 from app.viewer.lessons.guide.lesson import Lesson
-from app.viewer.lessons.guide.outline import Configuration, Outline
+from app.viewer.lessons.guide.outline import Outline, Pose
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.joints import go_to_buttons
@@ -180,26 +180,24 @@ class Guide(Feature):
 
     def _bring(self) -> None:
         """Bring the scene to the pose of the step on show."""
-        progress, steps = self._progress, self._progress.outline.steps
-        pose = progress.outline.pose_of(progress.at)
-        if pose is None:
-            return
-        if pose.drawing and self._shown is not None:
-            self._shown.restore(dict(pose.drawing))
-        title = "Check" if progress.at == len(steps) else f"Step {progress.at + 1}: {steps[progress.at].title}"
-        self.stage.move_to(np.array(pose.q), Notice("hand", title, "The arm is at the pose of this step."))
-        if pose.target is not None:
-            self.stage.set_target(from_position_wxyz(pose.target[:3], np.array(pose.target[3:])))
+        progress = self._progress
+        if (pose := progress.outline.pose_of(progress.at)) is not None:
+            self._show_pose(pose, "The arm is at the pose of this step.")
 
     def _move_to_end(self, key: str) -> None:
-        """Let the arm show the answer to a question of the step on show."""
+        """Let the scene show the answer to a question of the step on show."""
         steps, at = self._progress.outline.steps, self._progress.at
-        if key != str(at + 1) or at == len(steps):
-            return
-        q: Configuration | None = steps[at].end
-        if q is not None:
-            notice = Notice("hand", f"Step {at + 1}: {steps[at].title}", "The arm shows the answer.")
-            self.stage.move_to(np.array(q), notice)
+        if key == str(at + 1) and at < len(steps) and (end := steps[at].end) is not None:
+            self._show_pose(end, "The arm shows the answer.")
+
+    def _show_pose(self, pose: Pose, words: str) -> None:
+        steps, at = self._progress.outline.steps, self._progress.at
+        if pose.drawing and self._shown is not None:
+            self._shown.restore(dict(pose.drawing))
+        title = "Check" if at == len(steps) else f"Step {at + 1}: {steps[at].title}"
+        self.stage.move_to(np.array(pose.q), Notice("hand", title, words))
+        if pose.target is not None:
+            self.stage.set_target(from_position_wxyz(pose.target[:3], np.array(pose.target[3:])))
 
     def _show(self) -> None:
         if self._shown is not None and (outline := self._shown.on_steps(self._progress)) is not None:

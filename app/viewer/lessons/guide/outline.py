@@ -74,7 +74,7 @@ class Step:
         question: the prediction that is asked before `shown`.
         shown: what is revealed after a right answer, or on request; on paper too, among the solutions.
         pose: what it is about; None: the pose of the outline.
-        end: the configuration to which the arm moves when the answer is revealed.
+        end: what the scene shows when the answer is revealed.
         practice: what to see or to do on the page then, in words that follow `shown`.
         figure: a figure that belongs to `shown`.
         withheld: facts that nothing in the page shows while the question is open:
@@ -86,7 +86,7 @@ class Step:
     question: Question | None = None
     shown: str = ""
     pose: Pose | None = None
-    end: Configuration | None = None
+    end: Pose | None = None
     practice: str = ""
     figure: Markup | None = None
     withheld: frozenset[str] = frozenset()

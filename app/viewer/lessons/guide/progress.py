@@ -10,7 +10,7 @@ from kin import InputError
 
 Mark = Literal["open", "right", "wrong", "shown"]
 MOST_MISSES = 99
-WAY_AFTER = 2  # misses: before, a wrong answer is only told what is wrong with it
+WAY_AFTER = 2  # misses: before, only what is wrong with the answer is said
 
 
 class Progress:

@@ -69,7 +69,7 @@ def _step(given: Exercise, key: StepKey, units: Units) -> Step:
     start = as_configuration(given.q)
     if key == "joints":
         end = (
-            as_configuration(given.followed.q)
+            Pose(as_configuration(given.followed.q))
             if given.followed.available and given.followed.q is not None
             else None
         )

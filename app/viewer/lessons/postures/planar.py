@@ -84,6 +84,6 @@ def steps(robot: Robot, units: Units) -> tuple[Step, ...]:
             elbow,
             f"The elbow is on the other side now. {turned}",
             pose=Pose(home),
-            end=as_configuration(other),
+            end=Pose(as_configuration(other)),
         ),
     )

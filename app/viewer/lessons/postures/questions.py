@@ -100,7 +100,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             f"The target is the pose that the tool has at home. {_many(robot)}",
             _solutions(known),
             pose=Pose(home),
-            end=known.other,
+            end=None if known.other is None else Pose(known.other),
             practice="The arm has changed its posture, if it has another one there. The tool is where it was.",
         ),
         Step(

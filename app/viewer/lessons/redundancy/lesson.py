@@ -76,7 +76,7 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
 
     def panel(self) -> Sequence[Node]:
         f, item, units = self.read, self.read.item, self.stage.units
-        nodes: list[Node] = [Html(views.idea_html, (f.idea,))]
+        nodes = [*self.unless_asked("null space", Html(views.idea_html, (f.idea,)))]
         if item is not None:
             nodes += self._controls(item)
             item = on_side_of(self._side, item, units.angles)

@@ -14,6 +14,7 @@ from kin.units import Units, fixed
 
 GOAL = "You can say how many motions of the joints leave the tool in place, and which joints take part in them."
 STILL = 1e-6
+NULL_SPACE = frozenset({"null space"})
 
 
 def null_vector(robot: Robot) -> Array:
@@ -37,6 +38,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             "Joints and conditions",
             f"The arm has {robot.n} joints. A tool at rest is six conditions on the joint speeds: J q̇ = 0.",
             _dimension(robot, free),
+            withheld=NULL_SPACE,
             practice="One such motion is a slider below."
             if free
             else "Choose an arm of seven joints to see a self-motion.",
@@ -53,13 +55,13 @@ def outline(robot: Robot, units: Units) -> Outline:
         steps.append(
             Step(
                 "Who moves",
-                "At home, the null space of J gives the joint speeds of the self-motion: " + _speeds(z) + ".",
+                "At home, the null space of J gives the joint speeds of the self-motion. The tool stays.",
                 _mover(robot, z),
-                pose=Pose(home),
+                "The speeds of the joints are " + _speeds(z) + ", times any factor.",
                 practice="Sweep the redundancy parameter: the joints move in this proportion at first.",
             )
         )
-    return Outline(GOAL, tuple(steps), _check(robot, free), pose=Pose(home))
+    return Outline(GOAL, tuple(steps), _check(robot, free), (frozenset(), NULL_SPACE), Pose(home))
 
 
 def _speeds(z: Array) -> str:

@@ -60,7 +60,8 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
         turns = MOTIONS[s.motion][0]
         return [
             Control("chained"),
-            Folder("One rotation", [
+            Folder("One rotation", self.unless_asked(
+                "forms",
                 Control("convention"),
                 Html(views.convention_html, (f.convention,)),
                 *(self._angle(k) for k in range(3)),
@@ -69,7 +70,7 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
                 Control("typed"),
                 Buttons("Use", {name: self.event(method) for name, method in uses.items()}, ACT_HINT),
                 Html(views.error_html, (self._error,)),
-            ], visible=not s.chained),
+            ), visible=not s.chained),
             Folder("Chain of frames", [
                 Control("motion"),
                 Control("turn", visible=turns),

@@ -7,10 +7,21 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.viewer.lessons.guide.outline import PLAIN, Mistake, Number, Outline, Pose, Step, apart, one_right
+from app.viewer.lessons.guide.outline import (
+    PLAIN,
+    Configuration,
+    Mistake,
+    Number,
+    Outline,
+    Pose,
+    Step,
+    apart,
+    one_right,
+)
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.rotations.check import CHECK
 from app.viewer.lessons.rotations.conventions import PAGE, Convention, axis_angle
+from app.viewer.lessons.rotations.frames import Motion, as_json
 from app.viewer.panel.readout import ANGLES
 from app.viewer.scene.chain import rotation
 from kin import Robot, fk
@@ -25,6 +36,10 @@ GOAL = (
 ANGLE, ENTRY, LENGTH = math.radians(2.0), 0.02, 0.002
 _SAMPLES = 64
 ZYZ = Convention("zyz", False)
+FORMS = frozenset({"forms"})
+TWO_TURNS = Motion(True, 2, math.pi / 2, True), Motion(True, 0, math.pi / 2, True)
+# The 1st and the 3rd axis coincide.
+LOCKED = {"chained": False, "convention": PAGE.key, "angles": [0.4, math.pi / 2, 0.0]}
 
 
 @lru_cache(maxsize=128)
@@ -33,20 +48,21 @@ def outline(robot: Robot, units: Units) -> Outline:
     q = example(robot)
     T = fk(robot, q)
     start = as_configuration(q)
+    tool = Pose(start, drawing=turned(T[:3, :3], PAGE))
     steps = (
-        _columns(T, start),
-        _inverse_rotation(T, start),
-        _order(),
+        _columns(T, tool, units),
+        _inverse_rotation(T, tool),
+        _order(start),
         _same(),
-        _pitch(T, start, units),
+        _pitch(T, tool, units),
         _other(T, start, units),
-        _axis(T, start, units),
-        _quaternion(T),
-        _lock(units),
-        _inverse(T, start, units),
-        _chain(),
+        _axis(T, tool, units),
+        _quaternion(T, tool),
+        _lock(start, units),
+        _inverse(T, tool, units),
+        _chain(start),
     )
-    return Outline(GOAL, steps, CHECK, pose=Pose(start))
+    return Outline(GOAL, steps, CHECK, pose=tool)
 
 
 @lru_cache(maxsize=64)
@@ -57,32 +73,39 @@ def example(robot: Robot) -> Array:
     return np.asarray(q[int(np.argmax(R.min(axis=1)))])
 
 
-def _columns(T: Array, start: tuple[float, ...]) -> Step:
+def _columns(T: Array, pose: Pose, units: Units) -> Step:
     R = T[:3, :3]
     row = int(np.argmax(np.abs(R[:, 2])))
+    angle = math.acos(max(-1.0, min(1.0, float(R[row, 2]))))
+    shown = units.angles.text(angle, 1)
     return Step(
         "Columns",
-        "The columns of R are the axes of the turned frame in coordinates of the fixed one. The "
-        "third column is the "
-        f"tool’s z axis. At the pose of this step it is ({', '.join(fixed(v) for v in R[:, 2].tolist())}).",
+        "The columns of R are the axes of the turned frame in coordinates of the fixed one. So each entry is the "
+        "scalar product of two unit vectors. At the pose of this step, the tool’s z axis is at an angle of "
+        f"{shown} to the fixed {'xyz'[row]} axis.",
         apart(
             Number(
-                f"What is the cosine of the angle between the tool’s z axis and the fixed {'xyz'[row]} axis?",
+                f"What is the entry of R in row {row + 1} and column 3?",
                 float(R[row, 2]),
                 PLAIN,
                 ENTRY,
-                "The scalar product of two unit vectors is the cosine of their angle: one entry of R.",
-                (Mistake(float(R[2, row]), "That is the entry of Rᵀ: row and column are exchanged."),),
+                "The scalar product of two unit vectors is the cosine of their angle.",
+                (
+                    Mistake(float(R[2, row]), "That is the entry of Rᵀ: row and column are exchanged."),
+                    Mistake(math.sin(angle), "That is the sine. The scalar product is the cosine."),
+                    Mistake(math.cos(math.degrees(angle)), "That is the cosine of so many radians, not degrees."),
+                ),
             ),
             ENTRY / 2.0,
         ),
-        "Each entry of R is such a cosine.",
-        pose=Pose(start),
-        practice="“From tool” below shows the tool’s frame beside the arm.",
+        f"The third column, the tool’s z axis, is ({', '.join(fixed(v) for v in R[:, 2].tolist())}).",
+        pose=pose,
+        withheld=FORMS,
+        practice="The frame beside the arm is turned as the tool is.",
     )
 
 
-def _inverse_rotation(T: Array, start: tuple[float, ...]) -> Step:
+def _inverse_rotation(T: Array, pose: Pose) -> Step:
     R = T[:3, :3]
     row, column = max(((0, 1), (0, 2), (1, 2)), key=lambda at: abs(abs(R[at]) - abs(R[at[::-1]])))
     names = [f"r{'₁₂₃'[i]}{'₁₂₃'[j]}" for i, j in ((row, column), (column, row))]
@@ -105,8 +128,14 @@ def _inverse_rotation(T: Array, start: tuple[float, ...]) -> Step:
             ENTRY / 2.0,
         ),
         "To turn back is to exchange rows and columns; nothing has to be solved.",
-        pose=Pose(start),
+        pose=pose,
+        withheld=FORMS,
     )
+
+
+def turned(R: Array, convention: Convention) -> dict[str, object]:
+    """The drawing of a rotation ``(3, 3)`` beside the arm, with its angles in a convention."""
+    return {"chained": False, "convention": convention.key, "angles": list(convention.angles(R))}
 
 
 def pointing(first: Array, second: Array) -> str:
@@ -121,7 +150,7 @@ def quarter(axis: str) -> Array:
     return rotation("xyz".index(axis), math.pi / 2)[:3, :3]
 
 
-def _order() -> Step:
+def _order(start: Configuration) -> Step:
     own, fixed_axes = pointing(quarter("z"), quarter("x")), pointing(quarter("x"), quarter("z"))
     return Step(
         "Order",
@@ -141,7 +170,9 @@ def _order() -> Step:
             1,
         ),
         "About the fixed x axis, the second turn multiplies from the left, and z ends elsewhere.",
-        practice="Build both chains below, with own and with fixed axes.",
+        pose=Pose(start, drawing={"chained": True, "chain": []}),
+        end=Pose(start, drawing={"chained": True, "chain": as_json(TWO_TURNS)}),
+        practice="Frame {2} beside the arm is turned so. Build the chain with fixed axes too.",
     )
 
 
@@ -166,7 +197,7 @@ def _same() -> Step:
     )
 
 
-def _pitch(T: Array, start: tuple[float, ...], units: Units) -> Step:
+def _pitch(T: Array, pose: Pose, units: Units) -> Step:
     R = T[:3, :3]
     _, pitch, _ = PAGE.angles(R)
     return Step(
@@ -188,12 +219,13 @@ def _pitch(T: Array, start: tuple[float, ...], units: Units) -> Step:
             ANGLE / 2.0,
         ),
         "roll = atan2(r₃₂, r₃₃) and yaw = atan2(r₂₁, r₁₁).",
-        pose=Pose(start),
+        pose=pose,
+        withheld=FORMS | {"angles"},
         practice="The read-out above the tabs shows them.",
     )
 
 
-def _other(T: Array, start: tuple[float, ...], units: Units) -> Step:
+def _other(T: Array, start: Configuration, units: Units) -> Step:
     R = T[:3, :3]
     _, beta, _ = ZYZ.angles(R)
     return Step(
@@ -211,12 +243,13 @@ def _other(T: Array, start: tuple[float, ...], units: Units) -> Step:
             ANGLE / 2.0,
         ),
         "The same rotation has other numbers in each convention: always say which one it is.",
-        pose=Pose(start),
+        pose=Pose(start, drawing=turned(R, ZYZ)),
+        withheld=FORMS,
         practice="Try all of them below.",
     )
 
 
-def _axis(T: Array, start: tuple[float, ...], units: Units) -> Step:
+def _axis(T: Array, pose: Pose, units: Units) -> Step:
     R = T[:3, :3]
     _, angle = axis_angle(R)
     trace = float(np.trace(R))
@@ -240,12 +273,13 @@ def _axis(T: Array, start: tuple[float, ...], units: Units) -> Step:
             ANGLE / 2.0,
         ),
         "The axis is the one direction that R leaves as it is.",
-        pose=Pose(start),
+        pose=pose,
+        withheld=FORMS | {"quaternion"},
         practice="“From tool” below draws it.",
     )
 
 
-def _quaternion(T: Array) -> Step:
+def _quaternion(T: Array, pose: Pose) -> Step:
     R = T[:3, :3]
     w = float(wxyz_from_rotation(R)[0])
     _, angle = axis_angle(R)
@@ -269,10 +303,12 @@ def _quaternion(T: Array) -> Step:
             ENTRY / 2.0,
         ),
         "q and −q are the same rotation: half a turn more of θ/2 is a whole turn more of θ.",
+        pose=pose,
+        withheld=FORMS | {"quaternion"},
     )
 
 
-def _lock(units: Units) -> Step:
+def _lock(start: Configuration, units: Units) -> Step:
     quarter_turn = units.angles.brief(math.pi / 2)
     return Step(
         "Gimbal lock",
@@ -298,10 +334,11 @@ def _lock(units: Units) -> Step:
         "Each set of three angles locks somewhere: Tait–Bryan angles where the second one is a "
         "quarter turn, proper "
         "Euler angles where it is zero or half a turn. R, axis with angle, and quaternions do not lock.",
+        pose=Pose(start, drawing=LOCKED),
     )
 
 
-def _inverse(T: Array, start: tuple[float, ...], units: Units) -> Step:
+def _inverse(T: Array, pose: Pose, units: Units) -> Step:
     lengths, p = units.lengths, T[:3, 3]
     back = inverse(T)[:3, 3]
     k = int(np.argmax(np.abs(back)))
@@ -326,11 +363,11 @@ def _inverse(T: Array, start: tuple[float, ...], units: Units) -> Step:
             )
         ),
         "T⁻¹ needs no matrix inversion: transpose R, and turn −p.",
-        pose=Pose(start),
+        pose=pose,
     )
 
 
-def _chain() -> Step:
+def _chain(start: Configuration) -> Step:
     return Step(
         "A chain of frames",
         "A camera is known in the base, T₀₁, and a workpiece in the camera, T₁₂.",
@@ -344,5 +381,6 @@ def _chain() -> Step:
             0,
         ),
         "Motions about own axes multiply from the right, those about fixed axes from the left.",
-        practice="Choose Chain of frames below, and add motions of both kinds.",
+        pose=Pose(start, drawing={"chained": True, "chain": []}),
+        practice="Add motions of both kinds to the chain below.",
     )

@@ -30,11 +30,13 @@ def tips(facts: ScrewsFacts) -> Array:
     return spread_tips(*facts.axes, REACH * r, APART * r)
 
 
-def scene(facts: ScrewsFacts, figure: FigureNodes, units: Units) -> list[Node]:
-    """All drawings."""
+def scene(facts: ScrewsFacts, figure: FigureNodes, units: Units, asked: bool = False) -> list[Node]:
+    """All drawings; only the axes if the numbers of the screws are asked."""
     with figure:
         ends = tips(facts)
-        nodes = [*_axes(facts, figure, ends), *_chosen(facts, figure, ends, units)]
+        nodes = _axes(facts, figure, ends)
+        if not asked:
+            nodes += _chosen(facts, figure, ends, units)
     if facts.ghost is not None:
         nodes.append(ghost("ghost", facts.robot, facts.ghost, GHOST, OPACITY))
     return nodes

@@ -51,8 +51,11 @@ class ScrewsLesson(DeclaredFeature[ScrewsSettings, ScrewsFacts], Lesson):
         return [
             Control("form"),
             Control("axes"),
-            Html(views.table_html, (robot, f.columns, s.form, f.now, f.chosen)),
-            Folder("One screw", [Control("joint", of=robot.id), Html(views.one_html, one)]),
+            *self.unless_asked("screws", Html(views.table_html, (robot, f.columns, s.form, f.now, f.chosen))),
+            Folder("One screw", [
+                Control("joint", of=robot.id),
+                *self.unless_asked("screws", Html(views.one_html, one)),
+            ]),
             Folder("Product of exponentials", [
                 Control("factors", of=robot.id),
                 Html(views.product_html, (robot, f.zero, f.acting, s.factors, s.form)),
@@ -62,9 +65,9 @@ class ScrewsLesson(DeclaredFeature[ScrewsSettings, ScrewsFacts], Lesson):
     def scene(self) -> Sequence[Lazy]:
         # Axes at zero do not move with the arm.
         facts, units = self.facts if self.facts.now else self.read, self.stage.units
-        return [Lazy("screws", scene, (facts, self._figure, units))]
+        return [Lazy("screws", scene, (facts, self._figure, units, self.hides("screws")))]
 
     def legend(self) -> str:
         f, s = self.read, self.settings
         ghost = None if f.ghost is None else s.factors
-        return views.legend_html(f.robot, s.form, f.now, ghost, f.chosen)
+        return views.legend_html(f.robot, s.form, f.now, ghost, f.chosen, self.hides("screws"))

@@ -23,28 +23,36 @@ from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.screws.product import foot
 from kin import Robot, screws
 from kin.transforms import Array
-from kin.units import Units
+from kin.units import Units, fixed
 
 GOAL = "You can write down the screw of every joint, and multiply their exponentials to the pose of the tool."
+NONE, SCREWS = frozenset[str](), frozenset({"screws"})
+SPACE = {"form": "space", "axes": "zero"}
 ALONG = 0.99  # cosine; an axis within 8° of a coordinate axis is called by its name
 
 
 def outline(robot: Robot, units: Units) -> Outline:
     """The outline for this arm."""
     found = screws(robot)
-    home = as_configuration(robot.q_home)
+    home, zeros = as_configuration(robot.q_home), np.zeros(robot.n)
+    zero = as_configuration(zeros) if robot.in_limits(zeros) else home
     steps = [
         Step(
             "Six numbers for an axis",
             "All joints are at zero. A screw is (ω, v): ω is the direction of the axis, and v = −ω × p, with any "
             "point p of the axis, is the velocity at the origin while the joint turns at 1 rad/s.",
             _direction(robot, found.S),
+            pose=Pose(zero, drawing=SPACE),
+            withheld=SCREWS,
             practice="The table shows the screws of all joints; each line in the scene is one of them.",
         ),
         Step(
             "How far the axis is",
-            "p may be any point of the axis: along the axis, ω × p does not change. So v depends on the line.",
+            "p may be any point of the axis: along the axis, ω × p does not change. So v depends on the line."
+            + _line(robot, units, found.S),
             _distance(robot, units, found.S),
+            pose=Pose(zero, drawing=SPACE),
+            withheld=SCREWS,
             practice="The dimension |v| in the scene is this distance, the red arrow the direction of v.",
         ),
         Step(
@@ -66,10 +74,11 @@ def outline(robot: Robot, units: Units) -> Outline:
             "T = M exp([B₁] θ₁) … exp([Bₙ] θₙ): the same axes, seen from the tool at zero.",
             _body(robot, units, found.B),
             "The product is the same.",
+            withheld=SCREWS,
             practice="Choose the form Body to see it, to the last digit shown.",
         ),
     ]
-    return Outline(GOAL, tuple(steps), _check(robot, units, found.S), pose=Pose(home))
+    return Outline(GOAL, tuple(steps), _check(robot, units, found.S), (NONE, NONE, NONE, SCREWS), Pose(home))
 
 
 def far_joint(S: Array) -> int:
@@ -97,6 +106,19 @@ def _direction(robot: Robot, S: Array) -> Number:
     )
 
 
+def _line(robot: Robot, units: Units, S: Array) -> str:
+    """The line of the axis whose distance is asked."""
+    if (joint := far_joint(S)) < 0:
+        return ""
+    point = axes_at(robot, np.zeros(robot.n))[0][joint]
+    omega = ", ".join(fixed(value) for value in S[:3, joint].tolist())
+    place = ", ".join(units.lengths.number(value) for value in point.tolist())
+    return (
+        f" With all joints at zero, axis {joint + 1} has ω = ({omega}) and passes through "
+        f"p = ({place}){units.lengths.suffix}."
+    )
+
+
 def _distance(robot: Robot, units: Units, S: Array) -> Number:
     joint = far_joint(S)
     if joint < 0:
@@ -114,7 +136,7 @@ def _distance(robot: Robot, units: Units, S: Array) -> Number:
             answer,
             units.lengths,
             two_percent(answer),
-            f"|v| = |ω| · distance, and |ω| = 1. Take the root of the squares of v in the table, row {joint + 1}.",
+            "v = −ω × p, and |v| = |ω| · distance with |ω| = 1. Multiply ω × p, and take the root of the squares.",
             (
                 Mistake(origin, "That is the distance of a frame on the axis; the perpendicular is shorter."),
                 Mistake(float(np.abs(S[3:, joint]).max()), "That is one component of v only."),
@@ -226,11 +248,12 @@ def _check(robot: Robot, units: Units, S: Array) -> tuple[Number | Choice, ...]:
     nearest = apart(
         Number(
             f"p = ω × v is the point of an axis nearest to the origin. What is its {'xyz'[axis]} for joint "
-            f"{joint + 1}?",
+            f"{joint + 1}, with ω = ({', '.join(fixed(x) for x in S[:3, joint].tolist())}) and "
+            f"v = ({', '.join(fixed(x) for x in S[3:, joint].tolist())}) m/s?",
             value,
             units.lengths,
             two_percent(value),
-            f"Multiply ω × v of row {joint + 1}; v is in metres.",
+            "Multiply ω × v; the result is in metres.",
             (Mistake(-value, "That is v × ω: the order matters."),),
         )
     )

@@ -96,13 +96,14 @@ def product_html(robot: Robot, zero: Screws, q: Array, factors: int, form: Form)
     )
 
 
-def legend_html(robot: Robot, form: Form, now: bool, ghost: int | None, chosen: int) -> str:
+def legend_html(robot: Robot, form: Form, now: bool, ghost: int | None, chosen: int, asked: bool = False) -> str:
     """What is drawn in the scene; `ghost`: the factors that act on it, None without a ghost."""
     where = "where they are now" if now else "at zero"
     items = [("ring", joint_color(chosen), f"joint axes {where}, in their positive sense")]
-    if robot.revolute[chosen]:
+    if robot.revolute[chosen] and not asked:
         items.append(("line", GREY, f"distance of axis {chosen + 1} from the {FRAME[form]} frame"))
-    items.append(("arrow", VELOCITY, f"v of joint {chosen + 1}, direction only"))
+    if not asked:
+        items.append(("arrow", VELOCITY, f"v of joint {chosen + 1}, direction only"))
     if ghost is not None:
         words = (
             "the arm with all joints at zero" if ghost in (0, robot.n) else "the arm after the factors that act"

@@ -197,7 +197,7 @@ def _two_ways(found: Ways, units: Units) -> Step:
         f"you expect.",
         figure=chart(rows, curves, "PTP and LIN between the same two configurations"),
         pose=Pose(start),
-        end=end,
+        end=Pose(end),
     )
 
 

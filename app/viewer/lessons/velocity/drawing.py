@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from functools import lru_cache
 
 import numpy as np
@@ -30,15 +31,18 @@ CROSS = np.stack([-np.eye(3), np.eye(3)], axis=1).astype(np.float32)
 CHOICES = np.array([(1.0, b, c) for b in (1.0, -1.0) for c in (1.0, -1.0)])
 
 
-def scene(now: VelocityFacts, read: VelocityFacts, eye: Array) -> list[Node]:
-    """All drawings; numbers and lost directions are those that the panel shows, as seen from `eye` ``(3,)``."""
+def scene(now: VelocityFacts, read: VelocityFacts, eye: Array, withheld: Collection[str] = ()) -> list[Node]:
+    """All drawings but those `withheld`, whose numbers and lost directions are those of the panel.
+
+    They are drawn as seen from `eye` ``(3,)``.
+    """
     r, kind, chosen = body(now.robot).radius, now.settings.ellipsoid, now.settings.joint
-    parts: list[Node | Lazy] = [Lazy("lost", _lost, (read,))]
-    if kind is not None:
+    parts: list[Node | Lazy] = [] if "singularities" in withheld else [Lazy("lost", _lost, (read,))]
+    if kind is not None and "ellipsoid" not in withheld:
         parts.append(_ellipsoid(now, read, kind, eye, r))
-    if chosen is not None:
+    if chosen is not None and "jacobian" not in withheld:
         parts += _column(now, chosen, r)
-    if now.settings.statics.on:
+    if now.settings.statics.on and "torques" not in withheld:
         end = force_scale(now.robot) * np.array(now.settings.statics.force)
         parts.append(
             arrows("force", np.array([[np.zeros(3), end]]), COLORS["force"], (0.013 * r, 0.034 * r, 0.08 * r))

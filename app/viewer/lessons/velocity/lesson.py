@@ -52,28 +52,36 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         f, s, robot, units = self.read, self.settings, self.stage.now.robot, self.stage.units
         columns = {str(k + 1): self.event(self.on_column, k) for k in range(robot.n)}
         return [
-            Html(views.warning_html, (robot, f.found, units, f.lost_words)),
+            *self.unless_asked("singularities", Html(views.warning_html, (robot, f.found, units, f.lost_words))),
             Control("frame"),
-            Folder("Jacobian", [
+            Folder("Jacobian", self.unless_asked(
+                "jacobian",
                 Html(views.matrix_html, (robot, f.rows, s.frame, s.joint)),
                 Html(views.units_html, (robot, s.frame)),
                 Buttons("Column", columns, COLUMN_HINT, of=robot.id),
                 Html(views.column_html, (robot, f.J, s.joint)),
-            ]),
-            Folder("Ellipsoid", [Control("ellipsoid"), self._ellipsoid(f)]),
+            )),
+            Folder("Ellipsoid", self.unless_asked("ellipsoid", Control("ellipsoid"), self._ellipsoid(f))),
             Folder("Jog", [
                 Control("step"), Control("turn"), Html(views.jog_html),
                 *(self._jog_button(axis, sign) for axis, sign in BUTTONS),
             ]),
-            Folder("Singular values", [Html(views.values_html, (robot, f.rates, f.J))], open=False),
-            Folder("Singularities", [Html(views.others_html, (robot, f.found, units))], open=False),
-            Folder("Forces", [
+            Folder("Singular values", self.unless_asked(
+                "ellipsoid", Html(views.values_html, (robot, f.rates, f.J)),
+            ), open=False),
+            Folder("Singularities", self.unless_asked(
+                "singularities", Html(views.others_html, (robot, f.found, units)),
+            ), open=False),
+            Folder("Forces", self.unless_asked(
+                "torques",
                 Control("statics.on"),
                 *(Control(f"statics.force.{k}", f"Along {axis} of the base") for k, axis in enumerate("xyz")),
                 Button("Cheapest direction", self.event(self.on_least), LEAST_HINT),
                 self._statics(f),
-            ], open=False),
-            Folder("Null space", [Control("goal"), Control("speed"), Control("runs"), self._null(f)], open=False),
+            ), open=False),
+            Folder("Null space", self.unless_asked(
+                "jacobian", Control("goal"), Control("speed"), Control("runs"), self._null(f),
+            ), open=False),
             Folder("Along a line", [
                 Button("Start here", self.event(self.on_line_start), line.START_HINT),
                 Button("Plot the line", self.event(self.on_line_plot), line.PLOT_HINT),
@@ -82,11 +90,18 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         ]  # fmt: skip
 
     def scene(self) -> Sequence[SceneNode]:
-        return scene(self.facts, self.read, np.asarray(self.stage.client.camera.position))
+        eye = np.asarray(self.stage.client.camera.position)
+        return scene(self.facts, self.read, eye, self.stage.activity.withheld)
 
     def legend(self) -> str:
         f, s = self.read, self.settings
-        return views.legend_html(s.ellipsoid, s.joint, f.state, f.twists, s.statics.on)
+        kind = None if self.hides("ellipsoid") else s.ellipsoid
+        joint = None if self.hides("jacobian") else s.joint
+        asked = self.hides("singularities")
+        state: views.State = "far" if asked else f.state
+        return views.legend_html(
+            kind, joint, state, f.twists[:0] if asked else f.twists, s.statics.on and not self.hides("torques")
+        )
 
     def _jog_button(self, axis: int, sign: int) -> Button:
         verb = "Turns the tool about" if axis > 2 else "Moves the tool along"

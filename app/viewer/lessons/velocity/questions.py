@@ -29,6 +29,7 @@ from kin.units import Unit, Units
 GOAL = "You can read the columns of the Jacobian, predict speeds and joint torques, and explain a singularity."
 SPEED, TORQUE, FORCE = Unit("m/s", 1.0, 3), Unit("N·m", 1.0, 2), Unit("N", 1.0, 2)
 LOAD = 10.0  # N
+JACOBIAN = frozenset({"jacobian", "torques"})
 LEAST = 5e-4  # m/s: speeds are shown with three decimals
 
 
@@ -43,6 +44,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             "Column i of the Jacobian is the velocity of the tool if only joint i moves, at 1 rad/s or 1 m/s.",
             _column(robot, J),
             pose=Pose(home),
+            withheld=JACOBIAN,
             practice="Press 1 under Column: the straight arrow is v, the round one ω.",
         ),
         Step(
@@ -51,6 +53,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             _omega(robot, robot.n - 1),
             "ω of a revolute joint is its axis as a unit vector, wherever the tool is.",
             pose=Pose(home),
+            withheld=JACOBIAN,
         ),
         Step(
             "Torques from a force",
@@ -58,6 +61,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             _torque(robot, J, k),
             "A column of J says what its joint does to the tool, and what a force does to its joint.",
             pose=Pose(home),
+            withheld=JACOBIAN,
         ),
     ]
     if found is not None:
@@ -68,11 +72,12 @@ def outline(robot: Robot, units: Units) -> Outline:
                 f"From home, the arm moves to a singularity: {short(near, units)}.",
                 _rank(robot, q),
                 pose=Pose(home),
-                end=as_configuration(q),
+                end=Pose(as_configuration(q)),
+                withheld=frozenset({"ellipsoid", "singularities"}),
                 practice="The ellipsoid is flat now, and the warning above names the motion that is lost.",
             )
         )
-    return Outline(GOAL, tuple(steps), _check(robot, J), pose=Pose(home))
+    return Outline(GOAL, tuple(steps), _check(robot, J), (JACOBIAN,), Pose(home))
 
 
 def singular(robot: Robot) -> tuple[Array, Singularity] | None:

@@ -227,8 +227,9 @@ def test_every_answer_is_judged_with_a_reason(outline: Outline) -> None:
 def test_steps_move_the_arm_within_its_limits(outline: Outline, request: pytest.FixtureRequest) -> None:
     robot: Robot = request.node.callspec.params["outline"][0]
     for step in outline.steps:
-        for q in (None if step.pose is None else step.pose.q, step.end):
-            if q is not None:
+        for pose in (step.pose, step.end):
+            if pose is not None:
+                q = pose.q
                 low, high = robot.lower - 1e-9, robot.upper + 1e-9
                 assert ((low <= np.array(q)) & (np.array(q) <= high)).all(), step.title
 
@@ -269,7 +270,8 @@ def test_dh_numbers(robot: Robot) -> None:
     assert found["3"] == pytest.approx(np.linalg.norm(T[row, :3, 3] - T[row - 1, :3, 3]))
     first = chosen["2"][0].split()[2]
     assert first == ("θ" if robot.convention == "standard" else "α")
-    end = np.array(outline.steps[4].end)
+    assert outline.steps[4].end is not None
+    end = np.array(outline.steps[4].end.q)
     assert np.flatnonzero(end != robot.q_home).tolist() == [0]
     ways = [kin.fk(robot, q)[:3, 3] for q in (robot.q_home, end)]
     assert found["5"] == pytest.approx(np.linalg.norm(ways[1] - ways[0]))
@@ -365,8 +367,8 @@ def test_postures_numbers(robot: Robot) -> None:
     T = kin.fk(robot, robot.q_home)
     solutions = kin.solve_ik(robot, T, q_seed=robot.q_home).solutions
     assert found["3"] == len(solutions)
-    if outline.steps[2].end is not None:
-        assert np.allclose(kin.fk(robot, np.array(outline.steps[2].end)), T, atol=1e-6), "the tool is where it was"
+    if (end := outline.steps[2].end) is not None:
+        assert np.allclose(kin.fk(robot, np.array(end.q)), T, atol=1e-6), "the tool is where it was"
     assert chosen["4"] == ["None"]
     assert chosen["c1"] == ["Yes" if robot.n >= 6 else "No"]
 
@@ -383,7 +385,8 @@ def test_planar_arms_by_hand(robot: Robot) -> None:
     wrist = kin.link_frames(robot, np.stack([q, folded]))[:, 1, :3, 3]
     assert ring.answer == pytest.approx(np.linalg.norm(wrist[1]))
     assert bend.answer == pytest.approx(abs(q[1]))
-    other = np.array(steps[2].end)
+    assert steps[2].end is not None
+    other = np.array(steps[2].end.q)
     assert theta.answer == pytest.approx(other[0])
     # Both are the solutions of the core, for the point or for the pose.
     T = kin.fk(robot, q)
@@ -467,7 +470,8 @@ def test_a_visitor_answers_and_the_link_keeps_it(server: int) -> None:
         press(tab, ["reveal", "5", 5], None)
         pioneer = ROBOTS[0]
         end = dh.outline(pioneer, DEGREES).steps[4].end
-        tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(pioneer, np.array(end)), atol=1e-6))
+        assert end is not None
+        tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(pioneer, np.array(end.q)), atol=1e-6))
         assert "The answer." in tab.html
         press(tab, ["go", 6], len(dh.outline(pioneer, DEGREES).steps))
         tab.wait(lambda: "0 of 4 right" in tab.html)

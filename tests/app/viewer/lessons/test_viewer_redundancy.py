@@ -252,6 +252,8 @@ def test_only_arms_with_a_given_joint_have_a_path() -> None:
 def tab(port: int) -> Iterator[FakeBrowser]:
     with FakeBrowser(port) as opened:
         opened.set("Lesson", "Redundancy")
+        opened.wait(lambda: "data-step" in opened.html)
+        opened.say("feature", ["guide", ["go", 1], 1])  # the first question withholds how many motions there are
         opened.wait(lambda: "data-idea" in opened.html)
         yield opened
 

@@ -278,7 +278,7 @@ def server() -> Iterator[int]:
 def tab(server: int) -> Iterator[FakeBrowser]:
     with FakeBrowser(server) as opened:
         opened.wait(lambda: any(m["props"].get("label") == "Lesson" for m in opened.gui.values()), 60.0)
-        opened.set("Lesson", "Velocity")
+        opened.open_lesson("Velocity")
         opened.wait(lambda: "data-singular" in opened.html, 60.0)
         yield opened
 

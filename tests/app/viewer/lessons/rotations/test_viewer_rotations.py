@@ -230,13 +230,13 @@ def test_gimbal_lock_is_worded() -> None:
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.id)
 def test_numbers_of_the_questions(robot: Robot) -> None:
     outline = questions.outline(robot, DEGREES)
-    start = outline.steps[0].start
-    assert start is not None
-    T = kin.fk(robot, np.array(start))
+    pose = outline.steps[0].pose
+    assert pose is not None
+    T = kin.fk(robot, np.array(pose.q))
     R, p = T[:3, :3], T[:3, 3]
     turn = Rotation.from_matrix(R)
     found = {k: q.answer for k, q in outline.questions() if isinstance(q, Number)}
-    row = "xyz".index(re.search(r"fixed (\w) axis", outline.steps[0].question.prompt)[1])  # type: ignore[index, union-attr]
+    row = "xyz".index(re.search(r"fixed (\w) axis", outline.steps[0].text)[1])  # type: ignore[index, union-attr]
     assert found["1"] == pytest.approx(R[row] @ [0.0, 0.0, 1.0])
     i, j = (int(v) - 1 for v in re.findall(r"(?:row|column) (\d)", outline.steps[1].question.prompt))  # type: ignore[union-attr]
     assert found["2"] == pytest.approx(np.linalg.inv(R)[i, j])
@@ -284,7 +284,7 @@ def test_a_visitor_turns_a_frame_and_builds_a_chain(server: int) -> None:
     robot = ROBOTS[0]
     with FakeBrowser(server) as tab:
         tab.settle()
-        tab.set("Lesson", "Rotations and frames")
+        tab.open_lesson("Rotations and frames")
         tab.wait(lambda: 'data-lock="far"' in tab.html)
         tab.set("Angles", "Z-Y-Z moving")
         tab.wait(lambda: "R = Rz(α) Ry(β) Rz(γ)" in tab.html)
@@ -293,7 +293,7 @@ def test_a_visitor_turns_a_frame_and_builds_a_chain(server: int) -> None:
         R = Rotation.from_euler("ZYZ", [10, 20, 30], degrees=True).as_matrix()
         tab.wait(lambda: np.allclose(turned(tab), R, atol=1e-3))
         tab.set("Use", "To target")
-        at = kin.fk(robot, robot.q_home)[:3, 3]
+        at = kin.fk(robot, questions.example(robot))[:3, 3]
         tab.wait(lambda: np.allclose(tab.gizmo_pose()[:3], np.column_stack([R, at]), atol=1e-3))
         tab.set("Use", "From tool")
         tab.settle()

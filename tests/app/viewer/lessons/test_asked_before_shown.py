@@ -1,0 +1,141 @@
+"""What a step asks is not shown before: in no message, control, label or read-out while its question is open."""
+
+from __future__ import annotations
+
+import html
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+from fake_browser import FakeBrowser
+from live_server import serve_viewer
+
+from app.exercises.questions import WHOLE
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.activity.activity import FACTS
+from app.viewer.lessons import LESSONS
+from app.viewer.lessons.guide.outline import Choice, Number, Outline
+from app.viewer.lessons.guide.progress import Progress
+from app.viewer.server import ViewerServer
+from kin.units import PLAIN, Units
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE, UNITS = Store(), Units()
+ARMS = [STORE.get(name) for name in ("pioneer5", "ur5", "scara", "puma560")]
+KEYS = ("rotations", "screws", "redundancy", "velocity", "trajectories")
+MOVED = [lesson for lesson in LESSONS if lesson.key in KEYS]
+COMMON = {float(n) for n in range(-12, 13)}  # numbers of joints and steps
+# What is asked is to be read from the page.
+READ = {("velocity", "c2"): "the longest semi-axis among those of the ellipsoid"}
+SCALES = {"°": (1.0, math.radians(1.0)), "mm": (1.0, 1e-3, 0.1)}  # of a value in the question's unit
+NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?![\w.]*\d)")
+MARKUP = re.compile(r"<(?:svg|style)\b.*?</(?:svg|style)>|<[^>]*>", re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[int]:
+    with serve_viewer(ViewerServer(STORE, Settings(), Clouds())) as port:
+        yield port
+
+
+@dataclass
+class Seen:
+    """The numbers of a page while a question is open: which it may know, and which it may not."""
+
+    question: Number
+    given: set[float]
+    shown: set[float]
+
+    @property
+    def hits(self) -> set[float]:
+        """Numbers on show that would be right answers."""
+        unit = self.question.unit
+        answer, near = self.question.answer * unit.scale, self.question.tolerance * unit.scale
+        if abs(answer) < 1e-6 or answer in COMMON:
+            return set()
+        error = min(near, 0.005 * abs(answer))
+        scales = SCALES.get(unit.name, (1.0,))
+        unknown = self.shown - self.given - COMMON
+        return {x for x in unknown if any(abs(abs(x) - abs(answer * s)) <= error * s for s in scales)}
+
+
+def numbers(text: str) -> set[float]:
+    plain = html.unescape(MARKUP.sub(" ", text))
+    return {float(found.replace("−", "-")) for found in NUMBER.findall(plain)}
+
+
+def texts(props: dict[str, Any]) -> str:
+    return " ".join(str(props[key]) for key in ("content", "text", "label", "hint") if props.get(key))
+
+
+def press(tab: FakeBrowser, *key: object, value: object = None) -> None:
+    tab.say("feature", ["guide", [*key, len(tab.log)], value])
+
+
+def seen(tab: FakeBrowser, outline: Outline, before: set[str]) -> Iterator[tuple[str, Seen]]:
+    """Every number that is asked, with what the page shows meanwhile: the lesson, the scene and the read-out."""
+    for key, question in outline.questions():
+        if not isinstance(question, Number) or (question.unit == PLAIN and question.tolerance == WHOLE):
+            continue
+        at = len(outline.steps) if key.startswith("c") else int(key) - 1
+        start = len(tab.log)
+        press(tab, "go", value=at)
+        tab.settle(0.1)
+        press(tab, "fields", key, value=[["98765.4"]])
+        tab.wait(lambda key=key: "98765.4" in tab.html and "Not quite" in tab.html)  # type: ignore[misc]
+        tab.settle(0.1)
+        own = [m for u, m in tab.gui.items() if u not in before or "kb-readout" in str(m["props"].get("content"))]
+        sent = [m.get("updates") or m.get("props") or {} for m in tab.log[start:] if m.get("uuid") not in before]
+        words = [texts(m["props"]) for m in [*own, *tab.nodes.values()]] + [texts(props) for props in sent]
+        step = None if key.startswith("c") else outline.steps[at]
+        told = [question.prompt, *(() if step is None else (step.text,))]
+        told += [q.prompt for _, q in outline.questions()] if step is None else []
+        told += [o.text for _, q in outline.questions() if isinstance(q, Choice) for o in q.options]
+        yield key, Seen(question, numbers(" ".join(told)), numbers(" ".join(words)))
+
+
+def leaks(server: int, lesson: Any) -> dict[str, list[tuple[str, set[float]]]]:
+    """Questions whose answers were on show on at least half of the arms that have them."""
+    found: dict[str, list[tuple[str, set[float]]]] = {}
+    asked: dict[str, int] = {}
+    for robot in ARMS:
+        with FakeBrowser(server) as tab:
+            tab.settle()
+            tab.choose(robot.name)
+            before = set(tab.gui)
+            tab.set("Lesson", lesson.title)
+            tab.wait(lambda: 'data-guide="steps"' in tab.html)
+            outline = lesson.outline(robot, UNITS)
+            for key, each in seen(tab, outline, before):
+                name = key if key.startswith("c") else outline.steps[int(key) - 1].title
+                asked[name] = asked.get(name, 0) + 1
+                if each.hits and (lesson.key, key) not in READ:
+                    found.setdefault(name, []).append((robot.id, each.hits))
+    return {name: hits for name, hits in found.items() if 2 * len(hits) >= max(2, asked[name])}
+
+
+@pytest.mark.parametrize("lesson", MOVED, ids=lambda lesson: lesson.key)
+def test_no_answer_is_on_show_before_it_is_given(server: int, lesson: Any) -> None:
+    assert leaks(server, lesson) == {}
+
+
+def test_an_answer_on_show_is_found(server: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Progress, "withheld", frozenset())
+    velocity = next(lesson for lesson in LESSONS if lesson.key == "velocity")
+    assert "A column" in leaks(server, velocity)
+
+
+def test_steps_withhold_facts_that_there_are() -> None:
+    for lesson in LESSONS:
+        for robot in ARMS:
+            outline = lesson.outline(robot, UNITS)
+            named = [step.withheld for step in outline.steps] + [*outline.withheld]
+            assert frozenset().union(*named) <= FACTS.keys()
+            assert len(outline.withheld) <= len(outline.check)
+            assert not any(step.withheld and step.question is None for step in outline.steps)
