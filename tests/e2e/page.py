@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from playwright.sync_api import Browser, Locator, Page, ViewportSize, expect
+from playwright.sync_api import Browser, ConsoleMessage, Locator, Page, ViewportSize, expect
 
 import kin
 from app.viewer.panel.joints import label
@@ -70,6 +70,12 @@ PLAIN = QUIET if PICTURES else QUIET + ROUGH
 # As after the first minute: the hints are closed.
 NO_HINTS = 'localStorage.setItem("kinboard-hints", "drag joint learn");'
 
+# What the console of a browser says beside errors of ours.
+EXPECTED = (
+    "THREE.Clock: This module has been deprecated",  # viser uses it
+    "KHR_parallel_shader_compile extension not supported",  # by software rendering
+)
+
 # For half a second and five looks: a page that is held up may be looked at twice before it acts on anything.
 UNCHANGED = """() => {
   const texts = [...document.querySelectorAll("[data-status], td, input")].map((e) => e.value ?? e.textContent);
@@ -98,9 +104,15 @@ class Tab:
         self.errors: list[str] = []
         self.spoilt = False  # a test failed here: nobody knows in which state it left the page
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", self._listen)
         self._arrive()
         expect(self.status).to_have_attribute("data-status", "hand")
         self.dismiss_notice()
+
+    def _listen(self, message: ConsoleMessage) -> None:
+        """Keep what the page writes into the browser's console, but for what is expected there."""
+        if message.type in ("error", "warning") and not any(each in message.text for each in EXPECTED):
+            self.errors.append(f"{message.type} in the console: {message.text}")
 
     def _arrive(self) -> None:
         """Go to the viewer."""

@@ -21,6 +21,7 @@ NOT_REACHED = """() => {
   return [...area.querySelectorAll(controls)]
     .filter((e) => e.checkVisibility() && !e.dataset.reached)
     .filter((e) => !e.closest(".mantine-NumberInput-controls, [inert]"))
+    .filter((e) => e.type !== "radio" || e.checked) // arrow keys lead to the others
     .map((e) => e.outerHTML.slice(0, 200));
 }"""
 REACHED = """() => {

@@ -38,7 +38,7 @@ class Panel:
         script: the connection to the page's own script.
         jog: buttons that move the arm in steps.
         joints, posture: folders that are filled for each robot.
-        obstacles: the folder of the obstacles, closed, so that the rest fits a small window.
+        obstacles: the folder of the obstacles, closed like that of `jog`, so that the rest fits a small window.
         learn: the tab for lessons.
         tabs: the features' tabs.
         legend: what a lesson draws in the scene; below the tabs, so that it stays when another tab is opened.
@@ -71,8 +71,8 @@ class Panel:
             self.joints = gui.add_folder("Joints")
             go_to_buttons(gui, post)
             self.target = TargetChoice(gui, DEFAULT_TASK, post)
-            self.jog = JogPad(gui, robot)
             self.posture = gui.add_folder("Posture and redundancy")
+            self.jog = JogPad(gui, robot)
             self.obstacles = gui.add_folder("Obstacles", expand_by_default=False)
         self.legend = gui.add_html("")
         self.hints = gui.add_html("")
