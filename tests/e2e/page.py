@@ -74,6 +74,7 @@ NO_HINTS = 'localStorage.setItem("kinboard-hints", "drag joint learn");'
 EXPECTED = (
     "THREE.Clock: This module has been deprecated",  # viser uses it
     "KHR_parallel_shader_compile extension not supported",  # by software rendering
+    "GL Driver Message",  # of software rendering, where a picture is read
 )
 
 # For half a second and five looks: a page that is held up may be looked at twice before it acts on anything.
