@@ -138,7 +138,7 @@ class Cone:
     def _same_point(self, T: Array) -> bool:
         return bool((T[:3, 3].round(4) == self.T[:3, 3].round(4)).all())
 
-    def node(self) -> Node:
+    def nodes(self) -> list[Node]:
         """The cone in the scene."""
         robot, T = self.patch.robot, self.T
         now = np.array([[np.zeros(3), _radius(robot) * T[:3, 2]]])
@@ -147,7 +147,7 @@ class Cone:
             looks = {"opacity": 0.32, "side": "double", "receive_shadow": False}
             # A new node for each patch: vertices and faces change together.
             nodes.append(replace(mesh(f"patch-{self.number}", solid, COLOR, **looks), keep=False))
-        return frame("cone", *nodes, position=T[:3, 3])
+        return [frame("cone", *nodes, position=T[:3, 3])]
 
 
 def cone_html(share: float) -> str:

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import kin
 from app.viewer.declared.facts import Facts
-from app.viewer.lessons.postures.directions import Cone
 from app.viewer.lessons.postures.remedies import Remedy
 from app.viewer.lessons.postures.settings import PosturesSettings, names_of
 from app.viewer.lessons.postures.survey import CLOSEST, Posture, survey
@@ -23,13 +22,11 @@ class PosturesFacts(Facts[PosturesSettings]):
         units: those of the sentences.
         result: the answer to the target; None: the tool is there.
         offers: what would help, as far as it was tried.
-        cone: the possible directions of a tool at the target, of arms that have such a cone.
     """
 
     units: Units = DEFAULT_UNITS
     result: IKResult | None = None
     offers: tuple[Remedy, ...] = ()
-    cone: Cone | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

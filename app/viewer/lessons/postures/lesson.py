@@ -63,14 +63,14 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         self._cone: Cone | None = None
 
     def besides(self) -> tuple[object, ...]:
-        return self._result, self.stage.units, self._offers, self._cone
+        return self._result, self.stage.units, self._offers
 
     def look(self) -> PosturesFacts:
         arm, units = self.stage.now, self.stage.units
         if arm.target is None:  # the arm has reached the target, or was moved elsewhere
             self._result = None
         offers = self._offers if self._asked == (self._result, units) else ()
-        return PosturesFacts(self.settings, arm, units, self._result, offers, self._cone)
+        return PosturesFacts(self.settings, arm, units, self._result, offers)
 
     # What is shown
 
@@ -92,8 +92,8 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         ]  # fmt: skip
         if has_cone(robot):
             nodes.append(Control("cone"))
-            if f.cone is not None and self.settings.cone:
-                nodes.append(Html(cone_html, (f.cone.patch.share,), key="share"))
+            if self._cone is not None and self.settings.cone:
+                nodes.append(Html(cone_html, (self._cone.patch.share,), key="share"))
         if not kin.branch_names(robot):
             nodes.append(Html(_note, key="unnamed"))
         return nodes
@@ -109,11 +109,11 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         )
         return Buttons("Show", events, GHOST_HINT, offered, of=f.robot.id)
 
-    def scene(self) -> Sequence[SceneNode | Lazy]:
+    def scene(self) -> Sequence[Lazy]:
         f = self.read
-        nodes: list[SceneNode | Lazy] = [Lazy("ghosts", self._ghosts, (f.robot, f.postures, f.seen - {f.present}))]
-        if f.cone is not None and self.settings.cone:
-            nodes.append(f.cone.node())
+        nodes = [Lazy("ghosts", self._ghosts, (f.robot, f.postures, f.seen - {f.present}))]
+        if self._cone is not None and self.settings.cone:
+            nodes.append(Lazy("cone", Cone.nodes, (self._cone,)))
         return nodes
 
     def _ghosts(self, *args: object) -> list[SceneNode]:
