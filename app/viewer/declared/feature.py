@@ -185,7 +185,12 @@ class DeclaredFeature(Feature, Generic[S, F]):
                 if (spec := self._panel.spec(serial)) is None:
                     return  # replaced since, by a control in other units
                 name = spec.names or path.rpartition(".")[2]
-                found = spec.read(name, value, self.stage.now.robot, self.stage.units)
+                try:
+                    found = spec.read(name, value, self.stage.now.robot, self.stage.units)
+                except InputError:
+                    if spec.kind == "dropdown":  # a list cannot show what is not in it; what was typed stays
+                        self._panel.took(serial, object())
+                    raise
                 self._panel.took(serial, found)
                 self.settings = self.settings.with_value(path, found)
                 self.changed(path)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from typing import Any, Literal, Self, TypeGuard
@@ -122,6 +122,10 @@ class Choice(Spec):
     old: Mapping[str, object] = field(default_factory=dict)
     anything: bool = False
     kind = "dropdown"
+
+    def narrowed(self, options: Options) -> Choice:
+        """The same with options that follow from facts."""
+        return replace(self, options=options)
 
     def offered(self, robot: Robot) -> Options:
         """The values by their labels."""
@@ -320,6 +324,27 @@ def numbers(name: str, entry: object, count: int) -> tuple[float, ...]:
     if not isinstance(entry, list) or len(entry) != count or not all(map(_is_number, entry)):
         raise InputError(name, entry, f"{count} finite numbers")
     return tuple(float(item) for item in entry)
+
+
+def subset(name: str, entry: object, known: Iterable[str]) -> frozenset[str]:
+    """An entry of a link that is a list of names, without those that are not known; raises `InputError`."""
+    if not isinstance(entry, list):
+        raise InputError(name, entry, "a list of names")
+    return frozenset(one for one in known if one in entry)
+
+
+def rows(name: str, entry: object, most: int) -> list[object]:
+    """An entry of a link that is a list with at most so many items; raises `InputError`."""
+    if not isinstance(entry, list) or len(entry) > most:
+        raise InputError(name, entry, f"a list of at most {most}")
+    return entry
+
+
+def ordinal(name: str, entry: object) -> int | None:
+    """An entry of a link that is a whole number from 0, or nothing; raises `InputError`."""
+    if entry is None or (type(entry) is int and entry >= 0):
+        return entry
+    raise InputError(name, entry, "a whole number from 0, or nothing")
 
 
 def _field(spec: Spec) -> Any:

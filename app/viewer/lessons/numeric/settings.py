@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 import kin
-from app.viewer.declared.fields import Settings, choice, flag, kept, numbers, slider
+from app.viewer.declared.fields import Settings, choice, flag, kept, numbers, ordinal, slider
 from app.viewer.lessons.numeric.example import example, usual_match
 from app.viewer.lessons.numeric.views import NAMES
-from kin import InputError, Robot
+from kin import Robot
 from kin.differential.iteration import Match, Method
 
 MATCHES: dict[str, Match] = {"Point": "point", "Pose": "pose"}
@@ -47,9 +47,7 @@ def _read_start(entry: object, robot: Robot) -> Numbers | None:
 
 
 def _read_at(entry: object, robot: Robot) -> int | None:
-    if entry is not None and (type(entry) is not int or entry < 0):
-        raise InputError("at", entry, "the number of an iterate, from 0, or nothing for the last one")
-    return entry
+    return ordinal("at", entry)
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import kin
-from app.viewer.declared.fields import Settings, flag, kept
+from app.viewer.declared.fields import Settings, flag, kept, subset
 from app.viewer.lessons.postures.survey import CLOSEST
-from kin import InputError, Robot
+from kin import Robot
 
 ALL_GHOSTS_HINT = "Shows all postures as translucent copies of the arm; grey ones are outside the limits"
 CONE_HINT = (
@@ -21,9 +21,7 @@ def names_of(robot: Robot) -> tuple[str, ...]:
 
 
 def _read_hidden(entry: object, robot: Robot) -> frozenset[str]:
-    if not isinstance(entry, list):
-        raise InputError("hidden", entry, "a list of names of postures")
-    return frozenset(name for name in names_of(robot) if name in entry)
+    return subset("hidden", entry, names_of(robot))
 
 
 @dataclass(frozen=True)

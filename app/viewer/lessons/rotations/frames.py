@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.viewer.declared.fields import rows
 from app.viewer.scene.chain import rotation, translation
+from kin import InputError
 from kin.transforms import Array
 
 MOST = 8  # motions of a chain
@@ -66,18 +68,16 @@ def as_json(motions: tuple[Motion, ...]) -> list[list[object]]:
     return [[m.turns, m.axis, m.amount, m.own] for m in motions]
 
 
-def from_json(value: object) -> tuple[Motion, ...] | None:
-    """What `as_json` made; None for anything else."""
-    if not isinstance(value, list) or len(value) > MOST:
-        return None
+def from_json(entry: object) -> tuple[Motion, ...]:
+    """What `as_json` made; raises `InputError` for anything else."""
     motions = []
-    for item in value:
+    for item in rows("chain", entry, MOST):
         match item:
             case [bool(turns), int(axis), float() | int() as amount, bool(own)] if axis in (0, 1, 2):
                 most = 2.0 * math.pi if turns else FARTHEST
                 if isinstance(axis, bool) or isinstance(amount, bool) or not abs(amount) <= most:
-                    return None
+                    raise InputError("chain", item, f"an angle or a length of at most {most:g}")
                 motions.append(Motion(turns, axis, float(amount), own))
             case _:
-                return None
+                raise InputError("chain", item, "whether it turns, axis 0 to 2, amount, whether about own axes")
     return tuple(motions)

@@ -9,7 +9,7 @@ from app.viewer.declared.fields import Number, Settings, choice, kept, number, t
 from app.viewer.lessons.rotations.conventions import CONVENTIONS, PAGE, Angles
 from app.viewer.lessons.rotations.frames import FARTHEST, Motion, as_json, from_json
 from app.viewer.lessons.rotations.typed import LONGEST
-from kin import InputError, Robot
+from kin import Robot
 
 MOTIONS = {
     f"{verb} {axis}": (turns, k)
@@ -32,10 +32,7 @@ ANGLE = Number(
 
 
 def _chain(entry: object, robot: Robot) -> tuple[Motion, ...]:
-    found = from_json(entry)
-    if found is None:
-        raise InputError("chain", entry, "a list of motions")
-    return found
+    return from_json(entry)
 
 
 @dataclass(frozen=True)

@@ -80,11 +80,14 @@ STATES: dict[str, list[dict[str, object]]] = {
 
 def record(key: str) -> dict[str, Any]:
     """What a feature shows, by arm and moment."""
+    from app.equations import book
     from app.viewer.lessons import LESSONS
 
     feature = next(lesson for lesson in LESSONS if lesson.key == key)
     found: dict[str, Any] = {}
     rng = np.random.default_rng(12)
+    for robot in ARMS if key == "equations" else ():
+        book(robot)  # derived before, so that nothing waits
     with bare_page(ARMS[0]) as page:
         shown = page.open(feature)
         for robot in ARMS:

@@ -28,7 +28,7 @@ from app.viewer.lessons.rotations.frames import MOST, Motion, as_json, factors, 
 from app.viewer.lessons.rotations.typed import read_rotation
 from app.viewer.panel.readout import roll_pitch_yaw
 from app.viewer.server import ViewerServer
-from kin import Robot
+from kin import InputError, Robot
 from kin.transforms import from_position_wxyz
 from kin.units import Units
 
@@ -172,7 +172,8 @@ def test_links_with_other_chains_are_refused() -> None:
     wrong: list[list[object]] = [[True, 3, 0.5, True], [1, 0, 0.5, True], [True, 0, math.nan, True]]
     wrong += [[False, 0, 99.0, True], [True, 0, "1", True], [True, True, 0.5, True], [True, 0, 0.5]]
     for value in (None, [good] * (MOST + 1), *([item] for item in wrong)):
-        assert from_json(value) is None, value
+        with pytest.raises(InputError, match="chain"):
+            from_json(value)
 
 
 def test_the_chain_in_words() -> None:

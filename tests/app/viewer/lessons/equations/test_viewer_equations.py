@@ -8,10 +8,10 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
+from bare_page import bare_page
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
@@ -22,7 +22,6 @@ from app.shared.clouds import Clouds
 from app.shared.computations import ComputationCache
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.arm import Arm
 from app.viewer.lessons.equations import views
 from app.viewer.lessons.equations.lesson import EquationsLesson
 from app.viewer.own_arm import OwnArm
@@ -55,7 +54,8 @@ def values_shown(tab: FakeBrowser) -> list[float]:
 
 
 def drawn(tab: FakeBrowser) -> list[str]:
-    return [name for name in tab.nodes if name.startswith("/equations-")]
+    inside = (name for name in tab.nodes if name.startswith("/equations-") and name.count("/") > 1)
+    return [name for name in inside if tab.visible.get(name)]
 
 
 # -- in the page --------------------------------------------------------------------------------------------
@@ -132,24 +132,20 @@ def test_a_failed_check_is_said_instead_of_shown(tab: FakeBrowser, monkeypatch: 
     assert "data-equation" not in tab.html
 
 
-def mocked_stage(robot: kin.Robot) -> MagicMock:
-    stage = MagicMock(now=Arm(robot, robot.q_home, robot.q_home), units=DEFAULT_UNITS)
-    stage.client.gui.add_dropdown.return_value._impl.removed = False
-    return stage
-
-
 def test_what_was_chosen_can_be_restored() -> None:
-    stage = mocked_stage(PIONEER)
     book(PIONEER)
-    chosen = EquationsLesson(stage)
-    chosen.handle("equation", "(13) x of a ✕ misprinted")
-    assert chosen.state() == {"equation": "13"}
-    other = EquationsLesson(stage)
-    for hostile in ({"equation": "nonsense"}, {"equation": ["13"]}, {"equation": None}, {}):
-        other.restore(hostile)
-        assert other.state() == {"equation": "6"}
-    other.restore(chosen.state())
-    assert other.state() == {"equation": "13"}
+    with bare_page(PIONEER) as page:
+        chosen = page.open(EquationsLesson)
+        page.set("Equation", "(13) x of a ✕ misprinted")
+        page.rest()
+        assert chosen.state() == {"equation": "13"}
+    with bare_page(PIONEER) as page:
+        other = page.open(EquationsLesson)
+        for hostile in ({"equation": "nonsense"}, {"equation": ["13"]}, {"equation": None}, {}):
+            page.restore(hostile)
+            assert other.state() == {"equation": "6"}
+        page.restore(chosen.state())
+        assert other.state() == {"equation": "13"}
 
 
 def test_only_the_last_of_many_edits_is_derived(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -162,23 +158,23 @@ def test_only_the_last_of_many_edits_is_derived(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(books, "derive", counted)
     cache = ComputationCache(ThreadPoolExecutor(1), 4)
     monkeypatch.setattr(books, "_BOOKS", cache)
-    stage = mocked_stage(PIONEER)
-    lesson = EquationsLesson(stage)
-    for d in (0.1, 0.2, 0.3):
-        robot = replace(PUMA, rows=(replace(PUMA.rows[0], d=d), *PUMA.rows[1:]))
-        stage.now = Arm(robot, PUMA.q_home, PUMA.q_home)
-        stage.own = OwnArm(stage.now.robot)
-        lesson.on_robot()
-        lesson.tick(time.perf_counter())
-    assert lesson.due is not None
-    assert stage.now.robot not in cache
-    lesson.tick(time.perf_counter() + 1.0)
-    assert stage.now.robot in cache
-    with books.book_later(stage.now.robot) as waiting:
-        waiting.future.result(30)
-    assert derived == [stage.now.robot]
-    lesson.handle("ready", None)
-    assert lesson.state() == {"equation": "p_x"}
+    with bare_page(PIONEER) as page:
+        lesson = page.open(EquationsLesson)
+        for d in (0.1, 0.2, 0.3):
+            robot = replace(PUMA, rows=(replace(PUMA.rows[0], d=d), *PUMA.rows[1:]))
+            page.use(robot)
+            page.own = OwnArm(robot)
+            lesson.on_robot()
+            lesson.tick(time.perf_counter())
+        assert lesson.due is not None
+        assert page.now.robot not in cache
+        lesson.tick(time.perf_counter() + 1.0)
+        assert page.now.robot in cache
+        with books.book_later(page.now.robot) as waiting:
+            waiting.future.result(30)
+        assert derived == [page.now.robot]
+        page.rest()
+        assert lesson.state() == {"equation": "p_x"}
 
 
 def test_a_lesson_that_is_closed_or_left_waits_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -186,23 +182,22 @@ def test_a_lesson_that_is_closed_or_left_waits_no_more(monkeypatch: pytest.Monke
     monkeypatch.setattr(books, "derive", lambda robot: released.wait(30) and derive(robot))
     cache = ComputationCache(ThreadPoolExecutor(1), 4)
     monkeypatch.setattr(books, "_BOOKS", cache)
-    stage = mocked_stage(PUMA)
-    for end in (EquationsLesson.remove, EquationsLesson.on_leave):
-        lesson = EquationsLesson(stage)
-        assert PUMA in cache
-        end(lesson)
-        assert PUMA not in cache
+    with bare_page(PUMA) as page:
+        for end in (EquationsLesson.remove, EquationsLesson.on_leave):
+            lesson = page.open(EquationsLesson)
+            assert PUMA in cache
+            assert "Deriving the equations" in str(page.panel())
+            end(lesson)
+            assert PUMA not in cache
     released.set()
 
 
 def test_an_arm_with_very_many_rows_has_no_equations() -> None:
     fixed_rows = tuple(kin.Joint(f"spacer {k}", kind="fixed") for k in range(books.MOST_ROWS))
     robot = replace(PUMA, rows=(*PUMA.rows, *fixed_rows))
-    stage = MagicMock(now=Arm(robot, robot.q_home, robot.q_home), units=DEFAULT_UNITS)
-    boxes = [MagicMock(name=str(k)) for k in range(5)]
-    stage.client.gui.add_html.side_effect = boxes
-    EquationsLesson(stage)
-    assert "at most 16 rows, this arm has 23" in boxes[0].content
+    with bare_page(robot) as page:
+        page.open(EquationsLesson)
+        assert "at most 16 rows, this arm has 23" in str(page.panel())
 
 
 # -- as HTML ------------------------------------------------------------------------------------------------
