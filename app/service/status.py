@@ -12,7 +12,7 @@ from starlette.responses import PlainTextResponse
 
 from app.classroom import Hub
 from app.service.startup import Status
-from app.service.web.compiling import told
+from app.service.web.compiling import known_soon
 from app.shared.metrics import CONTENT_TYPE, exposition
 from kin.warmup.preparation import Preparation
 
@@ -78,7 +78,7 @@ async def readyz(request: Request, response: Response) -> Readiness:
     return Readiness(
         status=status,
         complete=startup.complete,
-        kernels=None if status != "ready" or done else await told(lambda: _kernels(startup.preparation)),
+        kernels=None if status != "ready" or done else await known_soon(lambda: _kernels(startup.preparation)),
         classrooms=await run_in_threadpool(_classrooms, request),
     )
 

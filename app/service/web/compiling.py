@@ -80,7 +80,7 @@ class Compiling:
                 await refusal
 
 
-async def told(answer: Callable[[], T]) -> T | None:
+async def known_soon(answer: Callable[[], T]) -> T | None:
     """What `answer` says of the preparation, called in a thread; None if that takes long.
 
     The first call in a process looks at all families of arms, for which it may have to wait for the compiler too.
@@ -118,4 +118,4 @@ async def _step(robot: Robot | None, preparation: Preparation) -> str:
         done, of = preparation.steps(names)
         return f": step {min(done + 1, of)} of {of}" if of else ""
 
-    return await told(count) or ""
+    return await known_soon(count) or ""
