@@ -61,6 +61,7 @@ SHOTS = (
 
 
 WALL = "wall"
+PROJECTOR = {"width": 1920, "height": 1080}
 TASK = "which-joint-goes-down"
 RIGHT, WRONG = 2, 0  # of its choices
 # Alias, configuration, choices, and whether the hand is raised.
@@ -111,7 +112,7 @@ def join(page: Page, address: str, code: str, alias: str, q: list[float]) -> Non
 
 def take_wall(browser: Browser, address: str) -> Image.Image:
     """Open a room with a class that works on a task, and photograph the wall."""
-    teacher = browser.new_page(viewport=SIZE, color_scheme="light")
+    teacher = browser.new_page(viewport=PROJECTOR, color_scheme="light")
     teacher.set_default_timeout(WAIT)
     teacher.goto(f"{address}room")
     teacher.get_by_label("Title").fill("Robotics 2")

@@ -4,6 +4,21 @@
 // student's work is lost with the connection.
 (() => {
   const $ = (selector) => document.querySelector(selector);
+
+  // The height of the bar with the space around it, which a phone's picture leaves free.
+  const AROUND = 20; // px
+  let measured = null;
+  const size = new ResizeObserver(() => {
+    document.documentElement.style.setProperty("--kb-class-bar", `${measured.offsetHeight + AROUND}px`);
+  });
+  function measure() {
+    const bar = $("[data-class-bar]");
+    if (bar === measured) return;
+    size.disconnect();
+    measured = bar;
+    if (bar) size.observe(bar);
+  }
+
   let opened = "";
   function follow() {
     const bar = $("[data-class-open]");
@@ -123,5 +138,6 @@
   // A new connection counts from the beginning.
   addEventListener("kinboard-connect", () => { opened = ""; sent = new Set(); filled = null; });
   viserPage.watch(follow);
+  viserPage.watch(measure);
   viserPage.watch(() => { fill(); deliver(); });
 })();

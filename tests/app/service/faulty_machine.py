@@ -113,11 +113,15 @@ class Machine:
         found: list[psutil.Process] = []
 
         def all_there() -> bool:
-            found[:] = psutil.Process(self.service.process.pid).children()
-            return len(found) == 2
+            with contextlib.suppress(psutil.NoSuchProcess):  # it has ended meanwhile
+                found[:] = sorted(
+                    psutil.Process(self.service.process.pid).children(), key=lambda each: each.nice()
+                )
+                return len(found) == 2
+            return False
 
         wait_for(all_there, 30)
-        return dict(zip(("viewer", "rest"), sorted(found, key=lambda each: each.nice()), strict=True))
+        return dict(zip(("viewer", "rest"), found, strict=True))
 
     # Folders
 
