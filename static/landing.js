@@ -89,11 +89,28 @@ function card(robot) {
   return item;
 }
 
-// The classics and the operator's own arms; the library follows on request.
+function ownCard() {
+  const item = element("li", "", "card");
+  const title = element("h3", "");
+  const link = element("a", "Your arm");
+  link.href = "viewer/#tab=Robot";
+  link.target = "viewer";
+  link.addEventListener("click", () => byId("viewer").scrollIntoView());
+  title.append(link);
+  const shown = element("div", "", "shown");
+  shown.append(placeholder());
+  const facts = element("ul", "", "facts");
+  facts.append(element("li", "DH table"), element("li", "URDF or MJCF"));
+  const text = element("p", "Type its DH table, or drop its file onto the viewer: FK, all its postures and its workspace at once.");
+  item.append(shown, title, facts, text);
+  return item;
+}
+
+// The visitor's own arm, the classics and the operator's arms; the library follows on request.
 function showCards(cards, robots) {
   const library = new Set(cards.dataset.library.split(" "));
   const later = robots.filter((robot) => library.has(robot.id));
-  cards.replaceChildren(...robots.filter((robot) => !library.has(robot.id)).map(card));
+  cards.replaceChildren(ownCard(), ...robots.filter((robot) => !library.has(robot.id)).map(card));
   const more = byId("more");
   more.textContent = `Show ${later.length} more arms`;
   more.hidden = later.length === 0;

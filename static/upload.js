@@ -30,20 +30,20 @@
 
   const holdsFiles = (event) => [...(event.dataTransfer?.types ?? [])].includes("Files");
   addEventListener("dragover", (event) => {
-    if (!holdsFiles(event) || !block()) return;
-    event.preventDefault(); // a file that is dropped beside would replace the page
-    event.dataTransfer.dropEffect = event.target.closest?.("[data-arm]") ? "copy" : "none";
-    document.documentElement.toggleAttribute("data-arm-drop", event.dataTransfer.dropEffect === "copy");
+    if (!holdsFiles(event) || !viserPage.tab("Robot")) return;
+    event.preventDefault(); // the browser would open the file instead of the page
+    event.dataTransfer.dropEffect = "copy";
+    document.documentElement.setAttribute("data-arm-drop", "");
   });
   for (const name of ["dragleave", "drop"]) addEventListener(name, () => document.documentElement.removeAttribute("data-arm-drop"));
   addEventListener("drop", async (event) => {
-    if (!holdsFiles(event) || !block()) return;
+    if (!holdsFiles(event) || !viserPage.openTab("Robot")) return; // it says how far the file is, and asks where it must
     event.preventDefault();
-    if (!event.target.closest?.("[data-arm]")) return;
     const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
-    const found = [];
+    const found = entries.length ? [] : [...event.dataTransfer.files].map((file) => [file.name, file]);
     for (const entry of entries) await collect(entry, found);
-    if (found.length) open(found);
+    for (let looks = 0; !block() && looks < 100; looks++) await new Promise((done) => { setTimeout(done, 50); }); // until the tab is drawn
+    if (found.length && block()) open(found);
   });
 
   /** The files of a dropped file or folder, with their paths. */

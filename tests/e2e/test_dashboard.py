@@ -175,6 +175,27 @@ def test_a_zip_or_several_files_show_the_real_arm_and_delete_removes_it(tab: Tab
     tab.show(kin.get_robot("pioneer5"))
 
 
+DROP = """(text) => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File([text], "two.urdf"));
+  const scene = document.querySelector("canvas[data-engine]");
+  for (const kind of ["dragover", "drop"]) {
+    scene.dispatchEvent(new DragEvent(kind, { dataTransfer, bubbles: true, cancelable: true }));
+    if (kind === "dragover") window.kbOffer = getComputedStyle(document.body, "::after").content;
+  }
+  return window.kbOffer;
+}"""
+
+
+def test_a_file_dropped_onto_the_scene_is_the_arm(tab: Tab) -> None:
+    page, two = tab.page, kin.load_urdf(TWO_JOINTS)
+    assert "to open the arm" in page.evaluate(DROP, TWO_JOINTS)
+    tab.wait_for_tool(kin.fk(two, two.q_home)[:3, 3], within=0.06)
+    expect(page.get_by_role("tab", name="Robot")).to_have_attribute("aria-selected", "true")
+    page.get_by_role("button", name="Delete my arm").click()
+    tab.show(kin.get_robot("pioneer5"))
+
+
 def test_the_choice_between_several_ends_is_seen(tab: Tab) -> None:
     page = tab.page
     tab.open("Robot")

@@ -223,11 +223,11 @@ def test_the_landing_page(browser: Browser, address: str, name: str, width: int,
     if name != "light":  # loading the embedded viewer once is enough: it is rendered in software
         page.route("**/readyz", lambda route: route.fulfill(status=503, body='{"status": "warming"}'))
     page.goto(address)
-    expect(page.locator(".card h3 a")).to_have_count(len(ROBOTS))
+    expect(page.locator(".card h3 a")).to_have_count(len(ROBOTS) + 1)  # the visitor's own
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing sticks out"
     page.locator("#cards").scroll_into_view_if_needed()
     page.evaluate("document.querySelectorAll('.shown img').forEach(image => { image.loading = 'eager'; })")
-    expect(page.locator(".shown svg")).to_have_count(1)
+    expect(page.locator(".shown svg")).to_have_count(2)
     loaded = "[...document.querySelectorAll('.shown img')].filter(image => image.naturalWidth === 320).length"
     end = time.monotonic() + WAIT / 1000
     while page.evaluate(loaded) != len(ROBOTS) - 1:
@@ -236,14 +236,14 @@ def test_the_landing_page(browser: Browser, address: str, name: str, width: int,
 
     page.get_by_role("button", name="Inverse").click()
     page.get_by_role("button", name="Send").click()
-    expect(page.locator("#outcome")).to_contain_text("200")
+    expect(page.locator("#outcome")).to_contain_text("200", timeout=WAIT)
     expect(page.locator("#answer")).to_contain_text('"status": "solved"')
     page.locator("#body").fill('{"target": 5}')
     page.get_by_role("button", name="Send").click()
-    expect(page.locator("#outcome")).to_contain_text("422")
+    expect(page.locator("#outcome")).to_contain_text("422", timeout=WAIT)
     page.get_by_role("button", name="Workspace").click()
     page.get_by_role("button", name="Send").click()
-    expect(page.locator("#outcome")).to_contain_text("200")
+    expect(page.locator("#outcome")).to_contain_text("200", timeout=WAIT)
     save_picture(page, f"landing-{name}", full_page=True)
 
     if name == "light":
@@ -264,6 +264,9 @@ def test_the_landing_page(browser: Browser, address: str, name: str, width: int,
         expect(viewer.locator("input[value='UR5']").first).to_be_visible(timeout=WAIT)
         wait_for_tool(page, viewer, kin.fk(UR5, UR5.q_home))
         save_picture(page, "landing-card")
+        page.get_by_role("link", name="Your arm").click()
+        expect(viewer.get_by_role("tab", name="Robot")).to_have_attribute("aria-selected", "true", timeout=WAIT)
+        expect(viewer.locator("input[value='UR5']").first).to_be_visible(timeout=WAIT)
     assert errors == []
     page.close()
 
