@@ -16,10 +16,12 @@ from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 from kin import IKOptions, JointConstraints, Robot, Task
 from kin.ik.options import TASKS
+from kin.motion import Lin, PoseTarget, Program
 from kin.transforms import Array, rotation_angle, vector_angle
 from kin.units import Units, general
 
 FAR = 3.0  # position tolerances that a negated joint must have moved the tool by
+PLACES = 40  # of a line, at which its postures are computed
 LOCKED = (math.radians(0.5), 5e-4)  # rad, m: a locked joint may be off by this
 
 
@@ -37,6 +39,7 @@ class ReachKind(Kind):
     manipulability: Expression
     position_tolerance: float
     rotation_tolerance: float
+    line: tuple[Expression, ...]
 
     @classmethod
     def read(cls, fields: Fields) -> Self:
@@ -44,6 +47,9 @@ class ReachKind(Kind):
         for item in fields.tables("locked"):
             locked.append((item.whole("joint", 1, 32) - 1, item.expression("value")))
             item.done()
+        line = fields.expressions("line")
+        if line and len(line) != 3:
+            raise fields.refuse("line", len(line), "three values x, y, z")
         return cls(
             fields.choice("task", TASKS, "position"),  # type: ignore[arg-type]  # checked by choice()
             fields.text("branch", ""),
@@ -52,6 +58,7 @@ class ReachKind(Kind):
             fields.expression("manipulability", "0"),
             1e-3 * fields.number("position_tolerance", 3.0, above=0.0),
             math.radians(fields.number("rotation_tolerance", 3.0, above=0.0)),
+            line,
         )
 
     def asked(self, variant: Variant, units: Units) -> Asked:
@@ -69,6 +76,8 @@ class ReachKind(Kind):
             conditions.append(f"every joint {self.margin:g} % of its range away from its limits")
         if (least := variant.number(self.manipulability)) > 0.0:
             conditions.append(f"manipulability at least {general(least, 3)}")
+        if self.line:
+            conditions.append("from there the whole line can be driven")
         return Asked("posture", note=f"Required: {listed(conditions)}.", goal=variant.pose)
 
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
@@ -95,6 +104,8 @@ class ReachKind(Kind):
             w = float(kin.manipulability(robot, q))
             below = "" if w >= least else f", below {general(least, 3)}"
             parts.append((w >= least, f"The manipulability is {general(w, 3)}{below}."))
+        if self.line:
+            parts.append(self._along_line(variant, q, units) if parts[0][0] else (False, "The line begins there."))
         return Verdict.of(parts, " ".join(reason for _, reason in parts))
 
     def _at_target(self, variant: Variant, q: Array, units: Units) -> tuple[bool, str]:
@@ -111,6 +122,15 @@ class ReachKind(Kind):
             what = "orientation" if self.task == "pose" else "approach direction"
             return False, f"The point is reached; the {what} is off by {units.angles.text(turned, 1)}."
         return True, "The target is reached."
+
+    def _along_line(self, variant: Variant, q: Array, units: Units) -> tuple[bool, str]:
+        """Whether the tool can drive the line from a configuration without a change of posture."""
+        x, y, z = (variant.number(value) for value in self.line)
+        program = Program((Lin(PoseTarget((x, y, z))),), jerk_limited=False)
+        motion = kin.plan_motion(variant.robot, program, variant.robot.clip(q))
+        if motion.planned:
+            return True, "From this posture the whole line can be driven."
+        return False, f"From this posture the line does not go through. {motion.explain(units)}"
 
     def _negated(self, variant: Variant, q: Array) -> str:
         """Whether one joint with the other sign would reach the target."""
@@ -150,10 +170,22 @@ class ReachKind(Kind):
             task=self.task, branch=self.branch or None, constraints=JointConstraints(limits=limits, locked=locked),
             prefer="manipulability" if variant.number(self.manipulability) > 0.0 else "nearest",
         )  # fmt: skip
+        if self.line:
+            return self._first_through(variant, options)
         found = kin.ik.solve(robot, variant.pose, options, robot.q_home)
         if not found.solutions:
             raise ValueError(f"no posture meets the conditions: {found.reason}")
         return found.solutions[0].q.tolist()
+
+    def _first_through(self, variant: Variant, options: IKOptions) -> object:
+        """Of the postures at the start of the line, the first one that leads to its end."""
+        T = np.repeat(variant.pose[None], PLACES, axis=0)
+        way = np.array([variant.number(value) for value in self.line]) - variant.pose[:3, 3]
+        T[:, :3, 3] += np.linspace(0.0, 1.0, PLACES)[:, None] * way
+        found = kin.path_postures(variant.robot, T, options=options)
+        if not found.through:
+            raise ValueError(f"no posture leads along the line: {found.reason}")
+        return found.q[0, found.through[0]].tolist()
 
     def solution(self, variant: Variant, units: Units) -> str:
         robot = variant.robot

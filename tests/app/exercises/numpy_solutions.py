@@ -446,6 +446,53 @@ def reach_margin(v: Numbers, labels: list[str]) -> object:
     raise AssertionError(goal)
 
 
+@solves("line-across")
+def line_across(v: Numbers, labels: list[str]) -> object:
+    """Both elbows at the start; the one with which joint 1 stays within half a turn along the line."""
+    start, end = np.array([v["target_x"], v["target_y"]]), np.array([v["ex"], v["ey"]])
+    for elbow in range(2):
+        ways = [planar2(*(start + s * (end - start)), 1.0, 0.6)[elbow] for s in np.linspace(0.0, 1.0, 200)]
+        angles = np.unwrap([wrapped(first) for first, _ in ways])
+        if np.abs(angles).max() <= math.pi:
+            return [float(angles[0]), ways[0][1]]
+    raise AssertionError(start)
+
+
+@solves("line-wrist")
+def line_wrist(v: Numbers, labels: list[str]) -> object:
+    """Postures by descents from random configurations; each is followed along the line until a limit is passed."""
+    rows, _ = rows_of("irb120")
+    low, high = np.array([row["limits"] for row in rows]).T
+    q = np.array([v["s"] * 30 * DEG + v["b"], 20 * DEG, -10 * DEG, v["s"] * 60 * DEG, 30 * DEG, 0.0])
+    T, end = frames("irb120", q)[-1], np.array([v["ex"], v["ey"], v["ez"]])
+
+    def met(q: np.ndarray, point: np.ndarray) -> np.ndarray | None:
+        for _ in range(30):
+            now = frames("irb120", q)[-1]
+            turned = sum(np.cross(now[:3, k], T[:3, k]) for k in range(3))
+            error = np.concatenate([point - now[:3, 3], 0.5 * turned])
+            if np.linalg.norm(error) < 1e-9:
+                return q
+            q = q + np.linalg.lstsq(jacobian("irb120", q), error, rcond=1e-6)[0]
+        return None
+
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        start = met(rng.uniform(low, high), T[:3, 3])
+        if start is None:
+            continue
+        start = np.array([wrapped(x) for x in start])
+        at: np.ndarray | None = start
+        for share in np.linspace(0.0, 1.0, 60):
+            at = None if at is None else met(at, T[:3, 3] + share * (end - T[:3, 3]))
+            if at is None or (at < low).any() or (at > high).any():
+                at = None
+                break
+        if at is not None:
+            return start.tolist()
+    raise AssertionError(end)
+
+
 @solves("no-solution")
 def no_solution(v: Numbers, labels: list[str]) -> object:
     assert planar2(v["r"], 0.0, 1.0, 0.6) == []

@@ -224,6 +224,32 @@ def test_a_negated_joint_is_recognised() -> None:
             judged(REACH, given_)
 
 
+ACROSS = made(
+    "planar2r", "reach", '[target]\nposition = ["-1.2", "0.7", "0"]\n[answer]\nline = ["-1.2", "-0.3", "0"]'
+)
+
+
+def test_a_line_begins_in_a_posture_from_which_it_goes_through() -> None:
+    """Joint 1 would have to pass 180° with one elbow, as angles of the two links say."""
+    right = {}
+    for solution in kin.solve_ik(ACROSS[1].robot, ACROSS[1].pose, task="position").solutions:
+        verdict = judged(ACROSS, solution.q.tolist())
+        right[bool(solution.q[1] > 0.0)] = verdict.right
+        if not verdict.right:
+            assert "From this posture the line does not go through." in verdict.reason
+            assert "joint 1" in verdict.reason
+            assert verdict.credit == 0.5
+    assert right == {True: True, False: False}
+    away = judged(ACROSS, [0.0, 1.0])
+    assert (away.right, away.credit) == (False, 0.0)
+    with pytest.raises(ExerciseFileError, match="three values x, y, z"):
+        made("planar2r", "reach", '[target]\nposition = ["1", "0", "0"]\n[answer]\nline = ["1", "0"]')
+    with pytest.raises(VariantError, match="no posture leads along the line"):
+        made("planar2r", "reach", '[target]\nposition = ["1", "0", "0"]\n[answer]\nline = ["9", "0", "0"]')[
+            0
+        ].verify()
+
+
 # Solutions
 
 ALL = made("puma560", "solutions", '[target]\nq = ["0.3", "0.9", "-2.0", "0.4", "0.8", "0.5"]\n[answer]\nrows = 8')

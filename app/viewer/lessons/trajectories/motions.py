@@ -107,6 +107,24 @@ def turning_past(offset: float, speed: float, half: float) -> tuple[Array, Array
     return x, speed * offset / (x * x + offset * offset)
 
 
+def both_elbows(
+    start: tuple[float, float], end: tuple[float, float], links: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Joint 1 of an arm with two links along a line in its plane.
+
+    Returns:
+        Parts of the line ``(k,)``, and the angles ``(2, k)`` with the elbow positive and negative, without a jump.
+    """
+    share = np.linspace(0.0, 1.0, SAMPLES)
+    x, y = (a + share * (b - a) for a, b in zip(start, end, strict=True))
+    first, second = links
+    cosine = (x * x + y * y - first * first - second * second) / (2.0 * first * second)
+    elbow = np.arccos(cosine)
+    aside = np.arctan2(second * np.sin(elbow), first + second * cosine)
+    direction = np.unwrap(np.arctan2(y, x))
+    return share, np.stack([direction - aside, direction + aside])
+
+
 def frequency(robot: Robot) -> float:
     """Of the load that swings (Hz): its period is as long as a ramp of the S-curve, within what is usual."""
     _, _, _, (_, a, j) = example(robot)

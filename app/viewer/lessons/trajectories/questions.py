@@ -11,6 +11,7 @@ from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from app.viewer.lessons.trajectories.motions import (
     Ways,
+    both_elbows,
     example,
     family,
     frequency,
@@ -31,6 +32,7 @@ GOAL = (
 )
 SPEED, HALF = 0.2, 0.25  # m/s of the tool, and half the length of the line past the axis
 OFFSETS = (0.1, 0.05, 0.02)  # m
+LINKS, START, END = (1.0, 0.6), (-1.2, 0.7), (-1.2, -0.3)  # m: two links, and a line in their plane
 _TITLES = ("Position", "Velocity", "Acceleration", "Jerk")
 
 
@@ -41,7 +43,7 @@ def outline(robot: Robot, units: Units) -> Outline:
     steps = [_boundary(robot, units), _side_by_side(robot, units), _velocities(robot, units)]
     if found is not None:
         steps.append(_two_ways(found, units))
-    steps += [_singularity(robot, units), _jerk(robot, units)]
+    steps += [_singularity(robot, units), _jerk(robot, units), _postures(units)]
     return Outline(GOAL, tuple(steps), _check(), pose=Pose(as_configuration(robot.q_home)))
 
 
@@ -281,6 +283,50 @@ def _jerk(robot: Robot, units: Units) -> Step:
         ),
         f"{swings} A ramp that lasts as long as one swing leaves the load at rest.",
         figure=chart(rows, tuple(curves), "A swinging load behind two profiles"),
+    )
+
+
+def _postures(units: Units) -> Step:
+    lengths, angles = units.lengths, units.angles
+    share, found = both_elbows(START, END, LINKS)
+    half = angles.brief(np.pi)
+    curves = tuple(
+        Curve(f"elbow {name}", 100.0 * share, (row * angles.scale,))
+        for name, row in zip(("positive", "negative"), found, strict=True)
+    )
+    stop = 100.0 * float(share[np.argmax(found[1] > np.pi)])
+    places = [f"({lengths.number(x)}, {lengths.number(y)}) {lengths.name}" for x, y in (START, END)]
+    return Step(
+        "From which posture a line goes through",
+        f"Two links of {lengths.brief(LINKS[0])} and {lengths.brief(LINKS[1])}, whose joints turn ±{half}. The "
+        f"tool drives a line from {places[0]} to {places[1]}, across the negative x axis. At its start the arm "
+        "has two postures, and on a line it keeps the one it has.",
+        one_right(
+            "From which posture does the line go through?",
+            (
+                "Elbow positive: joint 1 points less far round than the tool.",
+                "It stays behind the direction to the tool, and has not come to its limit when the line ends.",
+            ),
+            (
+                (
+                    "Elbow negative: joint 1 points farther round than the tool.",
+                    "It runs ahead of the direction to the tool, and comes to its limit first.",
+                ),
+                ("From both: the start and the end are within reach.", "Reach is not enough: follow joint 1."),
+                ("From none: the line crosses the axis.", "The tool crosses it, joint 1 need not."),
+            ),
+            0,
+        ),
+        f"With the elbow negative, joint 1 is at {half} after {stop:.0f} % of the line, and cannot go on. So a "
+        "line that stops or is refused may go through from another posture at its start.",
+        practice="In the tab Program, Postures… at a line or an arc shows all postures of the arm along it, and "
+        "what is in the way of each.",
+        figure=chart(
+            (Row(f"Joint 1, {angles.name}", np.pi * angles.scale),),
+            curves,
+            "Joint 1 along the line, both elbows",
+            "%",
+        ),
     )
 
 

@@ -12,7 +12,7 @@ import kin
 from app.viewer.lessons.guide.outline import Number
 from app.viewer.lessons.trajectories import motions
 from app.viewer.lessons.trajectories.chart import WIDTH, Curve, Row, chart
-from app.viewer.lessons.trajectories.questions import OFFSETS, SPEED, outline
+from app.viewer.lessons.trajectories.questions import END, LINKS, OFFSETS, SPEED, START, outline
 from kin import Robot
 from kin.motion import profiles
 from kin.units import Units
@@ -55,6 +55,25 @@ def test_a_ptp_is_never_slower_than_a_line_and_leaves_it() -> None:
     assert off[0] == pytest.approx(0.0, abs=1e-9)
     assert off[-1] < 1e-5
     assert off.max() > 0.01
+
+
+def test_a_line_goes_through_in_the_posture_that_the_chart_of_postures_says() -> None:
+    arm = kin.get_robot("planar2r")
+    assert tuple(row.a for row in arm.rows) == LINKS
+    share, found = motions.both_elbows(START, END, LINKS)
+    points = np.array([[*(np.array(START) + s * np.subtract(END, START)), 0.0] for s in share])
+    postures = kin.path_postures(arm, points, options=kin.IKOptions(task="position"))
+    assert [postures.postures[row] for row in postures.through] == ["elbow positive"]
+    for name, angles in zip(("elbow positive", "elbow negative"), found, strict=True):
+        row = postures.postures.index(name)
+        last = int(postures.reach[0, row])
+        assert np.allclose(postures.q[: last + 1, row, 0], angles[: last + 1], atol=1e-9)
+        assert (np.abs(angles) <= np.pi).all() == (last == len(share) - 1)
+    step = next(each for each in outline(UR5, Units()).steps if "posture a line" in each.title)
+    (stop,) = re.findall(r"joint 1 is at 180° after (\d+) % of the line", step.shown)
+    assert float(stop) == pytest.approx(100.0 * last / (len(share) - 1), abs=1.1)
+    assert step.question is not None
+    assert step.question.judge(step.question.right()).right
 
 
 def test_a_load_behind_a_ramp_of_its_own_period_rests_after_the_stop() -> None:
