@@ -105,13 +105,16 @@
   let focus = null; // a selector of the field or button that has it
   let gone = false; // the visitor has left it
   let caret = null;
+  let scrolled = 0; // the list of findings in which a button was pressed
   let left = 0;
   addEventListener("focusin", (event) => {
     const row = event.target.closest?.("[data-arm] tr[data-row]");
     if (row) { here = Number(row.dataset.row); mark(); }
     const cell = event.target.closest?.("[data-arm] [data-cell]");
     const button = event.target.closest?.("[data-arm] [data-arm-do]");
-    const name = cell ? `[data-cell="${cell.dataset.cell}"]` : button ? `[data-arm-do="${button.dataset.armDo}"]` : null;
+    const argument = button?.dataset.argument === undefined ? "" : `[data-argument="${button.dataset.argument}"]`;
+    const name = cell ? `[data-cell="${cell.dataset.cell}"]`
+      : button ? `[data-arm-do="${button.dataset.armDo}"]${argument}` : null;
     clearTimeout(left);
     gone = false;
     if (cell?.matches("input") && name !== focus) cell.select();
@@ -142,6 +145,8 @@
     const cell = document.querySelector(`[data-arm] ${focus}`);
     if (!cell) return;
     cell.focus({ preventScroll: true });
+    const list = cell.closest(".kb-arm-findings ul");
+    if (list) list.scrollTop = scrolled;
     if (caret && cell.matches("input")) cell.setSelectionRange(...caret);
   }
 
@@ -223,6 +228,7 @@
     const row = target.closest("[data-arm-row]");
     if (row) { here = Number(row.dataset.armRow); mark(); }
     const button = target.closest("[data-arm-do]");
+    scrolled = button?.closest(".kb-arm-findings ul")?.scrollTop ?? scrolled;
     if (button && button.ariaDisabled !== "true") {
       const action = button.dataset.armDo;
       if (["add", "up", "down", "remove"].includes(action)) change(action);

@@ -94,6 +94,16 @@ class ImportRequest(schemas.Body):
     )
 
 
+class DoctorRequest(ImportRequest):
+    """A URDF, the part of it that is the arm, and what is mended in it."""
+
+    mends: Annotated[list[Annotated[int, Field(ge=0)]], Field(max_length=500)] | None = Field(
+        None,
+        description="Indices, from 0, of the `findings` that `mended` has done, each of them `automatic`; "
+        "by default all of these. What a mend of an element uncovers there is mended too.",
+    )
+
+
 @router.post("/robots/import", summary="Read a URDF", response_model=ImportAnswer, responses=_IMPORT_REFUSALS)
 async def import_robot(
     request: Request, body: Annotated[ImportRequest, Body(openapi_examples=IMPORT_EXAMPLES)]
@@ -110,14 +120,15 @@ async def import_robot(
     "/robots/doctor", summary="Examine a URDF", response_model=ExaminationAnswer, responses=_IMPORT_REFUSALS
 )
 async def examine(
-    request: Request, body: Annotated[ImportRequest, Body(openapi_examples=IMPORT_EXAMPLES)]
+    request: Request, body: Annotated[DoctorRequest, Body(openapi_examples=IMPORT_EXAMPLES)]
 ) -> Response:
     """What is wrong, suspicious or left out in a URDF, with line numbers, and the text with it mended.
 
     A file that cannot be read is no error here: that is a finding. Meshes are not sent along, and not looked at.
     """
     return await computed(
-        request, lambda _: reply(examination_answer(examine_urdf(body.urdf, body.base, body.tip)))
+        request,
+        lambda _: reply(examination_answer(examine_urdf(body.urdf, body.base, body.tip, mends=body.mends))),
     )
 
 

@@ -333,6 +333,9 @@ def add_doctor(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     parser.add_argument("file", metavar="FILE", help="URDF, or xacro (*.xacro, with kinboard[xacro])")
     _add_links(parser)
     parser.add_argument("-o", "--output", metavar="FILE", help="write the mended URDF")
+    parser.add_argument(
+        "--mend", type=int, nargs="+", metavar="N", help="mend only the findings with these numbers (default: all)"
+    )
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     return parser
 

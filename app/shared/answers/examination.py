@@ -31,6 +31,8 @@ class UrdfFindingAnswer(Answer):
     mend: str
     """What helps; empty if nothing has to be done."""
     automatic: bool
+    """Whether it can be mended without a decision."""
+    done: bool
     """Whether `mended` has it done."""
 
 
@@ -46,7 +48,7 @@ class ExaminationAnswer(Answer):
     text: str
     """The outcome in words."""
     mended: str | None
-    """The URDF with all automatic mends, and otherwise as it was; null if there are none."""
+    """The URDF with all automatic mends, or those asked for, and otherwise as it was; null if there are none."""
     moved: float | None
     """Largest distance in metres between the tool of the arm and that of the mended one, at random configurations;
     null if one of them is missing or they have other joints."""
@@ -62,7 +64,9 @@ def outcome(found: UrdfExamination) -> str:
     wrong, suspicious = found.count("wrong"), found.count("suspicious")
     if not wrong and not suspicious:
         return "Nothing is wrong or suspicious."
-    text = f"{wrong} wrong, {suspicious} suspicious; {found.mends} of them can be mended at once."
+    text = f"{wrong} wrong, {suspicious} suspicious; {found.mendable} of them can be mended at once."
+    if 0 < found.mends < found.mendable:
+        text += f" {found.mends} of these {'is' if found.mends == 1 else 'are'} chosen."
     if found.mended is None:
         return text
     if found.arm is None and found.mended_arm is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from pathlib import Path
 
@@ -108,3 +109,22 @@ def test_what_the_examination_mends_is_read(sick: Path) -> None:
     found = kin.examine_urdf(text, tip="tool0")
     assert found.mended_arm is not None
     assert np.isclose(found.mended_arm.robot.lower.min(), -2 * np.pi)
+
+
+def test_findings_are_mended_by_their_numbers(sick: Path, tmp_path: Path, capsys) -> None:
+    stl(sick.parents[1] / "meshes" / "a.stl", 400.0)
+    stl(sick.parents[1] / "other" / "b.stl", 0.1)
+    assert main(["doctor", str(sick), "--tip", "tool0"]) == 1
+    out = capsys.readouterr().out
+    number = re.search(r"has the length 1.5, not 1.*\n    mended \((\d+)\)", out)
+    assert number is not None
+    mended = tmp_path / "mended.urdf"
+    assert main(["doctor", str(sick), "--tip", "tool0", "--mend", number[1], "-o", str(mended)]) == 1
+    out = capsys.readouterr().out
+    assert out.count("    mended (") == 1
+    assert "    left (" in out
+    assert "1 of these is chosen" in out
+    text = sick.read_text()
+    assert mended.read_text() == text.replace('xyz="0 1.5 0"', 'xyz="0.0 1.0 0.0"')
+    assert main(["doctor", str(sick), "--tip", "tool0", "--mend", "77"]) == 2
+    assert "--mend: got 77, expected numbers of the report:" in capsys.readouterr().err

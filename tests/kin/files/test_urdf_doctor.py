@@ -310,3 +310,48 @@ def test_many_findings_are_bounded():
     found = kin.examine_urdf(f'<robot name="x">{joints}</robot>')
     assert len(found.findings) == 501
     assert "more findings" in found.findings[-1].text
+
+
+THREE = (
+    '<robot name="three"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>'
+    '<joint name="one" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 2"/>'
+    '<limit lower="1.5" upper="-1.5" effort="1" velocity="1"/></joint>'
+    '<joint name="two" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0.3 0 0"/>'
+    '<axis xyz="0 3 0"/>'
+    '<limit lower="-180" upper="180" effort="1" velocity="1"/></joint>'
+    '<joint name="three" type="revolute"><parent link="c"/><child link="d"/><origin xyz="0.3 0 0"/>'
+    '<axis xyz="0 1 0"/>'
+    '<limit lower="170" upper="-170" effort="1" velocity="1"/></joint></robot>'
+)
+
+
+def test_findings_are_mended_one_by_one():
+    whole = kin.examine_urdf(THREE)
+    can = [i for i, each in enumerate(whole.findings) if each.automatic]
+    assert len(can) >= 5
+    assert [each.done for each in whole.findings] == [each.automatic for each in whole.findings]
+    for i in can:
+        one = kin.examine_urdf(THREE, mends=[i])
+        assert [k for k, each in enumerate(one.findings) if each.done] == [i]
+        assert one.mends == 1
+        assert one.mendable == len(can)
+        assert one.mended is not None
+        left = {(e.place, e.symptom, e.text) for e in kin.examine_urdf(one.mended).findings if e.automatic}
+        before = {k: (e.place, e.symptom, e.text) for k, e in enumerate(whole.findings) if e.automatic}
+        assert before[i] not in left
+        others = [each for k, each in before.items() if k != i and each[0] != before[i][0]]
+        assert set(others) <= left, "another place was mended too"
+    assert kin.examine_urdf(THREE, mends=can).mended == whole.mended
+    none = kin.examine_urdf(THREE, mends=[])
+    assert none.mended is None
+    assert none.mends == 0
+
+
+@pytest.mark.parametrize("mends", [[99], [-1], ["0"], [True]])
+def test_what_cannot_be_mended_is_refused(mends):
+    with pytest.raises(
+        kin.InputError, match=r"mends: got .*, expected indices of findings that can be mended: 0, 1"
+    ):
+        kin.examine_urdf(THREE, mends=mends)
+    with pytest.raises(kin.InputError, match="none, for nothing can be mended"):
+        kin.examine_urdf(kin.to_urdf("planar2r"), mends=[0])

@@ -11,7 +11,7 @@ from app.viewer.meshes.archive import MB, Archive, MeshError
 from app.viewer.tabs.robot.files import Source, is_mjcf, is_urdf
 from app.viewer.views.templates import render
 from kin import InputError, RobotFileError, UrdfExamination, examine_urdf
-from kin.files.urdf.doctor.findings import RANKS
+from kin.files.urdf.doctor.findings import RANKS, Symptom, UrdfFinding
 from kin.files.urdf.doctor.meshes import extent_of
 from kin.transforms import Array
 
@@ -49,8 +49,18 @@ class MeshesSent:
         return None
 
 
+_Key = tuple[str, Symptom, str]
+
+
+def _key(each: UrdfFinding) -> _Key:
+    """What a finding is known by after other mends."""
+    return each.place, each.symptom, each.text
+
+
 class Doctor:
     """The report of one page.
+
+    Each finding that needs no decision is mended, unless the visitor has left it as it is.
 
     Attributes:
         found: about the URDF that was opened last; None if there is none, or it was closed.
@@ -59,22 +69,64 @@ class Doctor:
     def __init__(self) -> None:
         self.found: UrdfExamination | None = None
         self._source: Source | None = None
+        self._tip: str | None = None
+        self._left: set[_Key] = set()
 
     def look(self, source: Source, tip: str | None = None) -> None:
-        """Examine a file; one that is no URDF has none."""
+        """Examine a file; one that is no URDF has none. The same one, mended in part, keeps what was left."""
+        left = self._left if self.found is not None and self.found.file == (source.urdf or source.name) else set()
         self.close()
         if not is_urdf(source.text) or is_mjcf(source.text):
             return
-        name = source.urdf or source.name
-        meshes = None if source.archive is None else MeshesSent(source.archive, source.urdf)
+        self._source, self._tip = source, tip
         try:
-            self.found, self._source = examine_urdf(source.text, tip=tip, file=name, files=meshes), source
+            self.found = self._examined(None)
         except RobotFileError:
-            return  # opening the file reports it
+            self.close()  # opening the file reports it
+            return
+        self._left = left & {_key(each) for each in self.found.findings if each.automatic}
+        if self._left:
+            self._examine()
+
+    def _examined(self, mends: list[int] | None) -> UrdfExamination:
+        source = self._source
+        assert source is not None
+        meshes = None if source.archive is None else MeshesSent(source.archive, source.urdf)
+        return examine_urdf(source.text, tip=self._tip, file=source.urdf or source.name, files=meshes, mends=mends)
+
+    def _examine(self) -> None:
+        """Mend what is not left."""
+        assert self.found is not None
+        several = enumerate(self.found.findings)
+        chosen = [i for i, each in several if each.automatic and _key(each) not in self._left]
+        self.found = self._examined(chosen if self._left else None)
+
+    def choose(self, what: str) -> None:
+        """Mend all, none, or one more or less.
+
+        Args:
+            what: ``"all"``, ``"none"`` or the index of a finding.
+
+        Raises:
+            InputError: neither, or a finding that cannot be mended.
+        """
+        findings = () if self.found is None else self.found.findings
+        possible = {str(i): _key(each) for i, each in enumerate(findings) if each.automatic}
+        if what == "all":
+            self._left = set()
+        elif what == "none":
+            self._left = set(possible.values())
+        elif what in possible:
+            self._left ^= {possible[what]}
+        else:
+            raise InputError("mended", what, ", ".join(["save, open, close, all, none", *possible]))
+        if possible:
+            self._examine()
 
     def close(self) -> None:
         """Forget the report."""
-        self.found = self._source = None
+        self.found = self._source = self._tip = None
+        self._left = set()
 
     @property
     def mended(self) -> Source:
@@ -96,7 +148,7 @@ class Doctor:
             return ""
         groups = []
         for rank in RANKS:
-            several = [each for each in found.findings if each.rank == rank]
+            several = [(i, each) for i, each in enumerate(found.findings) if each.rank == rank]
             if several:
                 more = max(0, len(several) - MOST_LISTED)
                 groups.append(
@@ -109,4 +161,5 @@ class Doctor:
         return render(
             "robot/doctor", file=found.file, words=outcome(found), colour=colour, symbol=symbol, read=found.read,
             refusal=found.refusal, groups=groups, mends=found.mends if found.mended is not None else 0,
+            mendable=found.mendable,
         )  # fmt: skip

@@ -398,7 +398,7 @@ class RobotTab(Feature):
         self._show_files()
 
     def _use_mended(self, action: object) -> None:
-        """Save or open the mended URDF, or close the report about it."""
+        """Choose what is mended in the URDF, save or open it, or close the report about it."""
         doctor = self._uploads.doctor
         if action == "close":
             doctor.close()
@@ -410,7 +410,8 @@ class RobotTab(Feature):
         elif action == "open":
             self._open(self._uploads.open_mended)
         else:
-            raise InputError("mended", action, "save, open or close")
+            doctor.choose(str(action))
+            self._show_files()
 
     def _take_other(self, value: object) -> None:
         """A part of a text with the arm to compare with."""

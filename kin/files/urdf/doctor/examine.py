@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from kin.errors import InputError, RobotFileError
 from kin.files.urdf.doctor.bodies import MeshFiles, check_link
-from kin.files.urdf.doctor.findings import RANKS, UrdfExamination, UrdfFinding
+from kin.files.urdf.doctor.findings import RANKS, Symptom, UrdfExamination, UrdfFinding
 from kin.files.urdf.doctor.joints import check_joint
 from kin.files.urdf.doctor.notes import Notes, cut
-from kin.files.urdf.doctor.source import SourceText, decoded
+from kin.files.urdf.doctor.source import Edit, SourceText, decoded
 from kin.files.urdf.doctor.tree import LISTED, check_elements, check_tree
 from kin.files.urdf.read import UrdfRobot, read_urdf
 from kin.files.urdf.tree import UrdfTree, tree_of
@@ -34,6 +35,7 @@ def examine_urdf(
     tip: str | None = None,
     file: str = "",
     files: MeshFiles | None = None,
+    mends: Collection[int] | None = None,
 ) -> UrdfExamination:
     """Look for what is wrong, suspicious or left out in a URDF, with the line of each finding and its mend.
 
@@ -44,12 +46,14 @@ def examine_urdf(
         base, tip: the links of the arm, as for `read_urdf`.
         file: the name used in messages.
         files: the meshes that came with it; without it, no mesh is looked at.
+        mends: indices of the findings that are to be mended, as they are listed without this; by default all that
+            can be. What a mend of an element uncovers there is mended too.
 
     Returns:
-        What was read and found, and the text with all mends that need no decision.
+        What was read and found, and the text with all mends that need no decision, or with those asked for.
 
     Raises:
-        InputError: `source` is neither.
+        InputError: `source` is neither, or `mends` names a finding that cannot be mended.
         RobotFileError: there is no such file, or it is no text.
 
     Examples:
@@ -65,18 +69,46 @@ def examine_urdf(
     file = file or (str(source) if isinstance(source, Path) else "URDF")
     text = source if isinstance(source, str) else decoded(_content(source), file)
     first = _examined(text, base, tip, file, files)
-    mended = first.mended
+    chosen = _chosen(first.found.findings, mends)
+    places = {first.found.findings[i].place for i in chosen}
+    left = {_key(each) for i, each in enumerate(first.found.findings) if each.automatic and i not in chosen}
+
+    def uncovered(_: int, each: UrdfFinding | None) -> bool:
+        """Whether a finding that a mend has uncovered is mended."""
+        return mends is None or (each is not None and each.place in places and _key(each) not in left)
+
+    mended = after = first.changed(lambda i, _: mends is None or i in chosen)
     for _ in range(_ROUNDS - 1):
-        if mended is None or (further := _examined(mended, base, tip, file, files).mended) is None:
+        if after is None:
             break
-        mended = further
+        mended = after
+        after = _examined(mended, base, tip, file, files).changed(uncovered)
+    mended = after or mended
+    findings = tuple(replace(each, done=i in chosen) for i, each in enumerate(first.found.findings))
+    found = replace(first.found, findings=findings)
     if mended is None:
-        return first
+        return found
     try:
         arm: UrdfRobot | None = read_urdf(mended, base, tip, file)
     except RobotFileError:
         arm = None
-    return replace(first, mended=mended, mended_arm=arm, moved=_moved(first.arm, arm))
+    return replace(found, mended=mended, mended_arm=arm, moved=_moved(found.arm, arm))
+
+
+def _key(each: UrdfFinding) -> tuple[str, Symptom]:
+    return each.place, each.symptom
+
+
+def _chosen(findings: Sequence[UrdfFinding], mends: Collection[int] | None) -> set[int]:
+    """The indices of the findings to mend."""
+    possible = {i for i, each in enumerate(findings) if each.automatic}
+    if mends is None:
+        return possible
+    wrong = [i for i in mends if type(i) is not int or i not in possible]
+    if wrong:
+        valid = ", ".join(map(str, sorted(possible))) or "none, for nothing can be mended"
+        raise InputError("mends", wrong[0], f"indices of findings that can be mended: {valid}")
+    return set(mends)
 
 
 def _content(path: Path) -> bytes:
@@ -86,15 +118,29 @@ def _content(path: Path) -> bytes:
         raise RobotFileError(str(path), "file", str(error), "a readable URDF file") from error
 
 
-def _examined(text: str, base: str | None, tip: str | None, file: str, files: MeshFiles | None) -> UrdfExamination:
-    """One round; `mended` are the changes of this round only."""
+class _Round(NamedTuple):
+    """What one look at a text has found, and the changes that mend each finding."""
+
+    found: UrdfExamination
+    source: SourceText | None = None
+    edits: tuple[tuple[Edit, ...], ...] = ()
+
+    def changed(self, wanted: Callable[[int, UrdfFinding | None], bool]) -> str | None:
+        """The text with the wanted findings mended; None if that changes nothing."""
+        listed = [*self.found.findings[:MOST_FINDINGS], *[None] * len(self.edits)]
+        edits = [edit for i, several in enumerate(self.edits) if wanted(i, listed[i]) for edit in several]
+        return self.source.changed(edits) if self.source is not None and edits else None
+
+
+def _examined(text: str, base: str | None, tip: str | None, file: str, files: MeshFiles | None) -> _Round:
+    """One look at a text."""
     try:
         source = SourceText(text, file)
         if source.root.tag == "mujoco":
             raise RobotFileError(file, "root element", "mujoco", "<robot>: the doctor examines URDFs")
         tree = tree_of(source.root, file)
     except RobotFileError as error:
-        return UrdfExamination(file, (), (_unreadable(error),), None, str(error))
+        return _Round(UrdfExamination(file, (), (_unreadable(error),), None, str(error)))
     notes, refusal = Notes(source), ""
     arms: dict[str, UrdfRobot | str] = {}
     several = tip is None and len(tree.tips) > 1 and not tree.unread
@@ -120,13 +166,14 @@ def _examined(text: str, base: str | None, tip: str | None, file: str, files: Me
     if refusal and not tree.unread:  # else a finding has said why
         _note_refusal(notes, tree, refusal)
     _note_meshes(notes, tree, files)
-    ranked = sorted(notes.findings, key=lambda each: (RANKS.index(each.rank), each.line or 0))
+    both = zip(notes.findings, notes.edits, strict=True)
+    in_order = sorted(both, key=lambda each: (RANKS.index(each[0].rank), each[0].line or 0))
+    ranked, edits = [each for each, _ in in_order], tuple(several for _, several in in_order)
     more = len(ranked) - MOST_FINDINGS
     if more > 0:
         words = f"{more} more findings are not listed."
         ranked = [*ranked[:MOST_FINDINGS], UrdfFinding(None, "robot", "file", "left out", words)]
-    mended = source.changed(notes.edits) if notes.edits else None
-    return UrdfExamination(file, _read(tree, arm, arms), tuple(ranked), arm, refusal, mended)
+    return _Round(UrdfExamination(file, _read(tree, arm, arms), tuple(ranked), arm, refusal), source, edits)
 
 
 def _unreadable(error: RobotFileError) -> UrdfFinding:

@@ -27,7 +27,8 @@ class UrdfFinding:
             not what was meant. ``"left out"``: nothing is made of it.
         text: what it is, and for what is left out, why; a sentence.
         mend: what helps, a sentence; empty if nothing has to be done.
-        automatic: whether the mended text has it done.
+        automatic: whether it can be mended without a decision.
+        done: whether the mended text has it done.
     """
 
     line: int | None
@@ -37,6 +38,7 @@ class UrdfFinding:
     text: str
     mend: str = ""
     automatic: bool = False
+    done: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,7 @@ class UrdfExamination:
         findings: by rank, and then by line.
         arm: the arm between the links that were asked for; None if it is refused.
         refusal: why it is refused; empty if it is not.
-        mended: the text with all automatic mends; None if there are none.
+        mended: the text with all automatic mends, or with those that were asked for; None if there are none.
         mended_arm: the arm of the mended text; None without one, or if it is still refused.
         moved: largest distance in metres between the tools of both arms, at random configurations; None if one of
             them is missing or they have other joints.
@@ -67,6 +69,11 @@ class UrdfExamination:
     @property
     def mends(self) -> int:
         """How many findings the mended text has done."""
+        return sum(each.done for each in self.findings)
+
+    @property
+    def mendable(self) -> int:
+        """How many findings can be mended without a decision."""
         return sum(each.automatic for each in self.findings)
 
     def count(self, rank: Rank) -> int:

@@ -17,7 +17,7 @@ class Notes:
     def __init__(self, source: SourceText) -> None:
         self.source = source
         self.findings: list[UrdfFinding] = []
-        self.edits: list[Edit] = []
+        self.edits: list[tuple[Edit, ...]] = []  # of each finding
 
     def add(
         self,
@@ -32,7 +32,7 @@ class Notes:
         """A finding; with `edits` it is mended by them."""
         line = None if element is None else self.source.line(element)
         self.findings.append(UrdfFinding(line, cut(place), symptom, rank, text, mend, bool(edits)))
-        self.edits += edits
+        self.edits.append(edits)
 
     def numbers(self, element: Element, place: str, key: str, count: int = 1) -> list[float] | None:
         """The finite numbers of an attribute; None, and a note, if it has not so many; also None without it.

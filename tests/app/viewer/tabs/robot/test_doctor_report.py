@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 
 import numpy as np
 import pytest
@@ -19,6 +20,8 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 
 LONG = TWO_JOINTS.replace('axis xyz="0 1 0"', 'axis xyz="0 3 0"', 1)
 assert LONG != TWO_JOINTS
+BOTH = LONG.replace('axis xyz="0 1 0"', 'axis xyz="0 5 0"', 1)
+assert BOTH != LONG
 LINE = LONG[: LONG.index('"0 3 0"')].count("\n") + 1
 
 
@@ -46,6 +49,45 @@ def test_an_import_has_a_report_and_the_mended_file_is_saved_and_opened(port: in
         assert "Save mended" not in report(tab)
         say(tab, "mended", value="close")
         tab.wait(lambda: 'data-arm="doctor"' not in tab.html)
+
+
+def test_each_finding_can_be_mended_by_itself(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        upload(tab, BOTH)
+        shows(tab, TWO, TWO.q_home)
+        assert "2 suspicious; 2 of them can be mended at once." in report(tab)
+        lengths = [int(each) for each in re.findall(r"has the length (\d), not 1", report(tab))]
+        assert report(tab).count('aria-checked="true"') == 2
+        say(tab, "mended", value="1")
+        tab.wait(lambda: "1 of these is chosen" in report(tab))
+        assert re.findall(r'aria-checked="(\w+)"', report(tab)) == ["true", "false"]
+        say(tab, "mended", value="open")
+        tab.wait(lambda: "1 suspicious; 1 of them can be mended at once." in report(tab))
+        assert f"has the length {lengths[1]}, not 1" in report(tab)
+        assert "Left as it is" in report(tab)  # what was left stays so
+        assert "Save mended" not in report(tab)
+        say(tab, "mended", value="0")
+        tab.wait(lambda: "Save mended" in report(tab))
+        say(tab, "mended", value="open")
+        tab.wait(lambda: "Nothing is wrong or suspicious." in report(tab))
+
+
+def test_all_and_none_are_one_press_and_what_cannot_be_mended_is_refused(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        upload(tab, BOTH)
+        tab.wait(lambda: 'data-argument="none"' in report(tab))
+        assert 'data-argument="all"' not in report(tab)
+        say(tab, "mended", value="none")
+        tab.wait(lambda: 'aria-checked="true"' not in report(tab))
+        assert "Save mended" not in report(tab)
+        say(tab, "mended", value="all")
+        tab.wait(lambda: 'aria-checked="false"' not in report(tab))
+    doctor = Doctor()
+    for what in ("0", "7", "x", "None"):
+        with pytest.raises(kin.InputError, match="save, open, close, all, none"):
+            doctor.choose(what)
 
 
 def test_a_refused_file_has_a_report_that_mends_it(port: int) -> None:
