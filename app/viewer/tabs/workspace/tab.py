@@ -109,7 +109,7 @@ class Workspace(Feature):
 
     def on_robot(self) -> None:
         self._clear()
-        self._capability.use_robot()
+        self._capability.on_robot()
         robot = self.stage.now.robot
         self._tool = kin.fk(robot, robot.q_home)[:3, 3]
         self._controls.use_robot(robot)
@@ -125,7 +125,7 @@ class Workspace(Feature):
 
     def on_request(self) -> None:
         self._clouds.report()  # shows the locked joints
-        self._capability.report()
+        self._capability.refresh()
 
     def on_style(self) -> None:
         units = self.stage.units
@@ -152,11 +152,11 @@ class Workspace(Feature):
         self._clouds.advance(now, moving)
         self._update_section(now)
         try:
-            self._capability.tick(now, moving)
+            self._capability.poll(now, moving)
             self._fit_view()
         finally:
             cloud_due = DOT if self._dot_due else self._clouds.next_tick(now, moving)
-            times = [due for due in (cloud_due, self._capability.due) if due is not None]
+            times = [due for due in (cloud_due, self._capability.wait) if due is not None]
             self.due = min(times, default=None)
 
     def state(self) -> dict[str, object]:
@@ -175,7 +175,8 @@ class Workspace(Feature):
         self._controls.show(self._settings)
         if state.get("drawn") is True:
             self._start()
-        self._capability.restore(state.get("capability"))
+        if isinstance(saved := state.get("capability"), dict):
+            self._capability.restore(saved)
         self.due = 0.0
 
     def on_leave(self) -> None:
@@ -312,7 +313,7 @@ class Workspace(Feature):
         """Show the slabs on the visible side of the cut."""
         slabs = None if self._cut is None else self._cut.shown(self._settings.at, self._settings.keep)
         self._clouds.show(slabs)
-        self._capability.look(self._settings.map, self._cut, slabs)
+        self._capability.use_look(self._settings.map, self._cut, slabs)
 
     # Section
 

@@ -60,17 +60,17 @@ def test_levels_are_equal_steps_and_include_their_edge():
     ],
 )
 def test_a_wrong_setting_is_named_and_ignored_in_an_address(name, value):
+    fresh = MapSettings.fresh(PIONEER)
     with pytest.raises(kin.InputError, match=name):
-        MapSettings().with_value(name, value)
-    other = "least" if name != "least" else "directions"
-    assert MapSettings().restored({name: value, other: 0.5 if other == "least" else 96}) == replace(
-        MapSettings(), **{other: 0.5 if other == "least" else 96}
-    )
+        MapSettings.spec(name).unpack(name, value, PIONEER)
+    other, valid = ("least", 0.5) if name != "least" else ("directions", 12)
+    assert fresh.restored({name: value, other: valid}, PIONEER) == replace(fresh, **{other: valid})
 
 
 @pytest.mark.parametrize("state", [None, 3, "x", [1]])
 def test_an_invalid_state_restores_nothing(state):
-    assert MapSettings().restored(state) == MapSettings()
+    fresh = MapSettings.fresh(PIONEER)
+    assert fresh.restored(state, PIONEER) == fresh
 
 
 def test_the_description_matches_the_map():

@@ -1,19 +1,18 @@
-"""The settings of a capability map, validated for control events and for shared URLs alike."""
+"""The settings of a capability map."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Literal
 
-from kin import InputError, Robot
+from app.viewer.declared.fields import Settings, choice, number
+from kin import Robot
 
 By = Literal["share", "manipulability"]
 SIZES = {"15 voxels long": 15, "25 voxels long": 25, "40 voxels long": 40}
 DIRECTIONS = {"12": 12, "24": 24, "48": 48, "96": 96}
 BY: dict[str, By] = {"Directions": "share", "Manipulability": "manipulability"}
-CHOICES: dict[str, Mapping[str, object]] = {"resolution": SIZES, "directions": DIRECTIONS, "by": BY}
+LEVELS = 25  # of the values, one node of the scene each
 
 
 def default_directions(robot: Robot) -> int:
@@ -25,8 +24,20 @@ def default_directions(robot: Robot) -> int:
     return 24 if robot.n >= 6 else 96
 
 
+GRID_HINT = "Voxels along the longest side of the workspace; doubling them takes eight times as long"
+DIRECTIONS_HINT = (
+    "Number of evenly spread approach directions, tested at each voxel's centre. Arms with fewer than six joints "
+    "need many: they reach a place from a few directions only"
+)
+BY_HINT = (
+    "Directions: share of possible approach directions. Manipulability: the best w of the pose. The colours are "
+    "those chosen above."
+)
+LEAST_HINT = "Hides voxels below this share of the map's best value"
+
+
 @dataclass(frozen=True)
-class MapSettings:
+class MapSettings(Settings):
     """The settings of a map.
 
     Attributes:
@@ -35,37 +46,10 @@ class MapSettings:
         least: the smallest visible value, relative to the map's largest, 0 to 1.
     """
 
-    resolution: int = 25
-    directions: int = 24
-    by: By = "share"
-    least: float = 0.0
-
-    def with_value(self, name: str, value: object) -> MapSettings:
-        """These settings with one changed; raises `InputError` for an invalid value."""
-        return replace(self, **{name: _read(name, value)})  # type: ignore[arg-type]
-
-    def state(self) -> dict[str, object]:
-        """The settings as JSON."""
-        return asdict(self)
-
-    def restored(self, state: object) -> MapSettings:
-        """These settings with the values of a saved state; invalid and missing ones stay as they are."""
-        settings = self
-        for one in fields(self):
-            if isinstance(state, dict) and one.name in state:
-                try:
-                    settings = settings.with_value(one.name, state[one.name])
-                except InputError:
-                    continue  # the URL was edited
-        return settings
-
-
-def _read(name: str, value: object) -> object:
-    if name == "least":
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise InputError(name, value, "a finite number")
-        return min(max(float(value), 0.0), 1.0)
-    allowed = tuple(CHOICES[name].values())
-    if isinstance(value, bool) or not isinstance(value, int | str) or value not in allowed:
-        raise InputError(name, value, "one of " + ", ".join(str(one) for one in allowed))
-    return value
+    resolution: int = choice("Grid", SIZES, 25, hint=GRID_HINT)
+    directions: int = choice("Directions", DIRECTIONS, default_directions, hint=DIRECTIONS_HINT)
+    by: By = choice("Voxels show", BY, "share", hint=BY_HINT)
+    least: float = number(
+        "Hide voxels below (% of the best)", 0.0, (0.0, 1.0), hint=LEAST_HINT,
+        slider=(0.0, (LEVELS - 1) / LEVELS), scale=100.0, step=100.0 / LEVELS, digits=6, clip=True,
+    )  # fmt: skip
