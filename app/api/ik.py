@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from functools import partial
 from typing import Annotated, Any, ClassVar
+from weakref import WeakValueDictionary
 
 import numpy as np
 from fastapi import Request, Response
@@ -21,6 +22,7 @@ from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
     example,
+    reply,
     settings_of,
 )
 from app.api.work import Deadline, computed
@@ -29,8 +31,8 @@ from app.shared.answers.ik import Brief, IkAnswer, ik_answer
 from app.shared.metrics import SOLVE_SECONDS
 from app.shared.problems import FieldError
 from app.shared.settings import Settings
-from kin import IKOptions, Robot, Task
-from kin.ik import branch_names, solve
+from kin import IKOptions, Robot, Status, Task
+from kin.ik import branch_names, solve, solve_at_once
 from kin.ik.options import DEFAULTS
 from kin.transforms import Array
 
@@ -39,6 +41,9 @@ router = versioned("kinematics")
 # Bytes of an answer without solutions, of a solution, of one joint's value and of a redundancy parameter, about.
 ANSWER, SOLUTION, JOINT, PARAMETER = 2500, 190, 25, 250
 NUMERIC = 8  # solutions that the numeric solver finds, about
+
+# Arms that have been asked for a task, by their identity: what solves them is loaded.
+_ANSWERED: WeakValueDictionary[tuple[int, Task], Robot] = WeakValueDictionary()
 
 EXAMPLES = {
     "approach": example(
@@ -121,7 +126,35 @@ async def inverse_kinematics(request: Request, robot: Robot, body: IkRequest, fi
     behind them, `reason` is a sentence, `closest` is the closest configuration. One target gets one answer; a list
     gets `{"results": [...]}` in the same order. Each solution's errors are measured by forward kinematics.
     """
-    return await computed(request, partial(_solve, robot, body, names_of(fields), settings_of(request)))
+    names, settings = names_of(fields), settings_of(request)
+    if not isinstance(body.target, list):
+        answered = _at_once(robot, body, body.target, names, settings)
+        if answered is not None:
+            return answered
+    return await computed(request, partial(_solve, robot, body, names, settings))
+
+
+def _at_once(
+    robot: Robot, body: IkRequest, target: Target, names: tuple[str, ...], settings: Settings
+) -> Response | None:
+    """The answer to one target if it is there sooner than a thread could be asked for it; else None.
+
+    So the arm has been asked before, and joints are not locked: neither kernels nor formulas are made now.
+    """
+    given = body.keywords
+    avoids = given["avoid_self_collision"] or given["obstacles"]
+    if given["locked"] is not None or avoids or body.constant_frames:
+        return None
+    (seed,) = _seeds(robot, body, 1, settings)
+    goal = body.resolve(robot, target, "target", seed)
+    if _ANSWERED.get((id(robot), goal.task)) is not robot:
+        return None
+    with SOLVE_SECONDS.labels("rest").time():
+        result = solve_at_once(robot, goal.T, body.options(goal.task), seed, goal.rounding)
+        if result is None:
+            return None
+        whole = ik_answer(result)
+        return reply(brief(whole, names) if names else whole)
 
 
 def _solve(
@@ -139,7 +172,10 @@ def _solve(
 
     def answer(goal: Goal, seed: Array | None) -> IkAnswer | dict[str, Any]:
         deadline.check()
-        whole = ik_answer(solve(robot, goal.T, options[goal.task], seed, goal.rounding))
+        result = solve(robot, goal.T, options[goal.task], seed, goal.rounding)
+        if result.status is Status.SOLVED:
+            _ANSWERED[id(robot), goal.task] = robot
+        whole = ik_answer(result)
         return brief(whole, names) if names else whole
 
     def answers(some: slice) -> list[IkAnswer | dict[str, Any]]:

@@ -277,7 +277,8 @@ class AvoidingBody(FramesBody):
     @cached_property
     def keywords(self) -> dict[str, Any]:
         """The options in this request as keywords of the core; raises 422 naming ``obstacles[i]``."""
-        given = {name: getattr(self, name) for name in DEFAULTS if name in type(self).model_fields}
+        fields = type(self).model_fields
+        given = {name: getattr(self, name) for name in DEFAULTS if name in fields}
         try:
             given["obstacles"] = checked_obstacles(
                 [each.model_dump(exclude_none=True) for each in given["obstacles"]]

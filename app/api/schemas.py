@@ -78,11 +78,10 @@ class Body(BaseModel):
         """Rejects a field that the schema does not have, listing those it has."""
         offer()
         if isinstance(data, dict):
+            fields = cls.__pydantic_fields__  # `model_fields` takes ten times as long, and a batch has many bodies
             for name, value in data.items():
-                if name not in cls.model_fields:
-                    raise InputError(
-                        str(name)[:80] or '""', value, "only the fields " + ", ".join(cls.model_fields)
-                    )
+                if name not in fields:
+                    raise InputError(str(name)[:80] or '""', value, "only the fields " + ", ".join(fields))
         return data
 
 

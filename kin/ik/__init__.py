@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from kin.collision import Obstacle
 from kin.differential.task import Task
 from kin.errors import InputError
-from kin.ik.answers import answer
+from kin.ik.answers import answer, answer_at_once
 from kin.ik.options import Frame, IKOptions, Images, JointConstraints, Limits, Locks, Preference, Solver, Values
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKResult
@@ -140,6 +140,16 @@ def solve(
     """
     given = _DEFAULT if options is None else options
     return answer(IKProblem.of(robot_of(robot), target, given, q_seed, rounding))
+
+
+def solve_at_once(
+    robot: Robot, target: ArrayLike, options: IKOptions, q_seed: ArrayLike | None = None, rounding: float = 0.0
+) -> IKResult | None:
+    """`solve` where that takes some ten microseconds, for callers who can wait no longer; else None.
+
+    That holds once the arm has been asked for this task, with or without an answer: the first time takes longer.
+    """
+    return answer_at_once(IKProblem.of(robot, target, options, q_seed, rounding))
 
 
 def branch_names(robot: Robot | str) -> tuple[str, ...]:

@@ -32,6 +32,17 @@ def answer(problem: IKProblem) -> IKResult:
     return avoidance.checked(problem, _answer(avoidance.with_all_solutions(problem)), most)
 
 
+def answer_at_once(problem: IKProblem) -> IKResult | None:
+    """The same where it takes some ten microseconds: solutions of a closed form that is quick. Else None."""
+    options, form = problem.options, problem.closed_form
+    if form is None or problem.code not in form.quick or problem.branches is not None or options.avoids:
+        return None
+    if not options.prefer == options.images == "nearest":
+        return None
+    branches = solve_branches(problem, problem.T, problem.code)
+    return _solved(problem, branches, branches.good) if branches is not None and branches.order else None
+
+
 def _answer(problem: IKProblem) -> IKResult:
     branches = solve_branches(problem, problem.T, problem.code)
     if branches is None:

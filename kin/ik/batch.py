@@ -214,7 +214,8 @@ def _nearest(prepared: IKProblem, poses: Array, errors: Array, seeds: Array) -> 
     q = np.full((len(poses), prepared.robot.n), math.nan)
     options, form = prepared.options, prepared.closed_form
     plain = options.prefer == options.images == "nearest" and options.respect_limits and not options.avoids
-    if form is None or not plain or prepared.branches is not None or prepared.requested:
+    chosen = prepared.branches is not None or prepared.requested
+    if form is None or prepared.code not in form.quick or not plain or chosen:
         return q
     exact = np.flatnonzero(errors == 0.0)
     for start in range(0, len(exact), _AT_ONCE):
@@ -222,8 +223,7 @@ def _nearest(prepared: IKProblem, poses: Array, errors: Array, seeds: Array) -> 
         T, near = np.ascontiguousarray(poses[some]), seeds if len(seeds) == 1 else seeds[some]
         found = np.empty((len(some), q.shape[1]))
         rows = np.empty((len(some), len(form.branches), q.shape[1]))
-        if not form.solve_many(T, prepared.code, near, prepared.lower, prepared.upper, rows):
-            break
+        form.solve_many(T, near, prepared.lower, prepared.upper, rows)
         nearest_rows(prepared.requirement, T, near, rows, found)
         q[some] = found
     return q

@@ -278,7 +278,8 @@ def read_poses(targets: Sequence[ArrayLike] | Array, code: int, always: bool = F
     """
     count = len(targets)
     poses, errors = np.empty((count, *_POSE)), np.full(count, -1.0)
-    if isinstance(targets, np.ndarray) and targets.shape[1:] == _POSE and targets.dtype is _FLOAT:
+    # Arrays that were unpickled have a data type of their own, which is equal only.
+    if isinstance(targets, np.ndarray) and targets.shape[1:] == _POSE and targets.dtype == _FLOAT:
         straighten_many(np.ascontiguousarray(targets), FAR, poses, errors)
     exact = errors >= 0.0
     if always:

@@ -172,6 +172,7 @@ class ClosedForm(ABC):
         exact_ranges: whether the intervals of that parameter are exact, so that those of width 0 are found too.
         off: the largest angle (radians) or share of the arm's size by which the formulas are those of another arm;
             if it is not 0.0, configurations may be missing.
+        quick: the tasks whose targets take some microseconds each: `solve_many` serves these.
     """
 
     name: str
@@ -185,6 +186,7 @@ class ClosedForm(ABC):
     steady: bool = True
     exact_ranges: bool = True
     off: float = 0.0
+    quick: tuple[int, ...] = ()
 
     def names(self, robot: Robot, sense: Array) -> Names:
         """The names of the branches on `robot`, in which joint i counts `sense[i]` times as it does here."""
@@ -202,16 +204,16 @@ class ClosedForm(ABC):
     def solve(self, problem: SolverInput) -> Candidates:
         """All branches of a target, each with its redundancy parameters as near the seed as the limits allow."""
 
-    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """q ``(N, branches, n)`` ← what `solve` finds of many targets ``(N, 4, 4)``, with no value requested.
 
-        Bit-identical, in one compiled call. False, with q as it was, if the family has none for this task.
+        Bit-identical, in one compiled call. They are of a `quick` task.
 
         Args:
             seeds: one for each target ``(N, n)``, or one for all ``(1, n)``.
             lower, upper: ``(n,)`` joint limits, which count.
         """
-        return False
+        raise NotImplementedError(f"{self.name} is quick for no task")
 
     def add_missing(self, T: Array, near: Array, q: Array) -> Completeness:
         """Add to solutions ``(branches, n)`` of the batch kernels what they miss; how complete they are then."""

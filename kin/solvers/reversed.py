@@ -129,7 +129,7 @@ class ReversedJoints(ClosedForm):
 
     def __init__(self, form: ClosedForm, joints: Joints, robot: Robot) -> None:
         self.form, self.joints = form, joints
-        self.name, self.title, self.lengths = form.name, form.title, form.lengths
+        self.name, self.title, self.lengths, self.quick = form.name, form.title, form.lengths, form.quick
         *most, last = (str(i + 1) for i in joints)
         which = f"joints {', '.join(most)} and {last} are" if most else f"joint {last} is"
         self.reason = f"{form.reason}; {which} reversed"
@@ -171,14 +171,12 @@ class ReversedJoints(ClosedForm):
         arcs = [x if sign > 0.0 else _opposite(x) for x, sign in zip(found.arcs, signs, strict=True)]
         return replace(found, q=found.q * self.signs, values=found.values * signs, arcs=tuple(arcs))
 
-    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many targets, in the arm's own joint values."""
         reversed_ = self.signs < 0.0
         low, high = np.where(reversed_, -upper, lower), np.where(reversed_, -lower, upper)
-        if not self.form.solve_many(T, task, seeds * self.signs, low, high, q):
-            return False
+        self.form.solve_many(T, seeds * self.signs, low, high, q)
         q *= self.signs
-        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration ``(n,)`` is on."""

@@ -44,7 +44,7 @@ def match(robot: Robot) -> Parallel6 | None:
 class Parallel6(ClosedForm):
     """The closed form of an arm with three parallel axes and a wrist."""
 
-    name, title = NAME, TITLE
+    name, title, quick = NAME, TITLE, (POSE,)
     reason = (
         "axes 2, 3 and 4 are parallel, and axis 5 is perpendicular to axis 4 and meets axis 6 at a right angle"
     )
@@ -108,12 +108,9 @@ class Parallel6(ClosedForm):
             g.a1 + g.a2 * math.cos(t[1]) + g.a3 * math.cos(t[1] + t[2]) + g.a4 * math.cos(A) - g.d5 * math.sin(A)
         )
 
-    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many poses."""
-        if task != POSE:
-            return False
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
-        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the arm's side of axis 1, and the signs of x s3 and of s5."""

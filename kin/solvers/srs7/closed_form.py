@@ -50,7 +50,7 @@ def match(robot: Robot) -> Srs7 | None:
 class Srs7(ClosedForm):
     """The closed form of an S-R-S arm."""
 
-    name, title = NAME, TITLE
+    name, title, quick = NAME, TITLE, (POSE,)
     reason = (
         "axes 1, 2, 3 meet in one point and axes 5, 6, 7 in another, "
         "with the elbow's axis perpendicular to both links"
@@ -103,12 +103,9 @@ class Srs7(ClosedForm):
             obstacle = Obstacle("wrist centre too near to the shoulder", abs(g.d3 - g.d5))
         return Candidates(out[:, :7], values, tuple(all_arcs), gap, obstacle)
 
-    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many poses."""
-        if task != POSE:
-            return False
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
-        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of s2, s4 and s6."""

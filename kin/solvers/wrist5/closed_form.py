@@ -62,7 +62,7 @@ def match(robot: Robot) -> Wrist5 | None:
 class Wrist5(ClosedForm):
     """The closed form of a five-joint elbow arm with a two-axis wrist."""
 
-    name, title = NAME, TITLE
+    name, title, quick = NAME, TITLE, (POSE, APPROACH)
     reason = (
         "axes 2 and 3 are parallel and perpendicular to axis 1, "
         "axes 3 and 4 meet at a right angle, and so do axes 4 and 5"
@@ -114,12 +114,9 @@ class Wrist5(ClosedForm):
         obstacle = None if gap <= REACH else Obstacle("approach direction")
         return Candidates(out[:, :5], out[:, 5:], (arcs,), max(gap, 0.0), obstacle)
 
-    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many poses."""
-        if task == POSITION:
-            return False
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
-        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of the wrist centre's x, of s3 and of s5."""

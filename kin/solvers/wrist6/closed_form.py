@@ -55,7 +55,7 @@ def match(robot: Robot) -> Wrist6 | None:
 class Wrist6(ClosedForm):
     """The closed form of an elbow arm with a spherical wrist."""
 
-    name, title = NAME, TITLE
+    name, title, quick = NAME, TITLE, (POSE,)
     reason = "axes 4, 5 and 6 meet in one point, and axes 2 and 3 are parallel and perpendicular to axis 1"
 
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
@@ -130,12 +130,9 @@ class Wrist6(ClosedForm):
         g = self.geometry
         return float(g.a1 + g.a2 * math.cos(t[1]) + g.f * math.cos(t[1] + t[2]))
 
-    def solve_many(self, T: Array, task: int, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many poses."""
-        if task != POSE:
-            return False
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
-        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of X, of X s3 and of s5."""
