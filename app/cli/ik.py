@@ -41,7 +41,7 @@ def run(arguments: Namespace) -> int:
     units = units_of(arguments)
     if arguments.targets is not None:
         return _run_file(robot, arguments, units)
-    for option in ("output", "format"):
+    for option in ("output", "format", "dask"):
         if getattr(arguments, option) is not None:
             raise InputError(f"--{option}", getattr(arguments, option), "--targets FILE as well")
     wxyz = None if arguments.wxyz is None else _vector(arguments.wxyz, PLAIN, "--wxyz")
@@ -74,11 +74,13 @@ def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
         raise InputError("--frame", TOOL, "a frame that does not move, together with --targets")
     q_seed = None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", units)
     if _is_piped(arguments):
+        if arguments.dask is not None:
+            raise InputError("--dask", arguments.dask, "--targets and --output as .npy, .csv or .parquet files")
         return _run_rows(robot, arguments, units, q_seed)
     options = _options(robot, arguments, units, "pose" if arguments.mask else arguments.task or "pose")
     question = Question(robot, options, frame_of(robot, arguments, q_seed), q_seed)
     try:
-        count, solved = solve_file(question, Path(arguments.targets), Path(arguments.output))
+        count, solved = solve_file(question, Path(arguments.targets), Path(arguments.output), arguments.dask)
     except KeyboardInterrupt:
         print("kinboard: interrupted; the same command goes on from here", file=sys.stderr)
         return 130

@@ -2,7 +2,8 @@
 
 Targets are read, solved and written in pieces, so memory does not grow with their number. ``FILE.part`` is written
 until all is done. A run that was interrupted leaves it there, with ``FILE.state`` beside it: how many targets are
-done, and of which question. The same command goes on from there; any other question begins anew.
+done, and of which question. The same command goes on from there; any other question begins anew. A Parquet file
+cannot be continued: its rows stand in ``FILE.part`` as plain records, and become a Parquet file in the end.
 """
 
 from __future__ import annotations
@@ -15,24 +16,36 @@ import json
 import sys
 from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.exports.progress import progress_bar
+from app.shared.mapreduce import dask_client
 from app.shared.threads import processors
-from kin import IKOptions, IKResults, InputError, Robot, solve_ik_many
-from kin.transforms import from_position_wxyz
+from kin import IKOptions, InputError, Robot, Status, solve_ik_many
+from kin.transforms import from_position_wxyz, rotations_from_wxyz
 
 Array = NDArray[np.float64]
 AT_ONCE = 4096  # targets of one piece
 COLUMNS = ["x", "y", "z", "qw", "qx", "qy", "qz"]
 _FIELD = "--targets"
-_FILES = "a .npy file of poses (k, 4, 4), or a .csv file with the columns " + ", ".join(COLUMNS)
+_FILES = "a .npy file of poses (k, 4, 4), or a .csv or .parquet file with the columns " + ", ".join(COLUMNS)
+_ENDINGS = (".npy", ".csv", ".parquet")
+_STATUSES = list(Status)
+_RETRIES = 3  # of a piece that failed on a worker of a cluster
+
+
+class Found(NamedTuple):
+    """The answers to some targets: ``(m, n)`` joint values, NaN where there is no exact solution, and statuses."""
+
+    q: Array
+    status: tuple[Status, ...]
 
 
 @dataclass(frozen=True)
@@ -49,10 +62,11 @@ class Question:
     frame: Array
     q_seed: Array | None
 
-    def answers(self, T: Array, first: int) -> IKResults:
+    def answers(self, T: Array, first: int) -> Found:
         """The answers to targets ``(m, 4, 4)``; an error names the target by its place in the file."""
         try:
-            return solve_ik_many(self.robot, self.frame @ T, options=self.options, q_seed=self.q_seed)
+            found = solve_ik_many(self.robot, self.frame @ T, options=self.options, q_seed=self.q_seed)
+            return Found(found.q, found.status)
         except InputError as error:
             place, _, rest = error.field.removeprefix("targets[").partition("]")
             if not place.isdigit():
@@ -68,26 +82,47 @@ class Question:
         return hashlib.sha256(repr((*asked, *where)).encode()).hexdigest()
 
 
-def solve_file(question: Question, source: Path, output: Path) -> tuple[int, int]:
+def solve_file(question: Question, source: Path, output: Path, dask: str | None = None) -> tuple[int, int]:
     """Write the best solution of each target of `source` to `output`: (targets, how many are solved).
 
-    A .npy file gets ``(k, n)`` joint values, NaN where there is no exact solution; a .csv file a row ``status, q1,
-    …`` for each target. Radians and metres.
+    A .npy file gets ``(k, n)`` joint values, NaN where there is no exact solution; a .csv or .parquet file a row
+    ``status, q1, …`` for each target. Radians and metres.
+
+    Args:
+        dask: address of a Dask scheduler whose workers solve them; by default threads of this process do.
 
     Raises:
-        InputError: a file of another kind, one that cannot be read or written, or a target that is none.
+        InputError: a file of another kind, one that cannot be read or written, a target that is none, an extra
+            that is not installed, or a cluster that does not answer.
     """
-    if output.suffix.lower() not in (".npy", ".csv") or not output.parent.is_dir():
-        raise InputError("--output", str(output), "a file in an existing folder, with a name in .npy or .csv")
+    if output.suffix.lower() not in _ENDINGS or not output.parent.is_dir():
+        expected = "a file in an existing folder, with a name in " + ", ".join(_ENDINGS)
+        raise InputError("--output", str(output), expected)
+    if output.suffix.lower() == ".parquet":
+        _parquet("--output", output)
     try:
         total = _count(source)
-        return _resumed(question, source, output, total)
+        with _solvers(dask) as (pool, most):
+            return _resumed(question, source, output, total, pool, most)
     except OSError as error:
         named = str(error.filename or output)
         raise InputError(_FIELD, named, f"files that can be read and written ({error.strerror})") from None
 
 
-def _resumed(question: Question, source: Path, output: Path, total: int) -> tuple[int, int]:
+@contextmanager
+def _solvers(dask: str | None) -> Iterator[tuple[Executor, int]]:
+    """What solves pieces, and how many it solves at a time: threads, or the workers of a Dask cluster."""
+    if dask is None:
+        with ThreadPoolExecutor(processors(), thread_name_prefix="targets") as pool:
+            yield pool, processors()
+        return
+    with dask_client(dask, "--dask") as client:
+        yield client.get_executor(pure=False, retries=_RETRIES), sum(client.nthreads().values())
+
+
+def _resumed(
+    question: Question, source: Path, output: Path, total: int, pool: Executor, most: int
+) -> tuple[int, int]:
     """`solve_file` of this many targets, from where an earlier run has ended."""
     part, state = (output.with_name(output.name + end) for end in (".part", ".state"))
     key = question.key(source, output)
@@ -101,31 +136,35 @@ def _resumed(question: Question, source: Path, output: Path, total: int) -> tupl
         advance(done)
         if not done:
             file.write(_heading(output, total, question.robot.n))
-        for found in _answered(question, source, done):
+        for found in _answered(question, source, done, pool, most):
             file.write(_written(output, found))
             file.flush()
-            done, solved = done + len(found), solved + int(found.solved.sum())
+            done, solved = done + len(found.q), solved + found.status.count(Status.SOLVED)
             state.write_text(json.dumps({"key": key, "done": done, "solved": solved, "size": file.tell()}))
-            advance(len(found))
-    part.replace(output)
+            advance(len(found.q))
+    if output.suffix.lower() == ".parquet":
+        _write_parquet(part, output, question.robot.n)
+        part.unlink()
+    else:
+        part.replace(output)
     state.unlink(missing_ok=True)
     return done, solved
 
 
-def _answered(question: Question, source: Path, first: int) -> Iterator[IKResults]:
-    """The answers to the targets from the first one on, piece by piece in order, computed by threads."""
-    waiting: deque[Future[IKResults]] = deque()
-    pool = ThreadPoolExecutor(processors(), thread_name_prefix="targets")
+def _answered(question: Question, source: Path, first: int, pool: Executor, most: int) -> Iterator[Found]:
+    """The answers to the targets from the first one on, piece by piece in order; `most` pieces at a time."""
+    waiting: deque[Future[Found]] = deque()
     try:
         for T in _pieces(source, first):
             waiting.append(pool.submit(question.answers, T, first))
             first += len(T)
-            if len(waiting) > processors():
+            if len(waiting) > most:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
     finally:
-        pool.shutdown(cancel_futures=True)
+        for each in waiting:
+            each.cancel()
 
 
 def _state(state: Path, part: Path, key: str) -> tuple[int, int, int]:
@@ -141,6 +180,8 @@ def _state(state: Path, part: Path, key: str) -> tuple[int, int, int]:
 
 def _heading(output: Path, total: int, n: int) -> bytes:
     """What stands before the rows of a file."""
+    if output.suffix.lower() == ".parquet":
+        return b""
     if output.suffix.lower() == ".csv":
         return ",".join(["status", *(f"q{i + 1}" for i in range(n))]).encode() + b"\n"
     header = io.BytesIO()
@@ -148,13 +189,17 @@ def _heading(output: Path, total: int, n: int) -> bytes:
     return header.getvalue()
 
 
-def _written(output: Path, found: IKResults) -> bytes:
+def _written(output: Path, found: Found) -> bytes:
     """The rows of some answers."""
     if output.suffix.lower() == ".npy":
         return found.q.astype("<f8").tobytes()
+    if output.suffix.lower() == ".parquet":
+        records = np.empty(len(found.q), _record(found.q.shape[1]))
+        records["status"], records["q"] = [_STATUSES.index(status) for status in found.status], found.q
+        return records.tobytes()
     rows = [
-        ",".join([status.value, *(repr(x) if solved else "" for x in q)])
-        for status, solved, q in zip(found.status, found.solved.tolist(), found.q.tolist(), strict=True)
+        ",".join([status.value, *("" if x != x else repr(x) for x in q)])
+        for status, q in zip(found.status, found.q.tolist(), strict=True)
     ]
     return ("\n".join(rows) + "\n").encode()
 
@@ -168,6 +213,9 @@ def _count(source: Path) -> int:
             if [name.strip() for name in head] != COLUMNS:
                 raise InputError(_FIELD, head, _FILES)
             count = sum(1 for _ in lines)
+    elif source.suffix.lower() == ".parquet":
+        with _opened(source) as table:
+            count = table.metadata.num_rows
     else:
         count = len(_poses(source))
     if not count:
@@ -193,6 +241,9 @@ def _poses(source: Path) -> NDArray[Any]:
 
 def _pieces(source: Path, first: int) -> Iterator[Array]:
     """The targets ``(m, 4, 4)`` from the first one on, some at a time."""
+    if source.suffix.lower() == ".parquet":
+        yield from _parquet_pieces(source, first)
+        return
     if source.suffix.lower() != ".csv":
         poses = _poses(source)
         for start in range(first, len(poses), AT_ONCE):
@@ -211,3 +262,77 @@ def _pose(place: int, row: list[str]) -> Array:
         return from_position_wxyz([x, y, z], wxyz)
     except (ValueError, InputError):
         raise InputError(f"{_FIELD}[{place}]", ",".join(row), "seven numbers: " + ", ".join(COLUMNS)) from None
+
+
+# -- Parquet ---------------------------------------------------------------------------------------------------
+
+
+def _parquet(field: str, file: Path) -> Any:
+    """pyarrow with its Parquet module; an `InputError` names the field that needs it."""
+    try:
+        import pyarrow.parquet
+    except ImportError:
+        expected = "the extra parquet installed: pip install 'kinboard[parquet]'; or a .csv or .npy file"
+        raise InputError(field, str(file), expected) from None
+    return pyarrow
+
+
+def _opened(source: Path) -> Any:
+    """A Parquet file of targets, open."""
+    arrow = _parquet(_FIELD, source)
+    try:
+        table = arrow.parquet.ParquetFile(source)
+    except arrow.ArrowInvalid:
+        raise InputError(_FIELD, str(source), _FILES) from None
+    if not set(COLUMNS) <= set(table.schema_arrow.names):
+        raise InputError(_FIELD, table.schema_arrow.names, _FILES)
+    return table
+
+
+def _parquet_pieces(source: Path, first: int) -> Iterator[Array]:
+    """The targets ``(m, 4, 4)`` of a Parquet file from the first one on; earlier row groups are not read."""
+    with _opened(source) as table:
+        sizes = [table.metadata.row_group(i).num_rows for i in range(table.num_row_groups)]
+        ends = np.cumsum(sizes)
+        begin = int(np.searchsorted(ends, first, side="right"))
+        place = int(ends[begin]) - sizes[begin] if begin < len(sizes) else first
+        for batch in table.iter_batches(AT_ONCE, row_groups=range(begin, len(sizes)), columns=COLUMNS):
+            skipped = min(max(0, first - place), batch.num_rows)
+            some = batch.slice(skipped)
+            place += batch.num_rows
+            if some.num_rows:
+                yield _poses_of(some, place - some.num_rows)
+
+
+def _poses_of(batch: Any, place: int) -> Array:
+    """Rows of seven columns as poses ``(m, 4, 4)``; `place` is that of the first in its file."""
+    try:
+        columns = [batch.column(name).to_numpy(zero_copy_only=False).astype(np.float64) for name in COLUMNS]
+    except (TypeError, ValueError):
+        raise InputError(f"{_FIELD}[{place}]", "a column of another type", _FILES) from None
+    rows = np.stack(columns, axis=1)
+    rotations = rotations_from_wxyz(rows[:, 3:]) if np.isfinite(rows).all() else None
+    if rotations is None:
+        return np.stack([_pose(place + i, list(map(str, row))) for i, row in enumerate(rows.tolist())])
+    T = np.zeros((len(rows), 4, 4))
+    T[:, :3, :3], T[:, :3, 3], T[:, 3, 3] = rotations, rows[:, :3], 1.0
+    return T
+
+
+def _record(n: int) -> np.dtype[Any]:
+    """A row of ``FILE.part``: the place of its status among all, and joint values."""
+    return np.dtype([("status", "u1"), ("q", "<f8", (n,))])
+
+
+def _write_parquet(part: Path, output: Path, n: int) -> None:
+    """The rows of ``FILE.part`` as a Parquet file; joint values are null where there is no exact solution."""
+    arrow = _parquet("--output", output)
+    names = ["status", *(f"q{i + 1}" for i in range(n))]
+    schema = arrow.schema([(name, arrow.float64() if name != "status" else arrow.string()) for name in names])
+    new = output.with_name(output.name + ".new")
+    words = np.array([status.value for status in _STATUSES])
+    with part.open("rb") as file, arrow.parquet.ParquetWriter(new, schema) as writer:
+        while len(some := np.fromfile(file, _record(n), 16 * AT_ONCE)):
+            joints = [arrow.array(some["q"][:, i], from_pandas=True) for i in range(n)]
+            writer.write_table(arrow.table([arrow.array(words[some["status"]]), *joints], schema=schema))
+    new.replace(output)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
@@ -53,23 +54,10 @@ def run_dask(grid: CapabilityGrid, address: str) -> Iterator[CapabilityBlock]:
         InputError: the extra ``cluster`` is not installed, there is no scheduler, no worker, none that has
             Kinboard, a block lost one worker after another, or the scheduler was lost.
     """
-    try:
+    with dask_client(address) as client:
         import distributed as untyped
-    except ImportError:
-        raise InputError("dask", address, "the extra cluster installed: pip install 'kinboard[cluster]'") from None
-    distributed: Any = untyped
-    running = "the address of a running scheduler, like tcp://host:8786"
-    if not re.fullmatch(r"(tcp|tls)://.+:\d+", address):  # a client that cannot read it would linger
-        raise InputError("dask", address, running)
-    try:
-        client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
-    except OSError:  # nobody listens, or no answer in time
-        raise InputError("dask", address, running) from None
-    with client:
-        try:
-            client.wait_for_workers(1, timeout=_WORKER)
-        except TimeoutError:
-            raise InputError("dask", address, "a scheduler with at least one worker") from None
+
+        distributed: Any = untyped
         futures = client.map(
             partial(capability_block, grid), range(len(grid.blocks)), pure=False, retries=_RETRIES
         )
@@ -82,3 +70,30 @@ def run_dask(grid: CapabilityGrid, address: str) -> Iterator[CapabilityBlock]:
             raise InputError("dask", address, f"workers that have Kinboard and stay alive ({error})") from None
         finally:
             client.cancel(futures)
+
+
+@contextmanager
+def dask_client(address: str, field: str = "dask") -> Iterator[Any]:
+    """A client of the Dask scheduler at `address` that has a worker, for as long as the context lasts.
+
+    Raises:
+        InputError: naming `field`: the extra ``cluster`` is not installed, there is no scheduler or no worker.
+    """
+    try:
+        import distributed as untyped
+    except ImportError:
+        raise InputError(field, address, "the extra cluster installed: pip install 'kinboard[cluster]'") from None
+    distributed: Any = untyped
+    running = "the address of a running scheduler, like tcp://host:8786"
+    if not re.fullmatch(r"(tcp|tls)://.+:\d+", address):  # a client that cannot read it would linger
+        raise InputError(field, address, running)
+    try:
+        client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
+    except OSError:  # nobody listens, or no answer in time
+        raise InputError(field, address, running) from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=_WORKER)
+        except TimeoutError:
+            raise InputError(field, address, "a scheduler with at least one worker") from None
+        yield client

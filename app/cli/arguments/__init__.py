@@ -105,6 +105,15 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     return parser
 
 
+def _add_dask(parser: argparse.ArgumentParser) -> None:
+    """The argument of the commands whose work a cluster can do."""
+    parser.add_argument(
+        "--dask", metavar="ADDRESS",
+        help="compute on the workers of this Dask scheduler, such as tcp://host:8786; "
+        "`pip install 'kinboard[cluster]'` installs what that needs",
+    )  # fmt: skip
+
+
 def _add_target(parser: argparse.ArgumentParser) -> None:
     """The arguments of ``ik`` that say what the tool has to match."""
     place = parser.add_mutually_exclusive_group(required=True)
@@ -112,13 +121,14 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
     _add_rows(
         parser,
         "--targets",
-        "many targets, in metres: a table with the columns x, y, z, qw, qx, qy, qz, a .npy array of poses "
-        "(k, 4, 4), or JSON lines with targets of REST",
+        "many targets, in metres: a table (CSV or Parquet) with the columns x, y, z, qw, qx, qy, qz, a .npy array "
+        "of poses (k, 4, 4), or JSON lines with targets of REST",
         "the best solutions in radians (metres): a table with the status, an array (k, n) with NaN where there is "
-        "none, or answers of REST. A run from a .csv or .npy file to another that was interrupted is continued by "
-        "the same command",
+        "none, or answers of REST. A run from a .csv, .npy or .parquet file to another that was interrupted is "
+        "continued by the same command",
         place,
     )
+    _add_dask(parser)
     turn = parser.add_mutually_exclusive_group()
     turn.add_argument("--wxyz", nargs=4, metavar=("W", *XYZ), help="orientation as a quaternion")
     turn.add_argument("--approach", nargs=3, metavar=XYZ, help="direction of the tool's z axis")
@@ -375,10 +385,6 @@ def add_capability(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     parser.add_argument(
         "--directions", type=int, default=48, metavar="N", help="directions per voxel: 12, 24, 48 (default) or 96"
     )
-    parser.add_argument(
-        "--dask", metavar="ADDRESS",
-        help="compute on the workers of this Dask scheduler, such as tcp://host:8786; "
-        "`pip install 'kinboard[cluster]'` installs what that needs",
-    )  # fmt: skip
+    _add_dask(parser)
     parser.add_argument("-o", "--output", metavar="FILE", help="write the map to a file: .npz, .ply or .csv")
     return parser

@@ -5,8 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import re
+import sys
 
+import distributed
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import kin
@@ -71,8 +75,101 @@ def test_a_csv_file_in_a_frame_gets_the_status_of_each(tmp_path, capsys):
     assert np.abs(kin.fk("ur5", q) - T[4]).max() < 1e-8
 
 
+def table(path, T, rows=3):
+    """A Parquet file of targets, with row groups of a few."""
+    columns = np.array([[*each[:3, 3], *wxyz(each)] for each in T]).T
+    made = pa.table({"note": ["x"] * len(T), **dict(zip(targets.COLUMNS, columns, strict=True))})
+    pq.write_table(made, path, row_group_size=rows)
+
+
 @pytest.mark.usefixtures("small")
-@pytest.mark.parametrize("ending", ["npy", "csv"])
+def test_a_parquet_file_gets_a_table_with_the_status_of_each(tmp_path, capsys):
+    T = poses(11)
+    table(tmp_path / "in.parquet", T)
+    out = tmp_path / "out.parquet"
+    assert main(["ik", "ur5", "--targets", str(tmp_path / "in.parquet"), "-o", str(out)]) == 1
+    assert "10 of 11 targets have an exact solution" in capsys.readouterr().out
+    found = pq.read_table(out)
+    assert found.column_names == ["status", *(f"q{i + 1}" for i in range(6))]
+    assert found["status"].to_pylist() == ["solved"] * 2 + ["unreachable"] + ["solved"] * 8
+    assert found["q1"][2].as_py() is None
+    q = np.array([found[f"q{i + 1}"].to_pylist() for i in range(6)], dtype=float).T
+    solved = np.delete(np.arange(11), 2)
+    assert np.abs(kin.fk("ur5", q[solved]) - T[solved]).max() < 1e-8
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["in.parquet", "out.parquet"]
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("first", [0, 2, 3, 7, 11])
+def test_a_parquet_file_is_read_from_any_row_on(tmp_path, first):
+    T = poses(11)
+    table(tmp_path / "in.parquet", T)
+    pieces = list(targets._pieces(tmp_path / "in.parquet", first))
+    assert all(len(each) <= 4 for each in pieces)
+    assert sum(map(len, pieces)) == 11 - first
+    assert not pieces or np.abs(np.concatenate(pieces) - T[first:]).max() < 1e-12
+
+
+def test_without_the_extra_a_sentence_says_what_is_missing(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    np.save(tmp_path / "in.npy", poses(3))
+    (tmp_path / "in.parquet").write_bytes(b"PAR1")
+    words = ["ik", "ur5", "--targets"]
+    assert main([*words, str(tmp_path / "in.npy"), "-o", str(tmp_path / "out.parquet")]) == 2
+    assert "pip install 'kinboard[parquet]'" in capsys.readouterr().err
+    assert main([*words, str(tmp_path / "in.parquet"), "-o", str(tmp_path / "out.npy")]) == 2
+    assert "pip install 'kinboard[parquet]'" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("small")
+def test_what_is_no_parquet_file_of_targets_is_refused_by_name(tmp_path, capsys):
+    source, out = tmp_path / "in.parquet", tmp_path / "out.npy"
+    given = [
+        (b"no table", "a .npy file of poses"),
+        ({"x": [1.0]}, "the columns x, y, z"),
+        ({name: ["a"] for name in targets.COLUMNS}, r"--targets\[0\]"),
+        ({name: [1.0, 1.0, None] for name in targets.COLUMNS}, r"--targets\[2\]"),
+        ({name: [0.5] * 5 + [0.0] for name in targets.COLUMNS}, r"--targets\[5\]"),
+    ]
+    for content, message in given:
+        if isinstance(content, bytes):
+            source.write_bytes(content)
+        else:
+            pq.write_table(pa.table(content), source)
+        assert main(["ik", "ur5", "--targets", str(source), "-o", str(out)]) == 2
+        assert re.search(message, capsys.readouterr().err), message
+        assert not out.exists()
+
+
+@pytest.mark.usefixtures("small")
+def test_a_cluster_writes_the_same_file(tmp_path, capsys):
+    np.save(tmp_path / "in.npy", poses(30))
+    words = ["ik", "ur5", "--targets", str(tmp_path / "in.npy"), "-o"]
+    assert main([*words, str(tmp_path / "here.csv")]) == 1
+    with distributed.LocalCluster(1, processes=False, protocol="tcp", dashboard_address=None) as cluster:
+        assert main([*words, str(tmp_path / "there.csv"), "--dask", cluster.scheduler_address]) == 1
+    assert (tmp_path / "there.csv").read_bytes() == (tmp_path / "here.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--targets", "in.npy", "-o", "out.npy", "--dask", "nowhere"], "the address of a running scheduler"),
+        (["--targets", "in.npy", "-o", "-", "--dask", "tcp://127.0.0.1:1"], "as .npy, .csv or .parquet files"),
+        (["--position", "100", "0", "0", "--dask", "tcp://127.0.0.1:1"], "--targets FILE as well"),
+    ],
+)
+def test_a_cluster_that_cannot_help_is_refused(tmp_path, monkeypatch, capsys, words, message):
+    monkeypatch.chdir(tmp_path)
+    np.save("in.npy", poses(3))
+    assert main(["ik", "ur5", *words]) == 2
+    said = capsys.readouterr().err
+    assert "--dask" in said
+    assert message in said
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("ending", ["npy", "csv", "parquet"])
 def test_an_interrupted_run_goes_on_where_it_ended(tmp_path, monkeypatch, ending):
     T = poses(18)
     np.save(tmp_path / "in.npy", T)
