@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from app.exercises.expressions import VALID, Expression, ExpressionError
 from kin.errors import KinematicsError, shorten
@@ -39,7 +39,12 @@ class Fields:
     Args:
         names: the names that texts may contain in braces.
         found: the expressions read so far; tables of one file share it.
+
+    Attributes:
+        declared: the tables that declare these names, for messages.
     """
+
+    declared: ClassVar[str] = "[vary] or [let]"
 
     def __init__(
         self, file: str, table: object, prefix: str = "", names: frozenset[str] = frozenset(),
@@ -86,7 +91,7 @@ class Fields:
         for name in _PLACE.findall(text):
             if name not in self.names:
                 known = ", ".join(sorted(self.names)) or "none, because nothing is drawn"
-                raise self.refuse(field, f"{{{name}}}", f"a name from [vary] or [let]: {known}")
+                raise self.refuse(field, f"{{{name}}}", f"a name from {self.declared}: {known}")
         return text
 
     def words(self, field: str, default: str | None = None) -> Words:

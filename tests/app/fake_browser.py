@@ -195,6 +195,9 @@ class FakeBrowser:
     def reveal(self, question: str) -> None:
         """Have the answer to a question of the lesson shown."""
         self.say("feature", ["guide", ["reveal", question, len(self.log)], None])
+        self.wait(
+            lambda: f'data-question="{question}" data-closed="1"' in self.html and "data-asked" not in self.html
+        )
 
     def grab(self) -> None:
         self.send("TransformControlsDragStartMessage", name=self.gizmo, owner=self.nodes[self.gizmo]["owner"])

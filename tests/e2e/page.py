@@ -169,6 +169,13 @@ class Tab:
         self.open("Learn")
         self.choose("Lesson", title)
 
+    def show_answer(self) -> None:
+        """Have the answer of the step on show shown, if its question withholds what the lesson shows."""
+        expect(self.page.locator("[data-guide=steps]")).to_be_visible()
+        if self.page.locator("[data-asked]").count():
+            self.page.locator(".kb-reveal").first.click()
+        expect(self.page.locator("[data-asked]")).to_have_count(0)
+
     def set_dark(self, dark: bool) -> None:
         """Switch to the dark or the light colour scheme."""
         self.open("View")

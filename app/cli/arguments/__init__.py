@@ -320,9 +320,9 @@ def add_bench(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 
 def add_check(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard check``."""
-    about = "validate an arm, an exercise or a course"
+    about = "validate an arm, an exercise, a course or the texts of a lesson"
     parser = _command(commands, "check", about, parents.robots, parents.output, takes_robot=False)
-    parser.add_argument("file", metavar="FILE", help="robot, exercise or course (*.toml), *.urdf or *.xacro")
+    parser.add_argument("file", metavar="FILE", help="robot, exercise, course or lesson (*.toml), *.urdf, *.xacro")
     _add_links(parser)
     return parser
 

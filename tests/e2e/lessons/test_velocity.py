@@ -22,6 +22,7 @@ IIWA = kin.get_robot("iiwa14")
 def open_lesson(tab: Tab) -> None:
     tab.page.get_by_role("tab", name="Learn").click()
     tab.choose("Lesson", "Velocity")
+    tab.show_answer()
     expect(tab.page.locator("[data-singular]")).to_be_visible()
 
 

@@ -150,7 +150,7 @@ def test_a_force_is_typed_dragged_and_turned(server: int) -> None:
     J = kin.jacobian(pioneer, pioneer.q_home)
     with FakeBrowser(server) as tab:
         tab.settle()
-        tab.set("Lesson", "Velocity")
+        tab.open_lesson("Velocity")
         tab.wait(lambda: "Forces" in str(tab.gui))
         tab.set("Force at the tool", True)
         tab.wait(lambda: numbers(tab.html, "data-torque") != [])
@@ -189,7 +189,7 @@ def run_a_self_motion(tab: FakeBrowser, panda: kin.Robot, ended: Callable[[Array
     """Run it until `ended` at the configuration shown; the tool was held and the measure has grown."""
     tab.settle()
     tab.choose(panda.name)
-    tab.set("Lesson", "Velocity")
+    tab.open_lesson("Velocity")
     tab.wait(lambda: "(I−J⁺J)z" in tab.html)
     tab.set(label(panda, 2), 40.0)
     tab.settle()
@@ -226,7 +226,7 @@ def test_the_self_motion_ends_at_the_best_place(server: int) -> None:
 def test_a_line_is_plotted(server: int) -> None:
     with FakeBrowser(server) as tab:
         tab.settle()
-        tab.set("Lesson", "Velocity")
+        tab.open_lesson("Velocity")
         tab.wait(lambda: "Plot the line" in str(tab.gui))
         tab.set("Plot the line", True)
         tab.wait(lambda: "Start and end are the same" in tab.html)

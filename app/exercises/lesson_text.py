@@ -1,0 +1,192 @@
+"""The texts of a lesson: goal, steps and check in a TOML file beside its code.
+
+The file declares the facts that its texts and expressions use, each with a sentence on what it is. The lesson
+computes them for an arm; `kinboard check` reads the file without it. Questions are those of exercises, with the
+same fields::
+
+    goal = "You can …"
+
+    [facts]
+    speed = "of the tool point while joint 1 moves by itself, m/s"
+    "turns(joint)" = "whether a joint turns"
+
+    [[steps]]
+    title = "A column"
+    text = "Column i of the Jacobian …"
+    pose = "home"
+    withheld = ["jacobian"]
+
+    [steps.question]
+    kind = "number"
+    prompt = "How fast is the tool point?"
+    value = "speed"
+
+Texts may be lists of alternatives with `when`, and so may questions. Steps and questions of the check with `when`
+are left out where it does not hold.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import kin
+from app.exercises.contract import Kind
+from app.exercises.expressions import Expression
+from app.exercises.fields import ExerciseFileError, Fields, Words
+from app.exercises.kinds import KINDS
+from app.exercises.lessons import LESSONS
+from app.exercises.variant import Facts
+
+_FACT = re.compile(r"([a-z][a-z0-9_]*)(?:\([a-z0-9_, ]+\))?")
+_NEVER = ""  # the name of no pose
+
+
+@dataclass(frozen=True)
+class QuestionText:
+    """A question: when it is asked, its prompt, its kind with its fields, and the facts that it withholds."""
+
+    when: Expression
+    prompt: Words
+    kind: Kind
+    withheld: frozenset[str]
+
+
+@dataclass(frozen=True)
+class StepText:
+    """A step, as in `app.viewer.lessons.guide.outline.Step`; `pose` and `end` are names of poses of the lesson.
+
+    Attributes:
+        questions: alternatives, of which the first whose condition holds is asked; there may be none.
+    """
+
+    when: Expression
+    title: Words
+    text: Words
+    questions: tuple[QuestionText, ...]
+    shown: Words
+    practice: Words
+    pose: str
+    end: str
+
+
+@dataclass(frozen=True)
+class LessonText:
+    """A lesson's file.
+
+    Attributes:
+        file: where it was read, for messages.
+        facts: what each fact is, by its name.
+        words: names for texts that depend on facts.
+        check: each question as alternatives.
+    """
+
+    file: str
+    goal: Words
+    facts: Mapping[str, str]
+    words: Mapping[str, Words]
+    steps: tuple[StepText, ...]
+    check: tuple[tuple[QuestionText, ...], ...]
+
+    @property
+    def poses(self) -> frozenset[str]:
+        """The names of all poses."""
+        return frozenset(name for step in self.steps for name in (step.pose, step.end) if name)
+
+
+class _Fields(Fields):
+    declared = "[facts] or [words]"
+
+
+def parse_lesson(text: str, file: str = "lesson") -> LessonText:
+    """The texts of a lesson in TOML.
+
+    Raises:
+        ExerciseFileError: naming the file, the field, the value and what would be valid.
+    """
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ExerciseFileError(file, "file", str(error), "valid TOML") from None
+    facts = _facts(Fields(file, data.get("facts", {}), "facts."))
+    found: list[Expression] = []
+    aliases = _Fields(file, data.get("words", {}), "words.", frozenset(facts), found)
+    words = {name: aliases.words(name) for name in aliases.table}
+    fields = _Fields(file, data, names=frozenset((*facts, *words)), found=found)
+    fields.get("facts"), fields.get("words")
+    steps = tuple(_step(item) for item in fields.tables("steps", 1))
+    check = tuple(_alternatives(item) for item in fields.tables("check", 1))
+    lesson = LessonText(file, fields.words("goal"), facts, words, steps, check)
+    fields.done()
+    known = frozenset(facts) | frozenset(Facts(one := kin.get_robot("ur5"), one.q_home))
+    for expression in found:
+        if unknown := sorted(expression.names - known):
+            valid = f"a name from [facts], or of the arm: {', '.join(sorted(known))}"
+            raise ExerciseFileError(file, expression.field, unknown[0], valid)
+    return lesson
+
+
+def load_lesson(path: Path | str) -> LessonText:
+    """The texts of a file; raises `ExerciseFileError`."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ExerciseFileError(str(path), "file", str(error), "a readable UTF-8 text file") from error
+    return parse_lesson(text, str(path))
+
+
+def lesson_files() -> dict[str, Path]:
+    """The files of the lessons that have one, by key."""
+    folder = Path(__file__).parents[1] / "viewer" / "lessons"
+    return {key: path for key in LESSONS if (path := folder / key / "lesson.toml").exists()}
+
+
+def _facts(fields: Fields) -> dict[str, str]:
+    found = {}
+    for name, about in fields.table.items():
+        match = _FACT.fullmatch(name)
+        if match is None or not isinstance(about, str) or not about.strip():
+            raise fields.refuse(name, about, 'a name such as speed or "turns(joint)", and what it is')
+        found[match[1]] = about
+    return found
+
+
+def _step(fields: Fields) -> StepText:
+    question = fields.get("question")
+    if isinstance(question, list):
+        questions = tuple(_question(item) for item in fields.tables("question", 1))
+    else:
+        questions = () if question is None else (_question(fields.sub("question")),)
+    step = StepText(
+        fields.expression("when", "1"),
+        fields.words("title"),
+        fields.words("text"),
+        questions,
+        fields.words("shown", ""),
+        fields.words("practice", ""),
+        fields.text("pose", _NEVER),
+        fields.text("end", _NEVER),
+    )
+    fields.done()
+    return step
+
+
+def _alternatives(fields: Fields) -> tuple[QuestionText, ...]:
+    """One question of the check, or ``either``: alternatives of which one is asked."""
+    if fields.has("either"):
+        found = tuple(_question(item) for item in fields.tables("either", 1))
+        fields.done()
+        return found
+    return (_question(fields),)
+
+
+def _question(fields: Fields) -> QuestionText:
+    kind = KINDS[fields.choice("kind", KINDS)]
+    prompt, when = fields.words("prompt"), fields.expression("when", "1")
+    withheld = frozenset(fields.texts("withheld"))
+    question = QuestionText(when, prompt, kind.read(fields), withheld)
+    fields.done()
+    return question

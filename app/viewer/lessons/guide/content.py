@@ -1,0 +1,101 @@
+"""A lesson's texts and the facts that it computes for an arm, put together to its outline."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+
+from app.exercises.expressions import Expression, Function
+from app.exercises.fields import ExerciseFileError
+from app.exercises.lesson_text import LessonText, QuestionText, StepText, lesson_files, load_lesson
+from app.exercises.variant import Quantity, Variant
+from app.viewer.lessons.guide.outline import Outline, Pose, Question, Step
+from kin import Robot
+from kin.units import Units
+
+
+@dataclass(frozen=True)
+class LessonFacts:
+    """What the texts of a lesson may use of an arm; the names are those that its file declares.
+
+    Attributes:
+        numbers: values in radians, metres and SI units; one with a measure is written in the reader's units.
+        functions: of numbers, such as those of joints, which count from 1.
+        words: texts, in the reader's units.
+        poses: those that steps are about. A step that names none has the pose "home".
+    """
+
+    numbers: Mapping[str, float | Quantity]
+    functions: Mapping[str, Function] = field(default_factory=dict)
+    words: Mapping[str, str] = field(default_factory=dict)
+    poses: Mapping[str, Pose] = field(default_factory=dict)
+
+
+@cache
+def texts_of(lesson: str) -> LessonText:
+    """The texts of a lesson."""
+    return load_lesson(lesson_files()[lesson])
+
+
+def outline_of(lesson: str, robot: Robot, units: Units, facts: LessonFacts) -> Outline:
+    """The outline of a lesson with a file; raises `ExerciseFileError` for what the facts do not have."""
+    text = texts_of(lesson)
+    names = {*facts.numbers, *facts.functions, *facts.words}
+    if missing := sorted(text.facts.keys() - names):
+        raise ExerciseFileError(text.file, "facts", missing[0], f"one of {', '.join(sorted(names))}")
+    values = {name: x if isinstance(x, Quantity) else Quantity(x) for name, x in facts.numbers.items()}
+    first = Variant(lesson, robot, robot.q_home, values, None, facts.functions, facts.words)
+    words = {name: first.text(alias, units) for name, alias in text.words.items()}
+    variant = Variant(lesson, robot, robot.q_home, values, None, facts.functions, {**facts.words, **words})
+    made = _Maker(text.file, variant, units, facts.poses)
+    steps = tuple(made.step(step) for step in text.steps if made.holds(step.when))
+    check = [one for one in map(made.first, text.check) if one is not None]
+    return Outline(
+        variant.text(text.goal, units),
+        steps,
+        tuple(made.question(one) for one in check),
+        tuple(one.withheld for one in check),
+        facts.poses.get("home"),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Maker:
+    """Makes values of texts for one arm."""
+
+    file: str
+    variant: Variant
+    units: Units
+    poses: Mapping[str, Pose]
+
+    def holds(self, when: Expression) -> bool:
+        return bool(self.variant.number(when))
+
+    def first(self, alternatives: tuple[QuestionText, ...]) -> QuestionText | None:
+        return next((one for one in alternatives if self.holds(one.when)), None)
+
+    def question(self, text: QuestionText) -> Question:
+        return text.kind.ask(self.variant.text(text.prompt, self.units), self.variant, self.units)
+
+    def pose(self, name: str) -> Pose | None:
+        """The pose of this name; None for no name."""
+        if name and name not in self.poses:
+            raise ExerciseFileError(self.file, "pose", name, f"one of {', '.join(sorted(self.poses))}")
+        return self.poses.get(name)
+
+    def step(self, text: StepText) -> Step:
+        asked = self.first(text.questions)
+        title, body, shown, practice = (
+            self.variant.text(one, self.units) for one in (text.title, text.text, text.shown, text.practice)
+        )
+        return Step(
+            title,
+            body,
+            None if asked is None else self.question(asked),
+            shown,
+            self.pose(text.pose),
+            self.pose(text.end),
+            practice,
+            withheld=frozenset() if asked is None else asked.withheld,
+        )
