@@ -238,3 +238,38 @@ def test_nothing_is_lost_and_all_that_is_shown_agrees(lesson: Class, times: tupl
     eve.do("go")
     eve.shows("[data-class-bar=gone]")
     assert re.search("You lead 2 of 3", teacher.page.locator("[data-class-bar]").inner_text()) is not None
+
+
+def test_a_course_is_where_it_was_after_a_reload(browser: Browser, address: str) -> None:
+    """Its list, and an exercise of it with the tries so far, also when the page was closed meanwhile."""
+    teacher = Member(browser, address)
+    ann = Member(browser, address, teacher.code, "Ann")
+    page = ann.page
+    teacher.page.locator("[data-guide=class-course] [data-guide-do=fields]").click()
+    course = page.locator("[data-course=follow]")
+    expect(course).to_be_visible()
+    page.reload()
+    expect(course).to_be_visible()
+    expect(course.locator("[data-course-done]")).to_contain_text("0 of")
+
+    course.locator("[data-guide-do=next]").click()
+    for tries in (1, 2):
+        expect(page.locator(f"[data-exercise={EXERCISE}]")).to_be_visible()
+        ann.answer(WRONG)
+        page.reload()
+        attempts = page.locator("[data-exercises-attempts]")
+        expect(attempts).to_contain_text(f"{tries} attempt{'s' if tries > 1 else ''}")
+        expect(page.locator("[data-guide=course-bar]")).to_be_visible()
+
+    context = browser.new_context(storage_state=page.context.storage_state())  # without what the tab remembers
+    again = context.new_page()
+    again.goto(address + "viewer/")
+    expect(again.locator("[data-course=follow], [data-guide=course-bar]")).to_be_visible()
+    context.close()
+    ann.answer(RIGHT)
+    page.reload()
+    expect(teacher.page.locator(".kb-class-list li button")).to_contain_text("solved · 3 tries")
+    page.locator("[data-guide=course-bar] [data-guide-do=list]").click()
+    expect(course.locator("[data-course-done]")).to_contain_text("1 of")
+    for member in (teacher, ann):
+        member.close()
