@@ -102,6 +102,7 @@ RULES: dict[str, set[str]] = {
     "app/cli": {
         "kin",
         "numpy",
+        "pyarrow",
         "pydantic",
         "typing_extensions",
         "app.classroom",

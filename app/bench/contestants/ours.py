@@ -50,6 +50,8 @@ def ours(task: Task) -> list[Contestant]:
         return [Contestant(OURS, kin.fk, [(robot, q) for q in task.q], one_answer)]
     if row.kind == "branches" and row.batch:
         return [Contestant(OURS, kin.ik_branches, [(robot, task.T, row.value)], list, len(task.T))]
+    if row.batch:
+        return _answers(task)
     found = []
     if row.kind == "branches":
         found.append(Contestant(OURS, kin.ik_branches, [(robot, T, row.value) for T in task.T], one_answer))
@@ -62,6 +64,21 @@ def ours(task: Task) -> list[Contestant]:
 
     found.append(Contestant(SOLVE_IK, solve, [(T,) for T in task.T], _solutions))
     return found
+
+
+def _answers(task: Task) -> list[Contestant]:
+    """The best answers to a batch of targets; and their branches alone, without limits, order and verification."""
+    robot, kind = task.robot, "approach" if task.row.approach else "pose"
+    options = kin.IKOptions(task=kind)
+
+    def solve(T: Array) -> Array:
+        return kin.solve_ik_many(robot, T, options=options).q
+
+    name = f"{OURS}, branches only"
+    return [
+        Contestant(OURS, solve, [(task.T,)], lambda q: [*q[:, None]], len(task.T), one=True),
+        Contestant(name, kin.ik_branches, [(robot, task.T)], no_answers, len(task.T), floor=True),
+    ]
 
 
 def _cloud(task: Task) -> list[Contestant]:
