@@ -559,3 +559,19 @@ def test_a_fixed_joint_has_no_limits_of_any_kind():
     assert closed_form_of(limited) is not None
     row = fixed(limited, {2: 0.3}).rows[limited.joint_rows[2]]
     assert (row.kind, row.limits, row.velocity, row.acceleration, row.jerk, row.effort) == ("fixed", *5 * [None])
+
+
+def test_an_arm_on_a_rail_has_all_postures_at_a_value_of_the_rail():
+    """As a whole it goes to descents, which say that they may miss postures."""
+    ur5 = kin.get_robot("ur5")
+    rail = kin.Joint("rail", 0.0, 0.1, 0.0, PI / 2, limits=(0.0, 2.0), kind="prismatic")
+    robot = replace(ur5, id="rail", rows=(rail, *ur5.rows), home=(0.5, *ur5.home))
+    for q in robot.random_q(np.random.default_rng(0), 5):
+        T = kin.fk(robot, q)
+        whole = kin.solve_ik(robot, T)
+        assert (whole.status, whole.solver, whole.completeness) == (Status.SOLVED, "numeric", "unknown")
+        assert whole.redundancy == ()
+        found = kin.solve_ik(robot, T, locked=[float(q[0]), *[None] * 6])
+        assert found.completeness == "proved"
+        assert min(apart(s.q, q) for s in found.solutions) < 1e-8
+        assert all(np.abs(kin.fk(robot, s.q) - T).max() < 1e-9 for s in found.solutions)
