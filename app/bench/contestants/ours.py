@@ -68,8 +68,8 @@ def ours(task: Task) -> list[Contestant]:
 
 def _answers(task: Task) -> list[Contestant]:
     """The best answers to a batch of targets; and their branches alone, without limits, order and verification."""
-    robot, kind = task.robot, "approach" if task.row.approach else "pose"
-    options = kin.IKOptions(task=kind)
+    robot = task.robot
+    options = kin.IKOptions(task="approach" if task.row.approach else "pose")
 
     def solve(T: Array) -> Array:
         return kin.solve_ik_many(robot, T, options=options).q
