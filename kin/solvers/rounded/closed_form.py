@@ -31,6 +31,11 @@ Flags = NDArray[np.bool_]
 _MASK = np.array([1.0] * 6 + [0.0])
 _MOVED = 0.1  # rad, m: a descent that goes farther has left the posture
 _DIRECTIONS = np.concatenate([np.eye(6), -np.eye(6)])
+# Where two limits of the reach meet, only a motion away from both leads back.
+_CORNERS = np.array([
+    [*np.eye(3)[i] * a + np.eye(3)[j] * b, 0.0, 0.0, 0.0]
+    for i, j in ((0, 1), (0, 2), (1, 2)) for a in (1.0, -1.0) for b in (1.0, -1.0)
+])  # fmt: skip
 _MARGIN = 10.0  # times the rounding: how far from a target starts are looked for
 _ABOUT = 1e-9  # m, rad: what is closer needs no descent with another task
 
@@ -84,13 +89,15 @@ class Rounded(ClosedForm):
         completeness = weakest(found.completeness, "agreed") if met else "unknown"
         if six is not None:
             q, completeness = six.completed(p.T, found.q, starts, q)
+            if np.isnan(q).all() and found.gap < self._margin:  # the true table may just reach it
+                completeness = "unknown"
         return Candidates(q, values, found.arcs, found.gap, obstacle, completeness)
 
     def _with_starts(self, form: BatchKernels, T: Array, near: Array, q: Array) -> Array:
         """The rows ``(k, 6)``, the missing ones from targets close by: the true table may just reach this one."""
         out, missing, rows = q.copy(), np.isnan(q[:, 0]), np.empty(q.shape)
-        for direction in _DIRECTIONS:
-            if not missing.any():
+        for i, direction in enumerate((*_DIRECTIONS, *_CORNERS)):
+            if not missing.any() or (i >= len(_DIRECTIONS) and not missing.all()):
                 break
             moved = T.copy()
             moved[:3, 3] += self._margin * direction[:3]

@@ -195,6 +195,22 @@ def test_near_folds_nothing_is_missing_that_is_proved(robot):
     near_folds(robot, TARGETS)
 
 
+def test_no_posture_at_the_corner_of_the_reach_is_not_called_complete():
+    """Elbow stretched and wrist nearest to axis 1: the exact arm reaches the pose by no motion along one axis."""
+    robot = next(each for each in FAMILIES if each.id == "puma560-1.5708")
+    q = np.array([
+        -1.1325942185166853, -1.5698179555207745, -1.5257294354010233, -2.1148235916255356, 0.7544880020439604,
+        -1.445842761747103,
+    ])  # fmt: skip
+    found, known = candidates(robot, kin.fk(robot, q), q)
+    assert known == "unknown"
+    assert apart(found, q).min() < 1e-3
+    far = kin.fk(robot, q)
+    far[:3, 3] += 1.0
+    found, known = candidates(robot, far, q)
+    assert (len(found), known) == (0, "agreed")
+
+
 def near_folds(robot, count):
     """Targets within 1e-5 to 0.1 rad of a fold: what is called complete has the configuration."""
     rng = np.random.default_rng(2)
