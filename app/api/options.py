@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from inspect import signature
 from itertools import cycle
 from typing import Annotated, Any, Literal, TypeVar, get_type_hints
@@ -288,6 +288,12 @@ class AvoidingBody(FramesBody):
         return given
 
 
+@lru_cache(maxsize=256)
+def _options(given: tuple[tuple[str, Any], ...]) -> IKOptions:
+    """Options of the core by their keywords. Most requests give the same ones."""
+    return IKOptions.of(None, **dict(given))
+
+
 @takes(name for name in signature(solve_path).parameters if name in DEFAULTS)
 class OptionsBody(AvoidingBody, WorkpiecesBody):
     """Task, joint constraints, branch, errors that count as none, what is avoided."""
@@ -300,7 +306,11 @@ class OptionsBody(AvoidingBody, WorkpiecesBody):
 
     def options(self, task: Task) -> IKOptions:
         """These fields as options of the core, for a task that the targets may imply."""
-        return IKOptions.of(None, **{**self.keywords, "task": task})
+        given = tuple({**self.keywords, "task": task}.items())
+        try:
+            return _options(given)
+        except TypeError:  # lists cannot be looked up
+            return _options.__wrapped__(given)
 
     def resolve_all(
         self, robot: Robot, target: Target | list[Target], settings: Settings, q: Sequence[Array | None] = (None,)
