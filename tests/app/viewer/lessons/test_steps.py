@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -22,6 +23,7 @@ from app.viewer.lessons.guide.outline import Outline, Pose, Step
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.server import ViewerServer
+from app.viewer.session.state import PageState, encode
 from kin import Robot
 from kin.units import Units
 
@@ -89,6 +91,30 @@ def test_a_step_is_one_step_of_undo(server: int) -> None:
         tab.wait(lambda: "2. Turning" in tab.html and is_at(tab, UR5, UR5.q_home))
         tab.say("undo", None)
         tab.wait(lambda: "1. A column" in tab.html and is_at(tab, UR5, q))
+
+
+def test_a_link_without_a_configuration_opens_at_the_pose_of_the_step(server: int) -> None:
+    lesson = next(each for each in LESSONS if each.key == "rotations")
+    pose = lesson.outline(UR5, DEGREES).pose_of(0)
+    assert pose is not None
+    assert not np.allclose(pose.q, UR5.q_home)
+    q = tuple(float(x) for x in UR5.q_home + 0.1)
+    for saved, expected in ((None, pose.q), (q, q)):
+        state = encode(PageState(robot="ur5", q=None if saved is None else np.array(saved), lesson="rotations"))
+        with FakeBrowser(server, memory=json.dumps({"address": "http://127.0.0.1/", "state": state})) as tab:
+            tab.wait(lambda expected=expected: "1. Columns" in tab.html and is_at(tab, UR5, expected))
+
+
+def test_another_robot_comes_to_the_pose_of_the_open_step(server: int) -> None:
+    lesson = next(each for each in LESSONS if each.key == "rotations")
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.set("Lesson", lesson.title)
+        tab.wait(lambda: "1. Columns" in tab.html)
+        tab.choose(UR5.name)
+        pose = lesson.outline(UR5, DEGREES).pose_of(0)
+        assert pose is not None
+        tab.wait(lambda: is_at(tab, UR5, pose.q))
 
 
 def asked(form: str, units: Units) -> Question:
