@@ -277,6 +277,7 @@ class VisitorPage(ShownArm, Worker):
         self.for_features(lambda feature: feature.on_leave())
 
     def _step(self, batch: list[tuple[Hashable, object]]) -> None:
+        played = self.arm.playing
         with in_one_frame(self.client):
             with self.client.atomic():
                 for key, value in batch:
@@ -296,7 +297,7 @@ class VisitorPage(ShownArm, Worker):
                         self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
             self.client.flush()
             self.numbers.update()
-        if batch:
+        if batch or (played and not self.arm.playing):
             self._persistence.postpone(now)
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
             self._guard(lambda: self._persistence.save(self._actions.history.take_key()))

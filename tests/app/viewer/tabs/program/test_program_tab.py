@@ -114,6 +114,19 @@ def test_recorded_poses_are_played(tab: FakeBrowser) -> None:
     assert tab.script["undo"] == "Time of the program"
 
 
+def test_the_link_has_the_end_of_a_program_that_was_played(tab: FakeBrowser) -> None:
+    record(tab, 10, 170)
+    press(tab, "play")
+    tab.wait(lambda: clock(tab)["playing"] == "0")
+    shows(tab, PIONEER, turned(170))
+
+    def kept() -> np.ndarray:
+        q = decode(tab.kept[-1], STORE.robots).q
+        return np.zeros(PIONEER.n) if q is None else q
+
+    tab.wait(lambda: np.allclose(kept(), turned(170), atol=1e-6))
+
+
 def test_moving_the_arm_ends_playing(tab: FakeBrowser) -> None:
     record(tab, 10, 170)
     press(tab, "loop", value=True)
