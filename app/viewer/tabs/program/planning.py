@@ -265,6 +265,7 @@ def items_of(program: Program, robot: Robot, q: Array) -> Items:
         InputError: a pose that the arm cannot reach, or something that the list cannot hold.
     """
     _only_what_the_list_holds(program)
+    _check_count(sum(len(each.points) if isinstance(each, Spline) else 1 for each in program.segments))
     first = program.segments[0]
     start = first.target.q if isinstance(first, Ptp) and isinstance(first.target, JointTarget) else q
     motion = kin.plan_motion(robot, program, start)
@@ -277,9 +278,13 @@ def items_of(program: Program, robot: Robot, q: Array) -> Items:
             found += _waypoints(segment, robot, motion, k, before)
     if not isinstance(first, Ptp | Dwell):
         found.insert(0, waypoint(robot.clip(q)))
-    if len(found) > MOST:
-        raise InputError("segments", f"{len(found)} waypoints and pauses", f"at most {MOST} in this page")
+    _check_count(len(found))
     return tuple(found)
+
+
+def _check_count(count: int) -> None:
+    if count > MOST:
+        raise InputError("segments", f"{count} waypoints and pauses", f"at most {MOST} in this page")
 
 
 def _waypoints(segment: Segment, robot: Robot, motion: Motion, index: int, before: Array) -> list[Item]:

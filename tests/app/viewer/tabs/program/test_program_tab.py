@@ -329,6 +329,43 @@ def test_a_file_is_opened_and_one_that_does_not_fit_is_refused(tab: FakeBrowser)
         assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
 
 
+HERE = "[[segments]]\nkind = 'ptp'\nq = [0.5, 0.6, 0.7, 0.5, 0.5]\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (HERE + "[[segments]]\nkind = 'lin'\nposition = [9, 9, 9]\n", ("segments[1]", "the nearest is", "m away")),
+        (HERE + HERE + "tool_speed = 0\n", ("segments[1].tool_speed", "0")),
+        (HERE + HERE + "speed = 0\n", ("segments[1].speed", "0")),
+        (HERE + HERE + "acceleration = nan\n", ("segments[1].acceleration", "nan")),
+        (
+            HERE + "[[segments]]\nkind = 'dwell'\nseconds = 1\n" * 700,
+            ("701 waypoints and pauses", f"at most {MOST}"),
+        ),
+        (HERE * 500, ("500 waypoints and pauses", f"at most {MOST}")),
+        (None, ("The file was not used", "a file of at most 30 kB")),
+    ],
+    ids=[
+        "outside the workspace",
+        "no tool speed",
+        "no speed",
+        "nan",
+        "701 pauses",
+        "500 waypoints",
+        "ten thousand waypoints",
+    ],
+)
+def test_a_file_that_cannot_be_driven_or_held_is_named_and_nothing_is_lost(
+    tab: FakeBrowser, text: str | None, words: tuple[str, ...]
+) -> None:
+    record(tab, 20)
+    press(tab, "upload", value=["bad.toml", text])
+    tab.wait(lambda: all(each in html.unescape(tab.html) for each in ('data-status="error"', *words)))
+    assert titles(tab) == ["Waypoint 1"]
+    assert clock(tab)["duration"] == "0.000"
+
+
 def test_postures_on_the_way_are_shown_and_a_click_starts_there(ur5: FakeBrowser) -> None:
     line_of_the_ur5(ur5)
     before, _ = recorded(ur5, 0), recorded(ur5, 1)
