@@ -231,7 +231,7 @@ class Number(Spec):
         low, high = self.of(robot).limits
         expected = f"a number from {low:g} to {high:g}"
         if self.whole:
-            expected = f"a whole number from {low:g} to {high:g}"
+            expected = f"a whole number from {low:.0f} to {high:.0f}"
         elif self.clip:
             expected = "a finite number"
         if not _is_number(entry):

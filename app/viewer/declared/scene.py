@@ -144,6 +144,8 @@ class SceneView:
 
     def show(self, nodes: Sequence[Node | Lazy]) -> None:
         """Make the scene equal to these nodes."""
+        if self._top is None and not nodes:
+            return
         if self._top is None:
             self._top = self._scene.add_frame(f"/{self._key}-{next(_ROOTS)}", show_axes=False)
         self._fill(self._top.name, nodes, self._shown)

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 
 from app.shared.clouds import Cloud
 from app.viewer.feature import Stage
-from app.viewer.panel import assign, update_html
 from app.viewer.scene.camera import Sphere
 from app.viewer.scene.motion import FRAME
 from app.viewer.tabs.workspace import colours, views
 from app.viewer.tabs.workspace.cloud_nodes import CloudNodes, Look
-from app.viewer.tabs.workspace.controls import Controls
 from app.viewer.tabs.workspace.cut import Cut
+from app.viewer.tabs.workspace.said import Said
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
 from kin import Robot
@@ -47,7 +46,7 @@ class CloudView:
     def __init__(
         self,
         stage: Stage,
-        controls: Controls,
+        said: Said,
         settings: WorkspaceSettings,
         window: SendWindow,
         new_root: Callable[[], str],
@@ -56,7 +55,7 @@ class CloudView:
         self.settings = settings
         self.nodes: list[CloudNodes] = []
         self._stage = stage
-        self._controls = controls
+        self._said = said
         self._window = window
         self._new_root = new_root
         self._wake = wake
@@ -186,7 +185,7 @@ class CloudView:
                     nodes.running = False
                 self.report()
                 raise
-            if not self._controls.legend.content:
+            if not self._said.legend:
                 self.show_legend()
         if not self.busy:
             if self._running:
@@ -228,13 +227,11 @@ class CloudView:
         old = bool(self.nodes) and not self._is_shown(self._requested)
         line = views.progress(state, drawn, total or self.settings.n, speed, constraints.locked, old)
         percent = round(100.0 * drawn / total, 1) if total else 0.0
-        update_html(self._controls.line, line)
+        self._said.line = line
         if old != self._grey:
             self._grey = old
             self.recolour()
-        self._controls.show_buttons(views.buttons(state, old))
-        if self._controls.bar.value != percent:
-            assign(self._controls.bar, percent)
+        self._said.buttons, self._said.percent = views.buttons(state, old), percent
 
     # Look
 
@@ -276,7 +273,7 @@ class CloudView:
     def show_legend(self) -> None:
         """Update the legend. It is empty without points, because it needs sampled data, and for an old cloud."""
         if self._grey or not any(nodes.parts for nodes in self.nodes):
-            update_html(self._controls.legend, "")
+            self._said.legend = ""
             return
         robot, other = self._stage.now.robot, self.other
         if other is not None:
@@ -286,7 +283,7 @@ class CloudView:
         else:
             scale = colours.scale_of(robot, self.settings.by)
             content = colours.legend(scale, self.settings.map, self._stage.units)
-        update_html(self._controls.legend, content)
+        self._said.legend = content
 
     def _look(self, which: int) -> Look:
         if self._grey:

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 import kin
 from app.shared.clouds import Cloud
 from app.viewer.feature import Stage
-from app.viewer.panel import Post, update_html
+from app.viewer.panel import Post
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.workspace import views
 from app.viewer.tabs.workspace.background import run_in_background
 from app.viewer.tabs.workspace.cloud_nodes import CloudNodes
-from app.viewer.tabs.workspace.controls import Controls
+from app.viewer.tabs.workspace.said import Said
 from kin import InputError
 from kin.transforms import Array, finite_array
 from kin.units import grouped
@@ -64,9 +64,9 @@ class PointPicker:
         new_root: returns a node name that was never used before.
     """
 
-    def __init__(self, stage: Stage, controls: Controls, new_root: Callable[[], str], post: Post) -> None:
+    def __init__(self, stage: Stage, said: Said, new_root: Callable[[], str], post: Post) -> None:
         self._stage = stage
-        self._controls = controls
+        self._said = said
         self._new_root = new_root
         self._post = post
         self._searches = 0  # number of the newest search; older ones stop
@@ -128,7 +128,7 @@ class PointPicker:
             return
         if found is None or q is None:
             self._picked = None
-            self._controls.picked.content = views.nothing_picked()
+            self._said.picked = views.nothing_picked()
             return
         point = kin.fk(cloud.robot, q)[:3, 3]
         self._remove_mark()
@@ -145,15 +145,15 @@ class PointPicker:
         """Show the picked point in the present units."""
         if self._picked is not None:
             cloud, index, q, point = self._picked
-            content = views.picked(cloud.robot, cloud.constraints, index, q, point, self._stage.units)
-            update_html(self._controls.picked, content)
+            units = self._stage.units
+            self._said.picked = views.picked(cloud.robot, cloud.constraints, index, q, point, units)
 
     def clear(self) -> None:
         """Forget the picked point, and stop a search."""
         self._searches += 1
         self._remove_mark()
         self._picked = None
-        self._controls.picked.content = ""
+        self._said.picked = ""
 
     def _remove_mark(self) -> None:
         if self._mark is not None:

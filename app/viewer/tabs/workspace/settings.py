@@ -1,73 +1,45 @@
-"""The settings of the workspace tab, validated for control events and for shared URLs alike."""
+"""The settings of the workspace tab. The names are those of links."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass
 
+from app.viewer.declared.fields import Settings, choice, flag, number, slider
 from app.viewer.tabs.workspace.colours import BY, MAPS, By
 from app.viewer.tabs.workspace.cut import AXES, KEEP, Axis, Keep
-from kin import InputError, Robot
-from kin.workspace import STRATEGIES, Strategy
+from kin import Robot
+from kin.units import grouped
+from kin.workspace import Strategy
 
 MAX_POINTS = 4_000_000  # points of a cloud in a browser
+MAX_SEED = (1 << 53) - 1
 MIN_SIZE, MAX_SIZE = 0.0005, 0.02  # m, of a point
 FAR = 1e3  # m
-
-
-@dataclass(frozen=True)
-class WorkspaceSettings:
-    """The settings of the tab.
-
-    Attributes:
-        n, strategy, seed: of the cloud.
-        by, map: coloured quantity, and colour map.
-        size: diameter of a point (m).
-        axis, at, keep: direction of the cut, None for none; its position (m along the normal); the visible side.
-        compare: id of the other robot, None for none.
-        sizes, section, axes: whether the sizes, the section plot and axes with numbers are shown.
-        clicks: whether a click moves the arm to a point.
-    """
-
-    n: int = 100_000
-    strategy: Strategy = "uniform"
-    seed: int = 0
-    by: By = "radius"
-    map: str = "cividis"
-    size: float = 0.003
-    axis: Axis | None = None
-    at: float = 0.0
-    keep: Keep = "below"
-    compare: str | None = None
-    sizes: bool = False
-    section: bool = False
-    axes: bool = False
-    clicks: bool = True
-
-    def with_value(self, name: str, value: object, others: Iterable[str]) -> WorkspaceSettings:
-        """These settings with one changed; raises `InputError` for an invalid value.
-
-        Args:
-            others: ids of the robots to compare with.
-        """
-        return replace(self, **{name: _read(name, value, tuple(others))})  # type: ignore[arg-type]
-
-    def state(self) -> dict[str, object]:
-        """The settings as JSON."""
-        return asdict(self)
-
-    def restored(self, state: dict[str, object], others: Iterable[str]) -> WorkspaceSettings:
-        """These settings with the values of a saved state; invalid and missing ones stay as they are."""
-        allowed = tuple(others)
-        settings = self
-        for one in fields(self):
-            if one.name in state:
-                try:
-                    settings = settings.with_value(one.name, state[one.name], allowed)
-                except InputError:
-                    continue  # the URL was edited, or the robot is gone
-        return settings
+FINE = 3  # decimals of a millimetre
+NONE = "none"
+SAMPLING: dict[str, Strategy] = {
+    "joints at random": "uniform",
+    "joints spread evenly": "quasi",
+    "even in space": "volume",
+    "envelope only": "boundary",
+}
+POINTS_HINT = f"1 to {grouped(MAX_POINTS)} points"
+STRATEGY_HINT = (
+    "Joints at random: each joint anywhere between its limits. Joints spread evenly: the same with fewer "
+    "clusters. Even in space: the same density everywhere. Envelope only: the boundary. The last two take longer."
+)
+SEED_HINT = "Another seed gives other random configurations"
+MAP_HINT = "All three maps are legible with every common kind of colour vision"
+CUT_HINT = "Along the arm: the vertical plane of the arm's present pose. The cut moves in steps."
+AT_HINT = "Position of the cut: distance from the base along the cut's direction"
+CLICKS_HINT = "A click on a point moves the arm to the configuration that produced it"
+COMPARE_HINT = "Another robot's cloud in the same scene, each in one colour"
+SECTION_HINT = (
+    "The section in (r, z), its boundary, and the tool in it; locked joints are ignored. "
+    "The outline in the scene faces as joint 1 does."
+)
+AXES_HINT = "Axes with numbers, along the edges of a box around the workspace"
+SIZES_HINT = "Bounding box, reach, holes, volume and surface; locked joints are ignored"
 
 
 def default_size(robot: Robot) -> float:
@@ -75,40 +47,42 @@ def default_size(robot: Robot) -> float:
     return min(max(round(robot.reach * 0.005 / 0.0005) * 0.0005, MIN_SIZE), MAX_SIZE)
 
 
-def _read(name: str, value: object, others: tuple[str, ...]) -> object:
-    if name in ("n", "seed"):
-        low, high = (1, MAX_POINTS) if name == "n" else (0, (1 << 53) - 1)
-        return _whole({"n": "points"}.get(name, name), value, low, high)
-    if name in ("size", "at"):
-        return _number(name, value, *((MIN_SIZE, MAX_SIZE) if name == "size" else (-FAR, FAR)))
-    if name in ("sizes", "section", "axes", "clicks"):
-        if not isinstance(value, bool):
-            raise InputError(name, value, "true or false")
-        return value
-    if name == "by" and value == "limits":  # the name in older links
-        value = "limit_margin"
-    allowed: tuple[object, ...] = {
-        "strategy": STRATEGIES,
-        "by": tuple(BY.values()),
-        "map": tuple(MAPS),
-        "axis": (None, *AXES.values()),
-        "keep": tuple(KEEP.values()),
-        "compare": (None, *others),
-    }[name]
-    if not isinstance(value, str | None) or value not in allowed:
-        raise InputError(name, value, "one of " + ", ".join(str(one) for one in allowed))
-    return value
+@dataclass(frozen=True)
+class WorkspaceSettings(Settings):
+    """The settings of the tab.
 
+    Attributes:
+        n, strategy, seed: of the cloud.
+        by, map: coloured quantity, and colour map.
+        size: diameter of a point (m).
+        axis, at, keep: direction of the cut, None for none; its position (m along the normal); the visible side.
+        compare: id of the other robot, None for none. Which there are follows from the service.
+        sizes, section, axes: whether the sizes, the section plot and axes with numbers are shown.
+        clicks: whether a click moves the arm to a point.
+    """
 
-def _number(name: str, value: object, low: float, high: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(name, value, "a finite number")
-    return min(max(float(value), low), high)
-
-
-def _whole(name: str, value: object, low: int, high: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | float) or value != value // 1:
-        raise InputError(name, value, f"a whole number from {low} to {high}")
-    if not low <= value <= high:
-        raise InputError(name, value, f"a whole number from {low} to {high}")
-    return int(value)
+    n: int = number("Points", 100_000, (1, MAX_POINTS), whole=True, names="points", hint=POINTS_HINT)
+    strategy: Strategy = choice("Sampling", SAMPLING, "uniform", hint=STRATEGY_HINT)
+    seed: int = number("Seed", 0, (0, MAX_SEED), whole=True, hint=SEED_HINT)
+    by: By = choice(
+        "Colour by", BY, "radius", old={"limits": "limit_margin"}, hint="The quantity that the colours show"
+    )
+    map: str = choice("Colours", {name: name for name in MAPS}, "cividis", hint=MAP_HINT)
+    size: float = slider(
+        "Point size",
+        default_size,
+        (MIN_SIZE, MAX_SIZE),
+        "length",
+        digits=FINE,
+        clip=True,
+        named=False,
+        hint="Diameter of a point",
+    )
+    axis: Axis | None = choice("Cut", {NONE: None, **AXES}, None, hint=CUT_HINT, renew=True)
+    at: float = slider("Cut at", 0.0, (-FAR, FAR), "length", digits=FINE, clip=True, named=False, hint=AT_HINT)
+    keep: Keep = choice("Keep", KEEP, "below", hint="Which side of the cut is visible")
+    compare: str | None = choice("Compare with", {NONE: None}, None, anything=True, hint=COMPARE_HINT, renew=True)
+    sizes: bool = flag("Sizes", hint=SIZES_HINT)
+    section: bool = flag("Section plot", hint=SECTION_HINT)
+    axes: bool = flag("Axes with numbers", hint=AXES_HINT)
+    clicks: bool = flag("Click on a point", True, hint=CLICKS_HINT)

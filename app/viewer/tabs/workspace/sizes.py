@@ -8,9 +8,9 @@ from markupsafe import Markup
 
 from app.shared.computations import Subscription
 from app.viewer.feature import Stage
-from app.viewer.panel import Post, update_html
+from app.viewer.panel import Post
 from app.viewer.tabs.workspace.background import run_in_background
-from app.viewer.tabs.workspace.controls import Controls
+from app.viewer.tabs.workspace.said import Said
 from app.viewer.views.templates import render
 from kin import Robot, WorkspaceFacts
 from kin.units import Unit, Units
@@ -22,9 +22,9 @@ SMALLEST_HOLE = 5e-4  # m; smaller holes are not reported
 class Sizes:
     """The table of sizes. Posts ``"facts"`` to itself; `post` returns it to `take`."""
 
-    def __init__(self, stage: Stage, controls: Controls, post: Post) -> None:
+    def __init__(self, stage: Stage, said: Said, post: Post) -> None:
         self._stage = stage
-        self._controls = controls
+        self._said = said
         self._post = post
         self._visible = False
         self._found: tuple[WorkspaceFacts, bool] | None = None  # sizes, and whether they are complete
@@ -34,8 +34,7 @@ class Sizes:
         """Compute and show the sizes of the selected robot, or hide them."""
         self.leave()
         self._visible, self._found = visible, None
-        wait = render("panel/note", text="Computing…") if visible else ""
-        update_html(self._controls.sizes, wait)
+        self._said.sizes = render("panel/note", text="Computing…") if visible else ""
         if not visible:
             return
         robot, summaries = self._stage.now.robot, self._stage.summaries
@@ -65,7 +64,7 @@ class Sizes:
         """Show the sizes in the present units."""
         if self._found is not None:
             found, complete = self._found
-            update_html(self._controls.sizes, html(found, not complete, self._stage.units))
+            self._said.sizes = html(found, not complete, self._stage.units)
 
 
 def html(facts: WorkspaceFacts, waiting: bool, units: Units) -> str:

@@ -7,24 +7,28 @@ the folder `capability`. Slow work runs in background threads that post their re
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
 from typing import Any, ClassVar, cast
 
 import kin
-from app.viewer.feature import Feature, Stage
+from app.viewer.declared.facts import Facts
+from app.viewer.declared.feature import DeclaredFeature
+from app.viewer.declared.panel import Buttons, Control, Node
+from app.viewer.feature import Stage
 from app.viewer.tabs.workspace.axes import Axes
 from app.viewer.tabs.workspace.capability.panel import Capability
 from app.viewer.tabs.workspace.cloud import CloudView
-from app.viewer.tabs.workspace.controls import Controls
 from app.viewer.tabs.workspace.cut import Cut, cut_of
+from app.viewer.tabs.workspace.form import FIGURES, PRESETS, cloud, figures_hint, form, is_in_the_book
 from app.viewer.tabs.workspace.pick import PointPicker
+from app.viewer.tabs.workspace.said import Said
 from app.viewer.tabs.workspace.section.panel import SectionPanel
 from app.viewer.tabs.workspace.send_window import SendWindow
-from app.viewer.tabs.workspace.settings import WorkspaceSettings, default_size
+from app.viewer.tabs.workspace.settings import WorkspaceSettings
 from app.viewer.tabs.workspace.sizes import Sizes
 from kin import Robot, Section
 from kin.transforms import Array
-from kin.units import Units
 from kin.warmup import CAPABILITY, CLOUDS
 
 REDRAW = 1.0  # s between two updates of the section plot with more points
@@ -33,27 +37,33 @@ FIGURE: dict[str, object] = {"n": 20_000, "strategy": "uniform", "by": "one", "a
 MOVED = 0.3  # s after its last frame, the arm still counts as moving
 
 
-class Workspace(Feature):
+class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
     """Clouds of tool points, their sizes, their section, and the capability map."""
 
     key: ClassVar[str] = "workspace"
     title: ClassVar[str] = "Workspace"
     shared: ClassVar[bool] = True
     kernels = (CLOUDS,)
+    settings_of, facts_of = WorkspaceSettings, Facts
 
     def __init__(self, stage: Stage) -> None:
+        self._said = Said()
+        self._parts = False  # whether they are there
         super().__init__(stage)
-        self._settings = WorkspaceSettings(size=default_size(stage.now.robot))
-        self._controls = Controls(
-            stage.client.gui, self._settings, stage.now.robot, stage.store.robots, stage.units, self.post
-        )
+
+    def started(self) -> None:
+        if not self._parts:
+            self._build(self.stage)
+
+    def _build(self, stage: Stage) -> None:
+        self._parts = True
         window = SendWindow(stage.client, lambda: self.post("more"))
         self._roots = 0
         self._clouds = CloudView(
-            stage, self._controls, self._settings, window, self._new_root, lambda: self.post("more")
+            stage, self._said, self.settings, window, self._new_root, lambda: self.post("more")
         )
-        self._picker = PointPicker(stage, self._controls, self._new_root, self.post)
-        self._sizes = Sizes(stage, self._controls, self.post)
+        self._picker = PointPicker(stage, self._said, self._new_root, self.post)
+        self._sizes = Sizes(stage, self._said, self.post)
         self._section: SectionPanel | None = None
         self._axes = Axes(stage.client.scene, self._new_root)
         self._cut: Cut | None = None
@@ -67,17 +77,12 @@ class Workspace(Feature):
             window,
             self._post_capability,
             self._new_root,
-            self._settings.map,
+            self.settings.map,
         )
         # Events by the first part of their key. A handler takes the other parts, and the value.
         self._handlers: dict[str, Callable[..., None]] = {
             "more": lambda _: None,
             "failed": _raise,
-            "start": lambda _: self._start(),
-            "pause": lambda _: self._clouds.pause(),
-            "continue": lambda _: self._clouds.resume(),
-            "stop": lambda _: self._clouds.stop(),
-            "clear": lambda _: self._clear(),
             "click": self._search,
             "picked": lambda found: self._picker.take(*cast(tuple[Any, ...], found)),
             "facts": lambda found: self._sizes.take(*cast(tuple[Any, ...], found)),
@@ -85,11 +90,30 @@ class Workspace(Feature):
             "outline-found": self._take_outline,
             "plotted": lambda made: self._section.show_cloud(made) if self._section is not None else None,
             "capability": self._capability.handle,
-            "preset": self._use_preset,
-            "figure": self._show_figure,
-            "length": self._set_length,
         }
         self._clouds.report()
+
+    def panel(self) -> Sequence[Node]:
+        s, robot, unit = self.settings, self.stage.now.robot, self.stage.units.lengths
+        presets = {label: self.event(self.on_preset, number) for label, number in PRESETS.items()}
+        nodes: list[Node] = [Control("n"), Buttons(" ", presets, "Common numbers of points", key="presets")]
+        if is_in_the_book(robot, self.stage.store.robots):
+            figures = {label: self.event(self.on_figure, key) for label, key in FIGURES.items()}
+            nodes.append(Buttons("As in the book", figures, figures_hint(robot), key="figures"))
+        actions = {
+            "Start": self.event(self.on_start),
+            "Restart": self.event(self.on_start),
+            "Pause": self.event(self.on_pause),
+            "Continue": self.event(self.on_continue),
+            "Stop": self.event(self.on_stop),
+            "Clear": self.event(self.on_clear),
+        }
+        others = tuple(other for other in self.stage.store.robots if other != robot)
+        return [
+            *nodes,
+            *cloud(s, self._said, actions),
+            *form(s, self._said, robot, others, self._cut, unit),
+        ]
 
     # Events
 
@@ -97,11 +121,9 @@ class Workspace(Feature):
         name, *arguments = key if isinstance(key, tuple) else (key,)
         if name in self._handlers:
             self._handlers[name](*arguments, value)
-        elif isinstance(key, str):
-            self._apply(key, self._controls.read(key, value))
         else:
-            raise KeyError(key)
-        self.due = 0.0  # the next tick determines when to wake up
+            super().handle(key, value)
+        self.due = 0.0  # the next tick shows everything, and determines when to wake up
 
     @classmethod
     def kernels_of(cls, key: Hashable) -> tuple[str, ...]:
@@ -112,24 +134,24 @@ class Workspace(Feature):
         self._capability.on_robot()
         robot = self.stage.now.robot
         self._tool = kin.fk(robot, robot.q_home)[:3, 3]
-        self._controls.use_robot(robot)
-        self._use(self._settings.restored({"size": default_size(robot), "axis": None, "compare": None}, ()))
-        self._controls.show(self._settings)
+        self._use(self.settings.for_robot(robot))
         self._set_cut()
         if self._section is not None:
             self._show_section(False)
             self._show_section(True)
-        self._sizes.show(self._settings.sizes)
+        self._sizes.show(self.settings.sizes)
         self._show_axes()
+        self.refresh()
         self.due = 0.0
 
     def on_request(self) -> None:
         self._clouds.report()  # shows the locked joints
         self._capability.refresh()
+        self.refresh()
+        self.due = 0.0
 
     def on_style(self) -> None:
         units = self.stage.units
-        self._controls.use_units(units, self._settings, self._cut)
         self._show_axes()
         self._clouds.show_legend()
         self._picker.refresh()
@@ -137,6 +159,8 @@ class Workspace(Feature):
         if self._section is not None:
             self._section.use(units)
         self._capability.refresh()
+        self.refresh()
+        self.due = 0.0
 
     def on_pose(self, T_base_tool: Array) -> None:
         self._moved = time.perf_counter()
@@ -155,28 +179,40 @@ class Workspace(Feature):
             self._capability.poll(now, moving)
             self._fit_view()
         finally:
+            self.refresh()
             cloud_due = DOT if self._dot_due else self._clouds.next_tick(now, moving)
             times = [due for due in (cloud_due, self._capability.wait) if due is not None]
             self.due = min(times, default=None)
 
     def state(self) -> dict[str, object]:
         drawn = bool(self._clouds.nodes)
-        return {**self._settings.state(), "drawn": drawn, "capability": self._capability.state()}
+        return {**super().state(), "drawn": drawn, "capability": self._capability.state()}
 
     def restore(self, state: dict[str, object]) -> None:
-        settings = self._settings.restored(state, self._others)
-        for name, value in settings.state().items():
-            if name not in ("axis", "at"):
-                self._apply(name, value)
-        self._apply("axis", settings.axis)
-        if settings.axis is not None:
-            self._apply("at", settings.at)
-            self._controls.show_cut(self._cut, self._settings.at)
-        self._controls.show(self._settings)
+        before, robot = self.settings, self.stage.now.robot
+        self._use(before.restored(state, robot))
+        if self.settings.compare not in (None, *(r.id for r in self.stage.store.robots if r != robot)):
+            self._use(replace(self.settings, compare=before.compare))  # the robot is gone
+        at = self.settings.at
+        self._clouds.report()
+        self._clouds.resize()
+        self._clouds.compare()
+        self._set_cut()
+        if self._cut is not None:
+            self._use(replace(self.settings, at=at))
+            self._show_slabs()
+        self._clouds.recolour()
+        self._show_axes()
+        for name in ("section", "sizes"):
+            if getattr(before, name) != getattr(self.settings, name):
+                self.changed(name)
+        self._listen_clicks()
         if state.get("drawn") is True:
             self._start()
         if isinstance(saved := state.get("capability"), dict):
             self._capability.restore(saved)
+        self._write = True
+        self.refresh()
         self.due = 0.0
 
     def on_leave(self) -> None:
@@ -186,6 +222,7 @@ class Workspace(Feature):
             self._section.leave()
 
     def remove(self) -> None:
+        super().remove()
         self._clear()
         self._capability.clear()
         self._sizes.leave()
@@ -198,16 +235,13 @@ class Workspace(Feature):
     # Settings
 
     def _use(self, settings: WorkspaceSettings) -> None:
-        self._settings = self._clouds.settings = settings
+        self.settings = self._clouds.settings = settings
 
-    def _apply(self, name: str, value: object) -> None:
-        """Change a setting and update the scene; raises `InputError` for an invalid value."""
-        before = self._settings
-        self._use(before.with_value(name, value, self._others))
-        match name:
+    def changed(self, path: str) -> None:
+        self._use(self.settings)
+        match path:
             case "n" | "strategy" | "seed":
                 self._clouds.report()  # a cloud of other settings says so
-                self._controls.show_load(self._settings.n)
             case "by" | "map":
                 self._clouds.recolour()
                 self._show_slabs()
@@ -219,46 +253,60 @@ class Workspace(Feature):
                 self._show_slabs()
             case "compare":
                 self._clouds.compare()
-                if self._settings.axis is not None:
+                if self.settings.axis is not None:
                     self._set_cut()
                 self._clouds.recolour()
             case "clicks":
                 self._listen_clicks()
             case "axes":
                 self._show_axes()
-            case "section" if before.section != self._settings.section:
-                self._show_section(self._settings.section)
-            case "sizes" if before.sizes != self._settings.sizes:
-                self._sizes.show(self._settings.sizes)
+            case "section":
+                self._show_section(self.settings.section)
+            case "sizes":
+                self._sizes.show(self.settings.sizes)
 
-    def _use_preset(self, number: int, _: object) -> None:
-        self._apply("n", number)
-        self._controls.show(self._settings)
+    def on_preset(self, number: int) -> None:
+        """Take a common number of points."""
+        self._set(n=number)
 
-    def _show_figure(self, robot_id: str, _: object) -> None:
+    def on_figure(self, robot_id: str) -> None:
         """A workspace as the source chapter shows it."""
         robot = self.stage.store.get(robot_id)
         if robot != self.stage.now.robot:
             self.stage.change_robot(robot)  # which calls `on_robot`
-        for name, value in FIGURE.items():
-            self._apply(name, value)
-        self._controls.show(self._settings)
+        self._set(**FIGURE)
         self._start()
 
+    def _set(self, **values: Any) -> None:
+        """Set fields as a visitor does."""
+        for name, value in values.items():
+            self.change(**{name: value})
+            self.changed(name)
+
     def _show_axes(self) -> None:
-        self._axes.show(self.stage.now.robot if self._settings.axes else None, self.stage.units, self.stage.dark)
-
-    def _set_length(self, name: str, units: Units, value: object) -> None:
-        """Set a length; an event of a slider in other units is ignored, because it was replaced since."""
-        length = self._controls.read_length(value, units)
-        if length is not None:
-            self._apply(name, length)
-
-    @property
-    def _others(self) -> tuple[str, ...]:
-        return tuple(robot.id for robot in self.stage.store.robots if robot != self.stage.now.robot)
+        self._axes.show(self.stage.now.robot if self.settings.axes else None, self.stage.units, self.stage.dark)
 
     # Cloud and clicks
+
+    def on_start(self) -> None:
+        """Sample a cloud."""
+        self._start()
+
+    def on_pause(self) -> None:
+        """Stop sampling for now."""
+        self._clouds.pause()
+
+    def on_continue(self) -> None:
+        """Continue after a pause."""
+        self._clouds.resume()
+
+    def on_stop(self) -> None:
+        """End sampling; the points stay."""
+        self._clouds.stop()
+
+    def on_clear(self) -> None:
+        """Remove the cloud."""
+        self._clear()
 
     def _start(self) -> None:
         if self._clouds.start():
@@ -276,11 +324,11 @@ class Workspace(Feature):
             self._section.drop_cloud()
 
     def _listen_clicks(self) -> None:
-        self._picker.listen(bool(self._clouds.nodes) and self._settings.clicks)
+        self._picker.listen(bool(self._clouds.nodes) and self.settings.clicks)
 
     def _search(self, ray: object) -> None:
         if self._clouds.nodes:
-            self._picker.search(ray, self._clouds.nodes[0], self._settings.size)
+            self._picker.search(ray, self._clouds.nodes[0], self.settings.size)
 
     def _new_root(self) -> str:
         """A prefix of node names that was never used before."""
@@ -301,19 +349,18 @@ class Workspace(Feature):
     def _set_cut(self) -> None:
         """Cut along the axis in the settings, near the middle, or not at all."""
         self._cut = None
-        if self._settings.axis is not None:
+        if self.settings.axis is not None:
             robots = [self.stage.now.robot, *([self._clouds.other] if self._clouds.other is not None else [])]
-            self._cut = cut_of(robots, self._settings.axis, self.stage.now.q)
-            self._use(self._settings.with_value("at", self._cut.middle, ()))
-        self._controls.show_cut(self._cut, self._settings.at)
+            self._cut = cut_of(robots, self.settings.axis, self.stage.now.q)
+            self._use(replace(self.settings, at=self._cut.middle))
         self._clouds.set_cut(self._cut, None)
         self._show_slabs()
 
     def _show_slabs(self) -> None:
         """Show the slabs on the visible side of the cut."""
-        slabs = None if self._cut is None else self._cut.shown(self._settings.at, self._settings.keep)
+        slabs = None if self._cut is None else self._cut.shown(self.settings.at, self.settings.keep)
         self._clouds.show(slabs)
-        self._capability.use_look(self._settings.map, self._cut, slabs)
+        self._capability.use_look(self.settings.map, self._cut, slabs)
 
     # Section
 

@@ -16,6 +16,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from arms import CLASSICS
+from bare_page import bare_page
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 from PIL import Image
@@ -32,6 +33,7 @@ from app.viewer.tabs.workspace import axes, colours, cut, pick, send_window, siz
 from app.viewer.tabs.workspace.section import plot
 from app.viewer.tabs.workspace.section.panel import SectionPanel, subscribe_section
 from app.viewer.tabs.workspace.settings import MAX_POINTS, WorkspaceSettings, default_size
+from app.viewer.tabs.workspace.tab import Workspace
 from kin.robot import Joint
 from kin.units import DEFAULT_UNITS, Units, grouped
 
@@ -165,27 +167,50 @@ def test_a_click_picks_the_point_on_the_ray_nearest_to_the_eye():
         *(("size", v) for v in ("x", math.nan, None, False)),
         *(("strategy", v) for v in ("guess", None, 3, ["uniform"])),
         *(("by", v) for v in ("taste", None)),
-        ("compare", "nobody"),
+        *(("compare", v) for v in (3, ["ur5"])),
         ("axis", "w"),
         ("sizes", 1),
     ],
 )
 def test_a_wrong_setting_is_named_and_ignored_in_an_address(name, value):
-    settings = WorkspaceSettings(n=77)
-    with pytest.raises(kin.InputError, match="points" if name == "n" else name):
-        settings.with_value(name, value, ("puma560",))
-    assert settings.restored({name: value, "seed": 3 if name != "seed" else value}, ("puma560",)) == replace(
-        settings, seed=3 if name != "seed" else 0
-    )
+    settings = replace(WorkspaceSettings.fresh(PIONEER), n=77)
+    with pytest.raises(kin.InputError, match=name):
+        WorkspaceSettings.spec(name).unpack(name, value, PIONEER)
+    state = {name: value, "seed": 3 if name != "seed" else value}
+    assert settings.restored(state, PIONEER) == replace(settings, seed=3 if name != "seed" else 0)
 
 
 def test_settings_are_restored_from_their_state():
     settings = WorkspaceSettings(
         5, "quasi", 9, "limit_margin", "viridis", 0.002, "arm", 0.01, "slice", "puma560", True, True, False
     )
-    assert WorkspaceSettings().restored(settings.state(), ("puma560",)) == settings
-    assert WorkspaceSettings().restored({**settings.state(), "unheard": 1}, ()) == replace(settings, compare=None)
-    assert WorkspaceSettings().restored({"by": "limits"}, ()).by == "limit_margin"  # as in older links
+    fresh = WorkspaceSettings.fresh(PIONEER)
+    assert fresh.restored(settings.state(), PIONEER) == settings
+    assert fresh.restored({**settings.state(), "unheard": 1}, PIONEER) == settings
+    assert fresh.restored({"by": "limits"}, PIONEER).by == "limit_margin"  # as in older links
+
+
+def test_a_robot_to_compare_with_that_is_gone_is_left_out() -> None:
+    with bare_page(PIONEER) as page:
+        opened = page.open(Workspace)
+        for name in ("nobody", PIONEER.id):
+            page.restore({"compare": name, "seed": 4})
+            assert opened.state()["compare"] is None
+            assert opened.state()["seed"] == 4
+        page.restore({"compare": PUMA.id})
+        assert opened.state()["compare"] == PUMA.id
+        page.change(PUMA)
+        assert opened.state()["compare"] is None
+
+
+def test_figures_of_the_chapter_are_offered_while_one_of_its_arms_is_on_show() -> None:
+    with bare_page(PIONEER) as page:
+        page.open(Workspace)
+        assert PIONEER.source in page.control("As in the book").hint
+        page.change(PUMA)
+        assert "As in the book" not in str(page.panel())
+        page.change(kin.get_robot("redundant7"))
+        assert "table 3" in page.control("As in the book").hint
 
 
 # Plot and numbers
@@ -515,7 +540,7 @@ def test_the_tab_follows_the_unit_of_length_and_keeps_its_state():
     with serve_viewer(server) as port, Visitor(port) as tab:
         tab.settle(0.2)
         (session,) = server._pages.values()
-        post = next(tab.post for tab in session._tabs if tab.key == "workspace")
+        shown = next(tab for tab in session._tabs if tab.key == "workspace")
         tab.draw(2000, seed=17)
         tab.set("Cut", "across z (level)")
         tab.set("Sizes", True)
@@ -530,18 +555,21 @@ def test_the_tab_follows_the_unit_of_length_and_keeps_its_state():
             tab.points(only_visible=True),
         )
         table = tab.html.count(">mm</td>")
+        before = set(shown._panel._live)
         tab.set("Lengths", "cm")
         tab.wait(lambda: "Cut at (cm)" in tab.sliders)
         # Late events of replaced sliders.
-        post(("at", DEFAULT_UNITS), 0.0)
-        post(("size", DEFAULT_UNITS), 20.0)
+        (gone, also) = before - set(shown._panel._live)
+        for path, value in (("at", 0.0), ("size", 20.0)):
+            shown.post(("at", path, gone), value)
+            shown.post(("at", path, also), value)
         tab.settle()
         assert tab.value("Cut at (cm)") == pytest.approx(20.0)
         assert tab.value("Point size (cm)") == pytest.approx(size / 10)
         assert tab.html.count(">cm</td>") == table
         assert "z: height, cm" in tab.html
         assert re.search(r"<span>[−\d.]+ cm</span>", tab.html), "the legend"
-        assert not re.search(r"[> ]mm\b", tab.html)
+        assert not re.search(r"[> ]mm\b(?! or °)", tab.html), "but for the steps of the pad"
         assert tab.sent("PointCloudMessage") == sent
         assert np.array_equal(tab.points(only_visible=True), seen)
         tab.set("Point size (cm)", 0.8)
