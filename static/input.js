@@ -266,8 +266,7 @@
     // From where the tool is, everything is zero; in the frame above, the present numbers.
     const kind = form().dataset.typed;
     const input = form().querySelector("textarea");
-    const zero = { pose: "0 0 0\n0 0 0", position: "0 0 0", angles: "0 0 0", quaternion: "1 0 0 0" };
-    if (event.target.value) input.value = zero[kind];
+    if (event.target.value) input.value = JSON.parse(form().dataset.none)[kind];
     else openForm(kind);
     input.focus();
   });

@@ -18,7 +18,8 @@ from app.cli.terminal import configuration, quantity, units_of
 from app.exercises.questions import Number
 from app.exercises.typed import EntryError
 from app.viewer.panel.entry import read_cell, read_pose, read_value
-from app.viewer.panel.readout import html, roll_pitch_yaw
+from app.viewer.panel.readout import html
+from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.tabs.program.items import Item
 from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.robot.edits import quantity as quantity_of_cell

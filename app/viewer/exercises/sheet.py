@@ -16,7 +16,7 @@ import numpy as np
 from app.exercises import Verdict
 from app.exercises.contract import LONGEST_PROGRAM
 from app.viewer.panel.entry import read_pose
-from app.viewer.panel.readout import roll_pitch_yaw
+from app.viewer.panel.rotations import roll_pitch_yaw
 from kin import InputError
 from kin.transforms import Array, wxyz_from_rotation
 from kin.typed import LONGEST

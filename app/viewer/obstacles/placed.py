@@ -14,7 +14,7 @@ import numpy as np
 
 import kin
 from app.viewer.own_arm import clean
-from app.viewer.panel.readout import roll_pitch_yaw
+from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.scene.meshes import body
 from kin import InputError, Obstacle, Robot
 from kin.collision.obstacles import LARGEST, MOST_OBSTACLES, SHAPES, SMALLEST, Shape

@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
 from app.exercises.typed import EntryError
-from app.viewer.panel.readout import ANGLES
-from kin import InputError, KinematicsError, Task, from_xyz_rpy
-from kin.transforms import Array, as_transform, frame_from_approach, rotation_from_wxyz
+from app.viewer.panel.rotations import DEFAULT, Notation, Rotations
+from kin import InputError, KinematicsError, Task
+from kin.transforms import Array, as_transform, frame_from_approach
 from kin.typed import ReadError, cut, elements, example, interpret, read, read_element, unit_at_end
 from kin.units import LENGTH_UNITS, PLAIN, Unit, Units, general
 
 PoseKind = Literal["position", "angles", "quaternion", "pose"]
+_UR_POSE = re.compile(r"p\[([^\[\]]*)\]", re.IGNORECASE)  # of a UR arm: metres and radians
 ALONG = "along"  # between a point and a direction
 SHORTEST = 1e-9  # of a direction
 OPPOSITE = -0.999  # cosine of an angle near a half turn
@@ -28,8 +30,6 @@ FARTHEST = 1000.0  # m: the largest coordinate of a target or a camera
 LARGEST = 1e6  # rad or m: a value in a table, as in robot files
 LIKE_METRES = 5.0  # the coordinates of a matrix on a screen in mm or cm look like metres below this
 LIMIT_DIGITS = 2  # decimals of a degree or a millimetre in which limits are shown
-# A quaternion typed with three decimals is normalised; one that is further off was mistyped.
-_NORM_SLACK = 0.01
 # Matrices copied from a screen have few decimals.
 _MATRIX_SLACK = 2e-3
 
@@ -69,13 +69,16 @@ def read_cell(text: str, unit: Unit) -> float:
         ) from None
 
 
-def read_pose(kind: PoseKind, text: str, units: Units, T: Array) -> tuple[Array, Task]:
+def read_pose(
+    kind: PoseKind, text: str, units: Units, T: Array, rotations: Rotations = DEFAULT
+) -> tuple[Array, Task]:
     """A typed target.
 
     Args:
-        kind: what was typed: ``"position"`` x y z, ``"angles"`` roll pitch yaw, ``"quaternion"`` w x y z, or
-            a whole ``"pose"``: 3 numbers (a point), 6 (with roll pitch yaw), 7 (with a quaternion), 12 or 16 (a
-            matrix), or a point, the word *along* and the direction of the tool.
+        kind: what was typed: ``"position"`` x y z, ``"angles"`` such as roll pitch yaw, ``"quaternion"``, or
+            a whole ``"pose"``: 3 numbers (a point), 6 or 7 (with a rotation), 12 or 16 (a matrix), a point, the
+            word *along* and the direction of the tool, or UR's ``p[x, y, z, rx, ry, rz]`` in metres and radians.
+        rotations: how rotations are typed. With axis and angle, 7 numbers are a point, an axis and an angle.
         T: the present target pose ``(4, 4)``; what was not typed is taken from it.
 
     Returns:
@@ -85,22 +88,26 @@ def read_pose(kind: PoseKind, text: str, units: Units, T: Array) -> tuple[Array,
         EntryError: with what is wrong.
     """
     try:
-        return interpret(text, lambda way: _pose(kind, way, units, T.copy()), _same)
+        return interpret(text, lambda way: _pose(kind, way, units, T.copy(), rotations), _same)
     except EntryError:
         raise
     except ReadError as error:
-        detail = error.sentence if error.readings else f"{error.sentence} Valid: {_valid(kind, units)}."
+        detail = error.sentence if error.readings else f"{error.sentence} Valid: {_valid(kind, units, rotations)}."
         raise EntryError("The target was not changed", detail, error.readings) from None
 
 
-def _valid(kind: PoseKind, units: Units) -> str:
+def _valid(kind: PoseKind, units: Units, rotations: Rotations) -> str:
     """What is valid for this kind of target."""
+    turned, quaternion = rotations.notation, rotations.quaternion
+    counts = {3 + len(turned.turns): f"x y z {turned.names}"}
+    counts.setdefault(7, f"x y z and a quaternion {quaternion.names}")
+    listed = ", ".join(f"{count} ({what})" for count, what in counts.items())
     return {
         "position": f"x y z in {units.lengths.name}",
-        "angles": f"roll pitch yaw in {units.angles.name}, with {ANGLES}",
-        "quaternion": "a quaternion w x y z, scalar first",
-        "pose": "3 numbers (x y z, point only), 6 (x y z roll pitch yaw), 7 (x y z and a quaternion w x y z), "
-        "12 or 16 (a 3×4 or 4×4 matrix), or x y z along x y z (a point and the direction of the tool)",
+        "angles": f"{turned.names} in {units.angles.name}, with {turned.definition}",
+        "quaternion": f"a quaternion {quaternion.names}, {quaternion.definition.partition(', ')[2]}",
+        "pose": f"3 numbers (x y z, point only), {listed}, 12 or 16 (a 3×4 or 4×4 matrix), "
+        "p[x, y, z, rx, ry, rz] in m and rad, or x y z along x y z (a point and the direction of the tool)",
     }[kind]
 
 
@@ -108,39 +115,44 @@ def _same(one: tuple[Array, Task], other: tuple[Array, Task]) -> bool:
     return one[1] == other[1] and np.allclose(one[0], other[0], rtol=0.0, atol=1e-12)
 
 
-def _pose(kind: PoseKind, text: str, units: Units, pose: Array) -> tuple[Array, Task]:
+def _pose(kind: PoseKind, text: str, units: Units, pose: Array, rotations: Rotations) -> tuple[Array, Task]:
     """`read_pose` of a text in which a comma only separates; raises `ReadError`."""
-    lengths, angles = [units.lengths] * 3, [units.angles] * 3
+    lengths = [units.lengths] * 3
+    if kind == "pose" and (found := _UR_POSE.fullmatch(text.strip())):
+        text, rotations, units = found[1], Rotations("vector"), Units(degrees=False, length="m")
+        if len(elements(text)) != 6:
+            detail = f"Found {len(elements(text))}. Valid: p[x, y, z, rx, ry, rz] in m and rad."
+            raise EntryError("Six numbers are needed in p[…]", detail)
+        lengths = [units.lengths] * 3
     point, along, direction = text.partition(ALONG)
     if kind == "pose" and along:
         return _approach(elements(point), elements(direction), lengths, pose), "approach"
     if kind == "pose" and (read_matrix := _matrix_text(text)) is not None:
         return _matrix(text, *read_matrix, units), "pose"
     words = elements(text)
-    count = {"position": 3, "angles": 3, "quaternion": 4}.get(kind, len(words))
+    turned, quaternion = rotations.notation, rotations.quaternion
+    count = {"position": 3, "angles": len(turned.turns), "quaternion": 4}.get(kind, len(words))
+    valid = f"Found {len(words)}. Valid: {_valid(kind, units, rotations)}."
     if len(words) != count:
-        raise EntryError(f"{count} numbers are needed here", f"Found {len(words)}. Valid: {_valid(kind, units)}.")
-    if kind == "angles":
-        pose[:3, :3] = from_xyz_rpy(np.zeros(3), _values(words, angles))[:3, :3]
+        raise EntryError(f"{count} numbers are needed here", valid)
+    if kind in ("angles", "quaternion"):
+        typed = turned if kind == "angles" else quaternion
+        pose[:3, :3] = typed.matrix(_values(words, _units_of(typed, units)))
         return pose, "pose"
-    if kind == "quaternion":
-        pose[:3, :3] = _rotation(_values(words, [PLAIN] * 4))
-        return pose, "pose"
-    match len(words):
-        case 3:
-            pose[:3, 3] = _position(_values(words, lengths))
-            return pose, "position" if kind == "pose" else "pose"
-        case 6:
-            values = _values(words, lengths + angles)
-            pose[:3, :3] = from_xyz_rpy(np.zeros(3), values[3:])[:3, :3]
-        case 7:
-            values = _values(words, [*lengths, *[PLAIN] * 4])
-            pose[:3, :3] = _rotation(values[3:])
-        case found:
-            detail = f"Found {found}. Valid: {_valid(kind, units)}."
-            raise EntryError("The target needs another count of numbers", detail)
+    if len(words) == 3:
+        pose[:3, 3] = _position(_values(words, lengths))
+        return pose, "position" if kind == "pose" else "pose"
+    written = next((each for each in (turned, quaternion) if len(words) == 3 + len(each.turns)), None)
+    if written is None:
+        raise EntryError("The target needs another count of numbers", valid)
+    values = _values(words, lengths + _units_of(written, units))
+    pose[:3, :3] = written.matrix(values[3:])
     pose[:3, 3] = _position(values[:3])
     return pose, "pose"
+
+
+def _units_of(notation: Notation, units: Units) -> list[Unit]:
+    return [units.angles if turn else PLAIN for turn in notation.turns]
 
 
 def _values(words: Sequence[str], units: Sequence[Unit]) -> list[float]:
@@ -202,13 +214,6 @@ def _position(values: list[float]) -> Array:
 def _check_distance(position: Array) -> None:
     if np.abs(position).max() > FARTHEST:
         raise EntryError("The target is too far away", f"Coordinates are valid up to {FARTHEST:g} m.")
-
-
-def _rotation(wxyz: list[float]) -> Array:
-    norm = math.hypot(*wxyz)
-    if abs(norm - 1.0) > _NORM_SLACK:
-        raise EntryError("Not a unit quaternion", f"The norm of w x y z is {norm:.4g}; valid is 1.")
-    return rotation_from_wxyz(np.array(wxyz))
 
 
 def _matrix_text(text: str) -> tuple[list[str], str] | None:

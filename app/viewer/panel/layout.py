@@ -16,7 +16,7 @@ from app.viewer.panel.script import PageScript
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.target import DEFAULT_TASK, TargetChoice
-from app.viewer.panel.view import AVOID_HINT, ColourChoice, UnitChoice, ViewOptions, ViewState
+from app.viewer.panel.view import AVOID_HINT, ColourChoice, RotationChoice, UnitChoice, ViewOptions, ViewState
 from app.viewer.views.templates import render
 from kin import Robot, fk
 from kin.units import Units
@@ -85,6 +85,7 @@ class Panel:
                     self.robots.add_field(gui, post)
         with group.add_tab("View"):
             self.units = UnitChoice(gui, units, post)
+            self.rotations = RotationChoice(gui, view.rotations, post)
             self.colours.build(view.dark)
             self.view = ViewOptions(gui, view, detailed, post)
             with gui.add_folder("Share"):

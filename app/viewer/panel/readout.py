@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Collection, Sequence
 
@@ -9,56 +10,56 @@ import viser
 
 from app.viewer.frames import TITLES, Frames
 from app.viewer.panel import update_html
+from app.viewer.panel.rotations import DEFAULT, Notation, Rotations
 from app.viewer.views.templates import render
 from app.viewer.viser_patches import show_content
 from kin.frames import WORLD
-from kin.transforms import Array, wxyz_from_rotation
-from kin.units import Units, fixed
-
-ANGLES = "R = Rz(yaw)·Ry(pitch)·Rx(roll)"
-
-
-def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
-    """Angles in radians with ``R = Rz(yaw) Ry(pitch) Rx(roll)``; roll is 0 where pitch is ±90°."""
-    level = math.hypot(R[0, 0], R[1, 0])
-    pitch = math.atan2(-R[2, 0], level)
-    if level < 1e-9:
-        return 0.0, pitch, math.atan2(-R[0, 1], R[1, 1])
-    return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
+from kin.transforms import Array
+from kin.units import Unit, Units, fixed
 
 
 def html(
     T_frame_tool: Array, units: Units, T_frame_target: Array | None = None, frame: str = WORLD,
-    withheld: Collection[str] = (),
+    withheld: Collection[str] = (), rotations: Rotations = DEFAULT,
 ) -> str:  # fmt: skip
-    """Position, roll/pitch/yaw and quaternion of a pose ``(4, 4)`` as a small table.
+    """Position, angles such as roll, pitch, yaw, and quaternion of a pose ``(4, 4)`` as a small table.
 
     Args:
         T_frame_target: a target that the tool has missed, from which the form for a typed target starts.
         frame: name of the frame in which both are.
         withheld: rows that an open question asks for: position, angles, quaternion.
+        rotations: how rotations are written.
     """
     lengths, angles = units.lengths, units.angles
     titles = (
         ("position", "x y z", f"Tool point in the frame {frame}", lengths.name),
-        ("angles", "roll pitch yaw", ANGLES, angles.name),
-        ("quaternion", "w x y z", "Quaternion, scalar first", ""),
+        ("angles", rotations.notation.names, rotations.notation.definition, angles.name),
+        ("quaternion", rotations.quaternion.names, rotations.quaternion.definition, ""),
     )
-    tool = _parts(T_frame_tool, units)
-    target: Sequence[Sequence[str]] = ((),) * 3 if T_frame_target is None else _parts(T_frame_target, units)
+    tool = _parts(T_frame_tool, units, rotations)
+    target: Sequence[Sequence[str]] = (
+        ((),) * 3 if T_frame_target is None else _parts(T_frame_target, units, rotations)
+    )
     rows = [(*title, numbers, wanted) for title, numbers, wanted in zip(titles, tool, target, strict=True)]
     return render("panel/readout", rows=rows, frame=frame, withheld=withheld)
 
 
-def _parts(T: Array, units: Units) -> tuple[list[str], list[str], list[str]]:
-    """Position, roll-pitch-yaw and quaternion of a pose as texts."""
-    lengths, angles = units.lengths, units.angles
-    turned = [angles.scale * _half_turn_positive(a) for a in roll_pitch_yaw(T[:3, :3])]
+def _parts(T: Array, units: Units, rotations: Rotations) -> tuple[list[str], list[str], list[str]]:
+    """Position and both notations of the rotation of a pose as texts."""
+    lengths = units.lengths
     return (
         _numbers((lengths.scale * T[:3, 3]).tolist(), lengths.decimals(1)),
-        _numbers(turned, angles.decimals(1)),
-        _numbers(wxyz_from_rotation(T[:3, :3]).tolist(), 3),
+        _turned(T[:3, :3], rotations.notation, units.angles),
+        _turned(T[:3, :3], rotations.quaternion, units.angles),
     )
+
+
+def _turned(R: Array, notation: Notation, angles: Unit) -> list[str]:
+    pairs = zip(notation.values(R), notation.turns, strict=True)
+    return [
+        fixed(angles.scale * _half_turn_positive(value), angles.decimals(1)) if turn else fixed(value, 3)
+        for value, turn in pairs
+    ]
 
 
 def _half_turn_positive(angle: float) -> float:
@@ -76,7 +77,22 @@ class PoseReadout:
     def __init__(self, gui: viser.GuiApi, T_world_tool: Array, units: Units) -> None:
         self._choice = gui.add_html("")
         self._html = gui.add_html(html(T_world_tool, units))
-        gui.add_html(render("panel/typed_target"))
+        self._form = gui.add_html("")
+        self.use_rotations(DEFAULT)
+
+    def use_rotations(self, rotations: Rotations) -> None:
+        """Write rotations in these notations from the next pose on, and ask for them in the form."""
+        self._rotations = rotations
+        turned, quaternion = rotations.notation, rotations.quaternion
+        none = {
+            "pose": f"0 0 0\n{turned.none}",
+            "position": "0 0 0",
+            "angles": turned.none,
+            "quaternion": quaternion.none,
+        }
+        both = len(turned.turns) != len(quaternion.turns)
+        form = render("panel/typed_target", turned=turned, quaternion=quaternion, both=both, none=json.dumps(none))
+        update_html(self._form, form)
 
     def show_frames(self, frames: Frames) -> None:
         """Offer the frames of the page."""
@@ -88,4 +104,4 @@ class PoseReadout:
         withheld: Collection[str] = (),
     ) -> None:  # fmt: skip
         """Replace the numbers; see `html`."""
-        show_content(self._html, html(T, units, target, frame, withheld))
+        show_content(self._html, html(T, units, target, frame, withheld, self._rotations))

@@ -10,6 +10,7 @@ import viser
 
 from app.viewer.labels import TEXT_SIZES
 from app.viewer.panel import Post, assign, listen, listen_click
+from app.viewer.panel.rotations import ANGLES, QUATERNIONS, Rotations
 from app.viewer.views.templates import render
 from kin import InputError, Robot
 from kin.units import LENGTHS, Length, Units
@@ -49,6 +50,7 @@ class ViewState:
         look: how an arm is drawn of which there is a body.
         detailed: whether the body is that of an installed package, for arms of which there is one.
         avoid: whether the arm is moved to targets without touching itself or an obstacle.
+        angles, quaternions: how rotations are written and typed: keys of `ANGLES` and `QUATERNIONS`.
     """
 
     frames: bool = False
@@ -59,6 +61,13 @@ class ViewState:
     look: Look = "body"
     detailed: bool = False
     avoid: bool = False
+    angles: str = "rpy"
+    quaternions: str = "wxyz"
+
+    @property
+    def rotations(self) -> Rotations:
+        """The notations of rotations."""
+        return Rotations(self.angles, self.quaternions)
 
 
 class UnitChoice:
@@ -87,6 +96,34 @@ class UnitChoice:
             raise InputError("lengths", value, "one of " + ", ".join(LENGTHS))
         self._length = value
         return replace(units, length=self._length)
+
+
+class RotationChoice:
+    """Posts ``("rotations", "angles")`` and ``("rotations", "quaternions")``."""
+
+    def __init__(self, gui: viser.GuiApi, rotations: Rotations, post: Post) -> None:
+        hint = "How rotations are written in the read-out, and typed in a target"
+        self._tables = {"angles": ANGLES, "quaternions": QUATERNIONS}
+        self._menus: dict[str, viser.GuiDropdownHandle[str]] = {}
+        for name, label in (("angles", "Rotations"), ("quaternions", "Quaternions")):
+            titles = tuple(each.title for each in self._tables[name].values())
+            chosen = self._tables[name][getattr(rotations, name)].title
+            self._menus[name] = gui.add_dropdown(label, titles, initial_value=chosen, hint=hint)
+            listen(self._menus[name], post, ("rotations", name))
+
+    def show(self, rotations: Rotations) -> None:
+        """Show these notations."""
+        for name, menu in self._menus.items():
+            assign(menu, self._tables[name][getattr(rotations, name)].title)
+
+    def read(self, name: str, value: object, before: Rotations) -> str:
+        """A choice as a field of `ViewState`; an unknown one raises `InputError`, and `before` is shown again."""
+        table = self._tables[name]
+        found = next((key for key, notation in table.items() if notation.title == value), None)
+        if found is None:
+            self.show(before)
+            raise InputError(name, value, "one of " + ", ".join(each.title for each in table.values()))
+        return found
 
 
 class ViewOptions:

@@ -68,6 +68,7 @@ RULES: Final[dict[str, Rule]] = {
     # The looks of the page, and the camera
     "radians": Rule("Unit of angles"),
     "lengths": Rule("Unit of lengths"),
+    "rotations": Rule("How rotations are written"),
     "view": Rule("View"),
     "look": Rule("Show arm as"),
     "colours": Rule("Page colours"),

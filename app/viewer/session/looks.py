@@ -86,6 +86,10 @@ class Looks:
         if view.detailed != page.bodies.detailed:
             page.bodies.detailed, page.bodies.last_refusal = view.detailed, ""
             self.redraw_body()
+        if view.rotations != before.rotations:
+            page.panel.rotations.show(view.rotations)
+            page.panel.readout.use_rotations(view.rotations)
+            page.numbers.use_pose()
         self.apply()
 
     def redraw_body(self) -> None:

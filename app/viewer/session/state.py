@@ -28,6 +28,7 @@ from app.viewer.obstacles import placed
 from app.viewer.obstacles.placed import Obstacles
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.entry import FARTHEST
+from app.viewer.panel.rotations import ANGLES, QUATERNIONS
 from app.viewer.panel.script import read_json
 from app.viewer.panel.view import LOOKS, ViewState
 from app.viewer.scene.viewpoints import UP
@@ -324,8 +325,10 @@ def _units(data: dict[str, Any]) -> Units:
 
 def _view(value: object) -> ViewState:
     options = value if isinstance(value, dict) else {}
-    flags = {name: options[name] for name in vars(FRESH) if name != "look" and isinstance(options.get(name), bool)}
-    return ViewState(**flags, look=next((look for look in LOOKS if look == options.get("look")), FRESH.look))
+    chosen = {name: options[name] for name in vars(FRESH) if isinstance(options.get(name), bool)}
+    for name, valid in (("look", LOOKS), ("angles", ANGLES), ("quaternions", QUATERNIONS)):
+        chosen[name] = next((each for each in valid if each == options.get(name)), getattr(FRESH, name))
+    return ViewState(**chosen)
 
 
 def _features(value: object) -> dict[str, dict[str, object]]:

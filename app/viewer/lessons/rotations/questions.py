@@ -22,7 +22,7 @@ from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.rotations.check import CHECK
 from app.viewer.lessons.rotations.conventions import PAGE, Convention, axis_angle
 from app.viewer.lessons.rotations.frames import Motion, as_json
-from app.viewer.panel.readout import ANGLES
+from app.viewer.panel.rotations import RPY
 from app.viewer.scene.chain import rotation
 from kin import Robot, fk
 from kin.axes import inverse
@@ -193,7 +193,7 @@ def _same() -> Step:
             0,
         ),
         "So 24 conventions make 12 pairs. Roll pitch yaw is such a name: in Kinboard it is X-Y-Z "
-        f"fixed, {ANGLES}.",
+        f"fixed, {RPY.definition}.",
     )
 
 
@@ -202,7 +202,7 @@ def _pitch(T: Array, pose: Pose, units: Units) -> Step:
     _, pitch, _ = PAGE.angles(R)
     return Step(
         "Roll pitch yaw",
-        f"In Kinboard’s convention, {ANGLES}, the entry r₃₁ is −sin(pitch). For the tool, r₃₁ = "
+        f"In Kinboard’s convention, {RPY.definition}, the entry r₃₁ is −sin(pitch). For the tool, r₃₁ = "
         f"{fixed(float(R[2, 0]))}.",
         apart(
             Number(
@@ -312,7 +312,8 @@ def _lock(start: Configuration, units: Units) -> Step:
     quarter_turn = units.angles.brief(math.pi / 2)
     return Step(
         "Gimbal lock",
-        f"In Kinboard’s convention, {ANGLES}, the 1st and the 3rd axis coincide at a pitch of {quarter_turn}.",
+        f"In Kinboard’s convention, {RPY.definition}, the 1st and the 3rd axis coincide at a pitch of "
+        f"{quarter_turn}.",
         one_right(
             "What is lost there?",
             (

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from app.viewer.lessons.rotations.conventions import LOCKED, NEAR, PAGE, Angles, Convention, axis_angle
 from app.viewer.lessons.rotations.frames import Motion, factors, places, swapped
-from app.viewer.panel.readout import ANGLES
+from app.viewer.panel.rotations import RPY
 from app.viewer.views.mathml import ident, number, op, row, sub, text
 from app.viewer.views.mathml import math as formula
 from app.viewer.views.mathml import matrix as matrix_of
@@ -75,7 +75,7 @@ def rotation_html(convention: Convention, angles: Angles, units: Units) -> str:
         ("Other angles", f"{triple(convention.other(angles), units)}, the same convention"),
         ("Axis and angle", f"({', '.join(fixed(v) for v in axis.tolist())}), {units.angles.text(turned)}"),
         ("Quaternion w x y z", ", ".join(fixed(v) for v in wxyz.tolist())),
-        ("Roll pitch yaw", f"{triple(page, units)}, as everywhere on this page: {ANGLES}"),
+        ("Roll pitch yaw", f"{triple(page, units)}, as everywhere on this page: {RPY.definition}"),
     ]
     if convention.room(angles) < LOCKED:
         rows[1] = ("Other angles", "infinitely many: only the sum or difference of α and γ counts")

@@ -29,6 +29,7 @@ class LookControls:
             "copy-as": lambda name: page.panel.share.choose(name),
             "view": self._on_view,
             "look": self._on_drawn_as,
+            "rotations": self._on_rotations,
             "body": looks.use_library,
             "colours": self._on_colours,
             "system-dark": lambda dark: looks.use_colours(page.view.dark, bool(dark)),
@@ -65,6 +66,13 @@ class LookControls:
     def _on_drawn_as(self, name: object) -> None:
         page = self._page
         page.looks.use_view(replace(page.view, look=page.panel.view.read_look(name, page.view.look)))
+
+    def _on_rotations(self, name: str, value: object) -> None:
+        page = self._page
+        chosen = page.panel.rotations.read(name, value, page.view.rotations)
+        view = replace(page.view)
+        setattr(view, name, chosen)
+        page.looks.use_view(view)
 
     def _on_view(self, name: str, value: object) -> None:
         view = replace(self._page.view)

@@ -73,7 +73,7 @@ class TypedInput:
         tool = kin.fk(page.now.robot, arm.goal)
         frame = page.frames.pose(page.now.robot, arm.goal, relative)
         present = inverse(frame) @ (tool if relative or arm.target is None else arm.target)
-        T, given = read_pose(kind, text, page.units, present)
+        T, given = read_pose(kind, text, page.units, present, page.view.rotations)
         T = frame @ T
         arm.target = None  # a changed task must not solve for the target of before
         if given != "pose" and page.now.task != given:

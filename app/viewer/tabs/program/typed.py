@@ -12,7 +12,7 @@ import kin
 from app.exercises.typed import EntryError
 from app.viewer.own_arm import clean
 from app.viewer.panel.entry import PoseKind, read_pose, read_value
-from app.viewer.panel.readout import roll_pitch_yaw
+from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.tabs.program.items import NAME, Item, configuration, point
 from kin import InputError, Robot, Task
 from kin.axes import inverse

@@ -14,7 +14,7 @@ import kin
 from app.viewer.meshes.links import capsules_for
 from app.viewer.own_arm import NAME, OF_MAKER, OwnArm, own_arm
 from app.viewer.panel.entry import read_cell
-from app.viewer.panel.readout import roll_pitch_yaw
+from app.viewer.panel.rotations import roll_pitch_yaw
 from kin import InputError, KinematicsError, Robot, RobotFileError
 from kin.robot import PEAK_FIELDS
 from kin.typed import ReadError, cut

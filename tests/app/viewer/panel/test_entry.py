@@ -14,7 +14,7 @@ import kin
 from app.exercises.typed import EntryError
 from app.viewer.panel.entry import read_pose, read_value
 from app.viewer.panel.fields import shown
-from app.viewer.panel.readout import roll_pitch_yaw
+from app.viewer.panel.rotations import roll_pitch_yaw
 from kin.transforms import wxyz_from_rotation
 from kin.units import Units
 

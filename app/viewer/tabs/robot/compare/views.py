@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
-from app.viewer.panel.readout import roll_pitch_yaw
+from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.panel.share import box_html
 from app.viewer.tabs.robot.compare.reference import Reference
 from app.viewer.tabs.robot.files import MOST

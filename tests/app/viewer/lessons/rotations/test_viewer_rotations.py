@@ -26,7 +26,7 @@ from app.viewer.lessons.rotations import questions, views
 from app.viewer.lessons.rotations.conventions import CONVENTIONS, PAGE, Angles, Convention, axis_angle
 from app.viewer.lessons.rotations.frames import MOST, Motion, as_json, factors, from_json, places, swapped
 from app.viewer.lessons.rotations.typed import read_rotation
-from app.viewer.panel.readout import roll_pitch_yaw
+from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.server import ViewerServer
 from kin import InputError, Robot
 from kin.transforms import from_position_wxyz

@@ -1,0 +1,119 @@
+"""Notations of rotations: compared with SciPy, read back, and typed as targets."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from scipy.spatial.transform import Rotation
+
+import kin
+from app.exercises.typed import EntryError
+from app.viewer.panel.entry import read_pose
+from app.viewer.panel.rotations import ANGLES, QUATERNIONS, Notation, Rotations
+from app.viewer.session.state import decode, encode
+from kin.units import Units
+
+RANDOM = Rotation.random(200, rng=np.random.default_rng(7)).as_matrix()
+SPECIAL = np.array(
+    [
+        Rotation.from_euler(axes, angles, degrees=True).as_matrix()
+        for axes, angles in (("ZYX", (30, 90, 0)), ("ZYX", (0, 0, 180)), ("ZYZ", (40, 0, 0)), ("ZYZ", (40, 180, 0)), ("X", 0))
+    ]
+)  # fmt: skip
+SCIPY = {
+    "roll pitch yaw": lambda v: Rotation.from_euler("xyz", v),
+    "Euler Z-Y-Z": lambda v: Rotation.from_euler("ZYZ", v),
+    "axis and angle": lambda v: Rotation.from_rotvec(np.array(v[:3]) * v[3]),
+    "rotation vector": Rotation.from_rotvec,
+    "w x y z": lambda v: Rotation.from_quat(v, scalar_first=True),
+    "x y z w": Rotation.from_quat,
+}
+NOTATIONS = [*ANGLES.values(), *QUATERNIONS.values()]
+each_notation = pytest.mark.parametrize("notation", NOTATIONS, ids=[each.title for each in NOTATIONS])
+
+
+@each_notation
+def test_the_numbers_are_those_of_scipy_and_are_read_back(notation: Notation) -> None:
+    for R in (*RANDOM, *SPECIAL):
+        values = notation.values(R)
+        assert len(values) == len(notation.turns) == len(notation.names.split())
+        assert np.allclose(SCIPY[notation.title](values).as_matrix(), R, atol=1e-12)
+        assert np.allclose(notation.matrix(values), R, atol=1e-12)
+
+
+@each_notation
+def test_no_rotation_is_typed_as_none(notation: Notation) -> None:
+    assert np.allclose(notation.matrix([float(word) for word in notation.none.split()]), np.eye(3), atol=1e-15)
+
+
+@pytest.mark.parametrize("angles", ANGLES)
+@pytest.mark.parametrize("units", [Units(), Units(degrees=False, length="m")])
+def test_a_pose_is_typed_as_it_is_shown(angles: str, units: Units) -> None:
+    rotations = Rotations(angles, "xyzw")
+    for R in RANDOM[:20]:
+        for notation in (rotations.notation, rotations.quaternion):
+            words = [
+                repr(value * units.angles.scale if turn else value)
+                for value, turn in zip(notation.values(R), notation.turns, strict=True)
+            ]
+            if notation is rotations.quaternion and len(rotations.notation.turns) == 4:
+                T, _ = read_pose("quaternion", " ".join(words), units, np.eye(4), rotations)
+            else:
+                T, given = read_pose("pose", " ".join(("100", "0", "-20", *words)), units, np.eye(4), rotations)
+                assert given == "pose"
+                assert np.allclose(T[:3, 3] * units.lengths.scale, (100.0, 0.0, -20.0))
+            assert np.allclose(T[:3, :3], R, atol=1e-12)
+
+
+def test_a_pose_of_a_ur_arm_is_in_metres_and_radians_whatever_is_on_screen() -> None:
+    T, given = read_pose("pose", " p[0.3, -0.2, 0.45, 0, 3.1415926535, 0]", Units(), np.eye(4))
+    assert given == "pose"
+    assert np.allclose(T[:3, 3], (0.3, -0.2, 0.45))
+    assert np.allclose(T[:3, :3], np.diag([-1.0, 1.0, -1.0]), atol=1e-9)
+    with pytest.raises(EntryError, match=r"Six numbers are needed in p\[…\]"):
+        read_pose("pose", "p[1, 2, 3]", Units(), np.eye(4))
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "rotations", "why"),
+    [
+        ("angles", "0 0 0 30", Rotations("axis"), "The axis has no length"),
+        ("angles", "1 0 0", Rotations("axis"), "4 numbers are needed here"),
+        ("quaternion", "1 1 0 0", Rotations("rpy", "xyzw"), "Not a unit quaternion"),
+        ("pose", "1 2 3 4 5", Rotations("zyz"), "The target needs another count of numbers"),
+        ("angles", "1 2 nan", Rotations("vector"), "The target was not changed"),
+    ],
+)
+def test_what_is_wrong_is_said(kind: str, text: str, rotations: Rotations, why: str) -> None:
+    with pytest.raises(EntryError) as caught:
+        read_pose(kind, text, Units(), np.eye(4), rotations)  # type: ignore[arg-type]
+    assert caught.value.title == why
+
+
+def test_the_page_writes_and_reads_the_chosen_notation(port: int) -> None:
+    ur5 = kin.get_robot("ur5")
+    with FakeBrowser(port) as tab:
+        tab.choose(ur5.name)
+        tab.set("Rotations", "rotation vector")
+        tab.set("Quaternions", "x y z w")
+        tab.settle()
+        assert "rx ry rz" in tab.html
+        assert "x y z w" in tab.html
+        tab.say("target", ["pose", "300 -200 400 0 90 0"])
+        T = np.eye(4)
+        T[:3, :3] = Rotation.from_rotvec([0.0, math.pi / 2, 0.0]).as_matrix()
+        T[:3, 3] = 0.3, -0.2, 0.4
+        tab.wait(lambda: np.allclose(tab.tool_pose(), T, atol=1e-6))
+        tab.settle()
+        tab.settle(0.8)
+        state = decode(tab.kept[-1], (ur5,))
+        assert state.view.rotations == Rotations("vector", "xyzw")
+        assert decode(encode(state), (ur5,)).view == state.view
+        tab.say("undo")
+        tab.say("undo")
+        tab.say("undo")
+        tab.settle()
+        assert "roll pitch yaw" in tab.html
