@@ -17,12 +17,8 @@ from app.viewer.session.state import decode, encode
 from kin.units import Units
 
 RANDOM = Rotation.random(200, rng=np.random.default_rng(7)).as_matrix()
-SPECIAL = np.array(
-    [
-        Rotation.from_euler(axes, angles, degrees=True).as_matrix()
-        for axes, angles in (("ZYX", (30, 90, 0)), ("ZYX", (0, 0, 180)), ("ZYZ", (40, 0, 0)), ("ZYZ", (40, 180, 0)), ("X", 0))
-    ]
-)  # fmt: skip
+SINGULAR = (("ZYX", (30, 90, 0)), ("ZYX", (0, 0, 180)), ("ZYZ", (40, 0, 0)), ("ZYZ", (40, 180, 0)), ("X", 0))
+SPECIAL = np.array([Rotation.from_euler(axes, angles, degrees=True).as_matrix() for axes, angles in SINGULAR])
 SCIPY = {
     "roll pitch yaw": lambda v: Rotation.from_euler("xyz", v),
     "Euler Z-Y-Z": lambda v: Rotation.from_euler("ZYZ", v),
