@@ -52,11 +52,14 @@ def move_row(task: Task, value: float, most: float, y: Array, p: Point) -> bool:
 
 
 @jit
-def _chosen(arcs: Array, k: int, wanted: float, circular: bool) -> tuple[int, float]:
-    """(interval, value) of branch k nearest to the wanted value: that, or slightly inside an end; −1 if none."""
+def _chosen(arcs: Array, k: int, wanted: float, circular: bool, tried: Array) -> tuple[int, float]:
+    """(interval, value) of branch k nearest to the wanted value: that, or slightly inside an end; −1 if none.
+
+    tried: ``(m,)`` 1.0 for intervals that do not count.
+    """
     best, value, least = -1, math.nan, math.inf
     for i in range(arcs.shape[0]):
-        if arcs[i, 0] != k:
+        if arcs[i, 0] != k or tried[i] > 0.0:
             continue
         low, high = arcs[i, 1], arcs[i, 2]
         inset = min(_INSET, 0.5 * (high - low))
@@ -113,14 +116,22 @@ def choose_rows(
         arcs, places: intervals ``(m, 3)`` and their postures ``(m, 3, 7)``.
     """
     task, wanted, most, box = task_of(model, T, setting), setting[WANTED], setting[MOST], (limits[0], limits[1])
-    p, y, missed = new_point(), np.empty(7), 0
+    p, y, missed, tried = new_point(), np.empty(7), 0, np.empty(arcs.shape[0])
     for k in range(rows.shape[0]):
         row, value = rows[k, :7], rows[k, 7]
         there = not math.isnan(row[0])
         aim = value if math.isnan(wanted) else wanted
-        i, chosen = _chosen(arcs, k, 0.0 if math.isnan(aim) else aim, task.joint < 0)
+        aim = 0.0 if math.isnan(aim) else aim
+        tried[:] = 0.0
+        i, chosen = _chosen(arcs, k, aim, task.joint < 0, tried)
         if i >= 0:
-            met, value = _row_in(task, box, chosen, row, places[i], y, p), chosen
+            met = False
+            # The middle of one interval may have crossed to another branch: then the next one counts.
+            while i >= 0 and not met:
+                met, value = _row_in(task, box, chosen, row, places[i], y, p), chosen
+                tried[i] = 1.0
+                if not met:
+                    i, chosen = _chosen(arcs, k, aim, task.joint < 0, tried)
         elif there:
             for c in range(7):
                 y[c] = row[c]

@@ -215,3 +215,19 @@ def test_no_posture_is_missing_of_many_targets(name):
     found = Judge(name).count(TARGETS, seed=1)
     print(name, dict(found))
     assert found["posture"] == found["branch"] == found["false"] == 0
+
+
+@pytest.mark.parametrize("name", ["panda 1.57", "panda 1.571"])
+def test_a_branch_is_kept_whose_interval_ends_where_another_one_begins(name):
+    """The middle of one of its two intervals is beyond the fold, on the other branch."""
+    robot, exact = arm_named(name)
+    q = np.array((-1.140407242, -0.163947841, -2.120581981, -1.861654815, -1.718358262, 0.971421293, 1.450763132))
+    T = kin.fk(robot, q)
+    found = kin.solve_ik(robot, T)
+    assert {s.branch for s in found.solutions} == {s.branch for s in kin.solve_ik(exact, T).solutions}
+    assert len(found.solutions) == 4
+    for solution in found.solutions:
+        assert np.abs(kin.fk(robot, solution.q) - T).max() < 1e-9
+        (low, high), *_ = solution.redundancy[0].intervals
+        assert low - 1e-3 <= solution.redundancy[0].value
+        assert high - low > 0.4
