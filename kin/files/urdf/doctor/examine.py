@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,24 +69,12 @@ def examine_urdf(
         raise InputError("source", source, "the text of a URDF as str, or the Path of a file")
     file = file or (str(source) if isinstance(source, Path) else "URDF")
     text = source if isinstance(source, str) else decoded(_content(source), file)
-    first = _examined(text, base, tip, file, files)
+    look = partial(_examined, base=base, tip=tip, file=file, files=files)
+    first = look(text)
     chosen = _chosen(first.found.findings, mends)
-    places = {first.found.findings[i].place for i in chosen}
-    left = {_key(each) for i, each in enumerate(first.found.findings) if each.automatic and i not in chosen}
-
-    def uncovered(_: int, each: UrdfFinding | None) -> bool:
-        """Whether a finding that a mend has uncovered is mended."""
-        return mends is None or (each is not None and each.place in places and _key(each) not in left)
-
-    mended = after = first.changed(lambda i, _: mends is None or i in chosen)
-    for _ in range(_ROUNDS - 1):
-        if after is None:
-            break
-        mended = after
-        after = _examined(mended, base, tip, file, files).changed(uncovered)
-    mended = after or mended
     findings = tuple(replace(each, done=i in chosen) for i, each in enumerate(first.found.findings))
     found = replace(first.found, findings=findings)
+    mended = _mended(first, look, None if mends is None else chosen)
     if mended is None:
         return found
     try:
@@ -93,6 +82,24 @@ def examine_urdf(
     except RobotFileError:
         arm = None
     return replace(found, mended=mended, mended_arm=arm, moved=_moved(found.arm, arm))
+
+
+def _mended(first: _Round, look: Callable[[str], _Round], chosen: set[int] | None) -> str | None:
+    """The text with these findings mended (None: all), and with what that uncovers; None if nothing changes."""
+    findings = first.found.findings
+    places = {findings[i].place for i in chosen or ()}
+    left = {_key(each) for i, each in enumerate(findings) if each.automatic and i not in (chosen or ())}
+
+    def uncovered(_: int, each: UrdfFinding | None) -> bool:
+        return chosen is None or (each is not None and each.place in places and _key(each) not in left)
+
+    mended = after = first.changed(lambda i, _: chosen is None or i in chosen)
+    for _ in range(_ROUNDS - 1):
+        if after is None:
+            break
+        mended = after
+        after = look(mended).changed(uncovered)
+    return after or mended
 
 
 def _key(each: UrdfFinding) -> tuple[str, Symptom]:
