@@ -10,9 +10,10 @@ from kin.comparison.results import Change, Comparison, Difference, Explanation
 from kin.comparison.tables import COLUMNS
 from kin.robot import Robot
 from kin.transforms import Array
-from kin.units import DEFAULT_UNITS, Units
+from kin.units import DEFAULT_UNITS, Unit, Units
 
 _SYMBOLS = dict(zip(COLUMNS, ("θ", "d", "a", "α"), strict=True))
+_MOST_DIGITS = 6  # decimals of a degree or a millimetre
 Names = tuple[str, str]  # how a sentence calls the arms a and b
 NAMES: Names = ("a", "b")
 
@@ -81,7 +82,7 @@ def difference(found: Difference, a: Robot, b: Robot, units: Units = DEFAULT_UNI
     if found.quantity == "direction":
         return f"the axis of joint {found.joints[0] + 1} lies differently relative to those before it"
     unit = units.of(found.quantity == "twist")
-    in_a, in_b = (unit.value(float(value or 0.0)) for value in (found.in_a, found.in_b))
+    in_a, in_b = _distinct_texts(float(found.in_a or 0.0), float(found.in_b or 0.0), unit)
     if found.quantity == "offset":
         joint = found.joints[0] + 1
         normals = f"along the axis of joint {joint}, its two common normals"
@@ -89,6 +90,16 @@ def difference(found: Difference, a: Robot, b: Robot, units: Units = DEFAULT_UNI
     first, second = (joint + 1 for joint in found.joints)
     what = "at an angle of" if found.quantity == "twist" else "at a distance of"
     return f"the axes of joints {first} and {second} are {what} {in_a} in {one} and {in_b} in {other}"
+
+
+def _distinct_texts(one: float, other: float, unit: Unit) -> tuple[str, str]:
+    """Two values with as many decimals as tell them apart, one at least."""
+    texts = unit.text(one), unit.text(other)
+    for digits in range(2, _MOST_DIGITS + 1):
+        if abs(one - other) * unit.scale >= 10.0 ** (1 - unit.decimals(digits)):
+            break
+        texts = unit.text(one, digits), unit.text(other, digits)
+    return texts
 
 
 def explanation(found: Explanation, a: Robot, b: Robot, units: Units = DEFAULT_UNITS) -> str:

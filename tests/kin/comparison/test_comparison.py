@@ -328,3 +328,14 @@ def test_a_fixed_row_of_several_that_was_left_out_is_named(place: int, name: str
     assert [(change.mistake, change.rows) for change in first.changes] == [("missing row", (missing,))]
     q = a.random_q(np.random.default_rng(1), 30)
     assert np.allclose(kin.fk(first.robot, q), kin.fk(a, q), atol=1e-9)
+
+
+def test_numbers_that_differ_are_written_differently():
+    a, b = kin.get_robot("ur5"), kin.get_robot("ur5")
+    b = replace(b, rows=(b.rows[0], replace(b.rows[1], a=b.rows[1].a + 4e-5), *b.rows[2:]))
+    first = kin.compare(a, b, explain=False).first
+    assert first is not None
+    said = messages.difference(first, a, b, names=("the book", "the table"))
+    assert (
+        said == "the axes of joints 2 and 3 are at a distance of 425.00 mm in the book and 424.96 mm in the table"
+    )
