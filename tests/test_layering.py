@@ -37,7 +37,7 @@ RULES: dict[str, set[str]] = {
     "kin/path": {"numpy", "kin.collision", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL},
     "kin/motion": {
         *("numpy", "kin.collision", "kin.files", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", "kin.motion"),
-        *MODEL,
+        *("kin.frames", *MODEL),
     },
     "kin/way": {"numpy", "ompl", "kin.collision", "kin.ik", "kin.motion", "kin.way", *MODEL},
     # It looks the service up by name when it is called.

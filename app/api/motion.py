@@ -11,6 +11,7 @@ from fastapi import Request, Response
 from pydantic import Field
 
 from app.api import schemas
+from app.api.arms.frames import WorkpiecesBody
 from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
@@ -59,11 +60,12 @@ EXAMPLES = {
 }
 
 
-class MotionRequest(AvoidingBody):
+class MotionRequest(AvoidingBody, WorkpiecesBody):
     """What the arm should do, and how the motion is answered."""
 
     program: Annotated[dict[str, Any], DescribedBy(ProgramBody)] = Field(
-        description="The segments of the motion. Poses are those of the tool in the world frame."
+        description="The segments of the motion. Poses are those of the tool in the world frame, or in the "
+        "`frame` that a segment or a point names: base, or one of `workpieces`."
     )
     q_start: Configuration | None = Field(
         None,
@@ -135,7 +137,8 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
     if body.q_start is not None:
         q_start = schemas.as_configurations(robot, body.q_start, settings, "q_start")[0][0]
     try:
-        program = program_from_dict(body.program, robot)
+        frames = {name: body.constant_frames[f"workpieces.{name}"][0] for name in body.workpieces}
+        program = program_from_dict(body.program, robot, frames)
         found = plan_motion(
             robot,
             program,

@@ -25,7 +25,7 @@ from app.shared.options import declared
 from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
 from app.shared.threads.turns import offer
-from kin import IKOptions, InputError, Robot, Task, solve_path
+from kin import IKOptions, InputError, JointConstraints, Robot, Task, solve_path
 from kin.collision.obstacles import LONGEST_NAME, MOST_OBSTACLES, checked_obstacles
 from kin.frames import WORLD
 from kin.ik.options import DEFAULTS
@@ -263,7 +263,7 @@ def _field(name: str) -> tuple[Any, Any]:
     given = Field([] if default == () else default, description=text)
     if name in _TYPES:
         return _TYPES[name], given
-    kind = get_type_hints(IKOptions, include_extras=True)[name]
+    kind = (get_type_hints(JointConstraints) | get_type_hints(IKOptions, include_extras=True))[name]
     if option.unit:
         (allowed,) = kind.__metadata__
         return Annotated[float, Field(ge=allowed.least, le=allowed.most, strict=True)] | None, given

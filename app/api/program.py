@@ -44,6 +44,9 @@ class SegmentTarget(_Described):
     pose: Annotated[list[Row], numbers(4)] | None = Field(
         None, description="A 4×4 matrix in the place of position and wxyz."
     )
+    frame: str | None = Field(
+        None, description="The frame in which poses and via points are: world (by default), base, or a workpiece."
+    )
 
 
 class _Move(_Described):

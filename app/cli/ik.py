@@ -125,6 +125,7 @@ def _options(robot: Robot, arguments: Namespace, units: Units, task: Task, shown
         "mask": None if arguments.mask is None else [name in arguments.mask for name in MASK_NAMES],
         "limits": constraints.limits,
         "locked": constraints.locked,
+        "wider_limits": constraints.wider_limits,
         "respect_limits": not arguments.ignore_limits,
         "redundancy": _redundancy(arguments, units),
         "max_solutions": None if arguments.all else arguments.max_solutions or shown,

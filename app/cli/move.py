@@ -19,6 +19,7 @@ from app.cli.terminal import (
     quantity,
     table,
     units_of,
+    workpieces_of,
 )
 from app.exports.motion import FORMATS, MotionFormat
 from app.exports.motion_plot import motion_plot
@@ -48,7 +49,12 @@ def run(arguments: Namespace) -> int:
     kind = _format(arguments)
     if arguments.picture is not None and Path(arguments.picture).suffix.lower() != ".svg":
         raise InputError("--picture", arguments.picture, "a name that ends in .svg")
-    motion = _planned(robot, parse_program(_text(arguments.program), robot), _start(robot, arguments), arguments)
+    motion = _planned(
+        robot,
+        parse_program(_text(arguments.program), robot, workpieces_of(arguments)),
+        _start(robot, arguments),
+        arguments,
+    )
     if arguments.json and arguments.output != "-":
         print_json(motion_answer(motion, sampled))
     elif arguments.output != "-" and not arguments.json:
@@ -85,14 +91,14 @@ def _run_many(robot: Robot, arguments: Namespace, rate: float | None) -> int:
     for option in ("format", "picture"):
         if getattr(arguments, option) is not None:
             raise InputError(f"--{option}", getattr(arguments, option), f"no --{option} besides --programs")
-    q_start, refused = _start(robot, arguments), False
+    q_start, workpieces, refused = _start(robot, arguments), workpieces_of(arguments), False
     with (
         opened_source(arguments.programs, "--programs") as source,
         opened_sink(arguments.output or "-", "ndjson", ()) as sink,
     ):
         for place, data in enumerate(source.objects()):
             try:
-                motion = _planned(robot, program_from_dict(data, robot), q_start, arguments)
+                motion = _planned(robot, program_from_dict(data, robot, workpieces), q_start, arguments)
             except InputError as error:
                 raise error.within(f"--programs[{place}]") from None
             sink.answers([motion_answer(motion, rate)])

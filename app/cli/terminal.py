@@ -77,6 +77,7 @@ def joint_constraints(robot: Robot, arguments: Namespace) -> JointConstraints:
     return JointConstraints(
         _per_joint(robot, arguments.limits, "--limit", 2, units_of(arguments)),
         _per_joint(robot, arguments.locked, "--lock", 1, units_of(arguments)),
+        arguments.wider_limits,
     )
 
 
@@ -138,6 +139,16 @@ def obstacles_of(arguments: Namespace) -> tuple[Obstacle, ...]:
     return checked_obstacles(data["obstacles"])
 
 
+def workpieces_of(arguments: Namespace) -> dict[str, Array]:
+    """The frames of ``--workpiece``, T_world_frame ``(4, 4)`` by name; raises `InputError`."""
+    workpieces: dict[str, Array] = {}
+    for name, texts in arguments.workpiece:
+        if name in workpieces or name in FRAMES:
+            raise InputError("--workpiece", name, f"names other than {', '.join(FRAMES)}, each once")
+        workpieces[name] = _pose(texts, f"--workpiece {name}", units_of(arguments))
+    return workpieces
+
+
 def frame_of(robot: Robot, arguments: Namespace, q: Array | None = None, name: str | None = None) -> Array:
     """T_world_frame ``(4, 4)`` of a frame, with those of ``--workpiece``; raises `InputError`.
 
@@ -146,12 +157,7 @@ def frame_of(robot: Robot, arguments: Namespace, q: Array | None = None, name: s
         name: of the frame; None: the one of ``--frame``.
     """
     frame = arguments.frame if name is None else name
-    units = units_of(arguments)
-    workpieces: dict[str, Array] = {}
-    for name, texts in arguments.workpiece:
-        if name in workpieces or name in FRAMES:
-            raise InputError("--workpiece", name, f"names other than {', '.join(FRAMES)}, each once")
-        workpieces[name] = _pose(texts, f"--workpiece {name}", units)
+    workpieces = workpieces_of(arguments)
     if frame not in (*FRAMES, *workpieces):
         raise InputError("--frame", frame, "one of " + ", ".join([*FRAMES, *workpieces]))
     return frame_pose(robot, frame, workpieces, q)

@@ -10,7 +10,7 @@ from pprint import pformat
 import numpy as np
 
 from app.exports.motion_ros import mcap, mcap_writer, trajectory_json, trajectory_yaml
-from app.exports.motion_samples import about, samples
+from app.exports.motion_samples import about
 from app.exports.snippets import robot_code
 from app.shared.answers.answer import as_plain
 from app.shared.answers.motion import motion_answer
@@ -43,20 +43,9 @@ class MotionFormat:
     check: Callable[[], object] = lambda: None
 
 
-def columns(motion: Motion) -> list[str]:
-    """The columns of a table of samples."""
-    joints = range(1, motion.robot.n + 1)
-    names = [f"{kind}{i}" for kind in ("q", "qd", "qdd") for i in joints]
-    return ["t", *names, "x", "y", "z", "qw", "qx", "qy", "qz", "tool_speed"]
-
-
 def _csv(motion: Motion, rate: float) -> Generator[bytes]:
-    yield (",".join(columns(motion)) + "\n").encode()
-    for sample in samples(motion, rate):
-        parts = [sample.t[:, None], sample.q, sample.qd, sample.qdd, sample.T[:, :3, 3]]
-        parts += [wxyz_from_rotation(sample.T[:, :3, :3]), sample.tool_speed[:, None]]
-        rows = np.hstack(parts).tolist()
-        yield "".join(",".join(map(repr, row)) + "\n" for row in rows).encode()
+    for piece in motion.csv_pieces(rate):
+        yield piece.encode()
 
 
 def _commented_csv(motion: Motion, rate: float) -> Generator[bytes]:
@@ -68,7 +57,7 @@ def _commented_csv(motion: Motion, rate: float) -> Generator[bytes]:
 def _ndjson(motion: Motion, rate: float) -> Generator[bytes]:
     """First the answer without samples, then one line per sample."""
     yield _line(as_plain(motion_answer(motion)))
-    for sample in samples(motion, rate):
+    for sample in motion.steps(rate):
         wxyz = wxyz_from_rotation(sample.T[:, :3, :3])
         lines = zip(
             *(part.tolist() for part in (sample.t, sample.q, sample.qd, sample.qdd, sample.T[:, :3, 3], wxyz)),

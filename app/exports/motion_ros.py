@@ -12,7 +12,7 @@ from collections.abc import Generator
 from types import ModuleType
 from typing import Any
 
-from app.exports.motion_samples import about, samples
+from app.exports.motion_samples import about
 from kin import InputError, Motion, link_frames
 from kin._version import __version__
 from kin.motion import MotionSample, program_to_dict
@@ -27,7 +27,7 @@ def trajectory_yaml(motion: Motion, rate: float) -> Generator[bytes]:
     yield "".join(f"# {key}: {value}\n" for key, value in about(motion)).encode()
     names = json.dumps([joint.name for joint in motion.robot.joints])
     yield f"header:\n  stamp: {{sec: 0, nanosec: 0}}\n  frame_id: world\njoint_names: {names}\npoints:\n".encode()
-    for sample in samples(motion, rate):
+    for sample in motion.steps(rate):
         yield "".join(_yaml_point(*row) for row in _points(sample)).encode()
 
 
@@ -57,7 +57,7 @@ def trajectory_json(motion: Motion, rate: float) -> Generator[bytes]:
     assert text.endswith("[]}}")
     yield text.removesuffix("]}}").encode()
     between = ""
-    for sample in samples(motion, rate):
+    for sample in motion.steps(rate):
         for row in _points(sample):
             yield (between + json.dumps(_json_point(*row), allow_nan=False)).encode()
             between = ",\n"
@@ -148,7 +148,7 @@ def mcap(motion: Motion, rate: float) -> Generator[bytes]:
     writer.add_attachment(0, 0, "program.json", "application/json", program)
     names = [joint.name for joint in motion.robot.joints]
     rows = [f"{i + 1} {row.name}".strip() for i, row in enumerate(motion.robot.rows)]
-    for sample in samples(motion, rate):
+    for sample in motion.steps(rate):
         frames = motion.robot.T_world_base @ link_frames(motion.robot, sample.q)
         for k, (t, q, qd, qdd) in enumerate(_points(sample)):
             at = round(t * _NANO)

@@ -1,24 +1,12 @@
-"""Samples of motions in chunks, so that a long motion is never in memory as text, and what files say of it."""
+"""What files of motions say of the motion in them."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 
-from app.shared.answers.motion import sample_times
 from kin import Motion
-from kin.motion import MotionSample
 from kin.robot import Joint
 from kin.transforms import Array
-
-AT_ONCE = 500  # samples of a chunk
-
-
-def samples(motion: Motion, rate: float) -> Iterator[MotionSample]:
-    """The motion at `rate` samples per second, in chunks."""
-    times = sample_times(motion, rate)
-    for start in range(0, len(times), AT_ONCE):
-        yield motion.sample(times[start : start + AT_ONCE])
 
 
 def about(motion: Motion) -> list[tuple[str, str]]:

@@ -23,7 +23,18 @@ from kin.collision import Obstacle
 from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.answers import answer, answer_at_once
-from kin.ik.options import Frame, IKOptions, Images, JointConstraints, Limits, Locks, Preference, Solver, Values
+from kin.ik.options import (
+    Frame,
+    IKOptions,
+    Images,
+    JointConstraints,
+    Limits,
+    Locks,
+    Preference,
+    Solver,
+    Values,
+    WiderLimits,
+)
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKResult
 from kin.named import robot_of
@@ -53,6 +64,7 @@ def solve_ik(
     mask_frame: Frame = "tool",
     limits: Limits | None = None,
     locked: Locks | None = None,
+    wider_limits: WiderLimits = "refuse",
     respect_limits: bool = True,
     branch: str | Sequence[str] | None = None,
     images: Images = "nearest",
@@ -74,9 +86,9 @@ def solve_ik(
         target: T_base_tool ``(4, 4)``; for ``task="position"`` also a point ``(3,)`` in metres.
         options: all further arguments but the seed as one value.
         q_seed: ``(n,)`` configuration to stay near; the home pose by default.
-        task, mask, mask_frame, limits, locked, respect_limits, branch, images, prefer, redundancy, max_solutions,
-            solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in `kin.IKOptions`,
-            `limits` and `locked` as in `kin.JointConstraints`.
+        task, mask, mask_frame, limits, locked, wider_limits, respect_limits, branch, images, prefer, redundancy,
+            max_solutions, solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in
+            `kin.IKOptions`, `limits`, `locked` and `wider_limits` as in `kin.JointConstraints`.
 
     Returns:
         Solutions, the best first, each with its branch and the error measured by FK; without one, the status, the
@@ -103,8 +115,8 @@ def solve_ik(
         task, mask_frame, respect_limits, branch, images, prefer, max_solutions, solver, position_tolerance,
         rotation_tolerance, avoid_self_collision,
     )  # fmt: skip
-    structured = mask is not None or limits is not None or locked is not None or redundancy is not None
-    if options is None and not structured and not obstacles:
+    constrained = limits is not None or locked is not None or wider_limits != "refuse"
+    if options is None and not (constrained or mask is not None or redundancy is not None or obstacles):
         try:
             wanted = _plain_options(*plain)
         except TypeError:  # a list, for example, cannot be looked up
@@ -115,6 +127,7 @@ def solve_ik(
             mask=mask,
             limits=limits,
             locked=locked,
+            wider_limits=wider_limits,
             redundancy=redundancy,
             obstacles=obstacles,
             **dict(zip(_PLAIN, plain, strict=True)),

@@ -24,7 +24,7 @@ from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.answers import answer
 from kin.ik.candidates import nearest_rows
-from kin.ik.options import Frame, IKOptions, Images, Limits, Locks, Preference, Solver, Values
+from kin.ik.options import Frame, IKOptions, Images, Limits, Locks, Preference, Solver, Values, WiderLimits
 from kin.ik.problem import FAR, IKProblem, listed, never_cancel, prepare, read_poses, read_seed
 from kin.ik.results import IKResult, Status
 from kin.kernels import fk as fk_kernels
@@ -113,6 +113,7 @@ def solve_ik_many(
     mask_frame: Frame = "tool",
     limits: Limits | None = None,
     locked: Locks | None = None,
+    wider_limits: WiderLimits = "refuse",
     respect_limits: bool = True,
     branch: str | Sequence[str] | None = None,
     images: Images = "nearest",
@@ -134,9 +135,9 @@ def solve_ik_many(
         targets: T_base_tool ``(k, 4, 4)``; for ``task="position"`` also points ``(k, 3)`` in metres.
         options: all further arguments but the seed as one value.
         q_seed: ``(n,)`` one seed for all targets, or ``(k, n)`` one for each; the home pose by default.
-        task, mask, mask_frame, limits, locked, respect_limits, branch, images, prefer, redundancy, max_solutions,
-            solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in `kin.solve_ik`,
-            for every target.
+        task, mask, mask_frame, limits, locked, wider_limits, respect_limits, branch, images, prefer, redundancy,
+            max_solutions, solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in
+            `kin.solve_ik`, for every target.
 
     Returns:
         The answers, one for each target, with the best solutions as one array.
@@ -159,6 +160,7 @@ def solve_ik_many(
         mask_frame=mask_frame,
         limits=limits,
         locked=locked,
+        wider_limits=wider_limits,
         respect_limits=respect_limits,
         branch=branch,
         images=images,

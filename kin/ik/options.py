@@ -34,6 +34,7 @@ Frame = Literal["tool", "base"]
 Images = Literal["nearest", "all"]
 Solver = Literal["auto", "numeric"]
 Preference = Literal["nearest", "limits", "manipulability"]
+WiderLimits = Literal["refuse", "intersect"]
 Limits = Sequence[Sequence[float] | None]
 Locks = Sequence[float | None]
 Values = float | Mapping[str, float] | tuple[tuple[str, float], ...]
@@ -85,16 +86,21 @@ class JointConstraints:
         limits: narrower joint limits, inside the robot's own, in radians (metres). One pair (lower, upper) per
             joint, none for a joint that keeps its own.
         locked: joint values to keep, in radians (metres). One per joint, none for a joint that may move.
+        wider_limits: what becomes of limits that are wider than a joint's own. refuse: an error. intersect: of
+            both, the narrower ones hold.
     """
 
     limits: Limits | None = None
     locked: Locks | None = None
+    wider_limits: WiderLimits = "refuse"
 
     def __post_init__(self) -> None:
         if self.limits is not None:
             object.__setattr__(self, "limits", _pairs(self.limits))
         if self.locked is not None:
             object.__setattr__(self, "locked", _lock_values(self.locked))
+        if not isinstance(self.wider_limits, str) or self.wider_limits not in get_args(WiderLimits):
+            raise InputError("wider_limits", self.wider_limits, 'one of "refuse", "intersect"')
 
     @classmethod
     def of(
@@ -129,10 +135,16 @@ class JointConstraints:
             if pair is None:
                 continue
             low, high = pair
-            if low < lower[i] - TOLERANCES.limit or high > upper[i] + TOLERANCES.limit:
-                expected = f"limits inside the joint's own, {_span(lower[i], upper[i])}"
+            own, expected = _span(lower[i], upper[i]), ""
+            if max(low, lower[i]) > min(high, upper[i]) + TOLERANCES.limit:
+                expected = f"limits that overlap the joint's own, {own}"
+            elif self.wider_limits == "refuse" and (
+                low < lower[i] - TOLERANCES.limit or high > upper[i] + TOLERANCES.limit
+            ):
+                expected = f"limits inside the joint's own, {own}, or the option wider_limits intersect"
+            if expected:
                 raise InputError(f"limits[{i}]", list(pair), expected)
-            lower[i], upper[i] = max(low, lower[i]), min(high, upper[i])
+            lower[i], upper[i] = max(low, lower[i]), max(min(high, upper[i]), max(low, lower[i]))
         for i, value in enumerate(locked):
             if value is None:
                 continue
@@ -158,7 +170,7 @@ class IKOptions:
         mask: instead of a task, which of the six coordinates x, y, z, rx, ry, rz of the error must be zero; the
             last three are the rotation vector from the target to the tool.
         mask_frame: directions of the mask's coordinates: of the target (tool) or of the world frame (base).
-        constraints: limits and locks of the joints; calls take `limits` and `locked` as keywords instead.
+        constraints: limits and locks of the joints; calls take its fields as keywords instead.
         respect_limits: leave out configurations outside the joint limits (each joint at its best whole turn).
         branch: only these branches: a name as in the robot's branches, parts of one such as "elbow up", "seed" for
             the branch of the seed, or several of these.
@@ -209,10 +221,11 @@ class IKOptions:
     def of(cls, options: IKOptions | None, **keywords: Any) -> IKOptions:
         """The options of a call that takes them as keywords or as one value; `InputError` if as both.
 
-        Keywords are the fields of this class, with `limits` and `locked` in the place of `constraints`.
+        Keywords are the fields of this class, with those of `JointConstraints` in the place of `constraints`.
         """
         if options is None:
-            constraints = JointConstraints(keywords.pop("limits", None), keywords.pop("locked", None))
+            names = [each.name for each in fields(JointConstraints)]
+            constraints = JointConstraints(**{name: keywords.pop(name) for name in names if name in keywords})
             return cls(constraints=constraints, **keywords)
         if not isinstance(options, cls):
             raise InputError("options", options, "a kin.IKOptions, or none")

@@ -6,15 +6,16 @@ A program begins where the arm is. Each segment leads from the end of the one be
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.differential.task import Task
 from kin.errors import InputError
-from kin.ik.options import finite_number
+from kin.ik.options import finite_number, shape_of
 from kin.transforms import Array, as_transform, from_position_wxyz, wxyz_from_rotation
 
 Orientation = Literal["geodesic", "two-axis"]
@@ -23,6 +24,7 @@ ORIENTATIONS: tuple[Orientation, ...] = get_args(Orientation)
 TASKS: tuple[Task, ...] = ("pose", "approach", "position")
 MOST_SEGMENTS, MOST_POINTS, MOST_VALUES = 1000, 200, 32
 LONGEST_NAME, LONGEST_DWELL = 120, 3600.0
+_POSE = (4, 4)
 _FAR = 1e6  # metres or radians
 
 
@@ -82,6 +84,17 @@ class PoseTarget:
 Target = JointTarget | PoseTarget
 
 
+class MoveOptions(TypedDict, total=False):
+    """The fields of `Move` as keywords, for type checkers."""
+
+    speed: float
+    acceleration: float
+    tool_speed: float | None
+    tool_turn: float | None
+    blend: float
+    name: str
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Move:
     """What all segments but a dwell have.
@@ -131,14 +144,21 @@ class Ptp(Move):
     """Point to point: all joints start and end together, as fast as they may; the tool's path follows from that.
 
     For a pose, the configuration nearest to the start is taken.
+
+    Attributes:
+        target: a `PoseTarget`, a `JointTarget`, a pose ``(4, 4)`` or joint values ``(n,)``.
     """
 
     target: Target
 
+    if TYPE_CHECKING:
+
+        def __init__(self, target: Target | ArrayLike, **move: Unpack[MoveOptions]) -> None: ...
+
     def __post_init__(self) -> None:
         """Check the values."""
         Move.__post_init__(self)
-        _check_target("target", self.target)
+        object.__setattr__(self, "target", _target("target", self.target))
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +166,7 @@ class Lin(Move):
     """A straight line of the tool point.
 
     Attributes:
+        target: as of `Ptp`.
         orientation: ``"geodesic"``: rotation about one fixed axis; ``"two-axis"``: the approach direction turns in
             its plane while the tool turns about it.
     """
@@ -153,10 +174,16 @@ class Lin(Move):
     target: Target
     orientation: Orientation = "geodesic"
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self, target: Target | ArrayLike, orientation: Orientation = "geodesic", **move: Unpack[MoveOptions]
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         """Check the values."""
         Move.__post_init__(self)
-        _check_target("target", self.target)
+        object.__setattr__(self, "target", _target("target", self.target))
         _check_orientation(self.orientation)
 
 
@@ -165,34 +192,54 @@ class Circ(Move):
     """An arc of the tool point through a via point; the orientation turns steadily from start to target.
 
     Attributes:
-        via: a point of the arc between start and target, metres.
+        via: a point of the arc between start and target, metres; of a pose ``(4, 4)`` its point.
+        target: as of `Ptp`.
     """
 
     via: tuple[float, float, float]
     target: Target
     orientation: Orientation = "geodesic"
 
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            via: ArrayLike,
+            target: Target | ArrayLike,
+            orientation: Orientation = "geodesic",
+            **move: Unpack[MoveOptions],
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         """Check the values."""
         Move.__post_init__(self)
-        _check_target("target", self.target)
+        object.__setattr__(self, "target", _target("target", self.target))
         _check_orientation(self.orientation)
+        if shape_of(self.via) == _POSE:
+            object.__setattr__(self, "via", PoseTarget.of(self.via).position)
         object.__setattr__(self, "via", _numbers("via", self.via, 3, "three numbers x, y, z in metres"))
 
 
 @dataclass(frozen=True, slots=True)
 class Spline(Move):
-    """A smooth curve through points: of the tool if all are poses, of the joints if all are configurations."""
+    """A smooth curve through points: of the tool if all are poses, of the joints if all are configurations.
+
+    Attributes:
+        points: each as the target of `Ptp`.
+    """
 
     points: tuple[Target, ...]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, points: Iterable[Target | ArrayLike], **move: Unpack[MoveOptions]) -> None: ...
 
     def __post_init__(self) -> None:
         """Check the values."""
         Move.__post_init__(self)
         expected = f"1 to {MOST_POINTS} poses, or as many configurations"
-        points = _items("points", self.points, expected)
-        for i, point in enumerate(points):
-            _check_target(f"points[{i}]", point)
+        given = list(self.points) if isinstance(self.points, np.ndarray) else self.points
+        points = tuple(_target(f"points[{i}]", point) for i, point in enumerate(_items("points", given, expected)))
         if not 1 <= len(points) <= MOST_POINTS or len({type(point) for point in points}) > 1:
             raise InputError("points", self.points, expected)
         object.__setattr__(self, "points", points)
@@ -288,9 +335,19 @@ def _items(field: str, values: object, expected: str) -> tuple[Any, ...]:
     return tuple(values)
 
 
-def _check_target(field: str, value: object) -> None:
-    if not isinstance(value, JointTarget | PoseTarget):
-        raise InputError(field, value, "a JointTarget or a PoseTarget")
+def _target(field: str, value: Any) -> Target:
+    """A target as it is, or made of a pose ``(4, 4)`` or of joint values ``(n,)``."""
+    if isinstance(value, JointTarget | PoseTarget):
+        return value
+    shape = shape_of(value) if isinstance(value, np.ndarray | list | tuple) else ()
+    try:
+        if shape == _POSE:
+            return PoseTarget.of(value)
+        if len(shape) == 1:
+            return JointTarget(value)
+    except InputError as error:
+        raise error.renamed(field + error.field.removeprefix("pose").removeprefix("q")) from None
+    raise InputError(field, value, "a pose (4, 4), joint values (n,), a PoseTarget or a JointTarget")
 
 
 def _check_orientation(value: object) -> None:

@@ -14,7 +14,8 @@ wxyz = [0, 1, 0, 0]
 blend = 20
 ```
 
-A target is `q`, or `position` with or without `wxyz`, or `pose`, a 4×4 matrix. Every error names the field, as in
+A target is `q`, or `position` with or without `wxyz`, or `pose`, a 4×4 matrix. Poses and via points are in the
+world frame, or in the one that `frame` names: ``"base"``, or a workpiece. Every error names the field, as in
 ``segments[1].blend``.
 """
 
@@ -26,10 +27,12 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from kin.errors import InputError, shorten
 from kin.files.numbers import scaled
 from kin.files.read import ANGLES
+from kin.frames import BASE, WORLD
 from kin.ik.options import finite_number
 from kin.motion.program import (
     KINDS,
@@ -49,20 +52,23 @@ from kin.motion.program import (
 )
 from kin.named import robot_of
 from kin.robot import LENGTHS, Robot
-from kin.transforms import as_transform
+from kin.transforms import Array, as_transform
 
-_TARGET = ("q", "position", "wxyz", "pose")
+_TARGET = ("q", "position", "wxyz", "pose", "frame")
 _TOP = (*field_names(Program), "units")
 _LENGTHS, _ANGLES = ("tool_speed", "blend"), ("tool_turn",)
 
 
-def parse_program(text: str, robot: Robot | str | None = None) -> Program:
+def parse_program(
+    text: str, robot: Robot | str | None = None, workpieces: Mapping[str, ArrayLike] | None = None
+) -> Program:
     r"""The program described by TOML or JSON text; see `program_from_dict`.
 
     Args:
         text: of a program file: JSON if it begins with a brace, else TOML.
         robot: the arm, or the id of a built-in one: it tells which joint values are lengths; without it all are
             angles.
+        workpieces: poses ``(4, 4)`` of workpiece frames in the world frame, by the names that a `frame` has.
 
     Returns:
         The program.
@@ -80,19 +86,24 @@ def parse_program(text: str, robot: Robot | str | None = None) -> Program:
         data = json.loads(text.lstrip("\ufeff")) if is_json else tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError("program", str(error), "valid JSON" if is_json else "valid TOML") from None
-    return program_from_dict(data, robot)
+    return program_from_dict(data, robot, workpieces)
 
 
-def program_from_dict(data: Mapping[str, Any], robot: Robot | str | None = None) -> Program:
+def program_from_dict(
+    data: Mapping[str, Any],
+    robot: Robot | str | None = None,
+    workpieces: Mapping[str, ArrayLike] | None = None,
+) -> Program:
     """The program described by plain data.
 
     Args:
         data: the fields of `Program`, with each segment as a dict; ``units`` for the numbers in it.
         robot: the arm, or the id of a built-in one: it tells which joint values are lengths; without it all are
             angles.
+        workpieces: poses ``(4, 4)`` of workpiece frames in the world frame, by the names that a `frame` has.
 
     Returns:
-        The program.
+        The program, with its poses in the world frame.
 
     Raises:
         InputError: naming the field, the value and what would be valid.
@@ -105,7 +116,7 @@ def program_from_dict(data: Mapping[str, Any], robot: Robot | str | None = None)
     if not isinstance(data, Mapping):
         raise InputError("program", data, "a table with the fields " + ", ".join(_TOP))
     _only(data, _TOP, "")
-    reader = _Reader(data.get("units", {}), None if robot is None else robot_of(robot))
+    reader = _Reader(data.get("units", {}), None if robot is None else robot_of(robot), workpieces or {})
     segments = data.get("segments")
     if not isinstance(segments, list | tuple) or not 1 <= len(segments) <= MOST_SEGMENTS:
         raise InputError("segments", segments, f"1 to {MOST_SEGMENTS} segments")
@@ -169,13 +180,13 @@ _PLAIN = Move()
 class _Reader:
     """Reads numbers in the units of the file."""
 
-    def __init__(self, units: object, robot: Robot | None) -> None:
+    def __init__(self, units: object, robot: Robot | None, workpieces: Mapping[str, ArrayLike]) -> None:
         if not isinstance(units, Mapping):
             raise InputError("units", units, 'a table such as { length = "mm", angle = "deg" }')
         _only(units, ("length", "angle"), "units.")
         self.length = _unit(units, "length", LENGTHS, "m")
         self.angle = _unit(units, "angle", ANGLES, "rad")
-        self.robot = robot
+        self.robot, self.workpieces = robot, workpieces
 
     def segment(self, data: object, where: str) -> Segment:
         if not isinstance(data, Mapping):
@@ -195,7 +206,7 @@ class _Reader:
         else:
             given["target"] = self.target(data, where)
         if kind == "circ":
-            given["via"] = self.via(data.get("via"), f"{where}.via")
+            given["via"] = self.via(data.get("via"), f"{where}.via", self.frame(data, where))
         try:
             made: Segment = cls(**given)
         except InputError as error:
@@ -222,19 +233,36 @@ class _Reader:
     def target(self, data: Mapping[str, Any], where: str) -> Target:
         given = [key for key in ("q", "position", "pose") if key in data]
         if len(given) != 1 or ("wxyz" in data and given != ["position"]):
-            keys = [key for key in _TARGET if key in data]
-            raise InputError(f"{where}.target", keys, "one of q; position with or without wxyz; pose")
+            keys = ", ".join(key for key in _TARGET if key in data)
+            raise InputError(where, keys or "no target", "one of q; position with or without wxyz; pose")
+        frame = self.frame(data, where)
         try:
             if given == ["q"]:
                 return self.joints(JointTarget(data["q"]))
             if given == ["pose"]:
                 T = as_transform(data["pose"], "pose")
                 T[:3, 3] = _times(tuple(T[:3, 3].tolist()), self.length)
-                return PoseTarget.of(T)
+                return PoseTarget.of(T if frame is None else frame @ T)
             read = PoseTarget(data["position"], data.get("wxyz"))
         except InputError as error:
             raise error.within(where) from None
-        return PoseTarget(_times(read.position, self.length), read.wxyz)
+        read = PoseTarget(_times(read.position, self.length), read.wxyz)
+        if frame is None:
+            return read
+        placed = frame @ read.pose(np.eye(4))
+        return PoseTarget.of(placed) if read.wxyz is not None else PoseTarget(_point(placed))
+
+    def frame(self, data: Mapping[str, Any], where: str) -> Array | None:
+        """T_world_frame ``(4, 4)`` of the frame in which a segment or point has its poses; None for the world."""
+        name = data.get("frame", WORLD)
+        if name == WORLD:
+            return None
+        base = {} if self.robot is None else {BASE: self.robot.T_world_base}
+        frames: dict[str, ArrayLike] = {**self.workpieces, **base}
+        if not isinstance(name, str) or name not in frames or "q" in data:
+            expected = "no frame besides q" if "q" in data else "one of " + ", ".join([WORLD, *frames])
+            raise InputError(f"{where}.frame", name, expected)
+        return as_transform(frames[name], f"workpieces.{name}")
 
     def joints(self, target: JointTarget) -> JointTarget:
         if self.robot is None:
@@ -244,19 +272,25 @@ class _Reader:
         scale = np.where(self.robot.revolute, self.angle, self.length).tolist()
         return JointTarget(tuple(scaled(value, each) for value, each in zip(target.q, scale, strict=True)))
 
-    def via(self, data: object, where: str) -> tuple[float, float, float]:
+    def via(self, data: object, where: str, frame: Array | None) -> tuple[float, float, float]:
         if isinstance(data, Mapping):
             _only(data, ("position",), f"{where}.")
             data = data.get("position")
         try:
-            return _times(PoseTarget(data).position, self.length)  # type: ignore[arg-type]  # checked there
+            point = _times(PoseTarget(data).position, self.length)  # type: ignore[arg-type]  # checked there
         except InputError as error:
             raise InputError(where, data, error.expected) from None
+        return point if frame is None else _point(frame @ PoseTarget(point).pose(np.eye(4)))
 
 
 def _times(position: tuple[float, float, float], scale: float) -> tuple[float, float, float]:
     x, y, z = position
     return scaled(x, scale), scaled(y, scale), scaled(z, scale)
+
+
+def _point(T: Array) -> tuple[float, float, float]:
+    x, y, z = T[:3, 3].tolist()
+    return x, y, z
 
 
 def _unit(units: Mapping[str, Any], key: str, valid: Mapping[str, float], default: str) -> float:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import repeat
 from operator import itemgetter
+from os import PathLike
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from kin.errors import InputError
 from kin.fk import fk, jacobian
-from kin.motion import messages
+from kin.motion import messages, tables
 from kin.motion.arrivals import Arrival
 from kin.motion.details import Cause, Help, Note, RefusalDetails
 from kin.motion.limits import MotionLimits
@@ -234,6 +238,45 @@ class Motion:
         q, qd, qdd, qddd = self.derivatives(times)
         twist = (jacobian(self.robot, q) @ qd[..., None])[..., 0]
         return MotionSample(times, q, qd, qdd, qddd, fk(self.robot, q), twist)
+
+    def step_times(self, rate: float) -> Array:
+        """Times ``(k,)`` at `rate` per second, from the start to the end, which is one of them.
+
+        None after a refusal. Raises `InputError` unless the rate is above 0.
+        """
+        times = tables.step_times(self.duration, rate)
+        return times if self.planned else times[:0]
+
+    def steps(self, rate: float) -> Iterator[MotionSample]:
+        """The motion at `step_times`, piece by piece, so that a long one need not fit into memory."""
+        times = self.step_times(rate)
+        for start in range(0, len(times), tables.AT_ONCE):
+            yield self.sample(times[start : start + tables.AT_ONCE])
+
+    def csv_pieces(self, rate: float = 100.0) -> Iterator[str]:
+        """What `to_csv` writes, as pieces of text."""
+        yield ",".join(tables.columns(self.robot.n)) + "\n"
+        for sample in self.steps(rate):
+            yield tables.lines(sample.t, (sample.q, sample.qd, sample.qdd), sample.T, sample.tool_speed)
+
+    def to_csv(self, file: str | PathLike[str], rate: float = 100.0) -> None:
+        """Write a table of samples: time, joint values, speeds, accelerations, pose and speed of the tool.
+
+        Args:
+            file: path of the file; one that exists is replaced.
+            rate: samples per second.
+
+        Raises:
+            InputError: a refused program, of which `driven` is what can be driven, or a rate that is not above 0.
+            OSError: the file cannot be written.
+        """
+        if not self.planned:
+            raise InputError(
+                "motion", self.reason, "a program that can be driven; motion.driven is its part that can"
+            )
+        tables.step_times(self.duration, rate)
+        with Path(file).open("w", encoding="utf-8", newline="") as written:
+            written.writelines(self.csv_pieces(rate))
 
     @cached_property
     def peaks(self) -> tuple[Peak, ...]:

@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 from kin.collision import Obstacle
 from kin.differential.task import Task
 from kin.errors import InputError
-from kin.ik.options import Frame, IKOptions, Limits, Locks, finite_number
+from kin.ik.options import Frame, IKOptions, Limits, Locks, WiderLimits, finite_number
 from kin.ik.problem import IKProblem, listed, never_cancel, read_poses
 from kin.named import robot_of
 from kin.path.details import JumpCause
@@ -70,6 +70,7 @@ def solve_path(
     mask_frame: Frame = "tool",
     limits: Limits | None = None,
     locked: Locks | None = None,
+    wider_limits: WiderLimits = "refuse",
     branch: str | Sequence[str] | None = None,
     position_tolerance: float | None = None,
     rotation_tolerance: float | None = None,
@@ -90,9 +91,9 @@ def solve_path(
         q_start: ``(n,)`` where the arm is. The way from there to the first waypoint counts as motion, but never as
             a jump: the path begins at its first waypoint. Without it the path may start anywhere; of equally good
             paths, the one that starts nearest to the home pose is taken.
-        task, mask, mask_frame, limits, locked, branch, position_tolerance, rotation_tolerance,
-            avoid_self_collision, obstacles: as in `kin.solve_ik`, for every waypoint; the branch ``"seed"`` is
-            that of `q_start`.
+        task, mask, mask_frame, limits, locked, wider_limits, branch, position_tolerance,
+            rotation_tolerance, avoid_self_collision, obstacles: as in `kin.solve_ik`, for every waypoint; the
+            branch ``"seed"`` is that of `q_start`.
         max_step: the most a joint may move between neighbouring waypoints: radians, or 4 per metre.
         stop: called now and then; cancels the computation by raising.
 
@@ -117,6 +118,7 @@ def solve_path(
         mask_frame=mask_frame,
         limits=limits,
         locked=locked,
+        wider_limits=wider_limits,
         branch=branch,
         position_tolerance=position_tolerance,
         rotation_tolerance=rotation_tolerance,

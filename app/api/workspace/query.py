@@ -13,9 +13,11 @@ from starlette.datastructures import QueryParams
 from app.api.problems import field_error, invalid
 from app.api.schemas import LARGEST, Body
 from app.shared.clouds import Cloud
+from app.shared.options import declared
 from app.shared.problems import FieldError, from_input_error, show
 from app.shared.settings import Settings
 from kin import InputError, JointConstraints, Robot
+from kin.ik.options import WiderLimits
 from kin.workspace import Measure, Strategy
 
 _FIELD_OF_CORE = {"limits": "limit", "locked": "lock"}
@@ -108,6 +110,8 @@ class RegionQuery(Body):
         examples=[["3:0.2"]],
     )
 
+    wider_limits: WiderLimits = Field("refuse", description=declared()["wider_limits"].sentence)
+
     def constraints(self, robot: Robot) -> JointConstraints:
         """Limits and locks as the core takes them; raises 422 naming the invalid one."""
         pairs, limit_at = _per_joint(robot, "limit", self.limit, _LIMIT)
@@ -115,7 +119,7 @@ class RegionQuery(Body):
         limits = tuple((p[0], p[1]) if p else None for p in pairs) if self.limit else None
         locked = tuple(v[0] if v else None for v in values) if self.lock else None
         try:
-            constraints = JointConstraints(limits, locked)
+            constraints = JointConstraints(limits, locked, self.wider_limits)
             constraints.bounds(robot)
         except InputError as error:
             # The core counts joints from 0 and does not know the order of the parameters.

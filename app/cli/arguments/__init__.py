@@ -98,7 +98,15 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "--seed", nargs="+", metavar="Q",
         help=f"prefer solutions near this configuration; {UNITS_NOTE}",
     )  # fmt: skip
-    shown = {"task", "mask", "mask_frame", "limits", "locked", "respect_limits"}  # above, or with another meaning
+    shown = {
+        "task",
+        "mask",
+        "mask_frame",
+        "limits",
+        "locked",
+        "wider_limits",
+        "respect_limits",
+    }  # above, or with another meaning
     add_options(parser, [name for name in declared() if name not in shown])
     parser.add_argument("--all", action="store_true", help="print all solutions, not only the best")
     parser.add_argument("--ignore-limits", action="store_true", help="also solutions outside the joint limits")
@@ -160,7 +168,7 @@ def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "motion of a program: timed joint values along PTP, LIN and CIRC segments",
         parents.robots,
         parents.output,
-        parents.mounts,
+        parents.frames,
     )
     program = parser.add_argument(
         "program", metavar="PROGRAM", help="program (TOML or JSON), with its own units; - is standard input"

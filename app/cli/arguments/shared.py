@@ -35,7 +35,7 @@ class Parents:
             help="read and print radians and metres",
         )  # fmt: skip
         self.joints = argparse.ArgumentParser(add_help=False)
-        add_options(self.joints, ["limits", "locked"])
+        add_options(self.joints, ["limits", "locked", "wider_limits"])
         self.mounts = argparse.ArgumentParser(add_help=False)
         for flag, about in (
             (

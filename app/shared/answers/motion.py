@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-import numpy as np
 from msgspec import UNSET, UnsetType
 
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.details import ContactAnswer, IkDetails, SingularityAnswer, Violation
 from app.shared.answers.fk import Matrix
 from kin import Motion
+from kin.ik.details import Details
 from kin.ik.results import Cause as IkCause
-from kin.motion import MotionLimits, messages
+from kin.motion import MotionLimits, Refusal, messages
 from kin.motion.details import (
     ArrivesOtherwise,
     BlendLeftOut,
@@ -22,11 +22,12 @@ from kin.motion.details import (
     HelpCode,
     JerkCost,
     Note,
+    NotReached,
     Slowed,
 )
 from kin.motion.program import Kind
 from kin.motion.results import Quantity
-from kin.transforms import Array, wxyz_from_rotation
+from kin.transforms import wxyz_from_rotation
 from kin.units import DEFAULT_UNITS
 
 NoteCode = Literal["arrives otherwise", "blend shortened", "blend left out", "slowed", "jerk cost"]
@@ -146,6 +147,10 @@ class HelpAnswer(Answer):
     """Name of the posture for "ptp" and "posture"."""
 
 
+def _ik_details(refusal: Refusal) -> Details | UnsetType:
+    return refusal.details.details if isinstance(refusal.details, NotReached) else UNSET
+
+
 class RefusalAnswer(Answer):
     """Why a program cannot be driven."""
 
@@ -167,6 +172,9 @@ class RefusalAnswer(Answer):
     """What would help."""
     reason: str
     """All of it in sentences for people."""
+    ik: Annotated[IkDetails | UnsetType, From(_ik_details)] = UNSET
+    """Cause "unreachable": the numbers of inverse kinematics, as in the answers of `ik`. They are in
+    `details.details` too, for older clients."""
 
 
 class NoteAnswer(Answer):
@@ -267,15 +275,7 @@ def motion_answer(motion: Motion, rate: float | None = None) -> MotionAnswer:
 
 
 def _samples(motion: Motion, rate: float | None) -> MotionSamples | UnsetType:
-    return UNSET if rate is None else MotionSamples.of(motion.sample(sample_times(motion, rate)))
-
-
-def sample_times(motion: Motion, rate: float) -> Array:
-    """Times ``(k,)`` at `rate` per second, from the start to the end, which is one of them."""
-    if not motion.planned:
-        return np.zeros(0)
-    steps = np.arange(int(motion.duration * rate * (1.0 + 1e-12)) + 1) / rate
-    return steps if motion.duration - steps[-1] < 1e-9 else np.append(steps, motion.duration)
+    return UNSET if rate is None else MotionSamples.of(motion.sample(motion.step_times(rate)))
 
 
 def _limits(limits: MotionLimits) -> list[JointLimitsAnswer]:

@@ -12,10 +12,9 @@ import pytest
 
 import kin
 from app.api import motion as motion_module
-from app.exports.motion import FORMATS, columns
-from app.exports.motion_samples import AT_ONCE
-from app.shared.answers.motion import sample_times
+from app.exports.motion import FORMATS
 from app.shared.threads.turns import Turn, Turns
+from kin.motion.tables import AT_ONCE, columns
 
 UR5 = kin.get_robot("ur5")
 Q = [0.0, -1.57, 1.57, 0.0, 1.57, 0.0]
@@ -47,7 +46,7 @@ def test_a_motion_is_that_of_the_core(client):
     assert all(peak["ratio"] <= 1 + 1e-9 for peak in peaks)
     assert answer["limits"][0]["velocity"] == pytest.approx(EXPECTED.limits.velocity[0])
     samples = answer["samples"]
-    times = sample_times(EXPECTED, 50)
+    times = EXPECTED.step_times(50)
     assert samples["t"] == times.tolist()
     assert samples["t"][-1] == pytest.approx(answer["duration"])
     expected = EXPECTED.sample(times)
@@ -78,14 +77,14 @@ def test_units_of_a_program_are_its_own(client):
 
 def test_tables_and_streams_hold_the_samples(client):
     rate = 400.0
-    times = sample_times(EXPECTED, rate)
+    times = EXPECTED.step_times(rate)
     assert len(times) > AT_ONCE, "more than one chunk"
     expected = EXPECTED.sample(times)
     response = post(client, {"rate": rate, "format": "csv"})
     assert response.headers["content-type"].startswith("text/csv")
     assert response.headers["content-disposition"] == 'attachment; filename="ur5-motion.csv"'
     head, *rows = csv.reader(io.StringIO(response.text))
-    assert head == columns(EXPECTED)
+    assert head == columns(EXPECTED.robot.n)
     values = np.array(rows, float)
     assert np.allclose(values[:, 0], times, atol=1e-12)
     assert np.allclose(values[:, 1:7], expected.q, atol=1e-12)
@@ -174,7 +173,8 @@ def test_a_pose_out_of_reach_is_explained_as_inverse_kinematics_does(client):
     program = {"segments": [{"kind": "ptp", "position": [3.0, 0.0, 0.5], "wxyz": [0, 1, 0, 0]}]}
     refusal = post(client, {"program": program}).json()["refusal"]
     assert (refusal["cause"], refusal["details"]["cause"]) == ("unreachable", "too far")
-    assert refusal["details"]["details"]["distance"] > 1.0
+    assert refusal["ik"]["distance"] > 1.0
+    assert refusal["details"]["details"] == refusal["ik"], "where it was before"
 
 
 def test_a_start_outside_the_limits_is_an_answer(client):
@@ -321,3 +321,30 @@ def test_postures_along_a_path_are_those_of_the_core(client):
     assert np.allclose(answer["best"]["q"], found.best.q)
     refused = client.post("/api/v1/robots/ur5/ik/path/postures", json={**body, "max_step": 0})
     assert refused.status_code == 422
+
+
+def test_poses_in_the_frame_of_a_workpiece_are_those_of_the_world(client):
+    table = kin.from_xyz_rpy([0.1, 0.05, -0.1], [0.0, 0.0, 0.4])
+    base = kin.from_xyz_rpy([0.0, 0.0, 0.2], [0.0, 0.0, 1.0])
+    arm = kin.get_robot("pioneer5").with_base(base)
+    there = np.linalg.inv(table) @ kin.fk(arm, [1.3, 0.6, 0.9, 0.4, 0.6])
+    body = {
+        "base": {"xyz": [0.0, 0.0, 0.2], "rpy": [0.0, 0.0, 1.0]},
+        "workpieces": {"table": {"xyz": [0.1, 0.05, -0.1], "rpy": [0.0, 0.0, 0.4]}},
+        "program": {
+            "units": {"length": "mm"},
+            "segments": [
+                {"kind": "ptp", "frame": "table", "position": (1e3 * there[:3, 3]).tolist(),
+                 "wxyz": kin.wxyz_from_rotation(there[:3, :3]).tolist()},
+            ],
+        },
+    }  # fmt: skip
+    found = client.post("/api/v1/robots/pioneer5/motion", json=body).json()
+    assert found["planned"], found["reason"]
+    assert found["samples"]["position"][-1] == pytest.approx((table @ there)[:3, 3].tolist(), abs=1e-8)
+    assert np.abs(kin.fk(arm, found["samples"]["q"][-1]) - table @ there)[:3, 2:].max() < 1e-8
+    body["program"]["segments"][0]["frame"] = "tool"
+    refused = client.post("/api/v1/robots/pioneer5/motion", json=body).json()
+    assert refused["errors"] == [
+        {"field": "program.segments[0].frame", "value": "'tool'", "expected": "one of world, table, base"}
+    ]

@@ -325,3 +325,30 @@ def test_a_way_is_piped_to_the_motion_of_its_program(run):
     assert "A way was found" in err
     _, out, _ = run("move", "ur5", "-", "--json", "--start", 0, -90, 90, 0, 90, 0, given=program)
     assert json.loads(out)["samples"]["q"][-1] == pytest.approx(np.radians([60, -90, 90, 0, 90, 0]).tolist())
+
+
+def test_limits_that_are_wider_than_the_arm_are_intersected_in_rest_and_here(run, client):
+    words = ("ik", "panda", "--position", 400, 100, 500, "--wxyz", 0, 1, 0, 0, "--limit", "1=-180:180", "--json")
+    code, out, _ = run(*words)
+    assert code == 2
+    assert "wider_limits" in json.loads(out)["detail"]
+    _, out, _ = run(*words, "--wider-limits", "intersect")
+    asked = {"target": {"position": [0.4, 0.1, 0.5], "wxyz": [0, 1, 0, 0]}, "wider_limits": "intersect"}
+    asked["limits"] = [[-np.pi, np.pi], *[None] * 6]
+    assert json.loads(out) == client.post("/api/v1/robots/panda/ik", json=asked).json()
+    address = "/api/v1/robots/panda/workspace/summary"
+    assert client.get(f"{address}?limit=1:-9:9").status_code == 422
+    assert client.get(f"{address}?limit=1:-9:9&wider_limits=intersect&effort=2").status_code == 200
+
+
+def test_a_program_in_the_frame_of_a_workpiece(run):
+    segment = {"kind": "lin", "frame": "table", "position": [0.0, 0.0, 0.02]}
+    start = (0, -90, 90, 0, 90, 0)
+    T = kin.fk(UR5, np.radians(start))
+    x, y, z = 1e3 * T[:3, 3]
+    words = ("move", "ur5", "-", "--json", "--start", *start, "--workpiece", f"table={x}:{y}:{z}")
+    code, out, _ = run(*words, given=json.dumps({"segments": [segment]}))
+    assert code == 0
+    assert json.loads(out)["samples"]["position"][-1] == pytest.approx(
+        (T[:3, 3] + [0, 0, 0.02]).tolist(), abs=1e-6
+    )

@@ -13,9 +13,8 @@ import yaml
 from mcap.reader import make_reader
 
 import kin
-from app.exports.motion import FORMATS, columns
-from app.shared.answers.motion import sample_times
-from kin.motion import program_to_dict
+from app.exports.motion import FORMATS
+from kin.motion import program_to_dict, tables
 
 RATE = 50.0
 UR5, STANFORD = kin.get_robot("ur5"), kin.get_robot("stanford")
@@ -38,7 +37,7 @@ def written(motion: kin.Motion, name: str) -> bytes:
 
 
 def check_trajectory(message: dict, motion: kin.Motion) -> None:
-    times = sample_times(motion, RATE)
+    times = motion.step_times(RATE)
     assert message["joint_names"] == [joint.name for joint in motion.robot.joints]
     assert message["header"]["stamp"] == {"sec": 0, "nanosec": 0}
     points = message["points"]
@@ -78,7 +77,7 @@ def test_the_commented_table_is_the_table_behind_its_comments(motion: kin.Motion
     head = [line for line in lines if line.startswith("#")]
     assert "".join(lines[len(head) :]).encode() == written(motion, "csv")
     rows = list(csv.DictReader(io.StringIO("".join(lines[len(head) :]))))
-    assert list(rows[0]) == columns(motion)
+    assert list(rows[0]) == tables.columns(motion.robot.n)
     sample = motion.sample(float(rows[3]["t"]))
     assert [float(rows[3][name]) for name in "xyz"] == pytest.approx(sample.T[:3, 3].tolist())
     says_what_is_in_it("".join(head), motion)
@@ -86,7 +85,7 @@ def test_the_commented_table_is_the_table_behind_its_comments(motion: kin.Motion
 
 def test_a_recording_is_read_by_the_reader_of_mcap(motion: kin.Motion) -> None:
     reader = make_reader(io.BytesIO(written(motion, "mcap")), validate_crcs=True)
-    times = sample_times(motion, RATE)
+    times = motion.step_times(RATE)
     summary = reader.get_summary()
     assert summary is not None
     assert {schema.name for schema in summary.schemas.values()} == {

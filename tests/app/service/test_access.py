@@ -6,6 +6,7 @@ import importlib
 import json
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import httpx2
 import pytest
@@ -418,6 +419,19 @@ def test_too_many_requests_get_a_429_with_retry_after():
     assert 1 <= int(answer.headers["retry-after"]) <= 5
     assert answer.json()["type"] == "urn:kinboard:problem:too-many-requests"
     assert client.get("/livez").status_code == 200
+
+
+def test_the_requests_of_ten_seconds_may_come_at_once_as_documented():
+    row = next(
+        line
+        for line in (Path(__file__).parents[3] / "docs/limits.md").read_text().splitlines()
+        if "KINBOARD_RATE_LIMIT" in line
+    )
+    assert "those of ten seconds may come at once, so a limit of 2 lets 20 through" in row
+    client = client_with(rate_limit=2.0)
+    statuses = [client.get("/api/v1/robots/ur5").status_code for _ in range(60)]
+    assert statuses[:20] == [200] * 20
+    assert statuses[20:].count(429) > 20
 
 
 def test_a_bucket_fills_up_again_and_forgets_the_oldest(monkeypatch):

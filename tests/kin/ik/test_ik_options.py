@@ -135,6 +135,22 @@ def test_narrowed_limits_and_locks_hold(robot_id, task, data):
         assert meets(kin.fk(robot, s.q), target, task)
 
 
+def test_wider_limits_are_intersected_where_that_is_wanted():
+    arm = kin.get_robot("ur5")
+    T = kin.fk(arm, [0.4, -1.2, 1.4, 0.3, 1.1, 0.2])
+    narrow = [(-9.0, 3.0), (-3.0, 0.0), (0.0, 9.0), None, None, (-7.0, 7.0)]
+    inside = [(arm.lower[0], 3.0), (-3.0, 0.0), (0.0, arm.upper[2]), None, None, (arm.lower[5], arm.upper[5])]
+    wanted = kin.solve_ik(arm, T, limits=inside)
+    found = kin.solve_ik(arm, T, limits=narrow, wider_limits="intersect")
+    assert [s.q.tolist() for s in found.solutions] == [s.q.tolist() for s in wanted.solutions]
+    assert 0 < len(found.solutions) < 8
+    many = kin.solve_ik_many(arm, [T], limits=narrow, wider_limits="intersect")
+    assert many.q[0].tolist() == found.solutions[0].q.tolist()
+    constraints = kin.JointConstraints(narrow, wider_limits="intersect")
+    points = kin.sample_workspace(arm, 50, constraints=constraints, with_q=True)
+    assert all((chunk.q <= arm.upper).all() and (chunk.q[:, 0] <= 3.0).all() for chunk in points)
+
+
 def test_a_violation_says_that_the_joint_is_locked():
     robot = kin.get_robot("pioneer5")
     target = kin.fk(robot, robot.home)
@@ -554,6 +570,9 @@ def test_no_orientation_of_a_dense_search_is_nearer(robot_id):
         ({"limits": [None] * 6 + [[0, math.nan]]}, "limits[6][1]", "finite"),
         ({"limits": [None] * 6 + [5]}, "limits[6]", "lower limit"),
         ({"limits": [[-9, 9]] + [None] * 6}, "limits[0]", "inside the joint's own"),
+        ({"limits": [[-9, 9]] + [None] * 6}, "limits[0]", "or the option wider_limits intersect"),
+        ({"limits": [[8, 9]] + [None] * 6, "wider_limits": "intersect"}, "limits[0]", "overlap the joint's own"),
+        ({"wider_limits": "clip"}, "wider_limits", '"intersect"'),
         ({"locked": [0.0]}, "locked", "7 joint values"),
         ({"locked": ["a"] + [None] * 6}, "locked[0]", "finite number"),
         ({"locked": [10**400] + [None] * 6}, "locked[0]", "finite number"),

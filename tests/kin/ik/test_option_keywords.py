@@ -22,6 +22,7 @@ OF_A_PATH = {
     "mask_frame",
     "limits",
     "locked",
+    "wider_limits",
     "branch",
     "position_tolerance",
     "rotation_tolerance",
@@ -42,6 +43,7 @@ VALUES: dict[str, tuple[Any, Any]] = {
     "mask_frame": ("base", "world"),
     "limits": ([(-1.0, 1.0), *[None] * 6], [(1.0, -1.0), *[None] * 6]),
     "locked": ([*[None] * 6, 0.25], ["0.25"]),
+    "wider_limits": ("intersect", "clip"),
     "respect_limits": (False, None),
     "branch": ("elbow positive", [3]),
     "images": ("all", True),
@@ -57,7 +59,8 @@ VALUES: dict[str, tuple[Any, Any]] = {
 
 
 def as_options(**keywords: Any) -> IKOptions:
-    constraints = JointConstraints(keywords.pop("limits", None), keywords.pop("locked", None))
+    names = [each.name for each in fields(JointConstraints) if each.name in keywords]
+    constraints = JointConstraints(**{name: keywords.pop(name) for name in names})
     return IKOptions(constraints=constraints, **keywords)
 
 
@@ -114,7 +117,7 @@ def test_every_keyword_reaches_the_call_and_options_hold_the_same(name, keyword)
         if name == "plan_motion":
             with pytest.raises(InputError) as caught:
                 call(options=as_options(**{keyword: good}))
-            field = "constraints" if keyword in ("limits", "locked") else keyword
+            field = "constraints" if keyword in ("limits", "locked", "wider_limits") else keyword
             assert caught.value.field == f"options.{field}"
         return
     if bad is not None:

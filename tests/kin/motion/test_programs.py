@@ -89,9 +89,12 @@ PTP = {"kind": "ptp", "q": [0, 0]}
         ({"segments": [5]}, "segments[0]"),
         ({"segments": [{}]}, "segments[0].kind"),
         ({"segments": [{"kind": ["ptp"]}]}, "segments[0].kind"),
-        ({"segments": [PTP, {"kind": "ptp"}]}, "segments[1].target"),
-        ({"segments": [PTP | {"position": [0, 0, 0]}]}, "segments[0].target"),
-        ({"segments": [PTP | {"wxyz": [1, 0, 0, 0]}]}, "segments[0].target"),
+        ({"segments": [PTP, {"kind": "ptp"}]}, "segments[1]"),
+        ({"segments": [PTP | {"position": [0, 0, 0]}]}, "segments[0]"),
+        ({"segments": [PTP | {"wxyz": [1, 0, 0, 0]}]}, "segments[0]"),
+        ({"segments": [PTP | {"frame": "base"}]}, "segments[0].frame"),
+        ({"segments": [{"kind": "lin", "position": [0, 0, 0], "frame": "moon"}]}, "segments[0].frame"),
+        ({"segments": [{"kind": "dwell", "seconds": 1, "frame": "world"}]}, "segments[0].frame"),
         ({"segments": [{"kind": "ptp", "q": [0, "x"]}]}, "segments[0].q[1]"),
         ({"segments": [{"kind": "ptp", "q": []}]}, "segments[0].q"),
         ({"segments": [{"kind": "ptp", "q": [1e9]}]}, "segments[0].q[0]"),
@@ -134,10 +137,13 @@ def test_a_malformed_program_names_the_field(data, field):
 @pytest.mark.parametrize(
     ("make", "field"),
     [
-        (lambda: kin.Ptp(target=(0, -1, 1, 0, 1, 0)), "target"),
+        (lambda: kin.Ptp(target=(0, -1, math.nan, 0, 1, 0)), "target[2]"),
+        (lambda: kin.Ptp(target=np.full((4, 4), 2.0)), "target[3]"),
+        (lambda: kin.Ptp(target=np.zeros((2, 6))), "target"),
+        (lambda: kin.Ptp(target="home"), "target"),
         (lambda: kin.Lin(target=None), "target"),
         (lambda: kin.Circ(via=(0, 0, 0), target=5), "target"),
-        (lambda: kin.Spline(points=[(1, 2)]), "points[0]"),
+        (lambda: kin.Spline(points=[(1, 2), "x"]), "points[1]"),
         (lambda: kin.Spline(points=3), "points"),
         (lambda: kin.Program(5), "segments"),
     ],
@@ -163,3 +169,60 @@ def test_the_number_of_joint_values_is_checked_against_the_arm():
         kin.plan_motion(kin.get_robot("ur5"), [kin.Ptp(kin.JointTarget((0, 0)))])
     with pytest.raises(kin.InputError, match="TOML"):
         kin.parse_program("segments = [")
+
+
+def test_poses_and_joint_values_are_targets_as_they_are():
+    T = kin.from_position_wxyz([0.4, 0.1, 0.3], [0.0, 1.0, 0.0, 0.0])
+    q = np.array([0.1, -1.0, 1.2, 0.3, 1.1, 0.2])
+    assert kin.Lin(T).target == kin.Lin(T.tolist()).target == kin.PoseTarget.of(T)
+    assert kin.Ptp(q, speed=0.5).target == kin.Ptp(q.tolist(), speed=0.5).target == kin.JointTarget(tuple(q))
+    arc = kin.Circ(T, T, blend=0.01)
+    assert (arc.via, arc.target) == ((0.4, 0.1, 0.3), kin.PoseTarget.of(T))
+    assert kin.Spline(np.stack([T, T])).points == (kin.PoseTarget.of(T),) * 2
+    assert kin.Spline([q, kin.JointTarget(tuple(q))]).points == (kin.JointTarget(tuple(q)),) * 2
+
+
+def test_frames_of_workpieces_become_poses_in_the_world():
+    table = kin.from_xyz_rpy([0.3, -0.1, 0.2], [0.1, 0.2, 0.3])
+    arm = kin.get_robot("ur5").with_base(kin.from_xyz_rpy([0.0, 0.0, 1.0], [0.0, 0.0, 2.0]))
+    T = kin.from_position_wxyz([0.1, 0.2, 0.05], [0.3, 0.9, 0.1, 0.2])
+    where = {"position": T[:3, 3].tolist(), "wxyz": kin.wxyz_from_rotation(T[:3, :3]).tolist()}
+    data = {
+        "segments": [
+            {"kind": "lin", "frame": "table", **where},
+            {"kind": "ptp", "frame": "base", "pose": T.tolist()},
+            {"kind": "circ", "frame": "table", "via": [0.1, 0.0, 0.0], "position": [0.2, 0.0, 0.0]},
+            {"kind": "spline", "points": [{**where, "frame": "table"}, {**where, "frame": "world"}]},
+        ]
+    }
+    lin, ptp, circ, spline = kin.program_from_dict(data, arm, {"table": table}).segments
+    identity = np.eye(4)
+    assert np.allclose(lin.target.pose(identity), table @ T, atol=1e-12)
+    assert np.allclose(ptp.target.pose(identity), arm.T_world_base @ T, atol=1e-12)
+    assert np.allclose(circ.via, (table @ [0.1, 0.0, 0.0, 1.0])[:3], atol=1e-12)
+    assert circ.target.wxyz is None
+    assert np.allclose(circ.target.position, (table @ [0.2, 0.0, 0.0, 1.0])[:3], atol=1e-12)
+    assert np.allclose(spline.points[0].pose(identity), table @ T, atol=1e-12)
+    assert np.allclose(spline.points[1].pose(identity), T, atol=1e-12)
+
+
+def test_a_motion_is_written_as_a_table(tmp_path):
+    arm = kin.get_robot("ur5")
+    motion = kin.plan_motion(arm, [kin.Ptp(arm.q_home + 0.3), kin.Lin(kin.fk(arm, arm.q_home + 0.25))])
+    motion.to_csv(tmp_path / "motion.csv", rate=200)
+    lines = (tmp_path / "motion.csv").read_text().splitlines()
+    assert lines[0].startswith("t,q1,")
+    assert lines[0].endswith(",x,y,z,qw,qx,qy,qz,tool_speed")
+    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
+    assert len(rows) > 1.5 * 200 * motion.duration / 2
+    assert np.allclose(np.diff(rows[:-1, 0]), 1 / 200)
+    assert rows[-1, 0] == motion.duration
+    assert np.abs(kin.fk(arm, rows[:, 1:7])[:, :3, 3] - rows[:, 19:22]).max() < 1e-12
+    speeds = np.linalg.norm(np.gradient(rows[:-1, 19:22], rows[:-1, 0], axis=0), axis=1)
+    assert np.abs(speeds - rows[:-1, 26])[1:-1].max() < 0.02
+    refused = kin.plan_motion(arm, [kin.Ptp([9.0, 0, 0, 0, 0, 0])])
+    with pytest.raises(kin.InputError, match="outside the limits"):
+        refused.to_csv(tmp_path / "none.csv")
+    with pytest.raises(kin.InputError, match="rate"):
+        motion.to_csv(tmp_path / "none.csv", rate=0)
+    assert not (tmp_path / "none.csv").exists()

@@ -1,0 +1,32 @@
+"""A motion as a table: equal steps of time, and the lines of a CSV file."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kin.errors import InputError
+from kin.ik.options import finite_number
+from kin.transforms import Array, wxyz_from_rotation
+
+AT_ONCE = 500  # samples of a piece, so that a long motion is never in memory as text
+
+
+def step_times(duration: float, rate: float) -> Array:
+    """Times ``(k,)`` at `rate` per second, from 0 to the end, which is one of them."""
+    expected = "a number above 0: samples per second"
+    if not finite_number("rate", rate, expected) > 0.0:
+        raise InputError("rate", rate, expected)
+    steps = np.arange(int(duration * rate * (1.0 + 1e-12)) + 1) / rate
+    return steps if duration - steps[-1] < 1e-9 else np.append(steps, duration)
+
+
+def columns(n: int) -> list[str]:
+    """The names of the columns for an arm with n joints."""
+    names = [f"{kind}{i}" for kind in ("q", "qd", "qdd") for i in range(1, n + 1)]
+    return ["t", *names, "x", "y", "z", "qw", "qx", "qy", "qz", "tool_speed"]
+
+
+def lines(t: Array, joints: tuple[Array, Array, Array], T: Array, tool_speed: Array) -> str:
+    """The lines of samples: times ``(k,)``; values, speeds and accelerations ``(k, n)``; poses ``(k, 4, 4)``."""
+    parts = [t[:, None], *joints, T[:, :3, 3], wxyz_from_rotation(T[:, :3, :3]), tool_speed[:, None]]
+    return "".join(",".join(map(repr, row)) + "\n" for row in np.hstack(parts).tolist())
