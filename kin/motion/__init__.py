@@ -15,7 +15,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from numpy.typing import ArrayLike
 
@@ -30,7 +30,7 @@ from kin.motion.planner import planned
 from kin.motion.planning.collisions import checked
 from kin.motion.planning.plan import task_of
 from kin.motion.planning.starts import segment_poses, start_as_recorded
-from kin.motion.program import Circ, Dwell, JointTarget, Lin, PoseTarget, Program, Ptp, Spline
+from kin.motion.program import Circ, Dwell, JointTarget, Lin, Move, PoseTarget, Program, Ptp, Segment, Spline
 from kin.motion.reading import parse_program, program_from_dict, program_to_dict
 from kin.motion.results import Motion, MotionSample, Peak, Refusal, SegmentTimes
 from kin.named import robot_of
@@ -65,7 +65,7 @@ __all__ = [
 
 def plan_motion(
     robot: Robot | str,
-    program: Program | Mapping[str, Any] | Sequence[Ptp | Lin | Circ | Spline | Dwell],
+    program: Program | Mapping[str, Any] | Sequence[Move | Dwell],
     q_start: ArrayLike | None = None,
     *,
     limits: MotionLimits | None = None,
@@ -106,7 +106,7 @@ def plan_motion(
     elif not isinstance(program, Program):
         if not isinstance(program, Sequence) or isinstance(program, str | bytes):
             raise InputError("program", program, "a Program, its segments, or a dict")
-        program = Program(tuple(program))
+        program = Program(cast(tuple[Segment, ...], tuple(program)))  # checked there
     q = robot.q_home if q_start is None else robot.check_q(q_start, "q_start")
     if q.ndim != 1:
         raise InputError("q_start", f"shape {q.shape}", f"one configuration of {robot.n} values")
