@@ -97,7 +97,7 @@ def arrive(page: Page) -> None:
 
 
 def join(page: Page, address: str, code: str, alias: str, q: list[float]) -> None:
-    """Join a room, with an arm at a configuration; the page opens the task of the class."""
+    """Join a room, with an arm at a configuration."""
     page.set_default_timeout(WAIT)
     page.add_init_script(SELDOM)
     page.goto(f"{address}room?code={code}")
@@ -106,7 +106,7 @@ def join(page: Page, address: str, code: str, alias: str, q: list[float]) -> Non
     page.wait_for_url("**/viewer/**")
     page.goto("about:blank")
     page.goto(link(address, {"robot": "puma560", "q": q}))
-    expect(page.locator("[data-exercises=question] [data-guide-do=answer]").first).to_be_attached()
+    expect(page.locator("[data-class-bar=free]")).to_be_attached()
 
 
 def take_wall(browser: Browser, address: str) -> Image.Image:
@@ -120,11 +120,12 @@ def take_wall(browser: Browser, address: str) -> Image.Image:
     teacher.get_by_role("link", name="Start teaching").click()
     arrive(teacher)
     teacher.get_by_role("tab", name="Class").click(force=True)
+    students = [browser.new_page(viewport={"width": 480, "height": 400}) for _ in CLASS]
+    for student, (alias, q, _, _) in zip(students, CLASS, strict=True):
+        join(student, address, code, alias, q)
     teacher.locator("[data-guide=class-task] select").select_option(TASK)
     teacher.locator("[data-guide=class-task] [data-guide-do=fields]").click()
-    for alias, q, choices, hand in CLASS:
-        student = browser.new_page(viewport={"width": 480, "height": 400})
-        join(student, address, code, alias, q)
+    for student, (_, _, choices, hand) in zip(students, CLASS, strict=True):
         for tries, choice in enumerate(choices, 1):
             student.locator("[data-exercises=question] [data-guide-do=answer]").nth(choice).dispatch_event("click")
             said = "solved" if choice == RIGHT else f"{tries} tr"
