@@ -93,6 +93,10 @@ class MistakeKind(Kind):
         added = "The value of a joint is added to θ of its row"
         if slides:
             added += f", that of joint {' and '.join(slides)} to d"
+        if fixed := [str(i + 1) for i, row in enumerate(arm.rows) if row.kind == "fixed"]:
+            added += (
+                f"; row{'s' * (len(fixed) > 1)} {' and '.join(fixed)} {'is' if len(fixed) == 1 else 'are'} fixed"
+            )
         convention = "standard" if arm.convention == "standard" else "Craig’s"
         note = (
             f"In {'the standard' if convention == 'standard' else convention} convention. {added}. "

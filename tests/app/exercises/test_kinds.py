@@ -487,6 +487,7 @@ def test_the_comparison_says_what_is_wrong_with_the_table_as_it_is_now() -> None
 def test_the_table_to_correct_is_on_the_page_and_its_exact_numbers_are_kept() -> None:
     exercise = mistaken("panda", "sign")  # 1.5707963…, shown as 90 or 1.5708
     variant = exercise.variant(1)
+    assert "added to θ of its row; row 8 is fixed." in exercise.asked(variant, UNITS).note
     for units in (UNITS, RADIANS):
         rows, right = shown_rows(exercise, variant, units), shown_rows_of(variant.robot, units)
         assert f'value="{rows[2][1]}"' in question_html(exercise.asked(variant, units), Sheet(), False)
