@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 
 from kin.axes import size
-from kin.fk import fk
+from kin.fk import fk, jacobian
 from kin.kernels.compile import MODEL, direct
 from kin.robot import Robot
 from kin.solvers import rolled
@@ -238,11 +238,18 @@ class Rounded7(Rounded):
                     certain &= count >= 0
                     for k in range(count):
                         ends = self._in_span(p, *pieces[k].tolist())
-                        whose = float(self.branch_of(postures[k, 2]))
+                        whose = float(self.branch_of(postures[k, self._clearest(postures[k])]))
                         if not any(whose == b and _are_alike(ends, (x, y)) for b, x, y in arcs):
                             arcs.append((whose, *ends))
                             places.append(postures[k].copy())
         return np.array(arcs).reshape(-1, 3), np.array(places).reshape(-1, 3, 7), certain
+
+    def _clearest(self, postures: Array) -> int:
+        """Which of the postures ``(3, 7)`` of an interval is farthest from a fold, where another branch begins."""
+        if self._joint < 0:
+            return 2
+        tangents = np.abs(np.linalg.svd(jacobian(self.robot, postures))[2][:, 6, self._joint])
+        return int(tangents.argmax())
 
     def _in_span(self, p: SolverInput, low: float, high: float) -> tuple[float, float]:
         """An interval at the whole turn at which the range of the parameter has it."""

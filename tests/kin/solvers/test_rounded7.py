@@ -231,3 +231,14 @@ def test_a_branch_is_kept_whose_interval_ends_where_another_one_begins(name):
         (low, high), *_ = solution.redundancy[0].intervals
         assert low - 1e-3 <= solution.redundancy[0].value
         assert high - low > 0.4
+
+
+def test_a_followed_interval_belongs_to_the_branch_of_its_posture_that_is_clear_of_folds():
+    """An interval of one branch was taken for one of the other beyond its fold, which was then lost."""
+    robot, exact = arm_named("gen72-urdf 1.571")
+    q = np.array((-1.180831024, -0.170383733, -2.195749817, -1.331852358, -1.779268556, -0.756429049, 3.146082476))
+    T = kin.fk(robot, q)
+    found, meant = kin.solve_ik(robot, T), kin.solve_ik(exact, T)
+    counts = [{s.branch: len(s.redundancy[0].intervals) for s in each.solutions} for each in (found, meant)]
+    assert len(counts[0]) == 4
+    assert counts[0] == counts[1]
