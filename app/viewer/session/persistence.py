@@ -115,8 +115,9 @@ class Persistence:
             if feature.key in saved.features:
                 state = saved.features[feature.key]
                 self._guard(lambda feature=feature, state=state: feature.restore(state))  # type: ignore[misc]
-        if lesson is not None and saved.q is None and self._rights.compute:
-            self._guard(page.lessons.begin)  # such a link leaves the pose to the step
+        bare = saved.q is None and not saved.features.keys() & {lesson, "guide"}
+        if lesson is not None and bare and self._rights.compute:
+            self._guard(page.lessons.begin)  # such a link leaves arm and drawing to the step
         if camera is not None:  # after the lessons, which may move it too
             self._guard(lambda: page.camera.restore(camera))
         notice = link_notice(saved)
