@@ -61,7 +61,7 @@ def test_segments_are_described_as_the_core_reads_them(document):
     variants = schemas["ProgramBody"]["properties"]["segments"]["items"]
     assert variants["discriminator"]["propertyName"] == "kind"
     assert set(variants["discriminator"]["mapping"]) == set(KINDS)
-    target = {"q", "position", "wxyz", "pose"}
+    target = {"q", "position", "wxyz", "pose", "frame"}
     for kind, segment in KINDS.items():
         described = schemas[variants["discriminator"]["mapping"][kind].rsplit("/", 1)[1]]
         own = {each.name for each in fields(segment)}
