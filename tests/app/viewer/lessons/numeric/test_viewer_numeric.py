@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 import re
 from collections.abc import Iterator
@@ -23,6 +24,7 @@ from app.viewer.lessons.numeric import basins, questions, views
 from app.viewer.lessons.numeric.drawing import COPIES, chosen
 from app.viewer.lessons.numeric.example import example
 from app.viewer.server import ViewerServer
+from app.viewer.session.state import PageState, encode
 from kin import Robot
 from kin.differential.iteration import METHODS, Match, Method, Problem, Settings, advance, factors, run
 from kin.transforms import Array
@@ -384,7 +386,9 @@ def test_all_iterates_are_in_view_until_the_lesson_is_closed(server: int) -> Non
     with FakeBrowser(server) as tab:
         tab.settle()
         before = distance()
-        tab.set("Lesson", "Numeric IK")
+    # A link: the lesson opened by hand goes to the pose of its step.
+    state = encode(PageState(robot=PIONEER.id, q=PIONEER.q_home, lesson="numeric"))
+    with FakeBrowser(server, memory=json.dumps({"address": "http://127.0.0.1/", "state": state})) as tab:
         tab.wait(lambda: "Converged in" in tab.html and distance() > 1.1 * before)
         tab.set("Lesson", "None")
         tab.wait(lambda: abs(distance() - before) < 1e-6)
