@@ -85,7 +85,7 @@ def send(role: str, number: signal.Signals) -> Act:
     def act(on: Machine, _: ExitStack) -> None:
         process = on.processes()[role]
         process.send_signal(number)
-        wait_for(lambda: process not in on.processes().values(), 30)
+        wait_for(lambda: process not in on.processes().values(), PATIENCE)  # how long it took is measured later
 
     return act
 
