@@ -7,7 +7,7 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 unset PYTHONDONTWRITEBYTECODE # hundreds of processes are started, each of which would compile all it imports
 chromium=${KINBOARD_TEST_CHROMIUM:-/usr/bin/chromium}
 
-# Three browsers, a screen for two of them, PostgreSQL and the two proxies, if they are missing.
+# Three browsers, a screen for two of them, PostgreSQL, shells, a C++ compiler, curl and the two proxies, if they are missing.
 install_programs() {
   missing=
   [ -x "$chromium" ] || missing=chromium
@@ -16,6 +16,9 @@ install_programs() {
   command -v Xvfb >/dev/null || missing="${missing:+$missing }xvfb"
   command -v initdb >/dev/null || ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || \
     missing="${missing:+$missing }postgresql"
+  for program in zsh fish curl g++; do # of the same names in Debian
+    command -v $program >/dev/null || missing="${missing:+$missing }$program"
+  done
   # shellcheck disable=SC2086 # several words
   [ -z "$missing" ] || apt_install $missing || fail "the tests of pages and classrooms need browsers and a database." \
     "On Debian: sudo apt-get install $missing"

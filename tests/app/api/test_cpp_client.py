@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
-import pytest
 from live_server import serve
 
 import kin
@@ -16,7 +14,6 @@ import kin
 PAGE = Path(__file__).parents[3] / "docs" / "integrate.md"
 
 
-@pytest.mark.skipif(not (shutil.which("g++") and shutil.which("curl")), reason="g++ or curl is not installed")
 def test_the_program_reads_a_motion(app, tmp_path):
     (code,) = re.findall(r"^```cpp\n(.*?)^```$", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
     source, program = tmp_path / "motion.cpp", tmp_path / "motion"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pty
 import select
-import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -30,10 +29,6 @@ CASES = [
 ]
 
 
-def shell(name):
-    return pytest.mark.skipif(shutil.which(name) is None, reason=f"{name} is not installed")
-
-
 @pytest.fixture
 def script(capsys, tmp_path):
     """The file of the script for a shell."""
@@ -51,7 +46,6 @@ def test_the_robots_are_those_of_the_core():
     assert completion.robots() == tuple(sorted(kin.builtin_robots()))
 
 
-@shell("bash")
 @pytest.mark.parametrize(("words", "expected"), CASES)
 def test_bash_completes(script, words, expected):
     asked = f"""
@@ -63,7 +57,6 @@ def test_bash_completes(script, words, expected):
     assert set(done.stdout.split()) == expected
 
 
-@shell("bash")
 def test_bash_completes_files_where_nothing_else_fits(script):
     asked = f"source {script('bash')}; COMP_WORDS=(kinboard fk ur5 -o ''); COMP_CWORD=4; _kinboard"
     asked += '; complete -p kinboard; echo "${#COMPREPLY[@]}"'
@@ -71,7 +64,6 @@ def test_bash_completes_files_where_nothing_else_fits(script):
     assert done.stdout.splitlines() == ["complete -o default -F _kinboard kinboard", "0"]
 
 
-@shell("fish")
 @pytest.mark.parametrize(("words", "expected"), CASES)
 def test_fish_completes(script, words, expected):
     line = " ".join(["kinboard", *words])
@@ -82,7 +74,6 @@ def test_fish_completes(script, words, expected):
     assert {each for each in found if not Path(each).exists()} == expected
 
 
-@shell("zsh")
 @pytest.mark.parametrize(("words", "expected"), CASES)
 def test_zsh_completes(script, words, expected):
     """Typed at a terminal: zsh completes only there. A list is shown where there are several."""
