@@ -20,7 +20,8 @@
   let busy = 0; // the timer of the message that waits for its answer
   let pause = 0; // the timer of `push`
   let due = 0; // when it ends
-  addEventListener("kinboard-connect", () => { typed.clear(); sent = null; clearTimeout(busy); busy = 0; });
+  function answered() { clearTimeout(busy); busy = 0; sent = null; }
+  addEventListener("kinboard-connect", () => { typed.clear(); answered(); });
 
   function keyOf(name) {
     const [where, column] = name.split(" ");
@@ -33,7 +34,7 @@
     const [[name, value]] = typed;
     typed.delete(name);
     sent = [name, value];
-    const next = () => { clearTimeout(busy); busy = 0; sent = null; pushLater(); };
+    const next = () => { answered(); pushLater(); };
     busy = setTimeout(next, PATIENCE);
     send(keyOf(name), value, next);
   }
