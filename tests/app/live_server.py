@@ -11,6 +11,7 @@ from contextlib import asynccontextmanager, contextmanager
 
 import uvicorn
 from fastapi import FastAPI
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.service.server import server_config
 from app.service.web.viewer_proxy import ViewerBridge
@@ -19,7 +20,7 @@ from app.viewer.server import ViewerServer
 
 
 @contextmanager
-def serve(app: FastAPI, settings: Settings | None = None) -> Iterator[int]:
+def serve(app: ASGIApp, settings: Settings | None = None) -> Iterator[int]:
     """Yields the port that `app` listens on, and stops the server's thread at the end."""
     listener = socket.create_server(("127.0.0.1", 0))
     server = uvicorn.Server(server_config(app, settings or Settings()))
@@ -33,6 +34,20 @@ def serve(app: FastAPI, settings: Settings | None = None) -> Iterator[int]:
         thread.join(10)
         listener.close()
         assert not thread.is_alive()
+
+
+def without_viewer(app: FastAPI) -> ASGIApp:
+    """An application that tests share: its own lifespan would start viser, and end what other tests need."""
+
+    async def served(scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "lifespan":
+            await app(scope, receive, send)
+            return
+        for done in ("startup", "shutdown"):
+            await receive()
+            await send({"type": f"lifespan.{done}.complete"})
+
+    return served
 
 
 @contextmanager

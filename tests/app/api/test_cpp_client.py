@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
-from live_server import serve
+from live_server import serve, without_viewer
 
 import kin
 
@@ -19,7 +19,7 @@ def test_the_program_reads_a_motion(app, tmp_path):
     source, program = tmp_path / "motion.cpp", tmp_path / "motion"
     source.write_text(code)
     subprocess.run(["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", source, "-o", program], check=True)
-    with serve(app) as port:
+    with serve(without_viewer(app)) as port:
         done = subprocess.run(
             [program, f"http://127.0.0.1:{port}"], capture_output=True, text=True, timeout=60, check=True
         )

@@ -13,7 +13,7 @@ from pathlib import Path
 import httpx
 import playwright._impl._driver as driver
 import pytest
-from live_server import serve
+from live_server import serve, without_viewer
 
 PACKAGE = "kinboard_client"
 INTEGRATE = Path(__file__).parents[3] / "docs" / "integrate.md"
@@ -181,16 +181,7 @@ def test_a_typescript_program_with_every_operation_has_right_types_and_works(app
         "node_modules/typescript/bin/tsc", *options, "--lib", "es2022,dom", "use.ts", "shown.ts", cwd=tmp_path
     )
 
-    async def without_viewer(scope, receive, send):
-        """The application's lifespan would start viser."""
-        if scope["type"] != "lifespan":
-            await app(scope, receive, send)
-            return
-        for done in ("startup", "shutdown"):
-            await receive()
-            await send({"type": f"lifespan.{done}.complete"})
-
-    with serve(without_viewer) as port:
+    with serve(without_viewer(app)) as port:
         answers = json.loads(run_node("use.js", f"http://127.0.0.1:{port}", cwd=tmp_path))
     assert answers.pop("solutions") >= 1
     assert set(answers) == {operation["operationId"] for _, _, operation in operations(document)}

@@ -10,6 +10,7 @@ import os
 import pytest
 import schemathesis
 from hypothesis import HealthCheck, settings
+from live_server import without_viewer
 from schemathesis.config import SchemathesisConfig
 
 import kin
@@ -41,17 +42,8 @@ def contract():
                 if parameter["name"] == "robot_id":  # any text is an id, but most answers would be 404
                     parameter["schema"]["enum"] = list(kin.classic_robots())
 
-    async def without_viewer(scope, receive, send):
-        """The lifespan would start viser, anew for each operation."""
-        if scope["type"] != "lifespan":
-            await service(scope, receive, send)
-            return
-        for done in ("startup", "shutdown"):
-            await receive()
-            await send({"type": f"lifespan.{done}.complete"})
-
     return schemathesis.openapi.from_asgi(
-        "/openapi.json", without_viewer, config=SchemathesisConfig.from_dict({"checks": CHECKS})
+        "/openapi.json", without_viewer(service), config=SchemathesisConfig.from_dict({"checks": CHECKS})
     )
 
 
