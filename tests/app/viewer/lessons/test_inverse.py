@@ -441,7 +441,7 @@ def test_a_typed_way_is_followed_to_its_posture(port: int) -> None:
         tab.wait(lambda: 'data-derived="centre" data-open="1"' in tab.html)
         say(tab, "go", 1)
         other = given.beside(0)
-        say(tab, "type", f"{math.degrees(asked['2'].ways[0].value):.1f}", "2")
+        say(tab, "fields", [[f"{math.degrees(asked['2'].ways[0].value):.1f}"]], "2")
         tab.wait(lambda: followed(tab) == other.name)
         part = other.name.split(" · ")[0]
         assert f"This is “{part}”, which you follow." in tab.html

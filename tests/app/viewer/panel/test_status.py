@@ -114,7 +114,7 @@ def test_undo_names_the_action_and_not_its_lesson() -> None:
     velocity, postures = object.__new__(VelocityLesson), object.__new__(Postures)
     assert velocity.step_name(("do", ("on_jog", 1, 2), 0, True)) == "Jog"
     assert velocity.step_name(("at", "frame", 0)) == "Velocity"
-    assert postures.step_name(("go", 1)) == "Posture"
+    assert postures.step_name(("do", ("on_go", 1), 0, True)) == "Posture"
 
 
 def test_a_sentence_has_the_short_name_of_a_posture() -> None:

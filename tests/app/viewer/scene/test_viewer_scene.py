@@ -13,7 +13,7 @@ from arms import CLASSICS
 
 import kin
 from app.shared.store import Store
-from app.viewer.panel import joints, readout, status
+from app.viewer.panel import joints, readout, rotations, status
 from app.viewer.scene import camera
 from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.bodies.drawing import drawing
@@ -298,9 +298,9 @@ def test_joint_labels_do_not_repeat_their_number() -> None:
 def test_roll_pitch_yaw_round_trip_and_stay_finite_at_the_pole() -> None:
     for q in Store().get("redundant7").random_q(np.random.default_rng(5), 50):
         R = kin.fk(Store().get("redundant7"), q)[:3, :3]
-        assert np.allclose(rotation(*readout.roll_pitch_yaw(R)), R, atol=1e-9)
+        assert np.allclose(rotation(*rotations.roll_pitch_yaw(R)), R, atol=1e-9)
     pole = rotation(0.3, math.pi / 2, 1.1)
-    assert np.allclose(rotation(*readout.roll_pitch_yaw(pole)), pole, atol=1e-9)
+    assert np.allclose(rotation(*rotations.roll_pitch_yaw(pole)), pole, atol=1e-9)
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:

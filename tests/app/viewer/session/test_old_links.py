@@ -170,7 +170,9 @@ def test_there_is_a_link_for_every_lesson_and_tab() -> None:
 @pytest.mark.parametrize("case", RECORDED)
 def test_a_recorded_link_restores_what_it_did(port: int, case: str) -> None:
     recorded = RECORDED[case]
-    assert described(restored(port, recorded["link"])) == recorded["restored"]
+    before = recorded["restored"]
+    before["view"] = vars(ViewState()) | before["view"]  # choices that came later are as at first
+    assert described(restored(port, recorded["link"])) == before
 
 
 if __name__ == "__main__":
