@@ -117,13 +117,12 @@ def _same(one: tuple[Array, Task], other: tuple[Array, Task]) -> bool:
 
 def _pose(kind: PoseKind, text: str, units: Units, pose: Array, rotations: Rotations) -> tuple[Array, Task]:
     """`read_pose` of a text in which a comma only separates; raises `ReadError`."""
-    lengths = [units.lengths] * 3
     if kind == "pose" and (found := _UR_POSE.fullmatch(text.strip())):
         text, rotations, units = found[1], Rotations("vector"), Units(degrees=False, length="m")
-        if len(elements(text)) != 6:
-            detail = f"Found {len(elements(text))}. Valid: p[x, y, z, rx, ry, rz] in m and rad."
+        if (count := len(elements(text))) != 6:
+            detail = f"Found {count}. Valid: p[x, y, z, rx, ry, rz] in m and rad."
             raise EntryError("Six numbers are needed in p[…]", detail)
-        lengths = [units.lengths] * 3
+    lengths = [units.lengths] * 3
     point, along, direction = text.partition(ALONG)
     if kind == "pose" and along:
         return _approach(elements(point), elements(direction), lengths, pose), "approach"
