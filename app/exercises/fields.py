@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 from app.exercises.expressions import VALID, Expression, ExpressionError
@@ -24,6 +26,22 @@ class ExerciseFileError(KinematicsError):
         self.file, self.field, self.expected = file, field, expected
         self.value = shorten(value)
         super().__init__(f"{file}: {field}: got {self.value}, expected {expected}")
+
+
+def text_of(path: Path | str) -> str:
+    """The text of a file; raises `ExerciseFileError`."""
+    try:
+        return Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ExerciseFileError(str(path), "file", str(error), "a readable UTF-8 text file") from error
+
+
+def toml_of(text: str, file: str) -> dict[str, Any]:
+    """The data of a TOML text; raises `ExerciseFileError`, naming `file`."""
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ExerciseFileError(file, "file", str(error), "valid TOML") from None
 
 
 @dataclass(frozen=True)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
 from app.exercises.exercise import TOPICS, Drawn, Exercise, Target
 from app.exercises.expressions import Expression
-from app.exercises.fields import ExerciseFileError, Fields
+from app.exercises.fields import ExerciseFileError, Fields, text_of, toml_of
 from app.exercises.kinds import KINDS
 from app.exercises.lessons import LESSONS
 from app.exercises.variant import Facts
@@ -33,10 +32,7 @@ def parse_exercise(text: str, file: str = "exercise", find: Find = get_robot, bu
     Raises:
         ExerciseFileError: naming the file, the field, the value and what would be valid.
     """
-    try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise ExerciseFileError(file, "file", str(error), "valid TOML") from None
+    data = toml_of(text, file)
     vary = _vary(Fields(file, data.get("vary", {}), "vary."))
     computed = Fields(file, data.get("let", {}), "let.")
     let = _let(computed, frozenset(vary))
@@ -91,11 +87,7 @@ def parse_exercise(text: str, file: str = "exercise", find: Find = get_robot, bu
 
 def load_exercise(path: Path | str, find: Find = get_robot, builtin: bool = False) -> Exercise:
     """The exercise of a file; raises `ExerciseFileError`."""
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ExerciseFileError(str(path), "file", str(error), "a readable UTF-8 text file") from error
-    return parse_exercise(text, str(path), find, builtin)
+    return parse_exercise(text_of(path), str(path), find, builtin)
 
 
 def load_folder(folder: Path, find: Find = get_robot, builtin: bool = False) -> tuple[Exercise, ...]:

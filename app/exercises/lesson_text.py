@@ -28,7 +28,6 @@ are left out where it does not hold.
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,7 +35,7 @@ from pathlib import Path
 import kin
 from app.exercises.contract import Kind
 from app.exercises.expressions import Expression
-from app.exercises.fields import ExerciseFileError, Fields, Words
+from app.exercises.fields import ExerciseFileError, Fields, Words, text_of, toml_of
 from app.exercises.kinds import KINDS
 from app.exercises.lessons import LESSONS
 from app.exercises.variant import Facts
@@ -107,10 +106,7 @@ def parse_lesson(text: str, file: str = "lesson") -> LessonText:
     Raises:
         ExerciseFileError: naming the file, the field, the value and what would be valid.
     """
-    try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise ExerciseFileError(file, "file", str(error), "valid TOML") from None
+    data = toml_of(text, file)
     facts = _facts(Fields(file, data.get("facts", {}), "facts."))
     found: list[Expression] = []
     aliases = _Fields(file, data.get("words", {}), "words.", frozenset(facts), found)
@@ -131,11 +127,7 @@ def parse_lesson(text: str, file: str = "lesson") -> LessonText:
 
 def load_lesson(path: Path | str) -> LessonText:
     """The texts of a file; raises `ExerciseFileError`."""
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ExerciseFileError(str(path), "file", str(error), "a readable UTF-8 text file") from error
-    return parse_lesson(text, str(path))
+    return parse_lesson(text_of(path), str(path))
 
 
 def lesson_files() -> dict[str, Path]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
 from collections.abc import Callable
 from difflib import get_close_matches
 from functools import cached_property
@@ -17,7 +16,7 @@ from typing import Any
 
 from app.classroom.courses.course import LONGEST, Course, Item
 from app.exercises import ExerciseFileError, Exercises
-from app.exercises.fields import Fields
+from app.exercises.fields import Fields, text_of, toml_of
 from app.exercises.lessons import LESSONS
 from kin import KinematicsError, Robot, get_robot
 
@@ -65,10 +64,7 @@ def course_of(data: object, exercises: Exercises, file: str = "course", find: Fi
 
 def parse_course(text: str, exercises: Exercises, file: str = "course", find: Find = get_robot) -> Course:
     """The course described by TOML text; raises `ExerciseFileError`. It has an item at least."""
-    try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise ExerciseFileError(file, "file", str(error), "valid TOML") from None
+    data = toml_of(text, file)
     course = course_of(data, exercises, file, find)
     if not course.items:
         raise ExerciseFileError(file, "item", data.get("item"), "at least one [[item]]: a lesson or an exercise")
@@ -77,11 +73,7 @@ def parse_course(text: str, exercises: Exercises, file: str = "course", find: Fi
 
 def load_course(path: Path | str, exercises: Exercises, find: Find = get_robot) -> Course:
     """The course of a file; raises `ExerciseFileError`."""
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ExerciseFileError(str(path), "file", str(error), "a readable UTF-8 text file") from error
-    return parse_course(text, exercises, str(path), find)
+    return parse_course(text_of(path), exercises, str(path), find)
 
 
 def to_data(course: Course) -> dict[str, Any]:
