@@ -107,6 +107,17 @@ class BarePage:
                 self.feature.tick(time.perf_counter())
             assert time.monotonic() < end, "the feature does not come to rest"
 
+    def messages_each(self, lesson: Any, robot: kin.Robot, count: int = 10) -> float:
+        """Messages for one new configuration of a lesson, on average; a frame alone takes none."""
+        self.watch()
+        for share in np.linspace(0.0, 1.0, count + 1)[1:]:
+            self.use(robot, robot.q_home + share * np.array([0.3, -0.2, 0.25, 0.1, 0.2, 0.3])[: robot.n])
+            before = len(self.sent)
+            lesson.on_pose(self.now.T_tool)
+            assert len(self.sent) == before, "a frame alone takes none"
+            self.rest()
+        return len(self.sent) / count
+
     def pose(self, q: Array, **more: Any) -> None:
         """Move the arm."""
         assert self.feature is not None
