@@ -115,9 +115,9 @@ class Unit:
         small = 0.0 < abs(scaled) < 0.5 * 10.0**-digits
         return (f"{scaled:.1e}" if small else f"{scaled:.{digits}f}") + self.suffix
 
-    def brief(self, value: float) -> str:
-        """A round value (radians or metres), such as a chosen step: without trailing zeros."""
-        return general(value * self.scale, 4) + self.suffix
+    def brief(self, value: float, digits: int = 4) -> str:
+        """A round value (radians or metres), such as a chosen step: so many digits, without trailing zeros."""
+        return general(value * self.scale, digits) + self.suffix
 
     def short(self, value: float, digits: int = 1) -> str:
         """`number` without trailing zeros."""

@@ -23,8 +23,8 @@ import numpy as np
 
 from kin.axes import size
 from kin.comparison.diagnosis import Search, differences
-from kin.comparison.frames import Mapping, free_offsets, plainest
-from kin.comparison.matching import Tolerance
+from kin.comparison.frames import Mapping, Reference, free_offsets
+from kin.comparison.matching import PRINTED, Tolerance
 from kin.comparison.results import Change, Comparison, Difference, Explanation, LimitDifference, Verdict
 from kin.comparison.tables import Tables, invariants
 from kin.dh.exponentials import exp_screw
@@ -36,14 +36,13 @@ from kin.transforms import Array
 
 Frames = Literal["fixed", "free"]
 
-# Of axes that count as one, and of poses that count as equal: metres for an arm of up to a metre, radians. Printed
-# tables have seven digits or so.
+# Of axes that count as one, for an arm of up to a metre.
 _AXES = Tolerance(1e-6, 1e-6)
-_PRINTED = Tolerance(1e-5, 2e-5)
 # Of axes that may be the same but for rounding; a mapping is then fitted to the poses.
 _ROUNDED = Tolerance(2e-3, 3e-3)
 _SAMPLES, _CLIMBS = 200, 5
 _MOST = 5  # explanations
+_SHARE = 0.1  # of an allowed difference of poses, as the tolerance of a search, which forgives ten times as much
 # The senses of n joints are 2ⁿ cases, and exchanged rows are pairs.
 _MAX_JOINTS, _MAX_ROWS = 12, 40
 
@@ -67,7 +66,8 @@ def compare(
         frames: ``"fixed"`` if equal joint values should give equal poses, so that another base, tool or zero is a
             mistake too; ``"free"`` if these are expected to differ, as between a URDF and a book.
         tolerance: largest difference of the poses, (metres, radians), up to which the arms count as ``"close"``.
-            By default none: then only digits beyond those that are printed are forgiven, 0.01 mm and 0.001°.
+            By default none: then only digits beyond those that are printed are forgiven, 0.01 mm and 0.001°. With
+            a tolerance, mistakes are also found in a table that is rounded elsewhere.
         explain: whether to look for mistakes in b.
         seconds: after which no further pairs of mistakes are tried; single ones are always tried.
         stop: called every few milliseconds while mistakes are sought; what it raises ends the comparison.
@@ -95,17 +95,31 @@ def compare(
     if not (isinstance(seconds, int | float) and 0.0 <= seconds < math.inf):
         raise InputError("seconds", seconds, "a number of seconds, 0 or more")
     deadline = time.monotonic() + seconds
-    scale = max(1.0, size(a))
-    axes = Tolerance(_AXES.length * scale, _AXES.angle)
-    result = _verdict(a, b, axes, scale, allowed)
+    axes = _AXES.of(a)
+    reference = Reference(a, axes)
+    result = _verdict(reference, b, allowed)
     if explain and result.verdict != "identical":
         unchanged = math.inf
         if result.mapping is not None and result.is_same:
             unchanged = result.mapping.cost(axes) * (1.0 if frames == "fixed" else 0.1)
-        search = Search(a, b, frames == "fixed", axes, deadline, stop or (lambda: None))
+        search = Search(reference, b, frames == "fixed", deadline, stop or (lambda: None))
         found = search.run(_MOST, unchanged)
+        if not found and allowed is not None and not result.is_same:
+            near = Reference(a, Tolerance(_SHARE * allowed.length, _SHARE * allowed.angle))
+            search = Search(near, b, frames == "fixed", deadline, stop or (lambda: None))
+            found = _within(a, search.run(_MOST, unchanged), allowed)
         result = replace(result, explanations=tuple(found), complete=search.complete)
     return result
+
+
+def _within(a: Robot, several: list[Explanation], allowed: Tolerance) -> list[Explanation]:
+    """Those after which the poses differ by no more than is allowed, measured as for a verdict."""
+    found = []
+    for each in several:
+        _, position, rotation = _largest(a, each.robot, each.mapping)
+        if allowed.holds(position, rotation):
+            found.append(replace(each, position=position, rotation=rotation))
+    return found
 
 
 def _allowed(tolerance: tuple[float, float] | None) -> Tolerance | None:
@@ -120,16 +134,17 @@ def _allowed(tolerance: tuple[float, float] | None) -> Tolerance | None:
     return Tolerance(length, angle)
 
 
-def _verdict(a: Robot, b: Robot, axes: Tolerance, scale: float, allowed: Tolerance | None) -> Comparison:
+def _verdict(reference: Reference, b: Robot, allowed: Tolerance | None) -> Comparison:
     """The comparison without explanations."""
+    a, axes = reference.robot, reference.tolerance
     differing = tuple(_differences(a, b, axes))
     if any(d.quantity in ("count", "kind") for d in differing):
         return Comparison("different", None, first=differing[0], differences=differing)
     rounded = _is_rounded(a, b)
-    printed = Tolerance(_PRINTED.length * scale, _PRINTED.angle)
+    printed = PRINTED.of(a)
     place = None
-    for tolerance in (axes, printed, Tolerance(_ROUNDED.length * scale, _ROUNDED.angle)):
-        found = plainest(a, b, tolerance)
+    for tolerance in (axes, printed, _ROUNDED.of(a)):
+        found = (reference if tolerance is axes else Reference(a, tolerance)).plainest_of(b)
         if isinstance(found, int):
             place = found if place is None else place
             continue
@@ -138,11 +153,11 @@ def _verdict(a: Robot, b: Robot, axes: Tolerance, scale: float, allowed: Toleran
             mapping = _fitted(a, b, mapping)
         worst, position, rotation = _largest(a, b, mapping)
         verdict: Verdict = "different"
-        if position <= printed.length and rotation <= printed.angle:
+        if printed.holds(position, rotation):
             verdict = "identical" if mapping.is_trivial else "same"
         elif tolerance is axes:
             continue
-        elif allowed is not None and position <= allowed.length and rotation <= allowed.angle:
+        elif allowed is not None and allowed.holds(position, rotation):
             verdict = "close"
         elif tolerance is printed:
             continue

@@ -12,15 +12,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from kin.axes import generic_q
-from kin.comparison.frames import FRAME, LEAST, Mapping, no_mapping, plainest
+from kin.comparison.frames import FRAME, LEAST, Mapping, Reference, Side, no_mapping
 from kin.comparison.matching import Tolerance
-from kin.comparison.mistakes import Edit, edits, fewer_rows, more_rows, own_numbers, value_edit
+from kin.comparison.mistakes import Edit, applied, fewer_rows, known_edits, more_rows, value_edit
 from kin.comparison.results import Change, Explanation
 from kin.comparison.tables import ALPHA, THETA, A, Chain, D, Ends, Invariants, Tables, chain, invariants
 from kin.fk import fk
@@ -50,15 +50,18 @@ class Search:
     """The search for mistakes in b that make it another arm than a.
 
     Args:
+        reference: arm a, and up to which differences axes count as one.
         fixed: whether the poses should agree as they are, so that base, tool and zeros are mistakes too.
         deadline: on `time.monotonic`; pairs are given up then.
         stop: called between two steps.
     """
 
     def __init__(
-        self, a: Robot, b: Robot, fixed: bool, tolerance: Tolerance, deadline: float, stop: Callable[[], None]
+        self, reference: Reference, b: Robot, fixed: bool, deadline: float, stop: Callable[[], None]
     ) -> None:
-        self._a, self._b, self._fixed = a, b, fixed
+        self._reference, self._b, self._fixed = reference, b, fixed
+        a, tolerance = reference.robot, reference.tolerance
+        self._a = a
         self._share = 1.0 if fixed else FREE_FRAMES  # of the cost of frames and zeros
         self._tolerance, self._deadline, self._stop = tolerance, deadline, stop
         self._probes = _probes(a)
@@ -100,8 +103,8 @@ class Search:
         single = start.tables
         n = len(single.joint_rows)
         if n == self._a.n:
-            several = [*edits(single.rows, self._a, self._fixed), *own_numbers(single.rows, self._a)]
-            yield _distinct([(e, e.apply(single)) for e in several], start)
+            several = known_edits(single.rows, self._a, self._fixed)
+            yield _distinct(several, applied(several, single), start)
             # A fixed row that was typed twice or left out.
             if single.rows > n:
                 yield from _levels([e for e in _typed_twice(single) if len(e[1].joint_rows) == n], start)
@@ -125,11 +128,7 @@ class Search:
                 self._second_rows(level)
                 continue
             self._solve(level)
-            second = sorted(
-                [*edits(level.tables.rows, self._a, self._fixed), *own_numbers(level.tables.rows, self._a)],
-                key=lambda edit: edit.cost,
-            )
-            for edit in second:
+            for edit in known_edits(level.tables.rows, self._a, self._fixed):
                 self._stop()
                 if time.monotonic() > self._deadline:
                     self.complete = False
@@ -185,15 +184,21 @@ class Search:
         fits = rest[wrong == 0]
         if not fits.size:
             return
-        least = level.cost[fits] + self._share * np.maximum(LEAST, FRAME * self._frames_needed(tables.take(fits)))
-        for k in np.argsort(least, kind="stable")[:_MOST_MATCHES]:
-            i = fits[k]
-            if least[k] >= min(self._least(), self._limit) or time.monotonic() > self._deadline:
+        needed = FRAME * self._frames_needed(tables.take(fits))
+        least = level.cost[fits] + self._share * np.maximum(LEAST, needed)
+        order = np.argsort(least, kind="stable")[:_MOST_MATCHES]
+        order = order[least[order] < min(self._least(), self._limit)]
+        if not order.size:
+            return
+        for k, side in zip(order, Side.several(tables.take(fits[order])), strict=True):
+            i = int(fits[k])
+            if least[k] >= self._least() or time.monotonic() > self._deadline:
                 break
             self._stop()
-            found = plainest(self._a, tables.robot(int(i), self._b), self._tolerance)
-            if not isinstance(found, int):
-                self._keep(level, int(i), found[0])
+            most = (self._limit - float(level.cost[i])) / self._share
+            found = self._reference.plainest(side, most, float(needed[k]))
+            if isinstance(found, tuple):
+                self._keep(level, i, found[0])
 
     def _frames_needed(self, tables: Tables) -> Array:
         """How many of base and tool every mapping of each table onto a has at least ``(N,)``.
@@ -353,21 +358,20 @@ def _levels(changed: Iterable[tuple[Edit, Tables]], start: _Level) -> Iterator[_
     for each in changed:
         alike.setdefault((each[1].kinds[0] == KIND_CODES["fixed"]).tobytes(), []).append(each)
     for several in alike.values():
-        yield _distinct(several, start)
+        several.sort(key=lambda each: each[0].cost)
+        yield _distinct([edit for edit, _ in several], Tables.joined([table for _, table in several]), start)
 
 
-def _distinct(changed: list[tuple[Edit, Tables]], start: _Level) -> _Level:
-    """Changed tables with the same fixed rows, each once, under the cheapest name."""
+def _distinct(changes: Sequence[Edit], tables: Tables, start: _Level) -> _Level:
+    """The tables with each of some changes, the cheapest first, each table once."""
     (before,), base_cost = start.history, float(start.cost[0])
-    changed = sorted(changed, key=lambda each: each[0].cost)
-    tables = Tables.joined([table for _, table in changed])
     seen = set(_keys(start.tables))
     index = []
     for i, key in enumerate(_keys(tables)):
         if key not in seen:
             seen.add(key)
             index.append(i)
-    edits = [changed[i][0] for i in index]
+    edits = [changes[i] for i in index]
     cost = np.array([base_cost + edit.cost + PER_CHANGE for edit in edits])
     return _Level(tables.take(np.array(index, dtype=np.intp)), [(*before, edit) for edit in edits], cost)
 

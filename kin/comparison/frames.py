@@ -12,19 +12,30 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kin.axes import inverse
-from kin.comparison.matching import NOBODY, Axis, Match, Tolerance, axes_of, cross, matches
+from kin.comparison.matching import (
+    FLIP,
+    NOBODY,
+    QUARTER,
+    Axis,
+    Match,
+    Matching,
+    Tolerance,
+    cross,
+    offset_cost,
+)
+from kin.comparison.tables import Tables, chain
 from kin.dh.exponentials import screws
 from kin.fk import fk
-from kin.robot import Robot
+from kin.robot import KIND_CODES, Robot
 from kin.transforms import Array
 
-# What makes a mapping less plain; only the order of sums matters.
-FRAME, _FLIP, _QUARTER, _OFFSET = 4.6, 2.2, 2.0, 2.9
-LEAST = _QUARTER  # cost of any mapping that is not trivial
+FRAME = 4.6  # what makes a mapping less plain, beside senses and zeros; only the order of sums matters
+LEAST = QUARTER  # cost of any mapping that is not trivial
 _NO_TURN = np.eye(3)
 _LAST = (0.0, 0.0, 0.0, 1.0)
 
@@ -57,12 +68,8 @@ class Mapping:
         total = 0.0
         for T in (self.base, self.tool):
             total += 0.0 if is_identity(T, tolerance) else FRAME
-        total += _FLIP * float(np.count_nonzero(self.signs < 0.0))
-        for offset in self.offsets.tolist():
-            if abs(offset) > tolerance.angle:
-                quarters = offset / (0.5 * math.pi)
-                total += _QUARTER if abs(quarters - round(quarters)) < 1e-6 else _OFFSET
-        return total
+        total += FLIP * float(np.count_nonzero(self.signs < 0.0))
+        return total + sum(offset_cost(offset, tolerance) for offset in self.offsets.tolist())
 
     @property
     def is_trivial(self) -> bool:
@@ -85,32 +92,105 @@ def is_identity(T: Array, tolerance: Tolerance) -> bool:
     return chord <= math.sqrt(8.0) * math.sin(0.5 * min(math.pi, tolerance.angle))
 
 
-def plainest(a: Robot, b: Robot, tolerance: Tolerance) -> tuple[Mapping, int] | int:
-    """The plainest mapping of b onto a.
+class Side(NamedTuple):
+    """What is compared of an arm.
 
-    Returns:
-        the mapping and the number of vectors of signs with which there is one; without any, the first joint (from
-        0) whose axis cannot be matched.
+    Attributes:
+        axes: at q = 0.
+        zero: ``(4, 4)`` pose of the tool at q = 0.
+        S: ``(6, n)`` screws of the axes, in the world.
     """
-    axes_a, axes_b = axes_of(a), axes_of(b)
-    found, furthest = matches(axes_a, axes_b, tolerance)
-    if furthest is not None:
-        return furthest.joint
-    zero_a, zero_b = fk(a, np.zeros(a.n)), fk(b, np.zeros(b.n))
-    S = screws(b).S
-    best, least = None, math.inf
-    frames = FRAME * (
-        (not _same_line(axes_a[0], axes_b[0], tolerance))
-        + (not _same_line(_seen_from(zero_a, axes_a[-1]), _seen_from(zero_b, axes_b[-1]), tolerance))
-    )
-    for match in sorted(found, key=lambda match: match.signs.count(-1)):
-        if frames + _FLIP * match.signs.count(-1) >= least:
-            break
-        for mapping in _candidates(match, axes_a, S, zero_a, zero_b, tolerance):
-            if (cost := mapping.cost(tolerance)) < least:
-                best, least = mapping, cost
-    assert best is not None
-    return best, len(found)
+
+    axes: Sequence[Axis]
+    zero: Array
+    S: Array
+
+    @classmethod
+    def several(cls, tables: Tables) -> list[Side]:
+        """Those of many tables of one shape."""
+        rows = tables.joint_rows
+        lines = chain(tables, np.zeros((1, len(rows))))
+        z, p = lines.z[:, 0, rows], lines.z_point[:, 0, rows]
+        slides = tables.kinds[:, rows] == KIND_CODES["prismatic"]
+        omega = np.where(slides[..., None], 0.0, z)
+        v = np.where(slides[..., None], z, np.cross(p, z))
+        S = np.concatenate([omega, v], axis=-1).swapaxes(-1, -2)
+        return [
+            cls(_Axes(*each[:3]), *each[3:]) for each in zip(z, p, slides.tolist(), lines.T[:, 0], S, strict=True)
+        ]
+
+
+class _Axes(Sequence[Axis]):
+    """Axes from arrays ``(n, 3)``, each made when it is asked for: most arms fail at one of the first."""
+
+    def __init__(self, z: Array, p: Array, slides: Sequence[bool]) -> None:
+        self._z, self._p, self._slides = z, p, slides
+
+    def __len__(self) -> int:
+        return len(self._slides)
+
+    def __getitem__(self, i: Any) -> Any:
+        return Axis(tuple(self._z[i].tolist()), tuple(self._p[i].tolist()), self._slides[i])
+
+
+class Reference:
+    """An arm a, onto which others are mapped.
+
+    Attributes:
+        robot: the arm.
+        tolerance: up to which axes count as one.
+    """
+
+    def __init__(self, a: Robot, tolerance: Tolerance) -> None:
+        self.robot, self.tolerance = a, tolerance
+        (self._a,) = Side.several(Tables.of(a))
+        self._matching = Matching(tuple(self._a.axes), tolerance)
+
+    def plainest_of(self, b: Robot) -> tuple[Mapping, int] | int:
+        """The plainest mapping of an arm b onto a.
+
+        Returns:
+            the mapping and the number of vectors of signs with which there is one; without any, the first joint
+            (from 0) whose axis cannot be matched.
+        """
+        found = self.plainest(Side.several(Tables.of(b))[0])
+        assert found is not None
+        return found
+
+    def plainest(
+        self, b: Side, most: float = math.inf, frames: float | None = None
+    ) -> tuple[Mapping, int] | int | None:
+        """The plainest mapping of b onto a.
+
+        Args:
+            most: a mapping must cost less.
+            frames: what base and tool cost at least, where that is known.
+
+        Returns:
+            the mapping and the number of vectors of signs with which there is one that may cost less; without any,
+            the first joint (from 0) whose axis cannot be matched, or None if there may be one that costs more.
+        """
+        a, tolerance = self._a, self.tolerance
+        if frames is None:
+            frames = _frames_needed(a, b, tolerance)
+        found, furthest = self._matching.matches(b.axes, most - frames)
+        if not found:
+            return furthest.joint if most == math.inf else None
+        best, least = None, most
+        for match in sorted(found, key=lambda match: match.signs.count(-1)):
+            if frames + FLIP * match.signs.count(-1) >= least:
+                break
+            for mapping in _candidates(match, a, b, tolerance):
+                if (cost := mapping.cost(tolerance)) < least:
+                    best, least = mapping, cost
+        return None if best is None else (best, len(found))
+
+
+def _frames_needed(a: Side, b: Side, tolerance: Tolerance) -> float:
+    """What base and tool cost at least: without them, first and last axis have to be where they are."""
+    first = _same_line(a.axes[0], b.axes[0], tolerance)
+    last = _same_line(_seen_from(a.zero, a.axes[-1]), _seen_from(b.zero, b.axes[-1]), tolerance)
+    return FRAME * (not first) + FRAME * (not last)
 
 
 def _seen_from(T: Array, axis: Axis) -> Axis:
@@ -126,14 +206,12 @@ def _same_line(one: Axis, other: Axis, tolerance: Tolerance) -> bool:
     return not turned and (one.slides or math.hypot(*apart) <= 10.0 * tolerance.length)
 
 
-def _candidates(
-    match: Match, axes_a: Sequence[Axis], S: Array, zero_a: Array, zero_b: Array, tolerance: Tolerance
-) -> Iterator[Mapping]:
+def _candidates(match: Match, a: Side, b: Side, tolerance: Tolerance) -> Iterator[Mapping]:
     """Mappings of one vector of signs: with or without an offset of the first joint, and of the last ones."""
     signs = np.array(match.signs, dtype=float)
-    M, columns = match.M.matrix(), S.T.tolist()
+    M, columns = match.M.matrix(), b.S.T.tolist()
     ends = [(M, np.array(match.offsets))]
-    if (closed := _closing(match, M, zero_a, zero_b, tolerance)) is not None:
+    if (closed := _closing(match, M, a.zero, b.zero, tolerance)) is not None:
         ends.append(closed)
     for M_n, offsets in ends:
         product = np.eye(4)  # exp(S_1 o_1) … exp(S_n o_n)
@@ -141,14 +219,14 @@ def _candidates(
             if offset:
                 product = product @ _exp(column, offset)
         B = M_n @ inverse(product)
-        E = inverse(M_n @ zero_b) @ zero_a
-        for first in {float(offsets[0]), 0.0, _first_offset(axes_a[0], signs[0], B, offsets[0], tolerance)}:
+        E = inverse(M_n @ b.zero) @ a.zero
+        for first in {float(offsets[0]), 0.0, _first_offset(a.axes[0], signs[0], B, offsets[0], tolerance)}:
             chosen = offsets.copy()
             chosen[0] = first
             # B exp(S_1 o_1) stays what it is.
             moved = B @ _exp(columns[0], float(offsets[0]) - first)
             yield Mapping(
-                _clean(moved, tolerance), _clean(E, tolerance), signs, _clean_offsets(chosen, S, tolerance)
+                _clean(moved, tolerance), _clean(E, tolerance), signs, _clean_offsets(chosen, b.S, tolerance)
             )
 
 

@@ -34,7 +34,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.axes import lines_of
+from kin.axes import size
 from kin.robot import Robot
 from kin.transforms import Array
 
@@ -42,6 +42,10 @@ Vector = tuple[float, float, float]
 Rotation = tuple[Vector, Vector, Vector]
 
 NOBODY = -1  # the base: whose motion is no joint's offset
+# What makes a mapping less plain: a joint that counts the other way, or from another zero.
+FLIP, QUARTER, OFFSET = 2.2, 2.0, 2.9
+_MOST_KEPT = 20_000  # states
+_ROUNDING = 1e-9  # of sums of costs
 
 
 class Axis(NamedTuple):
@@ -69,10 +73,22 @@ IDENTITY = Motion(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0
 
 
 class Tolerance(NamedTuple):
-    """How far two axes may be apart and still count as one: metres, radians."""
+    """How far two axes, or two poses, may be apart and still count as one: metres, radians."""
 
     length: float
     angle: float
+
+    def of(self, robot: Robot) -> Tolerance:
+        """The tolerance of an arm of up to a metre for this one."""
+        return Tolerance(self.length * max(1.0, size(robot)), self.angle)
+
+    def holds(self, position: float, rotation: float) -> bool:
+        """Whether poses that are so far apart count as one."""
+        return position <= self.length and rotation <= self.angle
+
+
+# Poses that count as equal, for an arm of up to a metre: printed tables have seven digits or so.
+PRINTED = Tolerance(1e-5, 2e-5)
 
 
 class Slide(NamedTuple):
@@ -117,32 +133,73 @@ class Match:
 
 @dataclass(frozen=True)
 class Furthest:
-    """Where the pass ended: the first axis (from 0) that no choice could bring onto its counterpart."""
+    """How far the pass came: the first axis (from 0) that no choice could bring onto its counterpart."""
 
     joint: int
 
 
-def axes_of(robot: Robot) -> tuple[Axis, ...]:
-    """The axes of an arm at q = 0."""
-    lines, turns = lines_of(robot, as_counted=True), robot.revolute.tolist()
-    return tuple(
-        Axis(tuple(z), tuple(p), not turning)
-        for z, p, turning in zip(lines.z.tolist(), lines.points.tolist(), turns, strict=True)
-    )
+class Matching:
+    """The pass over the joints of one arm a, for many arms b.
 
-
-def matches(a: Sequence[Axis], b: Sequence[Axis], tolerance: Tolerance) -> tuple[list[Match], Furthest | None]:
-    """All ways, one per vector of signs, to map the axes of b onto those of a.
-
-    Args:
-        a, b: axes at q = 0, of the same number and kinds.
-
-    Returns:
-        the matches; where there is none, how far the best attempt came.
+    Tables that differ in one row have the axes before it in common: what was found for these is kept, as a tree.
     """
-    reached = [0]
-    found = list(_search(a, b, tolerance, reached))
-    return found, None if found else Furthest(reached[0])
+
+    def __init__(self, a: Sequence[Axis], tolerance: Tolerance) -> None:
+        self._a, self._tolerance = a, tolerance
+        self._first: dict[Axis, list[_Node]] = {}
+        self._kept = 0
+
+    def matches(self, b: Sequence[Axis], most: float = math.inf) -> tuple[list[Match], Furthest]:
+        """All ways, one per vector of signs, to map the axes of b onto those of a.
+
+        Args:
+            b: axes at q = 0, of the same number and kinds as those of a.
+            most: ways whose senses and settled offsets cost as much are left out.
+
+        Returns:
+            the matches, and how far the best attempt came, if there is none.
+        """
+        if self._kept > _MOST_KEPT:
+            self._first, self._kept = {}, 0
+        n = len(self._a)
+        found, reached = [], 0
+        stack = self._started(b[0])[::-1]
+        while stack:
+            node = stack.pop()
+            if node.cost >= most:
+                continue
+            i = len(node.state.signs)
+            reached = max(reached, i)
+            if i == n:
+                found.append(Match(*node.state))
+            else:
+                stack += self._continued(node, b[i], i)[::-1]
+        return found, Furthest(min(reached, n - 1))
+
+    def _started(self, b: Axis) -> list[_Node]:
+        if b not in self._first:
+            zero = (0.0,) * len(self._a)
+            self._first[b] = [
+                self._node(_State((sign,), zero, *_first(self._a[0], b, sign, len(self._a), self._tolerance)))
+                for sign in (1, -1)
+            ]
+        return self._first[b]
+
+    def _continued(self, node: _Node, b: Axis, i: int) -> list[_Node]:
+        """What a state becomes with one more axis."""
+        if b not in node.after:
+            states = _continuations(node.state, self._a[i], b, i, self._tolerance)
+            node.after[b] = [self._node(state) for state in states]
+        return node.after[b]
+
+    def _node(self, state: _State) -> _Node:
+        self._kept += 1
+        cost = FLIP * state.signs.count(-1)
+        turn = state.free.turn
+        for i, offset in enumerate(state.offsets):
+            if i and offset and not self._a[i].slides and (turn is None or i != turn.joint):
+                cost += offset_cost(math.remainder(offset, 2.0 * math.pi), self._tolerance)
+        return _Node(state, cost - _ROUNDING, {})
 
 
 class _State(NamedTuple):
@@ -152,22 +209,26 @@ class _State(NamedTuple):
     free: Free
 
 
-def _search(a: Sequence[Axis], b: Sequence[Axis], tolerance: Tolerance, reached: list[int]) -> Iterator[Match]:
-    n = len(a)
-    zero = (0.0,) * n
-    stack = [_State((sign,), zero, *_first(a[0], b[0], sign, n, tolerance)) for sign in (-1, 1)]
-    while stack:
-        state = stack.pop()
-        i = len(state.signs)
-        if i == n:
-            yield Match(*state)
-            continue
-        for sign in (-1, 1):
-            after = _next(state, a[i], b[i], sign, i, tolerance)
-            if after is not None:
-                reached[0] = max(reached[0], i)
-                stack.append(after)
-    reached[0] = min(reached[0] + 1, n - 1)
+class _Node(NamedTuple):
+    """A state, and what became of it with each next axis.
+
+    Attributes:
+        cost: of the senses, and of the offsets that no later axis and no choice of base and tool can alter. Those
+            of the first joint and of the last one that turns can be shared with a frame, those of slides with each
+            other.
+    """
+
+    state: _State
+    cost: float
+    after: dict[Axis, list[_Node]]
+
+
+def offset_cost(offset: float, tolerance: Tolerance) -> float:
+    """What an angle within ±π as an offset costs."""
+    if abs(offset) <= tolerance.angle:
+        return 0.0
+    quarters = offset / (0.5 * math.pi)
+    return QUARTER if abs(quarters - round(quarters)) < 1e-6 else OFFSET
 
 
 def _first(a: Axis, b: Axis, sign: int, n: int, tolerance: Tolerance) -> tuple[Motion, Free]:
@@ -186,11 +247,37 @@ def _first(a: Axis, b: Axis, sign: int, n: int, tolerance: Tolerance) -> tuple[M
     return M, Free(Turn(a.z, a.p, 0), (Slide(a.z, none),))
 
 
-def _next(state: _State, a: Axis, b: Axis, sign: int, i: int, tolerance: Tolerance) -> _State | None:
-    """The state with one more axis; None if this sign cannot bring it onto that of a."""
-    signs, offsets, M, (turn, slides) = state
-    z = _scaled(_rotate(M.R, b.z), sign)
+def _continuations(state: _State, a: Axis, b: Axis, i: int, tolerance: Tolerance) -> Iterator[_State]:
+    """The state with one more axis, in each sense that can bring it onto that of a."""
+    M, turn = state.M, state.free.turn
+    z, p = _rotate(M.R, b.z), _apply(M, b.p)
     along = turn is not None and _parallel(a.z, turn.z, tolerance.angle)
+    if turn is None or along:
+        senses = [sign for sign in (1, -1) if _norm(_minus(_scaled(z, sign), a.z)) <= tolerance.angle]
+    else:
+        # No turn alters the angle to its own line, nor the moment about it.
+        angles, moments, rounding = (_dot(z, turn.z), _dot(a.z, turn.z)), (0.0, 0.0), 0.0
+        if not (a.slides or turn.everywhere):
+            here, there = _minus(p, turn.p), _minus(a.p, turn.p)
+            moments = _dot(here, cross(turn.z, z)), _dot(there, cross(turn.z, a.z))
+            rounding = 2.0 * (tolerance.length + tolerance.angle * (_norm(here) + _norm(there)))
+        senses = [
+            sign
+            for sign in (1, -1)
+            if abs(sign * angles[0] - angles[1]) <= tolerance.angle
+            and abs(sign * moments[0] - moments[1]) <= rounding
+        ]
+    for sign in senses:
+        after = _next(state, a, b, _scaled(z, sign), p, sign, along, i, tolerance)
+        if after is not None:
+            yield after
+
+
+def _next(
+    state: _State, a: Axis, b: Axis, z: Vector, p: Vector, sign: int, along: bool, i: int, tolerance: Tolerance
+) -> _State | None:
+    """The state with one more axis; None if this sign cannot bring it, at (z, p) so far, onto that of a."""
+    signs, offsets, M, (turn, slides) = state
     changed = list(offsets)
 
     def turned(M: Motion, turn: Turn, angle: float) -> Motion:
@@ -202,11 +289,10 @@ def _next(state: _State, a: Axis, b: Axis, sign: int, i: int, tolerance: Toleran
         flat, wanted = _across(z, turn.z), _across(a.z, turn.z)
         if _norm(flat) > tolerance.angle and _norm(_minus(z, a.z)) > 0.0:
             M = turned(M, turn, _angle(flat, wanted, turn.z))
-            z = _scaled(_rotate(M.R, b.z), sign)
-    if _norm(_minus(z, a.z)) > tolerance.angle:
-        return None
+            z, p = _scaled(_rotate(M.R, b.z), sign), _apply(M, b.p)
+        if _norm(_minus(z, a.z)) > tolerance.angle:
+            return None
     if not a.slides:
-        p = _apply(M, b.p)
         apart = _across(_minus(a.p, p), a.z)
         if turn is not None and along and not turn.everywhere:
             here, there = _across(_minus(p, turn.p), turn.z), _across(_minus(a.p, turn.p), turn.z)
@@ -255,12 +341,16 @@ def _slid(
     M: Motion, slides: tuple[Slide, ...], apart: Vector, z: Vector, signs: tuple[int, ...], offsets: list[float]
 ) -> tuple[Motion, Vector]:
     """M after the free slides that bring an axis of direction z nearest; what remains between the lines."""
-    V = np.array([_across(s.v, z) for s in slides]).T
-    shares = np.linalg.lstsq(V, np.array(apart), rcond=1e-9)[0].tolist()
+    across = [_across(slide.v, z) for slide in slides]
+    if len(slides) > 1:
+        shares = np.linalg.lstsq(np.array(across).T, np.array(apart), rcond=1e-9)[0].tolist()
+    else:
+        length = _dot(across[0], across[0])
+        shares = [_dot(across[0], apart) / length if length > 0.0 else 0.0]
     t, left = M.t, apart
-    for share, slide in zip(shares, slides, strict=True):
+    for share, slide, part in zip(shares, slides, across, strict=True):
         t = _plus(t, _scaled(slide.v, share))
-        left = _minus(left, _scaled(_across(slide.v, z), share))
+        left = _minus(left, _scaled(part, share))
         for j, weight in enumerate(slide.weights):
             if weight:
                 offsets[j] += signs[j] * weight * share
@@ -271,7 +361,9 @@ def _slid(
 
 
 def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    x, y, z = a
+    u, v, w = b
+    return x * u + y * v + z * w
 
 
 def cross(a: Vector, b: Vector) -> Vector:
@@ -292,7 +384,8 @@ def _scaled(a: Vector, share: float) -> Vector:
 
 
 def _norm(a: Vector) -> float:
-    return math.sqrt(_dot(a, a))
+    x, y, z = a
+    return math.sqrt(x * x + y * y + z * z)
 
 
 def _across(a: Vector, z: Vector) -> Vector:
@@ -310,7 +403,9 @@ def _angle(a: Vector, b: Vector, z: Vector) -> float:
 
 
 def _rotate(R: Rotation, a: Vector) -> Vector:
-    return _dot(R[0], a), _dot(R[1], a), _dot(R[2], a)
+    (a1, a2, a3), (b1, b2, b3), (c1, c2, c3) = R
+    x, y, z = a
+    return a1 * x + a2 * y + a3 * z, b1 * x + b2 * y + b3 * z, c1 * x + c2 * y + c3 * z
 
 
 def _apply(M: Motion, a: Vector) -> Vector:
@@ -345,7 +440,12 @@ def _between(a: Vector, b: Vector) -> Rotation:
 def _then_turn(M: Motion, turn: Turn, angle: float) -> Motion:
     """M, then a turn about the line."""
     R = _about(turn.z, angle)
-    columns = tuple(zip(*M.R, strict=True))
-    product = tuple(tuple(_dot(row, column) for column in columns) for row in R)
-    t = _plus(_rotate(R, _minus(M.t, turn.p)), turn.p)
-    return Motion(product, t)  # type: ignore[arg-type]
+    x, y, z = M.R
+    columns = (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
+    first, second, third = _rotate(R, columns[0]), _rotate(R, columns[1]), _rotate(R, columns[2])
+    product = (
+        (first[0], second[0], third[0]),
+        (first[1], second[1], third[1]),
+        (first[2], second[2], third[2]),
+    )
+    return Motion(product, _plus(_rotate(R, _minus(M.t, turn.p)), turn.p))

@@ -14,6 +14,7 @@ from kin.units import DEFAULT_UNITS, Unit, Units
 
 _SYMBOLS = dict(zip(COLUMNS, ("θ", "d", "a", "α"), strict=True))
 _MOST_DIGITS = 6  # decimals of a degree or a millimetre
+_FEWEST, _MOST_SHOWN = 4, 10  # digits of a cell before and after a change
 Names = tuple[str, str]  # how a sentence calls the arms a and b
 NAMES: Names = ("a", "b")
 
@@ -105,8 +106,11 @@ def _distinct_texts(one: float, other: float, unit: Unit) -> tuple[str, str]:
 def explanation(found: Explanation, a: Robot, b: Robot, units: Units = DEFAULT_UNITS) -> str:
     """The mistakes, and what is left when they are undone."""
     changes = ", and ".join(change(each, b, units) for each in found.changes)
-    if found.mapping.is_trivial:
+    if found.mapping.is_trivial and found.is_exact:
         left = "equal joint values then give equal poses"
+    elif found.mapping.is_trivial:
+        apart = f"{units.lengths.value(found.position)} and {units.angles.value(found.rotation)}"
+        left = f"equal joint values then give poses up to {apart} apart"
     else:
         left = "it is then the same arm, but " + "; ".join(mapping(Comparison("same", found.mapping), a, units))
     return f"Likely {changes}; {left}."
@@ -117,8 +121,7 @@ def change(found: Change, b: Robot, units: Units = DEFAULT_UNITS) -> str:
     where = _place(found)
     numbers = ""
     if found.was is not None and found.now is not None and found.columns:
-        unit = units.of(found.columns[0] in ("theta", "alpha"))
-        numbers = f" ({unit.brief(found.now)}, not {unit.brief(found.was)})"
+        numbers = _numbers(found.was, found.now, units.of(found.columns[0] in ("theta", "alpha")))
     other = "modified (Craig's)" if b.convention == "standard" else "standard"
     words = {
         "convention": f"the table is in the {other} convention",
@@ -140,11 +143,25 @@ def change(found: Change, b: Robot, units: Units = DEFAULT_UNITS) -> str:
         "rows exchanged": f"{where} are exchanged",
         "kind": f"{where} has the wrong kind of joint",
         "decimal point": f"{where} has its decimal point in the wrong place",
-        "base": "the base transform was left out",
-        "tool": "the tool transform was left out",
+        "base": f"the base transform {_left_out(b.T_world_base)}",
+        "tool": f"the tool transform {_left_out(b.T_last_tool)}",
         "value": f"{where} is wrong",
     }
     return words[found.mistake] + numbers
+
+
+def _numbers(was: float, now: float, unit: Unit) -> str:
+    """A cell after and before a change, with as many digits as tell the two apart."""
+    for digits in range(_FEWEST, _MOST_SHOWN + 1):
+        after, before = unit.brief(now, digits), unit.brief(was, digits)
+        if after != before:
+            break
+    return f" ({after}, not {before})"
+
+
+def _left_out(T: Array) -> str:
+    """What is wrong with a transform of table b: there is none, or another one."""
+    return "was left out" if np.array_equal(T, np.eye(4)) else "is wrong"
 
 
 def _place(found: Change) -> str:

@@ -7,7 +7,7 @@ change applies to many tables at once, so that pairs of changes are the changes 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
@@ -90,23 +90,59 @@ def edits(m: int, reference: Robot, frames_too: bool) -> Iterator[Edit]:
         yield Edit("tool", (), (), 1.0, lambda t: replace(t, tool=np.broadcast_to(tool, t.tool.shape)))
 
 
+@lru_cache(maxsize=16)
+def known_edits(m: int, reference: Robot, frames_too: bool) -> tuple[Edit, ...]:
+    """All changes that keep the number of rows, the likely ones first; arguments as for `edits`."""
+    several = [*edits(m, reference, frames_too), *own_numbers(m, reference)]
+    return tuple(sorted(several, key=lambda edit: edit.cost))
+
+
+def applied(several: Sequence[Edit], single: Tables) -> Tables:
+    """A single table with each of the changes, which keep the number of rows."""
+    tables = single.take(np.zeros(len(several), dtype=np.intp))
+    for k, edit in enumerate(several):
+        if isinstance(edit.apply, OnCells):
+            edit.apply.change_in(tables.cells[k])
+        else:
+            changed = edit.apply(single)
+            for name in ("cells", "kinds", "modified", "base", "tool"):
+                getattr(tables, name)[k] = getattr(changed, name)[0]
+    return tables
+
+
 def _other_convention(tables: Tables) -> Tables:
     return replace(tables, modified=~tables.modified)
 
 
-def on_cells(
-    rows: slice | tuple[int, ...], columns: tuple[int, ...], change: Callable[[Array], Array]
-) -> Callable[[Tables], Tables]:
-    """A change of some cells: `change` maps their values ``(N, rows, columns)``."""
-    chosen = rows if isinstance(rows, slice) else list(rows)
+@dataclass(frozen=True)
+class OnCells:
+    """A change of some cells.
 
-    def apply(tables: Tables) -> Tables:
+    Attributes:
+        rows, columns: which.
+        change: maps their values ``(..., rows)`` of one column.
+    """
+
+    rows: slice
+    columns: tuple[int, ...]
+    change: Callable[[Array], Array]
+
+    def __call__(self, tables: Tables) -> Tables:
+        """The changed tables."""
         cells = tables.cells.copy()
-        for column in columns:
-            cells[:, chosen, column] = change(cells[:, chosen, column])
+        self.change_in(cells)
         return tables.with_cells(cells)
 
-    return apply
+    def change_in(self, cells: Array) -> None:
+        """Change cells ``(..., m, 4)`` where they are."""
+        for column in self.columns:
+            part = cells[..., self.rows, column]
+            part[...] = self.change(part)
+
+
+def on_cells(rows: slice | tuple[int, ...], columns: tuple[int, ...], change: Callable[[Array], Array]) -> OnCells:
+    """A change of all rows, or of one."""
+    return OnCells(rows if isinstance(rows, slice) else slice(rows[0], rows[0] + 1), columns, change)
 
 
 def _names(*columns: int) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from kin.comparison.frames import Mapping
+from kin.comparison.matching import PRINTED
 from kin.comparison.mistakes import Mistake
 from kin.robot import Robot
 from kin.transforms import Array
@@ -85,6 +86,11 @@ class Explanation:
     cost: float
     position: float
     rotation: float
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the poses then agree but for digits that nobody prints; with a tolerance they need not."""
+        return PRINTED.of(self.robot).holds(self.position, self.rotation)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ THETA, D, A, ALPHA = range(4)
 COLUMNS = ("theta", "d", "a", "alpha")
 _KINDS: dict[float, Kind] = {code: kind for kind, code in KIND_CODES.items()}
 _PARALLEL = 1e-7  # sine
+_ZERO = 1e-15  # of cosines: that of π/2 is 6e-17 in floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,9 +149,9 @@ def _chain(tables: Tables, q: Array, modified: bool) -> Chain:
     turning, sliding = tables.kinds == KIND_CODES["revolute"], tables.kinds == KIND_CODES["prismatic"]
     theta = tables.cells[:, :, THETA, None] + turning[:, :, None] * values  # (N, m, Q)
     d = tables.cells[:, :, D, None] + sliding[:, :, None] * values
-    c, s = np.cos(theta)[..., None], np.sin(theta)[..., None]
+    c, s = (part[..., None] for part in _cos_sin(theta))
     a, alpha = tables.cells[:, :, A], tables.cells[:, :, ALPHA]
-    ca, sa = np.cos(alpha)[:, :, None, None], np.sin(alpha)[:, :, None, None]
+    ca, sa = (part[:, :, None, None] for part in _cos_sin(alpha))
     x, y, z, p = (np.broadcast_to(tables.base[:, None, :3, k], (N, Q, 3)) for k in range(4))
     lines = np.empty((4, N, Q, m, 3))
     for i in range(m):
@@ -166,6 +167,12 @@ def _chain(tables: Tables, q: Array, modified: bool) -> Chain:
     T = np.zeros((N, Q, 4, 4))
     T[..., :3, 0], T[..., :3, 1], T[..., :3, 2], T[..., :3, 3], T[..., 3, 3] = x, y, z, p, 1.0
     return Chain(lines[0], lines[1], lines[2], lines[3], T @ tables.tool[:, None])
+
+
+def _cos_sin(angles: Array) -> tuple[Array, Array]:
+    """Cosines and sines, exactly zero at multiples of 90° as in `exact_cos_sin`."""
+    c, s = np.cos(angles), np.sin(angles)
+    return np.where(np.abs(c) < _ZERO, 0.0, c), np.where(np.abs(s) < _ZERO, 0.0, s)
 
 
 class Invariants(NamedTuple):
