@@ -22,7 +22,7 @@ from typing import Literal
 import numpy as np
 
 from kin.axes import size
-from kin.comparison.diagnosis import Search, differences
+from kin.comparison.diagnosis import FREE_FRAMES, Search, differences
 from kin.comparison.frames import Mapping, Reference, free_offsets
 from kin.comparison.matching import PRINTED, Tolerance
 from kin.comparison.results import Change, Comparison, Difference, Explanation, LimitDifference, Verdict
@@ -99,17 +99,30 @@ def compare(
     reference = Reference(a, axes)
     result = _verdict(reference, b, allowed)
     if explain and result.verdict != "identical":
-        unchanged = math.inf
-        if result.mapping is not None and result.is_same:
-            unchanged = result.mapping.cost(axes) * (1.0 if frames == "fixed" else 0.1)
-        search = Search(reference, b, frames == "fixed", deadline, stop or (lambda: None))
-        found = search.run(_MOST, unchanged)
-        if not found and allowed is not None and not result.is_same:
-            near = Reference(a, Tolerance(_SHARE * allowed.length, _SHARE * allowed.angle))
-            search = Search(near, b, frames == "fixed", deadline, stop or (lambda: None))
-            found = _within(a, search.run(_MOST, unchanged), allowed)
-        result = replace(result, explanations=tuple(found), complete=search.complete)
+        result = _explained(result, reference, b, frames == "fixed", allowed, deadline, stop or (lambda: None))
     return result
+
+
+def _explained(
+    result: Comparison,
+    reference: Reference,
+    b: Robot,
+    fixed: bool,
+    allowed: Tolerance | None,
+    deadline: float,
+    stop: Callable[[], None],
+) -> Comparison:
+    """The comparison with likely mistakes in b."""
+    unchanged = math.inf
+    if result.mapping is not None and result.is_same:
+        unchanged = result.mapping.cost(reference.tolerance) * (1.0 if fixed else FREE_FRAMES)
+    search = Search(reference, b, fixed, deadline, stop)
+    found = search.run(_MOST, unchanged)
+    if not found and allowed is not None and not result.is_same:
+        near = Reference(reference.robot, Tolerance(_SHARE * allowed.length, _SHARE * allowed.angle))
+        search = Search(near, b, fixed, deadline, stop)
+        found = _within(reference.robot, search.run(_MOST, unchanged), allowed)
+    return replace(result, explanations=tuple(found), complete=search.complete)
 
 
 def _within(a: Robot, several: list[Explanation], allowed: Tolerance) -> list[Explanation]:

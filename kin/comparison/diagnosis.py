@@ -31,7 +31,9 @@ PER_CHANGE = 3.0  # cost of any change: fewer changes come first
 LIKELY = 7.0  # a single change that costs less needs no pairs beside it
 FREE_FRAMES = 0.1  # what frames and zeros cost where they are expected to differ, as a share
 _BETTER = 1.5  # a change that leaves frames or zeros open must be this much plainer than none
-_MOST_MATCHES = 60  # of tables of one level whose axes are compared; each takes a millisecond
+# Of tables of one level whose invariants agree: how many are looked at, and how many of these may be the arm.
+# Beside slides, invariants tell little, and most tables are given up at the first axis that does not fit.
+_MOST_TRIED, _MOST_MATCHES = 240, 60
 _VALUE = 2.6  # cost of a number that has no better name
 _NEAR = 3  # invariants that one wrong number can change, about
 _PROBES = 4
@@ -186,17 +188,19 @@ class Search:
             return
         needed = FRAME * self._frames_needed(tables.take(fits))
         least = level.cost[fits] + self._share * np.maximum(LEAST, needed)
-        order = np.argsort(least, kind="stable")[:_MOST_MATCHES]
+        order = np.argsort(least, kind="stable")[:_MOST_TRIED]
         order = order[least[order] < min(self._least(), self._limit)]
         if not order.size:
             return
+        matched = 0
         for k, side in zip(order, Side.several(tables.take(fits[order])), strict=True):
             i = int(fits[k])
-            if least[k] >= self._least() or time.monotonic() > self._deadline:
+            if matched >= _MOST_MATCHES or least[k] >= self._least() or time.monotonic() > self._deadline:
                 break
             self._stop()
             most = (self._limit - float(level.cost[i])) / self._share
             found = self._reference.plainest(side, most, float(needed[k]))
+            matched += not isinstance(found, int)
             if isinstance(found, tuple):
                 self._keep(level, i, found[0])
 

@@ -203,6 +203,16 @@ def test_a_length_of_the_puma_in_a_table_of_the_stanford_arm():
     assert first.startswith("Likely a of row 3 is wrong (0 mm, not 20.3 mm)")
 
 
+def test_the_stanford_arm_of_a_toolbox_has_a_length_of_the_puma():
+    """Its a₃ was copied along; its boom has another zero, and it ends at the wrist."""
+    verdict, first = said(kin.get_robot("stanford"), printed("stanford-toolbox"))
+    assert verdict.startswith("Different arms: the axis of joint 4")
+    assert first == (
+        "Likely a of row 3 is wrong (0 mm, not 20.3 mm); it is then the same arm, but joint 4 counts from 90.0°; "
+        "the tool is shifted by 263.0 mm."
+    )
+
+
 @pytest.mark.parametrize(
     ("row", "cell", "words"),
     [
