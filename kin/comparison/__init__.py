@@ -26,7 +26,7 @@ from kin.comparison.diagnosis import FREE_FRAMES, Search, differences
 from kin.comparison.frames import Mapping, Reference, free_offsets
 from kin.comparison.matching import PRINTED, Tolerance
 from kin.comparison.results import Change, Comparison, Difference, Explanation, LimitDifference, Verdict
-from kin.comparison.tables import Tables, invariants
+from kin.comparison.tables import invariants_of
 from kin.dh.exponentials import exp_screw
 from kin.errors import InputError
 from kin.fk import fk
@@ -202,7 +202,7 @@ def _differences(a: Robot, b: Robot, tolerance: Tolerance) -> list[Difference]:
     ]
     if kinds:
         return [Difference((i,), "kind", x, y) for i, x, y in kinds]
-    one, other = (invariants(Tables.of(robot)) for robot in (a, b))
+    one, other = invariants_of(a), invariants_of(b)
     found: list[Difference] = []
 
     def note(

@@ -14,6 +14,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -22,7 +23,19 @@ from kin.comparison.frames import FRAME, LEAST, Mapping, Reference, Side, no_map
 from kin.comparison.matching import Tolerance
 from kin.comparison.mistakes import Edit, applied, fewer_rows, known_edits, more_rows, value_edit
 from kin.comparison.results import Change, Explanation
-from kin.comparison.tables import ALPHA, THETA, A, Chain, D, Ends, Invariants, Tables, chain, invariants
+from kin.comparison.tables import (
+    ALPHA,
+    THETA,
+    A,
+    Chain,
+    D,
+    Ends,
+    Invariants,
+    Tables,
+    chain,
+    invariants,
+    invariants_of,
+)
 from kin.fk import fk
 from kin.robot import KIND_CODES, Robot
 from kin.transforms import Array
@@ -66,12 +79,8 @@ class Search:
         self._a = a
         self._share = 1.0 if fixed else FREE_FRAMES  # of the cost of frames and zeros
         self._tolerance, self._deadline, self._stop = tolerance, deadline, stop
-        self._probes = _probes(a)
-        self._poses = fk(a, self._probes)
-        table = Tables.of(a)
-        self._kinds = table.kinds[0, table.joint_rows]
-        self._invariants = invariants(table)
-        self._ends = Ends.of(table)
+        self._probes, self._poses, self._kinds, self._ends = _facts(a)
+        self._invariants = invariants_of(a)
         self._found: dict[bytes, Explanation] = {}
         self._limit = math.inf  # cost up to which an explanation that leaves frames or zeros open is worth having
         self.complete = True
@@ -408,6 +417,13 @@ def _probes(a: Robot) -> Array:
     spread = np.where(a.revolute, 0.7, 0.07)
     shifts = np.random.default_rng(5).uniform(-1.0, 1.0, (_PROBES - 1, a.n)) * spread
     return np.concatenate([q[None], q + shifts])
+
+
+@lru_cache(maxsize=32)
+def _facts(a: Robot) -> tuple[Array, Array, Array, Ends]:
+    """What every search with an arm as reference asks of it: probes, poses there, kinds of joints, outer axes."""
+    table, probes = Tables.of(a), _probes(a)
+    return probes, fk(a, probes), table.kinds[0, table.joint_rows], Ends.of(table)
 
 
 def differences(one: Array, other: Array) -> tuple[Array, Array]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -133,6 +134,12 @@ class _Axes(Sequence[Axis]):
         return Axis(tuple(self._z[i].tolist()), tuple(self._p[i].tolist()), self._slides[i])
 
 
+@lru_cache(maxsize=32)
+def _side(robot: Robot) -> Side:
+    (side,) = Side.several(Tables.of(robot))
+    return side._replace(axes=tuple(side.axes))
+
+
 class Reference:
     """An arm a, onto which others are mapped.
 
@@ -143,8 +150,8 @@ class Reference:
 
     def __init__(self, a: Robot, tolerance: Tolerance) -> None:
         self.robot, self.tolerance = a, tolerance
-        (self._a,) = Side.several(Tables.of(a))
-        self._matching = Matching(tuple(self._a.axes), tolerance)
+        self._a = _side(a)
+        self._matching = Matching(self._a.axes, tolerance)
 
     def plainest_of(self, b: Robot) -> tuple[Mapping, int] | int:
         """The plainest mapping of an arm b onto a.
@@ -153,7 +160,7 @@ class Reference:
             the mapping and the number of vectors of signs with which there is one; without any, the first joint
             (from 0) whose axis cannot be matched.
         """
-        found = self.plainest(Side.several(Tables.of(b))[0])
+        found = self.plainest(_side(b))
         assert found is not None
         return found
 
@@ -313,6 +320,7 @@ def _clean_offsets(offsets: Array, S: Array, tolerance: Tolerance) -> Array:
     return np.asarray(np.where(small, 0.0, wrapped))
 
 
+@lru_cache(maxsize=32)
 def free_offsets(a: Robot) -> tuple[tuple[int, ...], ...]:
     """Groups of joints whose offsets cannot be observed from poses, where base and tool are free too.
 

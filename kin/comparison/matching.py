@@ -28,7 +28,7 @@ in Lynch and Park, Modern Robotics, chapter 4.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -162,44 +162,59 @@ class Matching:
         if self._kept > _MOST_KEPT:
             self._first, self._kept = {}, 0
         n = len(self._a)
+        axes: dict[int, Axis] = {}
         found, reached = [], 0
         stack = self._started(b[0])[::-1]
         while stack:
             node = stack.pop()
-            if node.cost >= most:
+            if node.cost - _ROUNDING >= most:
                 continue
             i = len(node.state.signs)
             reached = max(reached, i)
             if i == n:
                 found.append(Match(*node.state))
-            else:
-                stack += self._continued(node, b[i], i)[::-1]
+                continue
+            if i not in axes:
+                axes[i] = b[i]
+            stack += self._continued(node, axes[i], i, most + _ROUNDING)
         return found, Furthest(min(reached, n - 1))
 
     def _started(self, b: Axis) -> list[_Node]:
         if b not in self._first:
             zero = (0.0,) * len(self._a)
-            self._first[b] = [
-                self._node(_State((sign,), zero, *_first(self._a[0], b, sign, len(self._a), self._tolerance)))
+            states = [
+                _State((sign,), zero, *_first(self._a[0], b, sign, len(self._a), self._tolerance))
                 for sign in (1, -1)
             ]
+            self._first[b] = [_Node(state, FLIP if state.signs[0] < 0 else 0.0, {}) for state in states]
         return self._first[b]
 
-    def _continued(self, node: _Node, b: Axis, i: int) -> list[_Node]:
-        """What a state becomes with one more axis."""
+    def _continued(self, node: _Node, b: Axis, i: int, most: float) -> list[_Node]:
+        """What a state becomes with one more axis for less, the usual sense last."""
+        state = node.state
         if b not in node.after:
-            states = _continuations(node.state, self._a[i], b, i, self._tolerance)
-            node.after[b] = [self._node(state) for state in states]
-        return node.after[b]
+            node.after[b] = _attempt(state, self._a[i], b, self._tolerance)
+        attempt = node.after[b]
+        found = []
+        for sign in attempt.senses:
+            if sign not in attempt.found and (sign > 0 or node.cost + FLIP < most):
+                after = _next(state, self._a[i], b, attempt, sign, i, self._tolerance)
+                self._kept += 1
+                attempt.found[sign] = (
+                    None if after is None else _Node(after, node.cost + self._added(state, after), {})
+                )
+            if (known := attempt.found.get(sign)) is not None:
+                found.append(known)
+        return found
 
-    def _node(self, state: _State) -> _Node:
-        self._kept += 1
-        cost = FLIP * state.signs.count(-1)
-        turn = state.free.turn
-        for i, offset in enumerate(state.offsets):
-            if i and offset and not self._a[i].slides and (turn is None or i != turn.joint):
-                cost += offset_cost(math.remainder(offset, 2.0 * math.pi), self._tolerance)
-        return _Node(state, cost - _ROUNDING, {})
+    def _added(self, before: _State, after: _State) -> float:
+        """What one more joint costs: its sense, and the offset of the last that turned, if it is settled."""
+        cost = FLIP if after.signs[-1] < 0 else 0.0
+        settled, turn = before.free.turn, after.free.turn
+        if settled is not None and settled.joint > 0 and (turn is None or turn.joint != settled.joint):
+            offset = math.remainder(after.offsets[settled.joint], 2.0 * math.pi)
+            cost += offset_cost(offset, self._tolerance)
+        return cost
 
 
 class _State(NamedTuple):
@@ -220,7 +235,23 @@ class _Node(NamedTuple):
 
     state: _State
     cost: float
-    after: dict[Axis, list[_Node]]
+    after: dict[Axis, _Attempt]
+
+
+class _Attempt(NamedTuple):
+    """A next axis, and what becomes of the state in each sense that has been tried.
+
+    Attributes:
+        z, p: the axis of b where the state maps it.
+        along: whether the axis of a is parallel to the line of the free turn.
+        senses: those that may bring it onto that of a.
+    """
+
+    z: Vector
+    p: Vector
+    along: bool
+    senses: list[int]
+    found: dict[int, _Node | None]
 
 
 def offset_cost(offset: float, tolerance: Tolerance) -> float:
@@ -247,36 +278,33 @@ def _first(a: Axis, b: Axis, sign: int, n: int, tolerance: Tolerance) -> tuple[M
     return M, Free(Turn(a.z, a.p, 0), (Slide(a.z, none),))
 
 
-def _continuations(state: _State, a: Axis, b: Axis, i: int, tolerance: Tolerance) -> Iterator[_State]:
-    """The state with one more axis, in each sense that can bring it onto that of a."""
+def _attempt(state: _State, a: Axis, b: Axis, tolerance: Tolerance) -> _Attempt:
+    """One more axis of b, and the senses in which it may be brought onto that of a."""
     M, turn = state.M, state.free.turn
     z, p = _rotate(M.R, b.z), _apply(M, b.p)
     along = turn is not None and _parallel(a.z, turn.z, tolerance.angle)
     if turn is None or along:
-        senses = [sign for sign in (1, -1) if _norm(_minus(_scaled(z, sign), a.z)) <= tolerance.angle]
-    else:
-        # No turn alters the angle to its own line, nor the moment about it.
-        angles, moments, rounding = (_dot(z, turn.z), _dot(a.z, turn.z)), (0.0, 0.0), 0.0
-        if not (a.slides or turn.everywhere):
-            here, there = _minus(p, turn.p), _minus(a.p, turn.p)
-            moments = _dot(here, cross(turn.z, z)), _dot(there, cross(turn.z, a.z))
-            rounding = 2.0 * (tolerance.length + tolerance.angle * (_norm(here) + _norm(there)))
-        senses = [
-            sign
-            for sign in (1, -1)
-            if abs(sign * angles[0] - angles[1]) <= tolerance.angle
-            and abs(sign * moments[0] - moments[1]) <= rounding
-        ]
-    for sign in senses:
-        after = _next(state, a, b, _scaled(z, sign), p, sign, along, i, tolerance)
-        if after is not None:
-            yield after
+        senses = [sign for sign in (-1, 1) if _norm(_minus(_scaled(z, sign), a.z)) <= tolerance.angle]
+        return _Attempt(z, p, along, senses, {})
+    # No turn alters the angle to its own line, nor the moment about it.
+    angles, moments, rounding = (_dot(z, turn.z), _dot(a.z, turn.z)), (0.0, 0.0), 0.0
+    if not (a.slides or turn.everywhere):
+        here, there = _minus(p, turn.p), _minus(a.p, turn.p)
+        moments = _dot(here, cross(turn.z, z)), _dot(there, cross(turn.z, a.z))
+        rounding = 2.0 * (tolerance.length + tolerance.angle * (_norm(here) + _norm(there)))
+    senses = [
+        sign
+        for sign in (-1, 1)
+        if abs(sign * angles[0] - angles[1]) <= tolerance.angle and abs(sign * moments[0] - moments[1]) <= rounding
+    ]
+    return _Attempt(z, p, along, senses, {})
 
 
 def _next(
-    state: _State, a: Axis, b: Axis, z: Vector, p: Vector, sign: int, along: bool, i: int, tolerance: Tolerance
+    state: _State, a: Axis, b: Axis, attempt: _Attempt, sign: int, i: int, tolerance: Tolerance
 ) -> _State | None:
-    """The state with one more axis; None if this sign cannot bring it, at (z, p) so far, onto that of a."""
+    """The state with one more axis; None if this sign cannot bring it onto that of a."""
+    z, p, along = _scaled(attempt.z, sign), attempt.p, attempt.along
     signs, offsets, M, (turn, slides) = state
     changed = list(offsets)
 

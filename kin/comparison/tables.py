@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -231,6 +232,12 @@ def invariants(tables: Tables, parallel: float = _PARALLEL) -> Invariants:
             length = ((leaves - start) * z[:, i]).sum(axis=-1)
             offset[:, i] = np.where(feet[:, i], length, math.nan)
     return Invariants(twist, distance, offset)
+
+
+@lru_cache(maxsize=32)
+def invariants_of(robot: Robot) -> Invariants:
+    """The invariants of an arm; not to be written to."""
+    return invariants(Tables.of(robot))
 
 
 class Ends(NamedTuple):
