@@ -17,11 +17,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kin.axes import generic_q
 from kin.comparison.frames import FRAME, LEAST, Mapping, Reference, Side, no_mapping
 from kin.comparison.matching import Tolerance
-from kin.comparison.mistakes import Edit, applied, fewer_rows, known_edits, more_rows, value_edit
+from kin.comparison.mistakes import UNEVEN, Edit, applied, fewer_rows, known_edits, more_rows, value_edit
 from kin.comparison.results import Change, Explanation
 from kin.comparison.tables import (
     ALPHA,
@@ -50,6 +51,7 @@ _MOST_TRIED, _MOST_MATCHES = 240, 60
 _VALUE = 2.6  # cost of a number that has no better name
 _NEAR = 3  # invariants that one wrong number can change, about
 _PROBES = 4
+_ROUNDING = 1e-9  # of sums of costs
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +201,10 @@ class Search:
         least = level.cost[fits] + self._share * np.maximum(LEAST, needed)
         order = np.argsort(least, kind="stable")[:_MOST_TRIED]
         order = order[least[order] < min(self._least(), self._limit)]
+        if self._limit < math.inf:
+            order = order[:_MOST_MATCHES]
+            at_least = needed[order] + self._beside(level, fits[order])
+            order = order[level.cost[fits[order]] + self._share * at_least < self._limit]
         if not order.size:
             return
         matched = 0
@@ -212,6 +218,19 @@ class Search:
             matched += not isinstance(found, int)
             if isinstance(found, tuple):
                 self._keep(level, i, found[0])
+
+    def _beside(self, level: _Level, index: NDArray[np.intp]) -> Array:
+        """What the joints before and after the one changed row cost at least, where b is a in other frames."""
+        begin, end = self._reference.least(self._b)
+        joints = np.cumsum(level.tables.kinds[0] != KIND_CODES["fixed"]).tolist()  # up to each row
+        total = np.zeros(len(index))
+        for k, i in enumerate(index.tolist()):
+            (edit,) = level.history[i]
+            if edit.rows and edit.mistake not in UNEVEN:
+                # The axis of a row in Craig's convention comes after its twist.
+                before = min(edit.rows) - int(level.tables.modified[i])
+                total[k] = begin[joints[before] if before >= 0 else 0] + end[joints[max(edit.rows)]]
+        return total - _ROUNDING
 
     def _frames_needed(self, tables: Tables) -> Array:
         """How many of base and tool every mapping of each table onto a has at least ``(N,)``.

@@ -21,6 +21,7 @@ from kin.axes import inverse
 from kin.comparison.matching import (
     FLIP,
     NOBODY,
+    OFFSET,
     QUARTER,
     Axis,
     Match,
@@ -134,6 +135,34 @@ class _Axes(Sequence[Axis]):
         return Axis(tuple(self._z[i].tolist()), tuple(self._p[i].tolist()), self._slides[i])
 
 
+class _Symmetries(NamedTuple):
+    """The ways to map the last joints of an arm onto themselves.
+
+    Attributes:
+        signs, offsets: ``(k, m)`` of m joints.
+        settled: ``(m,)`` whether no frame and no other joint can take over an offset.
+    """
+
+    signs: Array
+    offsets: Array
+    settled: Array
+
+
+@lru_cache(maxsize=32)
+def _symmetries(a: Robot, tolerance: Tolerance) -> list[_Symmetries]:
+    """Those of all joints, of all but the first, and so on to the last alone."""
+    axes, found = _side(a).axes, []
+    for i in range(a.n):
+        several, _ = Matching(axes[i:], tolerance).matches(axes[i:])
+        turn = several[0].free.turn
+        settled = [
+            k > 0 and not axis.slides and (turn is None or turn.joint != k) for k, axis in enumerate(axes[i:])
+        ]
+        signs, offsets = (np.array([getattr(each, name) for each in several]) for name in ("signs", "offsets"))
+        found.append(_Symmetries(signs, offsets, np.array(settled)))
+    return found
+
+
 @lru_cache(maxsize=32)
 def _side(robot: Robot) -> Side:
     (side,) = Side.several(Tables.of(robot))
@@ -163,6 +192,30 @@ class Reference:
         found = self.plainest(_side(b))
         assert found is not None
         return found
+
+    def least(self, b: Robot) -> tuple[Array, Array]:
+        """What joints of an arm that is a cost at least, whatever the others are.
+
+        A table of which one row is another has the joints before and after it in common with b.
+
+        Returns:
+            ``(n + 1,)`` of none of the first joints, of one, and so on to all; and ``(n + 1,)`` of all joints, of
+            all but the first, and so on to none.
+        """
+        axes = _side(b).axes
+        ends = np.zeros(self.robot.n + 1)
+        found, _ = self._matching.matches(axes)
+        if not found:  # the same but for rounding
+            return ends, ends
+        signs, offsets = np.array(found[0].signs), np.array(found[0].offsets)
+        for i, each in enumerate(_symmetries(self.robot, self.tolerance)):
+            shifted = offsets[i:] + signs[i:] * each.offsets
+            wrapped = np.abs(np.remainder(shifted + math.pi, 2.0 * math.pi) - math.pi)
+            quarters = wrapped / (0.5 * math.pi)
+            cost = np.where(np.abs(quarters - np.round(quarters)) < 1e-6, QUARTER, OFFSET)
+            cost = np.where((wrapped > self.tolerance.angle) & each.settled, cost, 0.0)
+            ends[i] = (cost.sum(axis=1) + FLIP * (signs[i:] * each.signs < 0).sum(axis=1)).min()
+        return np.array(self._matching.beginnings(axes)), ends
 
     def plainest(
         self, b: Side, most: float = math.inf, frames: float | None = None

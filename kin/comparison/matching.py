@@ -179,6 +179,15 @@ class Matching:
             stack += self._continued(node, axes[i], i, most + _ROUNDING)
         return found, Furthest(min(reached, n - 1))
 
+    def beginnings(self, b: Sequence[Axis]) -> list[float]:
+        """What the first axes of an arm that has been matched cost at least: none, one, and so on to all."""
+        nodes, least = self._started(b[0]), [0.0]
+        for i in range(1, len(self._a) + 1):
+            least.append(min((node.cost for node in nodes), default=math.inf))
+            if i < len(self._a):
+                nodes = [each for node in nodes for each in self._continued(node, b[i], i, math.inf)]
+        return least
+
     def _started(self, b: Axis) -> list[_Node]:
         if b not in self._first:
             zero = (0.0,) * len(self._a)

@@ -13,7 +13,9 @@ import kin
 from kin.axes import inverse, size
 from kin.comparison import Comparison, messages
 from kin.comparison.diagnosis import differences
-from kin.comparison.mistakes import Edit, edits, fewer_rows
+from kin.comparison.frames import FRAME, Reference, Side
+from kin.comparison.matching import Tolerance
+from kin.comparison.mistakes import Edit, edits, fewer_rows, known_edits
 from kin.comparison.tables import Tables
 from kin.robot import Joint, Robot
 from kin.transforms import from_position_wxyz
@@ -137,6 +139,33 @@ def test_a_small_change_is_the_same_arm_only_if_poses_cannot_tell():
             assert found.position <= 1e-5 * max(1.0, size(a))
             assert_confirmed(found, a, b, rng)
     assert said == {"identical", "same", "different"}
+
+
+def test_joints_beside_a_changed_row_cost_no_less_than_is_reckoned():
+    """Tables with another row are given up by this bound; the plainest mapping of none may fall below it."""
+    rng = np.random.default_rng(8)
+    tolerance, judged = Tolerance(1e-6, 1e-6), 0
+    for a in [*ARMS, *(random_arm(rng) for _ in range(30))]:
+        b = in_other_frames(a, rng)
+        reference = Reference(a, tolerance)
+        before, after = reference.least(b)
+        table = Tables.of(b)
+        joints = np.cumsum(table.kinds[0] != 0.0)
+        assert before[0] == after[-1] == 0.0
+        for edit in known_edits(table.rows, a, False):
+            changed = edit.apply(table)
+            if len(edit.rows) != 1 or not np.array_equal(changed.kinds, table.kinds):
+                continue
+            found = reference.plainest(Side.several(changed)[0])
+            if isinstance(found, tuple):
+                mapping, _ = found
+                frames = sum(not np.array_equal(T, np.eye(4)) for T in (mapping.base, mapping.tool))
+                (row,) = edit.rows
+                first = row - 1 if b.convention == "modified" else row
+                least = before[joints[first] if first >= 0 else 0] + after[joints[row]]
+                assert mapping.cost(tolerance) - FRAME * frames >= least - 1e-9, (a.id, edit.mistake, row)
+                judged += least > 0.0
+    assert judged > 500
 
 
 def single_mistakes(arm: Robot) -> list[tuple[Edit, Tables]]:
