@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from kin.axes import generic_q
 from kin.comparison.frames import FRAME, LEAST, Mapping, Reference, Side, no_mapping
 from kin.comparison.matching import Tolerance
-from kin.comparison.mistakes import UNEVEN, Edit, applied, fewer_rows, known_edits, more_rows, value_edit
+from kin.comparison.mistakes import Edit, applied, fewer_rows, known_edits, more_rows, value_edit
 from kin.comparison.results import Change, Explanation
 from kin.comparison.tables import (
     ALPHA,
@@ -201,36 +201,39 @@ class Search:
         least = level.cost[fits] + self._share * np.maximum(LEAST, needed)
         order = np.argsort(least, kind="stable")[:_MOST_TRIED]
         order = order[least[order] < min(self._least(), self._limit)]
+        rests: list[list[float]] = [[]] * len(order)
         if self._limit < math.inf:
             order = order[:_MOST_MATCHES]
-            at_least = needed[order] + self._beside(level, fits[order])
-            order = order[level.cost[fits[order]] + self._share * at_least < self._limit]
+            before, rests = self._beside(level, fits[order])
+            at_least = needed[order] + np.array([x + rest[0] for x, rest in zip(before, rests, strict=True)])
+            worth = np.flatnonzero(level.cost[fits[order]] + self._share * (at_least - _ROUNDING) < self._limit)
+            order, rests = order[worth], [rests[k] for k in worth]
         if not order.size:
             return
         matched = 0
-        for k, side in zip(order, Side.several(tables.take(fits[order])), strict=True):
+        for k, side, rest in zip(order, Side.several(tables.take(fits[order])), rests, strict=True):
             i = int(fits[k])
             if matched >= _MOST_MATCHES or least[k] >= self._least() or time.monotonic() > self._deadline:
                 break
             self._stop()
             most = (self._limit - float(level.cost[i])) / self._share
-            found = self._reference.plainest(side, most, float(needed[k]))
+            found = self._reference.plainest(side, most, float(needed[k]), rest)
             matched += not isinstance(found, int)
             if isinstance(found, tuple):
                 self._keep(level, i, found[0])
 
-    def _beside(self, level: _Level, index: NDArray[np.intp]) -> Array:
-        """What the joints before and after the one changed row cost at least, where b is a in other frames."""
+    def _beside(self, level: _Level, index: NDArray[np.intp]) -> tuple[list[float], list[list[float]]]:
+        """What joints that the changed rows leave alone cost at least, where b is a in other frames.
+
+        Returns:
+            for each table the cost of the joints before its changed rows; and from each joint on, that of the
+            joints behind them.
+        """
         begin, end = self._reference.least(self._b)
-        joints = np.cumsum(level.tables.kinds[0] != KIND_CODES["fixed"]).tolist()  # up to each row
-        total = np.zeros(len(index))
-        for k, i in enumerate(index.tolist()):
-            (edit,) = level.history[i]
-            if edit.rows and edit.mistake not in UNEVEN:
-                # The axis of a row in Craig's convention comes after its twist.
-                before = min(edit.rows) - int(level.tables.modified[i])
-                total[k] = begin[joints[before] if before >= 0 else 0] + end[joints[max(edit.rows)]]
-        return total - _ROUNDING
+        ranges = _changed(level.tables.take(index), Tables.of(self._b))
+        before = [begin[first] for first, _ in ranges]
+        rests = [[end[max(k, last)] for k in range(self._a.n + 1)] for _, last in ranges]
+        return before, rests
 
     def _frames_needed(self, tables: Tables) -> Array:
         """How many of base and tool every mapping of each table onto a has at least ``(N,)``.
@@ -414,6 +417,33 @@ def _keys(tables: Tables) -> list[bytes]:
     parts = [np.round(tables.cells, 10) + 0.0, tables.kinds, tables.modified, tables.base, tables.tool]
     together = np.concatenate([np.reshape(part, (N, -1)) for part in parts], axis=1)
     return [row.tobytes() for row in together]
+
+
+def _changed(tables: Tables, single: Tables) -> list[tuple[int, int]]:
+    """The joints whose axes do not move with the first ones of a single table or with its last ones: from, to.
+
+    The axes before them are those of that table, and those from the end of the range on move as one body.
+    """
+    n = len(single.joint_rows)
+    if tables.rows != single.rows:
+        return [(0, n)] * len(tables)
+    # Before each row, and behind the last.
+    joints = [0, *np.cumsum(single.kinds[0] != KIND_CODES["fixed"]).tolist()]
+    after_twist = int(single.modified[0])  # as the axis of a row in Craig's convention is
+    cells = (tables.cells != single.cells).any(axis=2)
+    conventions = (tables.modified != single.modified).tolist()
+    bases = (tables.base != single.base).any(axis=(1, 2)).tolist()
+    found = []
+    for each, convention, base in zip(cells, conventions, bases, strict=True):
+        rows = np.flatnonzero(each).tolist()
+        if convention:
+            found.append((0, n))
+        elif not rows:
+            found.append((0, 0) if base else (n, n))
+        else:
+            first = 0 if base else joints[rows[0] + 1 - after_twist]
+            found.append((first, joints[rows[-1] + 1]))
+    return found
 
 
 def _changes(table: Tables, history: tuple[Edit, ...]) -> tuple[Change, ...]:

@@ -16,6 +16,7 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kin.axes import inverse
 from kin.comparison.matching import (
@@ -145,7 +146,7 @@ class _Symmetries(NamedTuple):
 
     signs: Array
     offsets: Array
-    settled: Array
+    settled: NDArray[np.bool_]
 
 
 @lru_cache(maxsize=32)
@@ -193,7 +194,7 @@ class Reference:
         assert found is not None
         return found
 
-    def least(self, b: Robot) -> tuple[Array, Array]:
+    def least(self, b: Robot) -> tuple[list[float], list[float]]:
         """What joints of an arm that is a cost at least, whatever the others are.
 
         A table of which one row is another has the joints before and after it in common with b.
@@ -206,7 +207,7 @@ class Reference:
         ends = np.zeros(self.robot.n + 1)
         found, _ = self._matching.matches(axes)
         if not found:  # the same but for rounding
-            return ends, ends
+            return ends.tolist(), ends.tolist()
         signs, offsets = np.array(found[0].signs), np.array(found[0].offsets)
         for i, each in enumerate(_symmetries(self.robot, self.tolerance)):
             shifted = offsets[i:] + signs[i:] * each.offsets
@@ -215,16 +216,17 @@ class Reference:
             cost = np.where(np.abs(quarters - np.round(quarters)) < 1e-6, QUARTER, OFFSET)
             cost = np.where((wrapped > self.tolerance.angle) & each.settled, cost, 0.0)
             ends[i] = (cost.sum(axis=1) + FLIP * (signs[i:] * each.signs < 0).sum(axis=1)).min()
-        return np.array(self._matching.beginnings(axes)), ends
+        return self._matching.beginnings(axes), ends.tolist()
 
     def plainest(
-        self, b: Side, most: float = math.inf, frames: float | None = None
+        self, b: Side, most: float = math.inf, frames: float | None = None, rest: Sequence[float] = ()
     ) -> tuple[Mapping, int] | int | None:
         """The plainest mapping of b onto a.
 
         Args:
             most: a mapping must cost less.
             frames: what base and tool cost at least, where that is known.
+            rest: what the joints from each one on cost at least, where that is known.
 
         Returns:
             the mapping and the number of vectors of signs with which there is one that may cost less; without any,
@@ -233,7 +235,7 @@ class Reference:
         a, tolerance = self._a, self.tolerance
         if frames is None:
             frames = _frames_needed(a, b, tolerance)
-        found, furthest = self._matching.matches(b.axes, most - frames)
+        found, furthest = self._matching.matches(b.axes, most - frames, rest)
         if not found:
             return furthest.joint if most == math.inf else None
         best, least = None, most

@@ -149,12 +149,15 @@ class Matching:
         self._first: dict[Axis, list[_Node]] = {}
         self._kept = 0
 
-    def matches(self, b: Sequence[Axis], most: float = math.inf) -> tuple[list[Match], Furthest]:
+    def matches(
+        self, b: Sequence[Axis], most: float = math.inf, rest: Sequence[float] = ()
+    ) -> tuple[list[Match], Furthest]:
         """All ways, one per vector of signs, to map the axes of b onto those of a.
 
         Args:
             b: axes at q = 0, of the same number and kinds as those of a.
             most: ways whose senses and settled offsets cost as much are left out.
+            rest: what the joints from each one on cost at least, where that is known; n + 1 numbers.
 
         Returns:
             the matches, and how far the best attempt came, if there is none.
@@ -162,21 +165,23 @@ class Matching:
         if self._kept > _MOST_KEPT:
             self._first, self._kept = {}, 0
         n = len(self._a)
+        rest = rest or (0.0,) * (n + 1)
+        most += _ROUNDING
         axes: dict[int, Axis] = {}
         found, reached = [], 0
         stack = self._started(b[0])[::-1]
         while stack:
             node = stack.pop()
-            if node.cost - _ROUNDING >= most:
-                continue
             i = len(node.state.signs)
+            if node.cost + rest[i] >= most:
+                continue
             reached = max(reached, i)
             if i == n:
                 found.append(Match(*node.state))
                 continue
             if i not in axes:
                 axes[i] = b[i]
-            stack += self._continued(node, axes[i], i, most + _ROUNDING)
+            stack += self._continued(node, axes[i], i, most - rest[i + 1])
         return found, Furthest(min(reached, n - 1))
 
     def beginnings(self, b: Sequence[Axis]) -> list[float]:

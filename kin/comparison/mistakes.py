@@ -44,8 +44,6 @@ Mistake = Literal[
     "value",
 ]
 
-UNEVEN: tuple[Mistake, ...] = ("typed twice", "superfluous row", "missing row")  # rows are counted otherwise then
-
 
 @dataclass(frozen=True)
 class Edit:

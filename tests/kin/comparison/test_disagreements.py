@@ -109,7 +109,7 @@ def test_the_ur5_of_a_toolbox_stands_lower_or_has_another_d(frames):
 def test_the_ur5e_of_a_library_before_its_correction():
     """Two lengths are mistaken. The third that its pull request changes, d1, is a height of the base."""
     maker, library = kin.get_robot("ur5e"), printed("ur5e-visose")
-    verdict, first = said(maker, library, frames="free")
+    verdict, first = said(maker, library, frames="free", seconds=60.0)
     assert verdict.startswith("Different arms: the axes of joints 3 and 4 are at a distance of 392.20 mm in a")
     assert first == (
         "Likely d of row 5 is wrong (99.7 mm, not 100.3 mm), and a of row 3 is wrong (−392.2 mm, not −392.25 mm); "
