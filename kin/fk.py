@@ -55,7 +55,7 @@ _compiled = _Compiled()
 
 
 def fk(robot: Robot | str, q: ArrayLike) -> Array:
-    """Pose of the tool ``(..., 4, 4)``, T_base_tool, for configurations ``(..., n)`` in radians (metres).
+    """Pose of the tool ``(..., 4, 4)`` in the world frame, metres, for configurations ``(..., n)``.
 
     Equation (2) of the chapter, ``T = A_1 … A_n``, for either convention.
 

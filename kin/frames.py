@@ -70,7 +70,7 @@ def frame_pose(
         frame: ``"world"``, ``"base"`` (before the first DH row), ``"tool"`` (where the tool is at `q`), or the
             name of a workpiece frame.
         workpieces: poses ``(4, 4)`` of workpiece frames in the world frame, by name.
-        q: the present configuration ``(n,)``; needed for the frame of the tool.
+        q: the present configuration ``(n,)``, radians (metres); needed for the frame of the tool.
 
     Returns:
         The pose of the frame.

@@ -8,17 +8,36 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from fastapi.testclient import TestClient
 
 import kin
+from app.service.main import create_app
+from app.shared.settings import Settings
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "integrate.md").read_text(encoding="utf-8")
 GRIPPER = kin.from_xyz_rpy([0.0, 0.0, 0.12])
+
+
+# Runs hour.py where nothing is installed but what `kin` needs.
+WITH_THE_CORE_ALONE = """
+import runpy, sys
+
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        package = name.partition(".")[0]
+        if package[0] != "_" and package not in {*sys.stdlib_module_names, "kin", "numpy", "numba", "llvmlite"}:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Missing())
+runpy.run_path("hour.py", run_name="__main__")
+"""
 
 
 def example(beginning: str) -> str:
@@ -70,7 +89,7 @@ def test_the_hour_in_python(folder):
     code = example('python title="hour.py"')
     assert len(code.splitlines()) <= 40
     (folder / "hour.py").write_text(code)
-    assert "1000 targets: 1000 solved" in run(folder, sys.executable, "hour.py")
+    assert "1000 targets: 1000 solved" in run(folder, sys.executable, "-c", WITH_THE_CORE_ALONE)
     arm = arm_of(folder)
     home = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])
     q = np.loadtxt(folder / "joints.csv", delimiter=",", skiprows=1)
@@ -85,6 +104,24 @@ def test_the_hour_in_python(folder):
     assert np.abs(driven[-1] - T[750]).max() < 1e-5
     picture = ElementTree.fromstring((folder / "motion.svg").read_text())
     assert len(picture.findall("{*}path")) == 6
+
+
+def test_the_page_names_what_the_core_needs_as_the_project_does():
+    needed = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+    core = [f'"{each}"' for each in needed if each.startswith(("numpy", "numba"))]
+    assert f"pip install {' '.join(core)}\npip install --no-deps .\n" in PAGE
+    assert f"the {len(needed)} packages that the service needs" in PAGE
+
+
+def test_the_request_of_the_matlab_program_is_answered_with_the_field_that_it_shows():
+    code = example("matlab")
+    (numbers,) = re.findall(r'struct\("q", \[([\d. ]+)\]\)', code)
+    (address,) = re.findall(r'webwrite\("http://127\.0\.0\.1:8000(\S+)"', code)
+    answer = TestClient(create_app(Settings())).post(address, json={"q": list(map(float, numbers.split()))})
+    shown = answer.json()
+    for name in re.findall(r"disp\(answer\.([\w.]+)\)", code)[0].split("."):
+        shown = shown[name]
+    assert np.allclose(shown, kin.fk("pioneer5", np.fromstring(numbers, sep=" "))[:3, 3])
 
 
 def test_the_hour_on_the_command_line(folder):

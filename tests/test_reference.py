@@ -16,9 +16,27 @@ import kin
 from scripts.reference import OneByOne, one_by_one
 
 ROOT = Path(__file__).parents[1]
-FUNCTIONS = sorted(name for name in kin.__all__ if inspect.isfunction(getattr(kin, name)))
+FUNCTIONS = sorted(name for name in kin.__all__ if inspect.isfunction(inspect.unwrap(getattr(kin, name))))
+METHODS = sorted(
+    f"{name}.{method}"
+    for name in kin.__all__
+    if inspect.isclass(cls := getattr(kin, name)) and not issubclass(cls, Exception | kin.Robot)
+    for method, value in vars(cls).items()
+    if not method.startswith("_") and (inspect.isfunction(value) or isinstance(value, classmethod))
+    if value.__module__.startswith("kin.")
+)
 # What has no example that can run here: a notebook, and what only fills the cache of compiled kernels.
 NO_EXAMPLE = {"show", "warm_up", "warm_up_rest"}
+# Nothing that they may be given is refused.
+NEVER_RAISES = {
+    *("builtin_robots", "capability_join", "classic_robots", "warm_up", "warm_up_rest", "wxyz_from_rotation"),
+}
+# Numbers of a parameter with this annotation have units.
+NUMBERS = re.compile(r"\b(float|ArrayLike|Array|Limits|Locks|Values|MotionLimits)\b")
+UNITS = re.compile(
+    r"\b(radians?|metres?|m|mm|m/s|seconds?|kg|samples|quaternion|unit|orthonormal|scalar|share|from 0)\b"
+    r"|``\([^`]*4, 4\)``|0 to 1"
+)
 
 
 @pytest.fixture(scope="module")
@@ -33,22 +51,29 @@ def read() -> griffe.Module:
     )
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_every_function_is_described(read, name):
+@pytest.mark.parametrize("name", [*FUNCTIONS, *METHODS])
+def test_every_function_and_method_is_described(read, name):
     function = read["fk.fk" if name == "fk" else name]  # the module `kin.fk` has the name of its function
     function = function.final_target if function.is_alias else function
     sections = {section.kind.value: section.value for section in function.docstring.parsed}
     assert sections["text"].strip()
-    wanted = sorted(each.name for each in function.parameters)
-    assert sorted(each.name for each in sections.get("parameters", ())) == wanted
-    assert all(each.description.strip() for each in sections.get("parameters", ()))
+    wanted = {each.name: each for each in function.parameters if each.name not in ("self", "cls")}
+    described = {each.name: each.description for each in sections.get("parameters", ())}
+    assert sorted(described) == sorted(wanted)
+    for parameter, description in described.items():
+        assert description.strip()
+        if NUMBERS.search(str(wanted[parameter].annotation)):
+            assert UNITS.search(f"{parameter}: {description}"), f"no unit: {parameter}: {description}"
     assert str(function.returns) in ("None", "Any") or "returns" in sections
+    assert "raises" in sections or name in NEVER_RAISES or "." in name
     assert ("examples" in sections) != (name in NO_EXAMPLE)
 
 
-@pytest.mark.parametrize("name", [name for name in FUNCTIONS if name not in NO_EXAMPLE])
+@pytest.mark.parametrize("name", [name for name in [*FUNCTIONS, *METHODS] if name not in NO_EXAMPLE])
 def test_examples_run_and_give_what_is_shown(name):
-    (test,) = doctest.DocTestFinder(recurse=False).find(getattr(kin, name), name)
+    owner, _, method = name.rpartition(".")
+    described = getattr(getattr(kin, owner) if owner else kin, method)
+    (test,) = doctest.DocTestFinder(recurse=False).find(inspect.unwrap(described), name)
     assert test.examples
     output: list[str] = []
     result = doctest.DocTestRunner().run(test, out=output.append)

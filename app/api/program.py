@@ -37,7 +37,9 @@ class SegmentTarget(_Described):
     q: list[Number] | None = Field(
         None, min_length=1, max_length=MOST_VALUES, description="One value per joint, in the units of the program."
     )
-    position: Vector3 | None = Field(None, description="The tool point x, y, z in the world frame.")
+    position: Vector3 | None = Field(
+        None, description="The tool point x, y, z in `frame`, by default the world frame."
+    )
     wxyz: Vector4 | None = Field(
         None, description="Orientation at `position`; by default that at the start of the segment."
     )
@@ -76,14 +78,14 @@ class LinSegment(_Move, SegmentTarget):
 class ViaPoint(_Described):
     """A point of an arc."""
 
-    position: Vector3 = Field(description="The point x, y, z in the world frame.")
+    position: Vector3 = Field(description="The point x, y, z in the `frame` of the segment.")
 
 
 class CircSegment(_Move, SegmentTarget):
     """MoveC: an arc of the tool point."""
 
     kind: Literal["circ"] = Field(description="An arc.")
-    via: Vector3 | ViaPoint = Field(description="A point of the arc between start and target.")
+    via: Vector3 | ViaPoint = Field(description="A point of the arc between start and target, in `frame`.")
     orientation: Orientation = Field("geodesic", description="How the tool turns on the way.")
 
 

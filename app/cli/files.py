@@ -38,7 +38,10 @@ def run_import(arguments: Namespace) -> int:
     if arguments.output is None:
         print(text, end="")
         return 0
-    print("\n".join([f"{arguments.output}: {found.robot.name}", *report_lines(found.report)]))
+    units = tomllib.loads(text)["units"]
+    said = f"{units['length']} and {units['angle']} in the file; commands read mm and deg, with --rad m and rad"
+    lines = [f"{arguments.output}: {found.robot.name}", f"units       {said}", *report_lines(found.report)]
+    print("\n".join(lines))
     return 0
 
 

@@ -17,7 +17,7 @@ import sys
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from app.cli.pipes.parquet import arrow_with_parquet, opened_columns, rows_of
 from app.exports.progress import progress_bar
 from app.shared.mapreduce import dask_client
 from app.shared.threads import processors
@@ -99,7 +100,7 @@ def solve_file(question: Question, source: Path, output: Path, dask: str | None 
         expected = "a file in an existing folder, with a name in " + ", ".join(_ENDINGS)
         raise InputError("--output", str(output), expected)
     if output.suffix.lower() == ".parquet":
-        _parquet("--output", output)
+        arrow_with_parquet("--output", str(output))
     try:
         total = _count(source)
         with _solvers(dask) as (pool, most):
@@ -267,50 +268,20 @@ def _pose(place: int, row: list[str]) -> Array:
 # -- Parquet ---------------------------------------------------------------------------------------------------
 
 
-def _parquet(field: str, file: Path) -> Any:
-    """pyarrow with its Parquet module; an `InputError` names the field that needs it."""
-    try:
-        import pyarrow.parquet
-    except ImportError:
-        expected = "the extra parquet installed: pip install 'kinboard[parquet]'; or a .csv or .npy file"
-        raise InputError(field, str(file), expected) from None
-    return pyarrow
-
-
-def _opened(source: Path) -> Any:
+def _opened(source: Path) -> AbstractContextManager[Any]:
     """A Parquet file of targets, open."""
-    arrow = _parquet(_FIELD, source)
-    try:
-        table = arrow.parquet.ParquetFile(source)
-    except arrow.ArrowInvalid:
-        raise InputError(_FIELD, str(source), _FILES) from None
-    if not set(COLUMNS) <= set(table.schema_arrow.names):
-        raise InputError(_FIELD, table.schema_arrow.names, _FILES)
-    return table
+    return opened_columns(source, COLUMNS, _FIELD, _FILES)
 
 
 def _parquet_pieces(source: Path, first: int) -> Iterator[Array]:
-    """The targets ``(m, 4, 4)`` of a Parquet file from the first one on; earlier row groups are not read."""
+    """The targets ``(m, 4, 4)`` of a Parquet file from the first one on."""
     with _opened(source) as table:
-        sizes = [table.metadata.row_group(i).num_rows for i in range(table.num_row_groups)]
-        ends = np.cumsum(sizes)
-        begin = int(np.searchsorted(ends, first, side="right"))
-        place = int(ends[begin]) - sizes[begin] if begin < len(sizes) else first
-        for batch in table.iter_batches(AT_ONCE, row_groups=range(begin, len(sizes)), columns=COLUMNS):
-            skipped = min(max(0, first - place), batch.num_rows)
-            some = batch.slice(skipped)
-            place += batch.num_rows
-            if some.num_rows:
-                yield _poses_of(some, place - some.num_rows)
+        for place, rows in rows_of(table, COLUMNS, AT_ONCE, _FIELD, _FILES, first):
+            yield _poses_of(rows, place)
 
 
-def _poses_of(batch: Any, place: int) -> Array:
-    """Rows of seven columns as poses ``(m, 4, 4)``; `place` is that of the first in its file."""
-    try:
-        columns = [batch.column(name).to_numpy(zero_copy_only=False).astype(np.float64) for name in COLUMNS]
-    except (TypeError, ValueError):
-        raise InputError(f"{_FIELD}[{place}]", "a column of another type", _FILES) from None
-    rows = np.stack(columns, axis=1)
+def _poses_of(rows: Array, place: int) -> Array:
+    """Rows ``(m, 7)`` as poses ``(m, 4, 4)``; `place` is that of the first in its file."""
     rotations = rotations_from_wxyz(rows[:, 3:]) if np.isfinite(rows).all() else None
     if rotations is None:
         return np.stack([_pose(place + i, list(map(str, row))) for i, row in enumerate(rows.tolist())])
@@ -326,7 +297,7 @@ def _record(n: int) -> np.dtype[Any]:
 
 def _write_parquet(part: Path, output: Path, n: int) -> None:
     """The rows of ``FILE.part`` as a Parquet file; joint values are null where there is no exact solution."""
-    arrow = _parquet("--output", output)
+    arrow = arrow_with_parquet("--output", str(output))
     names = ["status", *(f"q{i + 1}" for i in range(n))]
     schema = arrow.schema([(name, arrow.float64() if name != "status" else arrow.string()) for name in names])
     new = output.with_name(output.name + ".new")

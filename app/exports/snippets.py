@@ -44,7 +44,7 @@ class Moment:
     Attributes:
         robot: the arm.
         q: configuration ``(n,)``.
-        target: T_base_tool ``(4, 4)``.
+        target: pose of the tool ``(4, 4)`` in the world frame.
         task: how much of it is to be met.
         address: where this service is, with a slash at the end; no character that a shell or a string would mind.
         token: whether the service asks for one.
@@ -128,7 +128,7 @@ def python_kin(moment: Moment) -> str:
 
 {load}
 q = {_list(moment.q)}
-print(kin.fk(robot, q))  # T_base_tool
+print(kin.fk(robot, q))  # pose of the tool in the world frame
 {around}
 target = [
 {_rows(moment.target)}]
@@ -168,7 +168,7 @@ robot = DHRobot(
     name={json.dumps(robot.name)},
 {ends})
 q = {_list(moment.q)}
-print(robot.fkine(q))  # T_base_tool
+print(robot.fkine(q))  # pose of the tool in the world frame
 
 target = {_se3(moment.target)}
 print(robot.ikine_LM(target, q0=q))  # numerical, the whole pose, one solution
@@ -214,7 +214,7 @@ def matlab(moment: Moment) -> str:
         "",
         f"offset = [{_row(np.array(offsets))}];  % MATLAB's joint values contain the table's constant part",
         f"q = [{_row(moment.q)}];",
-        f"T = getTransform(robot, q + offset, '{parent}')  % T_base_tool",
+        f"T = getTransform(robot, q + offset, '{parent}')  % pose of the tool in the world frame",
         "",
         f"target = {_matlab(moment.target)};",
         "solver = inverseKinematics('RigidBodyTree', robot);",

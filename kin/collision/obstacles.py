@@ -113,7 +113,16 @@ class Obstacle:
         return self.size
 
     def as_dict(self) -> dict[str, Any]:
-        """Its fields as plain data, without those that do not apply; `obstacle_from_dict` reads them."""
+        """Its fields as plain data, without those that do not apply; `obstacle_from_dict` reads them.
+
+        Returns:
+            Plain values, metres and radians, as JSON has them.
+
+        Examples:
+            >>> import kin
+            >>> kin.Obstacle("sphere", xyz=(0.5, 0.0, 0.2), radius=0.1).as_dict()
+            {'shape': 'sphere', 'xyz': [0.5, 0.0, 0.2], 'rpy': [0.0, 0.0, 0.0], 'radius': 0.1}
+        """
         found: dict[str, Any] = {"shape": self.shape, "xyz": list(self.xyz), "rpy": list(self.rpy)}
         for key in _NEEDED[self.shape]:
             value = getattr(self, key)

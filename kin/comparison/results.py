@@ -135,10 +135,22 @@ class Comparison:
         return self.verdict in ("identical", "same", "close")
 
     def to_b(self, q: Array) -> Array:
-        """Configurations of b ``(..., n)`` that put it where a is at `q`.
+        """Configurations of b that put it where a is.
+
+        Args:
+            q: ``(..., n)`` joint values of a, radians (metres).
+
+        Returns:
+            ``(..., n)`` joint values of b.
 
         Raises:
             ValueError: the arms have no mapping.
+
+        Examples:
+            >>> import kin
+            >>> found = kin.compare("ur5", kin.convert("ur5", "modified"))
+            >>> found.to_b([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
+            array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
         """
         if self.mapping is None:
             raise ValueError("the arms are different: there is no mapping of their joints")

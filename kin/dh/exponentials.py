@@ -47,7 +47,23 @@ class Screws(NamedTuple):
         return np.concatenate([R.T @ omega, R.T @ moved]) + 0.0
 
     def pose(self, q: ArrayLike) -> Array:
-        """The product of exponentials ``(..., 4, 4)`` for values ``(..., n)`` of its joints."""
+        """The product of exponentials.
+
+        Args:
+            q: ``(..., n)`` values of its joints, radians (metres).
+
+        Returns:
+            Poses ``(..., 4, 4)`` of the tool in the world frame.
+
+        Raises:
+            InputError: another number of joint values, or values that are not finite.
+
+        Examples:
+            >>> import kin, numpy as np
+            >>> arm = kin.get_robot("ur5")
+            >>> np.allclose(kin.screws(arm).pose(arm.q_home), kin.fk(arm, arm.q_home))
+            True
+        """
         values = finite_array("q", q, (self.S.shape[1],))
         T = np.broadcast_to(np.eye(4), (*values.shape[:-1], 4, 4))
         for i, S in enumerate(self.S.T):
@@ -62,7 +78,7 @@ def exp_screw(S: ArrayLike, value: ArrayLike) -> Array:
     With ω = 0 a translation by v times the value.
 
     Args:
-        S: ``(6,)`` the screw (ω, v), rotation first.
+        S: ``(6,)`` the screw (ω, v): rotation without unit first, then metres.
         value: ``(...)`` of the joint, radians (metres where ω = 0).
 
     Returns:
@@ -100,8 +116,8 @@ def screws(robot: Robot | str, q: ArrayLike | None = None) -> Screws:
 
     Args:
         robot: the arm, or the id of a built-in one.
-        q: ``(n,)`` the configuration at which the joints of the formula are zero; by default q = 0, so that they
-            are the joints of the arm.
+        q: ``(n,)`` the configuration at which the joints of the formula are zero, radians (metres); by default
+            q = 0, so that they are the joints of the arm.
 
     Returns:
         The screws in space and body form, and the pose of the tool at zero.
@@ -138,13 +154,13 @@ def robot_from_screws(
     """An arm from its screws and its tool pose at zero, with the same joint values.
 
     Args:
-        S: ``(6, n)`` one column (ω, v) per joint, in the world frame: |ω| = 1 for a revolute joint; ω = 0 and
-            |v| = 1 for a prismatic one.
+        S: ``(6, n)`` one column (ω, v) per joint, in the world frame: |ω| = 1 and v in metres for a revolute
+            joint; ω = 0 and |v| = 1 for a prismatic one.
         M: ``(4, 4)`` pose of the tool in the world frame at q = 0.
         limits: per joint (lower, upper), None for a revolute joint without limits. By default a revolute joint
             turns ±π and a prismatic one slides 0 to 1 m.
         names: of the joints.
-        home: one value per joint; by default the middle of the limits.
+        home: one value per joint, radians (metres); by default the middle of the limits.
         convention: of the DH table that the robot gets.
         robot_id, name, source: as in a robot file.
 

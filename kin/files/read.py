@@ -45,6 +45,7 @@ PER = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
 _POWERS = str.maketrans("²³", "23")
 _LONGEST = 80  # characters of a number with a unit
 _SURROGATE = re.compile("[\ud800-\udfff]")  # half a character, which no encoding can write
+_LONGEST_PATH = 4096
 UNLIMITED = "none"
 
 
@@ -121,8 +122,8 @@ def parse_robot(text: str, file: str = "robot") -> Robot:
         The arm.
 
     Raises:
-        RobotFileError: the text is invalid.
-        InputError: `text` is no text.
+        RobotFileError: the text is invalid, or the path of a file, which `load_robot` takes.
+        InputError: `text` is no text, but a `Path`, say.
 
     Examples:
         >>> import kin
@@ -130,7 +131,9 @@ def parse_robot(text: str, file: str = "robot") -> Robot:
         'Planar 2R'
     """
     if not isinstance(text, str):
-        raise InputError("text", text, "the text of a robot file as str; bytes are decoded first")
+        raise InputError("text", text, "the text of a robot file as str; kin.load_robot takes a path")
+    if is_path(text):
+        raise RobotFileError(file, "file", text, "the text of a robot file (TOML); kin.load_robot takes a path")
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError, as is an integer too long
@@ -166,7 +169,17 @@ def _path(field: str, given: Path | str) -> Path:
     """A path that a caller gave."""
     if not isinstance(given, str | os.PathLike):
         raise InputError(field, given, "a path, as pathlib.Path or str")
+    if isinstance(given, str) and "\n" in given:
+        raise InputError(field, given, "a path; kin.parse_robot takes the text of a robot file")
     return Path(given)
+
+
+def is_path(text: str) -> bool:
+    """Whether a text is plainly the path of a file: one line with a folder or an ending, and no TOML or JSON."""
+    line = text.strip()
+    if len(line) > _LONGEST_PATH or any(character in line for character in "\n=[{#"):
+        return False
+    return "/" in line or "\\" in line or Path(line).suffix != ""
 
 
 class Reader:

@@ -83,9 +83,10 @@ def solve_ik(
 
     Args:
         robot: the arm, or the id of a built-in one.
-        target: T_base_tool ``(4, 4)``; for ``task="position"`` also a point ``(3,)`` in metres.
+        target: pose ``(4, 4)`` of the tool in the world frame, metres; for ``task="position"`` also a point
+            ``(3,)``.
         options: all further arguments but the seed as one value.
-        q_seed: ``(n,)`` configuration to stay near; the home pose by default.
+        q_seed: ``(n,)`` configuration to stay near, radians (metres); the home pose by default.
         task, mask, mask_frame, limits, locked, wider_limits, respect_limits, branch, images, prefer, redundancy,
             max_solutions, solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in
             `kin.IKOptions`, `limits`, `locked` and `wider_limits` as in `kin.JointConstraints`.

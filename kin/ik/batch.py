@@ -132,9 +132,11 @@ def solve_ik_many(
 
     Args:
         robot: the arm, or the id of a built-in one.
-        targets: T_base_tool ``(k, 4, 4)``; for ``task="position"`` also points ``(k, 3)`` in metres.
+        targets: poses ``(k, 4, 4)`` of the tool in the world frame, metres; for ``task="position"`` also points
+            ``(k, 3)``.
         options: all further arguments but the seed as one value.
-        q_seed: ``(n,)`` one seed for all targets, or ``(k, n)`` one for each; the home pose by default.
+        q_seed: ``(n,)`` one seed for all targets, or ``(k, n)`` one for each, radians (metres); the home pose by
+            default.
         task, mask, mask_frame, limits, locked, wider_limits, respect_limits, branch, images, prefer, redundancy,
             max_solutions, solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in
             `kin.solve_ik`, for every target.
@@ -260,7 +262,7 @@ class _Prepared(NamedTuple):
 
 
 def ik_branches(robot: Robot | str, target: ArrayLike, redundancy: ArrayLike = math.nan) -> Array:
-    """All closed-form branches ``(..., branches, n)`` for poses T_base_tool ``(..., 4, 4)``, radians (metres).
+    """All closed-form branches ``(..., branches, n)`` for poses ``(..., 4, 4)``, radians (metres).
 
     Row i is branch i of :func:`kin.branch_names`, NaN where it does not exist; where two have merged, both rows
     hold the same joint values. Angles are in (−π, π], except for a joint whose value is requested. Limits are not
@@ -270,7 +272,7 @@ def ik_branches(robot: Robot | str, target: ArrayLike, redundancy: ArrayLike = m
 
     Args:
         robot: an arm with a closed form, or the id of a built-in one.
-        target: one pose, or any batch of them.
+        target: a pose ``(4, 4)`` in the world frame, metres, or any batch ``(..., 4, 4)``.
         redundancy: value of the arm's first redundancy parameter (a joint value such as θ1 or θ7, or the arm angle
             ψ; radians), one for all targets or one for each; NaN keeps it near the home configuration.
             Joint values that a singular target leaves undetermined are also near that configuration.

@@ -106,7 +106,24 @@ class JointConstraints:
     def of(
         cls, limits: Limits | None, locked: Locks | None, constraints: JointConstraints | None
     ) -> JointConstraints:
-        """The constraints of a call that takes them as two keywords or as one value; `InputError` if as both."""
+        """The constraints of a call that takes them as two keywords or as one value.
+
+        Args:
+            limits: pairs (lower, upper) in radians (metres), as in `JointConstraints`.
+            locked: joint values in radians (metres), as in `JointConstraints`.
+            constraints: both as one value.
+
+        Returns:
+            The constraints.
+
+        Raises:
+            InputError: they are given both ways, or malformed.
+
+        Examples:
+            >>> import kin
+            >>> kin.JointConstraints.of([(-1.0, 1.0), None], None, None).limits
+            ((-1.0, 1.0), None)
+        """
         if constraints is None:
             return cls(limits, locked)
         if limits is not None or locked is not None:
@@ -119,8 +136,19 @@ class JointConstraints:
     def bounds(self, robot: Robot) -> Bounds:
         """The limits that hold for an arm; a locked joint has equal ones.
 
+        Args:
+            robot: the arm.
+
+        Returns:
+            Lower and upper limits ``(n,)`` in radians (metres), and which joints are locked.
+
         Raises:
             InputError: the wrong number of joints, or a value outside the robot's own limits.
+
+        Examples:
+            >>> import kin
+            >>> kin.JointConstraints(limits=[(-1.0, 1.0), None]).bounds(kin.get_robot("planar2r")).lower.round(3)
+            array([-1.   , -3.142])
         """
         lower, upper = robot.lower.copy(), robot.upper.copy()
         limits = (None,) * robot.n if self.limits is None else self.limits
@@ -219,9 +247,22 @@ class IKOptions:
 
     @classmethod
     def of(cls, options: IKOptions | None, **keywords: Any) -> IKOptions:
-        """The options of a call that takes them as keywords or as one value; `InputError` if as both.
+        """The options of a call that takes them as keywords or as one value.
 
-        Keywords are the fields of this class, with those of `JointConstraints` in the place of `constraints`.
+        Args:
+            options: as one value; None if they are keywords.
+            keywords: the fields of this class, with those of `JointConstraints` in the place of `constraints`.
+
+        Returns:
+            The options.
+
+        Raises:
+            InputError: they are given both ways, or malformed.
+
+        Examples:
+            >>> import kin
+            >>> kin.IKOptions.of(None, task="position", locked=[None, 0.5]).constraints.locked
+            (None, 0.5)
         """
         if options is None:
             names = [each.name for each in fields(JointConstraints)]
@@ -247,7 +288,18 @@ class IKOptions:
         return hash(tuple(getattr(self, f.name) for f in fields(self)))
 
     def check_only(self, *names: str) -> None:
-        """Raise `InputError` for an option that is not the default, unless it is one of `names`."""
+        """Refuse options that a call does not use.
+
+        Args:
+            names: of the options that it uses.
+
+        Raises:
+            InputError: another option is not the default.
+
+        Examples:
+            >>> import kin
+            >>> kin.IKOptions(task="position").check_only("task", "mask")
+        """
         for f in fields(self):
             default = FREE if f.name == "constraints" else f.default
             if f.name not in names and getattr(self, f.name) != default:

@@ -195,7 +195,19 @@ class IKResult(Deferred):
         return self.explain().text
 
     def explain(self, units: Units = DEFAULT_UNITS) -> Explanation:
-        """The answer in words, with a headline and a detail, in any units."""
+        """The answer in words, in any units.
+
+        Args:
+            units: in which numbers are written, a `kin.units.Units`; by default degrees and millimetres.
+
+        Returns:
+            Texts: `text` is everything in one line, `headline` the outcome, `body` why, `note` a further sentence.
+
+        Examples:
+            >>> import kin
+            >>> kin.solve_ik("planar2r", kin.from_xyz_rpy([3.0, 0.0, 0.0]), task="position").explain().headline
+            'Out of reach by 1400.0 mm'
+        """
         found = explain(self.details, self.cause, self.task, self.singularities, units)
         if not self.target_error:
             return found

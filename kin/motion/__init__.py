@@ -79,8 +79,8 @@ def plan_motion(
     Args:
         robot: the arm, or the id of a built-in one.
         program: a `Program`, its segments, or plain data as in `program_from_dict`.
-        q_start: ``(n,)`` where the arm is; the home pose by default.
-        limits: other limits than those of `limits_of`.
+        q_start: ``(n,)`` where the arm is, radians (metres); the home pose by default.
+        limits: other limits than those of `limits_of`, in radians (metres) and seconds.
         options: the next two as one value. All others have to be the default: the program states the task, and
             its start the posture.
         avoid_self_collision, obstacles: the motion is checked, and refused at the first place where the arm

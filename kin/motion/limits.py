@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.errors import InputError
+from kin.named import robot_of
 from kin.robot import Joint, Robot
 from kin.transforms import Array
 
@@ -71,20 +72,24 @@ def _checked(key: str, values: ArrayLike, n: int, expected: str) -> Array:
 
 
 @lru_cache(maxsize=256)
-def limits_of(robot: Robot) -> MotionLimits:
+def limits_of(robot: Robot | str) -> MotionLimits:
     """The limits of an arm: stated in its file, or assumed.
 
     Args:
-        robot: the arm.
+        robot: the arm, or the id of a built-in one.
 
     Returns:
-        Velocity, acceleration and jerk of each joint, and of the tool.
+        Velocity, acceleration and jerk of each joint, in radians (metres) and seconds.
+
+    Raises:
+        UnknownRobotError: no built-in arm has this id.
 
     Examples:
         >>> import kin
-        >>> len(kin.limits_of(kin.get_robot("ur5")).velocity)
-        6
+        >>> kin.limits_of("ur5").velocity.round(3)
+        array([3.142, 3.142, 3.142, 3.142, 3.142, 3.142])
     """
+    robot = robot_of(robot)
     rows = [_of_joint(joint) for joint in robot.joints]
     velocity, acceleration, jerk, effort = np.array([row[:4] for row in rows]).T
     return MotionLimits(velocity, acceleration, jerk, effort, tuple(row[4] for row in rows))

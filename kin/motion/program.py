@@ -67,14 +67,42 @@ class PoseTarget:
 
     @classmethod
     def of(cls, T: ArrayLike) -> PoseTarget:
-        """The target for a transform T_base_tool ``(4, 4)``."""
+        """The target that is a pose of the tool.
+
+        Args:
+            T: ``(4, 4)`` in the world frame, metres.
+
+        Returns:
+            The target, with position and orientation.
+
+        Raises:
+            InputError: T is no rigid transform.
+
+        Examples:
+            >>> import kin
+            >>> kin.PoseTarget.of(kin.from_xyz_rpy([0.4, 0.1, 0.3])).position
+            (0.4, 0.1, 0.3)
+        """
         pose = as_transform(T, "pose")
         x, y, z = pose[:3, 3].tolist()
         w, i, j, k = wxyz_from_rotation(pose[:3, :3]).tolist()
         return cls((x, y, z), (w, i, j, k))
 
     def pose(self, before: Array) -> Array:
-        """T_base_tool ``(4, 4)``; `before` has the orientation that is kept where none is given."""
+        """The pose of the tool that is meant.
+
+        Args:
+            before: pose ``(4, 4)`` at the start of the segment; its orientation is kept where the target has none.
+
+        Returns:
+            The pose ``(4, 4)`` in the world frame, metres.
+
+        Examples:
+            >>> import kin
+            >>> import numpy as np
+            >>> kin.PoseTarget((0.4, 0.1, 0.3)).pose(np.eye(4))[:3, 3]
+            array([0.4, 0.1, 0.3])
+        """
         T = from_position_wxyz(self.position, self.wxyz)
         if self.wxyz is None:
             T[:3, :3] = before[:3, :3]

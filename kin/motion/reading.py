@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError, shorten
 from kin.files.numbers import scaled
-from kin.files.read import ANGLES
+from kin.files.read import ANGLES, is_path
 from kin.frames import BASE, WORLD
 from kin.ik.options import finite_number
 from kin.motion.program import (
@@ -74,13 +74,15 @@ def parse_program(
         The program.
 
     Raises:
-        InputError: the text is neither, or naming the field, the value and what would be valid.
+        InputError: the text is neither, or a path; or naming the field, the value and what would be valid.
 
     Examples:
         >>> import kin
         >>> len(kin.parse_program('[[segments]]\nkind = "dwell"\nseconds = 0.5').segments)
         1
     """
+    if not isinstance(text, str) or is_path(text):
+        raise InputError("text", text, 'the text of a program, such as pathlib.Path("program.toml").read_text()')
     is_json = text.lstrip("\ufeff \t\r\n").startswith("{")  # no TOML begins so
     try:
         data = json.loads(text.lstrip("\ufeff")) if is_json else tomllib.loads(text)
@@ -133,11 +135,16 @@ def program_to_dict(program: Program) -> dict[str, Any]:
     Returns:
         Plain values, as JSON has them.
 
+    Raises:
+        InputError: `program` is no `Program`.
+
     Examples:
         >>> import kin
         >>> kin.program_to_dict(kin.Program((kin.Dwell(0.5),)))["segments"]
         [{'kind': 'dwell', 'seconds': 0.5}]
     """
+    if not isinstance(program, Program):
+        raise InputError("program", program, "a kin.Program")
     data: dict[str, Any] = {}
     if program.name:
         data["name"] = program.name

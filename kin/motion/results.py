@@ -108,7 +108,20 @@ class Refusal:
         return self.explain()
 
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
-        """The refusal in sentences, in any units."""
+        """The refusal in sentences, in any units.
+
+        Args:
+            units: in which numbers are written, a `kin.units.Units`; by default degrees and millimetres.
+
+        Returns:
+            The sentences; `reason` is the same in the default units.
+
+        Examples:
+            >>> import kin
+            >>> far = kin.plan_motion("ur5", [kin.Lin(kin.PoseTarget((3.0, 0.0, 0.0)))])
+            >>> far.refusal.explain() == far.refusal.reason
+            True
+        """
         return messages.refusal(self.segment, self.kind, self.name, self.fraction, self.details, self.helps, units)
 
 
@@ -197,7 +210,19 @@ class Motion:
         return self.explain()
 
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
-        """The motion in sentences, in any units."""
+        """The motion in sentences, in any units.
+
+        Args:
+            units: in which numbers are written, a `kin.units.Units`; by default degrees and millimetres.
+
+        Returns:
+            The sentences; `reason` is the same in the default units.
+
+        Examples:
+            >>> import kin
+            >>> kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5]), kin.Dwell(1.0)]).explain()
+            '1 motion and 1 pause in 1.529 s.'
+        """
         if self.refusal is not None:
             return self.refusal.explain(units)
         said = [messages.note(fact, units) for fact in self.notes]
@@ -206,7 +231,21 @@ class Motion:
         return " ".join([messages.summary(motions, pauses, self.duration), *said])
 
     def q_before(self, index: int) -> Array | None:
-        """Where a segment begins ``(n,)``: where the one before arrives; None if that one is not planned."""
+        """Where a segment begins.
+
+        Args:
+            index: which segment, from 0.
+
+        Returns:
+            Joint values ``(n,)`` in radians (metres) at which the segment before arrives; None if that one is not
+            planned.
+
+        Examples:
+            >>> import kin
+            >>> motion = kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5]), kin.Ptp([0.0, 1.0])])
+            >>> motion.q_before(1)
+            array([0.5, 0.5])
+        """
         done = () if self.driven is None else self.driven.segments
         if index > len(done):
             return None
@@ -214,9 +253,25 @@ class Motion:
         return arrivals[-1].q if arrivals else self.q_start
 
     def derivatives(self, t: ArrayLike) -> Array:
-        """Joint values and their first three derivatives ``(4, ..., n)`` at times ``(...)``.
+        """Joint values and their first three derivatives, without the poses that `sample` computes.
 
         Before the start and after the end the arm is at rest where it begins and ends.
+
+        Args:
+            t: seconds from the start, a number or an array ``(...)``.
+
+        Returns:
+            ``(4, ..., n)``: radians (metres), and the same per second, per s² and per s³.
+
+        Raises:
+            InputError: times that are no finite numbers.
+
+        Examples:
+            >>> import kin
+            >>> motion = kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5])])
+            >>> q, qd, qdd, qddd = motion.derivatives([0.0, 0.5, motion.duration])
+            >>> q[-1]
+            array([0.5, 0.5])
         """
         times = _times(t)
         flat = times.ravel()
@@ -233,28 +288,88 @@ class Motion:
         return out.reshape(4, *times.shape, self.robot.n)
 
     def sample(self, t: ArrayLike) -> MotionSample:
-        """The motion at times ``(...)``, seconds; before the start and after the end the arm is at rest."""
+        """Joints, tool poses and tool speeds; before the start and after the end the arm is at rest.
+
+        Args:
+            t: seconds from the start, a number or an array ``(...)``.
+
+        Returns:
+            Arrays with the axes of `t` first.
+
+        Raises:
+            InputError: times that are no finite numbers.
+
+        Examples:
+            >>> import kin
+            >>> import numpy as np
+            >>> motion = kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5])])
+            >>> motion.sample(np.linspace(0.0, motion.duration, 50)).T.shape
+            (50, 4, 4)
+        """
         times = _times(t)
         q, qd, qdd, qddd = self.derivatives(times)
         twist = (jacobian(self.robot, q) @ qd[..., None])[..., 0]
         return MotionSample(times, q, qd, qdd, qddd, fk(self.robot, q), twist)
 
     def step_times(self, rate: float) -> Array:
-        """Times ``(k,)`` at `rate` per second, from the start to the end, which is one of them.
+        """The times of samples at a rate, from the start to the end, which is one of them.
 
-        None after a refusal. Raises `InputError` unless the rate is above 0.
+        Args:
+            rate: samples per second.
+
+        Returns:
+            Seconds ``(k,)``; empty after a refusal.
+
+        Raises:
+            InputError: a rate that is not above 0.
+
+        Examples:
+            >>> import kin
+            >>> kin.plan_motion("planar2r", [kin.Dwell(0.25)]).step_times(10.0)
+            array([0.  , 0.1 , 0.2 , 0.25])
         """
         times = tables.step_times(self.duration, rate)
         return times if self.planned else times[:0]
 
     def steps(self, rate: float) -> Iterator[MotionSample]:
-        """The motion at `step_times`, piece by piece, so that a long one need not fit into memory."""
+        """The motion at `step_times`, piece by piece, so that a long one need not fit into memory.
+
+        Args:
+            rate: samples per second.
+
+        Returns:
+            An iterator of samples, each at some of the times.
+
+        Raises:
+            InputError: a rate that is not above 0.
+
+        Examples:
+            >>> import kin
+            >>> motion = kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5])])
+            >>> sum(len(some.t) for some in motion.steps(1000.0)) == len(motion.step_times(1000.0))
+            True
+        """
         times = self.step_times(rate)
         for start in range(0, len(times), tables.AT_ONCE):
             yield self.sample(times[start : start + tables.AT_ONCE])
 
     def csv_pieces(self, rate: float = 100.0) -> Iterator[str]:
-        """What `to_csv` writes, as pieces of text."""
+        """What `to_csv` writes, as pieces of text.
+
+        Args:
+            rate: samples per second.
+
+        Returns:
+            An iterator of texts; the first one is the heading.
+
+        Raises:
+            InputError: a rate that is not above 0.
+
+        Examples:
+            >>> import kin
+            >>> next(kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5])]).csv_pieces())[:8]
+            't,q1,q2,'
+        """
         yield ",".join(tables.columns(self.robot.n)) + "\n"
         for sample in self.steps(rate):
             yield tables.lines(sample.t, (sample.q, sample.qd, sample.qdd), sample.T, sample.tool_speed)
@@ -269,6 +384,13 @@ class Motion:
         Raises:
             InputError: a refused program, of which `driven` is what can be driven, or a rate that is not above 0.
             OSError: the file cannot be written.
+
+        Examples:
+            >>> import kin, pathlib, tempfile
+            >>> file = pathlib.Path(tempfile.mkdtemp()) / "motion.csv"
+            >>> kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5])]).to_csv(file, rate=50.0)
+            >>> file.read_text().splitlines()[0]
+            't,q1,q2,qd1,qd2,qdd1,qdd2,x,y,z,qw,qx,qy,qz,tool_speed'
         """
         if not self.planned:
             raise InputError(
@@ -288,7 +410,23 @@ class Motion:
         return self._peaks(0.0, self.duration, 1.0, 1.0, (None, None))
 
     def segment_peaks(self, index: int) -> tuple[Peak, ...]:
-        """`peaks` during one segment, against its own limits: those of the arm times its scales."""
+        """`peaks` during one segment, against its own limits: those of the arm times its scales.
+
+        Args:
+            index: which segment, from 0.
+
+        Returns:
+            Velocity, acceleration and jerk of each joint, and the speeds of the tool.
+
+        Raises:
+            IndexError: a refused program, which has no segments, or an index beyond the last one.
+
+        Examples:
+            >>> import kin
+            >>> motion = kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5], speed=0.25)])
+            >>> max(peak.ratio for peak in motion.segment_peaks(0) if peak.ratio) <= 1.0 + 1e-9
+            True
+        """
         times, segment = self.segments[index], self.program.segments[index]
         if isinstance(segment, Dwell):
             return self._peaks(times.start, times.end, 1.0, 1.0, (None, None))

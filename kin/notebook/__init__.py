@@ -38,8 +38,8 @@ def show(
 
     Args:
         robot: the arm, or the id of a built-in one.
-        q: configuration ``(n,)``; None: the arm's home configuration.
-        path: configurations ``(k, n)`` through which the arm moves once the page is open.
+        q: configuration ``(n,)``, radians (metres); None: the arm's home configuration.
+        path: configurations ``(k, n)``, radians (metres), through which the arm moves once the page is open.
         seconds: that the path takes.
         panel: whether there is a small panel with the joints beside the scene.
         width, height: of the frame, in pixels or as CSS has it.

@@ -85,12 +85,13 @@ def solve_path(
 
     Args:
         robot: the arm, or the id of a built-in one.
-        targets: T_base_tool ``(k, 4, 4)``, k ≥ 1; for ``task="position"`` also points ``(k, 3)`` in metres.
+        targets: poses ``(k, 4, 4)`` of the tool in the world frame, metres, k ≥ 1; for ``task="position"`` also
+            points ``(k, 3)``.
         options: the arguments from `task` to `obstacles` as one value. Those that choose among the solutions of
             one target (`images`, `prefer`, `max_solutions`) have no effect: the path chooses.
-        q_start: ``(n,)`` where the arm is. The way from there to the first waypoint counts as motion, but never as
-            a jump: the path begins at its first waypoint. Without it the path may start anywhere; of equally good
-            paths, the one that starts nearest to the home pose is taken.
+        q_start: ``(n,)`` where the arm is, radians (metres). The way from there to the first waypoint counts as
+            motion, but never as a jump: the path begins at its first waypoint. Without it the path may start
+            anywhere; of equally good paths, the one that starts nearest to the home pose is taken.
         task, mask, mask_frame, limits, locked, wider_limits, branch, position_tolerance,
             rotation_tolerance, avoid_self_collision, obstacles: as in `kin.solve_ik`, for every waypoint; the
             branch ``"seed"`` is that of `q_start`.
@@ -161,7 +162,8 @@ def path_postures(
         robot, targets, q_start, max_step, stop: as in `solve_path`.
         options: as in `solve_path`. With `avoid_self_collision` or `obstacles`, configurations that touch
             something are in the way.
-        roundings: one per target, each as in `kin.ik.solve`.
+        roundings: one per target: how rounded the numbers are from which it was computed, such as the pose of a
+            workpiece (metres; for directions without unit). By default not at all.
 
     Returns:
         The table of targets and postures, and the path of `solve_path` in it.

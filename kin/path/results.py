@@ -50,7 +50,20 @@ class PathJump:
         return self.explain()
 
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
-        """The jump in a sentence, in any units."""
+        """The jump in a sentence, in any units.
+
+        Args:
+            units: in which numbers are written, a `kin.units.Units`; by default degrees and millimetres.
+
+        Returns:
+            The sentence; `reason` is the same in the default units.
+
+        Examples:
+            >>> import kin
+            >>> ends = kin.fk("planar2r", [[0.0, 1.0], [2.0, 1.0]])
+            >>> kin.solve_path("planar2r", ends, max_step=0.5).jumps[0].explain().partition(":")[0]
+            'Between waypoints 0 and 1 joint 1 (shoulder) jumps by 114.6°'
+        """
         return messages.jump(self.index, self.joints, self.widest, self.place, self.details, units)
 
 
@@ -82,7 +95,20 @@ class PathGap:
         return self.explain()
 
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
-        """The gap in a sentence, in any units."""
+        """The gap in a sentence, in any units.
+
+        Args:
+            units: in which numbers are written, a `kin.units.Units`; by default degrees and millimetres.
+
+        Returns:
+            The sentence; `reason` is the same in the default units.
+
+        Examples:
+            >>> import kin
+            >>> far = kin.from_xyz_rpy([3.0, 0.0, 0.0])
+            >>> kin.solve_path("planar2r", [far, far], task="position").gaps[0].explain().partition(":")[0]
+            'Out of reach by 1400.0 mm'
+        """
         return explain(self.details, self.cause, self.task, self.singularities, units).text
 
 
@@ -132,7 +158,19 @@ class PathResult:
         return self.explain()
 
     def explain(self, units: Units = DEFAULT_UNITS) -> str:
-        """The whole path in a sentence, in any units."""
+        """The whole path in a sentence, in any units.
+
+        Args:
+            units: in which numbers are written, a `kin.units.Units`; by default degrees and millimetres.
+
+        Returns:
+            The sentence; `reason` is the same in the default units.
+
+        Examples:
+            >>> import kin
+            >>> kin.solve_path("planar2r", kin.fk("planar2r", [[0.0, 1.0], [0.1, 1.1]])).explain()
+            'Continuous through 2 waypoints: the largest step is 5.7°.'
+        """
         jumps = [(jump.index, jump.cause) for jump in self.jumps]
         gaps = [gap.index for gap in self.gaps]
         text = messages.summary(len(self.q), self.largest_step, jumps, gaps, units)

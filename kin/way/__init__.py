@@ -59,7 +59,7 @@ def find_way(
     Args:
         robot: the arm, or the id of a built-in one.
         q_start: ``(n,)`` where the arm is.
-        goal: ``(n,)`` joint values, or T_base_tool ``(4, 4)``: then any of its postures may be the end.
+        goal: ``(n,)`` joint values, or a pose ``(4, 4)`` in the world frame, of which any posture may be the end.
         obstacles, avoid_self_collision: what must not be touched.
         seed: the same seed gives the same way, if it is found before the time is over.
         time_limit: seconds, above 0 and at most 600, for the search; shortening may take a fifth of it more. A

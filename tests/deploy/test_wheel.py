@@ -96,11 +96,16 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built
 
 
-def installed(folder: Path, *what: str) -> Path:
-    """Make a virtual environment with a package and our dependencies; returns its folder of packages."""
+def installed_alone(folder: Path, *what: str) -> Path:
+    """Make a virtual environment with a package and nothing else; returns its folder of packages."""
     venv.create(folder)
-    packages = Path(sysconfig.get_path("purelib", "venv", {"base": str(folder), "platbase": str(folder)}))
     pip("--python", str(folder / "bin" / "python"), "install", "--no-deps", *what)
+    return Path(sysconfig.get_path("purelib", "venv", {"base": str(folder), "platbase": str(folder)}))
+
+
+def installed(folder: Path, *what: str) -> Path:
+    """The same with our dependencies."""
+    packages = installed_alone(folder, *what)
     (packages / "z-dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")  # after a checkout
     return packages
 
@@ -162,6 +167,16 @@ def test_the_command_works_beside_a_foreign_package_app(environment, project):
     same, where = run(environment, project, "python", "-c", program).split()
     assert same == "True"
     assert where.startswith(str(environment))
+
+
+@pytest.mark.slow
+def test_the_core_works_with_numpy_and_numba_alone(wheel, tmp_path, project):
+    packages = installed_alone(tmp_path / "environment", "--no-index", str(wheel))
+    for each in Path(sysconfig.get_path("purelib")).iterdir():
+        if re.match(r"(numpy|numba|llvmlite)\b", each.name):
+            (packages / each.name).symlink_to(each)
+    program = "import kin; print(kin.fk('planar2r', [0.0, 0.0])[0, 3].round(9))"
+    assert run(tmp_path / "environment", project, "python", "-c", program) == "1.6"
 
 
 @pytest.mark.slow

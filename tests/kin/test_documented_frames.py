@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import kin
-from kin.transforms import rotation_vector
+from kin.transforms import frame_from_approach, rotation_vector
 
 BASE = kin.from_xyz_rpy([0.3, -0.5, 0.8], [0.4, -0.7, 1.9])
 TOOL = kin.from_xyz_rpy([0.02, 0.05, 0.11], [0.3, 0.2, -0.4])
@@ -57,6 +57,60 @@ def test_pose_targets_samples_and_twists_of_a_motion_are_in_the_world_frame():
     before, now, after = motion.sample([t - STEP, t, t + STEP]).T
     assert np.allclose(now, world(motion.sample(t).q), atol=1e-12)
     assert np.allclose(motion.sample(t).twist, rates(before, after, 2.0 * STEP), atol=1e-6)
+
+
+def test_the_table_of_a_motion_is_in_the_world_frame():
+    motion = kin.plan_motion(ARM, [kin.Ptp(Q + 0.2)], Q)
+    heading, *rows = "".join(motion.csv_pieces(20.0)).splitlines()
+    names = heading.split(",")
+    for row in rows[:: len(rows) - 1]:
+        cells = dict(zip(names, map(float, row.split(",")), strict=True))
+        T = world([cells[f"q{i + 1}"] for i in range(6)])
+        assert np.allclose([cells[axis] for axis in "xyz"], T[:3, 3], atol=1e-9)
+        assert np.allclose([cells[part] for part in ("qw", "qx", "qy", "qz")], kin.wxyz_from_rotation(T[:3, :3]))
+
+
+def test_branches_paths_and_postures_are_of_targets_in_the_world_frame():
+    targets = [world(Q), world(Q + 0.01), world(Q + 0.02)]
+    branches = kin.ik_branches(ARM, targets[0])
+    assert np.isfinite(branches).all(axis=1).sum() >= 4
+    for q in branches[np.isfinite(branches).all(axis=1)]:
+        assert np.allclose(world(q), targets[0], atol=1e-8)
+    path = kin.solve_path(ARM, targets, q_start=Q)
+    assert np.allclose([world(q) for q in path.q], targets, atol=1e-8)
+    found = kin.path_postures(ARM, targets, q_start=Q)
+    assert np.allclose(found.best.q, path.q, atol=1e-9)
+
+
+def test_named_frames_and_screws_are_in_the_world_frame():
+    assert np.allclose(kin.frame_pose(ARM, "base"), BASE, atol=1e-12)
+    assert np.allclose(kin.frame_pose(ARM, "tool", q=Q), world(Q), atol=1e-12)
+    assert np.allclose(kin.frame_pose(ARM, "table", {"table": TOOL}), TOOL, atol=1e-12)
+    screws = kin.screws(ARM)
+    assert np.allclose(screws.pose(Q), world(Q), atol=1e-12)
+    assert np.allclose(screws.S[:3, 0], BASE[:3, 2], atol=1e-12)
+    assert np.allclose(screws.S[3:, 0], np.cross(BASE[:3, 3], BASE[:3, 2]), atol=1e-12)
+
+
+def test_sections_and_voxels_are_in_the_world_frame():
+    arm = kin.get_robot("scara").with_base(BASE)
+    plain = kin.get_robot("scara")
+    section = kin.section(arm)
+    arc = section.arcs[0]
+    s, t = arc.points[0]
+    point = (BASE @ kin.fk(plain, arc.q))[:3, 3]
+    along = (point - section.origin) @ section.v
+    away = np.linalg.norm(point - section.origin - along * section.v)
+    assert np.allclose([away, along], [s, t], atol=1e-6)
+    assert np.allclose(section.v, BASE[:3, 2], atol=1e-9)
+    plain = kin.get_robot("puma560")
+    found = kin.capability_map(plain.with_base(BASE), resolution=5, directions=12)
+    voxels, ways = np.nonzero(found.approachable)
+    for k in range(0, len(voxels), len(voxels) // 10):
+        T = np.eye(4)
+        T[:3, :3] = frame_from_approach(found.grid.directions[ways[k]])
+        T[:3, 3] = found.centres[voxels[k]]
+        assert kin.solve_ik(plain, np.linalg.inv(BASE) @ T, task="approach").status == "solved"
 
 
 def test_a_rotation_mask_has_the_axes_of_the_world_frame_or_of_the_target():

@@ -432,7 +432,9 @@ def test_lengths_keep_their_digits_in_any_unit(unit, per_metre):
         (lambda: kin.load_folder("/no/such/folder"), "folder", "a folder that can be read"),
         (lambda: kin.load_folder(Path("with\0null")), "folder", "a folder that can be read"),
         (lambda: kin.load_robot(None), "path", "a path"),
+        (lambda: kin.load_robot("id = 'a'\nname = 'A'"), "path", "a path; kin.parse_robot takes the text"),
         (lambda: kin.parse_robot(b""), "text", "the text of a robot file"),
+        (lambda: kin.parse_robot(Path("arm.toml")), "text", "kin.load_robot takes a path"),
         (lambda: kin.load_urdf(None), "source", "the text of a URDF"),
         (lambda: kin.urdf_tips(b"<robot/>"), "source", "the text of a URDF"),
     ],
@@ -441,6 +443,16 @@ def test_what_is_no_file_is_refused_with_what_is_valid(call, field, valid):
     with pytest.raises(kin.InputError, match=valid) as caught:
         call()
     assert caught.value.field == field
+
+
+@pytest.mark.parametrize("path", ["arm.toml", "arms/mine", r"C:\arms\mine", " ~/arm.toml\n"])
+def test_a_path_instead_of_the_text_of_a_robot_file_is_named(path):
+    with pytest.raises(RobotFileError, match=r"kin\.load_robot takes a path"):
+        kin.parse_robot(path)
+    for text in ("x = 1.5", "[a.b]", "# arms/mine.toml", "a\nb.toml", "/" * 5000):
+        with pytest.raises(RobotFileError) as caught:
+            kin.parse_robot(text)
+        assert "path" not in str(caught.value)
 
 
 def test_a_folder_may_be_given_as_text(tmp_path):

@@ -1,4 +1,4 @@
-"""Where configurations and targets come from: CSV, NumPy or JSON lines, recognised by how they begin.
+"""Where configurations and targets come from: CSV, NumPy, Parquet or JSON lines, recognised by how they begin.
 
 Lines are handed on as they arrive. A program at the other end of two pipes can therefore send one line, and read
 its answer before it sends the next one.
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.cli.pipes.columns import POSE, Columns
+from app.cli.pipes.parquet import MAGIC, opened_columns, rows_of
 from kin import InputError, Robot, Task
 from kin.ik.problem import read_pose
 from kin.solvers import contract
@@ -29,7 +30,7 @@ Form = Literal["csv", "npy", "ndjson"]
 AT_ONCE = 4096  # rows of one piece
 LONGEST_LINE = 1 << 20
 _CHUNK = 1 << 16
-_MAGIC = b"\x93NUMPY"
+_NUMPY = b"\x93NUMPY"
 _EXAMPLE = '{"position": [0.4, 0.1, 0.3], "wxyz": [0, 1, 0, 0]}'
 _GIVEN = ("position", "wxyz", "approach", "matrix", "frame")
 
@@ -52,21 +53,22 @@ class Source:
     """Rows that have been opened.
 
     Attributes:
-        form: what they are written in.
+        form: what they are written in; "csv" for any table, also of a Parquet file.
         field: the option that names them.
     """
 
     def __init__(self, file: BinaryIO, field: str) -> None:
         self._file = file
         self._first = _read(file)
-        while self._first and _MAGIC.startswith(self._first):  # a pipe may give single bytes
+        while self._first and any(magic.startswith(self._first) for magic in (_NUMPY, MAGIC)):
+            # A pipe may give single bytes.
             more = _read(file)
             if not more:
                 break
             self._first += more
         self.field = field
         start = self._first.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
-        self.form: Form = "npy" if self._first.startswith(_MAGIC) else "ndjson" if start in (b"{", b"[") else "csv"
+        self.form: Form = "npy" if self._first.startswith(_NUMPY) else "ndjson" if start in (b"{", b"[") else "csv"
 
     def configurations(self, robot: Robot) -> Iterator[Array]:
         """Joint values ``(m, n)`` in radians (metres), piece by piece; rows of NaN where there are none.
@@ -165,6 +167,9 @@ class Source:
 
     def _table(self, names: tuple[str, ...] | list[str]) -> Iterator[tuple[int, list[list[float]]]]:
         """The named numbers of each row, and the place of the first row."""
+        if self._first.startswith(MAGIC):
+            yield from self._parquet(names)
+            return
         columns: Columns | None = None
         done = 0
         for _, lines in self._lines():
@@ -178,6 +183,16 @@ class Source:
             done += len(some)
         if not done:
             raise InputError(self.field, "a heading alone", "at least one row")
+
+    def _parquet(self, names: tuple[str, ...] | list[str]) -> Iterator[tuple[int, list[list[float]]]]:
+        """The named numbers of each row of a Parquet file, and the place of the first row."""
+        file = io.BytesIO(self._first + self._file.read())
+        expected = "a Parquet file with the columns " + ", ".join(names)
+        with opened_columns(file, names, self.field, expected) as table:
+            if not table.metadata.num_rows:
+                raise InputError(self.field, "a Parquet file without rows", "at least one row")
+            for first, rows in rows_of(table, names, AT_ONCE, self.field, expected):
+                yield first, rows.tolist()
 
     def _lines(self) -> Iterator[tuple[int, list[str]]]:
         """Lines as they arrive, without empty ones, and the place of the first."""

@@ -36,7 +36,7 @@ class JacobianAnswer(Answer):
 
 
 def jacobian_answers(robot: Robot, q: Array, frame: Literal["base", "tool"] = "base") -> list[JacobianAnswer]:
-    """Jacobians of configurations ``(k, n)`` in radians (metres), in the base or the tool frame."""
+    """Jacobians of configurations ``(k, n)`` in radians (metres), along axes of the world frame or of the tool."""
     J = jacobian(robot, q, frame)
     columns = zip(
         J.tolist(),

@@ -92,11 +92,40 @@ class CapabilityGrid:
         return tuple(range(start, min(start + size, total)) for start in range(0, total, size))
 
     def index(self, numbers: Rows) -> Rows:
-        """Indices ``(k, 3)`` of voxels by their numbers ``(k,)``."""
+        """Where voxels are in the grid.
+
+        Args:
+            numbers: ``(k,)`` of the voxels, in C order, as in `blocks`.
+
+        Returns:
+            Indices ``(k, 3)`` along x, y and z, from 0.
+
+        Raises:
+            ValueError: a number that no voxel of the grid has.
+
+        Examples:
+            >>> import kin, numpy as np
+            >>> grid = kin.capability_grid("planar2r", resolution=6, directions=12)
+            >>> grid.index(np.array([0, 1])).shape
+            (2, 3)
+        """
         return np.stack(np.unravel_index(numbers, self.shape), axis=-1).astype(np.int64)
 
     def centres(self, index: Rows) -> Array:
-        """Centres ``(k, 3)`` in metres of voxels by their indices ``(k, 3)``."""
+        """The points at which the arm is evaluated.
+
+        Args:
+            index: ``(k, 3)`` of the voxels, along x, y and z, from 0.
+
+        Returns:
+            Centres ``(k, 3)`` in metres, in the world frame.
+
+        Examples:
+            >>> import kin, numpy as np
+            >>> grid = kin.capability_grid("planar2r", resolution=6, directions=12)
+            >>> bool(np.allclose(grid.centres(np.zeros((1, 3))), np.array(grid.origin) + grid.voxel / 2))
+            True
+        """
         return np.asarray(np.array(self.origin) + (index + 0.5) * self.voxel)
 
 

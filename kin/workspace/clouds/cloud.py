@@ -140,7 +140,7 @@ def configuration_at(
 
     Args:
         robot: the arm, or the id of a built-in one.
-        index: of the points.
+        index: of the points, from 0.
         seed, strategy, limits, locked, constraints: as in `kin.sample_workspace`.
 
     Returns:

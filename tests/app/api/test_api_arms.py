@@ -254,6 +254,30 @@ def test_base_and_tool_frames(client):
     assert "one of the two" in post(client, "robots/pioneer5/ik", {**TARGET, "base": both}, 422)["detail"]
 
 
+def test_jacobians_and_motions_with_base_and_tool_are_in_the_world_frame(client):
+    asked = {
+        "tool": {"xyz": [0.02, 0.05, 0.11], "rpy": [0.3, 0.2, -0.4]},
+        "base": {"xyz": [1, 2, 3], "rpy": [0.4, 0, 1]},
+    }
+    base, tool = (kin.from_xyz_rpy(asked[name]["xyz"], asked[name]["rpy"]) for name in ("base", "tool"))
+
+    def world(q):
+        return base @ kin.fk("ur5", q) @ tool
+
+    ends = [world(np.add(SIX, step * axis)) for axis in np.eye(6) for step in (-1e-6, 1e-6)]
+    linear = [(after - before)[:3, 3] / 2e-6 for before, after in zip(ends[::2], ends[1::2], strict=True)]
+    J = np.array(post(client, "robots/ur5/jacobian", {"q": SIX, **asked})["jacobian"])
+    assert np.allclose(J[:3].T, linear, atol=1e-8)
+    in_tool = np.array(post(client, "robots/ur5/jacobian", {"q": SIX, "frame": "tool", **asked})["jacobian"])
+    assert np.allclose(in_tool[:3], world(SIX)[:3, :3].T @ J[:3], atol=1e-9)
+    program = {"segments": [{"kind": "ptp", "q": np.add(SIX, 0.2).tolist()}]}
+    samples = post(client, "robots/ur5/motion", {"program": program, "q_start": SIX, "rate": 20, **asked})[
+        "samples"
+    ]
+    for q, position, wxyz in zip(samples["q"], samples["position"], samples["wxyz"], strict=True):
+        assert np.allclose(kin.from_position_wxyz(position, wxyz), world(q), atol=1e-9)
+
+
 def test_what_an_arm_is(client):
     for robot in kin.classic_robots().values():
         found = client.get(f"/api/v1/robots/{robot.id}/inspect").json()

@@ -12,6 +12,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 import kin
@@ -117,6 +119,47 @@ def test_what_one_command_writes_the_other_reads(run, form):
     assert np.abs(np.load(io.BytesIO(again)) - kin.fk(UR5, q)).max() < 1e-9
 
 
+def parquet(columns):
+    """A Parquet file in which groups of rows are smaller than pieces."""
+    file = io.BytesIO()
+    pq.write_table(pa.table(columns), file, row_group_size=3)
+    return file.getvalue()
+
+
+def test_a_parquet_file_is_answered_as_the_same_table_in_csv(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(source, "AT_ONCE", 4)
+    T = kin.fk(UR5, UR5.random_q(np.random.default_rng(8), 9))
+    T[2, :3, 3] = 9.0
+    names = ["x", "y", "z", "qw", "qx", "qy", "qz"]
+    rows = [[*pose[:3, 3].tolist(), *wxyz(pose)] for pose in T]
+    table = ",".join(names) + "\n" + "".join(",".join(map(repr, row)) + "\n" for row in rows)
+    file = tmp_path / "in.parquet"
+    columns = dict(zip(names, np.transpose(rows), strict=True))
+    file.write_bytes(parquet({"note": ["x"] * 9, **columns}))
+    expected = run("ik", "ur5", "--targets", "-", given=table)
+    assert expected[0] == 1
+    assert len(expected[1].splitlines()) == 10
+    assert run("ik", "ur5", "--targets", file) == expected
+    assert run("ik", "ur5", "--targets", "-", given=file.read_bytes()) == expected
+    assert run("ik", "ur5", "--targets", file, "-o", tmp_path / "out.ndjson")[0] == 1
+    answers = list(map(json.loads, (tmp_path / "out.ndjson").read_text().splitlines()))
+    assert [each["status"] for each in answers] == ["solved"] * 2 + ["unreachable"] + ["solved"] * 6
+    # What ik writes into a Parquet file, fk reads.
+    run("ik", "ur5", "--targets", file, "-o", tmp_path / "out.parquet")
+    _, poses, _ = run("fk", "ur5", "--configurations", tmp_path / "out.parquet", "--format", "npy")
+    found = np.load(io.BytesIO(poses))
+    assert np.isnan(found[2]).all()
+    assert np.abs(np.delete(found, 2, 0) - np.delete(T, 2, 0)).max() < 1e-8
+
+
+def test_without_the_extra_a_parquet_file_is_refused_with_what_is_missing(run, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    (tmp_path / "in.parquet").write_bytes(b"PAR1")
+    code, _, err = run("ik", "ur5", "--targets", tmp_path / "in.parquet")
+    assert code == 2
+    assert "pip install 'kinboard[parquet]'" in err
+
+
 def test_what_was_not_solved_has_no_pose(run):
     _, solved, _ = run("ik", "ur5", "--targets", "-", "--format", "csv", given=lines(TARGETS))
     rows = list(csv.DictReader(solved.decode().splitlines()))
@@ -199,6 +242,15 @@ def test_each_line_is_answered_before_the_next_one_is_sent():
         ("ik", array(np.eye(4)), "an array of poses"),
         ("ik", array(np.array([object()])), "a broken .npy file"),
         ("ik", b"\x93NUMPY\x01\x00", "a broken .npy file"),
+        ("ik", b"PAR1", "a Parquet file with the columns x, y, z"),
+        ("ik", parquet({"x": [1.0]}), "a Parquet file with the columns x, y, z"),
+        (
+            "ik",
+            parquet({name: [0.5, None] for name in ("x", "y", "z", "qw", "qx", "qy", "qz")}),
+            r"--targets\[1\]",
+        ),
+        ("fk", parquet({f"q{i + 1}": ["a"] for i in range(6)}), r"--configurations\[0\]"),
+        ("fk", parquet({f"q{i + 1}": np.zeros(0) for i in range(6)}), "at least one row"),
         ("fk", lines([[1, 2, 3]]), "6 joint values"),
         ("fk", lines([[[1, 2, 3, 4, 5, 6]]]), "a list of 6 joint values"),
         ("fk", lines([{"x": 1}]), "a list of 6 joint values"),

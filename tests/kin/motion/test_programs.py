@@ -1,6 +1,7 @@
 """Programs: read from plain data, written back, refused with the name of the field."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -169,6 +170,23 @@ def test_the_number_of_joint_values_is_checked_against_the_arm():
         kin.plan_motion(kin.get_robot("ur5"), [kin.Ptp(kin.JointTarget((0, 0)))])
     with pytest.raises(kin.InputError, match="TOML"):
         kin.parse_program("segments = [")
+
+
+@pytest.mark.parametrize("text", [Path("program.toml"), "program.toml", "programs/first", b"[[segments]]", None])
+def test_a_path_instead_of_the_text_of_a_program_is_named(text):
+    with pytest.raises(kin.InputError, match=r"text: .* the text of a program, such as .*read_text\(\)"):
+        kin.parse_program(text)
+
+
+def test_what_is_no_program_is_not_written():
+    with pytest.raises(kin.InputError, match=r"program: .* a kin\.Program"):
+        kin.program_to_dict([kin.Dwell(1.0)])
+
+
+def test_limits_are_those_of_an_arm_or_of_its_id():
+    assert np.array_equal(kin.limits_of("ur5").jerk, kin.limits_of(kin.get_robot("ur5")).jerk)
+    with pytest.raises(kin.UnknownRobotError):
+        kin.limits_of("nobody")
 
 
 def test_poses_and_joint_values_are_targets_as_they_are():

@@ -77,5 +77,17 @@ class UrdfExamination:
         return sum(each.automatic for each in self.findings)
 
     def count(self, rank: Rank) -> int:
-        """How many findings have this rank."""
+        """How many findings have a rank.
+
+        Args:
+            rank: ``"wrong"``, ``"suspicious"`` or ``"left out"``.
+
+        Returns:
+            Their number.
+
+        Examples:
+            >>> import kin
+            >>> kin.examine_urdf(kin.to_urdf("ur5")).count("wrong")
+            0
+        """
         return sum(each.rank == rank for each in self.findings)
