@@ -16,6 +16,7 @@ import zstandard
 from websockets.sync.client import connect
 
 from app.viewer.panel.script import LABEL
+from app.viewer.session.persistence import SAVE_AFTER
 from app.viewer.session.worker.inbox import Inbox
 from app.viewer.session.worker.worker import Worker
 from kin.transforms import from_position_wxyz, wxyz_from_rotation
@@ -261,6 +262,12 @@ class FakeBrowser:
         while self._read(patience) or (_working() and time.monotonic() < late):
             patience = quiet
             assert time.monotonic() < end, f"the page did not come to rest within {timeout} s"
+
+    def stored(self) -> str:
+        """The state that the service has stored in the page, a moment after the last change."""
+        self.wait(lambda: bool(self.kept))
+        self.settle(quiet=SAVE_AFTER + 0.3)
+        return self.kept[-1]
 
     def _read(self, timeout: float) -> bool:
         try:

@@ -72,7 +72,7 @@ def serve_viewer(viewer: ViewerServer) -> Iterator[int]:
             viewer.stop()
 
 
-def wait_for(condition, seconds: float = 10.0) -> None:
+def wait_for(condition, seconds: float = 30.0) -> None:
     """Wait until `condition()` is true; fails the test after `seconds`."""
     deadline = time.monotonic() + seconds
     while not condition():

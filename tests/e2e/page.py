@@ -170,11 +170,13 @@ class Tab:
         self.open("Learn")
         self.choose("Lesson", title)
 
-    def show_answer(self) -> None:
-        """Have the answer of the step on show shown, if its question withholds what the lesson shows."""
-        expect(self.page.locator("[data-guide=steps]")).to_be_visible()
-        if self.page.locator("[data-asked]").count():
-            self.page.locator(".kb-reveal").first.click()
+    def show_answer(self, lesson: str) -> None:
+        """Once the lesson of this title is on show, have the answer to its step shown, if one is asked for."""
+        expect(self.page.locator(f'[data-guide=goal][data-lesson="{lesson}"]')).to_be_visible()
+        steps = self.page.locator("[data-guide=steps]")
+        expect(steps).to_be_visible()
+        if steps.locator(".kb-reveal").count():
+            steps.locator(".kb-reveal").first.click()
         expect(self.page.locator("[data-asked]")).to_have_count(0)
 
     def set_dark(self, dark: bool) -> None:

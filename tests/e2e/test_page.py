@@ -189,7 +189,7 @@ def test_texts_are_legible_the_status_stays_and_drawings_have_a_legend(tab: Tab)
     assert tab.page.evaluate(ILLEGIBLE) == []
     tab.select(PUMA)
     tab.choose_lesson("Velocity")
-    tab.show_answer()
+    tab.show_answer("Velocity")
     legend = tab.page.get_by_role("list", name="drawn at the tool").get_by_role("listitem")
     expect(legend).to_have_text(["possible velocities of the tool point"])
     tab.page.get_by_role("group", name="Column").get_by_role("button", name="2", exact=True).click()

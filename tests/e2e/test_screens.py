@@ -47,7 +47,7 @@ def lesson(robot: str, title: str, ready: str) -> Callable[[Tab], None]:
         tab.open("Learn")
         tab.choose("Lesson", title)
         if title != "None":
-            tab.show_answer()
+            tab.show_answer(title)
         if ready:
             expect(tab.page.locator(ready).first).to_be_visible()
 

@@ -145,7 +145,7 @@ def test_rare_kernels_are_compiled_when_ready_until_the_service_stops(monkeypatc
     monkeypatch.setattr(app.service.startup, "warm_up_rest", rest)
     with TestClient(create_app(Settings())) as client:
         assert begun.wait(30)
-        assert client.get("/readyz").json() == readiness("ready", False)
+        wait_for(lambda: client.get("/readyz").json() == readiness("ready", False), 60)
         assert not ended.is_set()
     assert ended.wait(10)
 

@@ -86,7 +86,7 @@ def test_the_ring_of_arm_angles(tab: Tab) -> None:
     tab.mark_is_under_thumb("Set ψ (tool held)", 70)
     tab.screenshot("redundancy-ring")
     learn(tab, PRINTED, "Redundancy")
-    tab.show_answer()
+    tab.show_answer("Redundancy")
     expect(tab.page.locator("[data-idea]")).to_contain_text("The axes of joints 1 and 2 coincide")
     tab.screenshot("redundancy-trade")
 

@@ -19,7 +19,7 @@ def test_screws_by_mouse_and_keyboard(desktop: Tab) -> None:
     tab.choose("Lesson", "None")
     tab.select(SCARA)
     tab.choose_lesson("Screws")
-    tab.show_answer()
+    tab.show_answer("Screws")
     table = page.locator('table[aria-label="screws"]')
     expect(table.locator("[data-s]")).to_have_count(24)
     expect(table.locator("[data-pitch]")).to_have_text(["0", "0", "∞", "0"])

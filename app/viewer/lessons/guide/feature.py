@@ -207,7 +207,7 @@ class Guide(Feature):
             activity.asked = progress.withheld
             activity.changed()
         open_ = [key for key, _ in progress.outline.questions() if self._is_on_show(key)]
-        update_html(self._goal, views.goal_html(progress.outline.goal))
+        update_html(self._goal, views.goal_html(self._lesson.title, progress.outline.goal))
         update_html(self._steps, views.steps_html(progress, {key: self._sheet(key) for key in open_}))
         forms = {key: progress.question(key).asked() for key in open_ if not progress.is_closed(key)}
         self._draw_ghost([key for key, asked in forms.items() if asked.form == "frame"])

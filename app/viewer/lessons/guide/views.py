@@ -18,9 +18,9 @@ MARKS: dict[Mark, tuple[str, str, str]] = {
 }
 
 
-def goal_html(goal: str) -> str:
-    """What the student can do at the end."""
-    return render("guide/goal", goal=goal)
+def goal_html(lesson: str, goal: str) -> str:
+    """What the student can do at the end of the lesson of that title."""
+    return render("guide/goal", lesson=lesson, goal=goal)
 
 
 def steps_html(progress: Progress, sheets: dict[str, Sheet]) -> str:

@@ -481,9 +481,7 @@ def test_a_visitor_answers_and_the_link_keeps_it(server: int) -> None:
         tab.wait(lambda: "1. A column" in tab.html)
         tab.set("Lesson", "DH table step by step")
         tab.wait(lambda: "1 of 4 right" in tab.html)
-        tab.wait(lambda: bool(tab.kept))
-        tab.settle()
-        kept = tab.kept[-1]
+        kept = tab.stored()
     memory = json.dumps({"address": "http://127.0.0.1/", "state": kept})
     with FakeBrowser(server, memory=memory) as tab:
         tab.wait(lambda: "1 of 4 right" in tab.html)

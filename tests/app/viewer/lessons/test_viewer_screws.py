@@ -201,9 +201,7 @@ def test_the_controls_change_table_product_and_scene(server: int) -> None:
         tab.set("Joint", list(joints(pioneer))[3])
         tab.wait(lambda: "v of joint 4, direction only" in tab.html and "after the factors" in tab.html)
         tab.wait(lambda: sum(name.startswith("/screws-") for name in tab.nodes) > 3 * pioneer.n)
-        tab.wait(lambda: bool(tab.kept))
-        tab.settle()
-        kept = tab.kept[-1]
+        kept = tab.stored()
     memory = json.dumps({"address": "http://127.0.0.1/", "state": kept})
     with FakeBrowser(server, memory=memory) as tab:
         tab.wait(lambda: "The factors of the first 2 joints act on M" in tab.html)

@@ -43,8 +43,7 @@ def opened(state: PageState) -> str:
 
 
 def kept(tab: FakeBrowser) -> PageState:
-    tab.wait(lambda: bool(tab.kept))
-    return decode(tab.kept[-1], ROBOTS)
+    return decode(tab.stored(), ROBOTS)
 
 
 def bodies(tab: FakeBrowser) -> dict[str, tuple[int, ...]]:

@@ -11,6 +11,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -37,13 +38,16 @@ class Heard:
     Attributes:
         text: all texts.
         block: what the exercise showed before an answer was given.
-        said, sent: how often each number was in texts, and elsewhere.
+        said: how often each number was in texts.
+        sent: each number that was elsewhere, to six digits and in order.
+        times: how often it was.
     """
 
     text: str
     block: str
     said: Counter[float]
-    sent: Counter[float]
+    sent: np.ndarray
+    times: np.ndarray
 
 
 def numbers_in(text: str) -> Counter[float]:
@@ -58,7 +62,8 @@ CHANCE = re.compile(
 
 def heard(messages: list[dict[str, Any]]) -> Heard:
     texts: list[str] = []
-    sent: Counter[float] = Counter()
+    numbers: list[float] = []
+    arrays: list[np.ndarray] = []  # bodies of arms have some 100 000 numbers
 
     def walk(value: object) -> None:
         match value:
@@ -67,11 +72,10 @@ def heard(messages: list[dict[str, Any]]) -> Heard:
             case bool() | None | bytes():
                 pass
             case int() | float():
-                sent[float(f"{value:.6g}")] += 1
+                numbers.append(value)
             case np.ndarray():
                 if value.dtype.kind in "fiu":
-                    for number, count in zip(*np.unique(value, return_counts=True), strict=True):
-                        sent[float(f"{number:.6g}")] += int(count)
+                    arrays.append(value.ravel())
             case dict():
                 for key in value.keys() - {"uuid", "name", "type", "container_uuid", "order"}:
                     walk(value[key])
@@ -82,7 +86,15 @@ def heard(messages: list[dict[str, Any]]) -> Heard:
     walk(messages)
     text = html.unescape("\n".join(texts))
     said = numbers_in(CHANCE.sub(" ", text))
-    return Heard(text, "", said, sent)
+    sent, times = np.unique(six_digits(np.concatenate([numbers, *arrays])), return_counts=True)
+    return Heard(text, "", said, sent, times)
+
+
+def six_digits(x: np.ndarray) -> np.ndarray:
+    """The numbers rounded to six significant digits."""
+    with np.errstate(divide="ignore"):
+        scale = 10.0 ** (5 - np.clip(np.floor(np.log10(np.abs(x))), -300, 300))
+    return np.round(x * scale) / scale
 
 
 def parts_of(one: Exercise, variant: Variant) -> list[list[tuple[float, float]]]:
@@ -103,12 +115,26 @@ def parts_of(one: Exercise, variant: Variant) -> list[list[tuple[float, float]]]
     return [[(x * scale, near * abs(x * scale)) for scale in scales] for x in flat]
 
 
-def is_right(number: float, alternatives: list[tuple[float, float]], error: float | None) -> bool:
+def is_right(number: float, alternatives: list[tuple[float, float]]) -> bool:
+    return any(abs(number - value) <= near for value, near in alternatives if value)
+
+
+def is_among(numbers: np.ndarray, alternatives: list[tuple[float, float]]) -> bool:
+    """Whether one of the alternatives is among the numbers, to five digits."""
     return any(
-        abs(number - value) <= (near if error is None else max(error * abs(value), 1e-9))
-        for value, near in alternatives
+        bool(np.any(np.abs(numbers - value) <= max(EXACT * abs(value), 1e-9)))
+        for value, _ in alternatives
         if value
     )
+
+
+def sent_to_one(pages: list[Heard]) -> list[np.ndarray]:
+    """For each page, the numbers that it was sent more often than another."""
+    numbers = np.unique(np.concatenate([page.sent for page in pages]))
+    times = np.zeros((len(pages), len(numbers)), int)
+    for row, page in zip(times, pages, strict=True):
+        row[np.searchsorted(numbers, page.sent)] = page.times
+    return [numbers[row > times.min(axis=0)] for row in times]
 
 
 def leaks(one: Exercise, pages: list[tuple[Variant, Heard]]) -> list[str]:
@@ -135,10 +161,9 @@ def leaks(one: Exercise, pages: list[tuple[Variant, Heard]]) -> list[str]:
             others = max(page.text.count(label) for i, label in enumerate(asked.labels) if i != answer)
             found += ["the label of the right option"] * (page.text.count(asked.labels[answer]) > others)  # type: ignore[call-overload]
     constant_said = _common([page.said for _, page in pages])
-    constant_sent = _common([page.sent for _, page in pages])
     constant_block = _common([numbers_in(page.block) for _, page in pages])
     counts = []
-    for variant, page in pages:
+    for (variant, page), sent in zip(pages, sent_to_one([page for _, page in pages]), strict=True):
         parts = parts_of(one, variant)
         if is_small(one):  # such numbers are everywhere: only those of the exercise's own blocks are looked at
             said = numbers_in(page.block) - numbers_in(text_of(one, variant)) - constant_block
@@ -147,11 +172,10 @@ def leaks(one: Exercise, pages: list[tuple[Variant, Heard]]) -> list[str]:
             counts.append((int(number in said), 1))
             continue
         given = numbers_in(text_of(one, variant))
-        parts = [part for part in parts if not any(is_right(number, part, EXACT) for number in given)]
-        said, sent = page.said - constant_said, page.sent - constant_sent
-        said = Counter({number: n for number, n in said.items() if number not in given})
+        parts = [part for part in parts if not is_among(np.array(list(given)), part)]
+        said = [number for number in page.said - constant_said if number not in given]
         hits = [
-            any(is_right(number, part, None) for number in said) or any(is_right(x, part, EXACT) for x in sent)
+            any(is_right(number, part) for number in said) or is_among(sent, part)
             for part in parts
             if abs(part[0][0]) > 1e-6
         ]
@@ -236,14 +260,18 @@ def fixed(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same numbers in each run; two students have different answers where there are any."""
     names: list[str] = []
 
+    @cache
+    def two_seeds(*parts: object) -> tuple[int, int]:
+        one = exercise(str(parts[0]))
+        seeds = [zlib.crc32(f"{salt}:{parts}".encode()) for salt in range(30)]
+        first = one.kind.answer(one.variant(seeds[0]))
+        others = (seed for seed in seeds[1:] if one.kind.answer(one.variant(seed)) != first)
+        return seeds[0], next(others, seeds[0])
+
     def seed(self: Place, *parts: object) -> int:
         if self.name not in names:
             names.append(self.name)
-        one, order = exercise(str(parts[0])), names.index(self.name)
-        seeds = [zlib.crc32(f"{salt}:{parts}".encode()) for salt in range(30)]
-        first = one.kind.answer(one.variant(seeds[0]))
-        others = [seed for seed in seeds if one.kind.answer(one.variant(seed)) != first]
-        return others[0] if order % 2 and others else seeds[0]
+        return two_seeds(*parts)[names.index(self.name) % 2]
 
     monkeypatch.setattr(Place, "seed", seed)
 

@@ -340,10 +340,7 @@ def test_some_lessons_are_for_visitors_who_may_only_look() -> None:
 
 
 def kept(tab: FakeBrowser) -> PageState:
-    """The stored state of the page once it is idle."""
-    tab.wait(lambda: bool(tab.kept))
-    tab.settle(quiet=0.8)
-    return decode(tab.kept[-1], ROBOTS)
+    return decode(tab.stored(), ROBOTS)
 
 
 def test_a_link_and_a_reconnection_restore_the_view(port):

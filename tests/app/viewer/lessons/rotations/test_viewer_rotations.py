@@ -312,9 +312,7 @@ def test_a_visitor_turns_a_frame_and_builds_a_chain(server: int) -> None:
         tab.set("Axes", "fixed axes")
         tab.set("Chain", "Add")
         tab.wait(lambda: "T = Tx(200.0 mm) · Rz(90.0°)" in tab.html)
-        tab.wait(lambda: bool(tab.kept))
-        tab.settle()
-        kept = tab.kept[-1]
+        kept = tab.stored()
     memory = json.dumps({"address": "http://127.0.0.1/", "state": kept})
     with FakeBrowser(server, memory=memory) as tab:
         tab.wait(lambda: "T = Tx(200.0 mm) · Rz(90.0°)" in tab.html)

@@ -85,8 +85,7 @@ def test_a_zip_shows_the_real_arm_and_undo_brings_back_what_it_replaced(port: in
 
 def kept_arm(tab: FakeBrowser) -> kin.Robot:
     """The arm of the link."""
-    tab.wait(lambda: bool(tab.kept))
-    own = decode(tab.kept[-1], [UR5]).own
+    own = decode(tab.stored(), [UR5]).own
     assert own is not None
     return own.robot
 
