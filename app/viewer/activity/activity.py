@@ -184,6 +184,11 @@ class Activity:
         self.practice.give_up(exercise)
         return True
 
+    def pass_lesson(self, key: str, robot_id: str) -> None:
+        """The check of a lesson was passed on this arm."""
+        if self.progress.take_lesson(key, robot_id):
+            self.changed()
+
     def say(self, note: str) -> None:
         """Write a sentence below the verdict."""
         if note != self.note:

@@ -21,6 +21,7 @@ class Progress:
         course: None: none is open.
         at: the index of the item on show; None: the list.
         seen: the indices of the lessons that were left with *Next*.
+        passed: the indices of the lessons whose check was passed.
         alias: the name in the result code.
     """
 
@@ -30,17 +31,22 @@ class Progress:
         self.course: Course | None = None
         self.at: int | None = None
         self.seen: set[int] = set()
+        self.passed: set[int] = set()
         self.alias = ""
 
     def open(self, course: Course) -> None:
         """Begin a course."""
-        self.course, self.at, self.seen = course, None, set()
+        self.course = course
+        self._begin()
 
     def edit(self, course: Course) -> None:
         """The course was changed: places and what was seen no longer fit."""
         if course.items != self._now.items:
-            self.at, self.seen = None, set()
+            self._begin()
         self.course = course
+
+    def _begin(self) -> None:
+        self.at, self.seen, self.passed = None, set(), set()
 
     @property
     def exercises(self) -> Exercises:
@@ -79,9 +85,21 @@ class Progress:
         """What has become of an item."""
         item = self._now.items[index]
         if item.kind == "lesson":
-            return "right" if index in self.seen else "open"
+            return "right" if index in self.passed else "wrong" if index in self.seen else "open"
         record = self._practice.records.get(item.key)
         return "open" if record is None else record.mark
+
+    def take_lesson(self, key: str, robot_id: str) -> bool:
+        """The check of a lesson was passed on this arm; returns whether that is news for the course."""
+        items = () if self.course is None else self.course.items
+        passed = {
+            i
+            for i, item in enumerate(items)
+            if (item.kind, item.key) == ("lesson", key) and item.robot in ("", robot_id)
+        }
+        news = not passed <= self.passed
+        self.passed |= passed
+        return news
 
     def first_open(self) -> int:
         """The first item that is not done; the first one if all are."""
@@ -123,20 +141,21 @@ class Progress:
         if self.course is None:
             return {}
         at = -1 if self.at is None else self.at
-        return {"course": to_data(self.course), "at": at, "seen": sorted(self.seen), "alias": self.alias}
+        indices = {"seen": sorted(self.seen), "passed": sorted(self.passed)}
+        return {"course": to_data(self.course), "at": at, "alias": self.alias, **indices}
 
     def restore(self, state: dict[str, object]) -> None:
         """Take what `state` returned; raises `ExerciseFileError` for a course that is not valid here."""
-        self.course, self.at, self.seen = None, None, set()
+        self.course = None
+        self._begin()
         if "course" not in state:
             return
         course = course_of(state["course"], self._courses.exercises, "link", self._courses.find)
-        at, seen, alias = state.get("at"), state.get("seen"), state.get("alias")
+        at, alias = state.get("at"), state.get("alias")
         self.course = course
         if type(at) is int and 0 <= at < len(course.items):
             self.at = at
-        if isinstance(seen, list):
-            self.seen = {i for i in seen[:MOST_ITEMS] if type(i) is int and 0 <= i < len(course.items)}
+        self.seen, self.passed = (_indices(state.get(name), len(course.items)) for name in ("seen", "passed"))
         self.alias = alias[:100] if isinstance(alias, str) else ""
 
     @property
@@ -144,3 +163,9 @@ class Progress:
         if self.course is None:
             raise InputError("course", None, "an open course")
         return self.course
+
+
+def _indices(value: object, count: int) -> set[int]:
+    """The indices of items in a list of a link; what is none is left out."""
+    found = value[:MOST_ITEMS] if isinstance(value, list) else []
+    return {i for i in found if type(i) is int and 0 <= i < count}

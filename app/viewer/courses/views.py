@@ -10,11 +10,19 @@ from app.classroom.courses import Courses, Item
 from app.classroom.courses.course import LONGEST, MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import Outcome
+from app.viewer.activity.practice import Mark
 from app.viewer.activity.progress import Progress
 from app.viewer.exercises.views import MARKS
 from app.viewer.lessons import LESSONS
 from app.viewer.panel.share import box_html
 from app.viewer.views.templates import render
+
+# Symbol, words and colour of what has become of a lesson.
+LESSON_MARKS: dict[Mark, tuple[str, str, str]] = {
+    "open": ("", "not begun", ""),
+    "wrong": ("◐", "read, its check is not passed", "amber"),
+    "right": ("✓", "check passed", "green"),
+}
 
 
 @dataclass
@@ -112,5 +120,6 @@ def _title(progress: Progress, item: Item) -> str:
 def _marks(progress: Progress) -> list[dict[str, str]]:
     course = progress.course
     assert course is not None
-    found = [MARKS[progress.mark(i)] for i in range(len(course.items))]
+    tables = [LESSON_MARKS if item.kind == "lesson" else MARKS for item in course.items]
+    found = [table[progress.mark(i)] for i, table in enumerate(tables)]
     return [{"symbol": symbol, "words": words, "color": color} for symbol, words, color in found]

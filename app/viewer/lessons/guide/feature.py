@@ -206,6 +206,9 @@ class Guide(Feature):
         if activity.asked != progress.withheld:  # before anything is shown that would give it away
             activity.asked = progress.withheld
             activity.changed()
+        right, count = progress.score
+        if right == count > 0:
+            activity.pass_lesson(self._lesson.key, self.stage.now.robot.id)
         open_ = [key for key, _ in progress.outline.questions() if self._is_on_show(key)]
         update_html(self._goal, views.goal_html(self._lesson.title, progress.outline.goal))
         update_html(self._steps, views.steps_html(progress, {key: self._sheet(key) for key in open_}))

@@ -22,9 +22,12 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.activity.places import Place
 from app.viewer.activity.practice import Practice
+from app.viewer.lessons.guide.lesson import Lesson
+from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
-from kin import classic_robots, get_robot
+from kin import Robot, classic_robots, get_robot
+from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -83,6 +86,24 @@ def block(tab: FakeBrowser, name: str) -> str:
     )
 
 
+def pass_check(tab: FakeBrowser, lesson: type[Lesson], robot: Robot) -> None:
+    """Answer every question of the check of the lesson on show right."""
+    outline = lesson.outline(robot, Units())
+    press(tab, "guide", ["go", 100], len(outline.steps))
+    tab.wait(lambda: 'data-guide="score"' in tab.html)
+    asked = [(key, question) for key, question in outline.questions() if key.startswith("c")]
+    for serial, (key, question) in enumerate(asked, 101):
+        right = question.right()
+        options = question.asked().form == "options"
+        press(
+            tab,
+            "guide",
+            ["answer" if options else "fields", key, serial],
+            right if options else question.cells(right),
+        )
+    tab.wait(lambda: f"{len(asked)} of {len(asked)} right" in tab.html)
+
+
 def test_a_student_follows_a_course_to_a_result_code(server: int, settings: Settings) -> None:
     with FakeBrowser(server, memory=linked()) as tab:
         tab.wait(lambda: "0 of 3 done" in block(tab, "follow"))
@@ -101,10 +122,16 @@ def test_a_student_follows_a_course_to_a_result_code(server: int, settings: Sett
         press(tab, "course", ["back", 5])
         tab.wait(lambda: "1 of 3" in block(tab, "bar") and "1. A column" in tab.html)
         press(tab, "course", ["list", 6])
-        tab.wait(lambda: "2 of 3 done" in block(tab, "follow") and not block(tab, "bar"))
-        press(tab, "course", ["fields", "alias", 7], [["  "]])
+        tab.wait(lambda: "1 of 3 done" in block(tab, "follow") and not block(tab, "bar"))
+        assert "read, its check is not passed" in block(tab, "follow"), "its pages were only turned"
+        press(tab, "course", ["go", 7], 0)
+        tab.wait(lambda: "1. A column" in tab.html)
+        pass_check(tab, VelocityLesson, get_robot("scara"))
+        press(tab, "course", ["list", 8])
+        tab.wait(lambda: "2 of 3 done" in block(tab, "follow") and "check passed" in block(tab, "follow"))
+        press(tab, "course", ["fields", "alias", 9], [["  "]])
         tab.wait(lambda: "1 to 32 characters" in block(tab, "follow"))
-        press(tab, "course", ["fields", "alias", 8], [["Ada <b>"]])
+        press(tab, "course", ["fields", "alias", 10], [["Ada <b>"]])
         tab.wait(lambda: "Copy code" in block(tab, "follow"))
         found = re.search(r"\b(?:[0-9A-Z]{5}-){8,}[0-9A-Z]+", block(tab, "follow"))
         assert found is not None
