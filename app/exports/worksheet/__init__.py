@@ -6,7 +6,7 @@
 
 from app.exports.worksheet.drawing import Drawing, draw
 from app.exports.worksheet.latex import latex
-from app.exports.worksheet.sheet import Formula, Part, Question, Row, Sheet
+from app.exports.worksheet.sheet import Formula, Left, Part, Question, Row, Sheet
 from app.exports.worksheet.tables import csv_text
 
-__all__ = ["Drawing", "Formula", "Part", "Question", "Row", "Sheet", "csv_text", "draw", "latex"]
+__all__ = ["Drawing", "Formula", "Left", "Part", "Question", "Row", "Sheet", "csv_text", "draw", "latex"]

@@ -15,6 +15,7 @@ HEAD = r"""\documentclass[11pt,a4paper]{article}
 \usepackage{amsmath,amssymb,array,tikz}
 \setlength{\parindent}{0pt}
 \setlength{\parskip}{6pt}
+\interlinepenalty=10000 % no page ends inside a paragraph
 \renewcommand{\arraystretch}{1.15}
 \newenvironment{together}{\begin{minipage}{\textwidth}\setlength{\parskip}{6pt}}{\end{minipage}\par\medskip}
 \begin{document}
@@ -33,9 +34,12 @@ def latex(sheet: Sheet) -> str:
         out.append(rf"\textbf{{Goal:}} {to_latex(sheet.goal)}")
     out += [r"\begin{center}", draw(sheet).tikz(), r"\end{center}"]
     values = ", ".join(f"{to_latex(name)} = {to_latex(value)}" for name, value in sheet.values)
-    out += [f"Joints: {values}.", _table(sheet, sheet.blank)]
-    if not sheet.blank:
+    out += ["The joint values are to be found." if sheet.left == "configuration" else f"Joints: {values}."]
+    out.append(_table(sheet, sheet.left == "table"))
+    if sheet.left == "nothing":
         out.append(_matrices(sheet))
+    elif sheet.left == "configuration":
+        out.append(f"Lengths in {sheet.units.lengths.name}.\n\\[T = {_matrix(sheet, sheet.pose)}\\]")
     out += [_formula(f.title, f.latex) for f in sheet.formulas if not f.solution]
     numbers = count(1)
     for part in sheet.parts:
@@ -45,7 +49,9 @@ def latex(sheet: Sheet) -> str:
         out += [_question(next(numbers), question) for question in part.questions]
     if sheet.has_solutions:
         out += [r"\newpage", rf"{{\Large\bfseries {title}: solutions}}"]
-        if sheet.blank:
+        if sheet.left == "configuration":
+            out.append(f"Joints: {values}.")
+        if sheet.left != "nothing":
             out += [_table(sheet, False), _matrices(sheet)]
         out += [_formula(f.title, f.latex) for f in sheet.formulas if f.solution]
         for number, question in enumerate(sheet.questions, 1):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from kin import Robot, fk
 from kin.transforms import Array
 from kin.units import Units, fixed
 
+# The table and the matrices are filled in; or the pose is given, and the configuration is to be found.
+Left = Literal["nothing", "table", "configuration"]
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
@@ -68,7 +71,7 @@ class Sheet:
         title: of the lesson, or of the sheet.
         goal: in one sentence; may be empty.
         q: configuration ``(n,)``.
-        blank: whether the table and the matrices are for the student to fill in.
+        left: what is left to the student besides the questions.
     """
 
     title: str
@@ -78,7 +81,7 @@ class Sheet:
     goal: str = ""
     parts: tuple[Part, ...] = ()
     formulas: tuple[Formula, ...] = ()
-    blank: bool = False
+    left: Left = "nothing"
 
     @property
     def questions(self) -> list[Question]:
@@ -88,7 +91,7 @@ class Sheet:
     @property
     def has_solutions(self) -> bool:
         """Whether anything is left to the student."""
-        return self.blank or bool(self.questions)
+        return self.left != "nothing" or bool(self.questions)
 
     @property
     def heads(self) -> tuple[str, str, str, str]:

@@ -83,7 +83,7 @@ class Worksheets(Feature):
         found = type(lesson).outline(stage.now.robot, stage.units)
         return Sheet(
             type(lesson).title, stage.now.robot, stage.now.goal, stage.units, found.goal, parts_of(found),
-            lesson.formulas(), lesson.to_fill,
+            lesson.formulas(), lesson.left,
         )  # fmt: skip
 
     def remove(self) -> None:

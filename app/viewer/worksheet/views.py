@@ -16,12 +16,14 @@ def page_html(sheet: Sheet) -> str:
     given = [(f"A{str(i).translate(SUBSCRIPTS)}", sheet.entries(A)) for i, A in enumerate(sheet.matrices, 1)]
     ends = [(name, sheet.entries(T)) for name, _, T in sheet.ends]
     pose = sheet.entries(sheet.pose)
+    empty = [(name, EMPTY) for name, _ in given]
+    matrices = {"nothing": given, "table": empty, "configuration": []}[sheet.left]
     return render(
         "sheet/page",
         sheet=sheet,
         picture=Markup(draw(sheet).svg()),
-        matrices=[*([(name, EMPTY) for name, _ in given] if sheet.blank else given), *ends],
-        pose=EMPTY if sheet.blank else pose,
+        matrices=[*matrices, *ends],
+        pose=EMPTY if sheet.left == "table" else pose,
         solved=[*given, *ends],
         solved_pose=pose,
         ends=[f"{name}: {words}" for name, words, _ in sheet.ends],

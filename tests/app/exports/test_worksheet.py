@@ -8,12 +8,13 @@ import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import combinations
+from typing import get_args
 
 import numpy as np
 import pytest
 
 import kin
-from app.exports.worksheet import Formula, Part, Question, Sheet, csv_text, draw, latex
+from app.exports.worksheet import Formula, Left, Part, Question, Sheet, csv_text, draw, latex
 from app.exports.worksheet.labels import BASE, Label
 from app.exports.worksheet.words import to_latex
 from kin.units import Units
@@ -119,10 +120,10 @@ def balanced(text):
 
 
 @each_robot
-@pytest.mark.parametrize("blank", [True, False])
-def test_latex_is_balanced(robot, blank):
+@pytest.mark.parametrize("left", get_args(Left))
+def test_latex_is_balanced(robot, left):
     formula = Formula("(6)", "<math></math>", r"p_{z} = \left(c_{1}\right)", True)
-    text = latex(sheet(robot, parts=PARTS, formulas=(formula,), blank=blank, goal="You can & will."))
+    text = latex(sheet(robot, parts=PARTS, formulas=(formula,), left=left, goal="You can & will."))
     balanced(text)
     assert text.isascii()
     questions, solutions = text.split(r"\newpage")
@@ -130,8 +131,10 @@ def test_latex_is_balanced(robot, blank):
     assert "12.0 mm" in solutions
     assert "(6)" in solutions
     assert "(6)" not in questions
-    assert r"\begin{bmatrix}" in (solutions if blank else questions)
-    assert (r"\begin{bmatrix}" in questions) != blank
+    count = len(robot.rows) + len(sheet(robot).ends) + 1
+    asked = {"nothing": count, "table": 0, "configuration": 1}[left]
+    assert questions.count(r"\begin{bmatrix}") == asked
+    assert solutions.count(r"\begin{bmatrix}") == (0 if left == "nothing" else count)
 
 
 def test_a_sheet_without_questions_has_no_solutions():

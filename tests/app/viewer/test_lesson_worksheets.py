@@ -26,7 +26,7 @@ ARMS = [PIONEER, kin.get_robot("planar2r"), kin.get_robot("redundant7-craig")]
 
 def as_sheet(lesson, robot, units=DEFAULT_UNITS):
     outline = lesson.outline(robot, units)
-    return Sheet(lesson.title, robot, robot.q_home, units, outline.goal, parts_of(outline), (), lesson.key == "dh")
+    return Sheet(lesson.title, robot, robot.q_home, units, outline.goal, parts_of(outline), (), lesson.left)
 
 
 def parsed(html):
@@ -52,7 +52,22 @@ def test_every_question_is_asked_and_solved(lesson, robot):
     left = {character for character in latex(sheet) if not character.isascii()}
     assert not left, "app/exports/worksheet/words.py says what they are in LaTeX"
     cells = [cell.text for cell in articles[0].iter("td")]
-    assert (None in cells or "" in cells) == sheet.blank
+    assert (None in cells or "" in cells) == (sheet.left == "table")
+
+
+@pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
+def test_the_joint_values_are_not_on_the_sheet_that_asks_for_them(robot):
+    sheet = as_sheet(next(lesson for lesson in LESSONS if lesson.key == "inverse"), robot)
+    asked, solved = ("".join(each.itertext()) for each in parsed(page_html(sheet)).findall("article"))
+    first, second = latex(sheet).split(r"\newpage")
+    for name, value in sheet.values:
+        assert f"{name} = {value}" not in asked
+        assert f"{name} = {value}" in solved
+    pose = sheet.entries(sheet.pose)[0]
+    assert all(number in asked for number in pose)
+    assert "Joints:" not in first
+    assert "A_{1}" not in first
+    assert "Joints:" in second
 
 
 def test_the_page_has_the_units_of_the_reader():
@@ -78,7 +93,7 @@ def test_equations_are_on_the_sheet_with_their_corrections_among_the_solutions()
 @pytest.fixture
 def worksheets():
     stage = MagicMock(now=Arm(PIONEER, PIONEER.q_home, PIONEER.q_home), units=DEFAULT_UNITS)
-    lesson = SimpleNamespace(key="dh", formulas=tuple, to_fill=True)
+    lesson = SimpleNamespace(key="dh", formulas=tuple, left="table")
     made = Worksheets(stage, lesson, MagicMock())
     made.sheet = lambda: Sheet("An arm", PIONEER, np.array(PIONEER.q_home), DEFAULT_UNITS)
     return made

@@ -46,7 +46,7 @@ class DHLesson(Lesson):
     key = "dh"
     title = "DH table step by step"
     computes = False
-    to_fill = True
+    left = "table"
     about = "How four motions per row lead from the base to the tool, one after another."
     messages = Assigning.messages
     outline = staticmethod(outline)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from app.exports.worksheet import Formula
+from app.exports.worksheet import Formula, Left
 from app.viewer.feature import Feature
 from app.viewer.lessons.guide.outline import Outline
 from app.viewer.lessons.guide.progress import Progress
@@ -21,11 +21,11 @@ class Lesson(Feature, ABC):
     Attributes:
         computes: whether it solves the pose, or has a scene of its own. Links do not open it for visitors who may
             only look.
-        to_fill: whether students fill in the table and the matrices of its worksheet.
+        left: what its worksheet leaves to the student besides the questions.
     """
 
     computes: ClassVar[bool] = True
-    to_fill: ClassVar[bool] = False
+    left: ClassVar[Left] = "nothing"
 
     def on_steps(self, progress: Progress) -> Outline | None:
         """The steps are about to be shown, after an answer for example; returns another outline to go on with."""

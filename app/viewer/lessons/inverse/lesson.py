@@ -51,6 +51,7 @@ class InverseLesson(Lesson):
 
     key = "inverse"
     title = "Inverse kinematics step by step"
+    left = "configuration"
     about = "From a target to the joint angles by hand, and where each solution comes from."
     outline = staticmethod(outline)
 
