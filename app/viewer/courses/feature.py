@@ -33,7 +33,7 @@ class CourseFeature(Feature):
 
     key = "course"
     title = "Courses"
-    about = "Lessons and exercises in an order; make your own, and check results."
+    about = "New here? Begin with the course First steps. Make your own courses, and check results."
     messages = frozenset(
         {"pick", "new", "close", "upload", "edit", "done", "set", "up", "down", "delete", "answers", "go", "next",
          "back", "list", "download", "link", "fields"}

@@ -22,7 +22,9 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.activity.places import Place
 from app.viewer.activity.practice import Practice
+from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.lesson import Lesson
+from app.viewer.lessons.guide.outline import Number
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
@@ -155,6 +157,20 @@ def test_a_student_follows_a_course_to_a_result_code(server: int, settings: Sett
         changed = letters[:-1] + ("A" if letters[-1] != "A" else "B")
         press(tab, "course", ["fields", "check", 4], [[changed]])
         tab.wait(lambda: "Not accepted" in block(tab, "choose"))
+
+
+def test_lessons_of_the_built_in_courses_open_on_an_arm_that_shows_what_they_teach() -> None:
+    """On a planar arm, for example, the numbers about rotations are 0 or 1."""
+    lessons = {lesson.key: lesson for lesson in LESSONS}
+    items = [item for course in Courses(ALL).all for item in course.items if item.kind == "lesson"]
+    assert len(items) >= 8
+    for item in items:
+        outline = lessons[item.key].outline(get_robot(item.robot), Units())
+        assert outline.check, item.key
+        if item.key == "rotations":
+            numbers = [step.question.right() for step in outline.steps if isinstance(step.question, Number)]
+            assert len(numbers) >= 6
+            assert all(abs(number - round(number)) > 0.1 for number in numbers), item.robot
 
 
 def _decoded(text: str) -> str:
