@@ -191,13 +191,15 @@ class Search:
         rest = index[~equal]
         if not frames or not rest.size:
             return
-        wrong = invariants(tables.take(rest)).agree(
+        others = tables.take(rest)
+        wrong = invariants(others).agree(
             self._invariants, 10.0 * self._tolerance.length, 10.0 * self._tolerance.angle
         )
-        fits = rest[wrong == 0]
-        if not fits.size:
+        alike = np.flatnonzero(wrong == 0)
+        if not alike.size:
             return
-        needed = FRAME * self._frames_needed(tables.take(fits))
+        fits, alike_tables = rest[alike], others.take(alike)
+        needed = FRAME * self._frames_needed(alike_tables)
         least = level.cost[fits] + self._share * np.maximum(LEAST, needed)
         order = np.argsort(least, kind="stable")[:_MOST_TRIED]
         order = order[least[order] < min(self._least(), self._limit)]
@@ -205,19 +207,19 @@ class Search:
         if self._limit < math.inf:
             order = order[:_MOST_MATCHES]
             before, rests = self._beside(level, fits[order])
-            at_least = needed[order] + np.array([x + rest[0] for x, rest in zip(before, rests, strict=True)])
+            at_least = needed[order] + np.array([x + y[0] for x, y in zip(before, rests, strict=True)])
             worth = np.flatnonzero(level.cost[fits[order]] + self._share * (at_least - _ROUNDING) < self._limit)
             order, rests = order[worth], [rests[k] for k in worth]
         if not order.size:
             return
         matched = 0
-        for k, side, rest in zip(order, Side.several(tables.take(fits[order])), rests, strict=True):
+        for k, side, behind in zip(order, Side.several(alike_tables.take(order)), rests, strict=True):
             i = int(fits[k])
             if matched >= _MOST_MATCHES or least[k] >= self._least() or time.monotonic() > self._deadline:
                 break
             self._stop()
             most = (self._limit - float(level.cost[i])) / self._share
-            found = self._reference.plainest(side, most, float(needed[k]), rest)
+            found = self._reference.plainest(side, most, float(needed[k]), behind)
             matched += not isinstance(found, int)
             if isinstance(found, tuple):
                 self._keep(level, i, found[0])

@@ -31,7 +31,7 @@ from kin.comparison.matching import (
     cross,
     offset_cost,
 )
-from kin.comparison.tables import Tables, chain
+from kin.comparison.tables import Tables
 from kin.dh.exponentials import screws
 from kin.fk import fk
 from kin.robot import KIND_CODES, Robot
@@ -112,7 +112,7 @@ class Side(NamedTuple):
     def several(cls, tables: Tables) -> list[Side]:
         """Those of many tables of one shape."""
         rows = tables.joint_rows
-        lines = chain(tables, np.zeros((1, len(rows))))
+        lines = tables.zero
         z, p = lines.z[:, 0, rows], lines.z_point[:, 0, rows]
         slides = tables.kinds[:, rows] == KIND_CODES["prismatic"]
         omega = np.where(slides[..., None], 0.0, z)

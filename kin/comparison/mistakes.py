@@ -99,15 +99,16 @@ def known_edits(m: int, reference: Robot, frames_too: bool) -> tuple[Edit, ...]:
 
 def applied(several: Sequence[Edit], single: Tables) -> Tables:
     """A single table with each of the changes, which keep the number of rows."""
-    tables = single.take(np.zeros(len(several), dtype=np.intp))
+    names = ("cells", "kinds", "modified", "base", "tool")
+    parts = {name: np.repeat(getattr(single, name), len(several), axis=0) for name in names}
     for k, edit in enumerate(several):
         if isinstance(edit.apply, OnCells):
-            edit.apply.change_in(tables.cells[k])
+            edit.apply.change_in(parts["cells"][k])
         else:
             changed = edit.apply(single)
-            for name in ("cells", "kinds", "modified", "base", "tool"):
-                getattr(tables, name)[k] = getattr(changed, name)[0]
-    return tables
+            for name in names:
+                parts[name][k] = getattr(changed, name)[0]
+    return Tables(**parts)
 
 
 def _other_convention(tables: Tables) -> Tables:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -72,11 +72,19 @@ class Tables:
         """The rows of the moving joints."""
         return np.flatnonzero(self.kinds[0] != KIND_CODES["fixed"])
 
+    @cached_property
+    def zero(self) -> Chain:
+        """The lines of all rows and the tool with all joints at zero; not to be written to."""
+        return chain(self, np.zeros((1, len(self.joint_rows))))
+
     def take(self, index: NDArray[np.intp]) -> Tables:
         """Some of them."""
-        return Tables(
+        taken = Tables(
             self.cells[index], self.kinds[index], self.modified[index], self.base[index], self.tool[index]
         )
+        if "zero" in self.__dict__:
+            taken.__dict__["zero"] = Chain(*(part[index] for part in self.zero))
+        return taken
 
     def with_cells(self, cells: Array) -> Tables:
         """The same with other cells ``(N, m, 4)``."""
@@ -204,7 +212,7 @@ def invariants(tables: Tables, parallel: float = _PARALLEL) -> Invariants:
     """The invariants of the axes of each table."""
     rows = tables.joint_rows
     n = len(rows)
-    lines = chain(tables, np.zeros((1, n)))
+    lines = tables.zero
     z, p = lines.z[:, 0, rows], lines.z_point[:, 0, rows]
     slides = tables.kinds[:, rows] == KIND_CODES["prismatic"]
     w = _cross(z[:, :-1], z[:, 1:])
@@ -256,7 +264,7 @@ class Ends(NamedTuple):
     def of(cls, tables: Tables) -> Ends:
         """Those of each table."""
         rows = tables.joint_rows[[0, -1]]
-        lines = chain(tables, np.zeros((1, len(tables.joint_rows))))
+        lines = tables.zero
         z, p = lines.z[:, 0, rows].copy(), lines.z_point[:, 0, rows].copy()
         R, t = lines.T[:, 0, :3, :3], lines.T[:, 0, :3, 3]
         z[:, 1] = np.einsum("nji,nj->ni", R, z[:, 1])
