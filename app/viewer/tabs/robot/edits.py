@@ -6,6 +6,7 @@ typed value has its own unit there, so that the other numbers stay exactly as th
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -16,6 +17,7 @@ from app.viewer.own_arm import NAME, OF_MAKER, OwnArm, own_arm
 from app.viewer.panel.entry import read_cell
 from app.viewer.panel.rotations import roll_pitch_yaw
 from kin import InputError, KinematicsError, Robot, RobotFileError
+from kin.files.read import PER
 from kin.robot import PEAK_FIELDS
 from kin.typed import ReadError, cut
 from kin.units import Units
@@ -24,11 +26,13 @@ from kin.units import Units
 Cell = tuple[int | str, str]
 ANGLES = ("theta", "alpha")
 NUMBERS = ("theta", "d", "a", "alpha", "low", "high")
-COLUMNS = (*NUMBERS, "name", "kind")
+MOTION = ("home", *(key for key in PEAK_FIELDS if key in PER))  # of a joint, besides the table
+COLUMNS = (*NUMBERS, "name", "kind", *MOTION)
 FRAMES = ("tool", "base")
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 KINDS = ("revolute", "prismatic", "fixed")
 NEW_LINK = 100  # mm: the length of a new row, so that it is seen
+_PER_TIME = re.compile(r"/\s*s(?:\^?[23]|[²³])?\s*$")  # after a typed limit
 _SHOWN = {"theta": "θ", "alpha": "α", "low": "lower limit", "high": "upper limit"}
 Fields = dict[str, Any]
 
@@ -182,8 +186,28 @@ def _type_row(data: Fields, robot: Robot, index: int, column: str, text: str, un
             row["limits"] = [None, None]
         value = quantity(text, units, is_angle) if text.strip() else None
         row["limits"][column == "high"] = value
+    elif column in MOTION:
+        _type_motion(data, robot, index, column, text, units)
     else:
         row[column] = quantity(text, units, column in ANGLES)
+
+
+def _type_motion(data: Fields, robot: Robot, index: int, column: str, text: str, units: Units) -> None:
+    """The value of a joint in the home configuration, or one of its limits; without a text that is assumed."""
+    row, turning = robot.rows[index], robot.rows[index].kind == "revolute"
+    if row.kind == "fixed":
+        raise ReadError("a fixed row does not move")
+    if column == "home":
+        joint = sum(each.kind != "fixed" for each in robot.rows[:index])
+        unit, low, high = units.of(turning), float(robot.lower[joint]), float(robot.upper[joint])
+        if not low <= read_cell(text, unit) <= high:
+            raise ReadError(f"“{cut(text)}” is outside the limits: {unit.text(low)} to {unit.text(high)}")
+        data["home"]["q"][joint] = quantity(text, units, turning)
+        return
+    given = _PER_TIME.sub("", text).strip()
+    data["rows"][index].pop(column, None)
+    if given:
+        data["rows"][index][column] = quantity(given, units, turning) + PER[column]
 
 
 def _type_frame(data: Fields, robot: Robot, frame: str, axis: str, text: str, units: Units) -> None:
@@ -226,8 +250,10 @@ def with_table(robot: Robot, own: OwnArm | None, other: Robot) -> OwnArm:
 
 def part_of(cell: Cell) -> str:
     """The part of the tab that a cell is in."""
-    where, _ = cell
-    return "table" if isinstance(where, int) else "start" if where == "arm" else "frames"
+    where, column = cell
+    if isinstance(where, int):
+        return "motion" if column in MOTION else "table"
+    return "start" if where == "arm" else "frames"
 
 
 def alike(one: Robot, other: Robot, named: bool) -> bool:

@@ -31,7 +31,7 @@ from kin.robot import Convention
 from kin.transforms import Array
 from kin.typed import LONGEST, cut
 
-PARTS = ("start", "table", "wrong", "about", "frames", "wrong-frames", "convert")
+PARTS = ("start", "table", "wrong", "about", "motion", "wrong-motion", "frames", "wrong-frames", "convert")
 OTHER: dict[Convention, Convention] = {"standard": "modified", "modified": "standard"}
 UNUSED = "The file was not used"
 SAVED = "Your browser has put it where it puts downloads."
@@ -186,6 +186,9 @@ class RobotTab(Feature):
         if self._editing != "table":
             self._written += 1
             self._show("table", self._table())
+        if self._editing != "motion":
+            withheld = "table" in self._withheld
+            self._show("motion", "" if withheld else views.motion(robot, units, self._texts))
         if self._editing != "frames":
             self._show("frames", views.frames(robot, units, self.stage.frames, self._texts))
         if self._editing != "start":
@@ -210,7 +213,8 @@ class RobotTab(Feature):
     def _show_wrong(self) -> None:
         messages = {cell: message for cell, (_, message) in self._wrong.items()}
         self._show("wrong", views.wrong(messages))
-        self._show("wrong-frames", views.wrong_frames(messages))
+        for part in ("motion", "frames"):
+            self._show(f"wrong-{part}", views.wrong_in(part, messages))
 
     def _show_conversion(self) -> None:
         robot = self.stage.now.robot

@@ -6,17 +6,30 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import kin
 from app.shared.answers.inspection import InspectionAnswer
 from app.viewer.frames import MOST as MOST_FRAMES
 from app.viewer.frames import Frames
 from app.viewer.meshes.archive import MB, MOST_BYTES
-from app.viewer.tabs.robot.edits import ANGLES, AXES, FRAMES, KINDS, NUMBERS, Cell, frame_values, name_of, part_of
+from app.viewer.tabs.robot.edits import (
+    ANGLES,
+    AXES,
+    FRAMES,
+    KINDS,
+    MOTION,
+    NUMBERS,
+    Cell,
+    frame_values,
+    name_of,
+    part_of,
+)
 from app.viewer.tabs.robot.files import MOST, Busy, Source
 from app.viewer.tabs.robot.presets import TITLES
 from app.viewer.tabs.robot.texts import Texts
 from app.viewer.views.templates import render
 from kin import Joint, Robot
 from kin.dh import SAMPLES, largest_difference
+from kin.files.read import PER
 from kin.units import Unit, Units, power
 
 FILE, LINK = "your own file", "a link"  # what an arm was made from, besides examples and robots
@@ -47,13 +60,14 @@ def text_of(value: float, unit: Unit) -> str:
 
 
 def start(robot: Robot, chosen: str, mine: bool, robots: Sequence[Robot]) -> str:
-    """What the arm was made from, its name and its convention."""
+    """What the arm was made from, its name and its convention. No arm is offered twice."""
+    names = {each.name for each in robots}
     return render(
         "robot/start",
         chosen=chosen,
         other=chosen if chosen in (FILE, LINK) else "",
         mine=mine,
-        presets=TITLES.items(),
+        presets=[(key, title) for key, title in TITLES.items() if key == chosen or title not in names],
         robots=[(r.id, r.name) for r in robots],
         name=robot.name,
         convention=robot.convention,
@@ -69,6 +83,28 @@ def table(robot: Robot, units: Units, revision: int, written: int, texts: Texts)
     rows = [[_cell(i, row, column, units, texts) for column in _HEADS] for i, row in enumerate(robot.rows)]
     about = {"revision": revision, "written": written, "convention": robot.convention}
     return render("robot/table", heads=heads, rows=rows, **about)
+
+
+def motion(robot: Robot, units: Units, texts: Texts) -> str:
+    """Fields for the home configuration and for the limits of motion; those that are assumed are empty."""
+    limits, rows = kin.limits_of(robot), []
+    moving = [(index, row) for index, row in enumerate(robot.rows) if row.kind != "fixed"]
+    for joint, (index, row) in enumerate(moving):
+        angle, cells = row.kind == "revolute", []
+        for column in MOTION:
+            value = float(robot.q_home[joint]) if column == "home" else getattr(row, column)
+            cell = (index, column)
+            hint = "" if value is not None else text_of(float(getattr(limits, column)[joint]), units.of(angle))
+            shown = "" if value is None else _text(cell, value, units, angle, texts)
+            cells.append({"key": f"{index} {column}", "value": shown, "hint": hint, "label": name_of(cell)})
+        rows.append({"number": index + 1, "title": row.name, "cells": cells})
+    names = {units.of(turning).name for turning in robot.revolute.tolist()}
+    per = " or ".join(sorted(names))
+    heads = [
+        ("home", per),
+        *((key, f"{per}{time.replace('2', '²').replace('3', '³')}") for key, time in PER.items()),
+    ]
+    return render("robot/motion", heads=heads, rows=rows)
 
 
 def withheld() -> str:
@@ -108,9 +144,9 @@ def wrong(messages: Mapping[Cell, str]) -> str:
     )
 
 
-def wrong_frames(messages: Mapping[Cell, str]) -> str:
-    """What is wrong in tool, base and workpieces."""
-    return render("robot/wrong", part="wrong-frames", cells="", messages=_said(messages, ("frames",)))
+def wrong_in(part: str, messages: Mapping[Cell, str]) -> str:
+    """What is wrong in another part of the tab."""
+    return render("robot/wrong", part=f"wrong-{part}", cells="", messages=_said(messages, (part,)))
 
 
 def _said(messages: Mapping[Cell, str], parts: Sequence[str]) -> list[str]:

@@ -9,7 +9,16 @@ import pytest
 
 import kin
 from app.viewer.own_arm import own_arm
-from app.viewer.tabs.robot.edits import EditError, add_row, changed_rows, frame_values, move_row, reread, typed
+from app.viewer.tabs.robot.edits import (
+    MOTION,
+    EditError,
+    add_row,
+    changed_rows,
+    frame_values,
+    move_row,
+    reread,
+    typed,
+)
 from app.viewer.tabs.robot.presets import PRESETS
 from kin.transforms import from_position_wxyz
 from kin.units import Units
@@ -59,6 +68,41 @@ def test_a_joint_without_limits_has_neither():
         type_in(STANFORD, ((2, "low"), ""), ((2, "high"), ""))
 
 
+def test_home_and_limits_of_motion_are_typed_in_the_units_of_the_joint():
+    limits = (((1, "velocity"), "90 °/s"), ((2, "acceleration"), "3 rad/s²"), ((3, "jerk"), "5000"))
+    own = type_in(UR5, ((1, "home"), "-80"), *limits)
+    robot = own.robot
+    assert robot.q_home.tolist() == [UR5.q_home[0], math.radians(-80), *UR5.q_home[2:]]
+    assert robot.rows[1].velocity == pytest.approx(math.pi / 2)
+    assert robot.rows[2].acceleration == 3.0
+    assert kin.limits_of(robot).jerk[3] == pytest.approx(math.radians(5000))
+    assert "jerk" not in kin.limits_of(robot).assumed[3]
+    assumed = type_in(robot, ((1, "velocity"), " "), own=own)
+    assert assumed.robot.rows[1].velocity is None
+    assert assumed.robot.rows[2].acceleration == 3.0
+    slide = type_in(STANFORD, ((2, "home"), "40 cm"), ((2, "velocity"), "250")).robot
+    assert (slide.q_home[2], slide.rows[2].velocity) == (0.4, 0.25)
+    assert type_in(STANFORD, ((2, "velocity"), "0.25 m/s"), units=RADIANS).robot.rows[2].velocity == 0.25
+
+
+@pytest.mark.parametrize(
+    ("column", "text", "words"),
+    [
+        ("home", "400", "“400” is outside the limits: −360.0° to 360.0°"),
+        ("home", "", "the field is empty"),
+        ("velocity", "0", "expected a positive number"),
+        ("jerk", "-5", "expected a positive number"),
+        ("acceleration", "fast", "“fast” is not a number"),
+        ("acceleration", "nan", "“nan”"),
+    ],
+)
+def test_a_home_outside_the_limits_and_a_limit_of_nothing_are_named_by_their_cell(column, text, words):
+    with pytest.raises(EditError) as caught:
+        type_in(UR5, ((1, column), text))
+    assert caught.value.cell == (1, column)
+    assert words in caught.value.message
+
+
 def test_another_kind_takes_its_default_limits_and_a_new_home():
     own = type_in(UR5, ((2, "kind"), "prismatic"))
     assert own.robot.rows[2].limits == (0.0, 1.0)
@@ -67,6 +111,11 @@ def test_another_kind_takes_its_default_limits_and_a_new_home():
     assert fixed.robot.n == 5
     with pytest.raises(EditError):
         type_in(fixed.robot, ((2, "low"), "1"), own=fixed)
+    for column in MOTION:
+        with pytest.raises(EditError, match="a fixed row does not move"):
+            type_in(fixed.robot, ((2, column), "1"), own=fixed)
+    later = type_in(fixed.robot, ((3, "home"), "-45"), own=fixed).robot
+    assert later.q_home.tolist() == [*fixed.robot.q_home[:2], math.radians(-45), *fixed.robot.q_home[3:]]
     with pytest.raises(EditError, match="one of"):
         type_in(UR5, ((2, "kind"), "ball"))
 

@@ -45,7 +45,8 @@ def part(tab: FakeBrowser, name: str) -> str:
 def cell(tab: FakeBrowser, key: str) -> str:
     """What a field shows, as the server has sent it."""
     found = re.search(
-        rf'data-cell="{key}" value="(.*?)"', part(tab, "table") + part(tab, "frames") + part(tab, "start")
+        rf'data-cell="{key}" value="(.*?)"',
+        "".join(part(tab, name) for name in ("table", "motion", "frames", "start")),
     )
     assert found is not None, key
     return html.unescape(found[1]).replace("−", "-")
@@ -115,6 +116,39 @@ def test_a_typed_cell_changes_the_arm_and_undo_takes_it_back(port: int) -> None:
         tab.settle()
         shows(tab, longer(PIONEER, 1, 0.255), q)
         assert tab.value("Robot") == f"My arm ({PIONEER.name} variant)"
+
+
+def test_home_and_limits_of_motion_are_typed_and_kept(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        assert cell(tab, "0 velocity") == ""
+        assert 'data-cell="0 velocity" value="" placeholder="180"' in part(tab, "motion")
+        table = part(tab, "motion")
+        type_in(tab, 0, "home", "50")
+        type_in(tab, 0, "velocity", "45")
+        assert part(tab, "motion") == table, "it is not sent again while it is typed in"
+        assert tab.script["undo"] == "Row 1, velocity"
+        say(tab, "left")
+        assert (cell(tab, "0 home"), cell(tab, "0 velocity")) == ("50", "45")
+        type_in(tab, 0, "velocity", "0")
+        assert list(wrong(tab)) == ["0 velocity"]
+        assert "Row 1, velocity: “0” is not valid: expected a positive number" in part(tab, "wrong-motion")
+        assert "Not used yet" not in part(tab, "wrong"), "it is said beside its field alone"
+        say(tab, "discard")
+        own = saved(tab).own
+        assert own is not None
+        assert own.robot.q_home.tolist() == [math.radians(50), *PIONEER.q_home[1:]]
+        assert own.robot.rows[0].velocity == math.radians(45)
+
+
+def test_no_arm_is_offered_twice_to_start_from(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        titles = re.findall(r"<option[^>]*>(.*?)</option>", part(tab, "start").split('id="kb-arm-name"')[0])
+        assert len(titles) == len(set(titles))
+        assert set(titles) >= {robot.name for robot in STORE.robots}
+        say(tab, "start", value="planar-2r")
+        assert '<option value="planar-2r" selected>' in part(tab, "start"), "a link of before still has its name"
 
 
 def test_undo_forgets_the_only_expression_that_was_typed(port: int) -> None:
