@@ -8,7 +8,7 @@
   // Buttons in a corner of the scene: name, drawing, message and argument for the server. The standard views are drawn
   // as an arm seen from there: towards the viewer, bent to the right, from above, and a cube.
   const TOOLS = [
-    ["Fit the picture to the arm", '<path d="M4 8V4h4M16 4h4v4M20 16v4h-4M8 20H4v-4"/><circle cx="12" cy="12" r="3.2"/>', "fit-arm", ""],
+    ["Fit the picture to arm, program and obstacles", '<path d="M4 8V4h4M16 4h4v4M20 16v4h-4M8 20H4v-4"/><circle cx="12" cy="12" r="3.2"/>', "fit-arm", ""],
     ["View from the front", '<path d="M7 21h10M12 21v-9"/><circle cx="12" cy="8" r="4.2"/><circle cx="12" cy="8" r="1.3" fill="currentColor"/>', "look-from", "Front"],
     ["View from the side", '<path d="M3 21h8M7 21V6l10 3.5v5M15 17v-2.5h4V17"/><circle cx="7" cy="5.5" r="1.7" fill="currentColor"/><circle cx="17" cy="9.5" r="1.7" fill="currentColor"/>', "look-from", "Side"],
     ["View from the top", '<circle cx="7.5" cy="12" r="5"/><circle cx="7.5" cy="12" r="1.3" fill="currentColor"/><path d="M8 10.4h8.5v3.2H8M21 9h-4.5v6H21"/>', "look-from", "Top"],

@@ -220,6 +220,10 @@ class Feature:
     def on_activity(self) -> None:
         """Something else is open or withheld, or an answer was judged: see `Stage.activity`."""
 
+    def extents(self) -> Sequence[Sphere]:
+        """Spheres around what it shows in the scene, which the picture shows with the arm when it is fitted."""
+        return ()
+
     def tick(self, now: float) -> None:
         """Continue long work, for at most ten milliseconds: frames wait. `now` is `time.perf_counter`'s."""
 

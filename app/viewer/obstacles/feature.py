@@ -15,6 +15,7 @@ from app.viewer.obstacles.placed import PLACE, SIZES, TURN
 from app.viewer.panel import update_html
 from app.viewer.panel.entry import read_cell
 from app.viewer.panel.status import Notice
+from app.viewer.scene.camera import Sphere
 from app.viewer.scene.gizmo import Pull
 from app.viewer.scene.meshes import body
 from app.viewer.tabs.robot.views import text_of
@@ -90,6 +91,9 @@ class ObstaclesFeature(Feature):
 
     def on_style(self) -> None:
         self._show_panel()
+
+    def extents(self) -> Sequence[Sphere]:
+        return [(each.T[:3, 3], float(each.row[16])) for each in self.stage.now.obstacles]
 
     def remove(self) -> None:
         self._nodes.remove()

@@ -155,8 +155,8 @@ class ViewOptions:
         self._axes = gui.add_dropdown("Arrows along", AXES, initial_value=initial, hint=AXES_HINT)
         listen(self._axes, post, "axes")
         gui.add_html(render("panel/text_size", names=tuple(TEXT_SIZES)))
-        group = gui.add_button_group("Camera", ("Fit arm", "Reset view"))
-        listen_click(group, post, {"Fit arm": "fit-arm", "Reset view": "camera"})
+        group = gui.add_button_group("Camera", ("Fit all", "Reset view"))
+        listen_click(group, post, {"Fit all": "fit-arm", "Reset view": "camera"})
         sides = gui.add_button_group("View from", SIDES)
         listen_click(sides, post, {side: ("look-from", side) for side in SIDES})
 

@@ -107,6 +107,8 @@ class VisitorCamera:
         self._extra = np.zeros((0, 3))  # points that the default view shows besides `_room`
         self._points = np.zeros((0, 3))
         self._glide: tuple[Array, float] | None = None  # start of the way to `_aimed`, and when it began
+        # The viewpoint that `keep` has left, and `chosen` there; None: it has not, or the visitor has moved since.
+        self._left: tuple[Array, Array | None] | None = None
         self._camera.on_update(self._on_update)
 
     def aim(self, body: Body, points: Array | None = None, glide: bool = False) -> None:
@@ -122,7 +124,7 @@ class VisitorCamera:
             self._points = points
         self._camera.fov = FOV
         self._camera.near, self._camera.far = body.radius / 50, body.radius * 200
-        self.chosen = None
+        self.chosen = self._left = None
         self._framed = self._aspect
         viewpoint = np.stack([*view(body, self._framed, self._room), UP])
         arrows = _ARROWS * body.radius
@@ -141,7 +143,8 @@ class VisitorCamera:
     def keep(self, points: Array, target: Array | None = None) -> None:
         """If the picture does not contain these origins of the arm's frames ``(n, 3)``, glide until it does.
 
-        It then also contains a target ``(3,)`` or, if that is very far, the beginning of the line to it.
+        It then also contains a target ``(3,)`` or, if that is very far, the beginning of the line to it. The
+        camera glides back from there when the picture of before contains everything again.
         """
         self._points = points
         self.look()
@@ -153,21 +156,36 @@ class VisitorCamera:
             far = float(np.linalg.norm(out)) / (_OUTLOOK * self._body.radius)
             seen = self._body.center + out / max(far, 1.0)
             points = np.vstack([points, seen, seen + _ABOVE * self._body.radius * UP])
+        if self._left is not None and self._shows(self._left[0], points):
+            self._return(*self._left)
+            return
         if self._shows(here, points):
             return
+        left = self._left or (None if target is None else (here, self.chosen))
         sphere = round_both(_together(self._body, self._room), self._arm(points))
         viewpoint = _framed(sphere, here[0] - here[1], self._aspect, here[2])
         if self.chosen is None:
             self._go(viewpoint, glide=True)
         else:
             self._choose(widened(viewpoint, self._aspect))
+        self._left = left
 
-    def look_at_arm(self, points: Array) -> None:
-        """Glide to a view that the arm fills, in the present direction."""
+    def _return(self, viewpoint: Array, chosen: Array | None) -> None:
+        """Glide back to a viewpoint that `keep` has left."""
+        self._left = None
+        self.chosen = chosen
+        self._go(viewpoint, glide=True)
+
+    def look_at_arm(self, points: Array, room: Sequence[Sphere] = ()) -> None:
+        """Glide to a view that the arm and these spheres fill, in the present direction; not to those far away."""
         self.look()
         here = self._viewpoint
         self._points = points
-        self._choose(_framed(self._arm(points), here[0] - here[1], 1.0, here[2]))
+        sphere, body = self._arm(points), self._body
+        for center, radius in () if body is None else room:
+            if float(np.linalg.norm(center - body.center)) + radius <= _OUTLOOK * body.radius:
+                sphere = round_both(sphere, (center, radius))
+        self._choose(_framed(sphere, here[0] - here[1], 1.0, here[2]))
 
     def look_from(self, side: Side, points: Array) -> None:
         """Glide to a standard view of the arm."""
@@ -222,7 +240,7 @@ class VisitorCamera:
         """Update `chosen`."""
         here = self._reported
         if self._settled and here is not None and not _same(here, self._aimed):
-            self._aimed, self._arrived = here, True
+            self._aimed, self._arrived, self._left = here, True, None
             self.chosen = widened(here, self._framed)
 
     def lead_back(self) -> None:
@@ -280,7 +298,7 @@ class VisitorCamera:
 
     def _choose(self, viewpoint: Array, glide: bool = True) -> None:
         """Move to a viewpoint that the visitor has chosen, as in a wide picture."""
-        self.chosen, self._framed = viewpoint, self._aspect
+        self.chosen, self._framed, self._left = viewpoint, self._aspect, None
         self._go(narrowed(viewpoint, self._framed), glide)
 
     def _go(self, viewpoint: Array, glide: bool = False) -> None:

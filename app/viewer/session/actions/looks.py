@@ -9,6 +9,7 @@ from typing import Any
 import kin
 from app.viewer.labels import size_labels, text_factor
 from app.viewer.panel.view import SIDES
+from app.viewer.scene.camera import Sphere
 from app.viewer.session.parts import Page
 from kin.transforms import Array
 
@@ -34,13 +35,19 @@ class LookControls:
             "colours": self._on_colours,
             "system-dark": lambda dark: looks.use_colours(page.view.dark, bool(dark)),
             "camera": lambda _: page.camera.aim(arm.scene.body, self._frames(), glide=True),
-            "fit-arm": lambda _: page.camera.look_at_arm(self._frames()),
+            "fit-arm": self._fit,
             "look-from": self._look_from,
             "resized": self._on_resize,
             "looked": self._on_look,  # the viewpoint is read when the camera rests
             "frame": lambda name: page.use_frames(page.frames.choose(name)),
             "text-size": lambda name: size_labels(page.client.scene, text_factor(name)),
         }
+
+    def _fit(self, _: object) -> None:
+        """Show the whole arm, and what there is of a program, obstacles and clouds."""
+        found: list[Sphere] = []
+        self._page.for_features(lambda feature: found.extend(feature.extents()))
+        self._page.camera.look_at_arm(self._frames(), found)
 
     def _on_resize(self, _: object) -> None:
         self._page.camera.refit()

@@ -43,6 +43,10 @@ class Drawing:
     Args:
         names: the text at each waypoint.
         fault: what cannot be driven; None: nothing.
+
+    Attributes:
+        points: ``(k, 3)`` of the tool's way and its waypoints.
+        top_speed: of the tool on the path that is drawn.
     """
 
     def __init__(
@@ -56,6 +60,7 @@ class Drawing:
         waypoints = [item for item in items if item.q]
         self._q = np.array([item.q for item in waypoints])
         poses = fk(robot, self._q)
+        self.points = poses[:, :3, 3]
         self._axes("waypoints", poses, 2.2, 0.11)
         labels = [(pose[:3, 3], name) for pose, name in zip(poses, names, strict=True)]
         if fault is not None and fault.place is not None:
@@ -92,6 +97,7 @@ class Drawing:
     def show_path(self, motion: Motion) -> None:
         """Draw the path of the tool. One node for each colour: the browser shows colours of points brighter."""
         points, speed = _path(motion)
+        self.points = np.vstack([self.points, points])
         self.top_speed = float(speed.max())
         if self.top_speed < 1e-6:
             return

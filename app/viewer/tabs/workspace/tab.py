@@ -16,6 +16,7 @@ from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Node
 from app.viewer.feature import Stage
+from app.viewer.scene.camera import Sphere, round_points
 from app.viewer.tabs.workspace.axes import Axes
 from app.viewer.tabs.workspace.capability.panel import Capability
 from app.viewer.tabs.workspace.cloud import CloudView
@@ -343,6 +344,11 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         if in_view != self._in_view:
             self._in_view = in_view
             self.stage.fit_view(clouds if mapped is None else [*clouds, mapped], corners)
+
+    def extents(self) -> Sequence[Sphere]:
+        mapped, corners = self._capability.extent, self._axes.corners
+        found = [*self._clouds.extents, *([] if mapped is None else [mapped])]
+        return found if corners is None else [*found, round_points(corners)]
 
     # Cut
 

@@ -280,6 +280,34 @@ def test_a_typed_target_and_the_arm_are_both_in_the_picture(target: tuple[float,
         assert np.linalg.norm(lens.position - arm.center) < 20.0 * arm.radius, "the arm is not lost from sight"
 
 
+@pytest.mark.parametrize("chosen", [False, True])
+def test_the_camera_comes_back_when_the_target_is_near_again(chosen: bool) -> None:
+    lens, of_visitor = a_camera()
+    origins = frames(PIONEER, PIONEER.q_home)
+    of_visitor.aim(body(PIONEER), origins)
+    if chosen:
+        near = body(PIONEER)
+        of_visitor.restore(np.stack([near.center + 3.0 * near.radius, near.center, camera.UP]))
+    view = of_visitor.chosen
+
+    def there() -> np.ndarray:
+        of_visitor.tick(math.inf)
+        return np.stack([lens.position, lens.look_at, lens.up_direction])
+
+    before = there()
+    for far in (1.0, 3.0, 2.0):
+        of_visitor.keep(origins, np.array([far, 0.0, 0.0]))
+        assert not np.allclose(there(), before)
+    of_visitor.keep(origins, body(PIONEER).center)
+    assert np.allclose(there(), before)
+    assert of_visitor.chosen is view
+    of_visitor.keep(origins, np.array([3.0, 0.0, 0.0]))
+    of_visitor.look_from("Front", origins)
+    front = there()
+    of_visitor.keep(origins)
+    assert np.allclose(there(), front), "the visitor has looked from elsewhere since"
+
+
 def test_the_default_view_shows_the_arrows_at_the_tool() -> None:
     lens, of_visitor = a_camera()
     rng = np.random.default_rng(5)
@@ -372,6 +400,34 @@ def test_standard_views_and_fit_arm(port: int) -> None:
         assert np.allclose(decode(tab.kept[-1], STORE.robots).camera, fitted, atol=1e-3)
         tab.set("Camera", "Reset view")
         tab.wait(lambda: np.allclose(shown(tab), default(PIONEER, DESKTOP)))
+
+
+def test_fit_shows_arm_program_and_obstacles_but_nothing_far_away(port: int) -> None:
+    ball = kin.Obstacle("sphere", (0.0, 1.2, 0.2), radius=0.2, name="ball")
+    lost = kin.Obstacle("sphere", (0.0, 0.0, 500.0), radius=0.2, name="lost")
+    turned = PIONEER.q_home.copy()
+    turned[0] -= 1.5
+    rows = [["p", PIONEER.q_home.tolist()], ["p", turned.tolist()]]
+    features = {"program": {"programs": {PIONEER.id: rows}}}
+    state = PageState(PIONEER.id, obstacles=(ball, lost), features=features)
+    with FakeBrowser(port, memory=memory(state)) as tab:
+        tab.wait(lambda: any("/program-" in name for name in tab.nodes))
+        tab.look()
+        tab.say("fit-arm")
+        tab.settle(quiet=0.6)
+        there = shown(tab)
+        q = np.linspace(PIONEER.q_home, turned, 20)
+        assert viewpoints.contains(there, DESKTOP, kin.fk(PIONEER, q)[:, :3, 3], 0.0)
+        assert viewpoints.contains(there, DESKTOP, np.array([ball.xyz]), ball.radius)
+        assert np.linalg.norm(there[0] - there[1]) < 20.0 * body(PIONEER).radius
+        tab.look()
+        closer = np.linalg.norm(there[0] - there[1])
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.look()
+        tab.say("fit-arm")
+        tab.settle(quiet=0.6)
+        assert np.linalg.norm(shown(tab)[0] - shown(tab)[1]) < closer
 
 
 def test_the_camera_returns_from_below_the_floor_and_from_far_aside(port: int) -> None:
