@@ -28,7 +28,7 @@ const viserPage = (() => {
     messages: "div:has(> [data-answers]) + div input", // the hidden field behind our hidden HTML
   };
   // What viser calls, and how often it has since this page was loaded.
-  const HOOKS = { readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0 };
+  const HOOKS = { readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0, writeHtml: 0 };
 
   // WebKit on Linux names the locale C as a language. viser's script would end there: no Intl knows it.
   const known = (tag) => { try { return Intl.getCanonicalLocales(tag).length > 0; } catch { return false; } };
@@ -171,6 +171,69 @@ const viserPage = (() => {
       if (sent === to) done(error, readings);
       else done("", []);
     }
+  }
+
+  // HTML that the server sends again: the control that is in use stays where it is, and all around it is new. So a text
+  // that is being typed stays, and a button that is held down is still there when it is released.
+
+  const KEPT_IN = ".kb-program, .kb-guide"; // the DH table has its own way: its rows move
+  const CONTROLS = "input, textarea, select, button";
+  let held = null; // the control under the pressed pointer
+  const unsent = new WeakSet(); // fields whose text has changed since it was sent
+  addEventListener("pointerdown", (event) => { held = closest(event.target, CONTROLS); }, true);
+  for (const kind of ["pointerup", "pointercancel"]) addEventListener(kind, () => setTimeout(() => { held = null; }), true); // after its click
+  addEventListener("input", (event) => unsent.add(event.target), true);
+  addEventListener("change", (event) => unsent.delete(event.target), true);
+  addEventListener("keydown", (event) => { if (event.key === "Enter" && event.target.matches?.("input")) unsent.delete(event.target); }, true);
+
+  const { get: readHtml, set: writeHtml } = Object.getOwnPropertyDescriptor(Element.prototype, "innerHTML");
+  Object.defineProperty(Element.prototype, "innerHTML", {
+    configurable: true,
+    enumerable: true,
+    get: readHtml,
+    set(html) {
+      const used = [held, document.activeElement].find((node) => node !== this && this.contains(node) && node.closest(KEPT_IN));
+      if (closest(this, PARTS.contents)) HOOKS.writeHtml++;
+      if (used?.matches(CONTROLS)) {
+        const fresh = this.cloneNode(false);
+        writeHtml.call(fresh, html);
+        const twin = twinOf(used, this, fresh);
+        if (twin) { renewAround(used, this, twin, fresh); return; }
+      }
+      writeHtml.call(this, html);
+    },
+  });
+
+  /** The control of new HTML that stands for one of the old HTML: of the same name, and at the same depth. */
+  function twinOf(node, old, fresh) {
+    const names = [...node.attributes].filter(({ name: key }) => key === "id" || key.startsWith("data-"));
+    if (!names.length) return null;
+    const selector = node.localName + names.map(({ name: key, value }) => `[${key}="${CSS.escape(value)}"]`).join("");
+    const [before, after] = [all(selector, old), all(selector, fresh)];
+    const twin = before.length === after.length ? after[before.indexOf(node)] : null;
+    return twin && wayTo(node, old) === wayTo(twin, fresh) ? twin : null;
+  }
+
+  const wayTo = (node, root) => (node === root ? "" : `${wayTo(node.parentElement, root)} ${node.localName}`);
+
+  /** Make `old` like `fresh`, but for the node at `used`, which only takes the attributes of its twin. */
+  function renewAround(used, old, twin, fresh) {
+    const listed = (node) => [...node.attributes].filter(({ name: key }) => key !== "open"); // details stay as they were left
+    for (const { name: key } of listed(old)) if (!fresh.hasAttribute(key)) old.removeAttribute(key);
+    for (const { name: key, value } of listed(fresh)) if (old.getAttribute(key) !== value) old.setAttribute(key, value);
+    if (old === used) {
+      const { value, checked } = fresh;
+      if (old.matches("button, select") && readHtml.call(old) !== readHtml.call(fresh)) old.replaceChildren(...fresh.childNodes);
+      if (!unsent.has(old) && held !== old && old.value !== value) old.value = value;
+      if (old.checked !== checked) old.checked = checked;
+      return;
+    }
+    const [kept, next] = [[old, used], [fresh, twin]].map(([root, node]) => [...root.children].find((child) => child.contains(node)));
+    for (const node of [...old.childNodes]) if (node !== kept) node.remove();
+    const nodes = [...fresh.childNodes], at = nodes.indexOf(next);
+    kept.before(...nodes.slice(0, at));
+    kept.after(...nodes.slice(at + 1));
+    renewAround(used, kept, twin, next);
   }
 
   // Tabs

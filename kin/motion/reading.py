@@ -121,7 +121,7 @@ def program_from_dict(
     reader = _Reader(data.get("units", {}), None if robot is None else robot_of(robot), workpieces or {})
     segments = data.get("segments")
     if not isinstance(segments, list | tuple) or not 1 <= len(segments) <= MOST_SEGMENTS:
-        raise InputError("segments", segments, f"1 to {MOST_SEGMENTS} segments")
+        raise InputError("segments", _counted(segments, "segments"), f"1 to {MOST_SEGMENTS} segments")
     read = tuple(reader.segment(segment, f"segments[{i}]") for i, segment in enumerate(segments))
     return Program(read, **{key: data[key] for key in field_names(Program)[1:] if key in data})
 
@@ -172,6 +172,11 @@ def _segment_to_dict(segment: Segment) -> dict[str, Any]:
         if value != getattr(_PLAIN, key):
             data[key] = value
     return data
+
+
+def _counted(value: object, what: str) -> object:
+    """How many there are, in the place of a list; anything else as it is."""
+    return f"{len(value)} {what}" if isinstance(value, list | tuple) else value
 
 
 def _target_to_dict(target: Target) -> dict[str, Any]:
@@ -228,7 +233,7 @@ class _Reader:
 
     def points(self, data: object, where: str) -> tuple[Target, ...]:
         if not isinstance(data, list | tuple) or not 1 <= len(data) <= MOST_POINTS:
-            raise InputError(where, data, f"1 to {MOST_POINTS} targets")
+            raise InputError(where, _counted(data, "targets"), f"1 to {MOST_POINTS} targets")
         found = []
         for i, item in enumerate(data):
             if not isinstance(item, Mapping):

@@ -92,11 +92,13 @@ def lost(robot: Robot, poses: Array, before: Array, task: Task) -> tuple[Cause, 
         best = solve_ik(robot, poses[-1], q_seed=before, task=task).best or result.best
         assert best is not None
         return "task", NotKept(robot.n, best.position_error, best.rotation_error)
-    if not result.solutions:
-        others = [solve_ik(robot, T, q_seed=before, task=task) for T in poses[1:]]
-        worst = max([result, *others], key=_shortfall)
-        return "unreachable", NotReached(worst.details, worst.cause, worst.task, worst.singularities)
     near = singularities_at(robot, before, NEAR)
+    if near or not result.solutions:
+        others = [solve_ik(robot, T, q_seed=before, task=task) for T in poses[1:]]
+        # A path that leaves the workspace passes a singularity first: there, too, it is the reach that ends.
+        if not result.solutions or not any(each.solutions for each in others):
+            worst = max([result, *others], key=_shortfall)
+            return "unreachable", NotReached(worst.details, worst.cause, worst.task, worst.singularities)
     jump = result.solutions[0].q - before
     joint = int(np.argmax(np.abs(jump)))
     row = robot.joints[joint]

@@ -157,8 +157,16 @@ class Tab:
         entry.press("Enter")
 
     def open(self, title: str) -> None:
-        """Open a tab of the panel. Tabs do not move, so the click need not wait for two equal frames."""
-        self.page.get_by_role("tab", name=title).click(force=True)
+        """Open a tab of the panel. Tabs seldom move, so the click need not wait for two equal frames."""
+        tab = self.page.get_by_role("tab", name=title)
+        tab.click(force=True)
+        try:
+            expect(tab).to_have_attribute("aria-selected", "true", timeout=1500)
+        except (
+            AssertionError
+        ):  # a folder was being closed: the panel got shorter, and the click has missed the tab
+            tab.click()
+            expect(tab).to_have_attribute("aria-selected", "true")
 
     def select(self, robot: kin.Robot) -> None:
         """Show this robot."""

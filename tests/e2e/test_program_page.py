@@ -193,6 +193,41 @@ def test_a_click_in_the_chart_of_postures_starts_there(ur5: Tab) -> None:
     expect(rows.nth(1)).to_contain_text("Arrives in another posture")
 
 
+def test_a_button_that_is_held_while_the_list_is_sent_again_is_pressed(ur5: Tab) -> None:
+    """What was typed before is sent when the button takes the focus; the answer comes before it is released."""
+    rows = open_file(ur5, list(LINE))
+    page = ur5.page
+    rows.nth(1).locator("[data-program-do=choose]").click()
+    page.locator("[data-program-field=speed]").fill("40")
+    button = page.get_by_role("button", name="Duplicate")
+    button.hover()
+    page.mouse.down()
+    expect(rows.nth(1)).to_contain_text("at 40 %")
+    page.mouse.up()
+    expect(rows).to_have_count(3)
+    expect(rows.nth(2)).to_contain_text("at 40 %")
+
+
+def test_what_is_typed_while_the_list_is_sent_again_stays_and_is_used(ur5: Tab) -> None:
+    rows = open_file(ur5, list(LINE))
+    page = ur5.page
+    rows.nth(1).locator("[data-program-do=choose]").click()
+    speed, acceleration = (page.locator(f"[data-program-field={name}]") for name in ("speed", "acceleration"))
+    speed.fill("40")
+    acceleration.press("Control+a")
+    acceleration.press("7")
+    expect(rows.nth(1)).to_contain_text("at 40 %")
+    expect(acceleration).to_have_value("7")
+    expect(acceleration).to_be_focused()
+    page.keyboard.type("5")
+    expect(acceleration).to_have_value("75")
+    page.keyboard.press("Enter")
+    rows.nth(0).locator("[data-program-do=choose]").click()
+    rows.nth(1).locator("[data-program-do=choose]").click()
+    expect(acceleration).to_have_value("75")
+    expect(speed).to_have_value("40")
+
+
 def test_a_way_around_an_obstacle_is_put_into_the_program(ur5: Tab) -> None:
     (sphere,) = placed.added((), "sphere", UR5, UR5.q_home)
     T = kin.fk(UR5, UR5.q_home)

@@ -65,6 +65,27 @@ def test_a_length_typed_right_after_the_kind_of_a_joint_stays(tab: Tab, address:
     expect(page.locator('[data-cell="2 kind"]')).to_have_value("prismatic")
 
 
+def test_the_place_of_an_obstacle_typed_faster_than_the_page_answers_is_used(tab: Tab, address: str) -> None:
+    page, texts = tab.page, {"x": "321", "y": "-456", "z": "234"}
+    page.get_by_text("Obstacles", exact=True).click()
+    page.get_by_role("button", name="Add a sphere").click()
+    page.locator("#kb-obstacle-x").click()
+    with held_up(address):
+        for text in texts.values():
+            page.keyboard.press("Control+a")
+            page.keyboard.type(text, delay=70)
+            page.keyboard.press("Tab")
+        for name, text in texts.items():
+            expect(page.locator(f"#kb-obstacle-{name}")).to_have_value(text.replace("-", "−"))
+    page.get_by_role("button", name="Done").click()
+    page.get_by_role("button", name="sphere", exact=True).click()
+    for name, text in texts.items():
+        expect(page.locator(f"#kb-obstacle-{name}")).to_have_value(text.replace("-", "−"))
+    page.get_by_role("button", name="Remove sphere").click()
+    page.get_by_text("Obstacles", exact=True).click()
+    expect(page.get_by_role("button", name="Add a sphere")).to_be_hidden()
+
+
 # Every field with text in sight, but for lists to choose from.
 FIELDS = ", ".join(
     f"{kind}:visible:enabled:not([readonly], [aria-haspopup])"

@@ -18,6 +18,7 @@ NAME = 40  # characters
 DIGITS = 7  # of a recorded joint value
 PAUSE = 1.0  # s, of a new pause
 SLOWEST = 0.01  # part of the limits
+LEAST = 1e-9  # m/s or rad/s: limits of the tool
 LARGEST = 1e6  # rad or m
 
 

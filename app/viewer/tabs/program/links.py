@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import get_args
 
 from app.viewer.own_arm import clean
-from app.viewer.tabs.program.items import LARGEST, MOST, NAME, SLOWEST, Item, Items, Kind
+from app.viewer.tabs.program.items import LARGEST, LEAST, MOST, NAME, SLOWEST, Item, Items, Kind
 from kin import Robot
 from kin.motion.program import LONGEST_DWELL
 
@@ -16,8 +16,8 @@ _KINDS: dict[str, Kind] = {letter: kind for kind, letter in LETTERS.items()}
 _MORE = (
     ("a", "acceleration", SLOWEST, 1.0),
     ("b", "blend", 0.0, LARGEST),
-    ("v", "tool_speed", 1e-9, LARGEST),
-    ("t", "tool_turn", 1e-9, LARGEST),
+    ("v", "tool_speed", LEAST, LARGEST),
+    ("t", "tool_turn", LEAST, LARGEST),
 )
 
 

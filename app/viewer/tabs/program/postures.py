@@ -14,12 +14,15 @@ import numpy as np
 from markupsafe import Markup, escape
 
 import kin
+from app.viewer.arm import Arm
 from app.viewer.panel.posture import short
+from app.viewer.tabs.program.items import Items
 from app.viewer.tabs.program.planning import Plan
 from app.viewer.views.templates import render
-from kin import IKOptions, Obstacle, PathPostures
+from kin import IKOptions, PathPostures
 from kin.motion import segment_poses
 from kin.path.postures import STATES, Reason, State
+from kin.units import Units
 
 PLACES = 80  # along the way
 WIDTH, LEFT, RIGHT, ROW, GAP, TOP, BOTTOM = 320.0, 18.0, 4.0, 15.0, 4.0, 4.0, 18.0
@@ -35,12 +38,15 @@ class Chart:
 
     Attributes:
         index: of the item.
+        plan, arm: of the list and the arm for which it is computed.
         found: the postures; None: not known yet.
         words: why there is no chart.
         cancelled: set when it is not wanted any more.
     """
 
     index: int
+    plan: Plan
+    arm: Arm
     found: PathPostures | None = None
     words: str = ""
     cancelled: threading.Event = field(default_factory=threading.Event)
@@ -50,9 +56,16 @@ class Chart:
         if self.cancelled.is_set():
             raise CancelledError
 
+    def fits(self, items: Items, arm: Arm) -> bool:
+        """Whether a list, and what an arm avoids, are still those for which it is computed."""
+        mine = self.arm
+        avoided = (arm.avoid, arm.obstacles) == (mine.avoid, mine.obstacles)
+        return items == self.plan.items and arm.robot == mine.robot and avoided
 
-def compute(chart: Chart, plan: Plan, avoid: bool, obstacles: tuple[Obstacle, ...]) -> None:
+
+def compute(chart: Chart) -> None:
     """Fill a chart; in a background thread."""
+    plan, avoid = chart.plan, chart.arm.avoid
     segment = plan.segments[chart.index]
     poses = segment_poses(plan.motion, segment, PLACES)
     before = plan.motion.q_before(segment)
@@ -61,22 +74,22 @@ def compute(chart: Chart, plan: Plan, avoid: bool, obstacles: tuple[Obstacle, ..
         return
     options = IKOptions(
         task=kin.motion.task_of(plan.motion.program, plan.motion.robot), avoid_self_collision=avoid,
-        obstacles=obstacles if avoid else (),
+        obstacles=chart.arm.obstacles if avoid else (),
     )  # fmt: skip
     chart.found = kin.path_postures(plan.motion.robot, poses, options=options, q_start=before, stop=chart.check)
 
 
-def html(chart: Chart) -> str:
+def html(chart: Chart, units: Units) -> str:
     """The chart, or that it is being computed."""
     found = chart.found
-    rows = [] if found is None else [_row(found, row) for row in range(len(found.postures))]
+    rows = [] if found is None else [_row(found, row, units) for row in range(len(found.postures))]
     used = set() if found is None else {STATES[state] for state in np.unique(found.states).tolist()}
     return render(
         "program/postures",
         index=chart.index,
         words=chart.words if found is None else _words(found),
         computing=found is None and not chart.words,
-        svg="" if found is None else _svg(found, chart.index),
+        svg="" if found is None else _svg(found, chart.index, units),
         rows=rows,
         legend=[(state.replace(" ", "-"), words) for state, words in LEGEND.items() if state in used],
     )
@@ -89,16 +102,16 @@ def _words(found: PathPostures) -> str:
     return found.reason
 
 
-def _row(found: PathPostures, row: int) -> dict[str, object]:
+def _row(found: PathPostures, row: int, units: Units) -> dict[str, object]:
     """A posture in words: how far it leads, and what ends it."""
     reach, last = int(found.reach[0, row]), len(found.reach) - 1
     if reach < 0:
-        reason = found.reasons.get((0, row), Reason()).explain()
+        reason = found.reasons.get((0, row), Reason()).explain(units)
         text = f"not at the start: {reason}" if reason else "not at the start: the pose cannot be met so"
     elif reach == last:
         text = "the whole way"
     else:
-        reason = found.reasons.get((reach + 1, row), Reason()).explain()
+        reason = found.reasons.get((reach + 1, row), Reason()).explain(units)
         text = f"to {100.0 * reach / max(last, 1):.0f} %" + (f": {reason}" if reason else "")
     return {
         "name": short(found.postures[row]), "text": text, "can": reach >= 0, "row": row,
@@ -106,7 +119,7 @@ def _row(found: PathPostures, row: int) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _svg(found: PathPostures, index: int) -> Markup:
+def _svg(found: PathPostures, index: int, units: Units) -> Markup:
     count = len(found.postures)
     length = WIDTH - LEFT - RIGHT
     step = length / len(found.states)
@@ -122,7 +135,9 @@ def _svg(found: PathPostures, index: int) -> Markup:
         y = TOP + stretch.posture * (ROW + GAP)
         able = found.reach[0, stretch.posture] >= 0
         does = f' data-program-do="begin" data-argument="{stretch.posture}" data-index="{index}"' if able else ""
-        name = LEGEND[stretch.state] + (f": {stretch.reason}" if stretch.reason else "")
+        middle = (stretch.first + stretch.last + 1) // 2
+        reason = found.reasons.get((middle, stretch.posture), Reason()).explain(units)
+        name = LEGEND[stretch.state] + (f": {reason}" if reason else "")
         parts.append(
             f'<rect class="kb-posture kb-posture-{stretch.state.replace(" ", "-")}" x="{x:.2f}" y="{y:.1f}" '
             f'width="{max(width, 0.5):.2f}" height="{ROW}"{does}><title>{escape(name)}</title></rect>'

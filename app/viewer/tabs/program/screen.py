@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from app.exports.motion_snippets import SNIPPETS
 from app.viewer.feature import Stage
 from app.viewer.panel import update_html
 from app.viewer.panel.share import box_html
+from app.viewer.scene.camera import Sphere, round_points
 from app.viewer.tabs.program import views, ways
 from app.viewer.tabs.program.compare import Choice
 from app.viewer.tabs.program.drawing import Drawing, Shown
@@ -78,11 +81,11 @@ class Screen:
 
     def postures(self, chart: Chart | None) -> None:
         """The chart of postures on the way to a waypoint."""
-        self._show("postures", "" if chart is None else html(chart))
+        self._show("postures", "" if chart is None else html(chart, self._stage.units))
 
     def way(self, search: Search | None, settings: Settings) -> None:
         """The form in which a way is searched, and how far the search is."""
-        self._show("way", "" if search is None else ways.html(search, settings))
+        self._show("way", "" if search is None else ways.html(search, settings, self._stage.units))
 
     def plot(self, motion: Motion | None, other: Motion | None) -> None:
         """The curves over time."""
@@ -142,6 +145,11 @@ class Screen:
                 self._drawing.show_frames(motion)
         if other is not None and other.planned and other.duration > 0.0:
             self._drawing.show_other(other)
+
+    @property
+    def extents(self) -> Sequence[Sphere]:
+        """A sphere around the drawing, if there is one."""
+        return [] if self._drawing is None else [round_points(self._drawing.points)]
 
     def remove(self) -> None:
         """Remove the drawing from the scene."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from app.exports.snippets import named
 from app.viewer.feature import Feature, Stage
 from app.viewer.own_arm import KEY
 from app.viewer.panel.status import Notice
+from app.viewer.scene.camera import Sphere
 from app.viewer.tabs.program import items as changes
 from app.viewer.tabs.program.compare import CHOICES, ZONE, Choice, other_motion
 from app.viewer.tabs.program.faults import Fault, find_fault
@@ -143,6 +144,9 @@ class ProgramTab(Feature):
         self._playback.stop()
         self._refresh()
 
+    def extents(self) -> Sequence[Sphere]:
+        return self._screen.extents
+
     def on_leave(self) -> None:
         self._ways.cancel()
         if self._chart is not None:
@@ -192,10 +196,9 @@ class ProgramTab(Feature):
 
     def _refresh(self, anew: bool = False) -> None:
         """Plan the motion, and show everything; `anew`: what was typed into the fields is replaced."""
-        self._close_postures(None)
-        arm = self.stage.now
-        self._ways.keep(self._items)
-        items, stage, loop = self._items, self.stage, self._player.loop
+        arm, items, stage, loop = self.stage.now, self._items, self.stage, self._player.loop
+        self._keep_postures()
+        self._ways.keep(items)
         self._plan, self._stale = plan(items, arm.robot, loop, arm.avoid, arm.obstacles), None
         self._fault = find_fault(self._plan, stage)
         self._playback.use(self._plan if self._plan is not None and self._plan.driven is not None else None)
@@ -304,12 +307,11 @@ class ProgramTab(Feature):
         self._close_postures(None)
         if self._plan is None:
             return
-        arm, plan, chart = self.stage.now, self._plan, Chart(index)
-        self._chart = chart
+        self._chart = chart = Chart(index, self._plan, self.stage.now)
         self._screen.postures(chart)
 
         def work() -> None:
-            compute(chart, plan, arm.avoid, arm.obstacles)
+            compute(chart)
             self.post(("charted",), chart)
 
         run_in_background(work, "postures", lambda key, value: self.post((key,), value))
@@ -323,6 +325,12 @@ class ProgramTab(Feature):
         self._ways.close()
         if isinstance(error, BaseException):
             raise error
+
+    def _keep_postures(self) -> None:
+        """Close the chart, unless nothing has changed that it depends on; its words may have other units."""
+        if self._chart is not None and not self._chart.fits(self._items, self.stage.now):
+            self._close_postures(None)
+        self._screen.postures(self._chart)
 
     def _close_postures(self, _: object) -> None:
         if self._chart is not None:

@@ -13,7 +13,7 @@ from app.exercises.typed import EntryError
 from app.viewer.own_arm import clean
 from app.viewer.panel.entry import PoseKind, read_pose, read_value
 from app.viewer.panel.rotations import roll_pitch_yaw
-from app.viewer.tabs.program.items import NAME, Item, configuration, point
+from app.viewer.tabs.program.items import LEAST, NAME, Item, configuration, point
 from kin import InputError, Robot, Task
 from kin.axes import inverse
 from kin.motion.program import LONGEST_DWELL
@@ -80,18 +80,24 @@ class Fields:
             case "seconds":
                 return {"seconds": read_number(text, SECONDS, 0.0, LONGEST_DWELL)}
             case "blend":
-                return {"blend": self._size(text, "Zone", False, FARTHEST) or 0.0}
+                return {"blend": self._blend(text)}
             case "tool_speed" | "tool_turn":
-                return {field: self._size(text, "Limit of the tool", field == "tool_turn", FASTEST)}
+                return {field: self._limit(text, field == "tool_turn")}
         if not item.q:
             raise InputError("field", field, "name or seconds")
         return self._pose(field, text, item)
 
-    def _size(self, text: str, name: str, is_angle: bool, most: float) -> float | None:
-        """A typed size; None for an empty text and for 0."""
-        unit = self.units.of(is_angle)
-        cleaned = text.replace("/s", "").strip()
-        return read_value(cleaned, name, unit, (0.0, most)) or None if cleaned else None
+    def _blend(self, text: str) -> float:
+        """A typed radius of a zone (m); 0 for an empty text."""
+        unit = self.units.lengths
+        valid = f"0 to {unit.short(FARTHEST)}{unit.suffix}, or nothing: the arm stops"
+        return _within(text, unit, 0.0, FARTHEST, valid) if text.strip() else 0.0
+
+    def _limit(self, text: str, is_angle: bool) -> float | None:
+        """A typed limit of the tool (m/s, rad/s); None for an empty text."""
+        unit, cleaned = self.units.of(is_angle), text.replace("/s", "").strip()
+        valid = f"above 0, at most {unit.short(FASTEST)}{unit.suffix}/s, or nothing: no limit"
+        return _within(cleaned, unit, LEAST, FASTEST, valid) if cleaned else None
 
     def _pose(self, field: str, text: str, item: Item) -> Mapping[str, Any]:
         robot, kind = self.robot, field.rstrip("0123456789")
@@ -129,12 +135,16 @@ def read_number(text: object, unit: Unit, low: float, high: float) -> float:
     """
     if not isinstance(text, str):
         raise InputError("field", text, "a text")
+    return round(_within(text, unit, low, high, f"{low:.10g} to {high:.10g} {unit.name}".rstrip()), 3)
+
+
+def _within(text: str, unit: Unit, low: float, high: float, valid: str) -> float:
+    """A number between two others; raises `EntryError` with what is `valid`."""
     title = "The field stays as it was"
-    valid = f"Valid: {low:.10g} to {high:.10g} {unit.name}".rstrip() + "."
     try:
         value = read(text, unit, (low, high))
     except ReadError as error:
-        raise EntryError(title, f"{error.sentence} {valid}", error.readings) from None
+        raise EntryError(title, f"{error.sentence} Valid: {valid}.", error.readings) from None
     if not low <= value <= high:
-        raise EntryError(title, f"“{cut(text)}” is not valid. {valid}")
-    return round(value, 3)
+        raise EntryError(title, f"“{cut(text)}” is not valid. Valid: {valid}.")
+    return value

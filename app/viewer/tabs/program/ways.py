@@ -59,7 +59,7 @@ class Search:
         index: of the waypoint.
         plan, arm: of the list and the arm for which it is searched.
         share: part of the time that has passed while it is searched; None: it is not.
-        title, words: why the list stays as it is; "" if that is not known yet.
+        title, explain: why the list stays as it is, the second in the units of the page; None: not known yet.
         found: the list with the waypoints of the way; None: not found.
         count: how many waypoints were put in.
         cancelled: set when it is not wanted any more.
@@ -70,7 +70,7 @@ class Search:
     arm: Arm
     share: float | None = None
     title: str = "No way was found"
-    words: str = ""
+    explain: Callable[[Units], str] | None = None
     found: Items | None = None
     count: int = 0
     cancelled: threading.Event = field(default_factory=threading.Event)
@@ -95,7 +95,7 @@ class Search:
         return f"A way to {self.index + 1} was found", put if self.count else "A PTP leads there straight."
 
 
-def compute(search: Search, settings: Settings, units: Units, report: Callable[[], None]) -> None:
+def compute(search: Search, settings: Settings, report: Callable[[], None]) -> None:
     """Search a way, and fill `search`; in a background thread. `report` is called while it goes on.
 
     Raises:
@@ -125,12 +125,12 @@ def compute(search: Search, settings: Settings, units: Units, report: Callable[[
             time_limit=settings.seconds, progress=progress, stop=stop,
         )  # fmt: skip
         if way.q is None:
-            search.words = way.explain(units)
+            search.explain = way.explain
             return
         like = Ptp(JointTarget(item.q), **{name: getattr(item, name) for name in _KEPT})
         motion = way_program(way, arm.obstacles, itself, stop, like)
     if not motion.planned:
-        search.title, search.words = "The way that was found cannot be driven", motion.explain(units)
+        search.title, search.explain = "The way that was found cannot be driven", motion.explain
         return
     between = [
         Item("ptp", configuration(np.array(segment.target.q)), blend=segment.blend,
@@ -151,7 +151,7 @@ def with_way(items: Items, before: int, index: int, between: list[Item]) -> Item
     return (*items[:before], start, *items[before + 1 : index], *between, end, *items[index + 1 :])
 
 
-def html(search: Search, settings: Settings) -> str:
+def html(search: Search, settings: Settings, units: Units) -> str:
     """The form, or how far the search is."""
     arm = search.arm
     start = search.start
@@ -163,7 +163,7 @@ def html(search: Search, settings: Settings) -> str:
         avoided=_avoided(len(arm.obstacles), bool(arm.robot.capsules)),
         share=search.share,
         title=search.title,
-        words=search.words,
+        words="" if search.explain is None else search.explain(units),
         settings=settings,
     )
 
@@ -203,11 +203,11 @@ class Ways:
         if self._search is None or self._search.share is not None or not is_installed():
             return
         search = Search(self._search.index, self._search.plan, self._stage.now, share=0.0)
-        self._search, settings, units = search, self._settings, self._stage.units
+        self._search, settings = search, self._settings
         self._redraw()
 
         def work() -> None:
-            compute(search, settings, units, lambda: self._post(("searching",), search))
+            compute(search, settings, lambda: self._post(("searching",), search))
             self._post(("searched",), search)
 
         run_in_background(work, "way", lambda key, value: self._post((key,), value))
@@ -225,7 +225,8 @@ class Ways:
         mine.share = None
         if mine.found is not None and len(mine.found) > MOST:
             mine.found, mine.title = None, "The way has too many waypoints"
-            mine.words = f"It has {mine.count}; the program may have {MOST} waypoints and pauses in all."
+            too_many = f"It has {mine.count}; the program may have {MOST} waypoints and pauses in all."
+            mine.explain = lambda _: too_many
         if mine.found is not None:
             self._search = None
         self._redraw()

@@ -128,7 +128,7 @@ FIELDS = Fields(PIONEER, DEFAULT_UNITS, np.eye(4), "approach")
     [
         ("speed", " 50 % ", {"speed": 0.5}), ("acceleration", "25", {"acceleration": 0.25}),
         ("blend", "20", {"blend": 0.02}), ("blend", "2 cm", {"blend": 0.02}), ("blend", "", {"blend": 0.0}),
-        ("tool_speed", "250 mm/s", {"tool_speed": 0.25}), ("tool_speed", "0", {"tool_speed": None}),
+        ("tool_speed", "250 mm/s", {"tool_speed": 0.25}), ("tool_speed", " ", {"tool_speed": None}),
         ("tool_turn", "180", {"tool_turn": np.pi}), ("name", "a\nb" + "x" * 100, {"name": "a b" + "x" * 36 + "…"}),
         ("via", "100, 0, 250.5", {"via": (0.1, 0.0, 0.2505)}),
     ],
@@ -154,7 +154,7 @@ def test_typed_joint_values_and_poses_are_exact() -> None:
     [
         ("speed", "0"), ("speed", "101"), ("speed", "nan"), ("seconds", "-1"), ("seconds", "x"), ("blend", "-1"),
         ("q0", "1000"), ("q0", ""), ("position", "1 2"), ("position", "9000 0 0"), ("via", "a b c"),
-        ("tool_speed", "x"),
+        ("tool_speed", "x"), ("tool_speed", "0"), ("tool_turn", "0"), ("tool_speed", "inf"), ("acceleration", "0"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_read_is_refused(field: str, text: str) -> None:
@@ -162,6 +162,13 @@ def test_what_cannot_be_read_is_refused(field: str, text: str) -> None:
         FIELDS.read(field, text, ITEMS[0])
     with pytest.raises(InputError):
         FIELDS.read("colour", text, ITEMS[0])
+
+
+def test_a_limit_of_zero_is_refused_with_what_would_be_valid() -> None:
+    for field, most in (("tool_speed", "1000000 mm/s"), ("tool_turn", "57295.8°/s")):
+        with pytest.raises(EntryError) as caught:
+            FIELDS.read(field, "0", ITEMS[0])
+        assert caught.value.detail == f"“0” is not valid. Valid: above 0, at most {most}, or nothing: no limit."
 
 
 CURVE = tuple(UR5.clip(UR5.q_home + 0.1 * k * np.array([1, 1, -1, 1, 0, 0])) for k in range(5))

@@ -14,6 +14,7 @@ from fake_browser import FakeBrowser
 
 import kin
 from app.shared.store import Store
+from app.viewer.panel.view import ViewState
 from app.viewer.session.state import PageState, decode, encode
 from app.viewer.tabs.program import ways
 from app.viewer.tabs.program.items import MOST, Item, waypoint
@@ -186,6 +187,65 @@ def test_a_waypoint_inside_an_obstacle_and_a_start_that_touches_are_answers(port
         press(tab, "way", 0)
         assert part(tab, "way") == "", "nothing leads to the start"
         assert rows(tab) == 3
+
+
+def test_units_that_are_changed_while_a_search_goes_on_neither_end_it_nor_lose_anything(port: int) -> None:
+    start, goal, post = around_a_post()
+    line = ["p", goal.tolist(), "above", 1.0, {"v": 0.25}]
+    with FakeBrowser(port, memory=opened(UR5, (post,), [["p", start.tolist()], line])) as tab:
+        tab.wait(lambda: rows(tab) == 2)
+        press(tab, "choose", 1)
+        assert 'value="250"' in part(tab, "list")
+        press(tab, "way", 1)
+        press(tab, "way-seconds", value="60")
+        press(tab, "way-seed", value="3")
+        press(tab, "search")
+        tab.set("Lengths", "m")
+        tab.set("Radians", True)
+        tab.wait(lambda: 'value="0.25"' in part(tab, "list"))
+        tab.wait(lambda: rows(tab) > 2)
+        assert "A way to 2 was found" in html.unescape(tab.html)
+        assert "touches" not in part(tab, "summary")
+        tab.wait(lambda: bool(tab.kept) and len(programs(tab)) > 2)
+        found = programs(tab)
+        assert found[-1][1] == pytest.approx(goal.tolist())
+        assert [row[4]["v"] for row in found[1:]] == [0.25] * (len(found) - 1)  # type: ignore[index]
+        assert f'value="{goal[0]:.5f}"' in part(tab, "list"), "joint values in radians"
+
+
+def test_units_that_are_changed_while_a_form_is_open_leave_what_was_typed(blocked: FakeBrowser) -> None:
+    press(blocked, "way", 1)
+    press(blocked, "way-seconds", value=f"{DURATION:g}")
+    press(blocked, "way-seed", value="7")
+    press(blocked, "search")
+    blocked.set("Radians", True)
+    blocked.settle()
+    assert "Searching for at most" in part(blocked, "way"), "it goes on"
+    press(blocked, "close-way")
+    assert f'value="{DURATION:g}"' in part(blocked, "way")
+    assert 'value="7"' in part(blocked, "way")
+
+
+def test_with_collisions_avoided_a_start_that_touches_and_a_goal_inside_keep_the_program(port: int) -> None:
+    goal = UR5.q_home.copy()
+    goal[0] += 1.0
+    for q, where, driven in ((UR5.q_home, "at its start", False), (goal, "on the way to 3 of 3", True)):
+        ball = kin.Obstacle("sphere", kin.fk(UR5, q)[:3, 3].tolist(), radius=0.05, name="ball")
+        near = UR5.q_home + np.array([-0.8, 0.0, 0.0, 0.0, 0.0, 0.0])
+        program = [["p", UR5.q_home.tolist()], ["p", near.tolist()], ["p", goal.tolist()]]
+        features = {"program": {"programs": {"ur5": program}}}
+        state = PageState("ur5", q=near, view=ViewState(avoid=True), obstacles=(ball,), features=features)
+        memory = json.dumps({"address": "http://a/", "state": encode(state)})
+        with FakeBrowser(port, memory=memory) as tab:
+            tab.wait(lambda: rows(tab) == 3)
+            index = 2 if driven else 0
+            items = part(tab, "list").split("<li")[1:]
+            assert ["touches ball" in item for item in items] == [i == index for i in range(3)]
+            assert ("Find a way…" in items[index]) == driven, "nothing leads to the start"
+            assert ('aria-disabled="true" aria-label="Play"' in part(tab, "player")) != driven
+            press(tab, "field", 1, value=["speed", "50"])
+            tab.wait(lambda where=where: f"The program ends {where}" in html.unescape(tab.html))  # type: ignore[misc]
+            assert rows(tab) == 3
 
 
 def test_where_the_search_is_not_installed_the_page_says_how_to_install_it(
