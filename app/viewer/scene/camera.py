@@ -181,10 +181,12 @@ class VisitorCamera:
         self.look()
         here = self._viewpoint
         self._points = points
-        sphere, body = self._arm(points), self._body
-        for center, radius in () if body is None else room:
-            if float(np.linalg.norm(center - body.center)) + radius <= _OUTLOOK * body.radius:
-                sphere = round_both(sphere, (center, radius))
+        sphere, middle, most = self._arm(points), np.zeros(3), 0.0
+        if self._body is not None:
+            middle, most = self._body.center, _OUTLOOK * self._body.radius
+        for other in room:
+            if float(np.linalg.norm(other[0] - middle)) + other[1] <= most:
+                sphere = round_both(sphere, other)
         self._choose(_framed(sphere, here[0] - here[1], 1.0, here[2]))
 
     def look_from(self, side: Side, points: Array) -> None:
