@@ -6,6 +6,7 @@ A few cases of each operation, and sequences of requests with ``-m slow``; KINBO
 from __future__ import annotations
 
 import os
+from functools import partial
 
 import pytest
 import schemathesis
@@ -56,13 +57,23 @@ OF_SENT_ARMS = r"^/api/v1/(?!robots$|robots/\{robot_id\})"
 
 
 @pytest.fixture(autouse=True)
-def quick_sizes(monkeypatch):
-    """Volumes take seconds and are looked at elsewhere."""
+def quick_answers(monkeypatch):
+    """Volumes, fine maps and sections, and searches for pairs of mistakes take seconds.
+
+    Answers have the same fields without them, and arguments are checked before. They are looked at elsewhere.
+    """
+
+    def coarse(function, most):
+        return lambda *given, **asked: function(*given, **asked | {"resolution": min(asked["resolution"], most)})
+
     facts = kin.workspace_facts
     monkeypatch.setattr(
         "app.shared.summaries.workspace_facts",
         lambda robot, **asked: facts(robot, **asked | {"effort": 2, "volume": False}),
     )
+    monkeypatch.setattr("app.shared.summaries.section", coarse(kin.section, 16))
+    monkeypatch.setattr("app.shared.maps.capability_grid", coarse(kin.capability_grid, 4))
+    monkeypatch.setattr("app.api.arms.compare.compare", partial(kin.compare, seconds=0.1))
 
 
 @pytest.fixture(autouse=True)
