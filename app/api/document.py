@@ -1,8 +1,11 @@
-"""Additions to FastAPI's OpenAPI document: media types and access control."""
+"""Additions to FastAPI's OpenAPI document: media types, examples of answers and access control."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
@@ -21,12 +24,16 @@ _OF_ACCESS: dict[str, Any] = {
     }.items()
 }
 
+# Answers to the first example of each operation, or to a short request; `tests/app/api/test_api_openapi.py` asks
+# for them again, and writes them with --snapshot-update.
+ANSWERS = Path(__file__).parent / "answers.json"
+
 # Parts of the schema of an arm that is sent along, and their names: generated clients have a class for each.
 _PARTS = {"rows": ("RowDescription", "A DH row."), "capsules": ("CapsuleDescription", "A body of a link.")}
 
 
 def complete_document(app: FastAPI, settings: Settings) -> None:
-    """Add to ``/openapi.json`` of `app`: media types of problems, answers of access control, names of parts."""
+    """Add to ``/openapi.json`` of `app`: media types of problems, examples of answers, access control, parts."""
     plain = app.openapi
 
     def openapi() -> dict[str, Any]:
@@ -37,6 +44,7 @@ def complete_document(app: FastAPI, settings: Settings) -> None:
             _name_media_type(operation)
             if path.startswith("/api/"):
                 operation["responses"].update(_OF_ACCESS)
+                _give_example(operation)
         _name_parts(document["components"]["schemas"])
         document["components"]["securitySchemes"] = {"token": {"type": "http", "scheme": "bearer"}}
         asked = settings.token is not None and not settings.read_only
@@ -50,6 +58,20 @@ def _operations(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]
     for path, item in document["paths"].items():
         for operation in item.values():
             yield path, operation
+
+
+@cache
+def _answers() -> dict[str, Any]:
+    """Answers by the name of their operation."""
+    found: dict[str, Any] = json.loads(ANSWERS.read_text(encoding="utf-8"))
+    return found
+
+
+def _give_example(operation: dict[str, Any]) -> None:
+    """Give an operation an example of its answer; that on an arm sent along has the same one."""
+    name = operation["operationId"].removesuffix("_sent")
+    if name in _answers():
+        operation["responses"]["200"]["content"]["application/json"]["example"] = _answers()[name]
 
 
 def _name_media_type(operation: dict[str, Any]) -> None:
