@@ -23,10 +23,10 @@ from kin.motion.results import Quantity
 from kin.units import Units, fixed
 
 KINDS: dict[Kind, tuple[str, str]] = {
-    "ptp": ("PTP – all joints straight to their values", "PTP"),
+    "ptp": ("PTP – straight in the joints", "PTP"),
     "lin": ("LIN – tool on a straight line", "LIN"),
-    "circ": ("CIRC – tool on an arc, by a via point", "CIRC"),
-    "spline": ("Spline – tool on a smooth curve", "spline"),
+    "circ": ("CIRC – tool on an arc", "CIRC"),
+    "spline": ("Spline – smooth curve", "spline"),
 }
 QUANTITIES: dict[Quantity, str] = {"velocity": "velocities", "acceleration": "accelerations", "jerk": "jerks"}
 EXCEEDED = 1.0 + 1e-6
