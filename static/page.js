@@ -3,7 +3,7 @@
 (() => {
   const root = document.documentElement;
   const DARK = matchMedia("(prefers-color-scheme: dark)");
-  const SYSTEM_IS_DARK = "The system is dark"; // label of a check box: see app/viewer/panel/view.py
+  const SYSTEM_IS_DARK = "The system is dark"; // label of a check box: see app/viewer/panel/theme.py
   const SCHEME = "kinboard-scheme"; // read by static/start.js
   // Buttons in a corner of the scene: name, drawing, message and argument for the server. The standard views are drawn
   // as an arm seen from there: towards the viewer, bent to the right, from above, and a cube.

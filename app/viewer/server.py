@@ -22,7 +22,7 @@ from app.shared.summaries import Summaries
 from app.viewer.meshes.library.library import Library
 from app.viewer.meshes.reader import MeshReader
 from app.viewer.panel.status import LOOKING, READY, Notice
-from app.viewer.panel.view import configure_theme
+from app.viewer.panel.theme import configure_theme
 from app.viewer.room.page import ClassroomPage
 from app.viewer.scene.lights import light_scene
 from app.viewer.scene.motion import Pace

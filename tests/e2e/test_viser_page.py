@@ -6,7 +6,7 @@ import pytest
 from page import Tab
 from playwright.sync_api import expect
 
-from app.viewer.panel.view import SYSTEM_IS_DARK
+from app.viewer.panel.theme import SYSTEM_IS_DARK
 
 pytestmark = pytest.mark.browser
 

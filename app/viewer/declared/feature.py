@@ -182,18 +182,9 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self.wake()  # shown once, after all events that wait, and after errors
         match key:
             case ("at", str(path), int(serial)):
-                if (spec := self._panel.spec(serial)) is None:
-                    return  # replaced since, by a control in other units
-                name = spec.names or path.rpartition(".")[2]
-                try:
-                    found = spec.read(name, value, self.stage.now.robot, self.stage.units)
-                except InputError:
-                    if spec.kind == "dropdown":  # a list cannot show what is not in it; what was typed stays
-                        self._panel.took(serial, object())
-                    raise
-                self._panel.took(serial, found)
-                self.settings = self.settings.with_value(path, found)
-                self.changed(path)
+                if (found := self._panel.received(self.settings, path, serial, value)) is not None:
+                    self.settings = found
+                    self.changed(path)
             case ("do", (str(name), *arguments), int(serial), int()):
                 if self._panel.is_live(serial):
                     getattr(self, name)(*arguments)

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import viser
@@ -20,11 +20,12 @@ import viser
 from app.viewer.declared.fields import Settings, Spec
 from app.viewer.declared.press import Press
 from app.viewer.viser_patches import show_content, show_value
-from kin import Robot
+from kin import InputError, Robot
 from kin.units import Units
 
 Event = tuple[Hashable, ...]
 Post = Callable[[Hashable, object], None]
+S = TypeVar("S", bound=Settings)
 
 
 @dataclass(slots=True, eq=False)
@@ -151,18 +152,30 @@ class PanelView:
         self._settings, self._robot, self._units, self._write = settings, robot, units, write
         self._fill(self._top, nodes, self._mounted)
 
-    def spec(self, serial: object) -> Spec | None:
-        """What is valid for the control with this number; None: it is no longer there."""
-        found = self._live.get(serial) if isinstance(serial, int) else None
-        return None if found is None else found.spec
+    def received(self, settings: S, path: str, serial: int, posted: object) -> S | None:
+        """The settings with what a control has sent; None: it has been replaced since, by one in other units.
+
+        Its own value is not sent back to it, so that a slider follows its finger.
+
+        Raises:
+            InputError: for an invalid value. What was typed stays; a list, which cannot show what is not in it,
+                shows the setting again.
+        """
+        one = self._live.get(serial)
+        if one is None or one.spec is None:
+            return None
+        try:
+            found = one.spec.read(one.spec.names or path.rpartition(".")[2], posted, self._robot, self._units)
+        except InputError:
+            if one.spec.kind == "dropdown":
+                one.known = object()
+            raise
+        one.known = found
+        return settings.with_value(path, found)
 
     def is_live(self, serial: object) -> bool:
         """Whether the control with this number is still there; 0: an event of no control."""
         return serial == 0 or serial in self._live
-
-    def took(self, serial: int, value: object) -> None:
-        """A control's own event has set this value: it is not sent back, so that a slider follows its finger."""
-        self._live[serial].known = value
 
     def remove(self) -> None:
         """Remove everything."""

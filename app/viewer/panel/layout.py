@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import viser
 
 from app.viewer.own_arm import OwnArm
-from app.viewer.panel import Post
+from app.viewer.panel import Post, listen
 from app.viewer.panel.jog import JogPad
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.readout import PoseReadout
@@ -15,8 +15,7 @@ from app.viewer.panel.robots import RobotMenu
 from app.viewer.panel.script import PageScript
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
-from app.viewer.panel.target import DEFAULT_TASK, TargetChoice
-from app.viewer.panel.view import AVOID_HINT, ColourChoice, RotationChoice, UnitChoice, ViewOptions, ViewState
+from app.viewer.panel.theme import SYSTEM_IS_DARK
 from app.viewer.views.templates import render
 from kin import Robot, fk
 from kin.units import Units
@@ -26,19 +25,20 @@ SMALL_WIDTH = 280  # of a small one
 
 
 class Panel:
-    """One visitor's panel. Posts ``"robot"``, ``"home"``, ``"random"``, and what its parts post.
+    """One visitor's panel. Posts ``"system-dark"``, and what its parts post.
 
     Args:
         own: the visitor's own arm.
         system_dark: whether the visitor's system is dark.
         tabs: titles of the features' tabs.
-        detailed: the robots that have a detailed body.
 
     Attributes:
         script: the connection to the page's own script.
         jog: buttons that move the arm in steps.
         joints, posture: folders that are filled for each robot.
         obstacles: the folder of the obstacles, closed like that of `jog`, so that the rest fits a small window.
+        view, target, avoid: where the choices for the whole page are: in the tab *View*, between the joints and
+            the posture, and at the top of the obstacles.
         learn: the tab for lessons.
         tabs: the features' tabs.
         legend: what a lesson draws in the scene; below the tabs, so that it stays when another tab is opened.
@@ -53,15 +53,13 @@ class Panel:
         own: OwnArm | None,
         robot: Robot,
         units: Units,
-        view: ViewState,
         system_dark: bool,
         welcome: Notice,
         tabs: Sequence[str],
-        detailed: Sequence[Robot],
         post: Post,
     ) -> None:
         self.status = StatusLine(gui, welcome)
-        self.colours = ColourChoice(gui, system_dark, post)
+        listen(gui.add_checkbox(SYSTEM_IS_DARK, system_dark), post, "system-dark")
         self.script = PageScript(gui, post)
         gui.add_html(render("panel/head"))
         self.robots = RobotMenu(gui, robots, own, robot, post)
@@ -70,7 +68,7 @@ class Panel:
         with group.add_tab("Move"):
             self.joints = gui.add_folder("Joints")
             go_to_buttons(gui, post)
-            self.target = TargetChoice(gui, DEFAULT_TASK, post)
+            self.target = gui.add_folder(None)
             self.posture = gui.add_folder("Posture and redundancy")
             self.jog = JogPad(gui, robot)
             self.obstacles = gui.add_folder("Obstacles", expand_by_default=False)
@@ -84,14 +82,11 @@ class Panel:
                 with tab:
                     self.robots.add_field(gui, post)
         with group.add_tab("View"):
-            self.units = UnitChoice(gui, units, post)
-            self.rotations = RotationChoice(gui, view.rotations, post)
-            self.colours.build(view.dark)
-            self.view = ViewOptions(gui, view, detailed, post)
+            self.view = gui.add_folder(None)
             with gui.add_folder("Share"):
                 self.share = SharePanel(gui, post)
         with self.obstacles:
-            self.view.add_box("avoid", "Avoid collisions", AVOID_HINT, view, post)
+            self.avoid = gui.add_folder(None)
 
     def fit(self, panel: viser.MainPanelHandle, embedded: str) -> None:
         """Set the width; within another page, keep the tool's pose and the joints only (``static/layout.css``)."""
@@ -99,5 +94,5 @@ class Panel:
         panel.set_width(SMALL_WIDTH if small else PANEL_WIDTH)
         if small:
             self.robots.hide()
-            self.target.hide()
-            self.jog.folder.visible = self.posture.visible = self.obstacles.visible = False
+            for folder in (self.target, self.jog.folder, self.posture, self.obstacles):
+                folder.visible = False

@@ -56,7 +56,7 @@ class MemberPage(VisitorPage):
         self.numbers.use_goal(None)
         self.sliders.show_locks(self.arm.locks)
         self.panel.robots.show(self.arm.robot, self.own)
-        self.panel.target.show(self.arm.task)
+        self.forms.show()
         self.posture.choose(self.arm.branch)
 
     def be_led(self, led: bool) -> None:

@@ -17,9 +17,18 @@ import viser
 from numpy.typing import NDArray
 
 from app.viewer.panel import Post
-from app.viewer.panel.view import Side
 from app.viewer.scene.meshes import Body
-from app.viewer.scene.viewpoints import DIRECTIONS, FOV, GLIDE, UP, between, contains, distance_to_see, place
+from app.viewer.scene.viewpoints import (
+    DIRECTIONS,
+    FOV,
+    GLIDE,
+    UP,
+    Side,
+    between,
+    contains,
+    distance_to_see,
+    place,
+)
 from kin.transforms import Array
 
 DIRECTION = np.array([0.80, 0.92, 0.46])  # of the default view, from the arm to the camera

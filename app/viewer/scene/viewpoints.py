@@ -6,12 +6,14 @@ A viewpoint ``(3, 3)`` has the rows camera position, look-at point, and up direc
 from __future__ import annotations
 
 import math
+from typing import Final, Literal, get_args
 
 import numpy as np
 
-from app.viewer.panel.view import Side
 from kin.transforms import Array
 
+Side = Literal["Front", "Side", "Top", "Corner"]
+SIDES: Final[tuple[Side, ...]] = get_args(Side)
 FOV = math.radians(38)
 UP = np.array([0.0, 0.0, 1.0])
 GLIDE = 0.45  # seconds from one viewpoint to another

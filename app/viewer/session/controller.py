@@ -25,12 +25,12 @@ import kin
 from app.shared.metrics import SOLVE_SECONDS
 from app.viewer.arm import Arm
 from app.viewer.panel import Post
-from app.viewer.panel.target import DEFAULT_TASK
 from app.viewer.scene import gizmo
 from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.bodies.drawing import Drawing
 from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
+from app.viewer.session.choices import DEFAULT_TASK
 from app.viewer.session.listener import ArmListener
 from kin import Obstacle, Robot, Task
 from kin.ik import solve

@@ -66,12 +66,7 @@ RULES: Final[dict[str, Rule]] = {
     "snap": Rule(step=False, message=True),
     "released": Rule(step=False, message=True),
     # The looks of the page, and the camera
-    "radians": Rule("Unit of angles"),
-    "lengths": Rule("Unit of lengths"),
-    "rotations": Rule("How rotations are written"),
-    "view": Rule("View"),
-    "look": Rule("Show arm as"),
-    "colours": Rule("Page colours"),
+    "view": Rule("View"),  # some of its controls say more
     "axes": Rule("Arrows along", message=True),
     "frame": Rule("Frame of the read-out", message=True),
     "text-size": Rule(step=False, message=True),

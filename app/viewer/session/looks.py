@@ -13,8 +13,10 @@ from app.viewer.meshes.bodies import Bodies
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import Notice, StatusLine
-from app.viewer.panel.view import ViewState, configure_theme
+from app.viewer.panel.theme import configure_theme
+from app.viewer.session.choices import ViewState
 from app.viewer.session.controller import ArmController
+from app.viewer.session.forms import Forms
 from app.viewer.session.numbers import Numbers
 from app.viewer.session.posture import PosturePanel
 from kin.units import Units
@@ -28,6 +30,7 @@ class LooksPage(Protocol):
     bodies: Bodies
     own: OwnArm | None
     panel: Panel
+    forms: Forms
     posture: PosturePanel
     status: StatusLine
     numbers: Numbers
@@ -56,6 +59,7 @@ class Looks:
         """Show all numbers in these units."""
         page = self._page
         page.units = units
+        page.forms.show()
         page.status.use(units)
         page.renew_sliders()
         page.posture.show()
@@ -67,7 +71,7 @@ class Looks:
         """Make the page dark or light; None: as the visitor's system is."""
         page = self._page
         before = page.dark
-        page.view.dark, page.system_dark = dark, system_dark
+        page.view, page.system_dark = replace(page.view, dark=dark), system_dark
         if page.dark != before:
             configure_theme(page.client.gui, page.dark)
             page.for_features(lambda feature: feature.on_style())
@@ -77,19 +81,17 @@ class Looks:
         """Show the page and the scene as `view` says."""
         page = self._page
         before, page.view = page.view, replace(view, dark=page.view.dark)
-        page.panel.view.show(view)
         if view.base_axes != before.base_axes:
             page.arm.use_base_axes(view.base_axes)
         if view.dark != before.dark:
-            page.panel.colours.show(view.dark)
             self.use_colours(view.dark, page.system_dark)
         if view.detailed != page.bodies.detailed:
             page.bodies.detailed, page.bodies.last_refusal = view.detailed, ""
             self.redraw_body()
         if view.rotations != before.rotations:
-            page.panel.rotations.show(view.rotations)
             page.panel.readout.use_rotations(view.rotations)
             page.numbers.use_pose()
+        page.forms.show()
         self.apply()
 
     def redraw_body(self) -> None:

@@ -29,12 +29,14 @@ from app.viewer.panel import update_html
 from app.viewer.panel.joints import JointSliders, lock_notice
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import READY, Notice, StatusLine
-from app.viewer.panel.view import ViewState, configure_theme
+from app.viewer.panel.theme import configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
 from app.viewer.session.actions.actions import Actions
 from app.viewer.session.actions.typed import BY_HAND
+from app.viewer.session.choices import ViewState
 from app.viewer.session.controller import ArmController
 from app.viewer.session.events import LINK
+from app.viewer.session.forms import Forms
 from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.looks import Looks
 from app.viewer.session.numbers import Numbers
@@ -97,6 +99,7 @@ class VisitorPage(ShownArm, Worker):
         self.camera: VisitorCamera
         self.posture: PosturePanel
         self.panel: Panel
+        self.forms: Forms
         self.status: StatusLine
         self.sliders: JointSliders
         self._more_joints: viser.GuiFolderHandle | None = None
@@ -144,8 +147,8 @@ class VisitorPage(ShownArm, Worker):
         self.for_features(lambda feature: feature.on_style())
 
     def set_task(self, task: Task) -> None:
-        self.panel.target.show(task)
         self.arm.set_task(task)
+        self.forms.show()
 
     def unlock(self, joint: int | None = None) -> None:
         self.change_lock(joint, False)
@@ -194,6 +197,7 @@ class VisitorPage(ShownArm, Worker):
         self.arm.scene.remove()
         self.panel.robots.show(robot, self.own)
         self._use_robot(robot, q, glide)
+        self.forms.show()
         self.for_features(lambda feature: feature.on_robot())
 
     def change_lock(self, joint: int | None, lock: bool) -> None:
@@ -342,15 +346,16 @@ class VisitorPage(ShownArm, Worker):
             self.numbers = Numbers(self, self._pace)
             gui.main_panel.dock_right()
             self.panel = Panel(
-                gui, self.store.robots, self.own, robot, self.units, self.view, self.system_dark, self._welcome,
-                [tab.title for tab in self.offered],
-                self._library.offered(self.store.robots), self.post,
+                gui, self.store.robots, self.own, robot, self.units, self.system_dark, self._welcome,
+                [tab.title for tab in self.offered], self.post,
             )  # fmt: skip
+            self.panel.readout.use_rotations(self.view.rotations)
             self.panel.fit(gui.main_panel, self._persistence.embedded)
             self.panel.obstacles.expand_by_default = bool(saved.obstacles)
             self.status = self.panel.status
             self.posture = PosturePanel(self, self.panel.posture, self.post)
             self._use_robot(robot, saved.q)
+            self.forms = Forms(gui, self.panel, self, self._library.offered(self.store.robots), self.post)
             self.lessons = LessonChoice(gui, self.panel.learn, self.panel.sheet, self, self.post)
             containers: list[viser.GuiFolderHandle | viser.GuiTabHandle] = [self.panel.obstacles, *self.panel.tabs]
             features: tuple[type[Feature], ...] = (ObstaclesFeature, *self.offered)
@@ -371,7 +376,6 @@ class VisitorPage(ShownArm, Worker):
         self.bodies.detailed = self.view.detailed
         self.arm.use(robot, q, self.dark, self.view.base_axes, self.bodies.of(robot, self.own))
         self.numbers.use_frames()
-        self.panel.target.show(self.arm.task)
         self.sliders = self._make_sliders()
         self.panel.jog.use_robot(robot)
         self.posture.use_robot()

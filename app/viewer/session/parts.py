@@ -10,9 +10,10 @@ from app.viewer.own_arm import OwnArm
 from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import StatusLine
-from app.viewer.panel.view import ViewState
 from app.viewer.scene.camera import VisitorCamera
+from app.viewer.session.choices import ViewState
 from app.viewer.session.controller import ArmController
+from app.viewer.session.forms import Forms
 from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.looks import Looks
 from app.viewer.session.posture import PosturePanel
@@ -31,6 +32,7 @@ class Page(Stage, Protocol):
     system_dark: bool
     looks: Looks
     panel: Panel
+    forms: Forms
     sliders: JointSliders
     posture: PosturePanel
     status: StatusLine

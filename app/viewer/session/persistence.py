@@ -175,7 +175,7 @@ class Persistence:
             branch=page.now.branch,
             lesson=page.activity.lesson,
             units=page.units,
-            view=replace(page.view),
+            view=page.view,
             features={key: state for key, state in states.items() if state},
             locks=tuple(i for i, lock in enumerate(page.arm.locks) if lock),
             camera=page.camera.chosen,

@@ -17,7 +17,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, get_args
+from typing import Any, Final, get_args
 
 import numpy as np
 
@@ -28,10 +28,9 @@ from app.viewer.obstacles import placed
 from app.viewer.obstacles.placed import Obstacles
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.entry import FARTHEST
-from app.viewer.panel.rotations import ANGLES, QUATERNIONS
 from app.viewer.panel.script import read_json
-from app.viewer.panel.view import LOOKS, ViewState
 from app.viewer.scene.viewpoints import UP
+from app.viewer.session.choices import ViewState
 from kin import KinematicsError, Robot, Task, branch_names
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS, LENGTHS, Units
@@ -47,7 +46,7 @@ CAMERA_DIGITS = 4  # of metres; finer differences are invisible
 CAMERA_RANGE = 100.0  # largest ratio of a camera's distance to the arm's reach, and the reverse
 
 EMBEDDED = ("scene", "panel")  # the scene alone, or with a small panel
-FRESH = ViewState()
+FRESH: Final = ViewState()
 _ADDRESS = re.compile(r"https?://[A-Za-z0-9._:%\[\]-]+/[A-Za-z0-9._~%/-]*")
 
 
@@ -81,7 +80,7 @@ class PageState:
     branch: str | None = None
     lesson: str | None = None
     units: Units = DEFAULT_UNITS
-    view: ViewState = field(default_factory=ViewState)
+    view: ViewState = FRESH
     features: dict[str, dict[str, object]] = field(default_factory=dict)
     locks: tuple[int, ...] = ()
     camera: Array | None = None
@@ -154,7 +153,7 @@ def encode(state: PageState) -> str:
         data["units"] = "rad"
     if state.units.length != DEFAULT_UNITS.length:
         data["length"] = state.units.length
-    view = {name: value for name, value in vars(state.view).items() if value != getattr(FRESH, name)}
+    view = {name: entry for name, entry in state.view.state().items() if entry != FRESH.state()[name]}
     if view:
         data["view"] = view
     if state.features:
@@ -187,7 +186,7 @@ def decode(text: str, robots: Sequence[Robot]) -> PageState:
     common: dict[str, Any] = {
         "lesson": lesson if isinstance(lesson, str) else None,
         "units": _units(data),
-        "view": _view(data.get("view")),
+        "view": FRESH.restored(data.get("view"), robots[0]),
         "features": _features(features),
         "own": own,
         "refused": refused,
@@ -321,14 +320,6 @@ def _viewpoint(value: object, robot: Robot) -> Array | None:
 def _units(data: dict[str, Any]) -> Units:
     length = next((unit for unit in LENGTHS if unit == data.get("length")), DEFAULT_UNITS.length)
     return Units(data.get("units") != "rad", length)
-
-
-def _view(value: object) -> ViewState:
-    options = value if isinstance(value, dict) else {}
-    chosen = {name: options[name] for name in vars(FRESH) if isinstance(options.get(name), bool)}
-    for name, valid in (("look", LOOKS), ("angles", ANGLES), ("quaternions", QUATERNIONS)):
-        chosen[name] = next((each for each in valid if each == options.get(name)), getattr(FRESH, name))
-    return ViewState(**chosen)
 
 
 def _features(value: object) -> dict[str, dict[str, object]]:

@@ -30,7 +30,7 @@ from app.shared.clients import client_of
 from app.shared.security import Rights
 from app.shared.settings import Settings
 from app.viewer.own_arm import own_arm
-from app.viewer.panel.view import ViewState
+from app.viewer.session.choices import ViewState
 from app.viewer.session.state import PageState, encode
 
 TOKEN = "correct horse battery"

@@ -8,7 +8,8 @@ import pytest
 from fake_browser import FakeBrowser
 
 from app.shared.store import Store
-from app.viewer.panel.view import SYSTEM_IS_DARK, ViewState
+from app.viewer.panel.theme import SYSTEM_IS_DARK
+from app.viewer.session.choices import ViewState
 from app.viewer.session.state import PageState, decode, encode
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")

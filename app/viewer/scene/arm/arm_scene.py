@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 import viser
 
-from app.viewer.panel.view import Look
 from app.viewer.scene.arm.contact import ContactMark
 from app.viewer.scene.arm.frames import ArmFrames
+from app.viewer.scene.arm.looks import Look
 from app.viewer.scene.bodies.drawing import Drawing, drawing
 from app.viewer.scene.bodies.nodes import GHOST, DrawnBody, LinkColors
 from app.viewer.scene.bodies.parts import Part

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import kin
@@ -18,6 +17,7 @@ from app.viewer.scene.gizmo import Pull
 from app.viewer.session.actions.arm import ArmControls
 from app.viewer.session.actions.looks import LookControls
 from app.viewer.session.actions.typed import TypedInput
+from app.viewer.session.choices import PageChoices
 from app.viewer.session.events import MESSAGES, RULES, belongs_before, pause_within
 from app.viewer.session.history import History, Step, same, without_results
 from app.viewer.session.parts import Page
@@ -44,7 +44,7 @@ class Actions:
             "feature": self._on_feature,
             "news": self._on_feature,
             "lesson": self._choose_lesson,
-            "axes": typed.use_axes,
+            "axes": typed.switch_axes,
             # Messages of the page's own script
             "undo": self._undo,
             "redo": self._redo,
@@ -157,13 +157,12 @@ class Actions:
         self._gesture = None
         self.history.arrive()
         if state.units != page.units:
-            page.panel.units.show(state.units)
             page.looks.use_units(state.units)
         if state.frames != page.frames:
             page.use_frames(state.frames)
         page.use_obstacles(state.obstacles)
         if state.view != page.view:
-            page.looks.use_view(replace(state.view))
+            page.looks.use_view(state.view)
         self.adopt(state)
         if state.lesson != page.activity.lesson:
             page.lessons.open(state.lesson)
@@ -197,6 +196,8 @@ def _label(gesture: tuple[object, ...], features: Sequence[Feature]) -> str:
     match gesture:
         case ("joint", _, int(index), int()):
             return f"Joint {index + 1}"
+        case ("view", _, str(path), int()):
+            return PageChoices.spec(path).undo or RULES["view"].label
         case ("feature", name, key, *_):
             return next((feature.step_name(key) for feature in features if feature.key == name), "Lesson")
     return RULES[str(gesture[0])].label

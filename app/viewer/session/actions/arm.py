@@ -8,8 +8,8 @@ from typing import Any
 
 import kin
 from app.viewer.panel.status import Notice, introduction
-from app.viewer.panel.target import DEFAULT_TASK, TASKS
 from app.viewer.session.actions.typed import BY_HAND, TypedInput
+from app.viewer.session.choices import DEFAULT_TASK
 from app.viewer.session.parts import Page
 from app.viewer.session.robots import robot_of
 from app.viewer.session.state import PageState
@@ -61,10 +61,10 @@ class ArmControls:
         page, arm = self._page, self._page.arm
         task: Task = state.task or DEFAULT_TASK
         locks = [i in state.locks for i in range(page.now.robot.n)]
-        page.panel.target.show(task)
         page.sliders.show_locks(locks)
         q = page.now.robot.q_home if state.q is None else state.q
         arm.restore(q, state.target, task, state.branch, locks)
+        page.forms.show()
 
     def _move_into_view(self, motion: Callable[[], None], title: str) -> None:
         """Move the arm, and the camera if it would not show the whole arm."""
@@ -135,9 +135,5 @@ class ArmControls:
         words = {0: "No arm fits", 1: "One arm fits"}.get(count, f"{count} arms fit")
         page.status.show(Notice("hand", words, "The menu Robot offers what fits, and the arm on show."))
 
-    def _on_task(self, value: object) -> None:
-        page = self._page
-        if value not in TASKS:
-            page.panel.target.show(page.now.task)
-            raise kin.InputError("task", value, "one of " + ", ".join(TASKS))
-        page.arm.set_task(TASKS[str(value)])
+    def _on_task(self, place: str, path: str, serial: int, value: object) -> None:
+        self._page.arm.set_task(self._page.forms.read(place, path, serial, value).task)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import kin
 from app.viewer.labels import size_labels, text_factor
-from app.viewer.panel.view import SIDES
 from app.viewer.scene.camera import Sphere
+from app.viewer.scene.viewpoints import SIDES
 from app.viewer.session.parts import Page
 from kin.transforms import Array
 
@@ -25,14 +24,9 @@ class LookControls:
         self._page = page
         arm, looks = page.arm, page.looks
         self.handlers: dict[str, Callable[..., Any]] = {
-            "radians": lambda radians: looks.use_units(replace(page.units, degrees=not radians)),
-            "lengths": lambda name: looks.use_units(page.panel.units.with_length(page.units, name)),
             "copy-as": lambda name: page.panel.share.choose(name),
             "view": self._on_view,
-            "look": self._on_drawn_as,
-            "rotations": self._on_rotations,
             "body": looks.use_library,
-            "colours": self._on_colours,
             "system-dark": lambda dark: looks.use_colours(page.view.dark, bool(dark)),
             "camera": lambda _: page.camera.aim(arm.scene.body, self._frames(), glide=True),
             "fit-arm": self._fit,
@@ -66,24 +60,12 @@ class LookControls:
         frames: Array = kin.link_frames(self._page.now.robot, self._page.now.goal)[:, :3, 3]
         return frames
 
-    def _on_colours(self, name: object) -> None:
+    def _on_view(self, place: str, path: str, serial: int, value: object) -> None:
         page = self._page
-        page.looks.use_colours(page.panel.colours.read(name, page.view.dark), page.system_dark)
-
-    def _on_drawn_as(self, name: object) -> None:
-        page = self._page
-        page.looks.use_view(replace(page.view, look=page.panel.view.read_look(name, page.view.look)))
-
-    def _on_rotations(self, name: str, value: object) -> None:
-        page = self._page
-        chosen = page.panel.rotations.read(name, value, page.view.rotations)
-        view = replace(page.view)
-        setattr(view, name, chosen)
-        page.looks.use_view(view)
-
-    def _on_view(self, name: str, value: object) -> None:
-        view = replace(self._page.view)
-        setattr(view, name, bool(value))
-        self._page.looks.use_view(view)
-        if name == "avoid":
-            self._page.solve_again()
+        before, chosen = page.view, page.forms.read(place, path, serial, value)
+        if chosen.units != page.units:
+            page.looks.use_units(chosen.units)
+        if chosen.view != before:
+            page.looks.use_view(chosen.view)
+        if chosen.view.avoid != before.avoid:
+            page.solve_again()

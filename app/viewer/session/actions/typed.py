@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import kin
 from app.exercises.typed import EntryError
@@ -11,7 +12,6 @@ from app.viewer.panel.entry import PoseKind, read_pose
 from app.viewer.panel.jog import STEPS
 from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice
-from app.viewer.panel.view import AXES
 from app.viewer.scene.gizmo import FINE_STEP, FINE_TURN, STEP, TURN
 from app.viewer.session.parts import Page
 from kin.axes import inverse
@@ -126,12 +126,10 @@ class TypedInput:
         if step not in STEPS:
             raise kin.InputError("jog", step, "a step of " + ", ".join(map(str, STEPS)))
 
-    def use_axes(self, value: object) -> None:
-        """Align the gizmo with the base or the tool; without a value, with the other one."""
+    def switch_axes(self, _: object) -> None:
+        """Align the gizmo with the base if it is aligned with the tool, and the reverse."""
         page = self._page
-        page.view.base_axes = not page.view.base_axes if value is None else value == AXES[True]
-        page.panel.view.show(page.view)
-        page.arm.use_base_axes(page.view.base_axes)
+        page.looks.use_view(replace(page.view, base_axes=not page.view.base_axes))
 
     def snap(self, value: object) -> None:
         """Drag the gizmo in steps, or freely."""

@@ -14,10 +14,10 @@ import kin
 from app.viewer.obstacles.feature import ObstaclesFeature
 from app.viewer.panel.entry import read_pose
 from app.viewer.panel.joints import label
-from app.viewer.panel.view import ViewState
 from app.viewer.scene.bodies.nodes import TOUCHING
 from app.viewer.scene.meshes import body
 from app.viewer.session import events
+from app.viewer.session.choices import ViewState
 from app.viewer.session.state import PageState, decode, encode
 from kin.units import DEFAULT_UNITS
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -13,7 +14,8 @@ import kin
 from app.exercises.typed import EntryError
 from app.viewer.panel.entry import read_pose
 from app.viewer.panel.rotations import ANGLES, QUATERNIONS, Notation, Rotations
-from app.viewer.session.state import decode, encode
+from app.viewer.session.choices import ViewState
+from app.viewer.session.state import PageState, decode, encode
 from kin.units import Units
 
 RANDOM = Rotation.random(200, rng=np.random.default_rng(7)).as_matrix()
@@ -108,6 +110,15 @@ def test_the_page_writes_and_reads_the_chosen_notation(port: int) -> None:
         state = decode(tab.kept[-1], (ur5,))
         assert state.view.rotations == Rotations("vector", "xyzw")
         assert decode(encode(state), (ur5,)).view == state.view
+
+
+def test_a_link_opens_with_the_notation_it_was_made_with(port: int) -> None:
+    state = encode(PageState("ur5", view=ViewState(angles="zyz", quaternions="xyzw")))
+    with FakeBrowser(port, memory=json.dumps({"address": "", "state": state})) as tab:
+        tab.wait(lambda: "α β γ" in tab.html)
+        tab.settle()
+        assert "x y z w" in tab.html
+        assert (tab.value("Rotations"), tab.value("Quaternions")) == ("Euler Z-Y-Z", "x y z w")
         tab.say("undo")
         tab.say("undo")
         tab.say("undo")

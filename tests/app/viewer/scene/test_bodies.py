@@ -11,10 +11,10 @@ import viser
 from scipy.spatial import cKDTree
 
 import kin
-from app.viewer.panel.view import LOOKS
 from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.bodies.drawing import FOLDER, drawing
 from app.viewer.scene.chain import link_poses
+from app.viewer.session.choices import LOOKS
 
 FILES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 Array = np.ndarray
@@ -88,7 +88,7 @@ def test_an_arm_is_drawn_in_three_ways(server: viser.ViserServer) -> None:
             if key.startswith("/arm") and key.split("/")[-1].startswith(names)
         }
 
-    for look in LOOKS:
+    for look in LOOKS.values():
         arm.show_as(look)
         arm.show_axes(True)
         arm.show_gap(T[:3, 3], T[:3, 3] + 0.3)

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from app.viewer.panel.view import SIDES
-from app.viewer.scene.viewpoints import DIRECTIONS, FOV, UP, between, contains, distance_to_see, place
+from app.viewer.scene.viewpoints import DIRECTIONS, FOV, SIDES, UP, between, contains, distance_to_see, place
 
 POINT = arrays(float, 3, elements=st.floats(-3.0, 3.0))
 

@@ -56,6 +56,8 @@ def posted(source: str, inside: bool) -> Iterator[str]:
                 place = 2 if ast.unparse(func).startswith("listen") else 0
                 for key in args[place : place + 1]:
                     yield from first(key)
+            case ast.Call(func=ast.Name("Buttons"), args=[_, events, *_]) if inside:
+                yield from first(events)
             case ast.Assign([ast.Name("key")], value) if inside:
                 yield from first(value)
 
@@ -102,6 +104,7 @@ def test_every_event_that_is_posted_has_a_rule_and_every_rule_an_event() -> None
         ),
         ('key = "grab" if start else "gizmo"', {"grab", "gizmo"}),
         ('self._page.post("new", 3)', {"new"}),
+        ('Buttons("Camera", {"Fit arm": ("fit-arm",), "Reset view": ("camera",)})', {"fit-arm", "camera"}),
     ],
 )
 def test_the_search_for_events_finds_all_ways_to_post(source: str, names: set[str]) -> None:

@@ -29,8 +29,8 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.panel.view import ViewState
 from app.viewer.server import ViewerServer
+from app.viewer.session.choices import ViewState
 from app.viewer.session.state import PageState, decode, encode
 from kin.units import Units
 

@@ -28,9 +28,9 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import listen
 from app.viewer.panel.joints import UNLOCK_ALL, label, lock_buttons
-from app.viewer.panel.view import ViewState
 from app.viewer.server import ViewerServer
 from app.viewer.session import page
+from app.viewer.session.choices import ViewState
 from app.viewer.session.persistence import Persistence
 from app.viewer.session.state import MAX_TEXT, PageState, decode, encode, read_stored_page
 from kin.units import DEFAULT_UNITS, Units

@@ -174,12 +174,24 @@ def test_settings_are_undone(port: int) -> None:
             "Posture": "Keep current",
             "Link frames": True,
             "Arrows along": "Base axes",
+            "Show arm as": "Both",
+            "Rotations": "Euler Z-Y-Z",
+            "Page colours": "Dark",
+            "Avoid collisions": True,
             "Lesson": "Velocity",
+        }
+        labels = {
+            "Radians": "Unit of angles",
+            "Lengths": "Unit of lengths",
+            "Link frames": "View",
+            "Rotations": "How rotations are written",
+            "Avoid collisions": "View",
         }
         before = {name: tab.value(name) for name in changes}
         for name, value in changes.items():
             tab.set(name, value)
             tab.settle(quiet=0.1)
+            assert tab.script["undo"] == labels.get(name, name)
         for name in reversed(changes):
             assert tab.value(name) != before[name]
             tab.say("undo")

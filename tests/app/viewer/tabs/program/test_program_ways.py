@@ -14,7 +14,7 @@ from fake_browser import FakeBrowser
 
 import kin
 from app.shared.store import Store
-from app.viewer.panel.view import ViewState
+from app.viewer.session.choices import ViewState
 from app.viewer.session.state import PageState, decode, encode
 from app.viewer.tabs.program import ways
 from app.viewer.tabs.program.items import MOST, Item, waypoint
