@@ -47,13 +47,14 @@ MOVES = [
     ["p", [2.6, -1.7, 1.6, -1.47, -1.5708, 0.0], "tray"],
 ]
 PROGRAM = {"programs": {"ur5": MOVES}, "ghosts": True, "compare": "lin"}
+ANSWERED = {"guide": {"revealed": ["1"]}}  # an open question withholds what these pictures show
 SHOTS = (
     Shot("dashboard", "Move", {"robot": "puma560", "q": PUMA}),
     Shot("dh", "Learn", {"robot": "stanford", "lesson": "dh", "features": {"dh": {"at": 8.0}}}),
-    Shot("equations", "Learn", {"robot": "pioneer5", "lesson": "equations"}),
-    Shot("postures", "Learn", {"robot": "puma560", "q": PUMA, "lesson": "postures"}, 8.0),
-    Shot("redundancy", "Learn", {"robot": "iiwa14", "lesson": "redundancy"}, 8.0),
-    Shot("velocity", "Learn", {"robot": "ur5", "lesson": "velocity"}, 8.0),
+    Shot("equations", "Learn", {"robot": "pioneer5", "lesson": "equations", "features": ANSWERED}),
+    Shot("postures", "Learn", {"robot": "puma560", "q": PUMA, "lesson": "postures", "features": ANSWERED}, 8.0),
+    Shot("redundancy", "Learn", {"robot": "iiwa14", "lesson": "redundancy", "features": ANSWERED}, 8.0),
+    Shot("velocity", "Learn", {"robot": "ur5", "lesson": "velocity", "features": ANSWERED}, 8.0),
     Shot("own-arm", "Robot", {"robot": KEY, "own": pack(own_arm(PRESETS["wrist-6r"], "wrist-6r"))}),
     Shot("program", "Program", {"robot": "ur5", "q": UR5, "features": {"program": PROGRAM}}, 8.0),
     Shot("workspace", "Workspace", {"robot": "irb120", "features": {"workspace": CLOUD}}, 25.0),

@@ -82,6 +82,7 @@ def test_a_lesson(tab: Tab) -> None:
             break
         page.keyboard.press("ArrowDown")
     page.keyboard.press("Enter")
+    page.get_by_role("button", name="Show the answer").press("Enter")  # the question withholds the list
     expect(page.locator("[data-posture]")).to_have_count(8)
     walk(tab)
     here = page.locator("[data-here]")

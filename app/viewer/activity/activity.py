@@ -33,6 +33,11 @@ FACTS: Final = {
     "screws": "the six numbers of each joint axis, and what is drawn of them",
     "forms": "a rotation in its other forms",
     "null space": "how many self-motions there are",
+    "iterates": "the iterates of a numeric solution, their errors, and how they end",
+    "method": "what a numeric method makes of the Jacobian",
+    "basins": "which solution each start of a numeric method leads to",
+    "postures": "the postures of the arm, which of them reach the target, and the one that it has",
+    "equations": "the equations of the tool's pose, and their values",
 }
 
 

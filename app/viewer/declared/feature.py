@@ -218,7 +218,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def on_activity(self) -> None:
         if self._withheld != self.stage.activity.withheld:
-            self.refresh()
+            self._begin()  # a refresh alone would end what `advance` has begun
 
     def tick(self, now: float) -> None:
         again = self.advance(now)

@@ -87,6 +87,10 @@ class BranchChoice:
             self._now = branch
             self._line.content = render("panel/branch", name=branch, text=short(branch))
 
+    def withhold(self, on: bool) -> None:
+        """Show neither the names nor the present branch."""
+        self._choice.visible = self._line.visible = not on
+
     def remove(self) -> None:
         """Remove it from the panel."""
         self._choice.remove()

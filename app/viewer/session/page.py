@@ -229,6 +229,7 @@ class VisitorPage(ShownArm, Worker):
         """Something else is open or withheld."""
         self.for_features(lambda feature: feature.on_activity())
         if self._tabs:
+            self.posture.use_activity()
             self.numbers.use_pose()
 
     # Reports of the arm's controller

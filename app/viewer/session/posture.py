@@ -28,6 +28,7 @@ class PosturePanel:
         self._folder = folder
         self._post = post
         self._dragged: str | None = None
+        self._asked = False  # an open question asks for the posture
         self._sliders = RedundancySliders(stage.client.gui, folder, post)
         self._choice: BranchChoice
         self._result: tuple[tuple[object, ...], tuple[Redundancy, ...]] | None = None
@@ -47,10 +48,17 @@ class PosturePanel:
         """Show the arm's branch, and the redundancy parameters there."""
         robot = self._stage.now.robot
         parameters = self._parameters()
-        if kin.branch_names(robot):
+        self._asked = "postures" in self._stage.activity.withheld
+        self._choice.withhold(self._asked)
+        if kin.branch_names(robot) and not self._asked:
             self._choice.show(kin.branch_of(robot, self._stage.now.goal))
         self._sliders.show(parameters, robot, self._stage.units, self._dragged)
         self._dragged = None
+
+    def use_activity(self) -> None:
+        """Something else is open or withheld."""
+        if self._asked != ("postures" in self._stage.activity.withheld):
+            self.show()
 
     def use_result(self, result: IKResult) -> None:
         """Take the redundancy parameters from the result whose solution the arm is heading for."""

@@ -18,6 +18,7 @@ PIONEER = kin.get_robot("pioneer5")
 def open_lesson(tab: Tab) -> None:
     tab.page.get_by_role("tab", name="Learn").click()
     tab.choose("Lesson", "Equations")
+    tab.show_answer("Equations")
     expect(shown(tab)).to_be_visible()
 
 
@@ -72,6 +73,9 @@ def test_equations_are_typeset_and_marked_and_the_largest_error_is_shown(tab: Ta
 
 def test_the_other_arms(tab: Tab) -> None:
     open_lesson(tab)
+    step = tab.page.get_by_role("button", name="Step 2")  # which withholds nothing, whatever the arm
+    step.click()
+    expect(step).to_have_attribute("aria-current", "step")
     for robot_id in ("redundant7", "redundant7-craig", "puma560"):
         tab.choose("Robot", kin.get_robot(robot_id).name)
         first = "19" if robot_id == "redundant7" else "p_x"

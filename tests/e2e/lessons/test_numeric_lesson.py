@@ -17,6 +17,7 @@ def test_iterations_by_mouse_and_by_keyboard(desktop: Tab) -> None:
     tab, page = desktop, desktop.page
     tab.select(PLANAR)
     tab.choose_lesson("Numeric IK")
+    tab.show_answer("Numeric IK")
     outcome, iterate = page.locator("[data-outcome]"), page.locator("[data-iterate]")
     expect(outcome).to_have_attribute("data-outcome", "reached")
     page.get_by_role("button", name="First", exact=True).click()

@@ -21,6 +21,7 @@ PUMA, SRS, PRINTED, PIONEER = (
 def learn(tab: Tab, robot: kin.Robot, lesson: str) -> None:
     tab.show(robot)  # at home: a robot keeps its pose while others are shown
     tab.choose_lesson(lesson)
+    tab.show_answer(lesson)
 
 
 def press(tab: Tab, at: np.ndarray) -> None:
@@ -86,7 +87,6 @@ def test_the_ring_of_arm_angles(tab: Tab) -> None:
     tab.mark_is_under_thumb("Set ψ (tool held)", 70)
     tab.screenshot("redundancy-ring")
     learn(tab, PRINTED, "Redundancy")
-    tab.show_answer("Redundancy")
     expect(tab.page.locator("[data-idea]")).to_contain_text("The axes of joints 1 and 2 coincide")
     tab.screenshot("redundancy-trade")
 

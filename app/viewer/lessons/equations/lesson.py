@@ -82,7 +82,9 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
         nodes: list[Node] = [Html(views.message, (self._words,), key="about")]
         book, equation = f.book, f.equation
         test, symbols = list[Node](), list[Node]()
-        if book is not None and equation is not None:
+        if self.hides("equations"):
+            nodes += self.unless_asked("equations")
+        elif book is not None and equation is not None:
             nodes += self._equation(f)
             if book.source == "chapter":
                 test = [Html(views.test_html, (book, f.q))]
@@ -112,7 +114,8 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
         ]
 
     def scene(self) -> Sequence[Lazy]:
-        return [Lazy("misprint", _misprint, (self.read,))] if self.read.misprinted else []
+        shown = self.read.misprinted and not self.hides("equations")
+        return [Lazy("misprint", _misprint, (self.read,))] if shown else []
 
     # Events
 

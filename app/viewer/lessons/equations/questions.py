@@ -25,6 +25,7 @@ from kin.units import Units, fixed
 
 GOAL = "You can read the pose of the tool from its equations, and find a misprint in them without a reference."
 SAMPLES = 8
+EQUATIONS = frozenset({"equations"})  # what questions withhold
 
 
 def outline(robot: Robot, units: Units) -> Outline:
@@ -38,6 +39,7 @@ def outline(robot: Robot, units: Units) -> Outline:
             "Each of the twelve entries is a formula of the joint values.",
             pose=Pose(home),
             practice="The menu Equation lists them.",
+            withheld=EQUATIONS,
         ),
         Step(
             "The tool point",
@@ -52,15 +54,18 @@ def outline(robot: Robot, units: Units) -> Outline:
             _cross(T),
             "So three of the equations are not needed. Books print them: that is where misprints hide.",
             pose=Pose(home),
+            withheld=EQUATIONS,
         ),
         Step(
             "A test that needs no reference",
             "R has the columns n, o and a. For a rotation, RᵀR is the identity, whatever the joints do.",
             _test(T),
             "RᵀR − I is zero for a correct R. An entry that differs from zero names two columns to look at.",
+            withheld=EQUATIONS,
         ),
     )
-    return Outline(GOAL, steps, _check(robot, T, units), pose=Pose(home))
+    check = _check(robot, T, units)
+    return Outline(GOAL, steps, check, (EQUATIONS, EQUATIONS), Pose(home))
 
 
 def _vector(column: Array) -> str:

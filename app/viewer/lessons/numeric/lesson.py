@@ -82,11 +82,12 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
                 Html(views.chart_html, (done.problem, done.runs, units), key="chart"),
                 Html(views.table_html, (done.problem, done.run, f.number, units), key="table"),
             ]
+        moves = Buttons("Iterate", {name: self.event(self.on_move, name) for name in MOVES}, MOVE_HINT)
+        take = Buttons("Arm", {"To this iterate": self.event(self.on_take)}, TAKE_HINT)
         return [
-            *outcome,
-            Buttons("Iterate", {name: self.event(self.on_move, name) for name in MOVES}, MOVE_HINT),
+            *self.unless_asked("iterates", *outcome, moves),
             Control("method"),
-            Html(views.method_html, (s.method, f.problem), key="formula"),
+            *self.unless_asked("method", Html(views.method_html, (s.method, f.problem), key="formula")),
             Control("damping", visible=s.method == "damped"),
             Control("gain", visible=s.method == "transpose"),
             Control("longest"),
@@ -94,9 +95,9 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
             Control("match"),
             Buttons("Aim", {"Target here": self.event(self.on_target)}, TARGET_HINT),
             Control("follow", value=s.start is None),
-            Buttons("Arm", {"To this iterate": self.event(self.on_take)}, TAKE_HINT),
-            Folder("Error and step", [Control("compare"), *course]),
-            Folder("Basins", [Control("picture"), *self._basins()]),
+            *([] if self.hides("iterates") else [take]),
+            Folder("Error and step", self.unless_asked("iterates", Control("compare"), *course)),
+            Folder("Basins", self.unless_asked("basins", Control("picture"), *self._basins())),
         ]
 
     def _basins(self) -> list[Node]:
@@ -111,7 +112,9 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
 
     def scene(self) -> Sequence[Lazy]:
         f = self.read
-        return [] if f.iterated is None else [Lazy("iterates", scene, (f.iterated, f.number, self._figure))]
+        if f.iterated is None or self.hides("iterates"):
+            return []
+        return [Lazy("iterates", scene, (f.iterated, f.number, self._figure))]
 
     # Events
 

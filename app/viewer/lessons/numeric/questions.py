@@ -36,6 +36,7 @@ GOAL = (
 )
 DAMPING, ERROR = 0.1, 0.2
 SHARE = Unit("", 1.0, 2)
+ITERATES, METHOD = frozenset({"iterates"}), frozenset({"method"})  # what questions withhold
 _COMPARED: tuple[Method, ...] = ("newton", "damped")
 
 
@@ -79,6 +80,7 @@ def _missing(known: Example, units: Units) -> Step:
         "An iteration makes e smaller step by step.",
         pose=Pose(as_configuration(known.start)),
         practice="“Target here” and a moved arm below make any error you like.",
+        withheld=ITERATES,
     )
 
 
@@ -114,6 +116,7 @@ def _linear(known: Example) -> Step:
         f"component{'s' * (rows > 1)} of e. Newton wants e to vanish: J Δq = e.",
         Choice("How many steps Δq solve J Δq = e for this arm, away from singularities?", options),
         "With J = U diag(σ) Vᵀ, the step is V diag(1/σ) Uᵀ e. All other methods replace 1/σ by another function.",
+        withheld=METHOD,
     )
 
 
@@ -145,6 +148,7 @@ def _newton(known: Example, units: Units) -> Step:
         f"{run.count} iterations to {power(float(run.errors[-1]))}.",
         figure=error_chart(known.problem, [("newton", run)], units),
         pose=Pose(as_configuration(known.start)),
+        withheld=ITERATES,
     )
 
 
@@ -177,6 +181,7 @@ def _transpose(known: Example, units: Units) -> Step:
         f"{words}; Newton needs {newton.count}. Directions with a small σ die out slowly.",
         figure=error_chart(known.problem, [("newton", newton), ("transpose", run)], units),
         pose=Pose(as_configuration(known.start)),
+        withheld=METHOD,
     )
 
 
@@ -271,6 +276,7 @@ def _singular(units: Units) -> Step:
             "First step of Newton and of damped least squares near the straight arm",
             f"{unit.name} of θ₂",
         ),
+        withheld=METHOD,
     )
 
 
@@ -299,6 +305,7 @@ def _limits() -> Step:
         "That is why numeric solvers start from several configurations. Without the limits, an iteration may end "
         "outside them, or whole turns away.",
         practice="“Joint limits” below does it.",
+        withheld=ITERATES,
     )
 
 
@@ -319,6 +326,7 @@ def _basins() -> Step:
             1,
         ),
         practice="Open Basins below: compare Newton with damped least squares, and move λ and the step limit.",
+        withheld=ITERATES | {"basins"},
     )
 
 

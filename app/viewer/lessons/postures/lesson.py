@@ -81,20 +81,23 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
             Button(fix.label, self.event(self.on_remedy, i), fix.hint or None, key=str(i), of=self._asked)
             for i, fix in enumerate(f.offers)
         ]
+        go = {number: self.event(self.on_go, i) for i, number in enumerate(numbers)}
         nodes: list[Node] = [
             Html(remedies.html, (f.result, f.arm.branch, f.units)),
             Folder(None, fixes),
-            Buttons("Go", {number: self.event(self.on_go, i) for i, number in enumerate(numbers)}, MOVE_HINT,
-                    of=robot.id),
-            Html(html, (robot, f.postures, f.present, f.seen, f.units)),
-            Control("ghosts"),
-            self._toggles(numbers),
-        ]  # fmt: skip
+            *self.unless_asked(
+                "postures",
+                Buttons("Go", go, MOVE_HINT, of=robot.id),
+                Html(html, (robot, f.postures, f.present, f.seen, f.units), key="list"),
+                Control("ghosts"),
+                self._toggles(numbers),
+            ),
+        ]
         if has_cone(robot):
             nodes.append(Control("cone"))
             if self._cone is not None and self.settings.cone:
                 nodes.append(Html(cone_html, (self._cone.patch.share,), key="share"))
-        if not kin.branch_names(robot):
+        if not kin.branch_names(robot) and not self.hides("postures"):
             nodes.append(Html(_note, key="unnamed"))
         return nodes
 
@@ -110,8 +113,9 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         return Buttons("Show", events, GHOST_HINT, offered, of=f.robot.id)
 
     def scene(self) -> Sequence[Lazy]:
-        f = self.read
-        nodes = [Lazy("ghosts", self._ghosts, (f.robot, f.postures, f.seen - {f.present}))]
+        f, nodes = self.read, list[Lazy]()
+        if not self.hides("postures"):
+            nodes.append(Lazy("ghosts", self._ghosts, (f.robot, f.postures, f.seen - {f.present})))
         if self._cone is not None and self.settings.cone:
             nodes.append(Lazy("cone", Cone.nodes, (self._cone,)))
         return nodes

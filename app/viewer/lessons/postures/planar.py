@@ -42,6 +42,8 @@ def steps(robot: Robot, units: Units) -> tuple[Step, ...]:
     point = "the tool point" if robot.n == 2 else "axis 3"
     length, home = units.lengths, as_configuration(q)
     bend = abs(float(q[1]))
+    stretched = q.copy()
+    stretched[1] = min(max(0.0, robot.lower[1]), robot.upper[1])
     links = f"l₁ = {length.text(l1)} and l₂ = {length.text(l2)}"
     at = f"({length.number(x)}, {length.number(y)}){length.suffix}"
     ring = apart(Number(
@@ -73,10 +75,12 @@ def steps(robot: Robot, units: Units) -> tuple[Step, ...]:
         ),
         Step(
             "By hand: the triangle",
-            f"The links are {links}; {point} is at (x, y) = {at}, as it is at home.",
+            f"The links are {links}; {point} is to come to (x, y) = {at}.",
             triangle,
             "An arc cosine has two signs: two elbows.",
-            pose=Pose(home),
+            pose=Pose(as_configuration(stretched)),
+            end=Pose(home),
+            practice="The arm has come there, with one of them.",
         ),
         Step(
             "By hand: the other elbow",
@@ -85,5 +89,6 @@ def steps(robot: Robot, units: Units) -> tuple[Step, ...]:
             f"The elbow is on the other side now. {turned}",
             pose=Pose(home),
             end=Pose(as_configuration(other)),
+            withheld=frozenset({"postures"}),
         ),
     )

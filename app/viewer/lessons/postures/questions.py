@@ -32,6 +32,7 @@ from kin.units import Units
 GOAL = "You can say how many postures reach a target, what tells them apart, and why a target is missed."
 ROLL = math.radians(30.0)
 BEYOND = 1.2  # reaches: a target that no arm has
+POSTURES = frozenset({"postures"})  # what questions withhold
 
 
 class Facts(NamedTuple):
@@ -79,6 +80,7 @@ def _exact(robot: Robot, T: Array) -> tuple[Status, tuple[IKSolution, ...]]:
 def outline(robot: Robot, units: Units) -> Outline:
     """The outline for this arm."""
     known, home = facts(robot), as_configuration(robot.q_home)
+    posture = _posture(known)
     steps = (
         Step(
             "Signs",
@@ -87,13 +89,15 @@ def outline(robot: Robot, units: Units) -> Outline:
             practice="The list below has one line for each of them."
             if known.names
             else "The list shows the closest one.",
+            withheld=POSTURES,
         ),
         Step(
             "The posture of the arm",
             "Look at the arm at home: at its shoulder, its elbow and its wrist.",
-            _posture(known),
+            posture,
             pose=Pose(home),
             practice="The list below marks the posture of the arm on show.",
+            withheld=frozenset() if posture is None else POSTURES,
         ),
         Step(
             "Within the limits",
@@ -102,12 +106,14 @@ def outline(robot: Robot, units: Units) -> Outline:
             pose=Pose(home),
             end=None if known.other is None else Pose(known.other),
             practice="The arm has changed its posture, if it has another one there. The tool is where it was.",
+            withheld=POSTURES,
         ),
         Step(
             "Out of reach",
             f"The target moves straight away from the base, to {BEYOND:g} times the arm’s reach.",
             _missed(),
             practice="Drag the target away from the arm: above the list it says why it is missed, and what helps.",
+            withheld=POSTURES,
         ),
     )
     by_hand = planar.steps(robot, units) if planar.is_planar(robot) else ()

@@ -28,7 +28,10 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 
 STORE, UNITS = Store(), Units()
 ARMS = [STORE.get(name) for name in ("pioneer5", "ur5", "scara", "puma560")]
-KEYS = ("rotations", "screws", "redundancy", "velocity", "trajectories")
+KEYS = (
+    *("rotations", "screws", "redundancy", "velocity", "trajectories"),
+    *("numeric", "postures", "equations"),
+)
 MOVED = [lesson for lesson in LESSONS if lesson.key in KEYS]
 COMMON = {float(n) for n in range(-12, 13)}  # numbers of joints and steps
 # What is asked is to be read from the page.
@@ -123,6 +126,37 @@ def leaks(server: int, lesson: Any) -> dict[str, list[tuple[str, set[float]]]]:
 @pytest.mark.parametrize("lesson", MOVED, ids=lambda lesson: lesson.key)
 def test_no_answer_is_on_show_before_it_is_given(server: int, lesson: Any) -> None:
     assert leaks(server, lesson) == {}
+
+
+# What the panel and the scene have of each lesson when the first question has been answered, and never before.
+ANSWERED = {
+    "numeric": ("data-outcome=", 'data-plot="iterations"', "/numeric-"),
+    "postures": ("data-posture=", "data-branch=", "/postures-"),
+    "equations": ("data-equation=", 'aria-label="values here"', "/equations-"),
+}
+
+
+@pytest.mark.parametrize("key", ANSWERED)
+def test_what_a_lesson_draws_and_lists_comes_with_the_answer(server: int, key: str) -> None:
+    title = next(lesson.title for lesson in LESSONS if lesson.key == key)
+    marks = ANSWERED[key]
+
+    def shown(tab: FakeBrowser) -> list[bool]:
+        content = [str(m["props"].get("content")) for m in tab.gui.values() if m["props"].get("visible", True)]
+        nodes = [name for name in tab.nodes if name.count("/") > 1 and tab.visible.get(name, True)]
+        return [any(mark in text for text in (*content, *nodes)) for mark in marks]
+
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        if key != "equations":  # the first arm has the chapter's equations
+            tab.choose("PUMA 560")
+        tab.set("Lesson", title)
+        tab.wait(lambda: "data-asked" in tab.html)
+        tab.settle(0.3)
+        assert shown(tab) == [False, False, False]
+        press(tab, "reveal", "1")
+        tab.wait(lambda: all(shown(tab)))
+        assert "data-asked" not in tab.html
 
 
 def test_an_answer_on_show_is_found(server: int, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -40,6 +40,7 @@ def tab() -> Iterator[FakeBrowser]:
     with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port, FakeBrowser(port) as opened:
         opened.settle()
         opened.set("Lesson", "Equations")
+        opened.say("feature", ["guide", ["go", 1], 1])  # the first question withholds the equations
         opened.wait(lambda: "data-equation" in opened.html)
         yield opened
 
