@@ -14,6 +14,7 @@ import numpy as np
 
 from app.viewer.activity.activity import EXERCISES
 from app.viewer.feature import Feature
+from app.viewer.lessons.guide.feature import Guide
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.status import READY
 from app.viewer.room.member_page import MemberPage
@@ -121,7 +122,7 @@ class Follower:
         lesson = None if state.lesson == EXERCISES else state.lesson
         before = None if last is None or last.lesson == EXERCISES else last.lesson
         if lesson != before:
-            page.guard(lambda: page.lessons.open(lesson))
+            page.guard(lambda: page.lessons.open(lesson, state.features.get(Guide.key)))
         for feature in page.features:
             if feature.key != lesson and not feature.shared:
                 continue

@@ -61,8 +61,15 @@ class LessonChoice:
         self.guide: Guide | None = None
         self._left: dict[tuple[str, str], dict[str, object]] = {}  # progress, by lesson and robot
 
-    def choose(self, title: object) -> None:
-        """Open this lesson instead of the present one; raises `kin.InputError` for an unknown one."""
+    def choose(self, title: object, steps: dict[str, object] | None = None) -> None:
+        """Open this lesson instead of the present one.
+
+        Args:
+            steps: how far the visitor is in its steps, as `Guide.state`; None: as when it was closed last.
+
+        Raises:
+            kin.InputError: for an unknown title.
+        """
         if title not in self._titles:
             assign(self._choice, self._title)
             raise InputError("lesson", title, "one of " + ", ".join(self._titles))
@@ -70,7 +77,7 @@ class LessonChoice:
         self.remove()
         try:
             with self._parent:
-                self._show(next((each for each in choices() if each.title == title), None))
+                self._show(next((each for each in choices() if each.title == title), None), steps)
         finally:
             self._stage.activity.changed()
 
@@ -79,7 +86,7 @@ class LessonChoice:
         if self.guide is not None:
             self.guide.begin()
 
-    def _show(self, chosen: type[Feature] | None) -> None:
+    def _show(self, chosen: type[Feature] | None, steps: dict[str, object] | None) -> None:
         """Build what was chosen, in the container that is open; None: the overview."""
         activity, always = self._stage.activity, (self.exercises, self.courses)
         if chosen is None:
@@ -87,9 +94,8 @@ class LessonChoice:
         elif issubclass(chosen, Lesson):
             self._box = self._gui.add_folder(None)
             with self._box:
-                self.guide = Guide(self._stage, chosen)
-                if (left := self._left.get((chosen.key, self._stage.now.robot.id))) is not None:
-                    self.guide.restore(left)
+                left = self._left.get((chosen.key, self._stage.now.robot.id))
+                self.guide = Guide(self._stage, chosen, left if steps is None else steps)
                 self.shown = chosen(self._stage)
                 self.guide.attach(self.shown)
             activity.lesson = chosen.key
@@ -109,11 +115,11 @@ class LessonChoice:
     def _title(self) -> str:
         return next((each.title for each in choices() if each.key == self._stage.activity.lesson), NONE)
 
-    def open(self, key: str | None) -> None:
-        """Open the lesson with this key, if there is one; None: close the open one."""
+    def open(self, key: str | None, steps: dict[str, object] | None = None) -> None:
+        """Open the lesson with this key, if there is one, at its `steps`; None: close the open one."""
         chosen = next((each for each in choices() if each.key == key), None)
         if key is None or chosen is not None:
-            self.choose(NONE if chosen is None else chosen.title)
+            self.choose(NONE if chosen is None else chosen.title, steps)
 
     def remove(self) -> None:
         """Remove the open lesson or the exercises, or the overview if none is open."""

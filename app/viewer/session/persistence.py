@@ -13,6 +13,7 @@ from dataclasses import replace
 
 from app.exports.snippets import LOCAL, Moment, Service
 from app.shared.security import Rights
+from app.viewer.lessons.guide.feature import Guide
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice
 from app.viewer.session.history import same
@@ -110,7 +111,7 @@ class Persistence:
         if target is not None:
             self._guard(lambda: page.arm.restore_target(target, saved.q))
         if lesson is not None:
-            self._guard(lambda: page.lessons.open(lesson))
+            self._guard(lambda: page.lessons.open(lesson, saved.features.get(Guide.key)))
         for feature in page.features:
             if feature.key in saved.features:
                 state = saved.features[feature.key]

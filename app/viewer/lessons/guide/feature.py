@@ -29,14 +29,18 @@ JOINTS_HINT = "The sliders of the tab Move, here as well. A target is typed with
 
 
 class Guide(Feature):
-    """Goal, steps, predictions and check of one lesson."""
+    """Goal, steps, predictions and check of one lesson.
+
+    Args:
+        state: how far the visitor is, as `state` returned it; None: at the beginning.
+    """
 
     key = "guide"
     title = "Lesson"
     shared = True
     messages = frozenset({"go", "answer", "fields", "posture", "pick", "reveal", "pose", "restart"})
 
-    def __init__(self, stage: Stage, lesson: type[Lesson]) -> None:
+    def __init__(self, stage: Stage, lesson: type[Lesson], state: dict[str, object] | None = None) -> None:
         super().__init__(stage)
         self._lesson = lesson
         self._sheets: dict[str, Sheet] = {}
@@ -52,7 +56,7 @@ class Guide(Feature):
             pass
         self._joints: viser.GuiFolderHandle | None = None
         self._shown: Lesson | None = None
-        self._show()
+        self.restore(state or {})
 
     def attach(self, lesson: Lesson) -> None:
         """Let the lesson below the steps follow them."""

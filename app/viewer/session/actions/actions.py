@@ -11,6 +11,7 @@ from typing import Any
 
 import kin
 from app.viewer.feature import Feature, message_of
+from app.viewer.lessons.guide.feature import Guide
 from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice
 from app.viewer.scene.gizmo import Pull
@@ -165,7 +166,7 @@ class Actions:
             page.looks.use_view(state.view)
         self.adopt(state)
         if state.lesson != page.activity.lesson:
-            page.lessons.open(state.lesson)
+            page.lessons.open(state.lesson, state.features.get(Guide.key))
         for feature in page.features:
             wanted = without_results(state.features.get(feature.key, {}))
             if wanted != without_results(feature.state()):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -103,6 +104,18 @@ def test_a_link_without_a_configuration_opens_at_the_pose_of_the_step(server: in
         state = encode(PageState(robot="ur5", q=None if saved is None else np.array(saved), lesson="rotations"))
         with FakeBrowser(server, memory=json.dumps({"address": "http://127.0.0.1/", "state": state})) as tab:
             tab.wait(lambda expected=expected: "1. Columns" in tab.html and is_at(tab, UR5, expected))
+
+
+def test_a_link_builds_no_step_before_its_own(server: int) -> None:
+    saved = {"guide": {"step": 1, "revealed": ["2"], "joints": True}}
+    state = encode(PageState(robot="ur5", q=UR5.q_home, lesson="velocity", features=saved))
+    with FakeBrowser(server, memory=json.dumps({"address": "http://127.0.0.1/", "state": state})) as tab:
+        tab.wait(lambda: "2. Turning" in tab.html)
+        tab.settle()
+        sent = [str(props.get("content")) for m in tab.log if (props := m.get("props") or m.get("updates"))]
+        assert {number for text in sent for number in re.findall('data-step="([^"]*)"', text)} == {"2"}
+        assert tab.value("Joint sliders") is True
+        assert not any("data-asked" in text for text in sent), "nothing is withheld, as by the first question"
 
 
 def test_another_robot_comes_to_the_pose_of_the_open_step(server: int) -> None:
