@@ -41,7 +41,7 @@ from app.exercises.lessons import LESSONS
 from app.exercises.variant import Facts
 
 _FACT = re.compile(r"([a-z][a-z0-9_]*)(?:\([a-z0-9_, ]+\))?")
-_NEVER = ""  # the name of no pose
+_NONE = ""  # the name of no pose and of no figure
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class QuestionText:
 
 @dataclass(frozen=True)
 class StepText:
-    """A step, as in `app.viewer.lessons.guide.outline.Step`; `pose` and `end` are names of poses of the lesson.
+    """A step, as in `app.viewer.lessons.guide.outline.Step`; `pose`, `end` and `figure` are names of the lesson's.
 
     Attributes:
         questions: alternatives, of which the first whose condition holds is asked; there may be none.
@@ -70,6 +70,7 @@ class StepText:
     practice: Words
     pose: str
     end: str
+    figure: str
 
 
 @dataclass(frozen=True)
@@ -159,8 +160,9 @@ def _step(fields: Fields) -> StepText:
         questions,
         fields.words("shown", ""),
         fields.words("practice", ""),
-        fields.text("pose", _NEVER),
-        fields.text("end", _NEVER),
+        fields.text("pose", _NONE),
+        fields.text("end", _NONE),
+        fields.text("figure", _NONE),
     )
     fields.done()
     return step

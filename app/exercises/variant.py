@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,6 +18,8 @@ from kin import Robot
 from kin.differential.task import rank, task_jacobian
 from kin.transforms import Array
 from kin.units import Unit, Units, general
+
+_PLACE = re.compile(r"\{([^{}]*)\}")
 
 
 class Facts(Mapping[str, "float | Function"]):
@@ -150,11 +153,14 @@ class Variant:
         """A text of the file, with the drawn numbers in the reader's units."""
         if isinstance(template, Words):
             template = next(text for when, text in template.alternatives if self.number(when))
-        for name, word in self.words.items():
-            template = template.replace(f"{{{name}}}", word)
-        for name, quantity in self.values.items():
-            template = template.replace(f"{{{name}}}", quantity.text(units))
-        return template
+
+        def named(place: re.Match[str]) -> str:
+            name = place[1]
+            if name in self.words:
+                return self.words[name]
+            return self.values[name].text(units) if name in self.values else place[0]
+
+        return _PLACE.sub(named, template)
 
 
 class Joined(Mapping[str, "float | Function"]):

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from typing import TypeVar
+
+from markupsafe import Markup
 
 from app.exercises.expressions import Expression, Function
 from app.exercises.fields import ExerciseFileError
@@ -13,6 +16,8 @@ from app.exercises.variant import Quantity, Variant
 from app.viewer.lessons.guide.outline import Outline, Pose, Question, Step
 from kin import Robot
 from kin.units import Units
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -24,12 +29,14 @@ class LessonFacts:
         functions: of numbers, such as those of joints, which count from 1.
         words: texts, in the reader's units.
         poses: those that steps are about. A step that names none has the pose "home".
+        figures: those that are shown with an answer.
     """
 
     numbers: Mapping[str, float | Quantity]
     functions: Mapping[str, Function] = field(default_factory=dict)
     words: Mapping[str, str] = field(default_factory=dict)
     poses: Mapping[str, Pose] = field(default_factory=dict)
+    figures: Mapping[str, Markup] = field(default_factory=dict)
 
 
 @cache
@@ -48,7 +55,7 @@ def outline_of(lesson: str, robot: Robot, units: Units, facts: LessonFacts) -> O
     first = Variant(lesson, robot, robot.q_home, values, None, facts.functions, facts.words)
     words = {name: first.text(alias, units) for name, alias in text.words.items()}
     variant = Variant(lesson, robot, robot.q_home, values, None, facts.functions, {**facts.words, **words})
-    made = _Maker(text.file, variant, units, facts.poses)
+    made = _Maker(text.file, variant, units, facts)
     steps = tuple(made.step(step) for step in text.steps if made.holds(step.when))
     check = [one for one in map(made.first, text.check) if one is not None]
     return Outline(
@@ -67,7 +74,7 @@ class _Maker:
     file: str
     variant: Variant
     units: Units
-    poses: Mapping[str, Pose]
+    facts: LessonFacts
 
     def holds(self, when: Expression) -> bool:
         return bool(self.variant.number(when))
@@ -78,11 +85,11 @@ class _Maker:
     def question(self, text: QuestionText) -> Question:
         return text.kind.ask(self.variant.text(text.prompt, self.units), self.variant, self.units)
 
-    def pose(self, name: str) -> Pose | None:
-        """The pose of this name; None for no name."""
-        if name and name not in self.poses:
-            raise ExerciseFileError(self.file, "pose", name, f"one of {', '.join(sorted(self.poses))}")
-        return self.poses.get(name)
+    def named(self, field: str, name: str, offered: Mapping[str, T]) -> T | None:
+        """What the lesson has of this name; None for no name."""
+        if name and name not in offered:
+            raise ExerciseFileError(self.file, field, name, f"one of {', '.join(sorted(offered))}")
+        return offered.get(name)
 
     def step(self, text: StepText) -> Step:
         asked = self.first(text.questions)
@@ -94,8 +101,9 @@ class _Maker:
             body,
             None if asked is None else self.question(asked),
             shown,
-            self.pose(text.pose),
-            self.pose(text.end),
+            self.named("pose", text.pose, self.facts.poses),
+            self.named("end", text.end, self.facts.poses),
             practice,
+            self.named("figure", text.figure, self.facts.figures),
             withheld=frozenset() if asked is None else asked.withheld,
         )

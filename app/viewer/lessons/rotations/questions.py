@@ -1,4 +1,4 @@
-"""The facts that the texts of the lesson "Rotations and frames" use (``lesson.toml``): numbers of one tool pose."""
+"""The facts that the texts of the lesson "Rotations and frames" use (``lesson.toml``): numbers of a tool pose."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The facts that the texts of the lesson "Screws" use (``lesson.toml``): numbers of an arm with all joints at zero."""
+"""The facts that the texts of the lesson "Screws" use (``lesson.toml``): an arm with all joints at zero."""
 
 from __future__ import annotations
 
