@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
-from app.viewer.lessons.guide.outline import Mistake, Number, Pose, Step, apart
+import numpy as np
+
+from app.viewer.lessons.guide.outline import Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from kin import Robot
 from kin.robot import IDENTITY
@@ -12,7 +14,6 @@ from kin.transforms import Array
 from kin.units import Units
 
 STRAIGHT = 0.05  # rad: an elbow bent by less is no example
-ANGLE, LENGTH = math.radians(0.5), 0.002
 
 
 def is_planar(robot: Robot) -> bool:
@@ -34,61 +35,37 @@ def other_elbow(robot: Robot) -> Array:
     return q
 
 
-def steps(robot: Robot, units: Units) -> tuple[Step, ...]:
-    """The derivation in three steps, for the point that the second link has at home."""
-    l1, l2 = robot.rows[0].a, robot.rows[1].a
-    q, other = robot.q_home, other_elbow(robot)
+def facts(robot: Robot, units: Units) -> tuple[dict[str, float], dict[str, str]]:
+    """The numbers and the words of the steps by hand, for the point that the second link has at home.
+
+    For an arm that is not planar they mean nothing, and no text uses them.
+    """
+    l1, l2 = (robot.rows[0].a, robot.rows[1].a) if is_planar(robot) else (0.0, 0.0)
+    q = robot.q_home if is_planar(robot) else np.zeros(2)
     x, y = l1 * math.cos(q[0]) + l2 * math.cos(q[0] + q[1]), l1 * math.sin(q[0]) + l2 * math.sin(q[0] + q[1])
-    point = "the tool point" if robot.n == 2 else "axis 3"
-    length, home = units.lengths, as_configuration(q)
-    bend = abs(float(q[1]))
-    stretched = q.copy()
+    length = units.lengths
+    numbers = {
+        "planar": float(is_planar(robot)),
+        "l1": l1,
+        "l2": l2,
+        "bend": abs(float(q[1])),
+        "theta1": float(q[0]),
+        "other_theta1": float(other_elbow(robot)[0]) if is_planar(robot) else 0.0,
+    }
+    return numbers, {
+        "l1_shown": length.text(l1),
+        "l2_shown": length.text(l2),
+        "ring_inside": length.text(abs(l1 - l2)),
+        "ring_outside": length.text(l1 + l2),
+        "theta2_shown": units.angles.text(float(q[1])),
+        "point": "the tool point" if robot.n == 2 else "axis 3",
+        "place": f"({length.number(x)}, {length.number(y)}){length.suffix}",
+    }
+
+
+def poses(robot: Robot) -> dict[str, Pose]:
+    """The poses of these steps."""
+    stretched = robot.q_home.copy()
     stretched[1] = min(max(0.0, robot.lower[1]), robot.upper[1])
-    links = f"l₁ = {length.text(l1)} and l₂ = {length.text(l2)}"
-    at = f"({length.number(x)}, {length.number(y)}){length.suffix}"
-    ring = apart(Number(
-        f"How near can {point} come to axis 1?",
-        abs(l1 - l2), length, LENGTH,
-        "Folded back, the shorter link lies on the longer one.",
-        (Mistake(l1 + l2, "That is how far it can go: the outer radius of the ring."),),
-    ))  # fmt: skip
-    triangle = apart(Number(
-        "How large is θ₂, without its sign?",
-        bend, units.angles, ANGLE,
-        "The cosine rule: cos θ₂ = (x² + y² − l₁² − l₂²) / (2 l₁ l₂).",
-        (Mistake(math.pi - bend, "That is the angle inside the triangle; θ₂ is 0 for the stretched arm."),),
-    ))  # fmt: skip
-    elbow = apart(Number(
-        "Which θ₁ belongs to the other sign of θ₂?",
-        float(other[0]), units.angles, ANGLE,
-        "θ₁ = atan2(y, x) − atan2(l₂ sin θ₂, l₁ + l₂ cos θ₂), with the other sign of θ₂.",
-        (Mistake(float(q[0]), "That is θ₁ of the arm at home. The elbow is on the other side now."),),
-        whole_turns=True,
-    ))  # fmt: skip
-    turned = "The tool points elsewhere." if robot.n == 2 else "θ₃ keeps the direction of the tool."
-    return (
-        Step(
-            "By hand: the ring",
-            f"The links are {links}.",
-            ring,
-            f"The workspace of {point} is a ring from {length.text(abs(l1 - l2))} to {length.text(l1 + l2)}.",
-        ),
-        Step(
-            "By hand: the triangle",
-            f"The links are {links}; {point} is to come to (x, y) = {at}.",
-            triangle,
-            "An arc cosine has two signs: two elbows.",
-            pose=Pose(as_configuration(stretched)),
-            end=Pose(home),
-            practice="The arm has come there, with one of them.",
-        ),
-        Step(
-            "By hand: the other elbow",
-            f"{point.capitalize()} stays at (x, y) = {at}. At home, θ₂ is {units.angles.text(float(q[1]))}.",
-            elbow,
-            f"The elbow is on the other side now. {turned}",
-            pose=Pose(home),
-            end=Pose(as_configuration(other)),
-            withheld=frozenset({"postures"}),
-        ),
-    )
+    other = Pose(as_configuration(other_elbow(robot)))
+    return {"stretched": Pose(as_configuration(stretched)), "the other elbow": other}

@@ -385,6 +385,10 @@ def test_planar_arms_by_hand(robot: Robot) -> None:
     wrist = kin.link_frames(robot, np.stack([q, folded]))[:, 1, :3, 3]
     assert ring.answer == pytest.approx(np.linalg.norm(wrist[1]))
     assert bend.answer == pytest.approx(abs(q[1]))
+    assert steps[1].pose is not None
+    assert steps[1].end is not None
+    assert steps[1].pose.q[1] == 0.0, "the slider of the joint does not show the answer"
+    assert np.allclose(steps[1].end.q, q)
     assert steps[2].end is not None
     other = np.array(steps[2].end.q)
     assert theta.answer == pytest.approx(other[0])

@@ -65,7 +65,7 @@ def test_only_exact_solutions_are_counted(robot: Robot) -> None:
     turned[:3, :2] = T[:3, :2] @ [[math.cos(postures.ROLL), -math.sin(postures.ROLL)],
                                   [math.sin(postures.ROLL), math.cos(postures.ROLL)]]  # fmt: skip
     results = [kin.solve_ik(robot, target, q_seed=robot.q_home) for target in (T, turned)]
-    known = postures.facts(robot)
+    known = postures.solved(robot)
     exact = [len(result.solutions) if result.status == "solved" else 0 for result in results]
     assert [known.found, known.rolled] == exact
     assert right(question(postures.outline(robot, UNITS), "c3")) == ["Yes" if exact[1] else "No"]
