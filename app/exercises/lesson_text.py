@@ -14,12 +14,18 @@ same fields::
     title = "A column"
     text = "Column i of the Jacobian …"
     pose = "home"
-    withheld = ["jacobian"]
+    end = "moved"
+    figure = "speeds"
+    drawn = { pose = "moved", joint = 1 }
 
     [steps.question]
     kind = "number"
     prompt = "How fast is the tool point?"
     value = "speed"
+    withheld = ["jacobian"]
+
+Poses and figures are the lesson's own. The scene shows `end` with the right answer; `drawn` is a pose that shows a
+wrong one, with the answer as the value of a joint. What is `withheld` is nowhere to be seen before.
 
 Texts may be lists of alternatives with `when`, and so may questions. Steps and questions of the check with `when`
 are left out where it does not hold.
@@ -41,6 +47,7 @@ from app.exercises.lessons import LESSONS
 from app.exercises.variant import Facts
 
 _FACT = re.compile(r"([a-z][a-z0-9_]*)(?:\([a-z0-9_, ]+\))?")
+MOST_JOINTS = 12
 _NONE = ""  # the name of no pose and of no figure
 
 
@@ -60,6 +67,7 @@ class StepText:
 
     Attributes:
         questions: alternatives, of which the first whose condition holds is asked; there may be none.
+        drawn: how a wrong joint value is drawn: the pose that has it, and the number of the joint.
     """
 
     when: Expression
@@ -71,6 +79,7 @@ class StepText:
     pose: str
     end: str
     figure: str
+    drawn: tuple[str, int] | None
 
 
 @dataclass(frozen=True)
@@ -94,7 +103,8 @@ class LessonText:
     @property
     def poses(self) -> frozenset[str]:
         """The names of all poses."""
-        return frozenset(name for step in self.steps for name in (step.pose, step.end) if name)
+        drawn = [step.drawn[0] for step in self.steps if step.drawn is not None]
+        return frozenset(name for step in self.steps for name in (step.pose, step.end) if name) | {*drawn}
 
 
 class _Fields(Fields):
@@ -163,9 +173,16 @@ def _step(fields: Fields) -> StepText:
         fields.text("pose", _NONE),
         fields.text("end", _NONE),
         fields.text("figure", _NONE),
+        _drawn(fields.sub("drawn")) if fields.has("drawn") else None,
     )
     fields.done()
     return step
+
+
+def _drawn(fields: Fields) -> tuple[str, int]:
+    found = fields.text("pose"), fields.whole("joint", 1, MOST_JOINTS)
+    fields.done()
+    return found
 
 
 def _alternatives(fields: Fields) -> tuple[QuestionText, ...]:

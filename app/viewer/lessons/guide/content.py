@@ -13,7 +13,7 @@ from app.exercises.expressions import Expression, Function
 from app.exercises.fields import ExerciseFileError
 from app.exercises.lesson_text import LessonText, QuestionText, StepText, lesson_files, load_lesson
 from app.exercises.variant import Quantity, Variant
-from app.viewer.lessons.guide.outline import Outline, Pose, Question, Step
+from app.viewer.lessons.guide.outline import Drawn, Outline, Pose, Question, Step
 from kin import Robot
 from kin.units import Units
 
@@ -91,6 +91,13 @@ class _Maker:
             raise ExerciseFileError(self.file, field, name, f"one of {', '.join(sorted(offered))}")
         return offered.get(name)
 
+    def drawn(self, name: str, joint: int) -> Drawn:
+        """How a wrong value of a joint is drawn, which counts from 1."""
+        pose = self.named("drawn.pose", name, self.facts.poses)
+        if pose is None or joint > len(pose.q):
+            raise ExerciseFileError(self.file, "drawn.joint", joint, "a joint of the arm")
+        return Drawn(pose.q, joint - 1)
+
     def step(self, text: StepText) -> Step:
         asked = self.first(text.questions)
         title, body, shown, practice = (
@@ -106,4 +113,5 @@ class _Maker:
             practice,
             self.named("figure", text.figure, self.facts.figures),
             withheld=frozenset() if asked is None else asked.withheld,
+            drawn=None if text.drawn is None else self.drawn(*text.drawn),
         )

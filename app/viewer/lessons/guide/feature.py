@@ -12,6 +12,7 @@ import numpy as np
 import viser
 
 from app.exercises.typed import EntryError
+from app.viewer.declared.scene import Node, SceneView, label
 from app.viewer.exercises.drawing import GHOST, Drawing
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
@@ -22,9 +23,11 @@ from app.viewer.lessons.guide.progress import Progress
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.status import Notice
-from kin import InputError
+from app.viewer.skeleton import ghost
+from kin import InputError, fk
 from kin.transforms import from_position_wxyz
 
+WRONG, OPACITY = (213, 94, 0), 0.42  # of a copy of the arm that has a wrong answer
 JOINTS_HINT = "The sliders of the tab Move, here as well. A target is typed with Type a target, above the tabs."
 
 
@@ -46,6 +49,7 @@ class Guide(Feature):
         self._sheets: dict[str, Sheet] = {}
         self._progress = Progress(self._outline())
         self._drawing = Drawing(stage.client.scene, self.post)
+        self._copies = SceneView(stage.client.scene, "answer", self.post)
         gui = stage.client.gui
         self._goal = gui.add_html("")
         with gui.add_folder("Steps"):
@@ -112,6 +116,7 @@ class Guide(Feature):
         self._progress = Progress(self._outline())
         self._progress.at = min(at, len(self._progress.outline.steps))
         self._sheets.clear()
+        self._copies.remove()
         self._show()
 
     def on_style(self) -> None:
@@ -135,6 +140,7 @@ class Guide(Feature):
 
     def remove(self) -> None:
         self._drawing.clear()
+        self._copies.remove()
         self._show_joints(False)
         self.stage.activity.asked = frozenset()
 
@@ -218,6 +224,7 @@ class Guide(Feature):
         update_html(self._steps, views.steps_html(progress, {key: self._sheet(key) for key in open_}))
         forms = {key: progress.question(key).asked() for key in open_ if not progress.is_closed(key)}
         self._draw_ghost([key for key, asked in forms.items() if asked.form == "frame"])
+        self._draw_answer()
         if any(asked.form == "posture" for asked in forms.values()):
             assign(self._joints_box, True)
             self._show_joints(True)
@@ -232,6 +239,20 @@ class Guide(Feature):
             self._drawing.clear()
         elif not self._drawing.has_ghost:
             self._drawing.ghost(self._sheet(keys[0]).ghost, self.stage.now.robot.reach)
+
+    def _draw_answer(self) -> None:
+        """What is wrong with the answer to the step on show, if the step says how it is drawn."""
+        progress = self._progress
+        steps, key = progress.outline.steps, str(progress.at + 1)
+        drawn = steps[progress.at].drawn if progress.at < len(steps) else None
+        given, nodes = progress.given.get(key), list[Node]()
+        if drawn is not None and given is not None and not progress.is_closed(key):
+            robot, q = self.stage.now.robot, np.array(drawn.at(given))
+            nodes = [
+                ghost("arm", robot, q, WRONG, OPACITY),
+                label("words", "your answer", fk(robot, q)[:3, 3], anchor=None),
+            ]
+        self._copies.show(nodes)
 
     def _show_joints(self, on: bool) -> None:
         if on == (self._joints is not None):

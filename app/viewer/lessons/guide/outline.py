@@ -33,6 +33,7 @@ __all__ = [
     "WHOLE",
     "Choice",
     "Configuration",
+    "Drawn",
     "Mistake",
     "Number",
     "Option",
@@ -66,6 +67,23 @@ class Pose:
 
 
 @dataclass(frozen=True)
+class Drawn:
+    """How a wrong joint value is drawn: a copy of the arm that has it, beside the arm on show.
+
+    Attributes:
+        q: the configuration ``(n,)`` of the copy, apart from this joint.
+        joint: the index of the joint.
+    """
+
+    q: Configuration
+    joint: int
+
+    def at(self, value: float) -> Configuration:
+        """The configuration with a typed value (rad or m)."""
+        return tuple(value if i == self.joint else other for i, other in enumerate(self.q))
+
+
+@dataclass(frozen=True)
 class Step:
     """One step of a lesson. Opening it brings the scene to its pose, as one step of undo.
 
@@ -77,6 +95,7 @@ class Step:
         end: what the scene shows when the answer is revealed.
         practice: what to see or to do on the page then, in words that follow `shown`.
         figure: a figure that belongs to `shown`.
+        drawn: what the scene shows of a wrong answer, beside what it shows anyway.
         withheld: facts that nothing in the page shows while the question is open:
             names of `app.viewer.activity.activity.FACTS`.
     """
@@ -90,6 +109,7 @@ class Step:
     practice: str = ""
     figure: Markup | None = None
     withheld: frozenset[str] = frozenset()
+    drawn: Drawn | None = None
 
 
 @dataclass(frozen=True)

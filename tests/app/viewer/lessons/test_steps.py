@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -20,7 +21,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
-from app.viewer.lessons.guide.outline import Outline, Pose, Step
+from app.viewer.lessons.guide.outline import Number, Outline, Pose, Step
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.server import ViewerServer
@@ -128,6 +129,52 @@ def test_another_robot_comes_to_the_pose_of_the_open_step(server: int) -> None:
         pose = lesson.outline(UR5, DEGREES).pose_of(0)
         assert pose is not None
         tab.wait(lambda: is_at(tab, UR5, pose.q))
+
+
+def test_a_wrong_angle_is_drawn_beside_the_arm(server: int) -> None:
+    planar = kin.get_robot("planar2r")
+    lesson = next(each for each in LESSONS if each.key == "postures")
+    outline = lesson.outline(planar, DEGREES)
+    at = next(i for i, step in enumerate(outline.steps) if step.title == "By hand: the other elbow")
+    l1, l2 = (row.a for row in planar.rows)
+
+    def ghosts(tab: FakeBrowser) -> list[str]:
+        return [name for name in tab.nodes if re.match("/answer-.*/", name) and tab.visible.get(name, True)]
+
+    def corners(theta1: float) -> np.ndarray:
+        """Base, elbow and tool of the copy, in the plane: its elbow is bent the other way."""
+        first, second = theta1, theta1 - planar.q_home[1]
+        elbow = l1 * np.array([math.cos(first), math.sin(first)])
+        return np.stack([elbow, elbow + l2 * np.array([math.cos(second), math.sin(second)])])
+
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.choose(planar.name)
+        tab.set("Lesson", lesson.title)
+        press(tab, ["go", at], at)
+        tab.wait(lambda: "By hand: the other elbow" in tab.html)
+        assert ghosts(tab) == []
+        for degrees in (10.0, -35.0):
+            press(tab, ["fields", str(at + 1), int(degrees)], [[str(degrees)]])
+            elbow, tool = corners(math.radians(degrees))
+
+            def drawn(elbow: np.ndarray = elbow, tool: np.ndarray = tool) -> bool:
+                names = {name.rpartition("/")[2]: name for name in ghosts(tab)}
+                if not {"arm", "words"} <= names.keys():
+                    return False
+                pieces = np.asarray(tab.nodes[names["arm"]]["props"]["batched_positions"]).reshape(-1, 3)
+                at_elbow = np.abs(pieces[:, :2] - elbow).max(axis=1).min() < 1e-5
+                return bool(at_elbow) and np.allclose(tab.poses[names["words"]]["position"][:2], tool, atol=1e-6)
+
+            tab.wait(drawn)
+            assert is_at(tab, planar, planar.q_home), "the arm stays at the point"
+        question = outline.steps[at].question
+        assert isinstance(question, Number)
+        press(tab, ["fields", str(at + 1), 3], [[question.value_text]])
+        tab.wait(lambda: ghosts(tab) == [])
+        end = outline.steps[at].end
+        assert end is not None
+        tab.wait(lambda: is_at(tab, planar, end.q))
 
 
 def asked(form: str, units: Units) -> Question:
