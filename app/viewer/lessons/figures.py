@@ -28,33 +28,37 @@ figure, as seen in the default view, takes the next of a few places, and stays t
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
 
 import numpy as np
 import viser
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from app.viewer.labels import add_label
-from app.viewer.lessons.label_room import HEIGHT, label_room
+from app.viewer.lessons.figure_shapes import (
+    AMBER,
+    ARC,
+    ASIDE,
+    BLUE,
+    GREY,
+    LINE,
+    MEASURE,
+    POINT,
+    RADIUS,
+    TINY,
+    Color,
+    above,
+    along,
+    arc,
+    beyond,
+    ruler,
+    turned,
+    unit,
+)
+from app.viewer.lessons.label_room import Labels
 from app.viewer.viser_patches import assign
 from kin.axes import cross, perpendicular_to
 from kin.transforms import Array
 from kin.units import Units
-
-Color = tuple[int, int, int]
-Segments = NDArray[np.float32]
-
-# Okabe and Ito's colours, of middle brightness: they show on a light and on a dark background.
-BLUE, VERMILION, GREEN, AMBER, PURPLE, SKY = (
-    (0, 114, 178), (213, 94, 0), (0, 158, 115), (230, 159, 0), (204, 121, 167), (86, 180, 233),
-)  # fmt: skip
-GREY = (128, 134, 145)
-ARC = 32  # segments
-# In units of the arm's thickness.
-ASIDE, RADIUS, POINT = 4.0, 6.0, 0.55
-LINE, MEASURE = 0.26, 0.42  # thickness
-BEYOND = 1.2  # from the end of a line to its label
-_TINY = 1e-9
 
 
 class Figure:
@@ -69,7 +73,7 @@ class Figure:
         self.scene, self.root, self.size = scene, root, size
         self._top = scene.add_frame(root, show_axes=False)
         self._count = 0
-        self.labels: dict[Part, Array] = {}  # where each label on show is
+        self.labels = Labels(size)
 
     def line(self, text: str = "", color: Color = GREY, width: float = LINE) -> Line:
         """A straight line, such as an axis, with its label beyond the end."""
@@ -106,17 +110,6 @@ class Figure:
         none = np.zeros((count, 2, 3), np.float32)
         return self.scene.add_line_segments(self.name(), none, color, thickness=width * self.size, visible=False)
 
-    def room(self, part: Part, text: str, at: Array) -> float:
-        """The room of a part's label at a point ``(3,)``: below 1 it covers another label in the default view."""
-        return min(
-            (
-                label_room(at - place, text, other.label.text, self.size)
-                for other, place in self.labels.items()
-                if other is not part
-            ),
-            default=math.inf,
-        )
-
 
 class Part:
     """A part of a figure: its nodes, and the label."""
@@ -125,7 +118,6 @@ class Part:
         self.size = figure.size
         self.text = text
         self._figure = figure
-        self._place = 0  # which of the label's places it has
         self.label = add_label(
             figure.scene, figure.name(), text, anchor="center-center", visible=False, scale=scale
         )
@@ -140,8 +132,7 @@ class Part:
         """Hide the part until it is shown again."""
         for node in (*self.nodes, self.label):
             set_visible(node, False)
-        self._figure.labels.pop(self, None)
-        self._place = 0
+        self._figure.labels.leave(self)
 
     def _write(self, text: str, *places: Array) -> None:
         """Show the nodes, and the label with this text at the first of these points ``(3,)`` that has room."""
@@ -151,17 +142,9 @@ class Part:
         if text != self.label.text:
             self.label.text = text
         if not text:
-            self._figure.labels.pop(self, None)
-            return
-        order = [self._place, *(k for k in range(len(places)) if k != self._place)]
-        rooms = dict.fromkeys(order, -1.0)
-        for k in order:
-            rooms[k] = self._figure.room(self, text, places[k])
-            if rooms[k] >= 1.0:
-                break
-        self._place = max(rooms, key=rooms.__getitem__)
-        at = self._figure.labels[self] = places[self._place]
-        assign(self.label, at)
+            self._figure.labels.leave(self)
+        else:
+            assign(self.label, self._figure.labels.place(self, text, places))
 
 
 class Line(Part):
@@ -177,12 +160,11 @@ class Line(Part):
         a, b = np.asarray(start, float), np.asarray(end, float)
         self.text = self.text if text is None else text
         self._line.points = np.array([[a, b]], np.float32)
-        way = self.size * _unit(b - a)
-        self._write(self.text, b + BEYOND * way, b + (BEYOND + HEIGHT) * way, a - BEYOND * way)
+        self._write(self.text, *beyond(a, b, self.size))
 
     def show_axis(self, point: ArrayLike, direction: ArrayLike, reach: float, text: str | None = None) -> None:
         """Draw an axis through a point ``(3,)``, to a distance `reach` (m) on both sides."""
-        at, way = np.asarray(point, float), reach * _unit(np.asarray(direction, float))
+        at, way = np.asarray(point, float), reach * unit(np.asarray(direction, float))
         self.show(at - way, at + way, text)
 
 
@@ -212,16 +194,13 @@ class Dimension(Part):
             value: what the label says (m), where it has a sign; otherwise the distance.
             text: the whole label, instead of the name and the value.
         """
-        a, b, e = np.asarray(start, float), np.asarray(end, float), _unit(np.asarray(aside, float))
-        lines = ruler(a, b, ASIDE * self.size * e)
+        a, b = np.asarray(start, float), np.asarray(end, float)
+        off = ASIDE * self.size * unit(np.asarray(aside, float))
+        lines = ruler(a, b, off)
         self._witness.points, self._measure.points = lines[:2], lines[2:]
         value = float(np.linalg.norm(b - a)) if value is None else value
         words = f"{self.text} = {units.lengths.text(value)}" if text is None else text
-        off = ASIDE * self.size * e
-        self._write(
-            words,
-            *(a + share * (b - a) + far * off for far in (1.35, 2.0, 2.7) for share in (0.5, 0.2, 0.8)),
-        )
+        self._write(words, *along(a, b, off))
 
 
 class Angle(Part):
@@ -269,10 +248,10 @@ class Angle(Part):
     ) -> None:
         """Draw the angle at a corner of a triangle, between the sides to two points ``(3,)``."""
         at = np.asarray(corner, float)
-        a, b = _unit(np.asarray(one, float) - at), _unit(np.asarray(other, float) - at)
+        a, b = unit(np.asarray(one, float) - at), unit(np.asarray(other, float) - at)
         normal = cross(a, b)
         sine = float(np.linalg.norm(normal))
-        about = normal / sine if sine > _TINY else perpendicular_to(a)
+        about = normal / sine if sine > TINY else perpendicular_to(a)
         self.show(at, a, about, math.atan2(sine, float(a @ b)), units, radius=radius, text=text)
 
 
@@ -292,9 +271,7 @@ class Point(Part):
         point = np.asarray(at, float)
         self.text = self.text if text is None else text
         assign(self._ball, point)
-        way = _unit(np.asarray(beside, float))
-        near, far = self._radius + BEYOND * self.size, self._radius + (BEYOND + HEIGHT) * self.size
-        self._write(self.text, point + near * way, point - near * way, point + far * way, point - far * way)
+        self._write(self.text, *above(point, beside, self._radius, self.size))
 
 
 class Face:
@@ -323,69 +300,6 @@ class Face:
     def hide(self) -> None:
         """Hide it until it is shown again."""
         set_visible(self.node, False)
-
-
-def arc(corner: ArrayLike, start: ArrayLike, about: ArrayLike, radius: float, angle: float) -> Segments:
-    """A rotation: first and last side, the arc, and its arrow head ``(ARC + 4, 2, 3)``."""
-    way = radius * turned(start, about, np.linspace(0.0, angle, ARC + 1))
-    along = _unit(way[-1] - way[-2])
-    back = min(0.16 * radius, radius * abs(angle) / 2)
-    lines = np.zeros((ARC + 4, 2, 3))
-    lines[:2, 1] = 1.12 * way[[0, -1]]
-    lines[2:-2, 0], lines[2:-2, 1] = way[:-1], way[1:]
-    lines[-2:, 0] = way[-1]
-    lines[-2:, 1] = way[-1] - back * along + np.array([[-0.5], [0.5]]) * back / radius * way[-1]
-    moved: Segments = (lines + np.asarray(corner, float)).astype(np.float32)
-    return moved
-
-
-def ruler(start: Array, end: Array, aside: Array) -> Segments:
-    """A distance: two extension lines, the dimension line at `aside` ``(3,)``, and arrow heads ``(7, 2, 3)``."""
-    far, length = float(np.linalg.norm(aside)), float(np.linalg.norm(end - start))
-    e, y = _unit(end - start), _unit(aside)
-    back = min(0.16 * far, length / 2)
-    barbs = [
-        (tip + aside, tip + aside + way * back * e + side * 0.4 * back * y)
-        for tip, way in ((start, 1.0), (end, -1.0))
-        for side in (-1.0, 1.0)
-    ]
-    witness = [(start, start + 1.12 * aside), (end, end + 1.12 * aside)]
-    return np.array([*witness, (start + aside, end + aside), *barbs], dtype=np.float32)
-
-
-def turned(start: ArrayLike, about: ArrayLike, angles: ArrayLike) -> Array:
-    """The direction `start`, perpendicular to `about`, turned by each angle about it ``(k, 3)``."""
-    z, x = _unit(np.asarray(about, float)), _unit(np.asarray(start, float))
-    y, each = cross(z, x), np.asarray(angles, float)[:, None]
-    return np.asarray(np.cos(each) * x + np.sin(each) * y)
-
-
-def clear_of(start: ArrayLike, end: ArrayLike, others: Iterable[ArrayLike]) -> Array:
-    """The direction ``(3,)`` perpendicular to a line in which a dimension is clear of points ``(3,)``, such as the
-    joints: away from their middle. Where they are on the line themselves, any perpendicular direction.
-    """
-    a, b = np.asarray(start, float), np.asarray(end, float)
-    e = _unit(b - a)
-    away = (a + b) / 2 - np.mean([np.asarray(each, float) for each in others], axis=0)
-    across = away - (away @ e) * e
-    far = float(np.linalg.norm(across))
-    if far > 1e-3 * max(float(np.linalg.norm(away)), float(np.linalg.norm(b - a)), _TINY):
-        return np.asarray(across / far)
-    return perpendicular_to(e) if e.any() else np.array([0.0, 0.0, 1.0])
-
-
-def plane_corners(center: ArrayLike, normal: ArrayLike, reach: float) -> Sequence[Array]:
-    """The corners of a square about a center, of 2 `reach` (m) each side, for a `Face` of four corners."""
-    at, z = np.asarray(center, float), _unit(np.asarray(normal, float))
-    x = perpendicular_to(z)
-    y = cross(z, x)
-    return [at + reach * (i * x + j * y) for i, j in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
-
-
-def _unit(v: Array) -> Array:
-    """The unit vector, or zero."""
-    length = float(np.linalg.norm(v))
-    return np.asarray(v / length if length > _TINY else np.zeros(3))
 
 
 def set_visible(node: viser.SceneNodeHandle, visible: bool) -> None:

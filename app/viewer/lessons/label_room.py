@@ -1,6 +1,12 @@
-"""The room between labels of a scene. Their size on screen is constant; here it is that of a small window."""
+"""The room between labels of a scene, and the places that they take.
+
+Their size on screen is constant; here it is that of a small window.
+"""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Collection, Hashable, Sequence
 
 import numpy as np
 
@@ -23,3 +29,49 @@ def label_room(between: Array, one: str, other: str, size: float) -> float:
     """
     width = LETTER * (len(one) + len(other)) / 2.0 + 0.5
     return max(abs(float(between @ _RIGHT)) / width, abs(float(between @ _UPWARDS)) / HEIGHT) / size
+
+
+class Labels:
+    """Where the labels of one figure are. Each has a few places, and stays in one while there is room.
+
+    Args:
+        size: the arm's thickness (m).
+    """
+
+    def __init__(self, size: float) -> None:
+        self._size = size
+        self._shown: dict[Hashable, tuple[int, Array, str]] = {}
+
+    def __contains__(self, key: Hashable) -> bool:
+        return key in self._shown
+
+    def at(self, key: Hashable) -> Array:
+        """Where the label is ``(3,)``."""
+        return self._shown[key][1]
+
+    def place(self, key: Hashable, text: str, places: Sequence[Array]) -> Array:
+        """The first of these points ``(3,)`` that has room for a label; where it is comes first."""
+        first = self._shown[key][0] if key in self._shown else 0
+        rooms = {}
+        for k in (first, *(k for k in range(len(places)) if k != first)):
+            rooms[k] = self._room(key, text, places[k])
+            if rooms[k] >= 1.0:
+                break
+        best = max(rooms, key=rooms.__getitem__)
+        self._shown[key] = best, places[best], text
+        return places[best]
+
+    def leave(self, key: Hashable) -> None:
+        """A label is no longer on show, and takes no room."""
+        self._shown.pop(key, None)
+
+    def keep(self, keys: Collection[Hashable]) -> None:
+        """Only these labels are on show."""
+        for key in [key for key in self._shown if key not in keys]:
+            del self._shown[key]
+
+    def _room(self, key: Hashable, text: str, at: Array) -> float:
+        """The room of a label at a point ``(3,)``: below 1 it covers another one in the default view."""
+        others = (shown for other, shown in self._shown.items() if other != key)
+        rooms = (label_room(at - place, text, words, self._size) for _, place, words in others)
+        return min(rooms, default=math.inf)

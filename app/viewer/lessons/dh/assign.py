@@ -19,7 +19,8 @@ from app.viewer.lessons.dh.attempt import Attempt, error_of, table_robot
 from app.viewer.lessons.dh.axes_drawing import AxesDrawing, axis_names
 from app.viewer.lessons.dh.drawing import PLACED, moving_frame, pose, triad_colors, triads
 from app.viewer.lessons.dh.steps import ORDERS, elementary, low
-from app.viewer.lessons.figures import AMBER, BLUE, VERMILION, Angle, Dimension, Figure, clear_of
+from app.viewer.lessons.figure_shapes import AMBER, BLUE, VERMILION, clear_of
+from app.viewer.lessons.figures import Angle, Dimension, Figure
 from app.viewer.panel import update_html
 from app.viewer.scene.meshes import body
 from app.viewer.views.templates import render

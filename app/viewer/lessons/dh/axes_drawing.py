@@ -8,7 +8,8 @@ from itertools import pairwise
 from app.exercises.rows import Line
 from app.viewer.lessons.dh.normals import Normal, axis_lines, common_normal
 from app.viewer.lessons.dh.steps import low
-from app.viewer.lessons.figures import AMBER, PURPLE, Figure
+from app.viewer.lessons.figure_shapes import AMBER, PURPLE
+from app.viewer.lessons.figures import Figure
 from app.viewer.scene.camera import Sphere
 from app.viewer.scene.meshes import body
 from kin import Robot

@@ -29,7 +29,8 @@ from app.viewer.lessons.dh.steps import (
     reread,
 )
 from app.viewer.lessons.dh.views import ABOUT_X, ABOUT_Z, TITLES
-from app.viewer.lessons.figures import GREY, Angle, Dimension, Figure, Segments, clear_of
+from app.viewer.lessons.figure_shapes import GREY, Segments, clear_of
+from app.viewer.lessons.figures import Angle, Dimension, Figure
 from app.viewer.lessons.label_room import label_room
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.camera import DIRECTION

@@ -9,7 +9,8 @@ import numpy as np
 import viser
 
 from app.viewer.lessons import figures
-from app.viewer.lessons.figures import AMBER, BLUE, GREEN, GREY, PURPLE, SKY, VERMILION, Figure
+from app.viewer.lessons.figure_shapes import AMBER, BLUE, GREEN, GREY, LINE, PURPLE, SKY, VERMILION
+from app.viewer.lessons.figures import Figure
 from app.viewer.lessons.inverse.arm import Arm
 from app.viewer.lessons.inverse.shapes import Angle, Face, Length, Line, Point, Shape, shapes
 from app.viewer.lessons.inverse.sheet import Derivation, StepKey
@@ -99,7 +100,7 @@ class Drawing:
             case Line(bone=True):
                 return figure.line("", SKY, BONE)
             case Line():
-                return figure.line(label, color or GREY, THIN if name in ("down", "SW", "x0") else figures.LINE)
+                return figure.line(label, color or GREY, THIN if name in ("down", "SW", "x0") else LINE)
             case Length():
                 return figure.dimension(label, color or BLUE)
             case Angle():

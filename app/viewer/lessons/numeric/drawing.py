@@ -6,7 +6,7 @@ import numpy as np
 
 from app.viewer.declared.scene import Node, axes, bars
 from app.viewer.lessons.figure_nodes import FigureNodes
-from app.viewer.lessons.figures import AMBER, BLUE, GREEN
+from app.viewer.lessons.figure_shapes import AMBER, BLUE, GREEN
 from app.viewer.lessons.numeric.facts import Iterated
 from app.viewer.skeleton import cylinder, places, skeleton
 from kin import Robot, fk

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.viewer.declared.scene import Node, axes, frame, label
 from app.viewer.lessons.figure_nodes import FigureNodes
-from app.viewer.lessons.figures import AMBER, BLUE, GREEN, PURPLE
+from app.viewer.lessons.figure_shapes import AMBER, BLUE, GREEN, PURPLE
 from app.viewer.lessons.rotations.conventions import axis_angle
 from app.viewer.lessons.rotations.facts import RotationsFacts
 from app.viewer.scene.camera import Sphere

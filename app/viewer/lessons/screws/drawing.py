@@ -6,7 +6,7 @@ import numpy as np
 
 from app.viewer.declared.scene import Color, Node, arrows, axes, mesh
 from app.viewer.lessons.figure_nodes import FigureNodes
-from app.viewer.lessons.figures import GREY, clear_of
+from app.viewer.lessons.figure_shapes import GREY, clear_of
 from app.viewer.lessons.screws.facts import ScrewsFacts
 from app.viewer.lessons.screws.product import foot
 from app.viewer.lessons.velocity.drawing import ring_arrow, wxyz_along

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from markupsafe import Markup
 
-from app.viewer.lessons.figures import GREY
+from app.viewer.lessons.figure_shapes import GREY
 from app.viewer.lessons.screws.drawing import GHOST, VELOCITY
 from app.viewer.lessons.screws.product import Form, foot, product
 from app.viewer.scene.bodies.parts import joint_color

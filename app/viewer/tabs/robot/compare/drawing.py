@@ -7,7 +7,8 @@ from itertools import count
 import numpy as np
 import viser
 
-from app.viewer.lessons.figures import BLUE, VERMILION, Figure
+from app.viewer.lessons.figure_shapes import BLUE, VERMILION
+from app.viewer.lessons.figures import Figure
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.meshes import body
 from app.viewer.skeleton import cylinder, places, skeleton
