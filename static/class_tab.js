@@ -50,6 +50,7 @@
   let draft = read(DRAFT, { place: "", cells: {} });
   let sent = new Set(); // ids of answers that were sent over this connection
   let filled = null; // the block of the question that has the draft
+  const member = () => $("[data-class-bar]:not([data-class-bar=closed])");
   const student = () => $("[data-class-bar]:not([data-class-bar=teacher], [data-class-bar=closed])");
   /** The exercise on show and its numbers. */
   function place() {
@@ -109,8 +110,9 @@
   function tell() {
     const late = answers.filter((one) => Date.now() - one.since >= WAITING).length;
     const waits = answers.length && (late || !online) ? "Your answer is waiting, and is sent when the connection is back." : "";
-    const words = online ? waits : `No connection. ${waits || "What you typed and opened is kept."}`;
-    const shown = student() ? words : "";
+    const kept = student() ? "What you typed and opened is kept." : "Students can go on by themselves. What you see here is from before.";
+    const words = online ? waits : `No connection. ${waits || kept}`;
+    const shown = member() ? words : "";
     document.documentElement.toggleAttribute("data-kb-offline", Boolean(shown) && !online);
     if (note.textContent !== shown) note.textContent = shown;
     note.hidden = !shown;
@@ -121,7 +123,7 @@
     tell();
   }
   async function ask() {
-    if (student() && !document.hidden) {
+    if (member() && !document.hidden) {
       try {
         await fetch("../livez", { cache: "no-store", signal: AbortSignal.timeout(PATIENCE) });
         become(true);

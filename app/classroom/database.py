@@ -3,6 +3,10 @@
 Nothing happens before the first transaction: then the folder and the file are made, and migrations are run.
 Several processes may do so at the same time; the database makes them wait for each other. Every error of the
 database becomes `ClassroomUnavailable`, with a sentence for the page and the error itself in the log.
+
+SQLite lets one transaction write at a time. The others look again after pauses that grow to a tenth of a second,
+and while many come, one of them may find the database locked each time until its patience ends. So the threads of
+a process write in turns: only one of them looks, and all others wait for it.
 """
 
 from __future__ import annotations
@@ -30,10 +34,12 @@ from app.classroom.views import ClassroomUnavailable
 logger = logging.getLogger("kinboard.classroom")
 
 WAIT = 3.0  # seconds for a lock, or for a connection
+PATIENCE = 10.0  # seconds for what a whole class does in the same moment, such as joining
 ERASE_WAIT = 100  # milliseconds for short readers; writers wait too
 LOG_EVERY = 10.0  # seconds between two lines about errors
 _MIGRATION_LOCK = 0x6B696E  # of PostgreSQL
 _KEY = "key"
+BUSY = "The classroom's database has too much to do at present. Try again in a moment."
 NEWER = (
     "The classroom's database was written by a newer version of Kinboard than this one. "
     "Tell the operator of this service; everything else works."
@@ -61,6 +67,7 @@ class Database:
         self._engine: Engine | None = None
         self._inode: tuple[int, int] | None = None
         self._lock = threading.Lock()
+        self._writing = threading.Lock()  # held by the thread of this process that may write into SQLite's file
         self._logged = -LOG_EVERY
 
     @contextlib.contextmanager
@@ -71,22 +78,39 @@ class Database:
             yield connection
 
     @contextlib.contextmanager
-    def write(self, durable: bool = True) -> Iterator[Connection]:
+    def write(self, durable: bool = True, wait: float | None = None) -> Iterator[Connection]:
         """A transaction that is stored when the block ends; raises `ClassroomUnavailable`.
 
         Args:
             durable: whether it survives a power failure; False: it may be lost together with all later ones.
+            wait: seconds to wait for others that write; None: `WAIT`.
         """
-        with self._words(), self._ready().connect() as connection:
+        end = steady() + (WAIT if wait is None else wait)
+        with self._words(), self._turn(end), self._ready().connect() as connection:
             if self._file is not None:
                 connection.execution_options(kinboard_write=True)
                 level = "FULL" if durable else "NORMAL"
                 raw = connection.connection.driver_connection
                 assert raw is not None
                 raw.execute(f"PRAGMA synchronous={level}")
+                raw.execute(f"PRAGMA busy_timeout={max(1, int(1000 * (end - steady())))}")
             with connection.begin():
                 yield connection
                 self._still_there()
+
+    @contextlib.contextmanager
+    def _turn(self, end: float) -> Iterator[None]:
+        """Wait until no other thread of this process writes into SQLite's file, or until `end` (`steady`'s)."""
+        if self._file is None:  # a server of databases has a queue of its own
+            yield
+            return
+        if not self._writing.acquire(timeout=max(0.0, end - steady())):
+            self._log("other writers of this process kept it for too long")
+            raise ClassroomUnavailable(BUSY)
+        try:
+            yield
+        finally:
+            self._writing.release()
 
     def key(self) -> str:
         """The key that signs tokens."""

@@ -11,7 +11,7 @@ from sqlalchemy import Connection, Text, cast, delete, func, insert, select, upd
 
 from app.classroom import erasure, marks
 from app.classroom.clock import now
-from app.classroom.database import Database
+from app.classroom.database import PATIENCE, Database
 from app.classroom.tables import TOKEN_BYTES, Attempt, LtiSeat, Room, Seat
 from app.classroom.tokens import Tokens, new_code, read_code
 from app.classroom.views import (
@@ -147,7 +147,7 @@ class Rooms:
             RefusedError: the alias is invalid, or the room is full.
         """
         code = read_code(code)
-        with self._database.write() as connection:
+        with self._database.write(wait=PATIENCE) as connection:
             query = select(Room.id).where(Room.code == code, Room.ends > now())
             room = connection.scalar(query.with_for_update())
             if room is None:

@@ -9,7 +9,7 @@ from sqlalchemy import delete, func, insert, select, update
 from sqlalchemy.exc import IntegrityError
 
 from app.classroom.clock import now
-from app.classroom.database import Database
+from app.classroom.database import PATIENCE, Database
 from app.classroom.lti.contents import Content
 from app.classroom.lti.launches import Launch
 from app.classroom.rooms import LONGEST_ALIAS, LONGEST_TITLE, Rooms, clean_name
@@ -46,7 +46,7 @@ class LtiSeats:
 
     def use_nonce(self, nonce: str, expires: float) -> bool:
         """Use up a nonce until a time of rooms; False if it was used before, by whichever process."""
-        with self._database.write() as connection:
+        with self._database.write(wait=PATIENCE) as connection:
             connection.execute(delete(LtiNonce).where(LtiNonce.expires < now()))
             try:
                 with connection.begin_nested():
@@ -85,7 +85,7 @@ class LtiSeats:
             "course": [] if content is None else [*content.exercises],
             "seat_id": ticket.seat,
         }
-        with self._database.write() as connection:
+        with self._database.write(wait=PATIENCE) as connection:
             changed = connection.execute(update(LtiSeat).where(LtiSeat.id == user).values(**values))
             if not changed.rowcount:
                 connection.execute(insert(LtiSeat).values(id=user, **values))
@@ -118,7 +118,7 @@ class LtiSeats:
             return found.id, found.code
         made = self._rooms.open(_named(launch.title, LONGEST_TITLE, "Class"), LIFE)
         state = {} if content is None else content.state(made.created)
-        with self._database.write() as connection:
+        with self._database.write(wait=PATIENCE) as connection:
             found = connection.execute(query).one_or_none()  # another launch may have been faster
             if found is None:
                 connection.execute(delete(LtiRoom).where(LtiRoom.id == link))

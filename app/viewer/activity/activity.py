@@ -6,7 +6,7 @@ and asks here what the others have open; `Feature.on_activity` reports every cha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from contextlib import suppress
 from typing import Final, NamedTuple, Protocol
 
@@ -112,6 +112,14 @@ class Activity:
     def exercise(self) -> Exercise | None:
         """The exercise on show."""
         return self.practice.at if self.lesson == EXERCISES else None
+
+    @property
+    def opened(self) -> Hashable:
+        """What is open and how far it has come: what a reload brings back, however soon it comes."""
+        exercise = self.exercise
+        record = None if exercise is None else self.practice.record(exercise)
+        done = None if record is None else (record.mark, record.attempts, record.hints, record.variant)
+        return self.lesson, None if exercise is None else exercise.id, done, self.progress.at
 
     @property
     def withheld(self) -> frozenset[str]:

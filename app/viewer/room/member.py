@@ -199,11 +199,11 @@ class Member(Feature):
 
     # For subclasses
 
-    def follow(self, leader: str, text: str, title: str = "") -> None:
-        """Show the state of another page from now on, or again; with a title, undo leads back."""
+    def follow(self, leader: str, text: str, title: str = "", before: PageState | None = None) -> None:
+        """Show the state of another page from now on, or again; with a title, undo leads back to `before`."""
         if leader != self.leader:
-            if not self.leader and title:
-                self.page.record(title, self.page.snapshot())
+            if not self.leader and title and before is not None:
+                self.page.record(title, before)
             self.leader, self._began = leader, time.perf_counter()
             self.page.be_led(True)
             self.follower.begin()

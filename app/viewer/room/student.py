@@ -51,7 +51,7 @@ class Student(Member):
         self._task_at: float | None = None
         self._over = False  # it was said that this page is no longer in the room
         self._first = True
-        self._paused = False  # the task was open when the teacher began to lead
+        self._paused = False  # an exercise was open when somebody began to lead
         self._course: tuple[str, float] | None = None  # the room's, and when it was sent; None: not known yet
         self._open_tab = 0
         self._read = ""  # the question whose result was read
@@ -78,15 +78,16 @@ class Student(Member):
                 alone = Notice("hand", "You work by yourself", "Nobody leads the class now.")
                 self.page.status.show(frozen if self.frozen else alone)
             self.free()
+            self._resume(self._gone)
             self._leader_before, self._gone = "", False
-            self._resume_task()
             return
         if lead.leader != self._leader_before or self.frozen:
             self._gone = False
         self._leader_before = lead.leader
         if not self._gone:
-            self._pause_task()
-            self.follow(lead.leader, lead.page, "What the class shows")
+            before = None if self.leader else self.page.snapshot()
+            self._pause()
+            self.follow(lead.leader, lead.page, "What the class shows", before)
 
     def _end(self) -> None:
         """The seat was removed, or the room has ended: nobody leads this page, and its work stays."""
@@ -127,18 +128,31 @@ class Student(Member):
         self._open_task()
         self.page.status.show(Notice("hand", "A task from your teacher", exercise.title))
 
-    def _pause_task(self) -> None:
+    def _pause(self) -> None:
         """While somebody leads, no exercise stands beside another arm."""
-        task = self.activity.task
-        if task is not None and self.activity.exercise == task:
+        if self.activity.exercise is not None:
             self._paused = True
             self.page.lessons.open(None)
 
-    def _resume_task(self) -> None:
-        """Nobody leads any more: open the task again."""
+    def _resume(self, gone: bool) -> None:
+        """Nobody leads any more: open the exercise again.
+
+        Args:
+            gone: whether the student had stopped following, and may have opened something else.
+        """
         paused, self._paused = self._paused, False
-        if paused and self.activity.task is not None:
-            self._open_task()
+        if not paused or (gone and self.activity.lesson is not None):
+            return
+        before = self._arm
+        self.page.lessons.open(EXERCISES)
+        if self._arm != before:
+            self.follower.drop_obstacles()
+        self._open_tab += 1
+
+    @property
+    def _arm(self) -> tuple[str, bytes]:
+        """The arm and where it is heading."""
+        return self.page.arm.robot.id, self.page.arm.goal.tobytes()
 
     def _set_course(self, replaced: Exercise | None) -> None:
         """Open a course that is new.
@@ -170,9 +184,9 @@ class Student(Member):
             if self.activity.lesson != EXERCISES:
                 lessons.open(EXERCISES)
             self.activity.leave_item()
-            before = self.page.arm.robot.id, self.page.arm.goal.tobytes()
+            before = self._arm
             lessons.exercises.open(task.exercise)
-            if (self.page.arm.robot.id, self.page.arm.goal.tobytes()) != before:
+            if self._arm != before:
                 self.follower.drop_obstacles()
             self._open_tab += 1
 
@@ -281,7 +295,16 @@ class Student(Member):
 
     def bar(self) -> str:
         away = self.activity.task is not None and self.activity.exercise != self.activity.task
-        return views.student_bar(self.room, self.mode, self._open_tab, self.activity.task, away, self._read)
+        return views.student_bar(
+            self.room, self.mode, self._open_tab, self.activity.task, away, self._read, self._paused
+        )
+
+    def state(self) -> dict[str, object]:
+        return {"paused": True} if self._paused else {}
+
+    def restore(self, state: dict[str, object]) -> None:
+        if self._first:  # as the page was stored; undo changes nothing about who leads
+            self._paused = state.get("paused") is True
 
     @property
     def mode(self) -> views.Mode:

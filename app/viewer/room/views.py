@@ -16,6 +16,7 @@ from app.classroom.work import URGENCY, Progress
 from app.exercises import Exercise, Exercises, VariantError
 from app.exercises.said import answer_in_words
 from app.viewer.room.submissions import Submissions
+from app.viewer.room.wall import MOST
 from app.viewer.views.templates import render
 from kin.units import Units
 
@@ -92,7 +93,13 @@ def _own_mark(room: RoomView) -> tuple[str, str]:
 
 
 def student_bar(
-    room: RoomView, mode: Mode, open_tab: int, task: Exercise | None, away: bool, read: str = ""
+    room: RoomView,
+    mode: Mode,
+    open_tab: int,
+    task: Exercise | None,
+    away: bool,
+    read: str = "",
+    paused: bool = False,
 ) -> str:
     """What a student must see whatever tab is open.
 
@@ -100,6 +107,7 @@ def student_bar(
         open_tab: grows when the tab Learn is to be opened.
         away: whether the page shows something else than the task that was set.
         read: the question whose result was read.
+        paused: whether an exercise was open when somebody began to lead.
     """
     poll = room.poll if room.poll is not None and room.poll.id != read else None
     quiet = mode == "free" and poll is None and not room.problem
@@ -107,6 +115,7 @@ def student_bar(
         "room/student_bar", room=room, mode=mode, lead=_mode(room, mode, guest=True), poll=poll, quiet=quiet,
         stays=STAYS, task=task, mark=_own_mark(room)[0],
         open_tab=open_tab, away=away and mode == "free", hand=bool(room.seat and room.seat.hand),
+        paused="Task paused" if task is not None else "Exercise paused" if paused else "",
     )  # fmt: skip
 
 
@@ -326,9 +335,11 @@ def teacher_bar(room: RoomView, looked: SeatView | None, wall: bool, open_tab: i
     following = members.being("following")
     apart = [(members.being("by themselves"), "by themselves"), (members.being("away"), "away")]
     words = [f"{count} {what}" for count, what in apart if count] if led else []
+    arms = sum(bool(seat.page) for seat in room.seats)
     return render(
-        "room/teacher_bar", room=room, looked=looked, wall=wall, hands=hands, count=students(members.came),
-        following=following, apart=words, stuck=members.at("stuck"), open_tab=open_tab,
+        "room/teacher_bar", room=room, looked=looked, wall=wall, arms=arms, most=MOST, hands=hands,
+        count=students(members.came), following=following, apart=words, stuck=members.at("stuck"),
+        open_tab=open_tab,
     )  # fmt: skip
 
 

@@ -5,6 +5,8 @@ The exercises and the courses are two of the choices. What is open, `Activity` k
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 import viser
 
 from app.viewer.courses.feature import CourseFeature
@@ -110,6 +112,11 @@ class LessonChoice:
         """The open lesson, its guide and its worksheet, and the exercises."""
         every = (self.guide, self.shown, self.sheets, self.exercises, self.courses)
         return [feature for feature in every if feature is not None]
+
+    @property
+    def opened(self) -> Hashable:
+        """As `Activity.opened`, with the step of the lesson."""
+        return self._stage.activity.opened, None if self.guide is None else self.guide.at
 
     @property
     def _title(self) -> str:

@@ -300,13 +300,18 @@ class VisitorPage(ShownArm, Worker):
                 for feature in self.features:
                     if feature.due is not None:
                         self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
+            if batch and self._persistence.urgent and not self._inbox.waits:  # what waits may open more
+                self._save()  # in the same frame, so that nothing is on show that a reload would lose
             self.client.flush()
             self.numbers.update()
         if batch or (played and not self.arm.playing):
             self._persistence.postpone(now)
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
-            self._guard(lambda: self._persistence.save(self._actions.history.take_key()))
+            self._save()
             self._show_hints()
+
+    def _save(self) -> None:
+        self._guard(lambda: self._persistence.save(self._actions.history.take_key()))
 
     def _act(self, key: Hashable, value: object) -> None:
         if not self._preparing.admits(key, value):

@@ -2,13 +2,14 @@
 
 The state is stored in the browser: in the page's URL and in the storage of its tab. The service keeps nothing of a
 visitor who leaves. When a page connects, for the first time or after a lost connection, the service reads the
-stored state; from then on it stores every state in which the visitor pauses. What is stored is a `PageState`.
+stored state; from then on it stores every state in which the visitor pauses, and what is opened at once. What is
+stored is a `PageState`.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 
 from app.exports.snippets import LOCAL, Moment, Service
@@ -68,6 +69,7 @@ class Persistence:
         self.embedded = ""
         self._saved = ""
         self._state = PageState()
+        self._opened: Hashable = None  # of the saved state, as `LessonChoice.opened`
         self._share: SharePanel
         self.due: float | None = None
         self.led = False
@@ -129,13 +131,18 @@ class Persistence:
         """Take the present state as saved, and return it; from now on `share` offers the saved state."""
         self._share = share
         self._state = self.snapshot()
-        self._saved = encode(self._state)
+        self._saved, self._opened = encode(self._state), self._page.lessons.opened
         self._update_share()
         return self._saved
 
     def postpone(self, now: float) -> None:
         """The visitor did something: wait for the next rest."""
         self.due = now + SAVE_AFTER
+
+    @property
+    def urgent(self) -> bool:
+        """Whether something else is open than in the saved state, or it has come further."""
+        return self._page.lessons.opened != self._opened
 
     def rested(self, now: float) -> bool:
         """Whether it is time to `save`; True once after each rest."""
@@ -153,7 +160,7 @@ class Persistence:
         self._page.camera.look()
         self._page.camera.lead_back()
         state = self.snapshot()
-        text = encode(state)
+        text, self._opened = encode(state), self._page.lessons.opened
         if text != self._saved:
             replaces = self.led or (key != KEY_RETURN and same(state, self._state))
             self._saved, self._state = text, state

@@ -27,6 +27,7 @@ from app.classroom import (
     Ticket,
     UnknownRoomError,
     clock,
+    rooms,
 )
 from app.classroom.live import Pending
 from app.classroom.standing import standing
@@ -380,6 +381,35 @@ def test_a_locked_database_delays_and_loses_nothing(hubs, tmp_path, monkeypatch)
     assert student.submit(new) == second  # again after an unclear end: stored once
     with here.database.read() as connection:
         assert sorted(connection.scalars(select(Attempt.id))) == sorted([first.id, second.id])
+
+
+def test_a_class_that_joins_at_once_waits_for_its_turn(hubs, monkeypatch):
+    """Sixty transactions take longer together than anybody waits for a lock, and no student is turned away."""
+    monkeypatch.setattr("app.classroom.database.WAIT", 0.3)
+    here, there = hubs
+    room = here.rooms.open("Kinematics", 3600)
+    count = rooms.next_version
+
+    def slow(connection, room):
+        time.sleep(0.02)  # as on a busy machine
+        return count(connection, room)
+
+    monkeypatch.setattr(rooms, "next_version", slow)
+    with ThreadPoolExecutor(60) as pool:
+        joined = list(pool.map(lambda k: (here, there)[k % 2].rooms.join(room.code, f"Student {k}"), range(60)))
+    assert len({ticket.seat for ticket in joined}) == 60
+    assert here.rooms.find(joined[0]).students == 60
+
+
+def test_who_does_not_get_a_turn_reads_so(hubs, monkeypatch):
+    monkeypatch.setattr("app.classroom.database.WAIT", 0.1)
+    here, _ = hubs
+    seat = here.rooms.join(here.rooms.open("Kinematics", 3600).code, "Ada")
+    with ThreadPoolExecutor(1) as pool, here.database.write():
+        other = pool.submit(here.rooms.submit, seat, attempt())
+        with pytest.raises(ClassroomUnavailable, match="too much to do"):
+            other.result(10)
+    here.rooms.submit(seat, attempt())
 
 
 def test_a_full_database_is_said_and_keeps_what_was_confirmed(hubs):

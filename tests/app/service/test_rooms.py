@@ -174,6 +174,18 @@ def test_joining_again_keeps_the_seat(make):
     assert "2 students" in teacher.get("/room").text
 
 
+def test_who_gets_a_number_to_the_alias_reads_so_and_the_rule_stands_before_the_error(make):
+    code = open_room(make())
+    assert "1 to 32 characters" in make().get("/room").text
+    assert join(make(), code, "Bob").status_code == 303, "straight to the arm"
+    second = make()
+    answer = join(second, code, "Bob")
+    assert answer.status_code == 200
+    assert "Another student has this alias: you are “Bob 2” here." in answer.text
+    assert "Open my arm" in answer.text
+    assert "You are in this room as a student" in second.get("/room").text
+
+
 @pytest.mark.parametrize(
     ("alias", "words"),
     [("", "empty"), ("   ", "empty"), ("\u202e\u200b", "empty"), ("x" * 33, "33 characters")],

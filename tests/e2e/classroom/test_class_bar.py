@@ -16,6 +16,15 @@ BOX = """(selector) => {
   const { left, top, right, bottom } = node?.getBoundingClientRect() ?? {};
   return node ? { left, top, right, bottom } : null;
 }"""
+# Hints come, and the picture gets its size: whether all boxes are where they were in the last four looks.
+AT_REST = """(selectors) => {
+  const nodes = selectors.flatMap((each) => [...document.querySelectorAll(each)]);
+  const now = JSON.stringify(nodes.map((node) => node.getBoundingClientRect())), before = window.kbBoxes;
+  window.kbBoxes = { now, looks: before?.now === now ? before.looks + 1 : 0 };
+  const rest = window.kbBoxes.looks >= 4;
+  if (rest) delete window.kbBoxes;
+  return rest;
+}"""
 BAR, SCENE, NOTICE, HINT = "[data-class-bar]", "canvas[data-engine]", "#webgl-software-rendering", ".kb-hint"
 CORNER = 0.4  # of the picture's width, which a bar that lies over it takes at most
 
@@ -69,7 +78,7 @@ def keeps_apart(student: Student, bar: str) -> None:
     """Wait until the bar is there, and the picture has made room for it; nothing lies on the bar."""
     page = student.page
     student.shows(bar)
-    page.wait_for_timeout(1000)  # hints come, and the picture gets its size
+    page.wait_for_function(AT_REST, arg=[BAR, SCENE, NOTICE, HINT], polling=100)
     ours, scene = box(page, BAR), box(page, SCENE)
     assert ours is not None
     assert scene is not None

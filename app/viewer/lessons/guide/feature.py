@@ -107,6 +107,11 @@ class Guide(Feature):
                 raise InputError("lesson", key, "a control of its steps")
         self._show()
 
+    @property
+    def at(self) -> int:
+        """The index of the step on show."""
+        return self._progress.at
+
     def step_name(self, key: Hashable) -> str:
         names = {"go": "Step", "pose": "Pose of the step", "reveal": "Answer shown", "restart": "Answers cleared"}
         return names.get(str(key[0]), "Answer") if isinstance(key, tuple) else "Joint sliders"

@@ -137,7 +137,7 @@ def test_a_student_follows_a_course_to_a_result_code(server: int, settings: Sett
         tab.wait(lambda: "Copy code" in block(tab, "follow"))
         found = re.search(r"\b(?:[0-9A-Z]{5}-){8,}[0-9A-Z]+", block(tab, "follow"))
         assert found is not None
-        tab.wait(lambda: any('"alias"' in _decoded(text) for text in tab.kept[-1:]))
+        tab.wait(lambda: any("Ada <b>" in _decoded(text) for text in tab.kept[-1:]))
         kept = tab.kept[-1]
     outcome = read_code(found[0], result_key(Hub.of(settings)))
     assert (outcome.alias, outcome.title, outcome.fingerprint) == ("Ada <b>", COURSE.title, COURSE.fingerprint)

@@ -26,6 +26,7 @@ from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
 from app.viewer.room.wall import PADS
 from app.viewer.server import ViewerServer
+from app.viewer.session.state import decode
 from app.viewer.session.worker.crew import BUILDS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -42,9 +43,9 @@ class Class:
         self.room = hub.rooms.open("Robotics <i>2</i>", 3600.0)
         self._open: list[FakeBrowser] = []
 
-    def browser(self, token: str, embedded: str = "") -> FakeBrowser:
+    def browser(self, token: str, embedded: str = "", state: str = "") -> FakeBrowser:
         headers = {"Cookie": f"{COOKIE}={token}"} if token else {}
-        memory = json.dumps({"address": "http://127.0.0.1/", "embedded": embedded})
+        memory = json.dumps({"address": "http://127.0.0.1/", "embedded": embedded, "state": state})
         browser = FakeBrowser(self.port, memory=memory, additional_headers=headers, close_timeout=0.1)
         self._open.append(browser)
         browser.__enter__()
@@ -80,6 +81,12 @@ def room(rooms_served: tuple[int, Hub]) -> Iterator[Class]:
 def press(browser: FakeBrowser, *key: str, value: object = None) -> None:
     """Press a control of the tab Class, as static/lesson.js does."""
     browser.say("feature", ["class", [*key, len(browser.log)], value])
+
+
+def opened(browser: FakeBrowser) -> dict[str, Any]:
+    """The lesson, and the states of the features, that the page has stored last."""
+    state = decode(browser.kept[-1], [*kin.classic_robots().values()])
+    return {"lesson": state.lesson, **state.features}
 
 
 def bar(browser: FakeBrowser) -> str:
@@ -281,7 +288,7 @@ def test_a_lead_pauses_the_task_and_returns_to_it(room: Class) -> None:
     teacher, student, _, q = lead(room)
     press(teacher, "fields", "task", value=[[EXERCISE]])
     student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
-    assert "your teacher sees that you did" in student.html
+    assert "If you press <i>Show the answer</i>, this is stored: your teacher sees it" in student.html
     mode(student, "free")
     press(teacher, "follow")
     student.wait(lambda: "data-class-paused" in student.html)
@@ -293,6 +300,62 @@ def test_a_lead_pauses_the_task_and_returns_to_it(room: Class) -> None:
     mode(student, "free")
     student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
     student.wait(lambda: "data-class-paused" not in student.html)
+
+
+def test_a_lead_pauses_the_exercise_of_a_course_and_returns_to_it(room: Class) -> None:
+    teacher, student, ticket, q = lead(room)
+    press(teacher, "fields", "course", value=[["0"]])
+    student.wait(lambda: 'data-course="follow"' in student.html)
+    student.say("feature", ["course", ["next", 1], None])
+    student.wait(lambda: f'data-exercise="{EXERCISE}"' in student.html)
+    press(teacher, "follow")
+    student.wait(lambda: "data-class-paused>Exercise paused" in student.html)
+    student.wait(lambda: f'data-exercise="{EXERCISE}"' not in student.html)
+    at(student, q)
+    student.wait(lambda: opened(student)["class"] == {"paused": True})  # for a reload
+    again = room.browser(room.hub.rooms.tokens.sign(ticket), state=student.kept[-1])
+    for tab in (student, again):
+        tab.wait(lambda tab=tab: "data-class-paused>Exercise paused" in tab.html)
+    press(teacher, "follow")
+    for tab in (student, again):
+        tab.wait(lambda tab=tab: f'data-exercise="{EXERCISE}"' in tab.html)
+        assert 'data-course="bar"' in tab.html
+
+    # Who has stopped following and opened something else keeps that.
+    mode(student, "free")
+    press(teacher, "follow")
+    mode(student, "led")
+    press(student, "go")
+    mode(student, "gone")
+    student.set("Lesson", "Screws")
+    student.wait(lambda: student.value("Lesson") == "Screws")
+    press(teacher, "follow")
+    mode(student, "free")
+    student.settle()
+    assert student.value("Lesson") == "Screws"
+
+
+def test_what_is_opened_is_stored_in_the_same_step(room: Class) -> None:
+    """A reload brings it back, however soon it comes: also while the arm is still on its way to the pose."""
+    student, _ = room.join("Ann")
+    student.set("Lesson", "Courses")
+    student.wait(lambda: 'data-course="choose"' in student.html)
+    assert opened(student)["lesson"] == "course"
+    student.say("feature", ["course", ["pick", 1], 0])
+    student.wait(lambda: 'data-course="follow"' in student.html)
+    student.log.clear()
+    student.say("feature", ["course", ["next", 1], None])
+    student.wait(lambda: any(m["type"] == "LocalStorageSetItemMessage" for m in student.log))
+    shown = next(i for i, m in enumerate(student.log) if f'data-exercise="{EXERCISE}"' in str(m.get("updates")))
+    assert not any(m["type"] == "SetOrientationMessage" for m in student.log[shown:]), "in the same step"
+    assert opened(student)["exercises"]["at"] == EXERCISE
+    assert opened(student)["course"]["at"] == 0
+    count = len(student.kept)
+    student.settle(1.5)
+    assert len(student.kept) - count <= 1, "nothing but the viewpoint is stored again"
+    student.say("feature", ["exercises", ["hint", 1], None])
+    student.wait(lambda: "Hint 1." in student.html)
+    assert opened(student)["exercises"]["done"][EXERCISE][2] == 1
 
 
 def test_the_picker_keeps_its_place_and_shows_the_exercise(room: Class) -> None:
@@ -624,7 +687,23 @@ def test_who_has_never_come_is_removed_together(room: Class, monkeypatch: pytest
     teacher.settle(SURE)
     press(teacher, "sweep")
     teacher.wait(lambda: "Ghost" not in teacher.html)
+    assert "3 students removed" in teacher.html
+    assert "Everybody else has come." in teacher.html
     assert bar(ann) == "free"
+
+
+def test_who_stays_when_nobody_is_removed_is_said(room: Class, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.classroom.live.AWAY", 0.2)
+    for i in range(3):
+        room.hub.rooms.join(room.room.code, f"Ghost {i}")
+    teacher = room.teacher()
+    teacher.wait(lambda: "Remove 3 who have never come" in teacher.html)
+    press(teacher, "sweep")
+    teacher.wait(lambda: "Press again: remove 3" in teacher.html)
+    teacher.settle(SURE)
+    press(teacher, "sweep")
+    teacher.wait(lambda: "Nobody is removed" in teacher.html)
+    assert "Stay: Ghost 0, Ghost 1, Ghost 2: joined less than a minute ago; press again later." in teacher.html
 
 
 def test_a_double_click_is_one(room: Class) -> None:

@@ -192,5 +192,12 @@ def test_list_chips_bar_and_task_say_the_same_of_thirty() -> None:
     assert re.findall(r'data-question-key="(\d+)"', above) == ["9", "21"], "the card stands below who was picked"
 
 
+@pytest.mark.parametrize(("arms", "words"), [(MOST, "All arms."), (MOST + 1, "The first 40 of 41 arms.")])
+def test_a_wall_says_how_many_arms_it_shows(arms: int, words: str) -> None:
+    seats = [SeatView(f"{i}", f"S{i}", page="…") for i in range(arms)] + [SeatView("x", "X")]
+    room = RoomView("r", seats=tuple(seats), students=len(seats))
+    assert f"{words} Click one to look at it." in plain(views.teacher_bar(room, None, True, 0))
+
+
 def plain(html: str) -> str:
     return " ".join(re.sub("<[^>]+>", " ", html).split())

@@ -305,9 +305,11 @@ class Counter(Feature):
         return {"count": self._slider.value} if self._slider.value else {}
 
     def restore(self, state):
-        if state["count"] == 13:
+        count = state.get("count")
+        if count == 13:
             raise RuntimeError("unlucky")
-        self._slider.value = state["count"]
+        if type(count) is int and 0 <= count <= 10:
+            self._slider.value = count
 
 
 @pytest.fixture(scope="module")
