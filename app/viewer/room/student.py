@@ -55,6 +55,9 @@ class Student(Member):
         self._course: tuple[str, float] | None = None  # the room's, and when it was sent; None: not known yet
         self._open_tab = 0
         self._read = ""  # the question whose result was read
+        self._sent_last: tuple[str, bool] | None = (
+            None  # exercise on show and `_gone`, as the room was last sent them
+        )
         self._answered: tuple[str, int] | None = None  # exercise and seed of the last answer
         self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, STORED)))
         ticket = self.attendance.ticket
@@ -237,8 +240,7 @@ class Student(Member):
     def shared_state(self) -> PageState | None:
         if self.room.closed:
             return None
-        at = self.activity.exercise
-        self.attendance.tell_task("" if at is None else at.id)
+        self._tell()
         state = self.page.snapshot()
         return PageState(
             robot=state.robot,
@@ -248,6 +250,15 @@ class Student(Member):
             task=state.task,
             locks=state.locks,
         )
+
+    def _tell(self) -> None:
+        """Say what this page shows, if it is something else: of two tabs, the one that has changed last counts."""
+        at = self.activity.exercise
+        shows = "" if at is None else at.id, self._gone and self.leader == ""
+        if shows != self._sent_last and self.attendance.room.seat is not None:
+            self._sent_last = shows
+            self.attendance.tell_task(shows[0])
+            self.attendance.tell_gone(shows[1])
 
     def refusal(self, act: str) -> str:
         if self.room.closed and self.page.guest:
@@ -284,7 +295,7 @@ class Student(Member):
                 self._open_task(again=True)
 
     def refresh(self) -> None:
-        self.attendance.tell_gone(self._gone and self.leader == "")
+        self._tell()
         guest = self.page.guest
         update_html(
             self._head, views.student_html(self.room, self.mode, self.activity.task, self._submissions, guest)
