@@ -156,5 +156,6 @@ class FrameAxes:
             position=T[:3, 3],
             wxyz=wxyz_from_rotation(T[:3, :3]),
         )
-        add_label(self._scene, f"{root}/name", name, position=(0.0, 0.0, 1.15 * size), anchor="bottom-center")
+        place = (0.0, 0.0, 1.15 * size)
+        add_label(self._scene, f"{root}/name", name, position=place, anchor="bottom-center", depth_test=True)
         return node

@@ -34,7 +34,11 @@ _scenes: WeakKeyDictionary[viser.SceneApi, _Labels] = WeakKeyDictionary()
 def add_label(
     scene: viser.SceneApi, name: str, text: str, *, scale: float = 1.0, **options: Any
 ) -> viser.LabelHandle:
-    """A label of `scale` times the usual size; `options` are those of viser's function of this name."""
+    """A label of `scale` times the usual size; `options` are those of viser's function of this name.
+
+    With `depth_test`, solids before the label hide it, as they hide what it names. Without, it is always seen: for
+    what is drawn inside a body, and for what must not be missed.
+    """
     labels = _scenes.setdefault(scene, _Labels())
     handle = scene.add_label(name, text, font_screen_scale=scale * labels.factor, **options)
     labels.handles[name, scale] = handle

@@ -39,7 +39,7 @@ class _Node:
         self._parts = [(node, node.color) for node in _meshes(scene, self.root, each, deep)]
         self._label = add_label(
             scene, f"{self.root}/name", each.label, scale=0.9, position=(0.0, 0.0, _above(each)),
-            anchor="bottom-center", visible=False,
+            anchor="bottom-center", depth_test=True, visible=False,
         )  # fmt: skip
         for node, _ in self._parts:
             _listen(node, clicked)

@@ -28,7 +28,7 @@ from kin.transforms import Array
 
 LINK_COLOR: Color = (214, 218, 224)
 TRIM_COLOR: Color = (58, 64, 74)
-TOOL_COLOR: Color = (92, 99, 112)
+TOOL_COLOR: Color = (136, 144, 158)  # three times as light as a dark page, and as dark as a light one
 APPROACH_COLOR: Color = (214, 39, 120)
 PEDESTAL_COLOR: Color = (126, 134, 147)
 PROBES = 8000

@@ -44,7 +44,7 @@ class ArmFrames:
         self.base_up: viser.SceneNodeHandle
         for tip, letter in zip(1.15 * length * np.eye(3), "xyz", strict=True):
             name = f"{self.base.name}/{letter}"
-            self.base_up = add_label(scene, name, letter, position=tip, anchor="center-center")
+            self.base_up = add_label(scene, name, letter, position=tip, anchor="center-center", depth_test=True)
 
     def add(self, parent: str, row: int, T: Array) -> None:
         """Add the frame of a DH row, at the pose ``(4, 4)`` in its parent; row −1 is the base frame."""
@@ -68,7 +68,15 @@ class ArmFrames:
         before, origin = self._origins[: row + 1], self._origins[row + 1]
         crowd = int((np.linalg.norm(before - origin, axis=1) < 1e-6).sum())
         place = (0.0, 0.0, (1.15 + 0.6 * crowd) * length)
-        label = add_label(self._scene, f"{name}/label", text, position=place, anchor="center-center", visible=True)
+        label = add_label(
+            self._scene,
+            f"{name}/label",
+            text,
+            position=place,
+            anchor="center-center",
+            depth_test=True,
+            visible=True,
+        )
         self._labels.append(label)
 
     def show(self, visible: bool) -> None:

@@ -12,6 +12,7 @@ import viser
 from arms import CLASSICS
 
 import kin
+from app.service.web.pages import static_folder
 from app.shared.store import Store
 from app.viewer.panel import joints, readout, rotations, status
 from app.viewer.scene import camera
@@ -178,6 +179,8 @@ def test_the_floor_names_its_scale_and_the_gizmo_stands_free(server: viser.Viser
     assert base.visible
     assert np.allclose(base.position, robot.T_world_base[:3, 3])
     assert get("/arm/frame-0/label").text == "base"  # type: ignore[union-attr]
+    assert get("/arm/frame-0/label").depth_test, "solids hide it"  # type: ignore[union-attr]
+    assert not get("/arm-contact/text").depth_test, "what touches is inside a solid"  # type: ignore[union-attr]
     (tool,) = node_names(server.scene, "frame-6")
     assert get(tool).axes_length < 0.6 * get(arm.gizmo.name).scale, (
         "the gizmo's arrows reach past the tool's frame"
@@ -189,6 +192,25 @@ def test_the_floor_names_its_scale_and_the_gizmo_stands_free(server: viser.Viser
     arm.show_gap(T[:3, 3], T[:3, 3] + 0.3)
     assert get(approach).visible  # type: ignore[union-attr]
     arm.remove()
+
+
+def test_the_gripper_stands_out_on_a_light_and_on_a_dark_page() -> None:
+    styles = (static_folder() / "viewer.css").read_text(encoding="utf-8")
+    pages = re.findall(r"--kb-near: (#[0-9a-f]+);", styles)
+    assert len(pages) == 2
+
+    def luminance(color: str | tuple[int, int, int]) -> float:
+        """Relative luminance of WCAG 2.1."""
+        if isinstance(color, str):
+            digits = color[1:] if len(color) == 7 else "".join(2 * digit for digit in color[1:])
+            color = tuple(bytes.fromhex(digits))  # type: ignore[assignment]
+        parts = [c / 255 / 12.92 if c <= 10 else ((c / 255 + 0.055) / 1.055) ** 2.4 for c in color]  # type: ignore[union-attr, operator]
+        return float(np.dot(parts, (0.2126, 0.7152, 0.0722)))
+
+    gripper = luminance(body(kin.get_robot("pioneer5")).gripper[0].color)
+    for page in map(luminance, pages):
+        light, dark = max(gripper, page), min(gripper, page)
+        assert (light + 0.05) / (dark + 0.05) >= 3.0
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
