@@ -133,14 +133,14 @@ class _Mounted:
 
 
 class PanelView:
-    """The controls of one feature, in the container that is open when this is made.
+    """The controls of one feature, in the container that is open when this is made, or in `top` itself.
 
     Events are posted as ``("at", path, serial)`` with a value, and ``("do", event, serial, press)``.
     """
 
-    def __init__(self, gui: viser.GuiApi, post: Post) -> None:
+    def __init__(self, gui: viser.GuiApi, post: Post, top: viser.GuiFolderHandle | None = None) -> None:
         self._gui, self._post = gui, post
-        self._top = gui.add_folder(None)
+        self._top = gui.add_folder(None) if top is None else top  # each one more makes labels narrower
         self._mounted: dict[Hashable, _Mounted] = {}
         self._live: dict[int, _Mounted] = {}
         self._serials = count(1)

@@ -51,8 +51,7 @@ class Forms:
         self._views: dict[str, PanelView] = {}
         containers = {"view": panel.view, "target": panel.target, "obstacles": panel.avoid}
         for place, container in containers.items():
-            with container:
-                self._views[place] = PanelView(gui, partial(self._forward, place))
+            self._views[place] = PanelView(gui, partial(self._forward, place), container)
         self.show()
 
     def show(self) -> None:
