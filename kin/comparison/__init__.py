@@ -6,6 +6,7 @@ another zero or in the other sense, base and tool may be drawn elsewhere.
 - :mod:`kin.comparison.matching` decides from the joint axes whether constant frames, signs and offsets turn one
   into the other.
 - :mod:`kin.comparison.frames` chooses the plainest of them.
+- :mod:`kin.comparison.bound` rules out many at once that cannot be plain enough.
 - :mod:`kin.comparison.diagnosis` looks for the mistakes that explain a difference.
 
 A comparison says "the same" only after forward kinematics has confirmed it.

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kin.axes import generic_q
+from kin.comparison.bound import Zeros
 from kin.comparison.frames import FRAME, LEAST, Mapping, Reference, Side, no_mapping
 from kin.comparison.matching import Tolerance
 from kin.comparison.mistakes import Edit, applied, fewer_rows, known_edits, more_rows, value_edit
@@ -81,7 +81,7 @@ class Search:
         self._a = a
         self._share = 1.0 if fixed else FREE_FRAMES  # of the cost of frames and zeros
         self._tolerance, self._deadline, self._stop = tolerance, deadline, stop
-        self._probes, self._poses, self._kinds, self._ends = _facts(a)
+        self._probes, self._poses, self._kinds, self._ends, self._zeros = _facts(a)
         self._invariants = invariants_of(a)
         self._found: dict[bytes, Explanation] = {}
         self._limit = math.inf  # cost up to which an explanation that leaves frames or zeros open is worth having
@@ -192,9 +192,8 @@ class Search:
         if not frames or not rest.size:
             return
         others = tables.take(rest)
-        wrong = invariants(others).agree(
-            self._invariants, 10.0 * self._tolerance.length, 10.0 * self._tolerance.angle
-        )
+        known = invariants(others)
+        wrong = known.agree(self._invariants, 10.0 * self._tolerance.length, 10.0 * self._tolerance.angle)
         alike = np.flatnonzero(wrong == 0)
         if not alike.size:
             return
@@ -203,39 +202,24 @@ class Search:
         least = level.cost[fits] + self._share * np.maximum(LEAST, needed)
         order = np.argsort(least, kind="stable")[:_MOST_TRIED]
         order = order[least[order] < min(self._least(), self._limit)]
-        rests: list[list[float]] = [[]] * len(order)
-        if self._limit < math.inf:
+        if order.size and self._limit < math.inf:
             order = order[:_MOST_MATCHES]
-            before, rests = self._beside(level, fits[order])
-            at_least = needed[order] + np.array([x + y[0] for x, y in zip(before, rests, strict=True)])
-            worth = np.flatnonzero(level.cost[fits[order]] + self._share * (at_least - _ROUNDING) < self._limit)
-            order, rests = order[worth], [rests[k] for k in worth]
+            zeros = Zeros.of(alike_tables.take(order), Invariants(*(part[alike[order]] for part in known)))
+            at_least = needed[order] + self._zeros.cost(zeros, self._tolerance)
+            order = order[level.cost[fits[order]] + self._share * (at_least - _ROUNDING) < self._limit]
         if not order.size:
             return
         matched = 0
-        for k, side, behind in zip(order, Side.several(alike_tables.take(order)), rests, strict=True):
+        for k, side in zip(order, Side.several(alike_tables.take(order)), strict=True):
             i = int(fits[k])
             if matched >= _MOST_MATCHES or least[k] >= self._least() or time.monotonic() > self._deadline:
                 break
             self._stop()
             most = (self._limit - float(level.cost[i])) / self._share
-            found = self._reference.plainest(side, most, float(needed[k]), behind)
+            found = self._reference.plainest(side, most, float(needed[k]))
             matched += not isinstance(found, int)
             if isinstance(found, tuple):
                 self._keep(level, i, found[0])
-
-    def _beside(self, level: _Level, index: NDArray[np.intp]) -> tuple[list[float], list[list[float]]]:
-        """What joints that the changed rows leave alone cost at least, where b is a in other frames.
-
-        Returns:
-            for each table the cost of the joints before its changed rows; and from each joint on, that of the
-            joints behind them.
-        """
-        begin, end = self._reference.least(self._b)
-        ranges = _changed(level.tables.take(index), Tables.of(self._b))
-        before = [begin[first] for first, _ in ranges]
-        rests = [[end[max(k, last)] for k in range(self._a.n + 1)] for _, last in ranges]
-        return before, rests
 
     def _frames_needed(self, tables: Tables) -> Array:
         """How many of base and tool every mapping of each table onto a has at least ``(N,)``.
@@ -421,33 +405,6 @@ def _keys(tables: Tables) -> list[bytes]:
     return [row.tobytes() for row in together]
 
 
-def _changed(tables: Tables, single: Tables) -> list[tuple[int, int]]:
-    """The joints whose axes do not move with the first ones of a single table or with its last ones: from, to.
-
-    The axes before them are those of that table, and those from the end of the range on move as one body.
-    """
-    n = len(single.joint_rows)
-    if tables.rows != single.rows:
-        return [(0, n)] * len(tables)
-    # Before each row, and behind the last.
-    joints = [0, *np.cumsum(single.kinds[0] != KIND_CODES["fixed"]).tolist()]
-    after_twist = int(single.modified[0])  # as the axis of a row in Craig's convention is
-    cells = (tables.cells != single.cells).any(axis=2)
-    conventions = (tables.modified != single.modified).tolist()
-    bases = (tables.base != single.base).any(axis=(1, 2)).tolist()
-    found = []
-    for each, convention, base in zip(cells, conventions, bases, strict=True):
-        rows = np.flatnonzero(each).tolist()
-        if convention:
-            found.append((0, n))
-        elif not rows:
-            found.append((0, 0) if base else (n, n))
-        else:
-            first = 0 if base else joints[rows[0] + 1 - after_twist]
-            found.append((first, joints[rows[-1] + 1]))
-    return found
-
-
 def _changes(table: Tables, history: tuple[Edit, ...]) -> tuple[Change, ...]:
     """The changes with the numbers of single cells before and after."""
     found = []
@@ -471,10 +428,16 @@ def _probes(a: Robot) -> Array:
 
 
 @lru_cache(maxsize=32)
-def _facts(a: Robot) -> tuple[Array, Array, Array, Ends]:
-    """What every search with an arm as reference asks of it: probes, poses there, kinds of joints, outer axes."""
+def _facts(a: Robot) -> tuple[Array, Array, Array, Ends, Zeros]:
+    """What every search with an arm as reference asks: probes, poses there, kinds of joints, outer axes, zeros."""
     table, probes = Tables.of(a), _probes(a)
-    return probes, fk(a, probes), table.kinds[0, table.joint_rows], Ends.of(table)
+    return (
+        probes,
+        fk(a, probes),
+        table.kinds[0, table.joint_rows],
+        Ends.of(table),
+        Zeros.of(table, invariants_of(a)),
+    )
 
 
 def differences(one: Array, other: Array) -> tuple[Array, Array]:

@@ -16,13 +16,11 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kin.axes import inverse
 from kin.comparison.matching import (
     FLIP,
     NOBODY,
-    OFFSET,
     QUARTER,
     Axis,
     Match,
@@ -136,34 +134,6 @@ class _Axes(Sequence[Axis]):
         return Axis(tuple(self._z[i].tolist()), tuple(self._p[i].tolist()), self._slides[i])
 
 
-class _Symmetries(NamedTuple):
-    """The ways to map the last joints of an arm onto themselves.
-
-    Attributes:
-        signs, offsets: ``(k, m)`` of m joints.
-        settled: ``(m,)`` whether no frame and no other joint can take over an offset.
-    """
-
-    signs: Array
-    offsets: Array
-    settled: NDArray[np.bool_]
-
-
-@lru_cache(maxsize=32)
-def _symmetries(a: Robot, tolerance: Tolerance) -> list[_Symmetries]:
-    """Those of all joints, of all but the first, and so on to the last alone."""
-    axes, found = _side(a).axes, []
-    for i in range(a.n):
-        several, _ = Matching(axes[i:], tolerance).matches(axes[i:])
-        turn = several[0].free.turn
-        settled = [
-            k > 0 and not axis.slides and (turn is None or turn.joint != k) for k, axis in enumerate(axes[i:])
-        ]
-        signs, offsets = (np.array([getattr(each, name) for each in several]) for name in ("signs", "offsets"))
-        found.append(_Symmetries(signs, offsets, np.array(settled)))
-    return found
-
-
 @lru_cache(maxsize=32)
 def _side(robot: Robot) -> Side:
     (side,) = Side.several(Tables.of(robot))
@@ -194,39 +164,14 @@ class Reference:
         assert found is not None
         return found
 
-    def least(self, b: Robot) -> tuple[list[float], list[float]]:
-        """What joints of an arm that is a cost at least, whatever the others are.
-
-        A table of which one row is another has the joints before and after it in common with b.
-
-        Returns:
-            ``(n + 1,)`` of none of the first joints, of one, and so on to all; and ``(n + 1,)`` of all joints, of
-            all but the first, and so on to none.
-        """
-        axes = _side(b).axes
-        ends = np.zeros(self.robot.n + 1)
-        found, _ = self._matching.matches(axes)
-        if not found:  # the same but for rounding
-            return ends.tolist(), ends.tolist()
-        signs, offsets = np.array(found[0].signs), np.array(found[0].offsets)
-        for i, each in enumerate(_symmetries(self.robot, self.tolerance)):
-            shifted = offsets[i:] + signs[i:] * each.offsets
-            wrapped = np.abs(np.remainder(shifted + math.pi, 2.0 * math.pi) - math.pi)
-            quarters = wrapped / (0.5 * math.pi)
-            cost = np.where(np.abs(quarters - np.round(quarters)) < 1e-6, QUARTER, OFFSET)
-            cost = np.where((wrapped > self.tolerance.angle) & each.settled, cost, 0.0)
-            ends[i] = (cost.sum(axis=1) + FLIP * (signs[i:] * each.signs < 0).sum(axis=1)).min()
-        return self._matching.beginnings(axes), ends.tolist()
-
     def plainest(
-        self, b: Side, most: float = math.inf, frames: float | None = None, rest: Sequence[float] = ()
+        self, b: Side, most: float = math.inf, frames: float | None = None
     ) -> tuple[Mapping, int] | int | None:
         """The plainest mapping of b onto a.
 
         Args:
             most: a mapping must cost less.
             frames: what base and tool cost at least, where that is known.
-            rest: what the joints from each one on cost at least, where that is known.
 
         Returns:
             the mapping and the number of vectors of signs with which there is one that may cost less; without any,
@@ -235,16 +180,21 @@ class Reference:
         a, tolerance = self._a, self.tolerance
         if frames is None:
             frames = _frames_needed(a, b, tolerance)
-        found, furthest = self._matching.matches(b.axes, most - frames, rest)
+        found, furthest = self._matching.matches(b.axes, most - frames)
         if not found:
-            return furthest.joint if most == math.inf else None
+            return furthest if most == math.inf else None
         best, least = None, most
         for match in sorted(found, key=lambda match: match.signs.count(-1)):
-            if frames + FLIP * match.signs.count(-1) >= least:
+            senses = frames + FLIP * match.signs.count(-1)
+            if senses >= least:
                 break
-            for mapping in _candidates(match, a, b, tolerance):
-                if (cost := mapping.cost(tolerance)) < least:
-                    best, least = mapping, cost
+            for M, offsets in _ends(match, a, b, tolerance):
+                zeros = _clean_offsets(offsets, b.S, tolerance).tolist()[1:]
+                if senses + sum((offset_cost(offset, tolerance) for offset in zeros), 0.0) >= least:
+                    continue
+                for mapping in _candidates(match.signs, M, offsets, a, b, tolerance):
+                    if (cost := mapping.cost(tolerance)) < least:
+                        best, least = mapping, cost
         return None if best is None else (best, len(found))
 
 
@@ -268,28 +218,31 @@ def _same_line(one: Axis, other: Axis, tolerance: Tolerance) -> bool:
     return not turned and (one.slides or math.hypot(*apart) <= 10.0 * tolerance.length)
 
 
-def _candidates(match: Match, a: Side, b: Side, tolerance: Tolerance) -> Iterator[Mapping]:
-    """Mappings of one vector of signs: with or without an offset of the first joint, and of the last ones."""
-    signs = np.array(match.signs, dtype=float)
-    M, columns = match.M.matrix(), b.S.T.tolist()
-    ends = [(M, np.array(match.offsets))]
+def _ends(match: Match, a: Side, b: Side, tolerance: Tolerance) -> Iterator[tuple[Array, Array]]:
+    """M and the offsets of one vector of signs: with a tool, and with offsets of the last joints instead."""
+    M = match.M.matrix()
+    yield M, np.array(match.offsets)
     if (closed := _closing(match, M, a.zero, b.zero, tolerance)) is not None:
-        ends.append(closed)
-    for M_n, offsets in ends:
-        product = np.eye(4)  # exp(S_1 o_1) … exp(S_n o_n)
-        for column, offset in zip(columns, offsets.tolist(), strict=True):
-            if offset:
-                product = product @ _exp(column, offset)
-        B = M_n @ inverse(product)
-        E = inverse(M_n @ b.zero) @ a.zero
-        for first in {float(offsets[0]), 0.0, _first_offset(a.axes[0], signs[0], B, offsets[0], tolerance)}:
-            chosen = offsets.copy()
-            chosen[0] = first
-            # B exp(S_1 o_1) stays what it is.
-            moved = B @ _exp(columns[0], float(offsets[0]) - first)
-            yield Mapping(
-                _clean(moved, tolerance), _clean(E, tolerance), signs, _clean_offsets(chosen, b.S, tolerance)
-            )
+        yield closed
+
+
+def _candidates(
+    senses: Sequence[int], M: Array, offsets: Array, a: Side, b: Side, tolerance: Tolerance
+) -> Iterator[Mapping]:
+    """Mappings with or without an offset of the first joint."""
+    signs, columns = np.array(senses, dtype=float), b.S.T.tolist()
+    product = np.eye(4)  # exp(S_1 o_1) … exp(S_n o_n)
+    for column, offset in zip(columns, offsets.tolist(), strict=True):
+        if offset:
+            product = product @ _exp(column, offset)
+    B = M @ inverse(product)
+    E = _clean(inverse(M @ b.zero) @ a.zero, tolerance)
+    for first in {float(offsets[0]), 0.0, _first_offset(a.axes[0], signs[0], B, offsets[0], tolerance)}:
+        chosen = offsets.copy()
+        chosen[0] = first
+        # B exp(S_1 o_1) stays what it is.
+        moved = B @ _exp(columns[0], float(offsets[0]) - first)
+        yield Mapping(_clean(moved, tolerance), E, signs, _clean_offsets(chosen, b.S, tolerance))
 
 
 def _first_offset(axis: Axis, sign: float, B: Array, offset: float, tolerance: Tolerance) -> float:

@@ -29,7 +29,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -114,28 +113,20 @@ class Free(NamedTuple):
     slides: tuple[Slide, ...]
 
 
-@dataclass(frozen=True)
-class Match:
-    """One way to map b onto a.
+class Match(NamedTuple):
+    """One way to map the first joints of b, or all, onto those of a.
 
     Attributes:
-        signs: ``s_i``.
-        offsets: ``o_i``; that of the last joint is 0, it is always free.
-        M: ``B · exp(S_1 o_1) … exp(S_{n−1} o_{n−1})`` of b: maps the last axis of b onto that of a.
+        signs: ``s_i`` of these joints.
+        offsets: ``o_i`` of all joints; that of the last one mapped is 0, it is always free.
+        M: ``B · exp(S_1 o_1) … exp(S_{k−1} o_{k−1})`` of b: maps the last of these axes of b onto that of a.
         free: what M may still be multiplied with from the left.
     """
 
     signs: tuple[int, ...]
     offsets: tuple[float, ...]
     M: Motion
-    free: Free = field(repr=False)
-
-
-@dataclass(frozen=True)
-class Furthest:
-    """How far the pass came: the first axis (from 0) that no choice could bring onto its counterpart."""
-
-    joint: int
+    free: Free
 
 
 class Matching:
@@ -149,23 +140,20 @@ class Matching:
         self._first: dict[Axis, list[_Node]] = {}
         self._kept = 0
 
-    def matches(
-        self, b: Sequence[Axis], most: float = math.inf, rest: Sequence[float] = ()
-    ) -> tuple[list[Match], Furthest]:
+    def matches(self, b: Sequence[Axis], most: float = math.inf) -> tuple[list[Match], int]:
         """All ways, one per vector of signs, to map the axes of b onto those of a.
 
         Args:
             b: axes at q = 0, of the same number and kinds as those of a.
             most: ways whose senses and settled offsets cost as much are left out.
-            rest: what the joints from each one on cost at least, where that is known; n + 1 numbers.
 
         Returns:
-            the matches, and how far the best attempt came, if there is none.
+            the matches, and the first joint (from 0) whose axis no choice could bring onto its counterpart, if
+            there is none.
         """
         if self._kept > _MOST_KEPT:
             self._first, self._kept = {}, 0
         n = len(self._a)
-        rest = rest or (0.0,) * (n + 1)
         most += _ROUNDING
         axes: dict[int, Axis] = {}
         found, reached = [], 0
@@ -173,31 +161,22 @@ class Matching:
         while stack:
             node = stack.pop()
             i = len(node.state.signs)
-            if node.cost + rest[i] >= most:
+            if node.cost >= most:
                 continue
             reached = max(reached, i)
             if i == n:
-                found.append(Match(*node.state))
+                found.append(node.state)
                 continue
             if i not in axes:
                 axes[i] = b[i]
-            stack += self._continued(node, axes[i], i, most - rest[i + 1])
-        return found, Furthest(min(reached, n - 1))
-
-    def beginnings(self, b: Sequence[Axis]) -> list[float]:
-        """What the first axes of an arm that has been matched cost at least: none, one, and so on to all."""
-        nodes, least = self._started(b[0]), [0.0]
-        for i in range(1, len(self._a) + 1):
-            least.append(min((node.cost for node in nodes), default=math.inf))
-            if i < len(self._a):
-                nodes = [each for node in nodes for each in self._continued(node, b[i], i, math.inf)]
-        return least
+            stack += self._continued(node, axes[i], i, most)
+        return found, min(reached, n - 1)
 
     def _started(self, b: Axis) -> list[_Node]:
         if b not in self._first:
             zero = (0.0,) * len(self._a)
             states = [
-                _State((sign,), zero, *_first(self._a[0], b, sign, len(self._a), self._tolerance))
+                Match((sign,), zero, *_first(self._a[0], b, sign, len(self._a), self._tolerance))
                 for sign in (1, -1)
             ]
             self._first[b] = [_Node(state, FLIP if state.signs[0] < 0 else 0.0, {}) for state in states]
@@ -221,7 +200,7 @@ class Matching:
                 found.append(known)
         return found
 
-    def _added(self, before: _State, after: _State) -> float:
+    def _added(self, before: Match, after: Match) -> float:
         """What one more joint costs: its sense, and the offset of the last that turned, if it is settled."""
         cost = FLIP if after.signs[-1] < 0 else 0.0
         settled, turn = before.free.turn, after.free.turn
@@ -229,13 +208,6 @@ class Matching:
             offset = math.remainder(after.offsets[settled.joint], 2.0 * math.pi)
             cost += offset_cost(offset, self._tolerance)
         return cost
-
-
-class _State(NamedTuple):
-    signs: tuple[int, ...]
-    offsets: tuple[float, ...]
-    M: Motion
-    free: Free
 
 
 class _Node(NamedTuple):
@@ -247,7 +219,7 @@ class _Node(NamedTuple):
             other.
     """
 
-    state: _State
+    state: Match
     cost: float
     after: dict[Axis, _Attempt]
 
@@ -281,7 +253,7 @@ def _first(a: Axis, b: Axis, sign: int, n: int, tolerance: Tolerance) -> tuple[M
     none = (0.0,) * n
     z = _scaled(b.z, sign)
     M = IDENTITY
-    if _norm(_minus(z, a.z)) > tolerance.angle:
+    if _distance(z, a.z) > tolerance.angle:
         M = Motion(_between(z, a.z), (0.0, 0.0, 0.0))
     if a.slides:
         return M, Free(Turn(a.z, a.p, NOBODY, True), tuple(Slide(v, none) for v in IDENTITY.R))
@@ -292,13 +264,13 @@ def _first(a: Axis, b: Axis, sign: int, n: int, tolerance: Tolerance) -> tuple[M
     return M, Free(Turn(a.z, a.p, 0), (Slide(a.z, none),))
 
 
-def _attempt(state: _State, a: Axis, b: Axis, tolerance: Tolerance) -> _Attempt:
+def _attempt(state: Match, a: Axis, b: Axis, tolerance: Tolerance) -> _Attempt:
     """One more axis of b, and the senses in which it may be brought onto that of a."""
     M, turn = state.M, state.free.turn
     z, p = _rotate(M.R, b.z), _apply(M, b.p)
     along = turn is not None and _parallel(a.z, turn.z, tolerance.angle)
     if turn is None or along:
-        senses = [sign for sign in (-1, 1) if _norm(_minus(_scaled(z, sign), a.z)) <= tolerance.angle]
+        senses = [sign for sign in (-1, 1) if _distance(_scaled(z, sign), a.z) <= tolerance.angle]
         return _Attempt(z, p, along, senses, {})
     # No turn alters the angle to its own line, nor the moment about it.
     angles, moments, rounding = (_dot(z, turn.z), _dot(a.z, turn.z)), (0.0, 0.0), 0.0
@@ -315,37 +287,37 @@ def _attempt(state: _State, a: Axis, b: Axis, tolerance: Tolerance) -> _Attempt:
 
 
 def _next(
-    state: _State, a: Axis, b: Axis, attempt: _Attempt, sign: int, i: int, tolerance: Tolerance
-) -> _State | None:
+    state: Match, a: Axis, b: Axis, attempt: _Attempt, sign: int, i: int, tolerance: Tolerance
+) -> Match | None:
     """The state with one more axis; None if this sign cannot bring it onto that of a."""
-    z, p, along = _scaled(attempt.z, sign), attempt.p, attempt.along
+    p, along = attempt.p, attempt.along
     signs, offsets, M, (turn, slides) = state
-    changed = list(offsets)
-
-    def turned(M: Motion, turn: Turn, angle: float) -> Motion:
-        if turn.joint != NOBODY:
-            changed[turn.joint] += signs[turn.joint] * angle
-        return _then_turn(M, turn, angle)
-
+    angle = 0.0  # of the free turn, as far as it is used up
     if turn is not None and not along:
-        flat, wanted = _across(z, turn.z), _across(a.z, turn.z)
-        if _norm(flat) > tolerance.angle and _norm(_minus(z, a.z)) > 0.0:
-            M = turned(M, turn, _angle(flat, wanted, turn.z))
-            z, p = _scaled(_rotate(M.R, b.z), sign), _apply(M, b.p)
-        if _norm(_minus(z, a.z)) > tolerance.angle:
+        z = _scaled(attempt.z, sign)
+        left = _distance(z, a.z)
+        if left > 0.0 and _norm(flat := _across(z, turn.z)) > tolerance.angle:
+            angle = _angle(flat, _across(a.z, turn.z), turn.z)
+            M = _then_turn(M, turn, angle)
+            left, p = _distance(_scaled(_rotate(M.R, b.z), sign), a.z), _apply(M, b.p)
+        if left > tolerance.angle:
             return None
+    changed = list(offsets)
     if not a.slides:
         apart = _across(_minus(a.p, p), a.z)
         if turn is not None and along and not turn.everywhere:
             here, there = _across(_minus(p, turn.p), turn.z), _across(_minus(a.p, turn.p), turn.z)
             if min(_norm(here), _norm(there)) > tolerance.length and _norm(apart) > 0.0:
-                M = turned(M, turn, _angle(here, there, turn.z))
+                angle = _angle(here, there, turn.z)
+                M = _then_turn(M, turn, angle)
                 apart = _across(_minus(a.p, _apply(M, b.p)), a.z)
         elif slides and _norm(apart) > 0.0:
             M, apart = _slid(M, slides, apart, a.z, signs, changed)
         if _norm(apart) > tolerance.length:
             return None
-    return _State(
+    if turn is not None and turn.joint != NOBODY:
+        changed[turn.joint] += signs[turn.joint] * angle
+    return Match(
         (*signs, sign), tuple(changed), M, _free_after(turn, slides, along, a, i, len(offsets), tolerance)
     )
 
@@ -370,10 +342,13 @@ def _combination(slides: tuple[Slide, ...], z: Vector, tolerance: float) -> tupl
     """The weights of the slide along z, None if the free slides do not contain it."""
     if not slides:
         return None
+    if len(slides) == 1:
+        share = _dot(slides[0].v, z)
+        if _distance(_scaled(slides[0].v, share), z) > tolerance:
+            return None
+        return tuple([share * weight for weight in slides[0].weights])
     V = np.array([s.v for s in slides]).T
-    shares = (
-        np.linalg.lstsq(V, np.array(z), rcond=1e-9)[0] if len(slides) > 1 else np.array([_dot(slides[0].v, z)])
-    )
+    shares = np.linalg.lstsq(V, np.array(z), rcond=1e-9)[0]
     if float(np.linalg.norm(V @ shares - z)) > tolerance:
         return None
     return tuple((shares @ np.array([s.weights for s in slides])).tolist())
@@ -410,7 +385,9 @@ def _dot(a: Vector, b: Vector) -> float:
 
 def cross(a: Vector, b: Vector) -> Vector:
     """a × b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    x, y, z = a
+    u, v, w = b
+    return y * w - z * v, z * u - x * w, x * v - y * u
 
 
 def _plus(a: Vector, b: Vector) -> Vector:
@@ -430,9 +407,20 @@ def _norm(a: Vector) -> float:
     return math.sqrt(x * x + y * y + z * z)
 
 
+def _distance(a: Vector, b: Vector) -> float:
+    """|a − b|."""
+    x, y, z = a
+    u, v, w = b
+    x, y, z = x - u, y - v, z - w
+    return math.sqrt(x * x + y * y + z * z)
+
+
 def _across(a: Vector, z: Vector) -> Vector:
     """The part of a that is perpendicular to the unit vector z."""
-    return _minus(a, _scaled(z, _dot(a, z)))
+    x, y, w = a
+    u, v, t = z
+    along = x * u + y * v + w * t
+    return x - along * u, y - along * v, w - along * t
 
 
 def _parallel(a: Vector, b: Vector, tolerance: float) -> bool:
@@ -451,7 +439,9 @@ def _rotate(R: Rotation, a: Vector) -> Vector:
 
 
 def _apply(M: Motion, a: Vector) -> Vector:
-    return _plus(_rotate(M.R, a), M.t)
+    ((a1, a2, a3), (b1, b2, b3), (c1, c2, c3)), (u, v, w) = M
+    x, y, z = a
+    return a1 * x + a2 * y + a3 * z + u, b1 * x + b2 * y + b3 * z + v, c1 * x + c2 * y + c3 * z + w
 
 
 def _about(z: Vector, angle: float) -> Rotation:
@@ -482,12 +472,11 @@ def _between(a: Vector, b: Vector) -> Rotation:
 def _then_turn(M: Motion, turn: Turn, angle: float) -> Motion:
     """M, then a turn about the line."""
     R = _about(turn.z, angle)
-    x, y, z = M.R
-    columns = (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
-    first, second, third = _rotate(R, columns[0]), _rotate(R, columns[1]), _rotate(R, columns[2])
+    (a1, a2, a3), (b1, b2, b3), (c1, c2, c3) = R
+    (x1, x2, x3), (y1, y2, y3), (z1, z2, z3) = M.R
     product = (
-        (first[0], second[0], third[0]),
-        (first[1], second[1], third[1]),
-        (first[2], second[2], third[2]),
+        (a1 * x1 + a2 * y1 + a3 * z1, a1 * x2 + a2 * y2 + a3 * z2, a1 * x3 + a2 * y3 + a3 * z3),
+        (b1 * x1 + b2 * y1 + b3 * z1, b1 * x2 + b2 * y2 + b3 * z2, b1 * x3 + b2 * y3 + b3 * z3),
+        (c1 * x1 + c2 * y1 + c3 * z1, c1 * x2 + c2 * y2 + c3 * z2, c1 * x3 + c2 * y3 + c3 * z3),
     )
     return Motion(product, _plus(_rotate(R, _minus(M.t, turn.p)), turn.p))

@@ -215,7 +215,7 @@ def invariants(tables: Tables, parallel: float = _PARALLEL) -> Invariants:
     lines = tables.zero
     z, p = lines.z[:, 0, rows], lines.z_point[:, 0, rows]
     slides = tables.kinds[:, rows] == KIND_CODES["prismatic"]
-    w = _cross(z[:, :-1], z[:, 1:])
+    w = cross_rows(z[:, :-1], z[:, 1:])
     sine = np.linalg.norm(w, axis=-1)
     cosine = np.abs((z[:, :-1] * z[:, 1:]).sum(axis=-1))
     twist = np.arctan2(sine, cosine)
@@ -226,8 +226,8 @@ def invariants(tables: Tables, parallel: float = _PARALLEL) -> Invariants:
     distance = np.where(lies, across, (e * w).sum(axis=-1) / safe)
     distance = np.where(slides[:, :-1] | slides[:, 1:], math.nan, distance)
     # Feet of the common normal of each link on its two axes, as lengths from the points p.
-    near = (_cross(e, z[:, 1:]) * w).sum(axis=-1) / safe**2
-    far = (_cross(e, z[:, :-1]) * w).sum(axis=-1) / safe**2
+    near = (cross_rows(e, z[:, 1:]) * w).sum(axis=-1) / safe**2
+    far = (cross_rows(e, z[:, :-1]) * w).sum(axis=-1) / safe**2
     feet = ~lies & ~slides[:, :-1] & ~slides[:, 1:]
     offset = np.full((len(tables), n), math.nan)
     start = np.full((len(tables), 3), math.nan)  # the last foot, carried along a run of parallel axes
@@ -273,13 +273,13 @@ class Ends(NamedTuple):
 
     def agree(self, others: Ends, tolerance: Tolerance) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether first and last axis of each of the others may lie where those of this single table do."""
-        turned = np.linalg.norm(_cross(self.z, others.z), axis=-1) <= 10.0 * tolerance.angle
-        apart = np.linalg.norm(_cross(others.p - self.p, self.z), axis=-1) <= 10.0 * tolerance.length
+        turned = np.linalg.norm(cross_rows(self.z, others.z), axis=-1) <= 10.0 * tolerance.angle
+        apart = np.linalg.norm(cross_rows(others.p - self.p, self.z), axis=-1) <= 10.0 * tolerance.length
         same = turned & (apart | others.slides)
         return same[:, 0], same[:, 1]
 
 
-def _cross(a: Array, b: Array) -> Array:
+def cross_rows(a: Array, b: Array) -> Array:
     """a × b of vectors ``(..., 3)``, without the checks of `numpy.cross`."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
