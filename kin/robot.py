@@ -9,7 +9,7 @@ are in use, and the same table read in both orders gives two *different* arms:
   turns about z of frame i.
 
 A revolute joint adds its value to θ, a prismatic one to d; a ``fixed`` row is constant (a tool, an adapter).
-``T_base_tool = base · A_1 … A_m · tool``. Lengths are metres and angles radians.
+``T_world_tool = base · A_1 … A_m · tool``. Lengths are metres and angles radians.
 """
 
 from __future__ import annotations
@@ -204,11 +204,20 @@ class Robot:
                 `Joint`. Without limits a revolute joint turns ±π and a prismatic one slides 0 to 1 m.
             convention: ``"standard"`` or ``"modified"`` (Craig).
             robot_id, name, source: as in a robot file.
-            home: one value per moving joint; by default the middle of the limits.
+            home: one value per moving joint, radians (metres); by default the middle of the limits.
             base, tool: constant transforms ``(4, 4)`` before the first and after the last row.
+
+        Returns:
+            The arm.
 
         Raises:
             InputError: an invalid row or field.
+
+        Examples:
+            >>> import kin
+            >>> arm = kin.Robot.from_dh([(0.0, 0.0, 0.5, 0.0), (0.0, 0.0, 0.3, 0.0)])
+            >>> kin.fk(arm, [0.0, 0.0])[:3, 3]
+            array([0.8, 0. , 0. ])
         """
         table = tuple(_row(i, row) for i, row in enumerate(rows))
         if home is None:
@@ -217,17 +226,63 @@ class Robot:
         return cls(robot_id, name, source, convention, table, tuple(home), **transforms)
 
     def with_base(self, T_world_base: ArrayLike) -> Robot:
-        """The same arm with another transform ``(4, 4)`` before its first row."""
+        """The same arm with another transform before its first row: where it stands in the world frame.
+
+        Args:
+            T_world_base: ``(4, 4)``, metres.
+
+        Returns:
+            An arm whose poses, targets and Jacobians are in the world frame.
+
+        Raises:
+            InputError: what is given is no rigid transform.
+
+        Examples:
+            >>> import kin
+            >>> arm = kin.get_robot("planar2r").with_base(kin.from_xyz_rpy([0.0, 0.0, 0.5]))
+            >>> kin.fk(arm, [0.0, 0.0])[:3, 3]
+            array([1.6, 0. , 0.5])
+        """
         return replace(self, base=as_transform(T_world_base, "T_world_base"))  # type: ignore[arg-type]
 
     def with_tool(self, T_last_tool: ArrayLike) -> Robot:
-        """The same arm with another transform ``(4, 4)`` after its last row: it replaces the tool of the arm."""
+        """The same arm with another transform after its last row: it replaces the tool of the arm.
+
+        Args:
+            T_last_tool: ``(4, 4)`` of the tool in the frame of the last row, metres.
+
+        Returns:
+            An arm whose poses are those of the tool.
+
+        Raises:
+            InputError: what is given is no rigid transform.
+
+        Examples:
+            >>> import kin
+            >>> arm = kin.get_robot("planar2r").with_tool(kin.from_xyz_rpy([0.1, 0.0, 0.0]))
+            >>> kin.fk(arm, [0.0, 0.0])[:3, 3]
+            array([1.7, 0. , 0. ])
+        """
         return replace(self, tool=as_transform(T_last_tool, "T_last_tool"))  # type: ignore[arg-type]
 
     def with_mounted(self, T_tool_mounted: ArrayLike) -> Robot:
-        """The same arm with a further tool on its tool, at the pose ``(4, 4)`` in the frame of that tool.
+        """The same arm with a further tool on its tool, as the field `tool` of REST requests mounts one.
 
-        All poses are then those of what is mounted. This is what the field `tool` of REST requests means.
+        Args:
+            T_tool_mounted: ``(4, 4)`` of the further tool in the frame of the arm's tool, metres.
+
+        Returns:
+            An arm whose poses are those of what is mounted.
+
+        Raises:
+            InputError: what is given is no rigid transform.
+
+        Examples:
+            >>> import kin
+            >>> gripper = kin.from_xyz_rpy([0.0, 0.0, 0.12])
+            >>> twice = kin.get_robot("ur5").with_mounted(gripper).with_mounted(gripper)
+            >>> twice.T_last_tool[:3, 3]
+            array([0.  , 0.  , 0.24])
         """
         return self.with_tool(self.T_last_tool @ as_transform(T_tool_mounted, "T_tool_mounted"))
 
@@ -320,7 +375,23 @@ class Robot:
         return total
 
     def check_q(self, q: ArrayLike, field: str = "q") -> Array:
-        """`q` as a finite array ``(..., n)``; raises `InputError` naming the joint count otherwise."""
+        """Joint values as an array.
+
+        Args:
+            q: ``(..., n)`` values of the moving joints, radians (metres).
+            field: the name used in messages.
+
+        Returns:
+            A float array ``(..., n)``.
+
+        Raises:
+            InputError: another number of joints, which it names, or values that are not finite.
+
+        Examples:
+            >>> import kin
+            >>> kin.get_robot("planar2r").check_q([0, 1])
+            array([0., 1.])
+        """
         try:
             return finite_array(field, q, (self.n,))
         except InputError as error:
@@ -330,15 +401,53 @@ class Robot:
             raise
 
     def in_limits(self, q: Array, slack: float = 0.0) -> NDArray[np.bool_]:
-        """Whether configurations ``(..., n)`` respect the joint limits: ``(...)`` booleans."""
+        """Whether configurations respect the joint limits.
+
+        Args:
+            q: ``(..., n)`` configurations, radians (metres).
+            slack: how far outside still counts as inside, radians (metres).
+
+        Returns:
+            ``(...)`` booleans.
+
+        Examples:
+            >>> import kin
+            >>> kin.get_robot("planar2r").in_limits([[0.0, 0.0], [9.0, 0.0]])
+            array([ True, False])
+        """
         return np.asarray(((q >= self.lower - slack) & (q <= self.upper + slack)).all(axis=-1))
 
     def clip(self, q: Array) -> Array:
-        """Configurations ``(..., n)`` moved to the nearest limit, joint by joint."""
+        """Configurations moved inside the joint limits, each joint to its nearest value.
+
+        Args:
+            q: ``(..., n)`` configurations, radians (metres).
+
+        Returns:
+            ``(..., n)``.
+
+        Examples:
+            >>> import kin
+            >>> kin.get_robot("planar2r").clip([9.0, 0.5]).round(4)
+            array([3.1416, 0.5   ])
+        """
         return np.clip(q, self.lower, self.upper)
 
     def random_q(self, rng: np.random.Generator, size: int | tuple[int, ...] = ()) -> Array:
-        """Uniform configurations inside the limits, ``(*size, n)``; an unlimited joint draws from ±π."""
+        """Random configurations, uniform inside the limits; an unlimited joint draws from ±π.
+
+        Args:
+            rng: that they are drawn from: the same seed gives the same configurations.
+            size: how many, or a shape; by default one.
+
+        Returns:
+            ``(*size, n)`` radians (metres).
+
+        Examples:
+            >>> import kin, numpy as np
+            >>> kin.get_robot("ur5").random_q(np.random.default_rng(1), 10).shape
+            (10, 6)
+        """
         shape = (size,) if isinstance(size, int) else size
         lower = np.where(np.isfinite(self.lower), self.lower, -math.pi)
         upper = np.where(np.isfinite(self.upper), self.upper, math.pi)

@@ -60,8 +60,8 @@ mypy
 wait $programs
 # If the second installation replaced a library in use, a compiling process may have failed: once more then.
 wait $compiling && wait $backwards || compile_kernels
-# Browsers and processes that start on a loaded machine can be late: a failure counts if it comes twice. The summary
-# names what was run again ("rerun"), which is a fault of the test or of the code all the same.
+# Browsers and processes that start on a loaded machine can be late: a failure counts if it comes twice, in a browser
+# three times. The summary names what was run again ("rerun"), which is a fault of the test or of the code all the same.
 twice="--reruns 1 -r R"
 # The files with tests of a marker: collecting all others takes longer than some of these run.
 files_of() {
@@ -70,7 +70,7 @@ files_of() {
 # The browser tests draw on one core and often wait: the other tests run beside them. What measures time runs alone.
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
-pytest $twice -m "not slow and browser" $(files_of browser) >"$log" 2>&1 &
+pytest --reruns 2 -r R -m "not slow and browser" $(files_of browser) >"$log" 2>&1 &
 browsing=$!
 failed=0
 pytest $twice -n 3 --dist loadfile --no-loadscope-reorder -m "not slow and not browser and not bench" || failed=1

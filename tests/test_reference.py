@@ -20,7 +20,7 @@ FUNCTIONS = sorted(name for name in kin.__all__ if inspect.isfunction(inspect.un
 METHODS = sorted(
     f"{name}.{method}"
     for name in kin.__all__
-    if inspect.isclass(cls := getattr(kin, name)) and not issubclass(cls, Exception | kin.Robot)
+    if inspect.isclass(cls := getattr(kin, name)) and not issubclass(cls, Exception)
     for method, value in vars(cls).items()
     if not method.startswith("_") and (inspect.isfunction(value) or isinstance(value, classmethod))
     if value.__module__.startswith("kin.")
