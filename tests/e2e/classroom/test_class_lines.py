@@ -535,6 +535,13 @@ def test_nothing_is_lost_and_all_that_is_shown_agrees(lesson: Class, times: tupl
         act(lesson)
 
 
+# Whether the page has written into its link what is open.
+STORED = """(name) => {
+  const state = new URLSearchParams(location.hash.slice(1)).get("s") ?? "";
+  return atob(state.replaceAll("-", "+").replaceAll("_", "/")).includes(name);
+}"""
+
+
 def test_a_course_is_where_it_was_after_a_reload(browser: Browser, address: str) -> None:
     """Its list, and an exercise of it with the tries so far, also when the page was closed meanwhile."""
     teacher = Member(browser, address)
@@ -550,7 +557,8 @@ def test_a_course_is_where_it_was_after_a_reload(browser: Browser, address: str)
     course.locator("[data-guide-do=next]").click()
     exercise = page.locator(f"[data-exercise={EXERCISE}]")
     expect(exercise).to_be_visible()
-    page.reload()  # at once: what is on show is stored
+    page.wait_for_function(STORED, arg=EXERCISE)  # it is sent right after what is on show
+    page.reload()
     for tries in (1, 2):
         expect(exercise).to_be_visible()
         expect(page.locator("[data-guide=course-bar]")).to_be_visible()
