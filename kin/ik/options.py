@@ -265,6 +265,8 @@ class IKOptions:
             (None, 0.5)
         """
         if options is None:
+            if all(name in DEFAULTS and value is DEFAULTS[name] for name, value in keywords.items()):
+                return _defaults_checked()
             names = [each.name for each in fields(JointConstraints)]
             constraints = JointConstraints(**{name: keywords.pop(name) for name in names if name in keywords})
             return cls(constraints=constraints, **keywords)
@@ -300,11 +302,16 @@ class IKOptions:
             >>> import kin
             >>> kin.IKOptions(task="position").check_only("task", "mask")
         """
-        for f in fields(self):
-            default = FREE if f.name == "constraints" else f.default
-            if f.name not in names and getattr(self, f.name) != default:
+        for name in self._chosen:
+            if name not in names:
                 expected = "the default; these are used here: " + ", ".join(names)
-                raise InputError(f"options.{f.name}", getattr(self, f.name), expected)
+                raise InputError(f"options.{name}", getattr(self, name), expected)
+
+    @cached_property
+    def _chosen(self) -> tuple[str, ...]:
+        """The names of the options that are not the default."""
+        defaults = {f.name: FREE if f.name == "constraints" else f.default for f in fields(self)}
+        return tuple(name for name, default in defaults.items() if getattr(self, name) != default)
 
     @cached_property
     def avoids(self) -> bool:
@@ -362,6 +369,11 @@ def _defaults() -> dict[str, Any]:
 
 
 DEFAULTS: Mapping[str, Any] = _defaults()
+
+
+@cache
+def _defaults_checked() -> IKOptions:
+    return IKOptions()
 
 
 @cache

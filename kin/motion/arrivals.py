@@ -58,7 +58,8 @@ class Arrival:
     @property
     def as_recorded(self) -> bool:
         """Whether no joint differs from its recorded value by more than `OTHERWISE`."""
-        return self.difference is None or float(np.abs(self.difference).max()) <= OTHERWISE
+        difference = self.difference
+        return difference is None or float(np.abs(difference).max()) <= OTHERWISE
 
     def _named(self, q: Array) -> str | None:
         return branch_of(self.robot, q) if branch_names(self.robot) else None

@@ -162,7 +162,7 @@ def natural(knots: Array, rows: Array) -> Array:
     if len(knots) > 3:
         return spline(knots, rows)
     full = np.zeros((len(knots) - 1, rows.shape[1], 4))
-    slopes = np.diff(rows, axis=0) / np.diff(knots)[:, None]
+    slopes = (rows[1:] - rows[:-1]) / (knots[1:] - knots[:-1])[:, None]
     full[:, :, 0], full[:, :, 1] = rows[:-1], slopes
     if len(knots) == 3:
         bend = (slopes[1] - slopes[0]) / (knots[2] - knots[0])
