@@ -28,7 +28,7 @@ const viserPage = (() => {
     messages: "div:has(> [data-answers]) + div input", // the hidden field behind our hidden HTML
   };
   // What viser calls, and how often it has since this page was loaded.
-  const HOOKS = { readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0, writeHtml: 0 };
+  const HOOKS = { readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0, reportCamera: 0, writeHtml: 0 };
 
   // WebKit on Linux names the locale C as a language. viser's script would end there: no Intl knows it.
   const known = (tag) => { try { return Intl.getCanonicalLocales(tag).length > 0; } catch { return false; } };
@@ -137,12 +137,17 @@ const viserPage = (() => {
   // as changes of the same field; `link` is the worker and the field's name, known from the first message.
   let link = null;
   let filled = ""; // the field, as it was filled last
+  const cameraWatchers = [];
   const { postMessage } = Worker.prototype;
   Worker.prototype.postMessage = function (data, ...rest) {
     const change = data?.type === "send" && data.message?.type === "GuiUpdateMessage" ? data.message : null;
     if (filled && change?.updates?.value === filled) {
       HOOKS.sendToWorker++;
       link = { worker: this, uuid: change.uuid };
+    }
+    if (data?.type === "send" && data.message?.type === "ViewerCameraMessage") {
+      HOOKS.reportCamera++;
+      for (const act of cameraWatchers) act(data.message.wxyz);
     }
     return postMessage.call(this, data, ...rest);
   };
@@ -361,6 +366,8 @@ const viserPage = (() => {
     /** Call `act` after changes of the page of the kinds `on`: childList, characterData or an attribute of ATTRIBUTES.
      *  With a delay in ms, changes until then are one. */
     watch,
+    /** Call `act` with the camera's orientation (w, x, y, z) in the world frame when viser reports it. */
+    watchCamera: (act) => { cameraWatchers.push(act); },
     /** Call `act` when the value of a slider changes; `thumb` is what `thumbOf` returns. */
     watchValue: (thumb, act) => { valueWatchers.set(thumb, act); },
 

@@ -15,6 +15,7 @@ from playwright.sync_api import expect
 
 import kin
 from app.viewer.panel.joints import label
+from app.viewer.scene.camera import DIRECTION, UP
 from app.viewer.session.state import decode
 
 pytestmark = pytest.mark.browser
@@ -42,6 +43,10 @@ CELLS_THAT_OVERFLOW = """() => [...document.querySelectorAll(".kb-jacobian td[da
   text.selectNodeContents(e);
   return text.getBoundingClientRect().width > e.getBoundingClientRect().width;
 }).map((e) => e.textContent)"""
+AXES_END_AT = """(ends) => ["x", "y", "z"].every((name, i) => {
+  const circle = document.querySelector(`#kb-axes [data-axis=${name}] circle`);
+  return circle && Math.hypot(circle.cx.baseVal.value - ends[i][0], circle.cy.baseVal.value - ends[i][1]) < 0.5;
+})"""
 UNDER_THE_SCROLLBAR = """() => {
   const area = document.querySelector("[data-status]").closest(".mantine-ScrollArea-viewport");
   const bar = area.parentElement.querySelector(".mantine-ScrollArea-scrollbar[data-orientation=vertical]");
@@ -166,6 +171,32 @@ def test_the_panel_is_made_wider_at_its_edge(desktop: Tab) -> None:
     tab.page.wait_for_function(f"Math.abs({width} - {before}) < 3")
     expect(tab.status).to_have_attribute("data-status", "hand")
     tab.dismiss_notice()
+
+
+def test_axes_in_a_corner_point_as_those_of_the_world(desktop: Tab, phone: Tab) -> None:
+    page = desktop.page
+    desktop.open("View")
+    for button, out in (("Reset view", DIRECTION), ("Side", np.array([0.0, -1.0, 0.0]))):
+        page.get_by_role("button", name=button, exact=True).click()
+        right = np.cross(UP, out)
+        down = np.cross(right, out)
+        ends = 36.0 + 25.0 * np.column_stack([right / np.linalg.norm(right), down / np.linalg.norm(down)])
+        page.wait_for_function(AXES_END_AT, arg=ends.tolist())
+    page.get_by_role("button", name="Reset view").click()
+    for tab in (desktop, phone):
+        axes, scene = (tab.page.locator(part).bounding_box() for part in ("#kb-axes", "canvas[data-engine]"))
+        assert axes is not None
+        assert scene is not None
+        assert scene["x"] <= axes["x"]
+        assert axes["x"] + axes["width"] <= scene["x"] + scene["width"]
+        assert scene["y"] <= axes["y"]
+        assert axes["y"] + axes["height"] <= scene["y"] + scene["height"]
+        for part in ("#kb-tools", "[data-status]")[: 1 if tab is phone else 2]:  # a phone's card may be long
+            other = tab.page.locator(part).bounding_box()
+            assert other is not None
+            across = min(axes["x"] + axes["width"], other["x"] + other["width"]) - max(axes["x"], other["x"])
+            down = min(axes["y"] + axes["height"], other["y"] + other["height"]) - max(axes["y"], other["y"])
+            assert across <= 0.0 or down <= 0.0, f"the axes cover {part}"
 
 
 def test_the_size_of_the_text_is_chosen_and_kept(desktop: Tab) -> None:

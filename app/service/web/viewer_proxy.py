@@ -66,6 +66,7 @@ _SCRIPTS = (
     b"class_tab",
     b"layout",
     b"page",
+    b"axes",
     b"hints",
 )
 _STYLES = (b"viewer", b"robot", b"program", b"class_tab", b"layout", b"hints")
