@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 
+import numpy as np
+
 from app.viewer.feature import Feature, Stage
 from app.viewer.obstacles import placed
 from app.viewer.obstacles.nodes import ObstacleNodes
@@ -16,7 +18,7 @@ from app.viewer.panel import update_html
 from app.viewer.panel.entry import read_cell
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
-from app.viewer.scene.gizmo import Pull
+from app.viewer.scene.gizmo import Pull, travel
 from app.viewer.scene.meshes import body
 from app.viewer.tabs.robot.views import text_of
 from app.viewer.views.templates import render
@@ -41,6 +43,7 @@ class ObstaclesFeature(Feature):
         self._wrong: tuple[str, str, str] | None = None  # field, what was typed, and what is wrong with it
         self._touched: frozenset[int] = frozenset()
         self._held = False
+        self._start = np.eye(4)  # pose of the chosen one when it was grabbed
         self._nodes = ObstacleNodes(stage.client.scene, self.post)
         self._html = stage.client.gui.add_html("")
         self._show()
@@ -76,7 +79,7 @@ class ObstaclesFeature(Feature):
 
     def on_obstacles(self) -> None:
         if self._chosen is not None and self._chosen >= len(self.stage.now.obstacles):
-            self._chosen = None
+            self._chosen, self._held = None, False
         self._show()
 
     def on_contacts(self, contacts: Sequence[Contact]) -> None:
@@ -135,11 +138,17 @@ class ObstaclesFeature(Feature):
         if self._chosen is None:
             return
         self._held = pull.phase != "end"
-        if pull.phase != "start":
+        if pull.phase == "start":
+            self._start = placed.pose(self.stage.now.obstacles[self._chosen])
+        else:
             T = from_position_wxyz(pull.position, pull.wxyz)
             self._wrong = None
             self._use(placed.moved(self.stage.now.obstacles, self._chosen, T))
-        if not self._held:
+        if self._held:
+            T = placed.pose(self.stage.now.obstacles[self._chosen])
+            radius = body(self.stage.now.robot).radius
+            self._nodes.travel.show(travel(self._start, T, self.stage.units), T[:3, 3], radius)
+        else:
             self._show()
 
     def _type(self, field: str, text: str) -> None:
@@ -178,6 +187,7 @@ class ObstaclesFeature(Feature):
         self._nodes.show(items, radius)
         self._nodes.mark(self._touched, self._chosen)
         if not self._held:
+            self._nodes.travel.hide()
             T = None if self._chosen is None else placed.pose(items[self._chosen])
             self._nodes.place_gizmo(T, radius)
         self._show_panel()

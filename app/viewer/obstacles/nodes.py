@@ -13,6 +13,7 @@ from app.viewer.obstacles.placed import Obstacles, pose, sizes
 from app.viewer.panel import Post
 from app.viewer.scene import gizmo
 from app.viewer.scene.bodies.nodes import TOUCHING
+from app.viewer.scene.key_number import KeyNumber
 from app.viewer.viser_patches import assign, keep_private
 from kin import Obstacle
 from kin.transforms import Array, wxyz_from_rotation
@@ -25,7 +26,9 @@ TOP, INSET = 0.06, 0.94  # thickness of a table's top in lengths, and how far wh
 # What casts the shadow of a table is inside it, and so deep (radii of the sphere around the arm) that its soft
 # shadow does not show on the top in dots.
 CORE, DEEP = 0.93, 0.25
-GIZMO, LINE = 0.2, 4.0  # length of the arrows in radii of the sphere around the arm, their thickness in pixels
+# Length of the arrows in radii of the sphere around the arm, their thickness in pixels, and how opaque they are:
+# smaller, thinner and fainter than those of the target.
+GIZMO, LINE, FAINT = 0.17, 2.0, 0.6
 _NUMBERS = count(1)  # a node name is never used twice: browsers keep the poses of removed nodes
 
 
@@ -101,6 +104,9 @@ class ObstacleNodes:
 
     Args:
         post: takes ``"choose"`` with the number of an obstacle that was clicked, and the events of the gizmo.
+
+    Attributes:
+        travel: how far one is dragged.
     """
 
     def __init__(self, scene: viser.SceneApi, post: Post) -> None:
@@ -108,6 +114,7 @@ class ObstacleNodes:
         self._nodes: list[_Node] = []
         self._drawn: list[tuple[object, ...]] = []
         self._gizmo: viser.TransformControlsHandle | None = None
+        self.travel = KeyNumber(scene, f"/travel-obstacle-{next(_NUMBERS)}", below=True)
 
     def show(self, items: Obstacles, radius: float) -> None:
         """Draw these; those whose shape and sizes are as before are only moved.
@@ -150,7 +157,7 @@ class ObstacleNodes:
         if self._gizmo is None or not math.isclose(self._gizmo.scale, scale):
             self.place_gizmo(None, radius)
             self._gizmo = self._scene.add_transform_controls(
-                f"/obstacle-gizmo-{next(_NUMBERS)}", scale=scale, line_width=LINE, depth_test=False, opacity=0.95
+                f"/obstacle-gizmo-{next(_NUMBERS)}", scale=scale, line_width=LINE, depth_test=False, opacity=FAINT
             )
             keep_private(self._gizmo)
             gizmo.listen(self._gizmo, ring=False, post=self._post)
@@ -158,5 +165,6 @@ class ObstacleNodes:
 
     def remove(self) -> None:
         """Remove everything from the scene."""
+        self.travel.hide()
         self.show((), 1.0)
         self.place_gizmo(None, 1.0)

@@ -10,11 +10,13 @@ import viser
 
 from app.viewer.panel import Post
 from kin.transforms import Array, rotation_about, rotation_angle, wxyz_from_rotation
+from kin.units import Units
 
 # Steps of the target: of a drag with Shift, and of one press of a key (with Shift: a tenth and a fifth).
 STEP, TURN = 0.01, math.radians(5.0)  # m, rad
 FINE_STEP, FINE_TURN = 0.001, math.radians(1.0)
 _SMALLEST = 1e-9
+_TURNED = 1e-4  # rad; smaller turns are not said
 
 
 class Pull(NamedTuple):
@@ -41,6 +43,17 @@ def listen(handle: viser.TransformControlsHandle, ring: bool, post: Post) -> Non
             gizmo = event.target
             key = "grab" if event.phase == "start" else "gizmo"  # the next event must not replace the start
             post(key, Pull(event.phase, gizmo.position.tolist(), gizmo.wxyz.tolist(), ring))
+
+
+def travel(start: Array, T: Array, units: Units) -> str:
+    """How far a pose ``(4, 4)`` is from another one, and how far it is turned, for a label."""
+    parts = [units.distance(float(np.linalg.norm(T[:3, 3] - start[:3, 3])))]
+    angle = rotation_angle(T[:3, :3], start[:3, :3])
+    if angle > _TURNED:
+        parts.append(units.angle(angle))
+        if parts[0] == units.distance(0.0):
+            del parts[0]
+    return "Δ " + " · ".join(parts)
 
 
 def snapped(T: Array, start: Array, R_gizmo: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The number that matters most while a target is missed, beside the target in the scene."""
+"""The number that matters most beside a point of the scene: what a target misses, or how far it was dragged."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ import numpy as np
 import viser
 
 from app.viewer.labels import add_label
+from app.viewer.viser_patches import assign
 from kin.transforms import Array
 
 Anchor = Literal["bottom-center", "top-center"]
-_ABOVE = 0.16  # height of the text above the target, relative to the radius of the sphere around the arm
+# Height of the text above the point, relative to the radius of the sphere around the arm; or below it, clear of
+# the arrows of a gizmo there.
+_ABOVE, _BELOW = 0.16, 0.3
 
 
 def place_beside(point: Array, size: float, target: Array | None, radius: float) -> tuple[float, Anchor]:
@@ -34,17 +37,19 @@ def place_beside(point: Array, size: float, target: Array | None, radius: float)
 
 
 class KeyNumber:
-    """A short text above the target. Not thread-safe: the visitor's worker calls it."""
+    """A short text above or below a point. Not thread-safe: the visitor's worker calls it."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
-        self._label = add_label(scene, "/key-number", "", anchor="bottom-center", visible=False)
+    def __init__(self, scene: viser.SceneApi, name: str = "/key-number", below: bool = False) -> None:
+        self._height = -_BELOW if below else _ABOVE
+        anchor: Anchor = "top-center" if below else "bottom-center"
+        self._label = add_label(scene, name, "", anchor=anchor, visible=False)
 
-    def show(self, text: str, target: Array, radius: float) -> None:
-        """Write above a target point ``(3,)``, for an arm in a sphere of this radius (m); "" hides the text."""
+    def show(self, text: str, point: Array, radius: float) -> None:
+        """Write beside a point ``(3,)``, for an arm in a sphere of this radius (m); "" hides the text."""
         if text:
             if self._label.text != text:
                 self._label.text = text
-            self._label.position = target + np.array([0.0, 0.0, _ABOVE * radius])
+            assign(self._label, point + np.array([0.0, 0.0, self._height * radius]))
         if self._label.visible != bool(text):
             self._label.visible = bool(text)
 

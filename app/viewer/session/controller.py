@@ -299,6 +299,7 @@ class ArmController:
             return
         if self.snap:
             target = gizmo.snapped(target, *self._drag_start)
+        self._listener.on_drag(self._drag_start[0], target if self.dragging else None)
         if self.target is None or not np.array_equal(target, self.target):
             self._solve(target)
         if not self.dragging and (ring or self.snap or self._in_base):

@@ -17,6 +17,9 @@ class ArmListener(Protocol):
     def on_goal(self, dragged: int | None) -> None:
         """The arm is heading elsewhere; `dragged` is the index of the joint whose slider the visitor holds."""
 
+    def on_drag(self, start: Array, target: Array | None) -> None:
+        """The visitor drags the target from one pose ``(4, 4)`` to another; None: it is released."""
+
     def on_result(self, result: IKResult) -> None:
         """Inverse kinematics was solved for a target."""
 

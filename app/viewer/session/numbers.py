@@ -19,6 +19,7 @@ from app.viewer.obstacles.words import sentence
 from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import StatusLine, key_number
+from app.viewer.scene.gizmo import travel
 from app.viewer.scene.key_number import KeyNumber
 from app.viewer.scene.motion import Pace
 from app.viewer.session.controller import ArmController
@@ -63,6 +64,7 @@ class Numbers:
         self._updated_at = 0.0
         self._dragged: int | None = None  # the joint whose slider the visitor holds
         self._beside_target = KeyNumber(page.client.scene)
+        self._travel = KeyNumber(page.client.scene, "/travel", below=True)
         self._axes = FrameAxes(page.client.scene)
         self._contacts: tuple[Contact, ...] = ()
 
@@ -89,9 +91,18 @@ class Numbers:
                 key_number(result, self._page.units), arm.target[:3, 3], arm.scene.body.radius
             )
 
+    def use_drag(self, start: Array, target: Array | None) -> None:
+        """The target is dragged from one pose ``(4, 4)`` to another: write how far; None: it is released."""
+        if target is None:
+            self._travel.hide()
+        else:
+            radius = self._page.arm.scene.body.radius
+            self._travel.show(travel(start, target, self._page.units), target[:3, 3], radius)
+
     def hide_target(self) -> None:
         """There is no target."""
         self._beside_target.hide()
+        self._travel.hide()
 
     @property
     def waiting(self) -> float | None:

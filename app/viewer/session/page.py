@@ -241,6 +241,9 @@ class VisitorPage(ShownArm, Worker):
     def on_goal(self, dragged: int | None) -> None:
         self.numbers.use_goal(dragged)
 
+    def on_drag(self, start: Array, target: Array | None) -> None:
+        self.numbers.use_drag(start, target)
+
     def on_result(self, result: IKResult) -> None:
         self._result = result
         self.posture.use_result(result)

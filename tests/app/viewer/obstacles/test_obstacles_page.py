@@ -156,6 +156,8 @@ def test_obstacles_are_dragged_with_their_gizmo(port: int) -> None:
         tab.send("TransformControlsDragStartMessage", name=gizmo, owner=owner)
         place = {"position": (0.1, 0.9, 0.5), "wxyz": (1.0, 0.0, 0.0, 0.0)}
         tab.send("TransformControlsUpdateMessage", name=gizmo, owner=owner, **place)
+        (travel,) = (name for name in tab.nodes if name.startswith("/travel-obstacle-"))
+        tab.wait(lambda: tab.nodes[travel]["props"]["text"] == "Δ 559 mm")
         tab.send("TransformControlsDragEndMessage", name=gizmo, owner=owner)
         tab.wait(lambda: bool(kept(tab).obstacles) and kept(tab).obstacles[0].xyz == (0.1, 0.9, 0.5))
         assert tab.script["undo"] == "Drag of an obstacle"

@@ -8,7 +8,9 @@ from fake_browser import FakeBrowser
 
 import kin
 from app.viewer.panel.status import key_number, notice
+from app.viewer.scene.gizmo import travel
 from app.viewer.scene.key_number import place_beside
+from kin.transforms import rotation_about
 from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -97,3 +99,42 @@ def test_labels_follow_the_size_of_the_text(port: int) -> None:
         tab.say("text-size", "Tiny")
         tab.wait(lambda: "Normal, Large, Projector" in tab.html)
         assert sizes()["/key-number"] == pytest.approx(1.7)
+
+
+def test_how_far_the_target_is_dragged_stands_beside_it_until_it_is_released(port: int) -> None:
+    home = kin.fk(UR5, UR5.q_home)
+    moved = home.copy()
+    moved[:3, 3] += [0.03, 0.0, -0.04]
+    turned = moved.copy()
+    turned[:3, :3] = rotation_about(np.array([0.0, 0.0, 1.0]), np.radians(12.0)) @ home[:3, :3]
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.choose(UR5.name)
+
+        def label() -> str:
+            return str(tab.nodes["/travel"]["props"]["text"]) if tab.visible.get("/travel") else ""
+
+        assert label() == ""
+        tab.grab()
+        tab.drag(moved)
+        tab.wait(lambda: label() == "Δ 50 mm")
+        place = tab.local("/travel")[:3, 3]
+        assert np.allclose(place[:2], moved[:2, 3])
+        assert place[2] < moved[2, 3]
+        tab.drag(turned)
+        tab.wait(lambda: label() == "Δ 50 mm · 12.0°")
+        tab.release()
+        tab.wait(lambda: label() == "")
+        tab.grab()
+        tab.drag(turned)
+        tab.choose(PIONEER.name)
+        tab.wait(lambda: label() == "")
+
+
+def test_a_turn_alone_is_said_without_a_length() -> None:
+    T = np.eye(4)
+    T[:3, :3] = rotation_about(np.array([1.0, 0.0, 0.0]), 0.5)
+    assert travel(np.eye(4), T, Units(False, "m")) == "Δ 0.500 rad"
+    assert travel(np.eye(4), np.eye(4), DEFAULT_UNITS) == "Δ 0 mm"
+    T[0, 3] = -0.0042
+    assert travel(np.eye(4), T, DEFAULT_UNITS) == "Δ 4.2 mm · 28.6°"
