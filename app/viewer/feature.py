@@ -220,6 +220,11 @@ class Feature:
     def on_activity(self) -> None:
         """Something else is open or withheld, or an answer was judged: see `Stage.activity`."""
 
+    @property
+    def failure(self) -> str:
+        """What has failed and stands, as words after "Ready, but"; "" if nothing has."""
+        return ""
+
     def extents(self) -> Sequence[Sphere]:
         """Spheres around what it shows in the scene, which the picture shows with the arm when it is fitted."""
         return ()

@@ -48,9 +48,11 @@ class Notice:
 
 READY = Notice("hand", "Ready", "Drag the coloured arrows at the tool, or move a joint slider.")
 
-READY_IN_CONTACT = "Ready, but something touches"
+TOUCHES = "something touches"  # after "Ready, but"
 
 LOOKING = Notice("hand", "Ready", "You may look: drag the picture to turn the view, and scroll to come closer.")
+
+WELL = (READY.title, "Reached")  # titles that promise that nothing is wrong
 
 
 def notice(result: IKResult, units: Units) -> Notice:
@@ -130,16 +132,16 @@ def _kind(result: IKResult) -> Kind:
     return "unreachable"
 
 
-def html(shown: Notice, warning: str = "", waiting: str = "") -> str:
+def html(shown: Notice, warning: str = "", waiting: str = "", failure: str = "") -> str:
     """The notice as a card, which ``static/layout.css`` places over the scene, with what is added to it.
 
-    A notice that all is well is no longer blue or green beside a warning, and the card says both.
+    A notice that all is well is no longer blue or green beside a warning or a failure, and the card says both.
     """
     symbol, color = LOOKS[shown.kind]
-    if warning and shown.kind in ("hand", "reached"):
+    if (warning or failure) and shown.kind in ("hand", "reached"):
         symbol, color = ("!", "kb-amber") if shown.kind == "hand" else (symbol, "kb-amber")
-        if shown.title == READY.title:
-            shown = replace(shown, title=READY_IN_CONTACT)
+        if shown.title in WELL:
+            shown = replace(shown, title=f"{shown.title}, but {TOUCHES if warning else failure}")
     if shown.kind != "error":  # which says what was typed
         shown = replace(shown, title=typeset(shown.title), detail=typeset(shown.detail))
     return render(
@@ -162,7 +164,7 @@ class StatusLine:
         self._news_since: float | None = None
         self._over = False  # the visitor did something else, before the notice could be seen
         self._shown = first
-        self._warning = self._waiting = ""
+        self._warning = self._waiting = self._failure = ""
         self._html = gui.add_html(html(first))
 
     @property
@@ -186,6 +188,12 @@ class StatusLine:
             self._warning = warning
             self._write()
 
+    def fail(self, failure: str) -> None:
+        """Say what has failed and stands, beside a notice that all is well, until the next call; "" ends it."""
+        if failure != self._failure:
+            self._failure = failure
+            self._write()
+
     def wait(self, waiting: str) -> None:
         """Show what the visitor waits for, until the next call; nothing if it is empty."""
         if waiting != self._waiting:
@@ -193,7 +201,7 @@ class StatusLine:
             self._write()
 
     def _write(self) -> None:
-        show_content(self._html, html(self._shown, self._warning, self._waiting))
+        show_content(self._html, html(self._shown, self._warning, self._waiting, self._failure))
 
     def show_result(self, result: IKResult, units: Units) -> None:
         """Show the result for a target."""

@@ -303,6 +303,7 @@ class VisitorPage(ShownArm, Worker):
                 for feature in self.features:
                     if feature.due is not None:
                         self._guard(lambda feature=feature: feature.tick(now))  # type: ignore[misc]
+                self.status.fail(next((feature.failure for feature in self.features if feature.failure), ""))
             if batch and self._persistence.urgent and not self._inbox.waits:  # what waits may open more
                 self._save()  # in the same frame, so that nothing is on show that a reload would lose
             self.client.flush()

@@ -91,6 +91,10 @@ class ProgramTab(Feature):
 
     # Reports of the session
 
+    @property
+    def failure(self) -> str:
+        return "" if self._fault is None or not self._items else "the program cannot be driven to its end"
+
     def on_robot(self) -> None:
         self._screen.chosen, self._screen.joint, self._player.time = None, None, 0.0
         self._playback.stop()

@@ -140,7 +140,27 @@ def test_a_warning_beside_ready_makes_the_card_amber_and_both_are_said() -> None
     status.show(UNDONE)
     assert "kb-amber" in element.content
     assert "<b>Undone: Home</b>" in element.content
+    status.show(Notice("reached", "Reached"))
+    assert "<b>Reached, but something touches</b>" in element.content
+    status.show(UNDONE)
     status.warn("")
     assert "kb-blue" in element.content
+    status.show(READY)
+    assert "<b>Ready</b>" in element.content
+
+
+def test_what_has_failed_stands_beside_a_notice_that_all_is_well() -> None:
+    status, element = line()
+    status.fail("the program cannot be driven to its end")
+    assert "<b>Ready, but the program cannot be driven to its end</b>" in element.content
+    assert "kb-amber" in element.content
+    status.show(Notice("reached", "Reached"))
+    assert "<b>Reached, but the program cannot be driven to its end</b>" in element.content
+    status.warn("Link 4 touches the table, 12 mm deep.")
+    assert "<b>Reached, but something touches</b>" in element.content
+    status.warn("")
+    status.show(Notice("compromise", "Reached with roll error"))
+    assert "<b>Reached with roll error</b>" in element.content
+    status.fail("")
     status.show(READY)
     assert "<b>Ready</b>" in element.content

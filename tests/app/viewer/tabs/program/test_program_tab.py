@@ -313,6 +313,10 @@ def test_a_program_that_cannot_be_driven_keeps_what_can_and_says_where_it_ends(u
     ur5.wait(lambda: clock(ur5)["playing"] == "0")
     ur5.wait(lambda: "The program ends on the way to 4" in ur5.html)
     assert clock(ur5)["time"] == clock(ur5)["duration"]
+    ur5.drag(kin.fk(UR5, UR5.q_home))
+    ur5.wait(lambda: "Reached, but the program cannot be driven to its end" in ur5.html)
+    press(ur5, "clear")
+    ur5.wait(lambda: "cannot be driven to its end" not in ur5.html)
 
 
 def test_a_file_is_opened_and_one_that_does_not_fit_is_refused(tab: FakeBrowser) -> None:
