@@ -1,0 +1,46 @@
+"use strict";
+// Runs in viser's page: what is too wide for the panel opens as a drawer below the scene, over its whole width, and goes
+// back, with the key B or the button of each such part. A part has the attribute data-wide; static/drawer.css moves it,
+// so that the service may write it anew at any time.
+(() => {
+  const SAVED = "kinboard-drawer";
+  const root = document.documentElement;
+  const SMALL = matchMedia("(max-width: 36em), (max-height: 30em)"); // a picture that has nothing to give away
+
+  if (root.dataset.kbEmbed) return;
+  let wanted = false;
+  // A browser may forbid storage; then a reload closes the drawer.
+  try { wanted = sessionStorage.getItem(SAVED) === "open"; } catch { /* see above */ }
+
+  const parts = () => [...document.querySelectorAll("[data-wide]")].filter((node) => node.checkVisibility());
+
+  /** The drawer is there while it is wanted, and the open tab has something for it. */
+  function show() {
+    const open = wanted && !SMALL.matches && parts().length > 0;
+    if (open !== root.hasAttribute("data-kb-drawer")) root.toggleAttribute("data-kb-drawer", open);
+    for (const button of document.querySelectorAll("[data-wide-do]")) {
+      if (button.ariaPressed !== String(open)) button.ariaPressed = String(open);
+    }
+  }
+
+  function toggle() {
+    wanted = !root.hasAttribute("data-kb-drawer");
+    try { sessionStorage.setItem(SAVED, wanted ? "open" : ""); } catch { /* see above */ }
+    show();
+  }
+
+  addEventListener("click", (event) => {
+    if (!(event.target instanceof Element)) return;
+    if (event.target.closest("[data-wide-do]")) toggle();
+    else if (viserPage.titleAt(event.target)) setTimeout(show, 50); // another tab is about to open
+  });
+  addEventListener("keydown", (event) => {
+    if (event.code !== "KeyB" || event.ctrlKey || event.metaKey || event.altKey || event.shiftKey || event.repeat) return;
+    const typing = event.target.matches("input:not([type=checkbox], [type=radio], [type=range]), textarea, select, [contenteditable]");
+    if (typing || !parts().length) return;
+    event.preventDefault();
+    toggle();
+  });
+  viserPage.watch(show, { on: ["childList", "aria-hidden"], delay: 50 });
+  SMALL.addEventListener("change", show);
+})();
