@@ -55,9 +55,8 @@ class Student(Member):
         self._course: tuple[str, float] | None = None  # the room's, and when it was sent; None: not known yet
         self._open_tab = 0
         self._read = ""  # the question whose result was read
-        self._sent_last: tuple[str, bool] | None = (
-            None  # exercise on show and `_gone`, as the room was last sent them
-        )
+        # The exercise on show and `_gone`, as the room was last sent them.
+        self._sent_last: tuple[str, bool] | None = None
         self._answered: tuple[str, int] | None = None  # exercise and seed of the last answer
         self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, STORED)))
         ticket = self.attendance.ticket
