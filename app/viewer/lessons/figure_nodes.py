@@ -23,10 +23,13 @@ from app.viewer.lessons.figure_shapes import (
     LINE,
     MEASURE,
     POINT,
+    RADIUS,
     above,
     along,
+    arc,
     beyond,
     ruler,
+    turned,
     unit,
 )
 from app.viewer.lessons.label_room import Labels
@@ -71,27 +74,67 @@ class FigureNodes:
 
     def dimension(
         self, key: str, start: ArrayLike, end: ArrayLike, text: str, units: Units, aside: ArrayLike,
-        color: Color = BLUE,
+        color: Color = BLUE, words: str | None = None,
     ) -> list[Node]:  # fmt: skip
-        """A distance with its value; `aside`: the direction ``(3,)`` to the dimension line, see `clear_of`."""
+        """A distance with its name and value, as in an engineering drawing; equal points have the label only.
+
+        Args:
+            aside: direction ``(3,)`` from the points to the dimension line, such as `clear_of` gives.
+            words: the whole label, instead of name and value.
+        """
         a, b = np.asarray(start, float), np.asarray(end, float)
         off = ASIDE * self.size * unit(np.asarray(aside, float))
         parts = ruler(a, b, off)
-        words = f"{text} = {units.lengths.text(float(np.linalg.norm(b - a)))}"
+        words = f"{text} = {units.lengths.text(float(np.linalg.norm(b - a)))}" if words is None else words
         return [
             self._bars(f"{key}-witness", parts[:2], GREY, LINE),
             self._bars(key, parts[2:], color, MEASURE),
             *self._label(key, words, 1.15, along(a, b, off)),
         ]
 
+    def angle(
+        self, key: str, corner: ArrayLike, start: ArrayLike, about: ArrayLike, angle: float, text: str,
+        units: Units, color: Color = BLUE, radius: float | None = None, words: str | None = None,
+    ) -> list[Node]:  # fmt: skip
+        """A rotation with its name and value: two sides, and the arc between them with an arrow head.
+
+        Args:
+            start, about: directions ``(3,)``: from which, and about which it turns, right-handed.
+            angle: signed (rad).
+            radius: of the arc (m); otherwise six times the arm's thickness.
+            words: the whole label, instead of name and value; "": none.
+        """
+        at, radius = np.asarray(corner, float), RADIUS * self.size if radius is None else radius
+        parts = arc(at, start, about, radius, angle)
+        words = f"{text} = {units.angles.text(angle)}" if words is None else words
+        ways = turned(start, about, angle * np.array([0.5, 0.15, 0.85]))
+        places = tuple(at + far * radius * way for far in (1.3, 1.75, 2.2) for way in ways)
+        return [
+            self._bars(f"{key}-sides", parts[:2], GREY, LINE),
+            self._bars(key, parts[2:], color, MEASURE),
+            *self._label(key, words, 1.15, places),
+        ]
+
     def point(
-        self, key: str, at: ArrayLike, text: str = "", color: Color = AMBER, beside: ArrayLike = (0.0, 0.0, 1.0)
-    ) -> list[Node]:
-        """A small ball with a label in the direction `beside` from it."""
-        place, radius = np.asarray(at, float), POINT * self.size
+        self, key: str, at: ArrayLike, text: str = "", color: Color = AMBER, beside: ArrayLike = (0.0, 0.0, 1.0),
+        radius: float = POINT,
+    ) -> list[Node]:  # fmt: skip
+        """A small ball, of this radius in thicknesses, with a label in the direction `beside` from it."""
+        place, radius = np.asarray(at, float), radius * self.size
         props = {"radius": radius, "color": color, "cast_shadow": False, "receive_shadow": False}
         places = above(place, beside, radius, self.size)
         return [Node("icosphere", key, props, place), *self._label(key, text, 1.0, places)]
+
+    def face(self, key: str, corners: ArrayLike, color: Color = BLUE, opacity: float = 0.22) -> list[Node]:
+        """A translucent convex polygon with these corners ``(k, 3)``, in order; visible from both sides."""
+        points = np.asarray(corners, np.float32)
+        fan = np.array([(0, k, k + 1) for k in range(1, len(points) - 1)], np.uint32)
+        look = {"side": "double", "flat_shading": True, "cast_shadow": False, "receive_shadow": False}
+        return [
+            Node(
+                "mesh_simple", key, {"vertices": points, "faces": fan, "color": color, "opacity": opacity, **look}
+            )
+        ]
 
     def _bars(self, key: str, points: ArrayLike, color: Color, width: float) -> Node:
         return bars(key, points, color, width * self.size)

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 import kin
 from app.viewer.lessons import figures
 from app.viewer.lessons.dh import steps
+from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.figure_shapes import BLUE, arc, clear_of, plane_corners, ruler
 from app.viewer.lessons.figures import Figure
 from app.viewer.lessons.label_room import label_room
@@ -177,3 +178,45 @@ def test_labels_of_a_figure_have_room_and_stay_where_they_are(figure: Figure) ->
     for part in (one, other, point):
         part.hide()
     assert not any(part in figure.labels for part in (one, other, point)), "hidden labels take no room"
+
+
+def test_declared_values_are_in_the_units_of_the_reader() -> None:
+    x, _, z = np.eye(3)
+    metres, radians = Units(length="m"), Units(degrees=False)
+
+    def label(units: Units, angle: float | None = None, words: str | None = None) -> str:
+        with FigureNodes(SIZE) as figure:
+            if angle is None:
+                nodes = figure.dimension("part", 0 * z, 0.25 * z, "d₁", units, x, words=words)
+            else:
+                nodes = figure.angle("part", 0 * z, x, z, angle, "θ₁", units, words=words)
+        return " ".join(node.props["text"] for node in nodes if node.kind == "label")
+
+    assert (label(DEFAULT_UNITS), label(metres)) == ("d₁ = 250.0 mm", "d₁ = 0.2500 m")
+    assert (label(DEFAULT_UNITS, words="half"), label(DEFAULT_UNITS, words="")) == ("half", "")
+    assert label(DEFAULT_UNITS, math.radians(-30)) == "θ₁ = −30.0°"
+    assert label(radians, math.radians(-30)) == "θ₁ = −0.524 rad"
+    assert label(radians, 1.0, "θ₁ = ?") == "θ₁ = ?"
+
+
+@pytest.mark.parametrize("angle", [0.7, -2.9])
+def test_a_declared_angle_has_its_arc_between_its_sides(angle: float) -> None:
+    x, y, z = np.eye(3)
+    with FigureNodes(SIZE) as figure:
+        sides, arc_, label = figure.angle("θ", y, x, z, angle, "θ", DEFAULT_UNITS, radius=2.0)
+    end = y + 2.0 * np.array([math.cos(angle), math.sin(angle), 0.0])
+    assert np.allclose(arc_.props["points"][0, 0], y + 2.0 * x, atol=1e-6)
+    assert np.allclose(arc_.props["points"][-3, 1], end, atol=1e-6)
+    assert np.allclose(np.cross(sides.props["points"][1, 1] - y, end - y), 0.0, atol=1e-6)
+    assert label.position is not None
+    middle = np.array([math.cos(angle / 2), math.sin(angle / 2), 0.0])
+    assert np.allclose(label.position, y + 1.3 * 2.0 * middle)
+
+
+def test_a_declared_face_is_a_fan_of_triangles_over_its_corners() -> None:
+    corners = plane_corners((1, 2, 3), (0, 0, 1), 0.5)
+    (face,) = FigureNodes(SIZE).face("plane", corners)
+    triangles = face.props["vertices"][face.props["faces"]]
+    areas = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
+    assert areas.sum() / 2 == pytest.approx(1.0)
+    assert len(triangles) == 2
