@@ -96,6 +96,8 @@ def _row_in(
         start = row if i == 3 else places[i]
         for c in range(7):
             y[c] = start[c]
+        if task.joint >= 0:  # an interval is known at one whole turn, its postures may be at another
+            y[task.joint] = value - wrap(value - y[task.joint])
         if settle(task, value, sense, y, p) and is_inside(lower, upper, y, task.joint):
             return True
     return False

@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 
 from kin.axes import size
-from kin.fk import fk, jacobian
+from kin.fk import fk
 from kin.kernels.compile import MODEL, direct
 from kin.robot import Robot
 from kin.solvers import rolled
@@ -38,6 +38,8 @@ _MOVED, _MOVED_BY = 0.1, 100.0  # rad, or times the rounding: a row that moves f
 _ENDS, _MIDDLE = np.array([0.0, 1.0]), np.array([0.5])  # shares of an interval
 _SHARES = np.array([0.5, 0.02, 0.98])  # where curves are begun
 _ALIKE = 1e-7  # rad: intervals with ends this close are one
+_CLEAR = 0.5  # of the distance of the next branch's row: a posture closer than that to a row is of its branch
+_SAME = 1e-8  # rad: postures this close are one
 _FREE = (math.nan,)
 
 
@@ -86,7 +88,8 @@ class Rounded7(Rounded):
         else:
             bits = _choose()(self.robot.model, p.T, setting, limits, arcs, places, rows)
             missed = (bits >> np.arange(8)) & 1 > 0
-        sure &= not (missed & known).any()
+            known[arcs[:, 0].astype(int)] = True
+        sure &= not (missed & known).any() and _are_apart(rows[:, :7])
         gap, obstacle = 0.0, None
         if np.isnan(rows[:, 0]).all():
             none = self.form.solve(p)
@@ -100,7 +103,7 @@ class Rounded7(Rounded):
         p = SolverInput(fk(self.robot, q), POSE, _FREE, True, q, self.robot.lower.copy(), self.robot.upper.copy())
         self.solve(p)
         self.solve(replace(p, values=(float(q[self._joint]) if self._joint >= 0 else 0.0,)))
-        pieces, postures = np.empty((PIECES, 2)), np.empty((PIECES, 3, 7))
+        pieces, postures = np.empty((PIECES, 3)), np.empty((PIECES, 3, 7))
         trace(self.robot.model, p.T, self._set(p), self._widened(p), self._move, q.copy(), pieces, postures)
 
     def _in_one_turn(self, problem: SolverInput) -> SolverInput:
@@ -224,7 +227,7 @@ class Rounded7(Rounded):
         """
         sure = moved[2][moved[0][:, 0].astype(int)] > 0.0
         arcs, places, certain = [(a, b, c) for a, b, c in moved[0][sure].tolist()], list(moved[1][sure]), True
-        pieces, postures = np.empty((PIECES, 2)), np.empty((PIECES, 3, 7))
+        pieces, postures = np.empty((PIECES, 3)), np.empty((PIECES, 3, 7))
         for intervals, shares in ((inner, _MIDDLE), (outer, _SHARES)):
             doubtful = intervals[moved[2][intervals[:, 0].astype(int)] == 0.0]
             starts = self._postures(p, doubtful, shares)
@@ -237,19 +240,30 @@ class Rounded7(Rounded):
                     )
                     certain &= count >= 0
                     for k in range(count):
-                        ends = self._in_span(p, *pieces[k].tolist())
-                        whose = float(self.branch_of(postures[k, self._clearest(postures[k])]))
+                        ends = self._in_span(p, *pieces[k, :2].tolist())
+                        whose, clear = self._whose(p, pieces[k], postures[k])
+                        certain &= clear
                         if not any(whose == b and _are_alike(ends, (x, y)) for b, x, y in arcs):
                             arcs.append((whose, *ends))
                             places.append(postures[k].copy())
         return np.array(arcs).reshape(-1, 3), np.array(places).reshape(-1, 3, 7), certain
 
-    def _clearest(self, postures: Array) -> int:
-        """Which of the postures ``(3, 7)`` of an interval is farthest from a fold, where another branch begins."""
-        if self._joint < 0:
-            return 2
-        tangents = np.abs(np.linalg.svd(jacobian(self.robot, postures))[2][:, 6, self._joint])
-        return int(tangents.argmax())
+    def _whose(self, p: SolverInput, values: Array, postures: Array) -> tuple[float, bool]:
+        """The branch of a piece with these values ``(3,)`` and postures ``(3, 7)``, and whether that is clear.
+
+        It is that of the nearest row of the arm that was meant, where the next one is farthest away: at a fold two
+        branches meet, and the signs that name them may differ between the two tables.
+        """
+        rows = np.empty((3, 8, 7))
+        T = np.empty((3, 4, 4))
+        T[:] = p.T
+        self._start.many(self._start.params, T, values, p.seed, rows)
+        away = np.abs(math.pi - (math.pi - (rows - postures[:, None])) % TURN).max(axis=2)
+        away[np.isnan(away)] = math.inf
+        order = np.argsort(away, axis=1)
+        nearest, next_one = np.take_along_axis(away, order, axis=1)[:, :2].T
+        best = int(np.argmin(np.where(np.isfinite(nearest), nearest / np.maximum(next_one, 1e-300), math.inf)))
+        return float(order[best, 0]), bool(nearest[best] < _CLEAR * next_one[best])
 
     def _in_span(self, p: SolverInput, low: float, high: float) -> tuple[float, float]:
         """An interval at the whole turn at which the range of the parameter has it."""
@@ -272,6 +286,12 @@ class Rounded7(Rounded):
             return True
 
         return WrappedKernels(form.params, one, many, self._kernels, form)
+
+
+def _are_apart(rows: Array) -> bool:
+    """Whether no posture is given to two branches, of rows ``(8, 7)`` that are NaN where a branch has none."""
+    away = np.abs(math.pi - (math.pi - (rows[:, None] - rows)) % TURN).max(axis=2)
+    return int((away < _SAME).sum()) == int(np.isfinite(rows[:, 0]).sum())
 
 
 def _is_known(arcs: list[tuple[float, float, float]], branch: float, value: float) -> bool:

@@ -25,6 +25,7 @@ _EVENTS = 32  # in one step at most
 _STEP, _FIRST, _LEAST = 0.15, 0.05, 1e-6  # rad of all joints together
 _STRAIGHT, _TURN = 0.995, 0.95  # cosines between tangents: of a step that may grow, and of one that is too long
 _POINTS = 6000
+_PASSED = 1.05  # times the chord of a step: the curve, in shorter steps, is past its end
 _EMPTY = 1e-12  # rad: what is between two events as close as that is no piece
 FAILED, OPEN, CLOSED = range(3)
 Curve = tuple[Array, Array, Array, Array]  # two points (7,) and the tangents there
@@ -80,6 +81,21 @@ def _at(curve: Curve, s: float, y: Array) -> None:
     for c in range(7):
         a, b, d = _cubic(curve, c)
         y[c] = curve[0][c] + s * (a + s * (b + s * d))
+
+
+@jit
+def _rate(task: Task, curve: Curve, s: float) -> float:
+    """The share of the parameter's joint in the motion along the curve at s; 1 where the parameter is an angle."""
+    if task.joint < 0:
+        return 1.0
+    a, b, d = _cubic(curve, task.joint)
+    return abs(a + s * (2.0 * b + 3.0 * s * d)) / _length(curve)
+
+
+@jit
+def _clearance(limits: tuple[Array, Array], y: Array, rate: float) -> float:
+    """How clear of the ends of its piece a posture is: of limits, in rad, and of folds, where the rate is zero."""
+    return min(_least_slack(limits, y), rate)
 
 
 @jit
@@ -179,22 +195,28 @@ def _copy(source: Array, out: Array) -> None:
 
 
 @jit
-def _far_end(task: Task, limits: tuple[Array, Array], margin: float, curve: Curve, sense: float) -> int:
-    """Follow the curve from its first point, which becomes the last one; returns why it ended."""
+def _far_end(
+    task: Task, limits: tuple[Array, Array], margin: float, curve: Curve, sense: float
+) -> tuple[int, float]:
+    """Follow the curve from its first point, which becomes the last one.
+
+    Returns why it ended, and the length of the last step.
+    """
     p = new_point()
     start, tangent = curve[0].copy(), curve[1].copy()
     h = _FIRST
     for count in range(_POINTS):
         h = _advance(task, curve, h, sense, p)
         if h == 0.0:
-            return FAILED
+            return FAILED, 0.0
         if count > 2 and _closes(curve, start, tangent):
-            return CLOSED
+            return CLOSED, 0.0
+        length = _length(curve)
         _copy(curve[2], curve[0])
         _copy(curve[3], curve[1])
         if _least_slack(limits, curve[0]) < -margin:
-            return OPEN
-    return FAILED
+            return OPEN, length
+    return FAILED, 0.0
 
 
 @jit
@@ -203,7 +225,7 @@ def trace(
 ) -> int:
     """The feasible intervals of the redundancy parameter on the curve through a posture; their number, −1 if lost.
 
-    arcs ``(PIECES, 2)`` ← their ends; places ``(PIECES, 3, 7)`` ← postures at the low end, the high end, inside.
+    arcs ``(PIECES, 3)`` ← their ends and a value inside; places ``(PIECES, 3, 7)`` ← the postures there.
     An interval that is whole turns of the parameter has the same posture in all three.
 
     Args:
@@ -221,25 +243,35 @@ def trace(
         curve[1][i] = -p.n[i]
     if _least_slack(limits, y) < -margin:
         return 0
-    kind = _far_end(task, limits, margin, curve, -1.0)
+    kind, outside = _far_end(task, limits, margin, curve, -1.0)
     if kind == FAILED:
         return -1
     for i in range(7):
         curve[1][i] = -curve[1][i]
-    return _record(task, limits, margin, curve, kind == CLOSED, arcs, places)
+    return _record(task, limits, margin, curve, kind == CLOSED, outside, arcs, places)
 
 
 @jit
 def _record(
-    task: Task, limits: tuple[Array, Array], margin: float, curve: Curve, closed: bool, arcs: Array, places: Array
+    task: Task,
+    limits: tuple[Array, Array],
+    margin: float,
+    curve: Curve,
+    closed: bool,
+    outside: float,
+    arcs: Array,
+    places: Array,
 ) -> int:
-    """Follow the curve from its first point and write down its feasible pieces, see `trace`."""
+    """Follow the curve from its first point and write down its feasible pieces, see `trace`.
+
+    outside: length at the beginning of an open curve that may be outside the margin.
+    """
     p, events, at, best = new_point(), np.empty((_EVENTS, 3)), np.empty(7), curve[0].copy()
     start, tangent, piece = curve[0].copy(), curve[1].copy(), curve[0].copy()
     value = dial_of(task, start)
-    first, score, there = value, _least_slack(limits, start), math.inf
+    first, score, there = value, -math.inf, math.inf
     begun, around, found = not closed, False, 0
-    entered = closed  # the curve begins outside the margin if it is not closed
+    travelled = 0.0
     h = _FIRST
     for count in range(_POINTS):
         h = _advance(task, curve, h, 1.0, p)
@@ -248,11 +280,12 @@ def _record(
         n = _events_between(task, limits, curve, events)
         done = 0.0
         for i in range(n):
-            _at(curve, 0.5 * (done + events[i, 0]), at)
+            middle = 0.5 * (done + events[i, 0])
+            _at(curve, middle, at)
             done = events[i, 0]
-            slack = _least_slack(limits, at)
-            if slack > score:
-                score = slack
+            clear = _clearance(limits, at, _rate(task, curve, middle))
+            if clear > score:
+                score = clear
                 _copy(at, best)
             _at(curve, done, at)
             if not arrive(task, int(events[i, 1]), events[i, 2], at, p):
@@ -268,9 +301,9 @@ def _record(
             _copy(at, piece)
         there = dial_of(task, curve[2])
         value += wrap(there - value)
-        slack = _least_slack(limits, curve[2])
-        if slack > score:
-            score = slack
+        clear = _clearance(limits, curve[2], _rate(task, curve, 1.0))
+        if clear > score:
+            score = clear
             _copy(curve[2], best)
         if closed and count > 2 and not around and _closes(curve, start, tangent):
             if not begun:
@@ -278,8 +311,8 @@ def _record(
                     return _put(task, (value - 2.0 * math.pi, value), (best, best, best), arcs, places, found)
                 return found
             around = True
-        entered = entered or n > 0 or slack >= -margin
-        if not closed and entered and slack < -margin:
+        travelled += _length(curve)
+        if not closed and travelled > _PASSED * outside and _least_slack(limits, curve[2]) < -margin:
             return found
         _copy(curve[2], curve[0])
         _copy(curve[3], curve[1])
@@ -302,4 +335,5 @@ def _put(
     _copy(postures[0], places[found, back])
     _copy(postures[1], places[found, 1 - back])
     _copy(inner, places[found, 2])
+    arcs[found, 2] = dial_of(task, inner)
     return found + 1

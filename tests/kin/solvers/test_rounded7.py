@@ -242,3 +242,26 @@ def test_a_followed_interval_belongs_to_the_branch_of_its_posture_that_is_clear_
     counts = [{s.branch: len(s.redundancy[0].intervals) for s in each.solutions} for each in (found, meant)]
     assert len(counts[0]) == 4
     assert counts[0] == counts[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "q"),
+    [
+        # Followed intervals were known at another whole turn than their postures: three branches had no row.
+        ("xarm7 1.571", (-2.17612, 0.919077, -2.260411, 2.665009, 0.484992, 2.59883, 2.932553)),
+        # An interval was named by a posture beside a fold, and its branch lost to another one.
+        ("gen3 1.57", (1.812197, 0.009301, -1.721985, -2.158063, 2.565146, 1.13676, -2.027949)),
+        ("gen3 1.57", (-1.807653, 1.253057, -2.146223, -1.598254, -1.347517, 0.487404, 2.113698)),
+        # Following a curve ended before it had come from outside the limits to its first interval.
+        ("iiwa14 1.57", (2.464489, 0.713379, 1.144468, -1.408516, -2.825301, -1.819765, 2.837233)),
+    ],
+)
+def test_followed_curves_keep_every_interval(name, q):
+    judge, q = Judge(name), np.array(q)
+    T = kin.fk(judge.robot, q)
+    found, exact = kin.solve_ik(judge.robot, T), kin.solve_ik(judge.exact, T)
+    assert found.complete
+    assert len(found.solutions) == len(exact.solutions) == 8
+    dense = judge.postures(T, q, np.random.default_rng(3), values=25, random=40)
+    assert len(dense) >= 30
+    assert [p.tolist() for p in dense if not judge.lists(T, found, p)] == []
