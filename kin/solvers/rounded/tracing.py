@@ -32,6 +32,12 @@ Curve = tuple[Array, Array, Array, Array]  # two points (7,) and the tangents th
 
 
 @jit
+def _copy(source: Array, out: Array) -> None:
+    for i in range(7):
+        out[i] = source[i]
+
+
+@jit
 def _least_slack(limits: tuple[Array, Array], y: Array) -> float:
     least = math.inf
     for c in range(7):
@@ -93,9 +99,15 @@ def _rate(task: Task, curve: Curve, s: float) -> float:
 
 
 @jit
-def _clearance(limits: tuple[Array, Array], y: Array, rate: float) -> float:
-    """How clear of the ends of its piece a posture is: of limits, in rad, and of folds, where the rate is zero."""
-    return min(_least_slack(limits, y), rate)
+def _clearer(limits: tuple[Array, Array], y: Array, rate: float, score: float, best: Array) -> float:
+    """best ``(7,)`` ← y if it is clearer of the ends of its piece than the score; the score of the best.
+
+    It counts how far joints are inside their limits, in rad, and the rate, which is zero at folds.
+    """
+    clear = min(_least_slack(limits, y), rate)
+    if clear > score:
+        _copy(y, best)
+    return max(clear, score)
 
 
 @jit
@@ -189,12 +201,6 @@ def _closes(curve: Curve, start: Array, tangent: Array) -> bool:
 
 
 @jit
-def _copy(source: Array, out: Array) -> None:
-    for i in range(7):
-        out[i] = source[i]
-
-
-@jit
 def _far_end(
     task: Task, limits: tuple[Array, Array], margin: float, curve: Curve, sense: float
 ) -> tuple[int, float]:
@@ -283,10 +289,7 @@ def _record(
             middle = 0.5 * (done + events[i, 0])
             _at(curve, middle, at)
             done = events[i, 0]
-            clear = _clearance(limits, at, _rate(task, curve, middle))
-            if clear > score:
-                score = clear
-                _copy(at, best)
+            score = _clearer(limits, at, _rate(task, curve, middle), score, best)
             _at(curve, done, at)
             if not arrive(task, int(events[i, 1]), events[i, 2], at, p):
                 return -1
@@ -301,10 +304,7 @@ def _record(
             _copy(at, piece)
         there = dial_of(task, curve[2])
         value += wrap(there - value)
-        clear = _clearance(limits, curve[2], _rate(task, curve, 1.0))
-        if clear > score:
-            score = clear
-            _copy(curve[2], best)
+        score = _clearer(limits, curve[2], _rate(task, curve, 1.0), score, best)
         if closed and count > 2 and not around and _closes(curve, start, tangent):
             if not begun:
                 if is_inside(limits[0], limits[1], best, -1):
