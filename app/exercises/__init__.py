@@ -8,8 +8,9 @@ the verdict is, and leaves only in `Exercise.solution`.
 from app.exercises.contract import Kind
 from app.exercises.exercise import TOPICS, Exercise, VariantError
 from app.exercises.fields import ExerciseFileError
-from app.exercises.files import Exercises, builtin_exercises, load_exercise, load_folder, parse_exercise
+from app.exercises.files import Exercises, Shelf, builtin_exercises, load_exercise, load_folder, parse_exercise
 from app.exercises.questions import Asked, Verdict
+from app.exercises.trial import Student, Trial, tried
 from app.exercises.variant import Variant
 
 __all__ = [
@@ -19,6 +20,9 @@ __all__ = [
     "ExerciseFileError",
     "Exercises",
     "Kind",
+    "Shelf",
+    "Student",
+    "Trial",
     "Variant",
     "VariantError",
     "Verdict",
@@ -26,4 +30,5 @@ __all__ = [
     "load_exercise",
     "load_folder",
     "parse_exercise",
+    "tried",
 ]

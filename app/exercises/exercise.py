@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -19,6 +20,7 @@ from kin.units import Units
 
 TOPICS = ("Frames and DH tables", "Forward kinematics", "Inverse kinematics", "Velocity", "Motions")
 CHECKED_SEEDS = range(8)
+LONGEST = 5.0  # s of computing until numbers are drawn
 _DRAWS = 500
 
 
@@ -119,8 +121,10 @@ class Exercise:
             VariantError: no valid numbers were drawn.
         """
         name = f"{self.id}:{seed}"
-        source = random.Random(name)
+        source, begun = random.Random(name), time.thread_time()
         for _ in range(_DRAWS if self.vary else 1):
+            if time.thread_time() - begun > LONGEST:
+                raise VariantError(f"the numbers for seed {seed} take longer than {LONGEST:g} s to draw")
             drawn = {key: rule.draw(source) for key, rule in self.vary.items()}
             try:
                 variant = self._made(name, drawn)

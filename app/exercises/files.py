@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 
@@ -19,6 +19,8 @@ from kin import KinematicsError, Robot, get_robot
 BUILTIN = Path(__file__).parent / "library"
 UNITS = {"deg": (math.pi / 180, "angle"), "rad": (1.0, "angle"), "mm": (1e-3, "length"), "m": (1.0, "length")}
 MOST_HINTS = 5
+MOST_BYTES = 4000  # of an exercise that is written in a page
+MOST_VALUES = 1_000_000  # from which a number is drawn
 LAST = 999  # place of an exercise without one
 _ID = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
@@ -142,6 +144,24 @@ class Exercises:
         return tuple((topic, exercises) for topic, exercises in found if exercises)
 
 
+class Shelf(Exercises):
+    """Those of a service, and those that one page has besides. Not thread-safe: the page's worker changes it."""
+
+    def __init__(self, known: Exercises) -> None:
+        self._known = known
+        self.put(())
+
+    def put(self, own: Iterable[Exercise]) -> None:
+        """Have these besides, instead of those before; one with an id of the service's is left out."""
+        self.own = {one.id: one for one in own if self._known.get(one.id) is None}
+        self.all = tuple(sorted((*self._known.all, *self.own.values()), key=lambda one: one.rank))
+        self._by_id = {exercise.id: exercise for exercise in self.all}
+
+    def is_own(self, exercise_id: str) -> bool:
+        """Whether the page has an exercise that the service does not have."""
+        return exercise_id in self.own
+
+
 def _robot(fields: Fields, find: Find) -> Robot:
     robot_id = fields.text("robot")
     try:
@@ -164,6 +184,8 @@ def _vary(fields: Fields) -> dict[str, Drawn]:
         else:
             low = rule.number("from")
             high, step = rule.number("to", above=low), rule.number("step", above=0.0)
+            if not (high - low) / step <= MOST_VALUES:
+                raise rule.refuse("step", step, f"a step that gives at most {MOST_VALUES} values")
             found[name] = Drawn(scale * low, scale * high, scale * step, (), measure)
         rule.done()
     return found

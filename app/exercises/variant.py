@@ -39,7 +39,7 @@ class Facts(Mapping[str, "float | Function"]):
             "rank": lambda: float(rank(robot, task_jacobian(robot, q), 1e-6)),
             "J": lambda: self._entry(kin.jacobian(robot, q)),
             "sigma": lambda: self._entry(np.linalg.svd(task_jacobian(robot, q), compute_uv=False)),
-            "postures": lambda: lambda: float(len(kin.solve_ik(robot, self._pose, q_seed=q).solutions)),
+            "postures": lambda: lambda: self._postures,
             "low": lambda: self._entry(robot.lower),
             "high": lambda: self._entry(robot.upper),
         }
@@ -57,6 +57,10 @@ class Facts(Mapping[str, "float | Function"]):
     @cached_property
     def _pose(self) -> Array:
         return kin.fk(self._robot, self._q)
+
+    @cached_property
+    def _postures(self) -> float:
+        return float(len(kin.solve_ik(self._robot, self._pose, q_seed=self._q).solutions))
 
     @cached_property
     def _frames(self) -> Array:

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple, Protocol
 
 from app.classroom.courses import Course, Courses
 from app.classroom.work import Work
-from app.exercises import Exercise, Verdict
+from app.exercises import Exercise, Shelf, Verdict
 from app.viewer.activity.places import Place
 from app.viewer.activity.practice import Practice
 from app.viewer.activity.progress import Progress
@@ -83,6 +83,8 @@ class Activity:
         changed: called after every change.
 
     Attributes:
+        courses: as given.
+        exercises: those of the service, and those of this page.
         lesson: the key of what the tab *Learn* shows: a lesson, the exercises or the courses; None: the overview.
         practice: what has been done of the exercises, and which one is open.
         progress: the open course and its item on show.
@@ -94,9 +96,9 @@ class Activity:
     """
 
     def __init__(self, courses: Courses, secret: Callable[[], bytes], changed: Callable[[], None]) -> None:
-        self.courses, self.exercises = courses, courses.exercises
+        self.courses, self.exercises = courses, Shelf(courses.exercises)
         self.secret, self.changed = secret, changed
-        self.practice = Practice(courses.exercises)
+        self.practice = Practice(self.exercises)
         self.progress = Progress(courses, self.practice)
         self.lesson: str | None = None
         self.sent: Course | None = None

@@ -309,11 +309,12 @@ class Practising(Feature):
             variant, closed = self._variant, self._shown.closed
             contents = [
                 views.task_html(
-                    exercise, variant, units, self.stage.now.robot == exercise.robot, self._shown.variant
+                    exercise, variant, units, self.stage.now.robot == exercise.robot, self._shown.variant,
+                    activity.exercises.is_own(exercise.id) and not practice.seated,
                 ),
                 views.question_html(self._asked, self._sheet, closed),
                 views.foot_html(exercise, variant, units, self._sheet, activity),
-            ]
+            ]  # fmt: skip
         posture = exercise is not None and self._asked.form == "posture"
         self._show_joints(posture and exercise is not None and not practice.record(exercise).closed)
         for block, content in zip(self._blocks, contents, strict=True):

@@ -42,16 +42,17 @@ def list_html(exercises: Exercises, practice: Practice) -> str:
     return render("exercises/list", topics=topics, total=total, solved=solved)
 
 
-def task_html(exercise: Exercise, variant: Variant, units: Units, at_home: bool, count: int) -> str:
+def task_html(exercise: Exercise, variant: Variant, units: Units, at_home: bool, count: int, own: bool) -> str:
     """The head of an exercise: title and text.
 
     Args:
         at_home: whether the exercise's arm is on show.
         count: how often other numbers were asked for.
+        own: whether it was written in this page.
     """
     return render(
         "exercises/task", exercise=exercise, level=LEVELS[exercise.level], text=variant.text(exercise.text, units),
-        at_home=at_home, count=count,
+        at_home=at_home, count=count, own=own,
     )  # fmt: skip
 
 

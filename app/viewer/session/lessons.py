@@ -10,6 +10,7 @@ from collections.abc import Hashable
 import viser
 
 from app.viewer.courses.feature import CourseFeature
+from app.viewer.exercises.author import Author
 from app.viewer.exercises.feature import Practising
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons import LESSONS
@@ -21,6 +22,7 @@ from app.viewer.worksheet.feature import Worksheets
 from kin import InputError
 
 NONE = "None"
+MORE: tuple[type[Feature], ...] = (Practising, CourseFeature, Author)
 KEPT = 50  # lessons of which the progress is kept, in the order in which they were left
 HINT = "The drawings of a lesson stay in the scene while other tabs are open."
 
@@ -35,7 +37,7 @@ class LessonChoice:
         shown: the open lesson.
         guide: its goal, steps and questions.
         sheets: the worksheet of the lesson, or of the arm.
-        exercises, courses: which live as long as the page.
+        author, exercises, courses: which live as long as the page.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class LessonChoice:
         with parent:
             self.courses = CourseFeature(stage)
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
+            self.author = Author(stage)
             self._overview: viser.GuiHtmlHandle | None = gui.add_html(_overview())
             self.sheets: Worksheets | None = Worksheets(stage, None, page)
         listen(self._choice, post, "lesson")
@@ -90,7 +93,7 @@ class LessonChoice:
 
     def _show(self, chosen: type[Feature] | None, steps: dict[str, object] | None) -> None:
         """Build what was chosen, in the container that is open; None: the overview."""
-        activity, always = self._stage.activity, (self.exercises, self.courses)
+        activity, always = self._stage.activity, (self.exercises, self.courses, self.author)
         if chosen is None:
             self._overview = self._gui.add_html(_overview())
         elif issubclass(chosen, Lesson):
@@ -109,8 +112,8 @@ class LessonChoice:
 
     @property
     def features(self) -> list[Feature]:
-        """The open lesson, its guide and its worksheet, and the exercises."""
-        every = (self.guide, self.shown, self.sheets, self.exercises, self.courses)
+        """The open lesson, its guide and its worksheet, the exercises and the courses."""
+        every = (self.guide, self.shown, self.sheets, self.author, self.exercises, self.courses)
         return [feature for feature in every if feature is not None]
 
     @property
@@ -136,6 +139,7 @@ class LessonChoice:
             self.sheets = None
         self.exercises.hide()
         self.courses.hide()
+        self.author.hide()
         if self.shown is not None and self.guide is not None:
             self._keep(self.shown.key, self.guide.state())
             self.shown.remove()
@@ -159,8 +163,8 @@ class LessonChoice:
 
 
 def choices() -> tuple[type[Feature], ...]:
-    """What the tab offers. The exercises and the courses live as long as the page."""
-    return (*LESSONS, Practising, CourseFeature)
+    """What the tab offers. All but the lessons live as long as the page."""
+    return (*LESSONS, *MORE)
 
 
 def lesson_titled(title: object) -> type[Lesson] | None:
@@ -175,4 +179,4 @@ def lesson_with_key(key: str | None) -> type[Lesson] | None:
 
 def _overview() -> str:
     """All lessons, with one sentence each."""
-    return render("panel/lessons", lessons=LESSONS, more=(Practising, CourseFeature))
+    return render("panel/lessons", lessons=LESSONS, more=MORE)

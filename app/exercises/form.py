@@ -1,0 +1,530 @@
+"""The fields of an exercise as a form: which there are, what each means, and what is typed into them.
+
+A draft is the data of a file, as `tomllib` reads it. `groups` says which cells stand where and what is in them,
+`with_cell`, `with_row` and `without_row` change one of them, and `to_toml` writes the file. Whether the draft is
+an exercise, only `files.parse_exercise` says: what makes no sense is kept as it was typed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tomllib
+from collections.abc import Iterator, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from app.exercises.exercise import TOPICS
+from app.exercises.fields import MOST_ITEMS
+from app.exercises.files import LAST, MOST_HINTS, UNITS
+from app.exercises.kinds import KINDS
+from app.exercises.kinds.mistake import MISTAKES
+from app.exercises.kinds.number import OTHER, SCALES
+from app.exercises.lessons import LESSONS
+from kin import InputError
+from kin.ik.options import TASKS
+from kin.robot import CONVENTIONS
+
+Draft = dict[str, Any]
+Form = Literal["line", "text", "lines", "expression", "expressions", "number", "numbers", "choice", "flag"]
+LONGEST_CELL = 2000  # characters
+TABLES = ("vary", "let", "target", "answer")
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_UNIT = "The unit of the numbers; none: they are as they are."
+_WHEN = "Only where this expression is true."
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One field.
+
+    Attributes:
+        name: in the file.
+        label, help: what stands beside it.
+        form: how it is typed. Of ``lines``, ``expressions`` and ``numbers`` there is one in each line.
+        options: of a choice.
+        default: of a flag.
+    """
+
+    name: str
+    label: str
+    help: str = ""
+    form: Form = "line"
+    options: tuple[str, ...] = ()
+    default: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of cells: a list of tables in the file, or, if they are `named`, a table of tables.
+
+    Attributes:
+        one: what a row is called.
+        fresh: what a new row holds.
+    """
+
+    name: str
+    label: str
+    help: str
+    one: str
+    columns: tuple[Cell, ...]
+    fresh: dict[str, Any]
+    named: bool = False
+
+
+Field = Cell | Table
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A cell with what is in it.
+
+    Attributes:
+        path: names it in the form.
+        field: its name in messages about the file.
+        at: where it is in the draft; of the name of a row, where that row is.
+        fixed: whether the file has something there that the form cannot change.
+        names: whether it is the name of a row.
+    """
+
+    cell: Cell
+    path: str
+    field: str
+    at: tuple[str | int, ...]
+    text: str
+    fixed: bool = False
+    names: bool = False
+
+
+@dataclass(frozen=True)
+class Rows:
+    """A table with its rows."""
+
+    table: Table
+    path: str
+    field: str
+    rows: tuple[tuple[Entry, ...], ...]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Fields that belong together."""
+
+    title: str
+    help: str
+    members: tuple[Entry | Rows, ...]
+
+
+_MOTIONS = Table(
+    "motions", "Motions", "In their order; each turns or slides.", "motion",
+    (
+        Cell("turn", "Turn about", "", "choice", ("x", "y", "z")),
+        Cell("slide", "Slide along", "", "choice", ("x", "y", "z")),
+        Cell("by", "By", "An angle or a length.", "expression"),
+    ),
+    {"turn": "z", "by": "90*deg"},
+)  # fmt: skip
+_FIXED_AXES = Cell("fixed_axes", "About the axes of the base", "Otherwise about the frame’s own.", "flag")
+_NEAR = Cell("position_tolerance", "Accepted distance, mm", "", "number")
+_TURNED = Cell("rotation_tolerance", "Accepted rotation, degrees", "", "number")
+_HEAD: tuple[tuple[str, str, tuple[Field, ...]], ...] = (
+    (
+        "About it",
+        "",
+        (
+            Cell("title", "Title", "Shown in the list."),
+            Cell("id", "Id", "Lower-case letters, digits and hyphens; different from all others."),
+            Cell("topic", "Topic", "", "choice", TOPICS),
+            Cell("level", "Level", "1 is easy, 3 is hard.", "number"),
+            Cell("place", "Place", f"Orders the exercises of one level, 1 to {LAST}.", "number"),
+            Cell("lesson", "Lesson", "The lesson that it belongs to.", "choice", tuple(LESSONS)),
+            Cell("robot", "Arm", "An arm of this service.", "choice"),
+        ),
+    ),
+    (
+        "Task",
+        "{t1} is the number t1 from below, in the reader’s unit.",
+        (
+            Cell("text", "Text", "What is asked.", "text"),
+            Cell("hints", "Hints", f"One in each line, at most {MOST_HINTS}; shown one after the other.", "lines"),
+            Cell("shown", "Why", "Why the answer is right; shown at the end.", "text"),
+        ),
+    ),
+    (
+        "Numbers",
+        "Each student gets other ones. Expressions are in radians and metres: 30*deg, 250*mm, pi/2.",
+        (
+            Table(
+                "vary", "Drawn", "From, to and step; or a list to choose from.", "number",
+                (
+                    Cell("from", "From", "", "number"),
+                    Cell("to", "To", "", "number"),
+                    Cell("step", "Step", "", "number"),
+                    Cell("choose", "Or one of", "One in each line.", "numbers"),
+                    Cell("unit", "Unit", _UNIT, "choice", tuple(UNITS)),
+                ),
+                {"from": -60, "to": 60, "step": 10, "unit": "deg"}, named=True,
+            ),
+            Table(
+                "let", "Computed", "From those, and from the arm at its posture.", "number",
+                (
+                    Cell("value", "Value", "", "expression"),
+                    Cell("unit", "Shown in", _UNIT, "choice", tuple(UNITS)),
+                ),
+                {"value": "0"}, named=True,
+            ),
+            Cell("require", "Required", "One in each line; numbers for which one is false are drawn again.",
+                 "expressions"),
+        ),
+    ),
+    (
+        "Posture and target",
+        "",
+        (
+            Cell("q", "Joints", "One expression in each line; empty: the home pose.", "expressions"),
+            Cell("target.q", "Target at", "The pose of the tool at these joints.", "expressions"),
+            Cell("target.position", "Target point", "x, y, z, with the orientation at the joints.", "expressions"),
+        ),
+    ),
+)  # fmt: skip
+_REASON = Cell("reason", "Reason", "Said to whom answers this.", "text")
+ANSWERS: dict[str, tuple[Field, ...]] = {
+    "number": (
+        Cell("value", "Right value", "An expression; of a vector one in each line.", "expressions"),
+        Cell("labels", "Names", "Of the parts of a vector, one in each line.", "lines"),
+        Cell("unit", "Unit", "In which it is typed.", "choice", (*SCALES, *OTHER)),
+        Cell("tolerance", "Tolerance", "In this unit, or a share such as 2 %.", "number"),
+        Cell("least", "Finest tolerance", "It then also keeps off mistakes and zero.", "expression"),
+        Cell("method", "Method", "How it is computed.", "text"),
+        Cell("whole_turns", "Whole turns count", "360° more is another answer.", "flag"),
+        Table(
+            "mistakes", "Known mistakes", "Values that students get by a mistake, and what is said.", "mistake",
+            (Cell("value", "Value", "", "expressions"), Cell("when", "When", _WHEN, "expression"), _REASON),
+            {"value": "0", "reason": "Why this is wrong."},
+        ),
+    ),
+    "choice": (
+        Table(
+            "options", "Options", "At least two.", "option",
+            (
+                Cell("text", "Text", "", "text"),
+                Cell("right", "Right", "", "flag"),
+                Cell("when", "Right when", "Instead: where this expression is true.", "expression"),
+                Cell("offered", "Offered when", _WHEN, "expression"),
+                _REASON,
+            ),
+            {"text": "Another answer", "reason": "Why this is wrong."},
+        ),
+        Cell("shuffle", "Shuffle the options", "", "flag", default=True),
+    ),
+    "dh": (
+        Cell("rows", "Rows", "Consecutive numbers from 1, one in each line.", "numbers"),
+        Cell("convention", "Convention", "None: that of the arm.", "choice", tuple(CONVENTIONS)),
+    ),
+    "mistake": (
+        Cell("mistakes", "Mistakes", "One in each line: " + ", ".join(MISTAKES) + ".", "lines"),
+    ),
+    "reach": (
+        Cell("task", "What must match", "", "choice", tuple(TASKS)),
+        Cell("branch", "Posture", "Such as: elbow up."),
+        Table(
+            "locked", "Locked joints", "Joints that must be at a value.", "joint",
+            (Cell("joint", "Joint", "Its number.", "number"), Cell("value", "Value", "", "expression")),
+            {"joint": 1, "value": "0"},
+        ),
+        Cell("margin", "Margin to the limits, %", "Of the range of each joint.", "number"),
+        Cell("manipulability", "Least manipulability", "", "expression"),
+        _NEAR,
+        _TURNED,
+        Cell("line", "Line to", "x, y and z of the end of a line that the tool drives from there.", "expressions"),
+    ),
+    "solutions": (
+        Cell("task", "What must match", "", "choice", tuple(TASKS)),
+        Cell("rows", "Rows", "Of the form.", "number"),
+        Cell("tolerance", "Tolerance, degrees", "", "number"),
+    ),
+    "singularity": (
+        Cell("asks", "Asks for", "", "choice", ("name", "direction")),
+        Cell("tolerance", "Tolerance, degrees", "Of a direction.", "number"),
+    ),
+    "term": (
+        Cell("name", "Name of the entry", "Such as: p_x."),
+        Cell("entry", "Its value", "", "expression"),
+        Table(
+            "terms", "Terms", "At least two; their sum is the entry.", "term",
+            (Cell("value", "Value", "", "expression"), Cell("shown", "As printed")), {"value": "0", "shown": "0"},
+        ),
+        Table(
+            "misprints", "Misprints", "One of them is drawn.", "misprint",
+            (
+                Cell("term", "Term", "Its number.", "number"),
+                Cell("value", "Value", "", "expression"),
+                Cell("shown", "As printed"),
+                _REASON,
+            ),
+            {"term": 1, "value": "0", "shown": "0", "reason": "Why this is wrong."},
+        ),
+    ),
+    "frame": (
+        _MOTIONS,
+        Cell("row", "Or the frame of row", "Instead of motions.", "number"),
+        _FIXED_AXES,
+        _NEAR,
+        _TURNED,
+    ),
+    "order": (_MOTIONS, _FIXED_AXES),
+    "program": (
+        Cell("straight", "Off the line at most, mm", "", "number"),
+        Cell("arrives", "Off the target at most, mm", "", "number"),
+        Cell("time", "Longest time, s", "0: no limit.", "expression"),
+        Cell("tool_speed", "Fastest tool, m/s", "0: no limit.", "expression"),
+    ),
+}  # fmt: skip
+
+
+def read(text: str) -> Draft:
+    """The draft of any text; empty if it is no TOML. What should be a table and is none is left out."""
+    try:
+        data = tomllib.loads(text)
+    except (ValueError, RecursionError):
+        return {}
+    return {name: value for name, value in data.items() if name not in TABLES or isinstance(value, dict)}
+
+
+def groups(draft: Draft, robots: Sequence[str] = ()) -> tuple[Group, ...]:
+    """The form of a draft; `robots` are the ids of the arms to choose from."""
+    found = []
+    for title, about, fields in _HEAD:
+        found.append(Group(title, about, tuple(_placed(draft, field, (), robots) for field in fields)))
+    kind = str(draft.get("kind"))
+    answer = tuple(_placed(draft, field, ("answer",), robots) for field in ANSWERS.get(kind, ()))
+    about = f"Kind {kind}: {KINDS[kind].about}" if kind in KINDS else ""
+    return (*found, Group("Answer", about, answer))
+
+
+def entries(draft: Draft) -> Iterator[Entry]:
+    """All cells of a draft."""
+    for group in groups(draft):
+        for member in group.members:
+            if isinstance(member, Entry):
+                yield member
+            else:
+                for row in member.rows:
+                    yield from row
+
+
+def with_cell(draft: Draft, path: str, text: str) -> Draft:
+    """The draft with another text in a cell. What is empty is left out of the file.
+
+    Raises:
+        InputError: there is no such cell, it is fixed, the text is too long, or the name of a row is taken.
+    """
+    entry = next((one for one in entries(draft) if one.path == path and not one.fixed), None)
+    if entry is None:
+        raise InputError("field", path, "a field of the form")
+    if len(text) > LONGEST_CELL:
+        raise InputError(entry.field, f"{len(text)} characters", f"at most {LONGEST_CELL}")
+    text = _clean(text)
+    if entry.names:
+        return _renamed(draft, entry, text.strip())
+    made = deepcopy(draft)
+    *above, last = entry.at
+    table: Any = made
+    for name in above:
+        if isinstance(name, str) and not isinstance(table.get(name), dict | list):
+            table[name] = {} if name not in table else {"value": table[name]}  # a number without a unit
+        table = table[name]
+    if (value := _value(entry.cell, text)) is None:
+        table.pop(last, None)
+    else:
+        table[last] = value
+    if "target" in made and not made["target"]:
+        del made["target"]
+    return made
+
+
+def with_row(draft: Draft, path: str) -> Draft:
+    """The draft with one more row of a table; raises `InputError` for no table, or a full one."""
+    rows = _rows(draft, path)
+    table = rows.table
+    if len(rows.rows) >= MOST_ITEMS:
+        raise InputError(rows.field, len(rows.rows) + 1, f"at most {MOST_ITEMS} rows")
+    made = deepcopy(draft)
+    inside = made.setdefault("answer", {}) if rows.field.startswith("answer.") else made
+    if table.named:
+        names = {**made.get("vary", {}), **made.get("let", {})}
+        free = next(name for i in range(1, 2 * MOST_ITEMS + 2) if (name := f"n{i}") not in names)
+        inside.setdefault(table.name, {})[free] = dict(table.fresh)
+    else:
+        inside.setdefault(table.name, []).append(dict(table.fresh))
+    return made
+
+
+def without_row(draft: Draft, path: str, index: int) -> Draft:
+    """The draft without a row of a table; raises `InputError` if there is none."""
+    rows = _rows(draft, path)
+    if not 0 <= index < len(rows.rows):
+        raise InputError(rows.field, index, "the index of a row")
+    made = deepcopy(draft)
+    inside = made["answer"] if rows.field.startswith("answer.") else made
+    table = inside[rows.table.name]
+    del table[list(table)[index] if rows.table.named else index]
+    if not table:
+        del inside[rows.table.name]
+    return made
+
+
+def to_toml(draft: Draft) -> str:
+    """The file of a draft."""
+    lines = [f"{_key(name)} = {_toml(value)}" for name, value in draft.items() if not isinstance(value, dict)]
+    for name, table in draft.items():
+        if isinstance(table, dict):
+            lists = {key: value for key, value in table.items() if _is_tables(value)}
+            lines += ["", f"[{_key(name)}]"]
+            lines += [f"{_key(key)} = {_toml(value)}" for key, value in table.items() if key not in lists]
+            for key, rows in lists.items():
+                for row in rows:
+                    lines += ["", f"[[{_key(name)}.{_key(key)}]]"]
+                    lines += [f"{_key(each)} = {_toml(value)}" for each, value in row.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _placed(draft: Draft, field: Field, above: tuple[str, ...], robots: Sequence[str]) -> Entry | Rows:
+    at = (*above, *field.name.split("."))
+    value = _at(draft, at)
+    name = ".".join(at)
+    if isinstance(field, Cell):
+        if field.name == "robot":
+            field = Cell(field.name, field.label, field.help, field.form, tuple(robots))
+        return _entry(field, name, name, at, value)
+    rows: list[tuple[Entry, ...]] = []
+    if field.named:
+        for i, (key, row) in enumerate(value.items() if isinstance(value, dict) else ()):
+            row = row if isinstance(row, dict) else {"value": row}
+            place = (*at, key)
+            named = Entry(Cell("", "Name"), f"{name}[{i}]", f"{name}.{key}", place, key, names=True)
+            label, full = f"{name}[{i}]", f"{name}.{key}"
+            rows.append((named, *(
+                _entry(c, f"{label}.{c.name}", f"{full}.{c.name}", (*place, c.name), row.get(c.name))
+                for c in field.columns
+            )))  # fmt: skip
+    else:
+        for i, row in enumerate(value if _is_tables(value) else ()):
+            label = f"{name}[{i}]"
+            rows.append(tuple(
+                _entry(c, f"{label}.{c.name}", f"{label}.{c.name}", (*at, i, c.name), row.get(c.name))
+                for c in field.columns
+            ))  # fmt: skip
+    return Rows(field, name, name, tuple(rows))
+
+
+def _entry(cell: Cell, path: str, field: str, at: tuple[str | int, ...], value: Any) -> Entry:
+    text = _text(cell, value)
+    return Entry(cell, path, field, at, "" if text is None else text, fixed=text is None)
+
+
+def _at(draft: Draft, at: tuple[str, ...]) -> Any:
+    value: Any = draft
+    for name in at:
+        value = value.get(name) if isinstance(value, dict) else None
+    return value
+
+
+def _rows(draft: Draft, path: str) -> Rows:
+    for group in groups(draft):
+        for member in group.members:
+            if isinstance(member, Rows) and member.path == path:
+                return member
+    raise InputError("field", path, "a table of the form")
+
+
+def _renamed(draft: Draft, entry: Entry, name: str) -> Draft:
+    """A row gets another name; the order stays."""
+    table, old = str(entry.at[0]), entry.at[1]
+    names = {**draft.get("vary", {}), **draft.get("let", {})}
+    if name != old and name in names:
+        raise InputError(entry.field, name, "a name that no other number has")
+    made = deepcopy(draft)
+    made[table] = {name if key == old else key: row for key, row in made[table].items()}
+    return made
+
+
+def _text(cell: Cell, value: Any) -> str | None:
+    """What a cell shows of a value; None: it cannot show it."""
+    match cell.form:
+        case "flag":
+            if value is None or isinstance(value, bool):
+                return "yes" if (cell.default if value is None else value) else "no"
+        case "lines" | "expressions" | "numbers":
+            items = [] if value is None else value if isinstance(value, list) else [value]
+            if all(_is_plain(item) for item in items):
+                return "\n".join(map(_shown, items))
+        case _ if value is None or _is_plain(value):
+            return "" if value is None else _shown(value)
+    return None
+
+
+def _value(cell: Cell, text: str) -> Any:
+    """What a text in a cell means in a file; None: nothing."""
+    lines = [line.strip() for line in text.split("\n") if line.strip()]
+    match cell.form:
+        case "flag":
+            return None if (text == "yes") == cell.default else not cell.default
+        case "lines":
+            return lines or None
+        case "numbers" | "expressions":
+            return [_number(line) for line in lines] or None
+        case "number" | "expression":
+            return _number(text.strip()) if text.strip() else None
+        case "text":
+            return text.strip() or None
+    return " ".join(text.split()) or None
+
+
+def _number(text: str) -> int | float | str:
+    """A number, or, if it is none, the text."""
+    try:
+        value = float(text) if re.fullmatch(r"[-+0-9.eE]{1,40}", text) else math.nan
+    except ValueError:
+        return text
+    if not math.isfinite(value):
+        return text
+    return int(text) if re.fullmatch(r"[-+]?\d{1,15}", text) else value
+
+
+def _clean(text: str) -> str:
+    """Without what no text file holds: control characters, and halves of characters."""
+    text = text.replace("\r\n", "\n").replace("\t", " ")
+    return "".join(c for c in text if c == "\n" or (c.isprintable() or c == "\u00a0"))
+
+
+def _shown(value: Any) -> str:
+    return value if isinstance(value, str) else repr(value)
+
+
+def _is_plain(value: Any) -> bool:
+    return type(value) in (str, int, float)
+
+
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(row, dict) for row in value)
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else _toml(name)
+
+
+def _toml(value: Any) -> str:
+    """A value in TOML; JSON's escapes are TOML's."""
+    match value:
+        case bool() | str():
+            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        case list():
+            return f"[{', '.join(map(_toml, value))}]"
+        case dict():
+            return "{ " + ", ".join(f"{_key(name)} = {_toml(each)}" for name, each in value.items()) + " }"
+        case int() | float():
+            return repr(value)
+    return json.dumps(str(value))

@@ -1,0 +1,291 @@
+"""Writing an exercise in the page: its fields, what three students get, and the way to try and to save it.
+
+The draft is the text of a file (`app.exercises.form` changes it, `app.exercises.trial` tries it), so that page,
+file and ``kinboard check`` have one reader and the same messages.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import kin
+from app.exercises import Exercise, ExerciseFileError, Exercises, Trial, Variant, tried
+from app.exercises import form as forms
+from app.exercises.fields import text_of
+from app.exercises.files import MOST_BYTES, Find, parse_exercise
+from app.exercises.kinds import KINDS
+from app.viewer.activity.activity import EXERCISES
+from app.viewer.declared.facts import Facts
+from app.viewer.declared.feature import DeclaredFeature
+from app.viewer.declared.fields import Settings
+from app.viewer.declared.fields import text as text_field
+from app.viewer.declared.panel import Html
+from app.viewer.declared.panel import Node as PanelNode
+from app.viewer.declared.scene import Node, axes, frame, label
+from app.viewer.exercises import author_views as views
+from app.viewer.exercises.drawing import SIZE
+from app.viewer.feature import Stage
+from app.viewer.panel.status import Notice
+from kin import InputError, KinematicsError
+from kin.transforms import Array
+
+FILE = "exercise"
+_TAKEN = re.compile(r"-(\d+)$")
+
+
+@dataclass(frozen=True)
+class AuthorSettings(Settings):
+    """The draft as the text of a file; empty: none is open."""
+
+    draft: str = text_field("Exercise", longest=MOST_BYTES, undo="Exercise text")
+
+
+@dataclass(frozen=True, eq=False)
+class Drafted(Facts[AuthorSettings]):
+    """What is known of the draft; `exercises` are those of the service, `find` gives the arm of an id."""
+
+    exercises: Exercises
+    find: Find
+
+    @cached_property
+    def data(self) -> forms.Draft:
+        """The data of the file; empty without one."""
+        return forms.read(self.settings.draft)
+
+    @cached_property
+    def trial(self) -> Trial:
+        """The draft, tried."""
+        return _trial(self.settings.draft, self.exercises, self.find)
+
+    @property
+    def exercise(self) -> Exercise | None:
+        """The exercise, if the draft is one that can be solved."""
+        return None if self.trial.error else self.trial.exercise
+
+    @property
+    def first(self) -> Variant | None:
+        """What the first student gets."""
+        return self.trial.variants[0] if self.trial.variants else None
+
+
+@lru_cache(maxsize=16)  # facts are made anew with each frame of a moving arm
+def _trial(draft: str, exercises: Exercises, find: Find) -> Trial:
+    return tried(draft, FILE, find, lambda name: exercises.get(name) is not None)
+
+
+class Author(DeclaredFeature[AuthorSettings, Drafted]):
+    """It lives as long as the page, so that the draft is kept while it is tried; `show` and `hide` it."""
+
+    key = "author"
+    title = "Write an exercise"
+    about = "For teachers: your own question, from a kind or from any exercise."
+    settings_of, facts_of = AuthorSettings, Drafted
+    messages = frozenset({"set", "add", "drop", "look", "pose", "try", "save", "close", "upload"})
+
+    def __init__(self, stage: Stage) -> None:
+        self.shown = False
+        self._error = views.Refusal()
+        super().__init__(stage)
+
+    def show(self) -> None:
+        """Show the form."""
+        self.shown = True
+        self.refresh()
+
+    def hide(self) -> None:
+        """Hide form and drawings; the draft stays."""
+        self.shown = False
+        self.refresh()
+
+    # Declared
+
+    def look(self) -> Drafted:
+        return Drafted(self.settings, self.stage.now, self.stage.activity.courses.exercises, self.stage.store.get)
+
+    def panel(self) -> Sequence[PanelNode]:
+        if not self.shown:
+            return ()
+        activity, units, f = self.stage.activity, self.stage.units, self.read
+        if activity.practice.seated:
+            return [Html(views.student_html, ())]
+        if not f.data:
+            return [Html(views.start_html, (activity.exercises.all, self._error))]
+        trial, robots = f.trial, tuple(robot.id for robot in self.stage.store.robots)
+        values, refusal = trial.values(units), self._error or views.Refusal(trial.field, trial.error)
+        nodes: list[PanelNode] = [Html(views.head_html, (trial, refusal))]
+        for i, group in enumerate(forms.groups(f.data, robots)):
+            nodes.append(Html(views.group_html, (group, i, values, refusal)))
+        nodes.append(Html(views.students_html, (trial.students(units), trial.error)))
+        return nodes
+
+    def scene(self) -> Sequence[Node]:
+        variant = self.read.first if self.shown else None
+        if variant is None or variant.target is None:
+            return ()
+        size = SIZE * variant.robot.reach
+        point = variant.target[:3, 3]
+        return [
+            axes("target", variant.target, size, 0.05 * size),
+            frame("name", label("text", "target", (0.0, 0.0, 0.5 * size)), position=point),
+        ]
+
+    # Events
+
+    def handle(self, key: Hashable, value: object) -> None:
+        match key:
+            case (str(name), *rest) if name in self.messages:
+                if self.stage.activity.practice.seated:
+                    raise InputError("exercise", name, "a page of a teacher: this one is a student’s in a room")
+                self.look_again()
+                self.wake()
+                self._error = views.Refusal()
+                try:
+                    self._act(name, rest, value)
+                except ExerciseFileError as error:
+                    self._error = views.Refusal(error.field, f"got {error.value}, expected {error.expected}")
+                except InputError as error:
+                    self._error = views.Refusal(error.field, f"got {error.value}, expected {error.expected}")
+            case _:
+                super().handle(key, value)
+
+    def _act(self, name: str, rest: list[Hashable], value: object) -> None:
+        data = self.facts.data
+        match name, rest, value:
+            case "set", ["new", int()], str(origin) if not data:
+                self._start(origin)
+            case "upload", _, [str(file), str(text)]:
+                self._upload(file[:80], text)
+            case "close", _, _:
+                self.change(draft="")
+            case "set", [str(path), int()], str(text) if data:
+                self._put(forms.with_cell(data, path, text))
+            case "add", [str(path), int()], _ if data:
+                self._put(forms.with_row(data, path))
+            case "drop", [str(path), int()], int(index) if data:
+                self._put(forms.without_row(data, path, index))
+            case "pose", [int()], _ if data:
+                self._take_pose(data)
+            case "look", [int()], int(seed) if 0 <= seed < len(self.facts.trial.variants):
+                self._look(self.facts.trial.variants[seed])
+            case "try", [int()], _ if (one := self.facts.exercise) is not None:
+                self._try(one)
+            case "save", [int()], _ if (one := self.facts.exercise) is not None:
+                self._save(one)
+            case (("try" | "save"), [int()], _):
+                pass  # the form says what is wrong
+            case _:
+                raise InputError("exercise", name, "a control of the form")
+
+    def _start(self, origin: str) -> None:
+        """A draft from an exercise, or from the first one of a kind, with an id of its own."""
+        known = self.stage.activity.exercises
+        one = known.get(origin)
+        if (kind := origin.removeprefix("kind:")) != origin:
+            one = next((each for each in known.all if each.kind.name == kind), None)
+        if one is None:
+            raise InputError("exercise", origin, "the id of an exercise, or one of the kinds " + ", ".join(KINDS))
+        text = self.settings.draft if known.is_own(one.id) else text_of(one.file)
+        data = forms.read(text)
+        if not known.is_own(one.id):
+            data["id"] = _free(one.id, known)
+            data["title"] = f"{one.title} (mine)"[:80]
+            data.pop("place", None)
+        self._open(data)
+
+    def _upload(self, file: str, text: str) -> None:
+        if not text or len(text.encode(errors="replace")) > MOST_BYTES:
+            raise InputError("file", file, f"a text file of 1 to {MOST_BYTES} bytes")
+        parse_exercise(text, file, self.stage.store.get)
+        self._open(forms.read(text))
+
+    def _open(self, data: forms.Draft) -> None:
+        self._put(data, move=False)
+        self._look(self.facts.first)
+
+    def _put(self, data: forms.Draft, move: bool = True) -> None:
+        """The draft has changed: the arm follows if another posture is asked about."""
+        text = forms.to_toml(data)
+        if len(text.encode()) > MOST_BYTES:
+            raise InputError("exercise", f"{len(text.encode())} bytes", f"at most {MOST_BYTES} bytes in all")
+        before = self.facts.first
+        self.change(draft=text)
+        self.look_again()
+        now = self.facts.first
+        moved = before is None or now is None or now.robot != before.robot or (now.q != before.q).any()
+        if move and moved:
+            self._look(now)
+        self._offer()
+
+    def _look(self, variant: Variant | None) -> None:
+        """Bring the arm to the posture of a student's numbers."""
+        if variant is None:
+            return
+        if self.stage.now.robot != variant.robot:
+            self.stage.change_robot(variant.robot)
+        title = self.facts.trial.exercise.title if self.facts.trial.exercise else self.title
+        self.stage.move_to(variant.q, Notice("hand", title, "The arm shows the posture of these numbers."))
+
+    def _take_pose(self, data: forms.Draft) -> None:
+        """The arm on show, and its posture, become those of the exercise."""
+        robot, q = self.stage.now.robot, self.stage.now.q
+        try:
+            known = self.stage.store.get(robot.id) == robot
+        except KinematicsError:
+            known = False
+        if not known:
+            raise InputError("robot", robot.name, "an arm of this service: students do not have yours")
+        rounded = [_rounded(float(value), bool(turns)) for value, turns in zip(q, robot.revolute, strict=True)]
+        self._put({**data, "robot": robot.id, "q": rounded}, move=False)
+
+    def _try(self, exercise: Exercise) -> None:
+        """Open it as a student sees it, with new marks."""
+        self._offer()
+        self.stage.activity.practice.records.pop(exercise.id, None)
+        self.stage.post("lesson", "Exercises")
+        self.stage.post(("feature", EXERCISES, ("open", exercise.id, 0)), None)
+
+    def _save(self, exercise: Exercise) -> None:
+        name = f"{exercise.id}.toml"
+        self.stage.client.send_file_download(name, self.settings.draft.encode(), save_immediately=True)
+        self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
+
+    def _offer(self) -> None:
+        """The page's exercises have the draft, as long as it is one."""
+        one = self.facts.exercise
+        self.stage.activity.exercises.put(() if one is None else (one,))
+
+    # Feature
+
+    def step_name(self, key: Hashable) -> str:
+        names = {"try": "Try the exercise", "close": "Exercise closed", "pose": "Posture of the exercise"}
+        return names.get(str(key[0]), "Exercise text") if isinstance(key, tuple) else self.title
+
+    def on_pose(self, T_base_tool: Array) -> None:
+        """The form does not follow the arm."""
+
+    def on_robot(self) -> None:
+        if self.shown:
+            super().on_robot()
+
+    def state(self) -> dict[str, object]:
+        return super().state() if self.settings.draft else {}
+
+    def restore(self, state: dict[str, object]) -> None:
+        super().restore({"draft": "", **state})
+        self.look_again()
+        self._offer()
+
+
+def _rounded(value: float, turns: bool) -> str | int:
+    """A joint value as an expression, to a degree or a millimetre."""
+    number = round(kin.units.DEGREES.shown(value, 0) if turns else 1000.0 * value)
+    return f"{number}*{'deg' if turns else 'mm'}" if number else 0
+
+
+def _free(name: str, known: Exercises) -> str:
+    """An id like this one that is not taken."""
+    stem = _TAKEN.sub("", name)[:34]
+    return next(new for i in range(2, 1000) if known.get(new := f"{stem}-{i}") is None)

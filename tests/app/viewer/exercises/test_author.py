@@ -1,0 +1,141 @@
+"""An exercise is written in a page: from another one, with refusals, tried as a student, kept, and saved."""
+
+from __future__ import annotations
+
+import html
+import json
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from live_server import serve_viewer
+
+import kin
+from app.exercises import Exercises, parse_exercise
+from app.exercises.files import MOST_BYTES
+from app.exercises.form import to_toml
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.server import ViewerServer
+from app.viewer.session.state import PageState, decode, encode
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+ALL = Exercises()
+SOURCE = next(one for one in ALL.all if one.id == "elbow-angle")
+HOME = kin.get_robot("puma560").q_home
+DRAFT = {**tomllib.loads(Path(SOURCE.file).read_text()), "id": "my-own", "title": "My own"}
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[int]:
+    with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port:
+        yield port
+
+
+def stored(draft: str = "") -> str:
+    features: dict[str, dict[str, object]] = {"author": {"draft": draft}} if draft else {}
+    text = encode(PageState(lesson="author", features=features))
+    return json.dumps({"address": "http://127.0.0.1/", "state": text})
+
+
+def press(tab: FakeBrowser, key: list[object], value: object = None) -> None:
+    tab.say("feature", ["author", key, value])
+
+
+def shown(tab: FakeBrowser) -> str:
+    return html.unescape(tab.html)
+
+
+def test_an_exercise_is_written_tried_and_comes_back(server: int) -> None:
+    with FakeBrowser(server, memory=stored()) as tab:
+        tab.wait(lambda: "Begin with a kind or with any exercise" in shown(tab))
+        press(tab, ["set", "new", 1], SOURCE.id)
+        tab.wait(lambda: "✓ Checked." in shown(tab) and f'value="{SOURCE.id}-2"' in tab.html)
+        first = parse_exercise(to_toml({**DRAFT, "id": f"{SOURCE.id}-2"})).variant(0)
+        tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(first.robot, first.q), atol=1e-6))
+
+        press(tab, ["set", "title", 2], "Where <b>is</b> it?")
+        tab.wait(lambda: "Where &lt;b&gt;is&lt;/b&gt; it?" in tab.html)
+        assert "<b>is</b>" not in tab.html
+        press(tab, ["set", "answer.value", 3], "hypot(")
+        tab.wait(lambda: "answer.value[0]:" in shown(tab) and "expected an expression" in shown(tab))
+        assert ">hypot(</textarea>" in tab.html, "what was typed stays"
+        press(tab, ["try", 4])
+        press(tab, ["set", "answer.value", 5], "\n".join(map(str, np.atleast_1d(DRAFT["answer"]["value"]))))
+        tab.wait(lambda: "✓ Checked." in shown(tab))
+        assert tab.value("Lesson") == "Write an exercise", "what is no exercise is not opened"
+
+        press(tab, ["try", 6])
+        tab.wait(lambda: tab.value("Lesson") == "Exercises" and f'data-exercise="{SOURCE.id}-2"' in tab.html)
+        assert "Go on writing" in tab.html
+        tab.set("Lesson", "Write an exercise")
+        tab.wait(lambda: "✓ Checked." in shown(tab) and "Where <b>is</b> it?" in shown(tab))
+        tab.set("Lesson", "Exercises")
+        tab.wait(lambda: f'data-exercise="{SOURCE.id}-2"' in tab.html)
+        tab.wait(lambda: any(decode(text, [SOURCE.robot]).lesson == "exercises" for text in tab.kept[-1:]))
+        kept = tab.kept[-1]
+    with FakeBrowser(server, memory=json.dumps({"address": "http://127.0.0.1/", "state": kept})) as tab:
+        tab.wait(lambda: f'data-exercise="{SOURCE.id}-2"' in tab.html)
+        tab.say("undo")
+        tab.set("Lesson", "Write an exercise")
+        tab.wait(lambda: "✓ Checked." in shown(tab))
+
+
+def test_undo_takes_back_what_was_typed(server: int) -> None:
+    with FakeBrowser(server, memory=stored(to_toml(DRAFT))) as tab:
+        tab.wait(lambda: 'value="My own"' in tab.html)
+        press(tab, ["set", "title", 1], "Other")
+        tab.wait(lambda: 'value="Other"' in tab.html)
+        tab.say("undo")
+        tab.wait(lambda: 'value="My own"' in tab.html)
+        press(tab, ["add", "answer.mistakes", 2])
+        tab.wait(lambda: "Why this is wrong." in shown(tab))
+        tab.say("undo")
+        tab.wait(lambda: "Why this is wrong." not in shown(tab))
+
+
+def test_the_arm_and_pose_on_show_become_those_of_the_exercise(server: int) -> None:
+    with FakeBrowser(server, memory=stored(to_toml(DRAFT))) as tab:
+        tab.wait(lambda: 'value="My own"' in tab.html)
+        tab.choose(kin.get_robot("puma560").name)
+        press(tab, ["pose", 1])
+        tab.wait(lambda: "<option selected>puma560</option>" in tab.html)
+        q = "\n".join("0" if not round(np.degrees(value)) else f"{round(np.degrees(value))}*deg" for value in HOME)
+        tab.wait(lambda: f">{q}</textarea>" in tab.html)
+
+
+def test_hostile_messages_and_files_change_nothing(server: int) -> None:
+    with FakeBrowser(server, memory=stored(to_toml(DRAFT))) as tab:
+        tab.wait(lambda: 'value="My own"' in tab.html)
+        for key, value in (
+            (["set", "nobody", 1], "x"),
+            (["set", "title", 2], {"a": 1}),
+            (["set", "title", 3], "x" * 50_000),
+            (["drop", "vary", 4], 99),
+            (["drop", "vary", 5], "0"),
+            (["add", "title", 6], None),
+            (["look", 7], 99),
+            (["at", "draft", 0], "x"),
+            (["upload", 8], ["a.toml", "x" * (MOST_BYTES + 1)]),
+            (["upload", 9], ["a.toml", "id = 1"]),
+            (["upload", 10], ["a.toml", "[" * 5000]),
+        ):  # fmt: skip
+            press(tab, key, value)
+        press(tab, ["set", "title", 11], "Still here")
+        tab.wait(lambda: 'value="Still here"' in tab.html)
+    for junk in (
+        "x" * (MOST_BYTES + 100),
+        "[",
+        "vary = 3",
+        "answer = 1\nkind = 'number'",
+        "[vary]\nt = [1]",
+        "kind = []",
+    ):
+        with FakeBrowser(server, memory=stored(junk)) as tab:
+            tab.wait(lambda: tab.value("Lesson") == "Write an exercise")
+            tab.settle()
