@@ -207,10 +207,10 @@ class Guide(Feature):
 
     def _show_pose(self, pose: Pose, words: str) -> None:
         steps, at = self._progress.outline.steps, self._progress.at
-        if pose.drawing and self._shown is not None:
-            self._shown.restore(dict(pose.drawing))
         title = "Check" if at == len(steps) else f"Step {at + 1}: {steps[at].title}"
         self.stage.move_to(np.array(pose.q), Notice("hand", title, words))
+        if pose.drawing and self._shown is not None:
+            self._shown.restore(dict(pose.drawing))
         if pose.target is not None:
             self.stage.set_target(from_position_wxyz(pose.target[:3], np.array(pose.target[3:])))
 

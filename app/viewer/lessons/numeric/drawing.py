@@ -10,6 +10,7 @@ from app.viewer.lessons.figure_shapes import AMBER, BLUE, GREEN
 from app.viewer.lessons.numeric.facts import Iterated
 from app.viewer.skeleton import cylinder, places, skeleton
 from kin import Robot, fk
+from kin.differential.iteration import Problem
 from kin.transforms import Array
 
 COPIES = 10  # ghosts at most, with the first and the last iterate among them
@@ -19,21 +20,28 @@ OPACITY = 0.45
 FIRST, LAST = np.array([105.0, 115.0, 130.0]), np.array([213.0, 94.0, 0.0])
 
 
-def scene(iterated: Iterated, at: int, figure: FigureNodes) -> list[Node]:
-    """The iterates up to one of them, and the target."""
+def scene(problem: Problem, iterated: Iterated | None, at: int, figure: FigureNodes) -> list[Node]:
+    """The target, and the iterates up to one of them."""
+    T, size = problem.T, figure.size
+    with figure:
+        nodes = [*figure.point("aim", T[:3, 3], "target", GREEN), axes("axes", T, 5.0 * size, 0.25 * size)]
+        if iterated is not None:
+            nodes += _iterates(iterated, at, figure)
+    return nodes
+
+
+def _iterates(iterated: Iterated, at: int, figure: FigureNodes) -> list[Node]:
     robot, T, q = iterated.problem.robot, iterated.problem.T, iterated.run.q[: at + 1]
     tools, size = fk(robot, q)[:, :3, 3], figure.size
-    with figure:
-        points = [*figure.point("aim", T[:3, 3], "target", GREEN), *figure.point("start", tools[0], "start", BLUE)]
-        if np.linalg.norm(tools[-1] - T[:3, 3]) > 4.0 * size and at:
-            points += figure.point("here", tools[-1], str(at), AMBER)
+    points = figure.point("start", tools[0], "start", BLUE)
+    if np.linalg.norm(tools[-1] - T[:3, 3]) > 4.0 * size and at:
+        points += figure.point("here", tools[-1], str(at), AMBER)
     # Always as many, so that no node is made anew; those beyond the iterates have no length.
     way = np.repeat(tools[-1][None, None], 2, axis=1).repeat(POINTS, axis=0)
     recent = tools[-POINTS - 1 :]
     way[: len(recent) - 1] = np.stack([recent[:-1], recent[1:]], axis=1)
     return [
         *points,
-        axes("axes", T, 5.0 * size, 0.25 * size),
         bars("way", way, AMBER, 0.3 * size),
         _ghosts(robot, q[chosen(len(q))]),
     ]

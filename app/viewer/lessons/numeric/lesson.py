@@ -112,9 +112,9 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
 
     def scene(self) -> Sequence[Lazy]:
         f = self.read
-        if f.iterated is None or self.hides("iterates"):
-            return []
-        return [Lazy("iterates", scene, (f.iterated, f.number, self._figure))]
+        iterated = None if self.hides("iterates") else f.iterated
+        problem = f.problem if iterated is None else iterated.problem
+        return [Lazy("iterates", scene, (problem, iterated, f.number, self._figure))]
 
     # Events
 

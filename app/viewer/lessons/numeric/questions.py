@@ -11,6 +11,7 @@ from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.numeric.example import Example, example
+from app.viewer.lessons.numeric.settings import LIMITS
 from app.viewer.lessons.numeric.views import NAMES, amount, error_chart
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from kin import Robot, fk, get_robot
@@ -20,6 +21,14 @@ from kin.transforms import Array
 from kin.units import Units, power
 
 DAMPING, ERROR = 0.1, 0.2
+# Settings of the lesson that show what the steps speak of, and what changes with the answers.
+DRAWING: dict[str, object] = {"start": None, "at": None, "damping": DAMPING, "gain": 1.0, "longest": LIMITS[1]}
+SHOWN: dict[str, dict[str, object]] = {
+    "start": {"method": "newton", "limits": False},
+    "transpose": {"method": "transpose", "limits": False},
+    "damped": {"method": "damped", "limits": False},
+    "within limits": {"method": "newton", "limits": True},
+}
 _COMPARED: tuple[Method, ...] = ("newton", "damped")
 
 
@@ -63,7 +72,11 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "coarse": lengths.brief(0.1),
         "fine": lengths.brief(1e-4),
     }
-    start = Pose(as_configuration(known.start))
+    drawing = {**DRAWING, "target": problem.T.ravel().tolist(), "match": problem.match}
+    poses = {
+        name: Pose(as_configuration(known.start), drawing={**drawing, **more}) for name, more in SHOWN.items()
+    }
+    poses["home"] = poses["start"]  # of steps without a pose of their own
     figures = {
         "newton": error_chart(problem, [("newton", newton)], units),
         "transpose": error_chart(problem, [("newton", newton), ("transpose", transpose)], units),
@@ -71,7 +84,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "singularity": _near_singularity(units),
     }
     values = {name: float(value) for name, value in numbers.items()}
-    return LessonFacts(values, {}, words, {"home": start, "start": start}, figures)
+    return LessonFacts(values, {}, words, poses, figures)
 
 
 def _place(point: Array, units: Units) -> str:

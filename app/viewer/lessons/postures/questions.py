@@ -17,7 +17,7 @@ from kin import IKOptions, IKSolution, Robot, Status, branch_names, branch_of, f
 from kin.axes import NEARLY
 from kin.differential.task import free_motions, rank
 from kin.ik import solve
-from kin.transforms import Array
+from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units
 
 ROLL = math.radians(30.0)
@@ -88,6 +88,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "rank_at_home": known.rank,
         # With fewer joints there may be a single one.
         "several": free > 0 or known.found > 1 or robot.n >= 6,
+        "another": known.other is not None,
         "rolled": known.rolled,
         "limits": known.roll is Status.LIMITS,
     }
@@ -101,10 +102,21 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     }
     home = Pose(as_configuration(robot.q_home))
     poses = {"home": home, "another posture": home if known.other is None else Pose(known.other)}
+    poses["beyond"] = Pose(home.q, beyond(robot))
     if planar.is_planar(robot):
         poses |= planar.poses(robot)
     values = {name: float(value) for name, value in numbers.items()}
     return LessonFacts(values | by_hand, functions, words | by_hand_words, poses)
+
+
+def beyond(robot: Robot) -> tuple[float, ...]:
+    """The pose of home, moved away from the base beyond the reach: position (m) and quaternion w, x, y, z."""
+    T, base = fk(robot, robot.q_home), robot.T_world_base[:3, 3]
+    out = T[:3, 3] - base
+    far = float(np.linalg.norm(out))
+    way = out / far if far > 1e-9 else np.array([1.0, 0.0, 0.0])
+    point = base + BEYOND * robot.reach * way
+    return (*point.tolist(), *wxyz_from_rotation(T[:3, :3]).tolist())
 
 
 def _others(known: Solved) -> dict[int, tuple[str, str]]:

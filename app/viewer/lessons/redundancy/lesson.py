@@ -117,6 +117,12 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
             self._changed = self.shown_at
             self.wake(QUIET)
 
+    def restore(self, state: dict[str, object]) -> None:
+        if not np.array_equal(self._sent, self.stage.now.goal):
+            self._stop()
+            self._hold()  # first, or a sweep that is asked for would end at once
+        super().restore(state)
+
     def state(self) -> dict[str, object]:
         return {**super().state(), "free": "" if self.read.item is None else self.read.item.name}
 

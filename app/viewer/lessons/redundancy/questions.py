@@ -47,7 +47,11 @@ def facts(robot: Robot) -> LessonFacts:
     }
     names = (*(f"{name}{i}" for name in ("slow", "speed") for i in (1, 2, 3)), "fast2")
     functions = {"still": lambda place: float(size[slow[int(place) - 1]] < STILL)}
-    poses = {"home": Pose(as_configuration(robot.q_home))}
+    home = as_configuration(robot.q_home)
+    poses = {
+        "home": Pose(home, drawing={"swing": False}),
+        "self-motion": Pose(home, drawing={"swing": bool(np.any(z))}),
+    }
     return LessonFacts(numbers, functions, dict.fromkeys(names, "") | words, poses)
 
 

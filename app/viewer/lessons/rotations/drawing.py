@@ -55,7 +55,8 @@ def _rotation(facts: RotationsFacts, figure: FigureNodes, length: float) -> list
     T[:3, :3] = R = facts.R
     nodes = [_frame("turned", T, length, THICK), label("turned-name", "{1}", 1.12 * length * R[:, 2])]
     for k, way in enumerate(facts.convention.axes_now(facts.settings.angles)):
-        text = f"{ORDER[k]} {facts.convention.axes[k]}"
+        # About fixed axes, later turns carry the axis of an earlier one along.
+        text = f"{ORDER[k]} {facts.convention.axes[k]}{', carried' if facts.convention.fixed and k < 2 else ''}"
         nodes += figure.axis(f"turn-{k}", np.zeros(3), way, (1.15 + 0.1 * k) * length, text, COLORS[k])
     axis, angle = axis_angle(R)
     if angle > 1e-6:

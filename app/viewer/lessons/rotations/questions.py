@@ -89,12 +89,20 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     poses = {
         "tool": Pose(start, drawing=turned(R, PAGE)),
         "z-y-z": Pose(start, drawing=turned(R, ZYZ)),
+        "z-y-x": Pose(start, drawing=turned(R, PAGE.twin)),
         "locked": Pose(start, drawing=LOCKED),
         "no turns": Pose(start, drawing={"chained": True, "chain": []}),
         "two turns": Pose(start, drawing={"chained": True, "chain": as_json(TWO_TURNS)}),
+        "camera": Pose(start, drawing={"chained": True, "chain": as_json(camera(robot))}),
     }
     poses["home"] = poses["tool"]  # of steps without a pose of their own
     return LessonFacts({name: float(value) for name, value in numbers.items()}, {}, words, poses)
+
+
+def camera(robot: Robot) -> tuple[Motion, ...]:
+    """The way to a camera that looks down, and from it to a workpiece."""
+    far = round(0.3 * robot.reach, 2)
+    return Motion(False, 2, far, True), Motion(True, 0, math.pi, True), Motion(False, 2, round(0.6 * far, 2), True)
 
 
 def turned(R: Array, convention: Convention) -> dict[str, object]:

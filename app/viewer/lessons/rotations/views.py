@@ -48,14 +48,15 @@ def lock_html(convention: Convention, angles: Angles, units: Units) -> str:
     about = f"β = {'0 or 180°' if convention.is_proper else '±90°'}"
     if not units.degrees:
         about = f"β = {'0 or π' if convention.is_proper else '±π/2'}"
+    axes = "The 1st and the 3rd axis"
+    if convention.fixed:
+        axes = "The axis of the 1st turn, carried along by the later ones, and that of the 3rd"
     if room < 1e-6:
         state, look = "at", ("kb-vermilion", "✕", "Gimbal lock")
-        detail = (
-            "The 1st and the 3rd axis are parallel: both angles turn about the same axis, and one turn is lost."
-        )
+        detail = f"{axes} are parallel: both angles turn about the same axis, and one turn is lost."
     elif room < NEAR:
         state, look = "near", ("kb-amber", "!", f"Near gimbal lock, {units.angle(room)} away")
-        detail = "The 1st and the 3rd axis are nearly parallel: small turns change α and γ much."
+        detail = f"{axes} are nearly parallel: small turns change α and γ much."
     else:
         state, look = "far", ("kb-green", "✓", f"{units.angle(room)} from gimbal lock")
         detail = f"This convention locks at {about}."

@@ -1,5 +1,5 @@
-"""What the lesson computes: profiles of one joint, two ways between two poses, a line past an axis, a swinging "
-"load."""
+"""What the lesson computes: profiles of one joint, two ways between two poses, a line past an axis, a swinging
+load."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ AFTER = 8  # periods of swinging that are shown
 
 
 class Example(NamedTuple):
-    """The motion of one joint that all profiles make: index and name of the joint, its way, and its limits "
-    "``(3,)``."""
+    """The motion of one joint that all profiles make: index and name of the joint, its way, and its limits
+    ``(3,)``."""
 
     joint: int
     name: str
@@ -37,6 +37,20 @@ def example(robot: Robot) -> Example:
     found = np.array([limits.velocity[0], limits.acceleration[0], limits.jerk[0]])
     v, a, j = found.tolist()
     return Example(0, robot.joints[0].name, 1.5 * (v * v / a + v * a / j), found)
+
+
+def joint_ends(robot: Robot) -> tuple[Array, Array]:
+    """Home with the example's joint at the start and at the end of its way, as near to home as its limits allow.
+
+    Both are home if the way is longer than the joint's range.
+    """
+    joint, _, way, _ = example(robot)
+    low, high = float(robot.lower[joint]), float(robot.upper[joint])
+    start, end = robot.q_home.copy(), robot.q_home.copy()
+    if way <= high - low:
+        start[joint] = min(max(float(robot.q_home[joint]) - 0.5 * way, low), high - way)
+        end[joint] = start[joint] + way
+    return start, end
 
 
 @lru_cache(maxsize=64)
@@ -55,8 +69,8 @@ def family(robot: Robot) -> dict[str, Profile]:
 
 
 def sampled(profile: Profile, scale: float) -> tuple[Array, tuple[Array, ...]]:
-    """Times ``(k,)``, and position, velocity, acceleration and jerk at them, in a unit that has `scale` in a "
-    "radian."""
+    """Times ``(k,)``, and position, velocity, acceleration and jerk at them, in a unit that has `scale` in a
+    radian."""
     inner = profile.breaks[1:-1]
     times = np.sort(np.concatenate([np.linspace(0.0, profile.duration, SAMPLES), inner - 1e-9, inner + 1e-9]))
     return times, tuple(profile.sample(times) * scale)
@@ -79,8 +93,8 @@ class Ways(NamedTuple):
 
 @lru_cache(maxsize=64)
 def ways(robot: Robot) -> Ways | None:
-    """Two poses of the arm about its home, far apart, that a line joins too; None: there are none among those "
-    "tried."""
+    """Two poses of the arm about its home, far apart, that a line joins too; None: there are none among those
+    tried."""
     low = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
     high = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
     span = np.minimum(high - low, 2.0)
@@ -101,8 +115,8 @@ def _signs(n: int) -> Array:
 
 
 def turning_past(offset: float, speed: float, half: float) -> tuple[Array, Array]:
-    """Along a line of length 2 `half` past an axis at a distance: places (m), and how fast the axis must turn "
-    "(rad/s)."""
+    """Along a line of length 2 `half` past an axis at a distance: places (m), and how fast the axis must turn
+    (rad/s)."""
     x = np.linspace(-half, half, 2 * SAMPLES + 1)
     return x, speed * offset / (x * x + offset * offset)
 

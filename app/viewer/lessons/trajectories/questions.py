@@ -16,6 +16,7 @@ from app.viewer.lessons.trajectories.motions import (
     example,
     family,
     frequency,
+    joint_ends,
     residual,
     turning_past,
     ways,
@@ -70,7 +71,6 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "blocked": f"{100.0 * float(share[np.argmax(elbows[1] > math.pi)]):.0f}",
         **dict.fromkeys(("off", "ptp", "lin"), ""),
     }
-    poses = {"home": Pose(as_configuration(robot.q_home))}
     shown = {
         "cubic": figures.cubic(robot, unit),
         "profiles": figures.family_of(robot, unit),
@@ -87,10 +87,24 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
             "ptp": f"{ptp.duration:.2f}",
             "lin": f"{lin.duration:.2f}",
         }
-        ends = {"start of the line": 0.0, "end of the line": ptp.duration}
-        poses |= {name: Pose(as_configuration(ptp.derivatives(t)[0])) for name, t in ends.items()}
         shown["ways"] = figures.two_ways(between, units)
-    return LessonFacts(numbers, {}, words, poses, shown)
+    return LessonFacts(numbers, {}, words, _poses(robot), shown)
+
+
+def _poses(robot: Robot) -> dict[str, Pose]:
+    """Home, joint 1 at both ends of its way, and the ends of the line; the ways are drawn at its end."""
+    first, last = joint_ends(robot)
+    poses = {
+        "home": Pose(as_configuration(robot.q_home), drawing={"paths": False}),
+        "start of joint 1": Pose(as_configuration(first), drawing={"paths": False}),
+        "end of joint 1": Pose(as_configuration(last)),
+    }
+    if (between := ways(robot)) is not None:
+        ptp = between.ptp
+        for name, t in (("start of the line", 0.0), ("end of the line", ptp.duration)):
+            q = ptp.derivatives(t)[0]
+            poses[name] = Pose(as_configuration(q), drawing={"paths": t > 0.0})
+    return poses
 
 
 def _place(point: tuple[float, float], units: Units) -> str:

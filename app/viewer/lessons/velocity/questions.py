@@ -31,6 +31,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     numbers = {
         "last": float(robot.n),
         "load": LOAD,
+        "all_turn": float(robot.revolute.all()),
         "speed": float(np.linalg.norm(J[:3, 0])),
         "from_axis": float(np.linalg.norm(fk(robot, home)[:3, 3] - joint_axes(robot)[0].point)),
         "turning": float(np.linalg.norm(J[3:, -1])),

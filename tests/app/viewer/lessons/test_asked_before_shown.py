@@ -130,7 +130,7 @@ def test_no_answer_is_on_show_before_it_is_given(server: int, lesson: Any) -> No
 
 # What the panel and the scene have of each lesson when the first question has been answered, and never before.
 ANSWERED = {
-    "numeric": ("data-outcome=", 'data-plot="iterations"', "/numeric-"),
+    "numeric": ("data-outcome=", 'data-plot="iterations"', "/way"),
     "postures": ("data-posture=", "data-branch=", "/postures-"),
     "equations": ("data-equation=", 'aria-label="values here"', "/equations-"),
 }

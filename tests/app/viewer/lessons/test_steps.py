@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
@@ -24,6 +25,7 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.outline import Number, Outline, Pose, Step
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.velocity.lesson import VelocityLesson
+from app.viewer.panel.joints import label
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, encode
 from kin import Robot
@@ -62,20 +64,32 @@ def is_at(tab: FakeBrowser, robot: Robot, q: Any) -> bool:
     return np.allclose(tab.tool_pose(), kin.fk(robot, np.array(q)), atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "robot",
+    [pytest.param(r, id=r.id, marks=[] if r.id in ("ur5", "planar2r") else pytest.mark.slow) for r in CLASSICS],
+)
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
-def test_opening_a_step_brings_the_arm_to_its_pose(server: int, lesson: Any) -> None:
-    outline = lesson.outline(UR5, DEGREES)
+def test_opening_a_step_brings_the_arm_to_its_pose(server: int, lesson: Any, robot: Robot) -> None:
+    outline = lesson.outline(robot, DEGREES)
     with FakeBrowser(server) as tab:
         tab.settle()
-        tab.set("Robot", UR5.name)
-        tab.set(next(name for name in tab.sliders if name.startswith("1 ")), 77.0)
+        tab.choose(robot.name)
+        tab.set(label(robot, 0), 77.0 if robot.revolute[0] else 10.0)
         tab.set("Lesson", lesson.title)
         for number, step in enumerate(outline.steps):
             press(tab, ["go", number], number)
             tab.wait(lambda number=number, step=step: f"{number + 1}. {step.title}" in tab.html)
             pose = outline.pose_of(number)
             assert pose is not None
-            tab.wait(lambda pose=pose: is_at(tab, UR5, pose.q))
+            tab.wait(lambda pose=pose: is_at(tab, robot, pose.q))
+            end = step.end
+            if end is None:
+                continue
+            press(tab, ["reveal", str(number + 1), number])
+            if end.target is None:
+                tab.wait(lambda end=end: is_at(tab, robot, end.q))
+            else:
+                tab.wait(lambda end=end: np.allclose(tab.gizmo_pose()[:3, 3], end.target[:3], atol=1e-6))
 
 
 def test_a_step_is_one_step_of_undo(server: int) -> None:
