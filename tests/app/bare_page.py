@@ -111,7 +111,7 @@ class BarePage:
         """Messages for one new configuration of a lesson, on average; a frame alone takes none."""
         self.watch()
         for share in np.linspace(0.0, 1.0, count + 1)[1:]:
-            self.use(robot, robot.q_home + share * np.array([0.3, -0.2, 0.25, 0.1, 0.2, 0.3])[: robot.n])
+            self.use(robot, robot.q_home + share * np.array([0.3, -0.2, 0.25, 0.1, 0.2, 0.3, 0.1])[: robot.n])
             before = len(self.sent)
             lesson.on_pose(self.now.T_tool)
             assert len(self.sent) == before, "a frame alone takes none"

@@ -326,6 +326,13 @@ def numbers(name: str, entry: object, count: int) -> tuple[float, ...]:
     return tuple(float(item) for item in entry)
 
 
+def numbers_by_name(name: str, entry: object) -> dict[str, float]:
+    """An entry of a link that has numbers by names, without what is no number; raises `InputError`."""
+    if not isinstance(entry, dict):
+        raise InputError(name, entry, "numbers by names")
+    return {str(key): item for key, item in entry.items() if _is_number(item)}
+
+
 def subset(name: str, entry: object, known: Iterable[str]) -> frozenset[str]:
     """An entry of a link that is a list of names, without those that are not known; raises `InputError`."""
     if not isinstance(entry, list):

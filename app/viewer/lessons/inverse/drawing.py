@@ -1,16 +1,14 @@
-"""The figure of a step in the scene. Its parts are made when they are first needed, and moved from then on."""
+"""The figure of a step in the scene."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import count
 
 import numpy as np
-import viser
 
-from app.viewer.lessons import figures
+from app.viewer.declared.scene import Node
+from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.figure_shapes import AMBER, BLUE, GREEN, GREY, LINE, PURPLE, SKY, VERMILION
-from app.viewer.lessons.figures import Figure
 from app.viewer.lessons.inverse.arm import Arm
 from app.viewer.lessons.inverse.shapes import Angle, Face, Length, Line, Point, Shape, shapes
 from app.viewer.lessons.inverse.sheet import Derivation, StepKey
@@ -20,7 +18,6 @@ from app.viewer.scene.meshes import body
 from kin.transforms import Array
 from kin.units import Units
 
-Part = figures.Line | figures.Dimension | figures.Angle | figures.Point | figures.Face
 LABELS = {
     "w": "wrist centre w", "p": "tool point p", "S": "shoulder S", "E": "elbow E", "2": "axis 2", "t": "tool",
     "z0": "axis 1", "x0": "x₀", "x3": "x₃", "y3": "y₃", "z3": "z₃", "down": "", "SW": "", "tilt": "", "tilt2": "",
@@ -28,8 +25,8 @@ LABELS = {
 }  # fmt: skip
 COLORS = {"a": VERMILION, "x3": GREY, "y3": GREY, "z3": BLUE, "z0": GREY, "X": GREEN, "β": PURPLE, "D": VERMILION}
 QUIET = ("tilt", "tilt2", "circle")  # arcs without a value
+FOUND = ("r", "D", "ρ")  # lengths that a step finds; the others are given
 BONE, THIN = 0.5, 0.2  # width
-_NUMBERS = count(1)
 
 
 def room(arm: Arm, found: Derivation, keys: Iterable[StepKey]) -> list[Sphere]:
@@ -41,75 +38,39 @@ def room(arm: Arm, found: Derivation, keys: Iterable[StepKey]) -> list[Sphere]:
     return [(T[:3, :3] @ line.end + T[:3, 3], reach) for line in lines]
 
 
-class Drawing:
-    """The figures for one arm; the visitor's worker calls it."""
+def figure(arm: Arm, found: Derivation, key: StepKey, made: FigureNodes, units: Units, opened: bool) -> list[Node]:
+    """The figure of a step; if it is not `opened`, the values that it asks for are left out."""
+    # The labels of lengths can give way best.
+    drawn = sorted(shapes(arm, found, key), key=lambda shape: isinstance(shape, Length))
+    with made:
+        return [node for shape in drawn for node in _nodes(arm, shape, made, units, opened)]
 
-    def __init__(self, scene: viser.SceneApi, arm: Arm) -> None:
-        self._arm = arm
-        self._figure = Figure(scene, f"/inverse-{next(_NUMBERS)}", body(arm.robot).size)
-        self._parts: dict[tuple[type, str], Part] = {}
 
-    def show(self, figure: list[Shape], units: Units, hidden: bool) -> None:
-        """Show these shapes and no others; `hidden`: their values are asked for."""
-        wanted = {(type(shape), shape.name) for shape in figure}
-        for key, part in self._parts.items():
-            if key not in wanted:
-                part.hide()
-        for shape in sorted(figure, key=lambda each: isinstance(each, Length)):  # their labels can give way best
-            self._show(shape, units, hidden)
+def _nodes(arm: Arm, shape: Shape, made: FigureNodes, units: Units, opened: bool) -> list[Node]:
+    R, name = arm.T_base_lesson[:3, :3], shape.name
 
-    def remove(self) -> None:
-        """Remove everything from the scene."""
-        self._figure.remove()
+    def at(point: Array) -> Array:
+        return np.asarray(R @ point + arm.T_base_lesson[:3, 3])
 
-    def _show(self, shape: Shape, units: Units, hidden: bool) -> None:
-        part = self._parts.get((type(shape), shape.name))
-        if part is None:
-            part = self._parts[type(shape), shape.name] = self._made(shape)
-        name = sub(shape.name)
-        match shape, part:
-            case Point(), figures.Point():
-                part.show(self._at(shape.at))
-            case Line(), figures.Line():
-                part.show(self._at(shape.start), self._at(shape.end))
-            case Length(), figures.Dimension():
-                text = f"{name} = ?" if hidden and shape.name in ("r", "D", "ρ") else None
-                part.show(self._at(shape.start), self._at(shape.end), units, self._along(shape.aside), text=text)
-            case Angle(), figures.Angle():
-                words = "" if shape.name in QUIET else f"{name} = ?" if hidden else None
-                part.show(
-                    self._at(shape.corner),
-                    self._along(shape.start),
-                    self._along(shape.about),
-                    shape.size,
-                    units,
-                    radius=shape.radius,
-                    text=words,
-                )
-            case Face(), figures.Face():
-                part.show([self._at(corner) for corner in shape.corners])
-
-    def _made(self, shape: Shape) -> Part:
-        figure, name = self._figure, shape.name
-        label, color = LABELS.get(name, sub(name)), COLORS.get(name)
-        if name == "w" and self._arm.family == "planar":
-            label = "end of link 2"
-        match shape:
-            case Point():
-                return figure.point(label, color or AMBER)
-            case Line(bone=True):
-                return figure.line("", SKY, BONE)
-            case Line():
-                return figure.line(label, color or GREY, THIN if name in ("down", "SW", "x0") else LINE)
-            case Length():
-                return figure.dimension(label, color or BLUE)
-            case Angle():
-                return figure.angle(label, color or GREEN)
-            case Face():
-                return figure.face(3, BLUE)
-
-    def _at(self, point: Array) -> Array:
-        return np.asarray(self._arm.T_base_lesson[:3, :3] @ point + self._arm.T_base_lesson[:3, 3])
-
-    def _along(self, direction: Array) -> Array:
-        return np.asarray(self._arm.T_base_lesson[:3, :3] @ direction)
+    key, color, text = f"{type(shape).__name__}-{name}", COLORS.get(name), LABELS.get(name, sub(name))
+    asked = None if opened else f"{sub(name)} = ?"
+    match shape:
+        case Point():
+            text = "end of link 2" if name == "w" and arm.family == "planar" else text
+            return made.point(key, at(shape.at), text, color or AMBER)
+        case Line(bone=True):
+            return made.line(key, at(shape.start), at(shape.end), "", SKY, BONE)
+        case Line():
+            width = THIN if name in ("down", "SW", "x0") else LINE
+            return made.line(key, at(shape.start), at(shape.end), text, color or GREY, width)
+        case Length():
+            words = asked if name in FOUND else None
+            ends = at(shape.start), at(shape.end)
+            return made.dimension(key, *ends, text, units, R @ shape.aside, color or BLUE, words)
+        case Angle():
+            words = "" if name in QUIET else asked
+            start, about, size = R @ shape.start, R @ shape.about, shape.size
+            corner, color = at(shape.corner), color or GREEN
+            return made.angle(key, corner, start, about, size, text, units, color, shape.radius, words)
+        case Face():
+            return made.face(key, [at(corner) for corner in shape.corners], BLUE)

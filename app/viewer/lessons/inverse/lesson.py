@@ -9,44 +9,39 @@ figure are those of this branch, for the target in the scene.
 
 from __future__ import annotations
 
-import math
-import time
-from collections.abc import Hashable
-from typing import Any, TypeGuard
-
-import numpy as np
-import viser
+from collections.abc import Sequence
+from typing import ClassVar
 
 import kin
+from app.viewer.declared.feature import DeclaredFeature
+from app.viewer.declared.panel import Button, Buttons, Control, Html, Node
+from app.viewer.declared.scene import Lazy
+from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.feature import Stage
+from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Number, Outline
+from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.inverse import views
-from app.viewer.lessons.inverse.arm import Arm, arm_of
-from app.viewer.lessons.inverse.derive import Signs, arm_angle, signs_of
-from app.viewer.lessons.inverse.drawing import Drawing, room
-from app.viewer.lessons.inverse.exercise import Branch, Exercise, all_branches, example, exercise, flipped
-from app.viewer.lessons.inverse.questions import keys_of, outline, outline_of
-from app.viewer.lessons.inverse.shapes import shapes
+from app.viewer.lessons.inverse.derive import signs_of
+from app.viewer.lessons.inverse.drawing import figure, room
+from app.viewer.lessons.inverse.exercise import flipped
+from app.viewer.lessons.inverse.facts import InverseFacts
+from app.viewer.lessons.inverse.questions import outline, outline_of
+from app.viewer.lessons.inverse.settings import InverseSettings
 from app.viewer.lessons.inverse.sheet import StepKey
-from app.viewer.lessons.inverse.tree import tree
-from app.viewer.panel import assign, listen, listen_click, update_html
 from app.viewer.panel.status import Notice
-from kin import InputError
-from kin.transforms import Array
+from app.viewer.scene.meshes import body
 
-INTERVAL = 0.1  # s between two updates of the numbers
 ARMS = ("planar2r", "planar3r", "pioneer5", "puma560", "redundant7-craig")
 FOLLOW_HINT = "The branch that the numbers and the figure follow, by its number in the tree"
 POSTURE_HINT = "Moves the arm to the branch that you follow"
 ASK_HINT = "Asks the questions again, about the pose that the arm has now"
-ALL_HINT = "Shows the numbers of all steps, answered or not"
 ARM_HINT = "Shows this arm"
-PSI_HINT = "Where the elbow is on its circle in the derivation"
 
 
-class InverseLesson(Lesson):
+class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
     """See the module."""
 
     key = "inverse"
@@ -54,299 +49,153 @@ class InverseLesson(Lesson):
     left = "configuration"
     about = "From a target to the joint angles by hand, and where each solution comes from."
     outline = staticmethod(outline)
+    settings_of, facts_of = InverseSettings, InverseFacts
+    undo: ClassVar[dict[str, str]] = {"on_follow": "Branch", "on_arm": "Arm"}
+    pace = 0.1
 
     def __init__(self, stage: Stage) -> None:
+        self._restart = self._drawn = False
         super().__init__(stage)
-        self._all = False
-        self._psi: float | None = None
-        self._opened: tuple[bool, ...] = ()
-        self._at = 0
-        self._restart = False
-        self._taken: dict[str, float] = {}  # answers whose way was followed, by question: it may be left again
-        self._shown_at = 0.0
-        self._arm: Arm | None
-        self._exercise: Exercise | None
-        self._drawing: Drawing | None = None
-        with stage.client.gui.add_folder(None) as self._container:
-            pass
-        self._controls: list[Any] = []
-        self._begin()
 
-    # Events
+    def started(self) -> None:
+        self._at, self._answered = 0, tuple[bool, ...]()
+        self._figure = FigureNodes(body(self.stage.now.robot).size)
+        self._figure_of: StepKey = "centre"
+        f = self.look()
+        if f.exists or self._drawn:
+            self.stage.see_through(f.exists, gizmo=f.exists)
+            self.stage.fit_view(room(f.derived, f.followed.derivation, f.keys) if f.exists else ())
+        self._drawn = f.exists
 
-    def handle(self, key: Hashable, value: object) -> None:
-        match key:
-            case ("follow", int(number)):
-                self._follow(number)
-            case "posture":
-                self._take_posture()
-            case "ask":
-                self._ask()
-            case "all":
-                self._all = bool(value)
-                self._update()
-            case ("psi", units) if units == self.stage.units:
-                if not isinstance(value, int | float) or not math.isfinite(value):
-                    raise InputError("arm angle", value, "a finite number")
-                self._psi = self.stage.units.angles.read(float(value))
-                self._update()
-            case ("psi", _):
-                pass
-            case ("arm", str(robot)) if robot in ARMS:
-                self.stage.change_robot(self.stage.store.get(robot))
-            case _:
-                raise InputError("inverse kinematics", key, "a control of this lesson")
+    def besides(self) -> tuple[object, ...]:
+        return self._at, self._answered
 
-    def step_name(self, key: Hashable) -> str:
-        names = {"follow": "Branch", "arm": "Arm", "psi": "Arm angle"}
-        return names.get(str(key[0]), self.title) if isinstance(key, tuple) else self.title
+    def look(self) -> InverseFacts:
+        return InverseFacts(self.settings, self.stage.now, self._at, self._answered)
+
+    # What is shown
+
+    def panel(self) -> Sequence[Node]:
+        f, units = self.read, self.stage.units
+        if not f.exists:
+            arms = [
+                Button(self.stage.store.get(robot).name, self.event(self.on_arm, robot), ARM_HINT, key=robot)
+                for robot in ARMS
+            ]
+            return [Html(views.others_html, (f.robot,), key="others"), *arms]
+        opened = dict(zip(f.keys, f.opened, strict=True))
+        numbers = f.derived, f.followed, f.keys, f.opened, f.at, units
+        inside = sum(branch.available for branch in f.branches)
+        follow = {str(b.number): self.event(self.on_follow, i) for i, b in enumerate(f.branches)}
+        return [
+            Html(views.derivation_html, numbers, key="numbers"),
+            Html(views.tree_html, (f.derived, f.tree, inside, opened, units), key="tree"),
+            *([Control("psi", value=f.psi, of=f.robot.id)] if f.derived.family == "srs7" else []),
+            Buttons("Follow", follow, FOLLOW_HINT, of=f.robot.id),
+            Button("Show this posture", self.event(self.on_posture), POSTURE_HINT, key="posture"),
+            Button("Ask about this pose", self.event(self.on_ask), ASK_HINT, key="ask"),
+            Control("all"),
+        ]
+
+    def scene(self) -> Sequence[Lazy]:
+        f = self.read
+        return [Lazy("figure", self._shapes, (f, self.stage.units))] if f.exists else []
+
+    def _shapes(self, *args: object) -> Sequence[SceneNode]:
+        """The figure of the step on show; the check has that of the whole posture."""
+        f = self.read
+        at = min(f.at, len(f.keys) - 1)
+        if self._figure_of != f.keys[at]:  # labels of another step take no room
+            self._figure, self._figure_of = FigureNodes(self._figure.size), f.keys[at]
+        return figure(f.derived, f.followed.derivation, f.keys[at], self._figure, self.stage.units, f.opened[at])
+
+    # The steps
 
     def on_steps(self, progress: Progress) -> Outline | None:
-        if self._arm is None or self._arm.robot is not self.stage.now.robot:
+        if self.facts.robot is not self.stage.now.robot or not self.facts.exists:
             return None
         if self._restart:
             progress.restart()
             self._restart = False
-            self._taken.clear()
-        assert self._exercise is not None
-        keys = keys_of(self._arm)
-        progress.use(outline_of(self._exercise, self.stage.units))
-        for number, key in enumerate(keys, 1):
+            self.change(taken={})
+        units = self.stage.units
+        progress.use(outline_of(self.look().exercise, units))
+        for number, key in enumerate(self.facts.keys, 1):
             self._take_way(progress, str(number), key)
-        self._at = progress.at
         asked = dict(progress.outline.questions())
-        self._opened = tuple(
-            progress.is_closed(str(i + 1)) if str(i + 1) in asked else i <= self._at for i in range(len(keys))
+        self._at, numbers = progress.at, [str(i + 1) for i in range(len(self.facts.keys))]
+        self._answered = tuple(
+            progress.is_closed(number) if number in asked else i <= progress.at for i, number in enumerate(numbers)
         )
-        self._update()
+        self.wake()
         return progress.outline
-
-    def on_robot(self) -> None:
-        self._clear()
-        self._begin()
-        self.stage.activity.changed()
-
-    def on_pose(self, T_base_tool: Array) -> None:
-        self._wake()
-
-    def on_result(self, result: kin.IKResult) -> None:
-        self._psi = None
-        self._wake()
-
-    def on_style(self) -> None:
-        self._build()
-        self._update()
-
-    def tick(self, now: float) -> None:
-        wait = INTERVAL - (now - self._shown_at)
-        if wait <= 0.0:
-            self._update()
-        else:
-            self.due = wait
-
-    def state(self) -> dict[str, object]:
-        if self._exercise is None:
-            return {}
-        return {
-            "q": self._exercise.q.tolist(),
-            "signs": list(self._exercise.signs),
-            "all": self._all,
-            "taken": dict(self._taken),
-        }
-
-    def restore(self, state: dict[str, object]) -> None:
-        q, signs, arm = state.get("q"), state.get("signs"), self._arm
-        if isinstance(shown := state.get("all"), bool):
-            self._all = shown
-        if isinstance(taken := state.get("taken"), dict):
-            self._taken = {str(key): x for key, x in taken.items() if type(x) in (int, float)}
-        if arm is not None and _is_row(q, arm.robot.n) and _is_row(signs, arm.splits):
-            followed = tuple(1 if sign > 0 else -1 for sign in signs)
-            self._exercise = exercise(arm, np.array(q, float), followed)
-        self._build()
-        self.stage.activity.changed()
-
-    def remove(self) -> None:
-        self._clear()
-        self._container.remove()
-
-    # What is followed
-
-    def _begin(self) -> None:
-        """Start with the example of the arm on show."""
-        arm = self._arm = arm_of(self.stage.now.robot)
-        self._exercise = None if arm is None else exercise(arm, example(arm))
-        self._psi, self._opened, self._at = None, (), 0
-        self._taken.clear()
-        self._build()
-        self._update()
 
     def _take_way(self, progress: Progress, number: str, key: StepKey) -> None:
         """Follow the other way where the student has typed it."""
-        given = self._exercise
-        question = dict(progress.outline.questions()).get(number)
-        if given is None or not isinstance(question, Number) or number not in progress.given:
+        question, answer = dict(progress.outline.questions()).get(number), progress.given.get(number)
+        if not isinstance(question, Number) or answer is None or number in progress.revealed:
             return
-        answer = progress.given[number]
-        if number in progress.revealed or self._taken.get(number) == answer:
+        if self.settings.taken.get(number) == answer:
             return
-        self._taken[number] = answer
-        if question.way_of(answer) <= 0:
-            return
+        self.change(taken={**self.settings.taken, number: answer})
+        given = self.look().exercise
         step = given.followed.derivation.step(key)
-        if step is not None and step.split >= 0:
-            self._set_signs(flipped(given.signs, step.split))
-            progress.use(outline_of(self._exercise, self.stage.units))  # type: ignore[arg-type]
+        if question.way_of(answer) > 0 and step is not None and step.split >= 0:
+            self.change(signs=flipped(given.signs, step.split))
+            progress.use(outline_of(self.look().exercise, self.stage.units))
 
-    def _set_signs(self, signs: Signs) -> None:
-        assert self._exercise is not None
-        self._exercise = exercise(self._exercise.arm, self._exercise.q, signs)
+    # Events
 
-    def _follow(self, number: int) -> None:
-        given = self._exercise
-        if given is None or not 1 <= number <= len(given.branches):
-            raise InputError("branch", number, "the number of a branch in the tree")
-        self._set_signs(given.branches[number - 1].derivation.signs)
+    def on_follow(self, index: int) -> None:
+        """Follow another branch."""
+        self.change(signs=self.facts.branches[index].derivation.signs)
         self.stage.activity.changed()
 
-    def _ask(self) -> None:
-        """Ask about the pose that the arm has now."""
-        arm = self._arm
-        if arm is None:
-            return
-        q = self.stage.now.goal.copy()
-        self._exercise, self._restart = exercise(arm, q, signs_of(arm, q)), True
-        self.stage.activity.changed()
-        self.stage.notify(Notice("hand", "New questions", "They are about the pose that the arm has now."))
-
-    def _take_posture(self) -> None:
-        branch = next((b for b in self._branches() if b.derivation.signs == self._signs), None)
-        if branch is None:
-            return
+    def on_posture(self) -> None:
+        """Move the arm to the branch that is followed, or say why it cannot go there."""
+        branch = self.facts.followed
         if branch.available and branch.q is not None:
             self.stage.move_to(branch.q, Notice("hand", f"Branch {branch.number}", branch.name))
             return
-        reason = (
-            "It has no solution at this target."
-            if branch.q is None
-            else views.outside_text(branch, self.stage.units)
-        )
-        self.stage.notify(
-            Notice("limits", f"Branch {branch.number} is not available", f"{reason.rstrip('.').capitalize()}.")
-        )
+        reason = "it has no solution at this target"
+        if branch.q is not None:
+            reason = views.outside_text(branch, self.stage.units)
+        title = f"Branch {branch.number} is not available"
+        self.stage.notify(Notice("limits", title, f"{reason.capitalize()}."))
 
-    @property
-    def _signs(self) -> Signs:
-        return () if self._exercise is None else self._exercise.signs
+    def on_ask(self) -> None:
+        """Ask about the pose that the arm has now."""
+        q = self.stage.now.goal
+        self.change(q=as_configuration(q), signs=signs_of(self.facts.derived, q))
+        self._restart = True
+        self.stage.activity.changed()
+        self.stage.notify(Notice("hand", "New questions", "They are about the pose that the arm has now."))
 
-    def _branches(self) -> tuple[Branch, ...]:
-        """All branches of the target in the scene."""
-        arm, stage = self._arm, self.stage
-        if arm is None:
-            return ()
-        T = stage.now.aim
-        psi = 0.0
-        if arm.family == "srs7":
-            psi = arm_angle(arm, stage.now.goal) if self._psi is None else self._psi
-        return all_branches(arm, T, stage.now.goal, psi)
+    def on_arm(self, robot: str) -> None:
+        """Show one of the lesson's arms."""
+        self.stage.change_robot(self.stage.store.get(robot))
 
-    # What is shown
+    def changed(self, path: str) -> None:
+        if path == "psi":
+            self.change(turned=True)
 
-    def _build(self) -> None:
-        """Controls for the arm on show."""
-        for control in self._controls:
-            control.remove()
-        gui, arm = self.stage.client.gui, self._arm
-        with self._container:
-            self._numbers = gui.add_html("")
-            self._tree = gui.add_html("")
-            self._controls = [self._numbers, self._tree]
-            if arm is None:
-                self._offer_arms(gui)
-                return
-            self._slider: viser.GuiSliderHandle[float] | None = None
-            if arm.family == "srs7":
-                unit = self.stage.units.angles
-                turn = unit.shown(math.pi)
-                self._slider = gui.add_slider("ψ of the derivation", -turn, turn, unit.step(1), 0.0, hint=PSI_HINT)
-                listen(self._slider, self.post, ("psi", self.stage.units))
-                self._controls.append(self._slider)
-            names = [str(i + 1) for i in range(2**arm.splits)]
-            group = gui.add_button_group("Follow", names, hint=FOLLOW_HINT)
-            listen_click(group, self.post, {name: ("follow", int(name)) for name in names})
-            self._controls.append(group)
-            for label, key, hint in (
-                ("Show this posture", "posture", POSTURE_HINT),
-                ("Ask about this pose", "ask", ASK_HINT),
-            ):
-                button = gui.add_button(label, hint=hint)
-                self._on_click(button, key)
-                self._controls.append(button)
-            box = gui.add_checkbox("All numbers", self._all, hint=ALL_HINT)
-            listen(box, self.post, "all")
-            self._controls.append(box)
+    def on_result(self, result: kin.IKResult) -> None:
+        self.change(turned=False)
+        self.wake()
 
-    def _offer_arms(self, gui: viser.GuiApi) -> None:
-        for robot in ARMS:
-            button = gui.add_button(self.stage.store.get(robot).name, hint=ARM_HINT)
-            self._on_click(button, ("arm", robot))
-            self._controls.append(button)
+    def on_robot(self) -> None:
+        super().on_robot()
+        self.stage.activity.changed()
 
-    def _on_click(self, button: viser.GuiButtonHandle, key: Hashable) -> None:
-        @button.on_click
-        async def _(event: Any) -> None:
-            if event.client is not None:
-                self.post(key)
+    def state(self) -> dict[str, object]:
+        return super().state() if self.facts.exists else {}
 
-    def _wake(self) -> None:
-        self.due = 0.0 if self.due is None else min(self.due, 0.0)
+    def restore(self, state: dict[str, object]) -> None:
+        super().restore(state)
+        self.stage.activity.changed()
 
-    def _update(self) -> None:
-        """Show numbers, tree and figure for the target in the scene."""
-        self._shown_at, self.due = time.perf_counter(), None
-        arm, units = self._arm, self.stage.units
-        if arm is None:
-            update_html(self._numbers, views.others_html(self.stage.now.robot))
-            return
-        found = self._branches()
-        branch = next(b for b in found if b.derivation.signs == self._signs)
-        keys = keys_of(arm)
-        opened = tuple(True for _ in keys) if self._all else (self._opened or (False,) * len(keys))
-        update_html(self._numbers, views.derivation_html(arm, branch, keys, opened, self._at, units))
-        inside = sum(b.available for b in found)
-        nodes = tree(found, self._signs)
-        by_key = dict(zip(keys, opened, strict=True))
-        update_html(self._tree, views.tree_html(arm, nodes, inside, by_key, units))
-        self._show_psi(found)
-        self._draw(arm, branch, keys, opened)
-
-    def _show_psi(self, found: tuple[Branch, ...]) -> None:
-        if self._slider is not None and self._psi is None and "ψ" in found[0].derivation.values:
-            shown = self.stage.units.angles.shown(found[0].derivation.number("ψ"))
-            assign(self._slider, min(max(shown, self._slider.min), self._slider.max))
-
-    def _draw(self, arm: Arm, branch: Branch, keys: tuple[StepKey, ...], opened: tuple[bool, ...]) -> None:
-        """Draw the figure of the step on show; the check has that of the whole posture."""
-        if self._drawing is None:
-            self._drawing = Drawing(self.stage.client.scene, arm)
-            self.stage.see_through(True, gizmo=True)
-            self.stage.fit_view(room(arm, branch.derivation, keys))
-        at = min(self._at, len(keys) - 1)
-        self._drawing.show(shapes(arm, branch.derivation, keys[at]), self.stage.units, not opened[at])
-
-    def _clear(self) -> None:
-        """Remove the figure."""
-        if self._drawing is not None:
-            self._drawing.remove()
-            self._drawing = None
+    def remove(self) -> None:
+        super().remove()
+        if self._drawn:
             self.stage.see_through(False)
             self.stage.fit_view(())
-
-
-def _is_row(values: object, size: int) -> TypeGuard[list[float]]:
-    """Whether a value of a link is a list of numbers of this length."""
-    return (
-        isinstance(values, list)
-        and len(values) == size
-        and all(type(value) in (int, float) and math.isfinite(value) for value in values)
-    )

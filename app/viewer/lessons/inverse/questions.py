@@ -31,6 +31,7 @@ GOAL = (
     "You can solve the inverse kinematics of an arm by hand, step by step, and say where each solution comes from "
     "and where the derivation ends."
 )
+WITHHELD = frozenset({"postures"})  # while it is asked how many of them there are
 LENGTH, ANGLE = 0.001, math.radians(0.5)
 _METHODS: dict[StepKey, str] = {
     "theta2": "θ₂ = atan2(h, ρ) − β, with β = atan2(forearm · sin θ₃, upper arm + forearm · cos θ₃).",
@@ -74,7 +75,8 @@ def _step(given: Exercise, key: StepKey, units: Units) -> Step:
             else None
         )
         shown = f"The numbers below lead to the branch {given.followed.name}. Choose another one with Follow."
-        return Step(words.title(arm, key), text, _limits(given), "", Pose(start), end, shown)
+        asked = _limits(given)
+        return Step(words.title(arm, key), text, asked, "", Pose(start), end, shown, withheld=WITHHELD)
     if found is None:
         failed = given.followed.derivation.failed
         where = "" if failed is None else f" It ends at the step “{words.title(given.arm, failed.key)}”."

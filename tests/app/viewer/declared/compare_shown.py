@@ -3,7 +3,7 @@
     python tests/app/viewer/declared/compare_shown.py /path/to/other/checkout [feature …]
 
 Each feature gets a page, on which all arms follow each other. Each of them is shown at home, with some settings,
-at random configurations, and in other units. Numbers may differ by `TOLERANCE`.
+at random configurations, in other units, and in each step of a lesson that follows them. Numbers may differ by `TOLERANCE`.
 """
 
 from __future__ import annotations
@@ -75,6 +75,14 @@ STATES: dict[str, list[dict[str, object]]] = {
     ],
     "equations": [{"equation": "3.14"}, {"equation": 7}],
     "trajectories": [{"paths": True}, {"paths": 5}],
+    "inverse": [
+        {"all": True},
+        {"q": [0.3] * 7, "signs": [-1, 1, -1], "taken": {"2": 0.5}},
+        {"q": [0.3] * 6, "signs": [1, -1, -1], "all": False, "taken": {}},
+        {"q": "far", "signs": [1, 2], "all": 3, "taken": []},
+        {"q": [0.3, 0.8], "signs": [-1], "all": True},
+        {"q": [0.2] * 5, "signs": [-1, 1, 1], "all": True},
+    ],
 }  # fmt: skip
 
 
@@ -82,14 +90,25 @@ def record(key: str) -> dict[str, Any]:
     """What a feature shows, by arm and moment."""
     from app.equations import book
     from app.viewer.lessons import LESSONS
+    from app.viewer.lessons.guide.lesson import Lesson
+    from app.viewer.lessons.guide.progress import Progress
 
     feature = next(lesson for lesson in LESSONS if lesson.key == key)
     found: dict[str, Any] = {}
     rng = np.random.default_rng(12)
     for robot in ARMS if key == "equations" else ():
         book(robot)  # derived before, so that nothing waits
+    follows = feature.on_steps is not Lesson.on_steps
     with bare_page(ARMS[0]) as page:
         shown = page.open(feature)
+
+        def follow(at: int = 0) -> None:
+            """Tell a lesson that follows them that the steps are shown."""
+            progress = Progress(feature.outline(page.now.robot, page.units))
+            progress.at, progress.revealed = at, {"1", "3"} if at else set()
+            shown.on_steps(progress)
+
+        page.activity.changed = follow
         for robot in ARMS:
             if robot is not page.now.robot:
                 page.change(robot)
@@ -105,6 +124,8 @@ def record(key: str) -> dict[str, Any]:
 
             note("at home")
             for k, state in enumerate(STATES[key]):
+                if isinstance(q := state.get("q"), list) and len(q) != robot.n:
+                    continue  # a link of another arm
                 page.restore(state)
                 note(f"state {k}")
                 page.pose(robot.random_q(rng))
@@ -112,6 +133,10 @@ def record(key: str) -> dict[str, Any]:
             page.style(Units(False, "cm"))
             note("radians")
             page.style(DEFAULT_UNITS)
+            for at in range(len(feature.outline(robot, DEFAULT_UNITS).steps) + 1) if follows else ():
+                follow(at)
+                page.rest()
+                note(f"step {at + 1}")
     return found
 
 

@@ -12,7 +12,7 @@ from app.viewer.lessons import LESSONS
 
 ROOT = Path(__file__).parents[4] / "app" / "viewer"
 # What talks through scripts of its own: half of it is HTML with messages.
-OTHERS = {"dh", "inverse"}
+OTHERS = {"dh"}
 PACKAGES = sorted(
     path.name
     for path in (ROOT / "lessons").iterdir()

@@ -30,7 +30,7 @@ STORE, UNITS = Store(), Units()
 ARMS = [STORE.get(name) for name in ("pioneer5", "ur5", "scara", "puma560")]
 KEYS = (
     *("rotations", "screws", "redundancy", "velocity", "trajectories"),
-    *("numeric", "postures", "equations"),
+    *("numeric", "postures", "equations", "inverse"),
 )
 MOVED = [lesson for lesson in LESSONS if lesson.key in KEYS]
 COMMON = {float(n) for n in range(-12, 13)}  # numbers of joints and steps

@@ -99,6 +99,17 @@ CASES: dict[str, PageState] = {
         features={"dh": {"at": 4, "symbols": True, "compare": True, "speed": 2.0, "lines": True}},
     ),
     "inverse": PageState(robot="ur5", lesson="inverse", features={"inverse": {"all": True}}),
+    "inverse, another branch": PageState(
+        robot="puma560",
+        lesson="inverse",
+        features={
+            "inverse": {
+                "q": [0.3, 0.2, 0.4, -0.5, 0.6, 0.7], "signs": [-1, -1, 1], "all": False,
+                "taken": {"2": -2.5},
+            },
+            "guide": {"step": 2, "given": {"2": -2.5}, "revealed": ["1"]},
+        },
+    ),
     "workspace": PageState(
         robot="irb120",
         features={
