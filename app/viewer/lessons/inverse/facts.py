@@ -24,11 +24,11 @@ class InverseFacts(Facts[InverseSettings]):
     """See the module; all but `exists` is known only of arms with a derivation.
 
     Attributes:
-        at: the index of the step on show, or of the last one during the check.
+        step: the index of the step on show; beyond the last one during the check.
         answered: for each step, whether its numbers may be on show.
     """
 
-    at: int = 0
+    step: int = 0
     answered: tuple[bool, ...] = ()
 
     @property

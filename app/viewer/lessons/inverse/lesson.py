@@ -84,7 +84,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
             ]
             return [Html(views.others_html, (f.robot,), key="others"), *arms]
         opened = dict(zip(f.keys, f.opened, strict=True))
-        numbers = f.derived, f.followed, f.keys, f.opened, f.at, units
+        numbers = f.derived, f.followed, f.keys, f.opened, f.step, units
         inside = sum(branch.available for branch in f.branches)
         follow = {str(b.number): self.event(self.on_follow, i) for i, b in enumerate(f.branches)}
         return [
@@ -104,7 +104,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
     def _shapes(self, *args: object) -> Sequence[SceneNode]:
         """The figure of the step on show; the check has that of the whole posture."""
         f = self.read
-        at = min(f.at, len(f.keys) - 1)
+        at = min(f.step, len(f.keys) - 1)
         if self._figure_of != f.keys[at]:  # labels of another step take no room
             self._figure, self._figure_of = FigureNodes(self._figure.size), f.keys[at]
         return figure(f.derived, f.followed.derivation, f.keys[at], self._figure, self.stage.units, f.opened[at])

@@ -31,7 +31,8 @@ GOAL = (
     "You can solve the inverse kinematics of an arm by hand, step by step, and say where each solution comes from "
     "and where the derivation ends."
 )
-WITHHELD = frozenset({"postures"})  # while it is asked how many of them there are
+POSTURES = frozenset({"postures"})  # withheld while it is asked how many of them there are
+TURNS = frozenset({"angles"})  # and while joint angles are asked, of which roll, pitch and yaw may be sums
 LENGTH, ANGLE = 0.001, math.radians(0.5)
 _METHODS: dict[StepKey, str] = {
     "theta2": "θ₂ = atan2(h, ρ) − β, with β = atan2(forearm · sin θ₃, upper arm + forearm · cos θ₃).",
@@ -75,8 +76,8 @@ def _step(given: Exercise, key: StepKey, units: Units) -> Step:
             else None
         )
         shown = f"The numbers below lead to the branch {given.followed.name}. Choose another one with Follow."
-        asked = _limits(given)
-        return Step(words.title(arm, key), text, asked, "", Pose(start), end, shown, withheld=WITHHELD)
+        limits = _limits(given)
+        return Step(words.title(arm, key), text, limits, "", Pose(start), end, shown, withheld=POSTURES)
     if found is None:
         failed = given.followed.derivation.failed
         where = "" if failed is None else f" It ends at the step “{words.title(given.arm, failed.key)}”."
@@ -85,13 +86,14 @@ def _step(given: Exercise, key: StepKey, units: Units) -> Step:
         )
     if found.failure is not None:
         return Step(words.title(arm, key), f"{text} {words.failure_text(found, units)}", pose=Pose(start))
-    special = words.special_text(arm, found)
+    asked, special = _question(given, found, units), words.special_text(arm, found)
     return Step(
         words.title(arm, key),
         f"{text} {special}".rstrip(),
-        _question(given, found, units),
+        asked,
         pose=Pose(start),
         practice=_shown(given, found),
+        withheld=TURNS if asked is not None and asked.unit == units.angles else frozenset(),
     )
 
 
@@ -117,7 +119,7 @@ def _shown(given: Exercise, found: DerivedStep) -> str:
     return f"You follow “{here}”. The other way is “{other}”."
 
 
-def _question(given: Exercise, found: DerivedStep, units: Units) -> Question | None:
+def _question(given: Exercise, found: DerivedStep, units: Units) -> Number | None:
     """What a step asks for; None where an angle is free."""
     if found.free:
         return None

@@ -229,9 +229,10 @@ def _srs(arm: Arm, found: Derivation, key: StepKey) -> Iterator[Shape]:
         yield Length("d3", shoulder, elbow, _away(shoulder, elbow, inside, Z))
         yield Length("d5", elbow, w, _away(elbow, w, inside, Z))
         yield Length("D", shoulder, w, _away(shoulder, w, elbow, -Z))
-        about = np.cross(upper, w - elbow)
+        t4 = found.number("θ4")
+        about = math.copysign(1.0, t4) * np.cross(upper, w - elbow)
         if float(np.linalg.norm(about)) > 1e-9:
-            yield Angle("θ4", elbow, upper, about, abs(found.number("θ4")), 0.45 * arm.lengths["d5"])
+            yield Angle("θ4", elbow, upper, about, t4, 0.45 * arm.lengths["d5"])
     elif key == "circle":
         center, radius = shoulder + found.number("A") * u, found.number("ρ")
         yield Line("SW", shoulder, w)

@@ -3,7 +3,8 @@
     python tests/app/viewer/declared/compare_shown.py /path/to/other/checkout [feature …]
 
 Each feature gets a page, on which all arms follow each other. Each of them is shown at home, with some settings,
-at random configurations, in other units, and in each step of a lesson that follows them. Numbers may differ by `TOLERANCE`.
+at random configurations, in other units, and in each step of a lesson that follows them. Numbers may differ by
+`TOLERANCE`.
 """
 
 from __future__ import annotations

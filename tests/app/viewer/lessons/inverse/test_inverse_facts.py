@@ -20,7 +20,15 @@ from kin import Robot
 from kin.transforms import Array
 
 # How many of the last joints turn about the wrist centre.
-WRISTS = {"planar2r": 0, "planar3r": 1, "pioneer5": 2, "puma560": 3, "irb120": 3, "redundant7-craig": 3, "iiwa14": 3}
+WRISTS = {
+    "planar2r": 0,
+    "planar3r": 1,
+    "pioneer5": 2,
+    "puma560": 3,
+    "irb120": 3,
+    "redundant7-craig": 3,
+    "iiwa14": 3,
+}
 DERIVED = [robot for robot in CLASSICS if robot.id in WRISTS]
 ARMS = pytest.mark.parametrize("robot", DERIVED, ids=[robot.id for robot in DERIVED])
 

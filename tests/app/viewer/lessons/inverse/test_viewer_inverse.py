@@ -133,13 +133,28 @@ def test_figures_measure_the_numbers(robot: Robot) -> None:
                 seen.add(shape.name)
             elif isinstance(shape, Angle) and shape.name[0] in "θβψφ":
                 value = given.followed.derivation.number(shape.name)
-                assert abs(shape.size) == pytest.approx(abs(value)), shape.name
+                assert shape.size == pytest.approx(value), shape.name
                 assert abs(shape.start @ shape.about) < 1e-9
     assert "D" in seen
     for point in joints_of(arm, given.followed.derivation)[2:]:
         at = arm.T_base_lesson[:3, :3] @ point + arm.T_base_lesson[:3, 3]
         if arm.family != "wrist6":  # whose elbow is drawn in the plane of the wrist centre
             assert np.linalg.norm(origins - at, axis=1).min() < 1e-9
+
+
+@pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
+def test_figures_say_what_the_questions_ask_on_every_branch(robot: Robot) -> None:
+    arm, seen = of(robot), 0
+    for signs in all_signs(arm):
+        given = exercise(arm, example(arm), signs)
+        for key, step in zip(keys_of(arm), outline_of(given, UNITS).steps, strict=True):
+            names = re.findall("θ[₁-₇]|[Dρ](?=,|, | of|\\?)", step.question.prompt if step.question else "")
+            for shape in shapes(arm, given.followed.derivation, key):
+                if isinstance(step.question, Number) and names[:1] == [words.sub(shape.name)]:
+                    size = shape.size if isinstance(shape, Angle) else math.dist(shape.start, shape.end)  # type: ignore[union-attr]
+                    assert size == pytest.approx(step.question.answer, abs=1e-9), (signs, step.title)
+                    seen += 1
+    assert seen >= len(all_signs(arm))
 
 
 def test_arms_without_a_derivation() -> None:
