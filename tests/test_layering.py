@@ -55,6 +55,7 @@ RULES: dict[str, set[str]] = {
     "app/classroom": {"sqlalchemy", "alembic", "itsdangerous", "app.classroom", "app.shared"},
     "app/classroom/lti": {"jwt", "cryptography", "sqlalchemy", "itsdangerous", "app.classroom"},
     "app/classroom/results": {"kin", "sqlalchemy", "app.classroom", "app.shared.spreadsheets"},
+    "app/live": {"kin", "app.classroom.tokens", "app.live", "app.shared.problems"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     # A page of a recorded run needs neither the core nor other libraries.
     "app/bench/board": {"jinja2", "markupsafe", "app.bench.board"},
@@ -65,11 +66,19 @@ RULES: dict[str, set[str]] = {
     },
     "app/api": {
         *("fastapi", "starlette", "pydantic", "pydantic_core", "msgspec", "numpy", "kin"),
-        *("app.api", "app.classroom", "app.equations", "app.exports", "app.shared"),
+        *("app.api", "app.classroom", "app.equations", "app.exports", "app.live", "app.shared"),
     },
     "app/viewer": {
         *("viser", "trimesh", "numpy", "jinja2", "markupsafe", "kin"),
-        *("app.viewer", "app.classroom", "app.equations", "app.exercises", "app.exports", "app.shared"),
+        *(
+            "app.viewer",
+            "app.classroom",
+            "app.equations",
+            "app.exercises",
+            "app.exports",
+            "app.live",
+            "app.shared",
+        ),
     },
     "app/viewer/viser_patches.py": {"msgspec", "numpy", "viser", "kin.transforms"},
     "app/viewer/viser_outbox.py": {"msgspec", "viser", "zstandard", "app.shared.connection", "app.shared.notes"},
@@ -85,7 +94,7 @@ RULES: dict[str, set[str]] = {
     "app/viewer/meshes/surface.py": {"numpy"},
     "app/service": {
         *("kin", "fastapi", "starlette", "pydantic", "pydantic_core", "uvicorn", "httptools", "websockets"),
-        *("app.api", "app.classroom", "app.exercises", "app.service", "app.shared", "app.viewer"),
+        *("app.api", "app.classroom", "app.exercises", "app.live", "app.service", "app.shared", "app.viewer"),
     },
     "app/service/web/rooms": {
         *("starlette", "jinja2", "segno", "app.api.problems", "app.classroom", "app.service.web.access"),

@@ -2,7 +2,7 @@
 
 Routes share objects in ``app.state``: ``settings``, the robots in ``store``, the caches ``clouds``, ``maps`` and
 ``summaries``, the limit of concurrent ``streams``, the slots for computations in ``compute``, and the memory of
-request bodies in ``uploads``, and the ``classroom``.
+request bodies in ``uploads``, the ``classroom``, and the ``lines`` of pages with the ``tries`` of their codes.
 """
 
 from starlette.routing import BaseRoute
@@ -12,6 +12,7 @@ from app.api.arms import compare, files, robots
 from app.api.body import UploadMemory
 from app.api.classroom import results
 from app.api.document import complete_document
+from app.api.live import socket as live
 from app.api.problems import install_problem_handlers
 from app.api.work import ComputeSlots
 from app.api.workspace import capability, download, reachable, socket, summary
@@ -43,6 +44,7 @@ _MODULES = (
     reachable,
     capability,
     results,
+    live,
 )
 
 

@@ -9,6 +9,9 @@ A connection belongs to one process at a time, which counts it, bounds it and lo
 The sockets between processes outlive them: what was sent to a process that dies is served by the one that replaces
 it. A process whose partner is away does everything itself, as far as it can: the viewer's process answers REST; a
 process for REST accepts connections, and tells visitors that the viewer is warming up.
+
+A program that is to be connected to a page may reach any process of any worker. The code in its address says which
+one has the page (:mod:`app.live.codes`): the processes with viewers are linked too, for these connections alone.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Final
 
+from app.live import code_in, home_of
 from app.shared import metrics
 from kin.warmup.preparation import SIZE
 
@@ -76,7 +80,7 @@ class Member:
         kernels: memory of `kin.warmup.preparation`, which they share.
         counts: memory of `app.shared.metrics`, which they share.
         group: numbers of this and its partners, the process of the viewer first.
-        links: sockets to the partners, by their numbers.
+        links: sockets to the partners, and of a process with a viewer to the others with one, by their numbers.
     """
 
     role: Role
@@ -92,6 +96,21 @@ class Member:
     def accepts(self) -> bool:
         """Whether this process accepts connections while all are there."""
         return self.role is not Role.REST
+
+    @property
+    def partners(self) -> Sequence[int]:
+        """The numbers of the others in the group."""
+        return [number for number in self.links if number in self.group]
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Of the groups, the number of this one, and how many there are."""
+        size = len(self.group)
+        return self.group[0] // size, len(self.phases) // size
+
+    def home(self, code: str) -> int:
+        """The process that has the page with this code."""
+        return home_of(code, self.place[1]) * len(self.group)
 
     def away(self, number: int) -> bool:
         """Whether a process serves nobody."""
@@ -124,6 +143,10 @@ def members(
         found.append(Member(role, first, listener, *memory, group, ours))
         for number, pair in pairs.items():
             found.append(Member(Role.REST, number, listener, *memory, group, {first: pair[1]}))
+    if SUPPORTED:
+        for one, other in itertools.combinations(found[::size], 2):
+            ends = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+            one.links[other.number], other.links[one.number] = ends
     return found
 
 
@@ -138,7 +161,7 @@ class Handover:
         self._member = member
         self._prefix = prefix
         self._waiting: dict[int, deque[tuple[asyncio.Transport, bytes]]] = {n: deque() for n in member.links}
-        self._turns = itertools.cycle(tuple(member.links))
+        self._turns = itertools.cycle(member.partners)
         self._adopt: Callable[[socket.socket, bytes], None]
         self._ended = False
         for link in member.links.values():
@@ -160,19 +183,30 @@ class Handover:
             while self._receive(number):
                 pass
 
-    def destination(self, path: str) -> int | None:
-        """The process that a request for this path belongs to; None: this one, at least for now."""
+    def destination(self, path: str, adopted: bool = False) -> int | None:
+        """The process that a request for this path belongs to; None: this one, at least for now.
+
+        Args:
+            adopted: whether another process has sent the connection, with this request.
+        """
         if self._ended or not self._waiting:
             return None
         if self._prefix and path.startswith(self._prefix + "/"):
             path = path.removeprefix(self._prefix)
-        if self._member.role.serves(path):
+        if (code := code_in(path)) is not None:
+            return self._towards(self._member.home(code))
+        if adopted or self._member.role.serves(path):
             return None
-        for _ in self._waiting:
+        for _ in self._member.partners:
             number = next(self._turns)
             if not self._member.away(number):
                 return number
         return None
+
+    def _towards(self, home: int) -> int | None:
+        """The next process on the way to the one with a page; None: this one, or it is away."""
+        number = home if home in self._waiting else self._member.group[0]
+        return None if number == self._member.number or self._member.away(number) else number
 
     def send(self, number: int, transport: asyncio.Transport, data: bytes) -> None:
         """Hand over a connection, from which nothing more is read, and the bytes read from it."""

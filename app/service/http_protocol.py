@@ -257,9 +257,9 @@ class HttpProtocol(HttpToolsProtocol):
         size = len(self.url) + sum(len(name) + len(value) + 4 for name, value in self.headers)
         if size > MAX_HEAD or len(self.headers) > MAX_HEADERS:  # a whole head may have come at once
             raise _head_too_large()
-        if self._handover is not None and not self._first:
+        if self._handover is not None:
             path = urllib.parse.unquote((httptools.parse_url(self.url).path or b"").decode("ascii", "replace"))
-            if (elsewhere := self._handover.destination(path)) is not None:
+            if (elsewhere := self._handover.destination(path, bool(self._first))) is not None:
                 raise _ElsewhereError(elsewhere)
         self._head_complete, self._first = True, b""
         super().on_headers_complete()

@@ -35,6 +35,7 @@ from app.api import (
 from app.classroom import Hub, clock
 from app.classroom.courses import Courses
 from app.exercises import ExerciseFileError, Exercises
+from app.live import Lines
 from app.service import status
 from app.service.gauges import update_gauges
 from app.service.handover import SUPPORTED, Member, Phase, Role, members
@@ -51,6 +52,7 @@ from app.service.web.pages import page_routes, static_folder
 from app.service.web.prefix import PathPrefix, clean_prefix
 from app.service.web.rooms import room_routes, sweeping
 from app.service.web.rooms.guests import Guests
+from app.service.web.rooms.limits import Limits
 from app.service.web.rooms.network import url_for_others
 from app.service.web.scoreboard import Scoreboard
 from app.service.web.viewer_proxy import ViewerBridge
@@ -122,7 +124,8 @@ def create_app(
     scoreboard = Scoreboard(settings, bench)
     classroom = Hub.of(settings)
     known = cache(lambda: courses or _courses(settings, store))
-    startup = Startup(settings, store, clouds, maps, summaries, classroom, known, bridge, member, on_ready)
+    lines = Lines(*((0, 1) if member is None else member.place))
+    startup = Startup(settings, store, clouds, maps, summaries, classroom, known, bridge, lines, member, on_ready)
 
     def idle() -> bool:
         return not (bridge.places.taken or work.used or state.streams.open or summaries.pending or maps.pending)
@@ -142,13 +145,14 @@ def create_app(
     state = app.state
     state.store, state.settings, state.startup, state.classroom = store, settings, startup, classroom
     state.clouds, state.maps, state.summaries = clouds, maps, summaries
+    state.lines, state.tries = lines, Limits()
     state.streams, state.compute = StreamLimit(settings.max_streams, settings.client_share), work
     state.uploads = UploadMemory(max(settings.upload_memory, settings.max_body), settings.client_share)
     state.update_gauges = partial(update_gauges, state, bridge)
     install_problem_handlers(app)
     complete_document(app, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
-    app.router.routes.extend([*room_routes(classroom, settings, known), *scoreboard.routes()])
+    app.router.routes.extend([*room_routes(classroom, settings, known, state.tries), *scoreboard.routes()])
     app.router.routes.extend(lti_routes(classroom, settings, known))
     app.include_router(status.router)
     _add_middleware(app, settings, Guests(classroom))

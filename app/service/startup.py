@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Literal
 
 from app.classroom import Hub
 from app.classroom.courses import Courses
+from app.live import Lines
 from app.service.compiler import STEP, PartsCompiler, compile_first
 from app.service.handover import Member, Phase, Role
 from app.service.web.viewer_proxy import ViewerBridge
@@ -43,6 +44,7 @@ class Startup:
 
     Args:
         courses: those that pages offer, and their exercises.
+        lines: of the pages, to the programs that are connected to them.
         member: what this process is among those of the service.
         on_ready: called by that thread when everything is ready, just before `status` says so.
 
@@ -60,6 +62,7 @@ class Startup:
         classroom: Hub,
         courses: Callable[[], Courses],
         bridge: ViewerBridge,
+        lines: Lines,
         member: Member | None = None,
         on_ready: Callable[[], None] | None = None,
     ) -> None:
@@ -74,6 +77,7 @@ class Startup:
         self._classroom = classroom
         self._courses = courses
         self._bridge = bridge
+        self._lines = lines
         self._on_ready = on_ready
         self._viewer: ViewerServer | None = None
         self._loop: asyncio.AbstractEventLoop
@@ -183,7 +187,7 @@ class Startup:
 
             caches = self._clouds, self._maps, self._summaries
             shared = self._classroom, self.preparation, self._courses()
-            viewer = ViewerServer(self._store, self._settings, *caches, *shared)
+            viewer = ViewerServer(self._store, self._settings, *caches, *shared, lines=self._lines)
             viewer.start(self._loop)
             self._viewer = self._bridge.viewer = viewer
         finally:

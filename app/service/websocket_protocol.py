@@ -23,10 +23,11 @@ from websockets.http11 import Request
 
 from app.api.problems import ProblemError
 from app.classroom import COOKIE
+from app.live.codes import PATH as LIVE
 from app.service.guard import Outflow
 from app.service.http_protocol import GuardedConfig, raw_answer, require_shape
 from app.service.web.inspection import BURST, RATE, MessageLimit
-from app.shared.connection import SILENCE
+from app.shared.connection import DELAY, SILENCE
 
 if sys.platform == "linux":
     import fcntl
@@ -36,6 +37,7 @@ CONTROL_COST: Final = 8.0  # of a frame that is no whole message, in messages
 PIECE: Final = 512  # bytes parsed before frames are counted: at most 85 frames
 MAX_FRAGMENTS: Final = 64  # of one message
 ROOM_PING: Final = 2.0  # seconds from an answer to the next ping, of a browser in a room: who is away is soon seen
+LIVE_PING: Final = 2.0  # the same of a page's program: the page shows how long an answer takes
 LINGER: Final = 5.0  # seconds between two looks whether a line is still slow
 
 
@@ -47,6 +49,7 @@ require_shape(
     *("send_receive_event_to_app", "curr_msg_data_type"),
     *("send_keepalive_ping", "keepalive_timeout", "conn", "queue", "frames", "transport"),
     *("read_paused", "close_sent", "handshake_initiated", "handshake_complete", "pong_timer"),
+    "last_ping_rtt",
 )
 
 
@@ -149,12 +152,19 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             super().handle_connect(event)
             if self.response.status_code == 101:
                 self.scope["state"][SILENCE] = self._silence
+                self.scope["state"][DELAY] = self._delay
+                if LIVE in event.path:
+                    self.ping_interval = min(LIVE_PING, self.ping_interval or LIVE_PING)
                 if any(COOKIE in value for value in event.headers.get_all("Cookie")):
                     self.ping_interval = min(ROOM_PING, self.ping_interval or ROOM_PING)
 
     def _silence(self) -> float:
         """For how many seconds the client has sent nothing, not even an answer to a ping. Thread-safe."""
         return time.monotonic() - self._heard
+
+    def _delay(self) -> float | None:
+        """Seconds from the last ping to its answer; None before the first one."""
+        return self.last_ping_rtt or None
 
     def _reject(self, why: str) -> None:
         """Answer 400 to a handshake."""

@@ -11,6 +11,7 @@ from typing import Protocol
 from app.shared.security import Rights
 
 SILENCE = "kinboard.silence"  # what a websocket's scope has `Connection.silence` as, in its state
+DELAY = "kinboard.delay"  # and there: a function, the seconds from the last ping to its answer, None before one
 
 
 def never_silent() -> float:

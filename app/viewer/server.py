@@ -12,6 +12,7 @@ import viser
 from app.classroom import ClassroomUnavailable, Hub, Ticket
 from app.classroom.courses import Courses
 from app.exercises import Exercises
+from app.live import Lines
 from app.shared.clouds import Clouds
 from app.shared.connection import Connection, ConnectionEnded, never_silent
 from app.shared.maps import Maps
@@ -50,6 +51,7 @@ class ViewerServer:
         maps, summaries, classroom: shared with REST; None: the viewer creates and closes its own.
         preparation: which kernels are compiled; None: all are.
         courses: shared with REST, as are the exercises in them; None: the viewer reads both.
+        lines: shared with REST, which connects programs to them; None: none is.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class ViewerServer:
         classroom: Hub | None = None,
         preparation: Preparation | None = None,
         courses: Courses | None = None,
+        lines: Lines | None = None,
     ) -> None:
         known = courses or Courses(Exercises(settings.exercises, store.get), settings.courses, store.get)
         meshes = MeshReader(settings.mesh_memory, settings.client_share, settings.receive_timeout)
@@ -69,7 +72,7 @@ class ViewerServer:
         caches = clouds, maps or Maps(), summaries or Summaries()
         readers = meshes, Library(meshes)
         kernels = preparation or Preparation()
-        self._services = Services(store, *caches, *readers, Pace(), known, hub, kernels)
+        self._services = Services(store, *caches, *readers, Pace(), known, hub, kernels, lines or Lines())
         self._owns_maps = maps is None
         self._owns_summaries = summaries is None
         self._owns_classroom = classroom is None

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from app.classroom import Hub
 from app.classroom.courses import Courses
+from app.live import Lines
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
@@ -19,7 +20,7 @@ from kin.warmup.preparation import Preparation
 @dataclass(frozen=True)
 class Services:
     """The robots, the caches of expensive results, the readers of meshes, the frame rate, courses with their
-    exercises, the live state of classrooms, and which kernels are compiled."""
+    exercises, the live state of classrooms, which kernels are compiled, and the lines to programs."""
 
     store: Store
     clouds: Clouds
@@ -31,3 +32,4 @@ class Services:
     courses: Courses
     classroom: Hub
     preparation: Preparation
+    lines: Lines

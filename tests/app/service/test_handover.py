@@ -18,6 +18,7 @@ from fake_browser import FakeBrowser
 from live_server import wait_for
 from websockets.sync.client import connect
 
+from app.live.codes import unused_code
 from app.service.handover import AT_ONCE, LARGEST, SUPPORTED, Handover, Member, Phase, Role, members
 from app.service.web.access import TRIES, TRY_EVERY
 
@@ -387,6 +388,26 @@ def test_nothing_is_handed_to_a_process_that_is_away(pair):
     assert handover.destination("/arm/livez") == 1
     assert handover.destination("/arm/viewer/") is None
     assert handover.destination("/viewer/") is None
+
+
+def test_a_program_reaches_the_process_with_its_page():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        found = members([listener] * 3, 1, bytearray)
+        for member in found:
+            member.report(Phase.READY)
+        assert [member.place for member in found[::2]] == [(0, 3), (1, 3), (2, 3)]
+        path = f"/api/v1/live/{unused_code((), place=2, places=3)}"
+        handovers = [Handover(member) for member in found]
+        assert [handover.destination(path) for handover in handovers] == [4, 0, 4, 2, None, 4]
+        assert handovers[2].destination(path, adopted=True) == 4  # a process for REST has sent it half the way
+        assert handovers[4].destination(path, adopted=True) is None
+        assert handovers[2].destination("/livez") == 3  # other requests stay within their group
+        assert handovers[3].destination("/livez", adopted=True) is None
+        found[4].report(Phase.AWAY)
+        assert [handover.destination(path) for handover in handovers] == [None, 0, None, 2, None, None]
+        for member in found:
+            for end in member.links.values():
+                end.close()
 
 
 def test_several_processes_take_turns():

@@ -1,4 +1,4 @@
-"""How often a client may try join codes, and open rooms.
+"""How often a client may try codes, of rooms and of pages for programs, and open rooms.
 
 A class comes through one address, so right codes always count, and wrong ones have a generous limit. Above it, and
 while wrong codes come in from everywhere, each try takes a second and only a few are made at a time: a class can
@@ -21,9 +21,7 @@ SLOW, SLOW_AT_ONCE = 1.0, 8  # seconds of a slow try, and how many of one client
 ROOMS, ROOMS_EVERY = 10, 60.0
 SEATS, SEATS_EVERY = 300, 1.0
 _ALL = "all"
-TOO_MANY = (
-    "Too many wrong join codes from your address: each try takes a second for a while. A right code still joins."
-)
+TOO_MANY = "Too many wrong codes from your address: each try takes a second for a while. A right code still works."
 
 
 class Limits:
@@ -38,7 +36,7 @@ class Limits:
 
     @contextlib.asynccontextmanager
     async def trying(self, client: str) -> AsyncIterator[None]:
-        """One try of a join code, slow after many wrong ones; raises 429."""
+        """One try of a code, slow after many wrong ones; raises 429."""
         wait = max(self._wrong.wait(client), self._wrong_all.wait(_ALL))
         if wait <= 0.0:
             yield

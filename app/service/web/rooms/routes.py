@@ -35,10 +35,12 @@ if TYPE_CHECKING:
 ASK_ERASED = 3  # seconds until the page asks again whether an ended room is erased
 
 
-def room_routes(hub: Hub, settings: Settings, courses: Callable[[], Courses]) -> list[BaseRoute]:
-    """The pages of rooms; `courses` has the exercises that they name."""
+def room_routes(
+    hub: Hub, settings: Settings, courses: Callable[[], Courses], limits: Limits | None = None
+) -> list[BaseRoute]:
+    """The pages of rooms; `courses` has the exercises that they name, `limits` counts codes, others' too."""
     results = Results(hub, courses)
-    pages = _Pages(hub, settings.allowed_origins, bool(settings.frame_ancestors))
+    pages = _Pages(hub, settings.allowed_origins, bool(settings.frame_ancestors), limits or Limits())
     return [
         Route("/room", pages.show, methods=["GET"], name="room"),
         Route("/room", pages.open, methods=["POST"]),
@@ -54,11 +56,11 @@ def room_routes(hub: Hub, settings: Settings, courses: Callable[[], Courses]) ->
 
 
 class _Pages:
-    def __init__(self, hub: Hub, origins: tuple[str, ...], framed: bool) -> None:
+    def __init__(self, hub: Hub, origins: tuple[str, ...], framed: bool, limits: Limits) -> None:
         self._hub = hub
         self._framed = framed
         self._origins = origins
-        self._limits = Limits()
+        self._limits = limits
 
     async def show(self, request: Request) -> Response:
         """The room of this browser; else the forms for joining and opening one."""

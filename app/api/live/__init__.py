@@ -1,0 +1,1 @@
+"""A page and its program: the websocket under ``/api/v1/live``, what may be sent, what the page answers."""

@@ -1,0 +1,252 @@
+"""What a program may send to a page, and how it is read.
+
+Each message is a JSON object; all its fields are optional. Values are checked against the arm on show, or the one
+that the same message brings, before the page hears of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Discriminator, Field, Tag
+
+from app.api.arms.description import RobotDescription
+from app.api.body import parsed
+from app.api.options import ObstacleBody, Target
+from app.api.problems import ProblemError, invalid
+from app.api.program import DescribedBy, ProgramBody
+from app.api.schemas import Body, Configuration, Vector3, Vector4, integral
+from app.api.workspace.query import validated
+from app.live import VALUES
+from app.shared.problems import FieldError, from_input_error, show
+from app.shared.store import Store
+from kin import InputError, Robot, UnknownRobotError, program_from_dict
+from kin.collision.obstacles import MOST_OBSTACLES, checked_obstacles
+from kin.transforms import Array
+
+MOST_BYTES = 64 * 1024  # of a message
+MOST_POINTS = 2000  # of a drawing
+MOST_RATE, USUAL_RATE = 60.0, 30.0  # messages a second that a program may ask for, and gets by default
+LONGEST_NAME, LONGEST_LABEL = 60, 200  # characters
+SLACK = 1e-6  # rad or m beyond a limit: rounding of who computed the values
+
+_Color = Annotated[str, Field(pattern="^#[0-9a-fA-F]{6}$")]
+_Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)]
+
+
+class PointsDrawing(Body):
+    """Points."""
+
+    kind: Literal["points"] = Field(description="Points.")
+    points: list[Vector3] = Field(
+        min_length=1, max_length=MOST_POINTS, fail_fast=True, description="x, y, z in metres, in the world frame."
+    )
+    size: float = Field(0.01, ge=0.0005, le=0.2, strict=True, description="Their diameter in metres.")
+    color: _Color = Field("#e8590c", description="As in CSS.")
+
+
+class LineDrawing(Body):
+    """A line through points."""
+
+    kind: Literal["line"] = Field(description="A line through points.")
+    points: list[Vector3] = Field(
+        min_length=2, max_length=MOST_POINTS, fail_fast=True, description="x, y, z in metres, in the world frame."
+    )
+    width: float = Field(3.0, ge=0.5, le=20.0, strict=True, description="In pixels.")
+    color: _Color = Field("#e8590c", description="As in CSS.")
+
+
+class FrameDrawing(Body):
+    """The three axes of a frame."""
+
+    kind: Literal["frame"] = Field(description="Three axes.")
+    position: Vector3 = Field(description="Its origin in metres, in the world frame.")
+    wxyz: Vector4 = Field([1.0, 0.0, 0.0, 0.0], description="Its orientation as a quaternion w, x, y, z.")
+    length: float = Field(0.1, ge=0.001, le=10.0, strict=True, description="Of an axis, in metres.")
+
+
+class LabelDrawing(Body):
+    """A text at a point."""
+
+    kind: Literal["label"] = Field(description="A text.")
+    position: Vector3 = Field(description="Where it is, in metres, in the world frame.")
+    text: str = Field(min_length=1, max_length=LONGEST_LABEL, description="What it says.")
+
+
+Drawing = Annotated[PointsDrawing | LineDrawing | FrameDrawing | LabelDrawing, Field(discriminator="kind")]
+
+
+class Subscription(Body):
+    """What the program wants to hear."""
+
+    values: list[Literal["q", "target", "result", "contacts", "program"]] = Field(
+        max_length=len(VALUES),
+        description="q: the configuration on show. target: the pose that the arm is asked for, null while it "
+        "follows the tool. result: the last answer of inverse kinematics. contacts: what the arm touches. "
+        "program: the program of the tab Program, and where it is.",
+    )
+    rate: float = Field(
+        USUAL_RATE, ge=0.1, le=MOST_RATE, strict=True, description="At most so many messages a second."
+    )
+
+
+def _robot_tag(value: object) -> str:
+    return "sent" if isinstance(value, dict) else "id"
+
+
+class LiveMessage(Body):
+    """A message of a program. Of each field the page uses the newest value."""
+
+    id: Annotated[int, Field(strict=True, ge=0, le=2**53), BeforeValidator(integral)] | None = Field(
+        None, description="A number of the program's: the page answers `done`, or a problem, with the same one."
+    )
+    subscribe: Subscription | None = Field(None, description="What the program wants to hear, in place of before.")
+    robot: (
+        Annotated[
+            Annotated[str, Field(max_length=100), Tag("id")] | Annotated[RobotDescription, Tag("sent")],
+            Discriminator(_robot_tag),
+        ]
+        | None
+    ) = Field(None, description="Another arm: an id of this service, or the fields of a robot file.")
+    obstacles: list[ObstacleBody] | None = Field(
+        None, max_length=MOST_OBSTACLES, description="All obstacles of the page."
+    )
+    program: Annotated[dict[str, Any], DescribedBy(ProgramBody)] | None = Field(
+        None, description="A program for the tab Program, in place of the one that is there."
+    )
+    play: Annotated[bool, Field(strict=True)] | None = Field(
+        None, description="true: play the program of the page from its beginning; false: stop."
+    )
+    q: Configuration | None = Field(
+        None, description="The configuration, in radians (metres for sliding joints), within the limits."
+    )
+    target: Target | None = Field(
+        None,
+        description="The pose that the arm is asked for, in the world frame. The page solves it as if it had been "
+        "dragged there; a position alone keeps the orientation.",
+    )
+    measured: Configuration | None = Field(
+        None,
+        description="Where a real arm is, drawn as a ghost beside the commanded one; null removes it. It may be "
+        "outside the limits.",
+    )
+    clear: Annotated[bool, Field(strict=True)] | None = Field(
+        None, description="true: remove everything that the program has drawn, before `draw`."
+    )
+    draw: dict[_Name, Drawing | None] | None = Field(
+        None, description="Drawings by name. One of the same name is replaced; null removes it."
+    )
+
+
+@dataclass(frozen=True)
+class Message:
+    """A message that was read.
+
+    Attributes:
+        id: to answer with.
+        subscription: what the program wants to hear from now on.
+        values: for the page, by name, in the order in which they are used.
+    """
+
+    id: int | None
+    subscription: Subscription | None
+    values: dict[str, Any]
+
+
+def id_of(text: str) -> int | None:
+    """The `id` of a message that is wrong in another field."""
+    try:
+        found = parsed(text.encode("utf-8", "replace"))
+    except ProblemError:
+        return None
+    given = found.get("id") if isinstance(found, dict) else None
+    return given if isinstance(given, int) and not isinstance(given, bool) and 0 <= given <= 2**53 else None
+
+
+def read(text: str, robot: Robot, store: Store) -> Message:
+    """Read a message for a page that shows this robot; raises `ProblemError` naming the field."""
+    if len(text) > MOST_BYTES or len(text.encode("utf-8", "replace")) > MOST_BYTES:
+        error = FieldError(
+            field="message", value=f"{len(text)} characters", expected=f"at most {MOST_BYTES} bytes"
+        )
+        raise ProblemError(
+            413,
+            "body-too-large",
+            f"The message is larger than {MOST_BYTES} bytes.",
+            "Send less at a time.",
+            [error],
+        )
+    body = validated(LiveMessage, parsed(text.encode("utf-8", "replace")), "body")
+    given = body.model_fields_set
+    if body.q is not None and body.target is not None:
+        raise invalid(FieldError(field="target", value="a target besides q", expected="one of the two"))
+    values: dict[str, Any] = {}
+    if body.robot is not None:
+        values["robot"] = sent = _robot(body.robot, store)
+        robot = sent if isinstance(sent, Robot) else body.robot.robot()  # type: ignore[union-attr]
+    try:
+        if body.obstacles is not None:
+            values["obstacles"] = checked_obstacles(
+                [each.model_dump(exclude_none=True) for each in body.obstacles]
+            )
+        if body.program is not None:
+            values["program"] = program_from_dict(body.program, robot)
+    except InputError as error:
+        prefix = "" if error.field.startswith(("obstacles", "program")) else "program."
+        raise invalid(from_input_error(error, prefix)) from None
+    if body.q is not None:
+        values["q"] = configuration(robot, body.q, "q", within=True)
+    if body.target is not None:
+        values["target"] = _target(body.target)
+    if body.play is not None:
+        values["play"] = body.play
+    if body.clear:
+        values["clear"] = True
+    if body.draw is not None:
+        values["draw"] = {name: None if each is None else each.model_dump() for name, each in body.draw.items()}
+    if "measured" in given:
+        measured = body.measured
+        values["measured"] = None if measured is None else configuration(robot, measured, "measured")
+    return Message(body.id, body.subscribe, values)
+
+
+def configuration(robot: Robot, q: list[float], field: str, within: bool = False) -> Array:
+    """A configuration ``(n,)``; raises 422 naming the joint that does not fit."""
+    if len(q) != robot.n:
+        names = ", ".join(joint.name for joint in robot.joints)
+        given = f"{len(q)} values: {show(q)}" if len(q) <= 8 else f"{len(q)} values"
+        expected = f"{robot.n} values in radians (metres for sliding joints)"
+        error = FieldError(field=field, value=given, expected=expected)
+        raise invalid(error, hint=f"The joints of the {robot.name} on the page are: {names}.")
+    found = np.array(q)
+    if within:
+        for i, (value, low, high) in enumerate(zip(q, robot.lower, robot.upper, strict=True)):
+            if not low - SLACK <= value <= high + SLACK:
+                unit = "rad" if robot.revolute[i] else "m"
+                expected = f"{low:.6g} to {high:.6g} {unit}, the limits of the joint {robot.joints[i].name}"
+                raise invalid(FieldError(field=f"{field}[{i}]", value=show(value), expected=expected))
+        found = robot.clip(found)
+    return found
+
+
+def _robot(given: str | RobotDescription, store: Store) -> Robot | dict[str, Any]:
+    """An arm of the service, or the fields of one that is sent along, which are checked."""
+    if isinstance(given, str):
+        try:
+            return store.get(given)
+        except UnknownRobotError as error:
+            expected = f"one of {', '.join(error.robot_ids)}, or the fields of a robot file"
+            raise invalid(FieldError(field="robot", value=show(given), expected=expected)) from None
+    given.robot()
+    return dict(given.root)
+
+
+def _target(given: Target) -> tuple[Array, bool]:
+    """T_world_tool ``(4, 4)``, and whether it has an orientation."""
+    if given.frame not in (None, "world"):
+        error = FieldError(field="target.frame", value=show(given.frame), expected='"world"')
+        raise invalid(error, hint="A program says poses in the world frame.")
+    task, T = given.resolve(None, "target")
+    return T, task != "position"

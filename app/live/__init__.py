@@ -1,0 +1,10 @@
+"""Programs that are connected to a page: the codes of pages, and the line between a page and its program.
+
+`Lines` are those of one process. A page opens a `Line` and shows its code; :mod:`app.api.live` lets the program
+with this code talk to the page, and :mod:`app.viewer.live` lets the page answer. Neither knows the other.
+"""
+
+from app.live.codes import code_in, home_of
+from app.live.line import VALUES, BusyLineError, Door, Line, Lines, Program
+
+__all__ = ["VALUES", "BusyLineError", "Door", "Line", "Lines", "Program", "code_in", "home_of"]

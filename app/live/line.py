@@ -1,0 +1,272 @@
+"""The line between a page and the program that is connected to it.
+
+What the program sends waits in the line until the page's worker takes it: of each kind only the newest value, so
+that a fast program makes nobody wait. What the page shows is kept there too, numbered by its changes, and the
+program's connection sends what has changed, as often as the program asks. Both sides are woken by calls that
+return at once; all methods are thread-safe.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from app.live.codes import unused_code
+from app.shared.problems import Problem
+from kin import Robot
+
+VALUES: Final = ("q", "target", "result", "contacts", "program")  # what a program may subscribe to
+MERGED: Final = "draw"  # of this kind the newest value of each name is kept
+QUIET: Final = frozenset({"measured", "draw", "clear", "drives"})  # changes nothing that undo restores
+LETTERS: Final = 64  # answers that may wait for a program; older ones are dropped
+REVOKED: Final = "The page has withdrawn the code."
+LEFT: Final = "The page was closed."
+
+Post = Callable[[str, object], None]
+
+
+class BusyLineError(Exception):
+    """Another program is connected to the page; `name` is its name."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.name = name
+
+
+@dataclass
+class Program:
+    """A program that is connected.
+
+    Attributes:
+        name: as it calls itself.
+        session: a word of its own. Who comes with the same one is this program, over a new connection.
+        wake: called after each change of what it wants, from any thread.
+        delay: seconds that a message and its answer were under way; None: not known yet.
+        wants: of `VALUES`, what it has subscribed to.
+        rate: messages of the last second.
+    """
+
+    name: str
+    session: str
+    wake: Callable[[], None]
+    delay: Callable[[], float | None] = lambda: None
+    wants: frozenset[str] = frozenset()
+    rate: float = 0.0
+
+
+@dataclass(frozen=True)
+class Letter:
+    """What a program hears once: that what the message of this number asks for is done, or why it is not."""
+
+    number: int | None = None
+    problem: Problem | None = None
+
+
+@dataclass
+class Parcel:
+    """What a program has sent since the page last took it, by kind, in the order of the last posts."""
+
+    values: dict[str, Any] = field(default_factory=dict)
+    numbers: list[int] = field(default_factory=list)
+
+
+class Line:
+    """See the module.
+
+    Args:
+        code: of the page.
+        robot: on show.
+        post: queues an event for the page: ``"live"``, or ``"drawn"`` if nothing changes that undo restores.
+    """
+
+    def __init__(self, code: str, robot: Robot, post: Post) -> None:
+        self.code = code
+        self.robot = robot
+        self._post = post
+        self._lock = threading.Lock()
+        self._program: Program | None = None
+        self._parcel = Parcel()
+        self._values: dict[str, tuple[int, Any]] = {}
+        self._count = 0
+        self._letters: deque[Letter] = deque(maxlen=LETTERS)
+        self.ended = ""  # why, once it has
+
+    # The program
+
+    @property
+    def program(self) -> Program | None:
+        """The program that is connected now."""
+        return self._program
+
+    def connect(self, program: Program) -> None:
+        """Connect a program, in place of an earlier connection of its own; raises `BusyLineError`."""
+        with self._lock:
+            before = self._program
+            if before is not None and before.session != program.session:
+                raise BusyLineError(before.name)
+            self._program = program
+            self._letters.clear()
+        if before is not None:
+            before.wake()
+        self._post("drawn", None)
+
+    def disconnect(self, program: Program) -> None:
+        """The connection of a program has ended; what it has drawn goes with it, unless it is connected again."""
+        with self._lock:
+            if self._program is not program:
+                return
+            self._program = None
+            self._parcel = Parcel({"clear": True, "measured": None, "drives": ""})
+        self._post("drawn", None)
+
+    def send(self, values: Mapping[str, Any], number: int | None = None) -> None:
+        """Pass on what a message of the program holds."""
+        with self._lock:
+            waiting = self._parcel.values
+            for name, value in values.items():
+                if name == MERGED:
+                    value = {**waiting.get(name, {}), **value}
+                elif name == "clear":
+                    waiting.pop(MERGED, None)
+                waiting.pop(name, None)
+                waiting[name] = value
+            if number is not None:
+                self._parcel.numbers.append(number)
+        self._post("drawn" if QUIET.issuperset(values) else "live", None)
+
+    def news(self, known: Mapping[str, int]) -> dict[str, tuple[int, Any]]:
+        """What has changed for the program since it saw these numbers of changes, with the numbers of now."""
+        with self._lock:
+            wants = {"robot", *(self._program.wants if self._program is not None else ())}
+            return {
+                name: value
+                for name, value in self._values.items()
+                if name in wants and known.get(name) != value[0]
+            }
+
+    def letters(self) -> list[Letter]:
+        """What the program hears once, since the last call."""
+        with self._lock:
+            letters = list(self._letters)
+            self._letters.clear()
+        return letters
+
+    # The page
+
+    def take(self) -> Parcel:
+        """What the program has sent since the last call."""
+        with self._lock:
+            parcel, self._parcel = self._parcel, Parcel()
+        return parcel
+
+    def publish(self, name: str, value: object, anew: bool = True) -> None:
+        """What the page shows now; unless `anew`, only where it is another object than before."""
+        with self._lock:
+            before = self._values.get(name)
+            if before is not None and before[1] is value and not anew:
+                return
+            self._count += 1
+            self._values[name] = self._count, value
+            program = self._program
+        if program is not None and (name in program.wants or name == "robot"):
+            program.wake()
+
+    def use_robot(self, robot: Robot) -> None:
+        """The page shows another robot."""
+        self.robot = robot
+        self.publish("robot", robot, anew=False)
+
+    def write(self, number: int | None = None, problem: Problem | None = None) -> None:
+        """Tell the program something once."""
+        with self._lock:
+            program = self._program
+            if program is not None:
+                self._letters.append(Letter(number, problem))
+        if program is not None:
+            program.wake()
+
+    def end(self, why: str) -> None:
+        """End the connection of the program, and let no other come."""
+        self.ended = why
+        if (program := self._program) is not None:
+            program.wake()
+
+
+class Lines:
+    """The lines of one process, by their codes.
+
+    Args:
+        place: of this process among those with pages.
+        places: how many there are.
+    """
+
+    def __init__(self, place: int = 0, places: int = 1) -> None:
+        self._place, self._places = place, places
+        self._lock = threading.Lock()
+        self._lines: dict[str, Line] = {}
+        self._reserved: set[str] = set()
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    def reserve(self, code: str) -> None:
+        """Keep a code for the page whose address has it."""
+        with self._lock:
+            self._reserved.add(code)
+
+    def is_reserved(self, code: str) -> bool:
+        """Whether a page with this code in its address opens a line at once."""
+        return code in self._reserved
+
+    def open(self, robot: Robot, post: Post, code: str = "") -> Line:
+        """A new line of a page that shows this robot; with a reserved code, in place of an earlier page."""
+        with self._lock:
+            taken: Collection[str] = {*self._lines, *self._reserved}
+            if code not in self._reserved:
+                code = unused_code(taken, self._place, self._places)
+            before = self._lines.get(code)
+            line = self._lines[code] = Line(code, robot, post)
+        if before is not None:
+            before.end(LEFT)
+        return line
+
+    def find(self, code: str) -> Line | None:
+        """The line with this code, as `read_code` returns it."""
+        return self._lines.get(code)
+
+    def close(self, line: Line, why: str) -> None:
+        """End a line; its code counts no more."""
+        with self._lock:
+            if self._lines.get(line.code) is line:
+                del self._lines[line.code]
+        line.end(why)
+
+
+class Door:
+    """The line of one page, while there is one.
+
+    Args:
+        post: queues an event for the page.
+        locked: whether none may be opened.
+    """
+
+    def __init__(self, lines: Lines, post: Post, locked: bool = False) -> None:
+        self._lines = lines
+        self._post = post
+        self.locked = locked
+        self.line: Line | None = None
+
+    def open(self, robot: Robot, code: str = "") -> None:
+        """Open a line unless there is one."""
+        if self.line is None and not self.locked:
+            self.line = self._lines.open(robot, self._post, code)
+            self.line.use_robot(robot)
+
+    def close(self, why: str = REVOKED) -> None:
+        """End the line."""
+        if self.line is not None:
+            self._lines.close(self.line, why)
+            self.line = None
