@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Callable, Coroutine
 from email.message import Message
 from functools import partial
+from inspect import iscoroutinefunction, signature
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -125,21 +126,22 @@ class JsonRequest(Request):
             self._json = parsed(await self.body())
         return self._json
 
-    async def validate(self, read: Callable[..., tuple[Any, list[Any]]]) -> None:
-        """Parse and validate a large body in a thread, in turn: meanwhile the event loop serves others.
+    async def validate(self, read: Callable[..., tuple[Any, list[Any]]]) -> Any:
+        """The validated body. A large one is validated in a thread, in turn: others are served meanwhile.
 
         FastAPI passes on the validated body as it is. Raises 400 or the errors of the schema.
         """
-        if len(await self.body()) < LARGE:
-            return
+        body = await self.body()
 
         def validated() -> Any:
-            value, errors = read(parsed(self._body))
+            value, errors = read(parsed(body))
             if errors:
                 raise RequestValidationError(errors)
             return value
 
-        self._json = await compute_slots(self).read(self, validated)
+        large = len(body) >= LARGE
+        self._json = await compute_slots(self).read(self, validated) if large else validated()
+        return self._json
 
     async def require_json(self) -> None:
         """Raises 415 if the Content-Type of the body is not JSON."""
@@ -160,7 +162,11 @@ class JsonRequest(Request):
 
 
 class JsonRoute(APIRoute):
-    """A route that reads its body as `JsonRequest` does."""
+    """A route that reads its body as `JsonRequest` does.
+
+    FastAPI collects the arguments of an endpoint anew for each request, which takes as long as a closed form of an
+    arm. Where there is nothing to collect but the parts of the path and the body, the endpoint is called at once.
+    """
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """FastAPI's handler, with a `JsonRequest`."""
@@ -168,15 +174,34 @@ class JsonRoute(APIRoute):
         field = self.body_field
         if field is None:
             return handle
+        asked_for = self._name_of_request()
+        read = partial(field.validate, loc=("body",))
 
         async def handle_json(request: Request) -> Response:
             with request.app.state.uploads.body(client_of(request.scope)) as memory:
                 request = JsonRequest(request, memory)
                 await request.require_json()
-                await request.validate(partial(field.validate, loc=("body",)))
-                return await handle(request)
+                if not await request.body():
+                    return await handle(request)  # which says that the body is missing
+                body = await request.validate(read)
+                if asked_for is None or request.scope["query_string"]:
+                    return await handle(request)
+                given = {asked_for: request, **request.path_params, field.name: body}
+                answer: Response = await self.endpoint(**given)
+                return answer
 
         return handle_json
+
+    def _name_of_request(self) -> str | None:
+        """The parameter of the endpoint for the request, if the others are parts of the path, the body and options
+        of the query, and it is a coroutine that answers with a `Response`; else None."""
+        found, parts = self.dependant, self.dependant.path_params
+        other = found.dependencies or found.header_params or found.cookie_params
+        plain = all(part.field_info.annotation is str for part in parts)
+        required = any(parameter.field_info.is_required() for parameter in found.query_params)
+        answers = signature(self.endpoint, eval_str=True).return_annotation is Response
+        fits = answers and plain and iscoroutinefunction(self.endpoint) and not other and not required
+        return found.request_param_name if fits else None
 
 
 def versioned(tag: str) -> APIRouter:

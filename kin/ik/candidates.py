@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.kernels.compile import MODEL, direct, jit, record, row_of
-from kin.kernels.fk import fk_into
+from kin.kernels.compile import MODEL, direct, inlined, jit, record, row_of
+from kin.kernels.fk import fk_into, fk_many
 from kin.solvers.common import TURN, nearest_image, wrap
 from kin.solvers.contract import APPROACH, MASK, POSE
 from kin.solvers.numeric.error import relative_pose
@@ -87,50 +87,60 @@ def residuals(T: Array, target: Array, task: int, mask: Array, e: Array) -> tupl
         position = math.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
         return position, math.sqrt(e[3] * e[3] + e[4] * e[4] + e[5] * e[5]), 0.0
     p = 0.0
-    chord = 0.0
-    trace = 0.0
     for r in range(3):
         p += (T[r, 3] - target[r, 3]) ** 2
-        for c in range(3):
-            chord += (T[r, c] - target[r, c]) ** 2
-            trace += T[r, c] * target[r, c]
-    # |R − S|_F = 2√2 sin(θ/2) and 1 + tr = 4 cos²(θ/2): exact from 0 to π.
-    angle = 2.0 * math.atan2(math.sqrt(chord / 8.0), 0.5 * math.sqrt(max(0.0, 1.0 + trace)))
-    ax, ay, az = T[0, 2], T[1, 2], T[2, 2]
-    bx, by, bz = target[0, 2], target[1, 2], target[2, 2]
-    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    tilt = math.atan2(math.sqrt(x * x + y * y + z * z), ax * bx + ay * by + az * bz)
     nx, ny, nz = target[0, 0], target[1, 0], target[2, 0]
+    bx, by, bz = target[0, 2], target[1, 2], target[2, 2]
     across = T[0, 0] * (by * nz - bz * ny) + T[1, 0] * (bz * nx - bx * nz) + T[2, 0] * (bx * ny - by * nx)
     roll = math.atan2(across, T[0, 0] * nx + T[1, 0] * ny + T[2, 0] * nz)
-    rotation = angle if task == POSE else (tilt if task == APPROACH else 0.0)
-    return math.sqrt(p), rotation, roll
+    return math.sqrt(p), turned_from(T, target, task), roll
+
+
+@jit
+def turned_from(T: Array, target: Array, task: int) -> float:
+    """The rotation error of a task that is no mask, radians."""
+    if task == POSE:
+        chord = 0.0
+        trace = 0.0
+        for r in range(3):
+            for c in range(3):
+                chord += (T[r, c] - target[r, c]) ** 2
+                trace += T[r, c] * target[r, c]
+        # |R − S|_F = 2√2 sin(θ/2) and 1 + tr = 4 cos²(θ/2): exact from 0 to π.
+        return 2.0 * math.atan2(math.sqrt(chord / 8.0), 0.5 * math.sqrt(max(0.0, 1.0 + trace)))
+    if task == APPROACH:
+        ax, ay, az = T[0, 2], T[1, 2], T[2, 2]
+        bx, by, bz = target[0, 2], target[1, 2], target[2, 2]
+        x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        return math.atan2(math.sqrt(x * x + y * y + z * z), ax * bx + ay * by + az * bz)
+    return 0.0
 
 
 @jit
 def to_image(requirement: Requirement, near: Array, seed: Array, q: Array) -> tuple[float, float]:
     """Bring q ``(n,)`` to its best image, in place: (distance to the seed, sum of what is outside the limits)."""
-    lower, upper, turns = requirement.lower, requirement.upper, requirement.turns
+    lower, upper, turns, respect = requirement.lower, requirement.upper, requirement.turns, requirement.respect
     distance = 0.0
     overrun = 0.0
     for i in range(q.shape[0]):
-        x = q[i]
-        low, high = (lower[i], upper[i]) if requirement.respect else (-math.inf, math.inf)
-        if turns[i] > 0.0:
-            x = nearest_image(x, near[i], low, high)
-        if x < lower[i]:
-            if lower[i] - x <= _LIMIT:
-                x = lower[i]
-            else:
-                overrun += lower[i] - x
-        elif x > upper[i]:
-            if x - upper[i] <= _LIMIT:
-                x = upper[i]
-            else:
-                overrun += x - upper[i]
-        q[i] = x
-        distance += (x - seed[i]) ** 2
+        q[i], outside = image_inside(q[i], near[i], turns[i], lower[i], upper[i], respect)
+        overrun += outside
+        distance += (q[i] - seed[i]) ** 2
     return math.sqrt(distance), overrun
+
+
+@inlined
+def image_inside(
+    x: float, near: float, turn: float, lower: float, upper: float, respect: bool
+) -> tuple[float, float]:
+    """The best image of a joint value, and how far it is outside the limits."""
+    if turn > 0.0:
+        x = nearest_image(x, near, lower if respect else -math.inf, upper if respect else math.inf)
+    if x < lower:
+        return (lower, 0.0) if lower - x <= _LIMIT else (x, lower - x)
+    if x > upper:
+        return (upper, 0.0) if x - upper <= _LIMIT else (x, x - upper)
+    return x, 0.0
 
 
 @jit
@@ -267,37 +277,65 @@ def measure_and_sort(requirement: Requirement, target: Array, near: Array, seed:
 
 @jit
 def nearest_rows(requirement: Requirement, T: Array, seeds: Array, rows: Array, q: Array) -> None:
-    """q ``(N, n)`` ← of the rows ``(N, k, n)`` of each target the one that `measure_and_sort` puts first, or NaN.
+    """q ``(N, n)`` ← of the rows ``(N, k, n)`` of each target the one that `measure_and_sort` puts first.
 
-    Only rows that may be the one are measured by forward kinematics. seeds ``(N, n)``, or ``(1, n)`` for all; rows
-    are brought to their best images.
+    NaN where there is none, and where the first one inside the limits does not meet the task. seeds ``(N, n)``, or
+    ``(1, n)`` for all; rows are brought to their best images, but for those that are too far before their last
+    joint.
     """
-    at, e, key = np.empty((4, 4)), np.empty(6), np.empty(rows.shape[1])
     last = seeds.shape[0] - 1
     for i in range(T.shape[0]):
         seed = seeds[min(i, last)]
-        for j in range(q.shape[1]):
-            q[i, j] = math.nan
+        best, least = -1, math.inf
         for k in range(rows.shape[1]):
-            key[k] = math.inf
-            if not math.isnan(rows[i, k, 0]):
-                distance, overrun = to_image(requirement, seed, seed, rows[i, k])
-                if overrun == 0.0 or not requirement.respect:
-                    key[k] = distance
-        for _ in range(rows.shape[1]):
-            best = 0
-            for k in range(1, rows.shape[1]):
-                if key[k] < key[best]:
-                    best = k
-            if key[best] == math.inf:
-                break
-            fk_into(requirement.model, rows[i, best], at)
-            close, turned, _ = residuals(at, T[i], requirement.task, requirement.mask, e)
-            if close <= requirement.position and turned <= requirement.rotation:
-                for j in range(q.shape[1]):
-                    q[i, j] = rows[i, best, j]
-                break
-            key[best] = math.inf
+            distance = _squared_distance(requirement, seed, rows[i, k], least)
+            if distance < least:
+                best, least = k, distance
+        for j in range(q.shape[1]):
+            q[i, j] = rows[i, best, j] if best >= 0 else math.nan
+    at, e = np.empty(T.shape), np.empty(6)
+    fk_many(requirement.model, q, at)
+    for i in range(T.shape[0]):
+        if not _meets(requirement, at[i], T[i], e):
+            for j in range(q.shape[1]):
+                q[i, j] = math.nan
+
+
+@inlined
+def _squared_distance(requirement: Requirement, seed: Array, q: Array, most: float) -> float:
+    """Bring q ``(n,)`` to its best image, in place: its squared distance to the seed.
+
+    Infinity, with q only partly there, if it is `most` or more, outside the limits that count, or NaN.
+    """
+    lower, upper, turns, respect = requirement.lower, requirement.upper, requirement.turns, requirement.respect
+    total = 0.0
+    for i in range(q.shape[0]):
+        q[i], outside = image_inside(q[i], seed[i], turns[i], lower[i], upper[i], respect)
+        total += (q[i] - seed[i]) ** 2
+        if not total < most or (respect and outside > 0.0):
+            return math.inf
+    return total
+
+
+@inlined
+def _meets(requirement: Requirement, at: Array, target: Array, e: Array) -> bool:
+    """Whether a pose meets the task; e ``(6,)`` is scratch."""
+    if requirement.task == MASK:
+        close, turned, _ = residuals(at, target, requirement.task, requirement.mask, e)
+        return bool(close <= requirement.position and turned <= requirement.rotation)
+    p = 0.0
+    for r in range(3):
+        p += (at[r, 3] - target[r, 3]) ** 2
+    if not math.sqrt(p) <= requirement.position:  # as where there is no pose, but NaN
+        return False
+    chord = 0.0
+    for r in range(3):
+        for c in range(3):
+            chord += (at[r, c] - target[r, c]) ** 2
+    # The angle between them is √(chord / 2), or a little more, and that of their z axes is no larger.
+    if chord <= requirement.rotation * requirement.rotation:
+        return True
+    return bool(turned_from(at, target, requirement.task) <= requirement.rotation)
 
 
 @cache

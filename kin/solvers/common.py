@@ -152,42 +152,52 @@ def add_roots(a: float, b: float, c: float, breaks: Array, count: int) -> int:
 
 
 @jit
-def zyz_breaks(
-    M0: Array, M1: Array, M2: Array, low: Array, high: Array, first: int, breaks: Array, count: int
-) -> int:
+def zyz_conditions(M: Array, limits: tuple[Array, Array], first: int, rows: Array, count: int) -> int:
+    """Append (a, b, c) to rows ``(3, n)``: ``a cos ψ + b sin ψ + c = 0`` where an angle may meet a limit.
+
+    M ``(3, 3, 3)``: M0, M1, M2 of ``Rz(A) Ry(B) Rz(C) = M0 + M1 cos ψ + M2 sin ψ``; limits: lower and upper ones,
+    of A, B, C from `first` on. Third column (cA sB, sA sB, cB), third row (−sB cC, sB sC, cB): A and C are of the
+    tan type, B of the cos type. Angles whose limits span a whole turn never bind.
+    """
+    low, high = limits
+    for side in range(2):
+        for i in range(3):
+            k = first + i
+            # A locked joint has one limit, not two.
+            if not (high[k] - low[k] < TURN and (side == 0 or high[k] > low[k])):
+                continue
+            s, c = sine_cosine(low[k] if side == 0 else high[k])
+            for part in range(3):
+                P = M[part]
+                if i == 0:
+                    value = P[1, 2] * c - P[0, 2] * s
+                elif i == 1:
+                    value = P[2, 2] - c if part == 0 else P[2, 2]
+                else:
+                    value = P[2, 1] * c + P[2, 0] * s
+                rows[(part + 2) % 3, count] = value
+            count += 1
+    return count
+
+
+@jit
+def zyz_breaks(M: Array, limits: tuple[Array, Array], first: int, breaks: Array, count: int) -> int:
     """Append every ψ where an angle of ``Rz(A) Ry(B) Rz(C) = M0 + M1 cos ψ + M2 sin ψ`` may meet a limit.
 
-    Third column (cA sB, sA sB, cB), third row (−sB cC, sB sC, cB): A and C are of the tan type, B of the cos
-    type. The extremes of cos B join them: there A and C may jump by π, and a limit of B may just be touched.
-    Angles whose limits span a whole turn never bind.
+    They are the roots of `zyz_conditions`, and the extremes of cos B: there A and C may jump by π, and a limit of
+    B may just be touched.
     """
-    for side in range(2):
-        # A locked joint has one limit, not two.
-        if high[first] - low[first] < TURN and (side == 0 or high[first] > low[first]):
-            t = low[first] if side == 0 else high[first]
-            s, c = sine_cosine(t)
-            count = add_roots(
-                M1[1, 2] * c - M1[0, 2] * s,
-                M2[1, 2] * c - M2[0, 2] * s,
-                M0[1, 2] * c - M0[0, 2] * s,
-                breaks,
-                count,
-            )
-        if high[first + 1] - low[first + 1] < TURN and (side == 0 or high[first + 1] > low[first + 1]):
-            t = low[first + 1] if side == 0 else high[first + 1]
-            count = add_roots(M1[2, 2], M2[2, 2], M0[2, 2] - sine_cosine(t)[1], breaks, count)
-        if high[first + 2] - low[first + 2] < TURN and (side == 0 or high[first + 2] > low[first + 2]):
-            t = low[first + 2] if side == 0 else high[first + 2]
-            s, c = sine_cosine(t)
-            count = add_roots(
-                M1[2, 1] * c + M1[2, 0] * s,
-                M2[2, 1] * c + M2[2, 0] * s,
-                M0[2, 1] * c + M0[2, 0] * s,
-                breaks,
-                count,
-            )
-    if M1[2, 2] * M1[2, 2] + M2[2, 2] * M2[2, 2] > 1e-30:
-        extreme = atan2(M2[2, 2], M1[2, 2])
+    rows = np.empty((3, 6))
+    for k in range(zyz_conditions(M, limits, first, rows, 0)):
+        count = add_roots(rows[0, k], rows[1, k], rows[2, k], breaks, count)
+    return add_extremes(M, breaks, count)
+
+
+@jit
+def add_extremes(M: Array, breaks: Array, count: int) -> int:
+    """Append the two ψ at which cos B of ``Rz(A) Ry(B) Rz(C) = M0 + M1 cos ψ + M2 sin ψ`` is extreme."""
+    if M[1, 2, 2] * M[1, 2, 2] + M[2, 2, 2] * M[2, 2, 2] > 1e-30:
+        extreme = atan2(M[2, 2, 2], M[1, 2, 2])
         breaks[count] = extreme
         breaks[count + 1] = wrap(extreme + math.pi)
         count += 2

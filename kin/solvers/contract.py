@@ -207,7 +207,8 @@ class ClosedForm(ABC):
     def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """q ``(N, branches, n)`` ← what `solve` finds of many targets ``(N, 4, 4)``, with no value requested.
 
-        Bit-identical, in one compiled call. They are of a `quick` task.
+        Bit-identical, in one compiled call. They are of a `quick` task. Rows may be NaN that are farther from the
+        seed than another one inside the limits.
 
         Args:
             seeds: one for each target ``(N, n)``, or one for all ``(1, n)``.

@@ -133,7 +133,8 @@ def _endpoint(call: Handler, handler: Handler, suffix: str, parameters: dict[str
     keyword, own = inspect.Parameter.KEYWORD_ONLY, inspect.signature(handler).parameters
     defaults = {name: own[name].default if name in own else inspect.Parameter.empty for name in parameters}
     signature = inspect.Signature(
-        [inspect.Parameter(n, keyword, default=defaults[n], annotation=a) for n, a in parameters.items()]
+        [inspect.Parameter(n, keyword, default=defaults[n], annotation=a) for n, a in parameters.items()],
+        return_annotation=get_type_hints(handler).get("return", inspect.Signature.empty),
     )
     call.__name__, call.__doc__ = handler.__name__ + suffix, handler.__doc__
     call.__signature__ = signature  # type: ignore[attr-defined]

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.solvers.blocks import solve_each
 from kin.solvers.canonical import FOREARM, OFFSET, UPPER_ARM, canonical_box, canonical_pose
 from kin.solvers.collinear7.redundancy import at_roll, choose_roll, roll_parts, theta1_intervals
 from kin.solvers.common import (
@@ -130,7 +131,7 @@ def _roll_probes(bent: Array, box: Array, respect_limits: bool, probes: Array) -
     if not respect_limits:
         return 0
     breaks = np.empty(64)
-    count = zyz_breaks(bent[0], bent[1], bent[2], box[LOW], box[HIGH], 4, breaks, 0)
+    count = zyz_breaks(bent, (box[LOW], box[HIGH]), 4, breaks, 0)
     return int(lay_probes(breaks, count, probes))
 
 
@@ -206,3 +207,20 @@ def _as_joint_values(arm: Array, row: Array) -> None:
         row[i] = wrap(row[i] - arm[OFFSET + i])
     row[0] = row[7] = theta1
     row[8] = wrap(row[8])
+
+
+@jit
+def _pose(
+    arm: Array, T: Array, value: float, seed: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> None:
+    """`solve` for a pose inside the limits, with θ1 as requested, or NaN."""
+    solve(arm, T, (value, math.nan, 0.0, True, False), seed, lower, upper, arcs, arcs, out)
+
+
+@jit
+def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 8, 7)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
+
+    seeds ``(N, 7)``, or ``(1, 7)`` for all; lower, upper ``(7,)``: joint limits.
+    """
+    solve_each(_pose, math.nan, (64, 9), params, T, seeds, (lower, upper), out)

@@ -10,7 +10,7 @@ from kin.axes import inverse, is_zero, links_by_rows, screw_z
 from kin.robot import Robot
 from kin.solvers.canonical import Geometry7
 from kin.solvers.collinear7.batch import branches_many, branches_one
-from kin.solvers.collinear7.branches import solve
+from kin.solvers.collinear7.branches import solve, solve_many
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -51,7 +51,7 @@ def match(robot: Robot) -> Collinear7 | None:
 class Collinear7(ClosedForm):
     """The closed form of the arm whose joints 1 and 2 turn about one line."""
 
-    name, title = NAME, TITLE
+    name, title, quick = NAME, TITLE, (POSE,)
     reason = "axes 1 and 2 are one line, axis 3 is perpendicular to it, and axes 5, 6, 7 meet in one point"
 
     def __init__(self, geometry: Geometry7, robot: Robot) -> None:
@@ -92,6 +92,10 @@ class Collinear7(ClosedForm):
         if free_roll:
             return Candidates(out[:, :7], out[:, 7:], (arcs[:count], rolls[:roll_count]), gap, obstacle)
         return Candidates(out[:, :7], out[:, 7:8], (arcs[:count],), gap, obstacle)
+
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """The branches of many poses."""
+        solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the side of w on which u lies, and the signs of s4 and s6."""

@@ -168,7 +168,7 @@ def _robust(arm: Array, T: Array, value: float, near: Array, out: Array) -> None
     for i in range(7):
         lower[i], upper[i] = -_UNBOUND, _UNBOUND
     no = arcs.shape[0] == 0  # a literal False would compile `solve` a second time
-    solve(arm, T, (value, no, no), near, lower, upper, arcs, rows)
+    solve(arm, T, (value, no, no, no), near, lower, upper, arcs, rows)
     for i in range(8):
         for j in range(7):
             out[i, j] = rows[i, j]

@@ -10,15 +10,18 @@ from kin.kernels.compile import jit
 from kin.solvers.blocks import solve_each
 from kin.solvers.canonical import OFFSET, UPPER_ARM, canonical_box, canonical_pose
 from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, excess, nearest_image, wrap
-from kin.solvers.srs7.geometry import FITS, SHAPE, STAY, angles_at, rotations, seed_arm_angle, sign_of, triangle_of
+from kin.solvers.srs7.geometry import FITS, SHAPE, STAY, affine, angles_at, seed_arm_angle, sign_of, triangle_of
 from kin.solvers.srs7.redundancy import COLUMNS, PSI, ROWS, intervals, lay_out, shorter_way, squared_step, weigh
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _SHORT = 0.05**2  # rad²; a squared step below this is not worth another arm angle
+_LIMIT = TOLERANCES.limit
 _UNBOUND = 1e9  # rad; joint limits that never bind
 # (the requested ψ, NaN for the feasible one nearest to the seed's; whether ψ is chosen so that the joint limits
-# hold where that is possible; whether joint 7 is a redundancy parameter as well, which keeps its seed value).
-Options = tuple[float, bool, bool]
+# hold where that is possible; whether joint 7 is a redundancy parameter as well, which keeps its seed value;
+# whether branches are left out that cannot be the nearest to the seed inside the limits).
+Options = tuple[float, bool, bool, bool]
 
 
 @jit
@@ -35,6 +38,69 @@ def _box(arm: Array, seed: Array, lower: Array, upper: Array, free_roll: bool) -
 
 
 @jit
+def _elbow_step(theta4: float, box: Array) -> float:
+    """The squared step of joint 4 from the seed to a canonical angle."""
+    return float((nearest_image(theta4, box[NEAR, 3], box[LOW, 3], box[HIGH, 3]) - box[NEAR, 3]) ** 2)
+
+
+@jit
+def _least_inside(box: Array, elbow: int, out: Array) -> float:
+    """The least squared step from the seed to a branch with this elbow inside the limits, canonical; or infinity.
+
+    A little more: a branch that moves as far is not to be left out for rounding.
+    """
+    least = math.inf
+    for other in range(4):
+        row = out[4 * (other >> 1) + 2 * elbow + (other & 1)]
+        total = 0.0
+        for i in range(7):
+            y = nearest_image(row[i], box[NEAR, i], box[LOW, i], box[HIGH, i])
+            # Half of the slack: limits are judged of joint values, which rounding has changed.
+            inside = box[LOW, i] - 0.5 * _LIMIT <= y <= box[HIGH, i] + 0.5 * _LIMIT
+            total += (y - box[NEAR, i]) ** 2 if inside else math.inf
+        least = min(least, total)
+    return least + 1e-9 * (1.0 + least)
+
+
+@jit
+def _elbow(
+    arm: Array, M: Array, triangle: Array, box: Array, elbow: int, request: tuple[float, float, bool, int],
+    W: Array, arcs: Array, found: int, out: Array,
+) -> int:  # fmt: skip
+    """out ``(8, 8)`` ← the four branches with one sign of sin θ4, canonical; returns the number of intervals.
+
+    request: the arm angle that is preferred, the one that is requested or NaN, whether the limits count, and how
+    many joints are to move little.
+    """
+    preferred, value, respect_limits, joints = request
+    free = math.isnan(value)
+    theta4 = sign_of(elbow, 0) * triangle[SHAPE, 2]
+    parts = np.empty((2, 3, 3, 3))
+    affine(arm, M, triangle, sign_of(elbow, 0), parts)
+    limits, count, filled = lay_out(parts, box, respect_limits, free, W)
+    # Shoulder and wrist are independent: each is weighed once per arm angle and sign.
+    weigh(parts, 0, 3, filled, box, W)
+    weigh(parts, 1, joints - 4, filled, box, W)
+    misfit = excess(theta4, box[LOW, 3], box[HIGH, 3])
+    step = _elbow_step(theta4, box)
+    for other in range(4):
+        branch = 4 * (other >> 1) + 2 * elbow + (other & 1)
+        psi, found = intervals(branch, misfit, limits, preferred, W, arcs, found)
+        row = out[branch]
+        row[7] = psi if free else value
+        angles_at(parts, theta4, branch, row[7], box, row)
+        least = 0.25 * squared_step(row, box, joints) if free else 0.0
+        if least >= 0.25 * _SHORT:
+            # Near sin θ2 = 0 or sin θ6 = 0 an elbow that does not move makes two joints turn against each other.
+            # A small elbow motion keeps them still: another ψ is taken if it at least halves the step.
+            j = shorter_way(branch, (misfit, step), limits, count, respect_limits, least, W)
+            if j >= 0:
+                row[7] = W[PSI, j]
+                angles_at(parts, theta4, branch, row[7], box, row)
+    return found
+
+
+@jit
 def solve(
     arm: Array, T: Array, options: Options, seed: Array, lower: Array, upper: Array, arcs: Array, out: Array
 ) -> tuple[int, float, int]:
@@ -44,45 +110,23 @@ def solve(
     both there. arcs ``(n, 3)`` ← the feasible intervals of ψ, rows (branch, low, high). seed, lower, upper
     ``(7,)``: joint values.
     """
-    value, respect_limits, free_roll = options
+    value, respect_limits, free_roll, nearest_only = options
     clear(out)
-    M, triangle, parts, W = np.empty((4, 4)), np.empty((4, 3)), np.empty((3, 2, 3, 3)), np.empty((ROWS, COLUMNS))
+    M, triangle, W = np.empty((4, 4)), np.empty((4, 3)), np.empty((ROWS, COLUMNS))
     box = _box(arm, seed, lower, upper, free_roll)
     canonical_pose(arm, T, M)
     code, gap = triangle_of(arm, M, triangle)
     if code != FITS:
         return code, gap, 0
+    preferred = seed_arm_angle(arm, box[NEAR], triangle) if math.isnan(value) else value
+    request = preferred, value, respect_limits, 6 if free_roll else 7
     bend = triangle[SHAPE, 2]
-    free = math.isnan(value)
-    preferred = seed_arm_angle(arm, box[NEAR], triangle) if free else value
-    joints = 6 if free_roll else 7
-    found = 0
-    for elbow in range(2 if bend > 0.0 else 1):
-        sign = sign_of(elbow, 0)
-        rotations(arm, M, triangle, sign, 0.0, 0.0, 1.0, parts[0])
-        rotations(arm, M, triangle, sign, 1.0, 0.0, 0.0, parts[1])
-        rotations(arm, M, triangle, sign, 0.0, 1.0, 0.0, parts[2])
-        limits, count = lay_out(parts, box, respect_limits, free, W)
-        # Shoulder and wrist are independent: each is weighed once per arm angle and sign.
-        weigh(parts, 0, 3, count, box, W)
-        weigh(parts, 1, joints - 4, count, box, W)
-        misfit = excess(sign * bend, box[LOW, 3], box[HIGH, 3])
-        step = (nearest_image(sign * bend, box[NEAR, 3], box[LOW, 3], box[HIGH, 3]) - box[NEAR, 3]) ** 2
-        for other in range(4):
-            branch = 4 * (other >> 1) + 2 * elbow + (other & 1)
-            psi, found = intervals(branch, misfit, limits, preferred, W, arcs, found)
-            row = out[branch]
-            row[7] = psi if free else value
-            angles_at(arm, M, triangle, branch, row[7], box, row)
-            least = 0.25 * squared_step(row, box, joints) if free else 0.0
-            if least >= 0.25 * _SHORT:
-                # Near sin θ2 = 0 or sin θ6 = 0 an elbow that does not move makes two joints turn against each
-                # other.
-                # A small elbow motion keeps them still: another ψ is taken if it at least halves the step.
-                j = shorter_way(branch, (misfit, step), limits, count, respect_limits, least, W)
-                if j >= 0:
-                    row[7] = W[PSI, j]
-                    angles_at(arm, M, triangle, branch, row[7], box, row)
+    first = 1 if nearest_only and bend > 0.0 and _elbow_step(-bend, box) < _elbow_step(bend, box) else 0
+    found = _elbow(arm, M, triangle, box, first, request, W, arcs, 0, out)
+    if bend > 0.0 and not (
+        nearest_only and _elbow_step(-sign_of(first, 0) * bend, box) > _least_inside(box, first, out)
+    ):
+        found = _elbow(arm, M, triangle, box, 1 - first, request, W, arcs, found, out)
     for branch in range(8):
         for i in range(7):
             out[branch, i] = wrap(out[branch, i] - arm[OFFSET + i])
@@ -99,6 +143,7 @@ def solve(
 def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
     """out ``(N, 8, 7)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
 
-    seeds ``(N, 7)``, or ``(1, 7)`` for all; lower, upper ``(7,)``: joint limits.
+    NaN for some that are not the nearest to the seed. seeds ``(N, 7)``, or ``(1, 7)`` for all; lower, upper
+    ``(7,)``: joint limits.
     """
-    solve_each(solve, (math.nan, True, False), (256, 8), params, T, seeds, (lower, upper), out)
+    solve_each(solve, (math.nan, True, False, True), (256, 8), params, T, seeds, (lower, upper), out)

@@ -84,7 +84,7 @@ class Srs7(ClosedForm):
         """All branches, each at the feasible arm angle nearest to the seed's (or at the requested one)."""
         g, free_roll = self.geometry, problem.task == APPROACH
         out, arcs = np.empty((8, 8)), np.empty((256, 3))
-        options = problem.values[0], problem.respect_limits, free_roll
+        options = problem.values[0], problem.respect_limits, free_roll, False
         code, gap, count = solve(
             self.kernels.params, problem.T, options, problem.seed, problem.lower, problem.upper, arcs, out
         )

@@ -89,17 +89,32 @@ def sign_of(branch: int, bit: int) -> float:
 
 
 @jit
-def angles_at(arm: Array, M: Array, triangle: Array, branch: int, psi: float, box: Array, out: Array) -> None:
-    """out ``(7,)`` ← the canonical angles of one branch at arm angle ψ.
+def affine(arm: Array, M: Array, triangle: Array, sign: float, parts: Array) -> None:
+    """parts ``(2, 3, 3, 3)`` ← M0, M1, M2 of R03 and of R47 ``= M0 + M1 cos ψ + M2 sin ψ``, for a sign of θ4."""
+    R = np.empty((2, 3, 3))
+    for part in range(3):
+        c, s, k = (1.0 if part == 1 else 0.0), (1.0 if part == 2 else 0.0), (1.0 if part == 0 else 0.0)
+        rotations(arm, M, triangle, sign, c, s, k, R)
+        for joint in range(2):
+            for i in range(3):
+                for j in range(3):
+                    parts[joint, part, i, j] = R[joint, i, j]
+
+
+@jit
+def angles_at(parts: Array, theta4: float, branch: int, psi: float, box: Array, out: Array) -> None:
+    """out ``(7,)`` ← the canonical angles of one branch at arm angle ψ; parts: as from `affine`.
 
     The box ``(4, 7)`` decides where a spherical joint is singular, see `kin.solvers.common.zyz`.
     """
-    R = np.empty((2, 3, 3))
-    sign = sign_of(branch, 1)
-    rotations(arm, M, triangle, sign, math.cos(psi), math.sin(psi), 1.0, R)
-    zyz(R[0], sign_of(branch, 2), box[NEAR], box[LOW], box[HIGH], 0, out)
-    out[3] = sign * triangle[SHAPE, 2]
-    zyz(R[1], sign_of(branch, 0), box[NEAR], box[LOW], box[HIGH], 4, out)
+    R = np.empty((3, 3))
+    s, c = sine_cosine(psi)
+    for joint in range(2):
+        for i in range(3):
+            for j in range(3):
+                R[i, j] = parts[joint, 0, i, j] + c * parts[joint, 1, i, j] + s * parts[joint, 2, i, j]
+        zyz(R, sign_of(branch, 2 - 2 * joint), box[NEAR], box[LOW], box[HIGH], 4 * joint, out)
+    out[3] = theta4
 
 
 @jit

@@ -13,17 +13,18 @@ import math
 import numpy as np
 
 from kin.kernels.compile import inlined, jit
-from kin.kernels.simd import TURN, atan2, rounded, sin_cos, widest
+from kin.kernels.simd import TURN, atan2, rounded, sin_cos, widest, wrapped
 from kin.solvers.common import (
     HIGH,
     LOW,
     NEAR,
+    add_extremes,
     extend_arcs,
     lay_probes,
     nearest_image,
     nearest_in_arcs,
     zyz,
-    zyz_breaks,
+    zyz_conditions,
 )
 from kin.solvers.srs7.geometry import STAY
 from kin.tolerances import TOLERANCES
@@ -33,30 +34,71 @@ from kin.transforms import Array
 # wrist is outside its limits and its squared step from the seed, then the Z-Y-Z angles of one spherical joint.
 PSI, SHOULDER_MISFIT, WRIST_MISFIT, SHOULDER_STEP, WRIST_STEP, FIRST = 0, 1, 3, 5, 7, 9
 ROWS, COLUMNS = 12, 160
+_CONDITIONS, _VECTOR = 24, 8  # at most 18 of the first; values in a vector of the processor
 _SINGULAR = TOLERANCES.singular
 _LIMIT = TOLERANCES.limit
 _PER_TURN = 1.0 / TURN
 
 
 @jit
-def lay_out(parts: Array, box: Array, respect_limits: bool, keep: bool, W: Array) -> tuple[int, int]:
-    """W[PSI] ← the arm angles to test. Returns how many come from limits, and how many there are.
+def lay_out(parts: Array, box: Array, respect_limits: bool, keep: bool, W: Array) -> tuple[int, int, int]:
+    """W[PSI] ← the arm angles to test. Returns how many come from limits, how many there are, and how many columns
+    are filled: whole vectors, the last ones with copies.
 
-    parts ``(3, 2, 3, 3)``: M0, M1, M2 of R03 and R47. Those from limits alternate between limit and middle. `keep`
-    adds those at which a joint keeps its seed value.
+    parts ``(2, 3, 3, 3)``: as from `affine`. Those from limits alternate between limit and middle. `keep` adds
+    those at which a joint keeps its seed value.
     """
-    psi = W[PSI]
-    limits = 0
+    psi, rows, breaks = W[PSI], np.zeros((3, _CONDITIONS)), np.empty(64)
+    bounds, held = (box[LOW], box[HIGH]), (box[NEAR], box[STAY])
+    first = last = 0
     if respect_limits:
-        breaks = np.empty(64)
-        count = zyz_breaks(parts[0, 0], parts[1, 0], parts[2, 0], box[LOW], box[HIGH], 0, breaks, 0)
-        count = zyz_breaks(parts[0, 1], parts[1, 1], parts[2, 1], box[LOW], box[HIGH], 4, breaks, count)
-        limits = lay_probes(breaks, count, psi)
-    count = limits
+        first = zyz_conditions(parts[0], bounds, 0, rows, 0)
+        first = last = zyz_conditions(parts[1], bounds, 4, rows, first)
     if keep:
-        count = zyz_breaks(parts[0, 0], parts[1, 0], parts[2, 0], box[NEAR], box[STAY], 0, psi, count)
-        count = zyz_breaks(parts[0, 1], parts[1, 1], parts[2, 1], box[NEAR], box[STAY], 4, psi, count)
-    return limits, count
+        last = zyz_conditions(parts[0], held, 0, rows, last)
+        last = zyz_conditions(parts[1], held, 4, rows, last)
+    _roots(rows)
+    limits = count = 0
+    if respect_limits:
+        count = _those_that_are(rows, 0, first, breaks, 0)
+        count = add_extremes(parts[0], breaks, count)
+        limits = count = lay_probes(breaks, add_extremes(parts[1], breaks, count), psi)
+    if keep:
+        count = _those_that_are(rows, first, last, psi, count)
+        count = add_extremes(parts[0], psi, count)
+        count = add_extremes(parts[1], psi, count)
+    filled = (count + _VECTOR - 1) // _VECTOR * _VECTOR
+    for j in range(count, filled):
+        psi[j] = psi[0]
+    return limits, count, filled
+
+
+@jit
+def _roots(rows: Array) -> None:
+    """rows[0], rows[1] ← the two roots of each condition in rows ``(3, _CONDITIONS)``, NaN if there is none.
+
+    Does the same as `kin.solvers.common.add_roots`, to all at once, as vectors.
+    """
+    widest()
+    for k in range(_CONDITIONS):
+        a, b, c = rows[0, k], rows[1, k], rows[2, k]
+        amplitude = math.sqrt(a * a + b * b)
+        none = (amplitude < 1e-15) | (abs(c) > amplitude * (1.0 + 1e-9))
+        square = (amplitude - c) * (amplitude + c)
+        centre = atan2(b, a)
+        offset = atan2(math.sqrt(square if square > 0.0 else 0.0), -c)
+        rows[0, k] = math.nan if none else wrapped(centre + offset)
+        rows[1, k] = wrapped(centre - offset)
+
+
+@jit
+def _those_that_are(rows: Array, first: int, last: int, out: Array, count: int) -> int:
+    """Append the roots of the conditions first…last−1; returns the new count."""
+    for k in range(first, last):
+        if not math.isnan(rows[0, k]):
+            out[count], out[count + 1] = rows[0, k], rows[1, k]
+            count += 2
+    return count
 
 
 @inlined
@@ -88,7 +130,7 @@ def _split(parts: Array, joint: int, count: int, box: Array, W: Array) -> int:
     Returns for how many of these sin B vanishes.
     """
     widest()
-    M0, M1, M2 = parts[0, joint], parts[1, joint], parts[2, joint]
+    M0, M1, M2 = parts[joint, 0], parts[joint, 1], parts[joint, 2]
     singular = 0
     for j in range(count):
         s, c = sin_cos(W[PSI, j])
@@ -113,7 +155,7 @@ def _split(parts: Array, joint: int, count: int, box: Array, W: Array) -> int:
 @jit
 def _split_singular(parts: Array, joint: int, count: int, box: Array, W: Array) -> None:
     """W[FIRST:FIRST+3] ← the Z-Y-Z angles where sin B vanishes and only A ± C is determined."""
-    M0, M1, M2 = parts[0, joint], parts[1, joint], parts[2, joint]
+    M0, M1, M2 = parts[joint, 0], parts[joint, 1], parts[joint, 2]
     R, angles = np.empty((3, 3)), np.empty(7)
     for j in range(count):
         s, c = sin_cos(W[PSI, j])
@@ -167,19 +209,21 @@ def intervals(
     arcs ``(n, 3)`` ← rows (branch, low, high). The arm angle is the feasible one nearest to `preferred`; if none
     is feasible, the tested one with the least excess over the limits.
     """
-    shoulder, wrist = SHOULDER_MISFIT + (branch >> 2), WRIST_MISFIT + (branch & 1)
-    psi = preferred
-    first = found
-    best = math.inf
+    shoulder, wrist = W[SHOULDER_MISFIT + (branch >> 2)], W[WRIST_MISFIT + (branch & 1)]
+    first, inside = found, 0
+    if elbow_misfit == 0.0:
+        for j in range(limits):
+            inside += 1 if shoulder[j] + wrist[j] == 0.0 else 0
+    if inside > 0:
+        for j in range(limits):
+            if shoulder[j] + wrist[j] == 0.0 and found < arcs.shape[0]:
+                found = extend_arcs(arcs, first, found, branch, W[PSI], j, limits)
+        return nearest_in_arcs(arcs, first, found, preferred), found
+    psi, best = preferred, math.inf
     for j in range(limits):
-        misfit = elbow_misfit + W[shoulder, j] + W[wrist, j]
-        if misfit == 0.0 and found < arcs.shape[0]:
-            found = extend_arcs(arcs, first, found, branch, W[PSI], j, limits)
-        elif misfit < best and found == first:
-            best = misfit
-            psi = W[PSI, j]
-    if found > first:
-        psi = nearest_in_arcs(arcs, first, found, preferred)
+        misfit = elbow_misfit + shoulder[j] + wrist[j]
+        if misfit < best:
+            best, psi = misfit, W[PSI, j]
     return psi, found
 
 
@@ -192,14 +236,21 @@ def shorter_way(
     elbow: how far θ4 is outside its limits, and its squared step. The middles between limits do not count.
     """
     elbow_misfit, elbow_step = elbow
+    if respect_limits and elbow_misfit > 0.0:
+        return -1
     side, flip = branch >> 2, branch & 1
-    best = -1
+    moved, turned = W[SHOULDER_STEP + side], W[WRIST_STEP + flip]
+    shorter = 0
     for j in range(count):
-        middle = j % 2 == 1 and j < limits
-        misfit = elbow_misfit + W[SHOULDER_MISFIT + side, j] + W[WRIST_MISFIT + flip, j]
-        way = elbow_step + W[SHOULDER_STEP + side, j] + W[WRIST_STEP + flip, j]
-        if way < least and not middle and not (respect_limits and misfit > 0.0):
-            least, best = way, j
+        shorter += 1 if elbow_step + moved[j] + turned[j] < least else 0
+    best = -1
+    if shorter > 0:
+        shoulder, wrist = W[SHOULDER_MISFIT + side], W[WRIST_MISFIT + flip]
+        for j in range(count):
+            middle = j % 2 == 1 and j < limits
+            way = elbow_step + moved[j] + turned[j]
+            if way < least and not middle and not (respect_limits and shoulder[j] + wrist[j] > 0.0):
+                least, best = way, j
     return best
 
 

@@ -7,6 +7,8 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.kernels.fk import sine_cosine
+from kin.kernels.simd import atan2
 from kin.solvers.blocks import solve_each
 from kin.solvers.canonical import canonical_box
 from kin.solvers.common import clear, copy_row, merged, wrap
@@ -35,7 +37,7 @@ def _elbow(arm: Array, rho: float, h: float) -> tuple[float, float]:
     D = math.sqrt(D2)
     miss = max(D - (a2 + d4), abs(a2 - d4) - D)
     far, near = (a2 + d4) ** 2 - D2, D2 - (a2 - d4) ** 2
-    return merged(2.0 * math.atan2(math.sqrt(max(far, 0.0)), math.sqrt(max(near, 0.0)))), miss
+    return merged(2.0 * atan2(math.sqrt(max(far, 0.0)), math.sqrt(max(near, 0.0)))), miss
 
 
 @jit
@@ -53,7 +55,7 @@ def solve(
     a, box = np.empty(3), np.empty((3, 5))
     canonical_box(arm[OFFSET:A1], seed, lower, upper, box)
     wx, wy, h = _wrist_centre(arm, T, a)
-    r = math.hypot(wx, wy)
+    r = math.sqrt(wx * wx + wy * wy)
     on_axis = r < SINGULAR
     gap = math.inf
     found = 0
@@ -64,11 +66,14 @@ def solve(
         gap = min(gap, miss)
         if miss > REACH:
             continue
+        azimuth, climb = atan2(shoulder * wy, shoulder * wx), atan2(h, rho)
+        sine, cosine = sine_cosine(bend)
+        spread = atan2(arm[D4] * sine, arm[A2] + arm[D4] * cosine)
         for i in range(4 if bend > 0.0 else 2):
             branch = 4 * side + i
             row = out[branch]
-            t1, t3 = math.atan2(shoulder * wy, shoulder * wx), bend if i < 2 else -bend
-            t2 = math.atan2(h, rho) - math.atan2(arm[D4] * math.sin(t3), arm[A2] + arm[D4] * math.cos(t3))
+            t1 = azimuth
+            t2, t3 = (climb - spread, bend) if i < 2 else (climb + spread, -bend)
             if on_axis:
                 given = value if math.isnan(value) else value + arm[OFFSET]
                 t1, found = choose_theta1(t2 + t3, a, branch, given, box, arcs, found)

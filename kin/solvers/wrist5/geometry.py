@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.kernels.fk import sine_cosine
+from kin.kernels.simd import atan2
 from kin.solvers.common import HIGH, LOW, NEAR
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -42,13 +44,16 @@ def wrist_angles(t1: float, t23: float, a: Array, branch: int, box: Array, out: 
 
     Bit 0 of the branch is the sign of θ5. Where sin θ5 = 0, θ4 is the seed's, inside its limits (box ``(3, 5)``).
     """
-    c1, s1, c23, s23 = math.cos(t1), math.sin(t1), math.cos(t23), math.sin(t23)
+    (s1, c1), (s23, c23) = sine_cosine(t1), sine_cosine(t23)
     flip = -1.0 if branch & 1 else 1.0
     level = c1 * a[0] + s1 * a[1]
     u1 = s23 * level + c23 * a[2]
     u2 = s1 * a[0] - c1 * a[1]
     u3 = c23 * level - s23 * a[2]
-    singular = math.hypot(u1, u2) < SINGULAR
-    t4 = min(max(box[NEAR, 3], box[LOW, 3]), box[HIGH, 3]) if singular else math.atan2(-flip * u2, -flip * u1)
-    out[3] = t4
-    out[4] = math.atan2(-(math.cos(t4) * u1 + math.sin(t4) * u2), u3)
+    across = math.sqrt(u1 * u1 + u2 * u2)
+    if across < SINGULAR:
+        out[3] = min(max(box[NEAR, 3], box[LOW, 3]), box[HIGH, 3])
+        s4, c4 = sine_cosine(out[3])
+        out[4] = atan2(-(c4 * u1 + s4 * u2), u3)
+    else:
+        out[3], out[4] = atan2(-flip * u2, -flip * u1), atan2(flip * across, u3)

@@ -233,7 +233,7 @@ def _on_axis(
     breaks, probes, angles = np.empty(32), np.empty(66), np.empty(6)
     n = 0
     if arcs.shape[0] > 0:
-        count = zyz_breaks(parts[0], parts[1], parts[2], low, high, 3, breaks, 0)
+        count = zyz_breaks(parts, (low, high), 3, breaks, 0)
         for side in range(2):
             if high[0] - low[0] < TURN:
                 breaks[count] = wrap(low[0] if side == 0 else high[0])
