@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fastapi import routing
 
 import kin
 from app.api import ik
@@ -78,3 +79,42 @@ def test_a_wrong_value_is_refused_at_once_as_in_a_thread(client, threads):
     after = [client.post(url, json=body) for body in wrong]
     assert [each.status_code for each in before] == [422] * 3
     assert [each.json() for each in after] == [each.json() for each in before]
+
+
+def test_arguments_are_collected_only_where_the_query_may_hold_some(client, monkeypatch):
+    collected = []
+    collect = routing.solve_dependencies
+
+    async def counted(**given):
+        collected.append(given["request"].url.path)
+        return await collect(**given)
+
+    monkeypatch.setattr(routing, "solve_dependencies", counted)
+    robot = kin.get_robot("ur5")
+    body = {"target": target(robot, 1)}
+    whole = ask(client, robot, **body)
+    assert client.post("/api/v1/ik", json={"robot": {"id": "ur5"}, **body}).status_code in (200, 422)
+    assert collected == []
+    some = client.post("/api/v1/robots/ur5/ik?fields=status,q", json=body).json()
+    assert collected == ["/api/v1/robots/ur5/ik"]
+    assert some == {"status": "solved", "q": whole["solutions"][0]["q"]}
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "field"),
+    [
+        ({"target": {"position": [0, 0]}}, 422, "target.position"),
+        ({"goal": 1}, 422, "goal"),
+        (None, 422, "body"),
+    ],
+)
+def test_a_body_that_is_wrong_is_refused_by_name(client, body, status, field):
+    """Whether its errors are found before the arguments are collected or after."""
+    answers = [
+        client.post(f"/api/v1/robots/ur5/ik{query}", **({} if body is None else {"json": body}))
+        for query in ("", "?fields=q")
+    ]
+    for answer in answers:
+        assert answer.status_code == status
+        assert any(error["field"].startswith(field) for error in answer.json()["errors"]), answer.text
+    assert answers[0].json() == answers[1].json()
