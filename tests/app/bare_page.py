@@ -37,9 +37,7 @@ class BarePage:
     """
 
     def __init__(self, server: viser.ViserServer, robot: kin.Robot) -> None:
-        self.client = SimpleNamespace(
-            gui=server.gui, scene=server.scene, camera=SimpleNamespace(position=EYE), client_id=0
-        )
+        self.client = SimpleNamespace(gui=server.gui, scene=server.scene, camera=_camera(), client_id=0)
         self.store, self.units, self.dark, self.frame = STORE, DEFAULT_UNITS, False, 1 / 30
         self.own: Any = None
         self.legend, self.translucent = "", False
@@ -209,6 +207,10 @@ def bare_page(robot: kin.Robot) -> Iterator[BarePage]:
         yield BarePage(server, robot)
     finally:
         server.stop()
+
+
+def _camera() -> SimpleNamespace:
+    return SimpleNamespace(position=EYE, look_at=np.zeros(3), image_width=1280, image_height=720)
 
 
 def _inside(gui: Any, container: Any) -> Iterator[Any]:

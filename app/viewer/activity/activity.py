@@ -23,6 +23,7 @@ EXERCISES: Final = "exercises"  # the key under which the exercises are opened
 # What questions may withhold, and what is then absent from panel, scene, read-out and messages.
 FACTS: Final = {
     "table": "the table of the arm, in every form",
+    "motions": "how far a row of the table turns or slides with its joint where it is now",
     "position": "the position of the tool in the read-out",
     "angles": "roll, pitch and yaw in the read-out",
     "quaternion": "the quaternion in the read-out",

@@ -150,6 +150,11 @@ class DeclaredFeature(Feature, Generic[S, F]):
         if (words := self.legend()) is not None:
             stage.show_legend(words)
 
+    def draw(self) -> None:
+        """Show the scene that is declared now: a frame of a motion, between two times of the panel."""
+        self.look_again()
+        self._scene.show(self.scene())
+
     def look_again(self) -> None:
         """Make `facts` anew if settings, arm, or what is `besides` have changed."""
         arm = self.stage.now
@@ -209,8 +214,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         self._begin()
 
     def on_pose(self, T_base_tool: Array) -> None:
-        self.look_again()
-        self._scene.show(self.scene())
+        self.draw()
         self.wake(max(0.0, self.pace - (time.perf_counter() - self.shown_at)))
 
     def on_style(self) -> None:

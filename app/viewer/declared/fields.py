@@ -217,15 +217,16 @@ class Number(Spec):
         return {"marks": limit_marks(*self._ends(self.slider, units))} if self.marks and self.slider else {}
 
     def read(self, name: str, posted: object, robot: Robot, units: Units) -> Any:
-        if self.whole or self.within is not None:
-            return self.of(robot).unpack(name, posted, robot)
-        unit, (low, high) = self._unit(units), self._ends(self.limits, units)
+        own = self.of(robot)
+        if self.whole:
+            return own.unpack(name, posted, robot)
+        unit, (low, high) = self._unit(units), own._ends(own.limits, units)
         valid = "a finite number" if self.clip else f"a number from {low:g} to {high:g}"
         if not _is_number(posted):
             raise InputError(name, posted, valid)
         if not self.clip and not low <= posted <= high:
             raise InputError(name, posted, valid)
-        return min(max(unit.read(float(posted)), self.limits[0]), self.limits[1])
+        return min(max(unit.read(float(posted)), own.limits[0]), own.limits[1])
 
     def unpack(self, name: str, entry: object, robot: Robot) -> Any:
         low, high = self.of(robot).limits
@@ -319,18 +320,25 @@ def _is_number(value: object) -> TypeGuard[float]:
     return not isinstance(value, bool) and isinstance(value, int | float) and abs(value) <= sys.float_info.max
 
 
-def numbers(name: str, entry: object, count: int) -> tuple[float, ...]:
-    """An entry of a link that is a list of so many finite numbers; raises `InputError`."""
+def numbers(name: str, entry: object, count: int, most: float = sys.float_info.max) -> tuple[float, ...]:
+    """An entry of a link that is a list of so many finite numbers, none above `most`; raises `InputError`."""
     if not isinstance(entry, list) or len(entry) != count or not all(map(_is_number, entry)):
         raise InputError(name, entry, f"{count} finite numbers")
+    if any(abs(item) > most for item in entry):
+        raise InputError(name, entry, f"numbers up to {most:g}")
     return tuple(float(item) for item in entry)
+
+
+def record(name: str, entry: object) -> Mapping[str, object]:
+    """An entry of a link that has values by names; raises `InputError`."""
+    if not isinstance(entry, dict):
+        raise InputError(name, entry, "values by names")
+    return entry
 
 
 def numbers_by_name(name: str, entry: object) -> dict[str, float]:
     """An entry of a link that has numbers by names, without what is no number; raises `InputError`."""
-    if not isinstance(entry, dict):
-        raise InputError(name, entry, "numbers by names")
-    return {str(key): item for key, item in entry.items() if _is_number(item)}
+    return {str(key): item for key, item in record(name, entry).items() if _is_number(item)}
 
 
 def subset(name: str, entry: object, known: Iterable[str]) -> frozenset[str]:

@@ -327,9 +327,11 @@ class PanelView:
         handle.on_update(changed)
 
     def _listen_group(self, handle: Any, one: _Mounted) -> None:
+        presses = count()
+
         async def clicked(event: Any) -> None:
             if event.client is not None and (found := one.events.get(event.target.value)) is not None:
-                self._post(("do", found, one.serial, 0), None)
+                self._post(("do", found, one.serial, next(presses)), None)
 
         handle.on_click(clicked)
 

@@ -17,7 +17,7 @@ import numpy as np
 from app.exercises.rows import Accepted, Factor, Line, Row
 from app.viewer.lessons.dh.normals import angle_about, axis_lines, common_normal
 from app.viewer.lessons.dh.steps import MOVED
-from kin import Robot, fk
+from kin import Robot, fk, link_frames
 from kin.axes import NEARLY, frame_of, inverse, size
 from kin.robot import Convention
 from kin.transforms import Array
@@ -109,6 +109,15 @@ class Assignment:
             moved = getattr(row, factor) + self.sense(joint, ends) * float(q[joint])
             found.append(found[-1] @ replace(row, **{factor: moved}).matrix(self.convention))
         return found
+
+    def carried(self, T: Array, q: Array) -> Array:
+        """The next frame, given ``(4, 4)`` with all joints at 0, where its link carries it at ``(n,)``."""
+        joints = len(self.frames)
+        if joints == 0:
+            return T
+        row = self.robot.joint_rows[joints - 1]
+        at_zero, now = (link_frames(self.robot, each)[row] for each in (np.zeros(self.robot.n), q))
+        return np.asarray(now @ inverse(at_zero) @ T)
 
     def tool(self) -> Array:
         """The constant transform from the last frame to the tool ``(4, 4)``."""

@@ -7,12 +7,15 @@ value is taken away from its θ or d, so that the row has its constant.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from app.exercises.rows import FACTORS, Factor, Row, turns
 from app.exercises.typed import EntryError, read_number
+from app.viewer.declared.fields import numbers, ordinal, record, rows
 from app.viewer.lessons.dh import choices
 from app.viewer.lessons.dh.assignment import ACCEPTED, Assignment, Verdict, judge, opposite_x, read_row
 from app.viewer.lessons.dh.choices import PARTS, Choice, Part
@@ -23,6 +26,7 @@ from kin.typed import LONGEST
 from kin.units import Units
 
 _DIGITS = 9  # of metres and radians in a link
+LARGEST = 1e6  # number in a link
 SAMPLES = 64
 
 
@@ -35,9 +39,11 @@ class Feedback:
     sentences: tuple[str, ...] = ()
 
 
-@dataclass
+@dataclass(eq=False)
 class Attempt:
     """The frames assigned so far, and the choices made for the next one.
+
+    What is among the settings of a page does not change: take a `copy` for the next step.
 
     Attributes:
         made: index of the choice made for each part of the next frame; at most the last of them is wrong.
@@ -57,6 +63,15 @@ class Attempt:
     def __post_init__(self) -> None:
         """Make the choices that are no choice."""
         self._settle()
+
+    @classmethod
+    def begun(cls, robot: Robot) -> Attempt:
+        """An attempt at the beginning."""
+        return cls(Assignment(robot))
+
+    def copy(self) -> Attempt:
+        """Another one at the same place."""
+        return replace(self, made=dict(self.made))
 
     @property
     def number(self) -> int:
@@ -247,28 +262,33 @@ class Attempt:
         return {"base": base, "rows": rows, "made": {str(part): index for part, index in self.made.items()}}
 
     @classmethod
-    def restored(cls, robot: Robot, state: object) -> Attempt:
-        """An attempt from what `state` returned, as far as it is valid."""
-        values = state if isinstance(state, dict) else {}
-        base, rows, made = (values.get(name) for name in ("base", "rows", "made"))
-        work = Assignment(robot)
-        if isinstance(base, list) and len(base) == 16 and all(_is_number(v) for v in base):
-            try:
-                frame = as_transform(np.array(base, float).reshape(4, 4), "base")
-            except InputError:
-                return cls(work)
-            work = work.with_base(frame)
-            for row in (rows if isinstance(rows, list) else [])[: robot.n]:
-                if not isinstance(row, list) or len(row) != 4 or not all(_is_number(v) for v in row):
-                    break
-                work = work.with_row(Row(*map(float, row)))
-        attempt = cls(work)
-        for part in PARTS:
-            index = made.get(part) if isinstance(made, dict) else None
-            if attempt.part == part and type(index) is int and 0 <= index < len(attempt.offered()[part]):
-                attempt.made = {**attempt.made, part: index}
+    def restored(cls, robot: Robot, entry: object) -> Attempt:
+        """An attempt from what `state` returned, as far as it is valid.
+
+        Raises:
+            InputError: the entry has no names.
+        """
+        values = record("assign", entry)
+        attempt = cls(_restored(robot, values))
+        with suppress(InputError):
+            made = record("made", values.get("made"))
+            for part in PARTS:
+                index = ordinal(part, made.get(part))
+                if index is not None and attempt.part == part and index < len(attempt.offered()[part]):
+                    attempt.made = {**attempt.made, part: index}
         attempt._settle()
         return attempt
+
+
+def _restored(robot: Robot, values: Mapping[str, object]) -> Assignment:
+    """The frames and rows of a link, up to the first that is not valid."""
+    work = Assignment(robot)
+    with suppress(InputError):
+        base = np.array(numbers("base", values.get("base"), 16, LARGEST)).reshape(4, 4)
+        work = work.with_base(as_transform(base, "base"))
+        for row in rows("rows", values.get("rows"), robot.n):
+            work = work.with_row(Row(*numbers("row", row, 4, LARGEST)))
+    return work
 
 
 def error_of(work: Assignment) -> float:
@@ -284,7 +304,3 @@ def table_robot(work: Assignment) -> Robot:
         for joint, row in zip(robot.joints, work.rows, strict=False)
     )
     return replace(robot, id=f"{robot.id}-assigned", rows=rows, home=robot.home[: len(rows)])
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from app.exercises.rows import Line
+from app.viewer.declared.scene import Node
 from app.viewer.lessons.dh.normals import Normal, axis_lines, common_normal
 from app.viewer.lessons.dh.steps import low
+from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.figure_shapes import AMBER, PURPLE
-from app.viewer.lessons.figures import Figure
 from app.viewer.scene.camera import Sphere
 from app.viewer.scene.meshes import body
 from kin import Robot
@@ -54,40 +55,24 @@ def room(robot: Robot) -> list[Sphere]:
     return [(end, 4.0 * thickness) for pair in spans(robot, lines, thickness) for end in pair]
 
 
-class AxesDrawing:
-    """The axes of all joints and their normals, as parts of a figure."""
+def joint_axes(
+    figure: FigureNodes, robot: Robot, q: Array, names: Sequence[str], only: Sequence[int] | None = None
+) -> list[Node]:
+    """The axes of all joints at a configuration ``(n,)``, with these names, and their normals.
 
-    def __init__(self, figure: Figure, robot: Robot) -> None:
-        self._robot = robot
-        self._size = figure.size
-        self._axes = [figure.line(color=PURPLE, width=0.15) for _ in range(robot.n)]
-        self._normals = [figure.line(color=AMBER, width=0.3) for _ in range(robot.n - 1)]
-        self._feet = [[figure.point(color=AMBER, radius=0.42) for _ in range(2)] for _ in range(robot.n - 1)]
-
-    def show(self, q: Array, names: Sequence[str], only: Sequence[int] | None = None) -> None:
-        """Draw them at a configuration ``(n,)``, the axes with these names.
-
-        Args:
-            only: indices of the normals to draw; by default all.
-        """
-        lines = axis_lines(self._robot, q)
-        feet = normals(self._robot, lines)
-        texts = list(names)
-        for k, normal in enumerate(feet):
-            if normal.relation == "one":  # one label for both, at the longer line
-                texts[k + 1], texts[k] = f"{texts[k]}, {texts[k + 1]}" if texts[k] else texts[k + 1], ""
-        for part, (start, end), text in zip(self._axes, spans(self._robot, lines, self._size), texts, strict=True):
-            part.show(start, end, text)
-        for k, (part, ends, normal) in enumerate(zip(self._normals, self._feet, feet, strict=True)):
-            if normal.relation in ("one", "meet") or (only is not None and k not in only):
-                for each in (part, *ends):
-                    each.hide()
-                continue
-            part.show(normal.start, normal.end)
-            for each, foot in zip(ends, (normal.start, normal.end), strict=True):
-                each.show(foot)
-
-    def hide(self) -> None:
-        """Hide all of it."""
-        for part in (*self._axes, *self._normals, *(foot for pair in self._feet for foot in pair)):
-            part.hide()
+    Args:
+        only: indices of the normals to draw; by default all.
+    """
+    lines, nodes = axis_lines(robot, q), list[Node]()
+    feet, texts = normals(robot, lines), list(names)
+    for k, normal in enumerate(feet):
+        if normal.relation == "one":  # one label for both, at the longer line
+            texts[k + 1], texts[k] = f"{texts[k]}, {texts[k + 1]}" if texts[k] else texts[k + 1], ""
+    for k, ((start, end), text) in enumerate(zip(spans(robot, lines, figure.size), texts, strict=True)):
+        nodes += figure.line(f"axis-{k}", start, end, text, PURPLE, 0.15)
+    for k, normal in enumerate(feet):
+        if normal.relation not in ("one", "meet") and (only is None or k in only):
+            nodes += figure.line(f"normal-{k}", normal.start, normal.end, "", AMBER, 0.3)
+            for i, foot in enumerate((normal.start, normal.end)):
+                nodes += figure.point(f"foot-{k}-{i}", foot, radius=0.42)
+    return nodes

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
-import viser
 from numpy.typing import NDArray
 
-from app.exercises.rows import Factor
-from app.viewer.labels import add_label
+from app.exercises.rows import turns
+from app.viewer.declared.scene import Lazy, Node, axes, bars, frame, label
+from app.viewer.lessons.dh.facts import DHFacts
 from app.viewer.lessons.dh.steps import (
+    MOVED,
     ORDERS,
-    Place,
     amount,
     axis,
     coaxial_joints,
@@ -29,15 +30,15 @@ from app.viewer.lessons.dh.steps import (
     reread,
 )
 from app.viewer.lessons.dh.views import ABOUT_X, ABOUT_Z, TITLES
+from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.figure_shapes import GREY, Segments, clear_of
-from app.viewer.lessons.figures import Angle, Dimension, Figure
 from app.viewer.lessons.label_room import label_room
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.camera import DIRECTION
 from app.viewer.scene.meshes import body
-from kin import Robot
+from kin import Robot, link_frames
 from kin.axes import inverse
-from kin.transforms import Array, wxyz_from_rotation
+from kin.transforms import Array
 from kin.units import Units
 
 AXES = ((204, 0, 0), (51, 153, 0), (0, 0, 204))  # x, y, z, as viser paints the axes of a frame
@@ -54,10 +55,11 @@ def triads(frames: Array, size: float) -> Segments:
     return np.stack([origins, tips], axis=2).reshape(-1, 2, 3).astype(np.float32)
 
 
+@lru_cache(maxsize=64)
 def triad_colors(count: int) -> NDArray[np.uint8]:
     """Colours of the lines of `count` `triads`."""
-    axes = np.array([linear(color) for color in AXES])
-    return np.tile(np.repeat(axes[:, None], 2, axis=1), (count, 1, 1))
+    colors = np.array([linear(color) for color in AXES])
+    return np.tile(np.repeat(colors[:, None], 2, axis=1), (count, 1, 1))
 
 
 def linear(color: tuple[int, int, int]) -> NDArray[np.uint8]:
@@ -87,191 +89,143 @@ def joint_axis(robot: Robot, frames: Array, joint: int, reach: float) -> Segment
     return np.array([[T[:3, 3] - reach * T[:3, 2], T[:3, 3] + reach * T[:3, 2]]], dtype=np.float32)
 
 
-class WalkDrawing:
-    """The walk on the arm itself. Not thread-safe: the visitor's worker calls it.
+def walk(facts: DHFacts, read: DHFacts, figure: FigureNodes, units: Units, asked: bool) -> list[Node | Lazy]:
+    """The walk on the arm itself.
 
     Args:
-        root: prefix of all node names; a different one for each arm of a scene.
+        read: what the panel shows. Labels of frames are moved with it: they cost as much as the rest.
+        asked: whether a question asks for what a joint makes of its row.
     """
+    size, at = body(facts.robot).size, facts.place
+    with figure:
+        measured = _measured(facts, figure, units, asked)
+    placed = _with_base(facts.robot, facts.frames)[: at.placed + 1]
+    return [
+        moving_frame("moving", at.T_0_now, size),
+        placed_frames("placed", placed, size),
+        *measured,
+        Lazy("names", _names, (read,)),
+    ]
 
-    def __init__(self, scene: viser.SceneApi, robot: Robot, frames: Array, root: str) -> None:
-        self._scene = scene
-        self._robot = robot
-        self._size = body(robot).size
-        self._root = scene.add_frame(root, show_axes=False)
-        self._name = root
-        self._moving = moving_frame(scene, f"{root}/moving", self._size)
-        # One label for all frames of one origin, at the tip of the z axis of one of them.
-        self._groups = coinciding(robot)
-        self._at = label_places(self._groups, np.concatenate([robot.T_world_base[None], frames]), self._size)
-        self._labels = [
-            add_label(scene, f"{root}/name-{group[0]}", "", anchor="center-center", visible=False)
-            for group in self._groups
-        ]
-        figure = Figure(scene, f"{root}/present", self._size)
-        self._quantities: dict[Factor, Angle | Dimension] = {
-            "theta": figure.angle("", ABOUT_Z),
-            "d": figure.dimension("", ABOUT_Z),
-            "a": figure.dimension("", ABOUT_X),
-            "alpha": figure.angle("", ABOUT_X),
-        }
-        self._placed: viser.LineSegmentsHandle | None = None
-        self._count = -1
-        self._made = 0
 
-    def show(self, at: Place, frames: Array, units: Units, names: bool) -> None:
-        """Show a place, with the arm's ``link_frames``; `names`: update the labels of frames as well."""
-        pose(self._moving, at.T_0_now)
-        self._show_placed(np.concatenate([self._robot.T_world_base[None], frames[: at.placed]]), names)
-        self._show_quantities(at, frames[:, :3, 3], units)
+def _names(facts: DHFacts) -> list[Node]:
+    """One label for all placed frames of one origin, at the tip of the z axis of one of them."""
+    robot, count, size, nodes = facts.robot, facts.place.placed + 1, body(facts.robot).size, []
+    frames = _with_base(robot, facts.frames)[:count]
+    for group, (member, height) in zip(coinciding(robot), _places_of_labels(robot), strict=True):
+        if placed := [number for number in group if number < count]:
+            T = frames[min(member, count - 1)]
+            point = T[:3, 3] + height * PLACED * size * T[:3, 2]
+            nodes.append(label(f"name-{group[0]}", frames_name(placed, len(robot.rows)), point))
+    return nodes
 
-    def remove(self) -> None:
-        """Remove everything from the scene."""
-        self._root.remove()
 
-    def _show_placed(self, frames: Array, names: bool) -> None:
-        points = triads(frames, PLACED * self._size)
-        if len(frames) == self._count and self._placed is not None:
-            self._placed.points = points
-        else:
-            if self._placed is not None:
-                self._placed.remove()
-            self._count = len(frames)
-            colors = triad_colors(len(frames))
-            self._placed = self._lines("placed", points, colors, 0.26)
-            for label, group in zip(self._labels, self._groups, strict=True):
-                placed = [number for number in group if number < len(frames)]
-                label.visible = bool(placed)
-                if placed:
-                    label.text = frames_name(placed, len(self._robot.rows))
-            names = True
-        if not names:
-            return
-        for label, group, (member, height) in zip(self._labels, self._groups, self._at, strict=True):
-            if group[0] < len(frames):
-                T = frames[min(member, len(frames) - 1)]
-                label.position = T[:3, 3] + height * PLACED * self._size * T[:3, 2]
-
-    def _show_quantities(self, at: Place, origins: Array, units: Units) -> None:
-        """The parameters of the row so far, each beside what it measures; the present one with its share."""
-        robot = self._robot
-        order = ORDERS[robot.convention]
-        T = at.T_0_now @ inverse(at.A)  # the frame before the row
-        for k, factor in enumerate(order):
-            part = self._quantities[factor]
-            value = at.values[k]
-            if k > at.motion or value == 0.0:
-                if part.shown:
-                    part.hide()
-                continue
-            shown = value * (at.share if k == at.motion else 1.0)
-            whole = amount(factor, value, units)
+def _measured(facts: DHFacts, figure: FigureNodes, units: Units, asked: bool) -> list[Node]:
+    """The parameters of the row so far, each beside what it measures; the present one with its share."""
+    robot, at, nodes = facts.robot, facts.place, list[Node]()
+    T = at.T_0_now @ inverse(at.A)  # the frame before the row
+    moved = MOVED.get(robot.rows[at.row].kind)
+    for k, factor in enumerate(ORDERS[robot.convention][: at.motion + 1]):
+        value = at.values[k]
+        shown = value * (at.share if k == at.motion else 1.0)
+        if value != 0.0 and not (asked and factor == moved):
             so_far = f"{amount(factor, shown, units)} of " if shown != value else ""
-            text = f"{expression(robot, at.row, factor, units)} = {so_far}{whole}"
-            p, R, about = T[:3, 3], T[:3, :3], axis(factor)
-            if isinstance(part, Angle):
+            text = f"{expression(robot, at.row, factor, units)} = {so_far}{amount(factor, value, units)}"
+            about, p, R = axis(factor), T[:3, 3], T[:3, :3]
+            color = ABOUT_Z if about == 2 else ABOUT_X
+            if turns(factor):
                 # About z from x, and about x from z.
-                part.show(p, R[:, 2 - about], R[:, about], shown, units, text=text)
+                start, axle = R[:, 2 - about], R[:, about]
+                nodes += figure.angle(factor, p, start, axle, shown, "", units, color, words=text)
             else:
-                aside = clear_of(p, p + value * R[:, about], origins)
-                part.show(p, p + shown * R[:, about], units, aside, text=text)
-            T = T @ elementary(factor, shown)
-
-    def _lines(
-        self, name: str, points: Segments, colors: NDArray[np.uint8], width: float
-    ) -> viser.LineSegmentsHandle:
-        self._made += 1
-        return self._scene.add_line_segments(
-            f"{self._name}/{name}-{self._made}", points, colors, thickness=width * self._size
-        )
+                off = clear_of(p, p + value * R[:, about], facts.frames[:, :3, 3])
+                nodes += figure.dimension(factor, p, p + shown * R[:, about], "", units, off, color, words=text)
+        T = T @ elementary(factor, shown)
+    return nodes
 
 
-class OtherDrawing:
+def both(facts: DHFacts, read: DHFacts) -> list[Node | Lazy]:
     """The table in the other convention: a skeleton next to the arm, and on both the joint axes that differ."""
-
-    def __init__(self, scene: viser.SceneApi, robot: Robot, root: str) -> None:
-        self.robot = reread(robot)
-        self._pair = (robot, self.robot)
-        self._size = body(robot).size
-        self.offset = aside(robot)
-        self._root = scene.add_frame(root, show_axes=False)
-        other = f"{root}/other"
-        scene.add_frame(other, show_axes=False, position=self.offset)
-        self._moving = moving_frame(scene, f"{other}/moving", self._size)
-        k = len(robot.rows)
-        nothing = np.zeros((1, 2, 3), np.float32)
-        self._bones = scene.add_line_segments(
-            f"{other}/bones", np.repeat(nothing, 2 * k, 0), GREY, thickness=1.1 * self._size
-        )
-        colors = triad_colors(k + 1)
-        self._frames = scene.add_line_segments(
-            f"{other}/frames", np.repeat(nothing, 3 * k + 3, 0), colors, thickness=0.26 * self._size
-        )
-        reach = 3.0 * self._size
-        for reading, parent in zip(self._pair, (root, other), strict=True):
-            base = reading.T_world_base[:3, 3] - np.array([0.0, 0.0, reach])
-            add_label(scene, f"{parent}/title", TITLES[reading.convention], position=base, anchor="top-center")
-        joints = sorted({j for r in self._pair for k in coaxial_joints(r) for j in (k, k + 1)})
-        self._lines = []
-        for reading, parent in zip(self._pair, (root, other), strict=True):
-            coaxial = coaxial_joints(reading)
-            for j in joints:
-                # Two joints on one axis have one label, at the outer tip.
-                name = f"joints {j} and {j + 1}: one axis" if j - 1 in coaxial else f"joint {j + 1}"
-                text = "" if j in coaxial else name
-                line = scene.add_line_segments(
-                    f"{parent}/line-{j + 1}", nothing, joint_color(j), thickness=0.3 * self._size
-                )
-                label = add_label(
-                    scene, f"{parent}/line-{j + 1}-name", text, anchor="center-left", visible=bool(text)
-                )
-                self._lines.append((reading, j, line, label))
-
-    def show(self, at: Place, frames: Array, frames_other: Array, names: bool) -> None:
-        """Show a place of the other table, with the ``link_frames`` of both; `names`: as for `WalkDrawing`."""
-        pose(self._moving, at.T_0_now)
-        self._bones.points = skeleton(self.robot, frames_other)
-        all_frames = np.concatenate([self.robot.T_world_base[None], frames_other])
-        self._frames.points = triads(all_frames, PLACED * self._size)
-        for reading, joint, line, label in self._lines:
-            points = joint_axis(
-                reading, frames_other if reading is self.robot else frames, joint, 11.0 * self._size
-            )
-            line.points = points
-            if names:
-                # At the outer end: what is drawn at the arm and at the skeleton must not meet in the middle.
-                ends = points[0] @ self.offset.astype(np.float32)
-                label.position = points[0, int(ends.argmax() if reading is self.robot else ends.argmin())]
-
-    def remove(self) -> None:
-        """Remove everything from the scene."""
-        self._root.remove()
+    robot, other, size, offset = facts.robot, facts.other, body(facts.robot).size, aside(facts.robot)
+    beside = [
+        moving_frame("moving", facts.other_place.T_0_now, size),
+        bars("bones", skeleton(other, facts.other_frames), GREY, 1.1 * size),
+        placed_frames("frames", _with_base(other, facts.other_frames), size),
+    ]
+    return [
+        *_joint_axes(robot, facts.frames, size),
+        Lazy("axes", _axis_names, (robot, read.frames, offset, size)),
+        frame(
+            "other",
+            *beside,
+            *_joint_axes(other, facts.other_frames, size),
+            Lazy("axes", _axis_names, (other, read.other_frames, -offset, size)),
+            position=offset,
+        ),
+    ]
 
 
-def moving_frame(scene: viser.SceneApi, name: str, size: float) -> viser.FrameHandle:
-    """A large frame with labelled axes."""
-    frame = scene.add_frame(
-        name,
-        axes_length=MOVING * size,
-        axes_radius=0.17 * size,
-        origin_radius=0.4 * size,
-        origin_color=(230, 159, 0),
-    )
-    for tip, letter in zip(np.eye(3), "xyz", strict=True):
-        add_label(scene, f"{name}/{letter}", letter, position=1.1 * MOVING * size * tip, anchor="center-center")
-    return frame
+@lru_cache(maxsize=64)
+def _compared_joints(robot: Robot) -> tuple[int, ...]:
+    """Indices of the joints that share an axis with a neighbour in one of the conventions."""
+    return tuple(sorted({j for r in (robot, reread(robot)) for k in coaxial_joints(r) for j in (k, k + 1)}))
 
 
-def pose(node: viser.SceneNodeHandle, T: Array) -> None:
-    """Set a node's pose ``(4, 4)``. viser ignores changes below 1e-5, which are invisible here."""
-    node.position = T[:3, 3]
-    node.wxyz = wxyz_from_rotation(T[:3, :3])
+def _joint_axes(robot: Robot, frames: Array, size: float) -> list[Node]:
+    return [
+        bars(f"line-{j + 1}", joint_axis(robot, frames, j, 11.0 * size), joint_color(j), 0.3 * size)
+        for j in _compared_joints(robot)
+    ]
+
+
+def _axis_names(robot: Robot, frames: Array, outwards: Array, size: float) -> list[Node]:
+    """The title of a reading and the names of its axes, at their outer ends: those of both arms must not meet."""
+    base = robot.T_world_base[:3, 3] - np.array([0.0, 0.0, 3.0 * size])
+    nodes, coaxial = [label("title", TITLES[robot.convention], base, anchor="top-center")], coaxial_joints(robot)
+    for j in _compared_joints(robot):
+        if j in coaxial:
+            continue  # two joints on one axis have one label
+        text = f"joints {j} and {j + 1}: one axis" if j - 1 in coaxial else f"joint {j + 1}"
+        ends = joint_axis(robot, frames, j, 11.0 * size)[0]
+        end = ends[int((ends @ outwards.astype(np.float32)).argmin())]
+        nodes.append(label(f"line-{j + 1}-name", text, end, anchor="center-left"))
+    return nodes
+
+
+def moving_frame(key: str, T: Array, size: float) -> Node:
+    """A large frame ``(4, 4)`` with labelled axes."""
+    look = {"origin_radius": 0.4 * size, "origin_color": (230, 159, 0)}
+    node = axes(key, T, MOVING * size, 0.17 * size, **look)
+    node.children = [Lazy("letters", _letters, (size,))]
+    return node
+
+
+def _letters(size: float) -> list[Node]:
+    return [label(letter, letter, 1.1 * MOVING * size * tip) for letter, tip in zip("xyz", np.eye(3), strict=True)]
+
+
+def placed_frames(key: str, frames: Array, size: float) -> Node:
+    """The axes of frames ``(k, 4, 4)`` as lines. Another number of them has a node of its own."""
+    node = bars(f"{key}-{len(frames)}", triads(frames, PLACED * size), triad_colors(len(frames)), 0.26 * size)
+    node.keep = False
+    return node
+
+
+def _with_base(robot: Robot, frames: Array) -> Array:
+    """The base's frame and the frames after each row ``(rows + 1, 4, 4)``."""
+    return np.concatenate([robot.T_world_base[None], frames])
 
 
 def aside(robot: Robot) -> Array:
     """The place ``(3,)`` of the other arm: to the left of the arm in the default view, out of its reach."""
     left = np.array([DIRECTION[1], -DIRECTION[0], 0.0])
     return 1.4 * body(robot).radius * left / np.linalg.norm(left)
+
+
+@lru_cache(maxsize=64)
+def _places_of_labels(robot: Robot) -> list[tuple[int, float]]:
+    frames = _with_base(robot, link_frames(robot, robot.q_home))
+    return label_places(coinciding(robot), frames, body(robot).size)
 
 
 def label_places(groups: Sequence[Sequence[int]], frames: Array, size: float) -> list[tuple[int, float]]:

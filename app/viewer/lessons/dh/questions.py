@@ -93,7 +93,7 @@ def outline(robot: Robot, units: Units) -> Outline:
         ),
         *_mistyped(robot, units),
     )
-    return Outline(GOAL, steps, _check(robot, units), pose=Pose(home))
+    return Outline(GOAL, steps, _check(robot, units), (frozenset({"motions"}),), Pose(home))
 
 
 def _telling_row(robot: Robot) -> int:

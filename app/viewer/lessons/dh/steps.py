@@ -63,6 +63,7 @@ class Place:
         return self.row + int(self.motion == MOTIONS - 1 and self.share == 1.0)
 
 
+@lru_cache(maxsize=64)
 def reread(robot: Robot) -> Robot:
     """The arm that the same table describes in the other convention."""
     return replace(robot, id=f"{robot.id}-reread", convention=OTHER[robot.convention])
@@ -201,8 +202,8 @@ def amount(factor: Factor, shown: float, units: Units) -> str:
     return units.of(turns(factor)).text(shown)
 
 
-def caption(robot: Robot, at: Place, units: Units) -> str:
-    """The present motion in words."""
+def caption(robot: Robot, at: Place, units: Units, asked: bool = False) -> str:
+    """The present motion in words; `asked`: without what a joint makes of its row."""
     if at.motion < 0:
         return "Frame 0 is at the base. Each row of the table carries a copy of it to the next frame."
     joint = robot.rows[at.row]
@@ -220,7 +221,8 @@ def caption(robot: Robot, at: Place, units: Units) -> str:
         words = f"{name} = 0, {none} {line}"
     else:
         verb = "turn {} about {}" if turns(at.factor) else "slide {} along {}"
-        words = verb.format(amount(at.factor, at.value, units), line) + f" ({name}{mover})"
+        far = "?" if asked and mover else amount(at.factor, at.value, units)
+        words = verb.format(far, line) + f" ({name}{mover})"
     end = f". {frames_name([at.row + 1], len(robot.rows)).capitalize()} is placed." if at.placed > at.row else "."
     return opening + words + end
 

@@ -49,9 +49,12 @@ def color(factor: Factor, strength: float = 1.0) -> str:
     return f"rgba({r},{g},{b},{strength:g})"
 
 
-def caption_html(robot: Robot, at: Place, units: Units) -> str:
-    """The present motion, in words and highlighted in the row's product of four. The height is constant."""
-    return render("dh/caption", words=caption(robot, at, units), formula=_product(robot, at, units))
+def caption_html(robot: Robot, at: Place, units: Units, asked: bool = False) -> str:
+    """The present motion, in words and highlighted in the row's product of four. The height is constant.
+
+    `asked`: without what a joint makes of its row, here and in all tables.
+    """
+    return render("dh/caption", words=caption(robot, at, units, asked), formula=_product(robot, at, units))
 
 
 def _product(robot: Robot, at: Place, units: Units) -> Markup:
@@ -86,6 +89,7 @@ def table_html(
     units: Units,
     title: str = "",
     senses: Sequence[float] = (),
+    asked: bool = False,
 ) -> str:
     """The table at a configuration ``(n,)``, columns in the order of application, the place `at` highlighted.
 
@@ -114,7 +118,7 @@ def table_html(
         now = ""
         if variable is not None:
             offset, joint = float(getattr(row, variable)), robot.joint_rows.index(i)
-            now = units.of(turns(variable)).text(offset + sense * float(q[joint]))
+            now = "?" if asked else units.of(turns(variable)).text(offset + sense * float(q[joint]))
         rows.append({"here": here, "cells": cells, "now": now})
     return render("dh/table", title=title or TITLES[robot.convention], heads=heads, rows=rows)
 
@@ -213,12 +217,14 @@ def same_arm_html(robot: Robot, units: Units) -> str:
     return render("dh/same_arm", rows=rows, angle=units.angles.name, length=units.lengths.name, rest=rest)
 
 
-def compare_html(robot: Robot, other: Robot, q: Array, place_other: Place, distance: float, units: Units) -> str:
+def compare_html(
+    robot: Robot, other: Robot, q: Array, place_other: Place, distance: float, units: Units, asked: bool = False
+) -> str:
     """The same numbers in the other convention: table, differences and reasons; `distance` of the tools (m)."""
     return render(
         "dh/compare",
         same=Markup(same_arm_html(robot, units)),
-        table=Markup(table_html(other, q, place_other, units)),
+        table=Markup(table_html(other, q, place_other, units, asked=asked)),
         paragraphs=verdict(robot, units),
         distance=units.lengths.text(distance),
     )

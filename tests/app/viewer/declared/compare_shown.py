@@ -75,6 +75,16 @@ STATES: dict[str, list[dict[str, object]]] = {
         {"form": 1, "axes": "then", "joint": 77, "factors": -1},
     ],
     "equations": [{"equation": "3.14"}, {"equation": 7}],
+    "dh": [
+        {"at": 6.5, "symbols": True, "compare": False, "speed": "Double", "lines": False, "assign": None},
+        {"at": 9, "symbols": False, "compare": True, "speed": "Half", "lines": True, "assign": None},
+        {"at": True, "symbols": 1, "compare": False, "speed": ["x"], "lines": "yes"},
+        {"at": 1e9, "compare": False, "assign": {"base": [], "rows": [], "made": {}}},
+        {"assign": {"base": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+                    "rows": [[0.1, 0.2, 0.3, 0.4], [0, 1e9, 0, 0]], "made": {"axis": 1, "x": True}}},
+        {"assign": {"base": [1, 2], "rows": 3, "made": {"axis": 99}}},
+        {"at": 4, "assign": None, "lines": True},
+    ],
     "trajectories": [{"paths": True}, {"paths": 5}],
     "inverse": [
         {"all": True},

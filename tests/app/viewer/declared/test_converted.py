@@ -11,12 +11,8 @@ from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.lessons import LESSONS
 
 ROOT = Path(__file__).parents[4] / "app" / "viewer"
-# What talks through scripts of its own: half of it is HTML with messages.
-OTHERS = {"dh"}
 PACKAGES = sorted(
-    path.name
-    for path in (ROOT / "lessons").iterdir()
-    if (path / "lesson.py").exists() and path.name not in OTHERS | {"guide"}
+    path.name for path in (ROOT / "lessons").iterdir() if (path / "lesson.py").exists() and path.name != "guide"
 )
 BANNED = {"listen", "listen_click", "assign", "update_html"}  # of `app.viewer.panel`
 
@@ -45,9 +41,8 @@ def offences(source: str) -> list[str]:
 
 
 def test_the_lessons_are_declared() -> None:
-    declared = {lesson.key for lesson in LESSONS if issubclass(lesson, DeclaredFeature)}
-    assert declared == set(PACKAGES)
-    assert {lesson.key for lesson in LESSONS} - declared == OTHERS
+    assert {lesson.key for lesson in LESSONS if issubclass(lesson, DeclaredFeature)} == set(PACKAGES)
+    assert {lesson.key for lesson in LESSONS} == set(PACKAGES)
 
 
 @pytest.mark.parametrize("package", PACKAGES)

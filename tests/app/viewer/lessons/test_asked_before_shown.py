@@ -30,12 +30,15 @@ STORE, UNITS = Store(), Units()
 ARMS = [STORE.get(name) for name in ("pioneer5", "ur5", "scara", "puma560")]
 KEYS = (
     *("rotations", "screws", "redundancy", "velocity", "trajectories"),
-    *("numeric", "postures", "equations", "inverse"),
+    *("numeric", "postures", "equations", "dh", "inverse"),
 )
 MOVED = [lesson for lesson in LESSONS if lesson.key in KEYS]
 COMMON = {float(n) for n in range(-12, 13)}  # numbers of joints and steps
-# What is asked is to be read from the page.
-READ = {("velocity", "c2"): "the longest semi-axis among those of the ellipsoid"}
+# What is to be read from the page, or equals other numbers of it by chance.
+READ = {
+    ("velocity", "c2"): "the longest semi-axis among those of the ellipsoid",
+    ("dh", "c1"): "right angles are in many columns of a table; test_dh_facts asks at other configurations",
+}
 SCALES = {"°": (1.0, math.radians(1.0)), "mm": (1.0, 1e-3, 0.1)}  # of a value in the question's unit
 NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?![\w.]*\d)")
 MARKUP = re.compile(r"<(?:svg|style)\b.*?</(?:svg|style)>|<[^>]*>", re.DOTALL)

@@ -17,6 +17,7 @@ from app.viewer.lessons.dh import choices
 from app.viewer.lessons.dh.assign import assign_html, rows_html
 from app.viewer.lessons.dh.assignment import Assignment, read_row
 from app.viewer.lessons.dh.attempt import Attempt, error_of
+from app.viewer.lessons.dh.settings import DHSettings
 from app.viewer.lessons.dh.steps import OTHER
 from kin.dh.tables import convert
 from kin.units import DEFAULT_UNITS, Units
@@ -195,12 +196,22 @@ def test_back_undoes_one_step_at_a_time(robot: kin.Robot) -> None:
 @pytest.mark.parametrize(
     "state",
     [
-        None, 3, {"base": [1]}, {"base": ["x"] * 16}, {"base": [math.inf] * 16}, {"base": [0.0] * 16},
+        {}, {"base": [1]}, {"base": ["x"] * 16}, {"base": [math.inf] * 16}, {"base": [0.0] * 16},
         {"rows": [[1, 2, 3, 4]]}, {"made": {"axis": 99, "x": True}}, {"made": {"axis": -1}},
     ],
 )  # fmt: skip
 def test_a_hostile_link_starts_at_the_beginning(state: object) -> None:
     assert Attempt.restored(PIONEER, state).state() == begin(PIONEER).state()
+
+
+@pytest.mark.parametrize("state", [3, "x", [], True])
+def test_what_is_no_attempt_is_refused(state: object) -> None:
+    with pytest.raises(kin.InputError, match="assign"):
+        Attempt.restored(PIONEER, state)
+    kept = DHSettings.fresh(PIONEER).restored({"assign": {}}, PIONEER)
+    assert kept.assign is not None
+    assert kept.restored({"assign": state}, PIONEER).assign is kept.assign
+    assert kept.restored({"assign": None}, PIONEER).assign is None
 
 
 def test_rows_of_a_link_are_taken_as_far_as_they_are_numbers() -> None:
