@@ -29,7 +29,9 @@ from kin.transforms import Array, as_transform, finite_array
 
 Convention = Literal["standard", "modified"]
 Kind = Literal["revolute", "prismatic", "fixed"]
+Mounting = Literal["pedestal", "floor", "table", "wall", "ceiling"]
 CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
+MOUNTINGS: tuple[Mounting, ...] = get_args(Mounting)
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 KIND_CODES: dict[Kind, float] = {"fixed": 0.0, "revolute": 1.0, "prismatic": 2.0}
 # Fields of a joint that hold the largest value of a quantity.
@@ -132,10 +134,12 @@ class Robot:
         payload, mass: what it may carry and what it weighs (kg), None where they are not known.
         capsules: the bodies of the links as its file states them, none where they are not known.
         capsules_source: where they are from.
+        mounting: what the arm is mounted on, None if that is not stated. How it is turned, `base` states.
+        floor: height (m) of the floor in the world frame, None if it is not stated.
 
     Raises:
-        InputError: an unknown convention or unit, no moving joint, a home of another length, or a base or tool
-            that is no rigid transform.
+        InputError: an unknown convention, unit or mounting, no moving joint, a home of another length, a floor
+            that is no finite number, or a base or tool that is no rigid transform.
     """
 
     id: str
@@ -153,6 +157,8 @@ class Robot:
     tool: Matrix = field(default=IDENTITY, repr=False)
     capsules: tuple[Capsule, ...] = field(default=(), repr=False)
     capsules_source: str = field(default="", repr=False)
+    mounting: Mounting | None = None
+    floor: float | None = None
 
     def __post_init__(self) -> None:
         """Check the fields; lists become tuples, and arrays become nested tuples."""
@@ -176,6 +182,10 @@ class Robot:
                 if not (weight := _number(key, value)) > 0.0:
                     raise InputError(key, value, "a positive number of kg, or None if it is not known")
                 object.__setattr__(self, key, weight)
+        if self.mounting is not None and (not isinstance(self.mounting, str) or self.mounting not in MOUNTINGS):
+            raise InputError("mounting", self.mounting, _one_of(*MOUNTINGS) + ", or None if it is not stated")
+        if self.floor is not None:
+            object.__setattr__(self, "floor", _number("floor", self.floor))
         for key in ("base", "tool"):
             T = getattr(self, key)
             if T is not IDENTITY:

@@ -29,7 +29,16 @@ LONGEST = 10_000  # characters of the compact form; a link holds 12 000 in all
 OF_MAKER = ("maker", "payload", "mass")  # fields that an own arm has not: nobody has built or weighed it
 _KINDS = {"revolute": "", "prismatic": "p", "fixed": "f"}
 _ROW = ("theta", "d", "a", "alpha", "limits", "kind", "name", "velocity", "effort", "acceleration", "jerk")
-_TOP = {"n": "name", "s": "source", "i": "description", "c": "convention", "b": "base", "t": "tool"}
+_TOP = {
+    "n": "name",
+    "s": "source",
+    "i": "description",
+    "c": "convention",
+    "b": "base",
+    "t": "tool",
+    "m": "mounting",
+    "z": "floor",
+}
 
 
 @dataclass(frozen=True)
@@ -73,6 +82,8 @@ def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
     away = float(np.abs(robot.T_world_base[:3, 3]).max())
     if away > LARGEST:
         raise InputError("base.xyz", f"{away:g} m", f"a base at most {LARGEST:g} m from the origin")
+    if abs(robot.floor or 0.0) > LARGEST:
+        raise InputError("floor", f"{robot.floor:g} m", f"a floor at most {LARGEST:g} m above or below z = 0")
     if robot.capsules and len(_text(robot)) > LONGEST:
         robot = replace(robot, capsules=(), capsules_source="")
     text = _text(robot)

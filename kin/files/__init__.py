@@ -25,7 +25,9 @@ is zero. Without ``limits`` a revolute joint turns ±180° and a prismatic one s
 leaves a revolute joint unlimited. ``velocity``, ``acceleration``, ``jerk`` and ``effort`` are optional. Without
 ``home`` the arm starts in the middle of its limits, or bent if that configuration is singular
 (:mod:`kin.files.home`). ``base`` and ``tool`` are tables ``{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }`` or
-``{ matrix = [[…], […], […], […]] }``. A number may be a text with a unit of its own, ``"0.13 m"``.
+``{ matrix = [[…], […], […], […]] }``. ``mounting`` is what the arm is mounted on, and ``floor`` the height of the
+floor in the world frame: drawings use them, kinematics does not. A number may be a text with a unit of its own,
+``"0.13 m"``.
 
 The same fields as a dict (:func:`robot_from_dict`, :func:`robot_to_dict`) are what REST and the page exchange.
 

@@ -23,6 +23,7 @@ from kin.robot import (
     IDENTITY,
     KIND_CODES,
     LENGTHS,
+    MOUNTINGS,
     PEAK_FIELDS,
     Capsule,
     Joint,
@@ -36,7 +37,7 @@ MAX_ROWS, MAX_CAPSULES = 32, 64
 MAX_REACH = 1e5  # metres; targets may have coordinates up to 1e6 m
 _TOP = {
     *("id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"),
-    *("capsules", "capsules_source", "maker", "payload", "mass"),
+    *("capsules", "capsules_source", "maker", "payload", "mass", "mounting", "floor"),
 }
 _CAPSULE = {"row", "start", "end", "radius", "assumed"}
 _ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", *PEAK_FIELDS}
@@ -232,6 +233,8 @@ class Reader:
             tool=self.transform(data, "tool"),
             capsules=self.capsules(data, rows),
             capsules_source=self.text(data, "capsules_source", ""),
+            mounting=self.choice(data, "mounting", MOUNTINGS) if "mounting" in data else None,  # type: ignore[arg-type]
+            floor=self.length_of("floor", data["floor"]) if "floor" in data else None,
         )
         if robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3])) > MAX_REACH:
             raise self.refuse(

@@ -141,6 +141,10 @@ class _Writer:
         for key, T in (("base", robot.base), ("tool", robot.tool)):
             if T != IDENTITY:
                 data[key] = self.transform(T)
+        if robot.mounting is not None:
+            data["mounting"] = robot.mounting
+        if robot.floor is not None:
+            data["floor"] = self.value(robot.floor, True)
         data["rows"] = [self.row(row) for row in robot.rows]
         pairs = zip(robot.joints, robot.home, strict=True)
         data["home"] = {"q": [self.value(value, joint.kind == "prismatic") for joint, value in pairs]}

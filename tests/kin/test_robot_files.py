@@ -62,6 +62,36 @@ def test_a_file_names_its_units():
     assert kin.fk(robot, [0, 0])[:3, 3] == pytest.approx([-0.05, 0.05, 0.6], abs=1e-12)
 
 
+@pytest.mark.parametrize("mounting", kin.robot.MOUNTINGS)
+def test_mounting_and_floor_are_read_written_and_change_no_pose(mounting, tmp_path):
+    robot = kin.parse_robot(f'mounting = "{mounting}"\nfloor = -120.7\n{GOOD}')
+    assert (robot.mounting, robot.floor) == (mounting, -0.1207)
+    kin.save_robot(robot, tmp_path / "bench.toml")
+    assert kin.load_robot(tmp_path / "bench.toml") == robot
+    assert kin.robot_from_dict(kin.robot_to_dict(robot)) == robot
+    plain = kin.parse_robot(GOOD)
+    assert (plain.mounting, plain.floor) == (None, None)
+    assert plain != robot
+    assert np.array_equal(kin.fk(plain, plain.q_home), kin.fk(robot, plain.q_home))
+    assert kin.parse_robot(f'floor = "-0.5 m"\n{GOOD}').floor == -0.5
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "valid"),
+    [
+        ("mounting", "sky", '"wall", "ceiling", or None if it is not stated'),
+        ("mounting", 3, "or None"),
+        ("floor", math.nan, "finite"),
+        ("floor", "low", "finite"),
+        ("floor", True, "finite"),
+    ],
+)
+def test_a_mounting_or_a_floor_that_is_none_is_named(field, value, valid):
+    with pytest.raises(InputError, match=valid) as caught:
+        replace(kin.parse_robot(GOOD), **{field: value})
+    assert caught.value.field == field
+
+
 def test_metres_and_radians():
     text = GOOD.replace('length = "mm", angle = "deg"', 'length = "cm", angle = "rad"')
     text = text.replace("[-90, 180]", "[-1.5, 3]").replace("q = [45, 125]", "q = [1, 125]")

@@ -423,6 +423,26 @@ def test_any_arm_written_and_read(seed):
     assert report.difference <= EXACT
 
 
+@pytest.mark.parametrize(
+    ("parent", "rpy", "mounting"),
+    [
+        ("world", "0 0 1.5708", "floor"),
+        ("world", "3.14159265 0 0", "ceiling"),
+        ("world", "0 1.5707963 0", "wall"),
+        ("pillar", "3.14159265 0 0", "floor"),  # the base of the arm may be modelled upside down
+    ],
+)
+def test_an_arm_stands_on_the_floor_at_its_root_unless_the_world_turns_it(parent, rpy, mounting):
+    joint = f'<joint name="held" type="fixed"><parent link="{parent}"/><child link="a"/>'
+    joint += f'<origin xyz="0 0 1.2" rpy="{rpy}"/></joint><link name="{parent}"/>'
+    moving = '<joint name="turn" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>'
+    robot = kin.load_urdf(f'<robot name="r"><link name="a"/><link name="b"/>{joint}{moving}</robot>')
+    assert (robot.mounting, robot.floor) == (mounting, 0.0)
+    assert kin.fk(robot, [0.0])[2, 3] == pytest.approx(1.2)
+    inside = kin.load_urdf(f'<robot name="r"><link name="a"/><link name="b"/>{joint}{moving}</robot>', base="a")
+    assert inside.mounting == "floor", "the arm was read without what holds it"
+
+
 def test_names_and_limits_are_written():
     rows = [
         Joint('a <b> & "c" \x01', d=0.1, limits=None, velocity=2.5, effort=87.0),

@@ -12,7 +12,7 @@ from app.shared.problems import FieldError
 from kin import Robot, RobotFileError, robot_from_dict
 from kin.files.numbers import LARGEST
 from kin.files.read import ANGLES, MAX_CAPSULES, MAX_ROWS
-from kin.robot import LENGTHS
+from kin.robot import LENGTHS, MOUNTINGS
 
 # What a file must state and an arm in a request need not.
 DEFAULTS = {"id": "sent", "name": "Sent arm", "source": "the request"}
@@ -172,6 +172,11 @@ _SCHEMA: dict[str, Any] = {
             "description": "Bodies of the links, for collisions; without any, bodies are assumed from the table.",
         },
         "capsules_source": {**_TEXT, "description": "Source of the bodies."},
+        "mounting": {
+            "enum": list(MOUNTINGS),
+            "description": "What the arm is mounted on, for drawings. How it is turned, `base` states.",
+        },
+        "floor": _quantity(_LENGTH, "Height of the floor in the world frame, in the length unit, for drawings."),
         "base": {**_TRANSFORM, "description": "Constant transform before the first row."},
         "tool": {**_TRANSFORM, "description": "Constant transform after the last row."},
     },

@@ -81,6 +81,10 @@ class RobotAnswer(Answer):
     """What each part of these names says about a configuration."""
     convention: Literal["standard", "modified"]
     """DH convention. standard: Rz(θ) Tz(d) Tx(a) Rx(α). modified (Craig): Rx(α) Tx(a) Rz(θ) Tz(d)."""
+    mounting: Literal["pedestal", "floor", "table", "wall", "ceiling"] | None
+    """What it is mounted on; null if that is not stated. How it is turned, `base` states."""
+    floor: float | None
+    """Height of the floor in the world frame, in metres; null if it is not stated."""
     reach: float
     """An upper bound of the tool's distance from the base origin, in metres."""
 

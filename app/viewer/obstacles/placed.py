@@ -40,6 +40,7 @@ _TABLE, _TABLE_AT = (0.45, 0.7), 0.6
 _NEW: dict[Shape, tuple[float, ...]] = {"box": (0.14, 0.14, 0.14), "sphere": (0.08,), "cylinder": (0.06, 0.24)}
 _SMALL_AT = 0.6
 _LOWER = (0.1, 0.0, -0.1, -0.2, -0.3, -0.5)  # heights of a table that are tried, from the base
+_LEAST_TABLE = 0.04  # height of a table
 _LEAST_ROOM = 0.01  # between a new obstacle and the arm
 _AROUND = [math.radians(turn) for turn in (0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180)]
 
@@ -85,28 +86,30 @@ def added(items: Obstacles, shape: object, robot: Robot, q: Array) -> Obstacles:
 
 def _tables(shape: Shape, items: Obstacles, robot: Robot) -> Iterator[Obstacle]:
     """Tables around the arm, that before it first, as high as they can be."""
-    step, base, floor = _step(robot), robot.T_world_base[:3, 3], body(robot).floor
+    step, base, mount = _step(robot), robot.T_world_base[:3, 3], body(robot).mount
     length, width = (_rounded(share * robot.reach, step) for share in _TABLE)
     for turn in _AROUND:
         yaw = _front(robot) + turn
         x, y = base[:2] + _TABLE_AT * robot.reach * np.array([math.cos(yaw), math.sin(yaw)])
         for low in _LOWER:
             top = _rounded(base[2] + low * robot.reach, step)
-            height = max(_rounded(top - floor, step), step)
+            height = _rounded(top - mount.floor, step)
+            if height < _LEAST_TABLE * robot.reach and low != _LOWER[0]:
+                continue
+            height = max(height, step)
             place = (_rounded(x, step), _rounded(y, step), top)
             yield Obstacle(shape, place, (0.0, 0.0, _wrapped(yaw)), (length, width, height))
 
 
 def _others(shape: Shape, items: Obstacles, robot: Robot) -> Iterator[Obstacle]:
-    """Smaller bodies around the arm, on a table if there is one."""
-    step, base = _step(robot), robot.T_world_base[:3, 3]
+    """Smaller bodies around the arm, on the floor, or on a table if there is one."""
+    step, base, mount = _step(robot), robot.T_world_base[:3, 3], body(robot).mount
     values = [_rounded(share * robot.reach, step) for share in _NEW[shape]]
     half = values[0] if shape == "sphere" else 0.5 * values[-1]
     for turn in _AROUND:
         yaw = _front(robot) + turn
         x, y = base[:2] + _SMALL_AT * robot.reach * np.array([math.cos(yaw), math.sin(yaw)])
-        stands = max((each.xyz[2] for each in items if _carries(each, x, y)), default=float(base[2]))
-        # A little above: bodies in contact flicker where their faces coincide.
+        stands = max((each.xyz[2] for each in items if _carries(each, x, y)), default=mount.surface(x, y))
         place = (_rounded(x, step), _rounded(y, step), stands + half)
         yield Obstacle(shape, place, (0.0, 0.0, 0.0), **of_sizes(shape, values))
 

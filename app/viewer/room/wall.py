@@ -233,12 +233,12 @@ class Wall:
     def _pads(self, arms: Sequence[SmallArm]) -> tuple[Array, Array]:
         """Scales and positions ``(2 * count, 3)`` of the pads, and of the columns below the arms' bases."""
         bases = [arm.robot.T_world_base[:3, 3] for arm in arms]
-        feet = [np.array([*base[:2], body(arm.robot).floor]) for base, arm in zip(bases, arms, strict=True)]
+        feet = [body(arm.robot).mount.foot for arm in arms]
         placed = np.array(
             [self._place(i, arm.robot, foot) for i, (arm, foot) in enumerate(zip(arms, feet, strict=True))]
         )
         heights = [
-            self._scale(arm.robot) * max(base[2] - foot[2], 0.0)
+            self._scale(arm.robot) * max(base[2] - foot[2], 0.0) * body(arm.robot).mount.stands
             for arm, base, foot in zip(arms, bases, feet, strict=True)
         ]
         side = self._layout.side

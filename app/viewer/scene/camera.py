@@ -262,7 +262,8 @@ class VisitorCamera:
         radius, aside = self._body.radius, look_at - self._body.center
         near = aside * min(1.0, _FARTHEST_ASIDE * radius / max(float(np.linalg.norm(aside)), 1e-9))
         center, out = self._body.center + near, position - look_at
-        height = max(out[2], min(self._body.floor + _LOWEST * radius - center[2], float(np.linalg.norm(out))))
+        lowest = self._body.mount.floor + _LOWEST * radius - center[2]
+        height = max(out[2], min(lowest, float(np.linalg.norm(out))))
         # The page reports rounded numbers: at a limit, they may lie a little beyond it.
         too_low = height - out[2] > SAME * radius
         if not too_low and float(np.linalg.norm(near - aside)) <= SAME * radius:
@@ -304,7 +305,7 @@ class VisitorCamera:
         """A sphere around the arm whose frames have these origins."""
         if self._body is None:
             return round_points(points)
-        center, radius = round_points(np.vstack([points, self._body.foot]))
+        center, radius = round_points(np.vstack([points, self._body.mount.foot]))
         return center, radius + _AROUND * self._body.radius
 
     def _choose(self, viewpoint: Array, glide: bool = True) -> None:

@@ -1,15 +1,15 @@
-"""Where the drawn arm passes through its pedestal or the floor.
+"""Where the drawn arm passes through what it is mounted on, or through the floor.
 
 The drawn parts are covered by spheres along their centre lines, each fixed to the frame of a DH row. One test of a
-configuration takes about 20 µs: 100–250 spheres against a plane and three cylinders. Links are not tested against
+configuration takes about 20 µs: 100–250 spheres against a plane and a few blocks. Links are not tested against
 each other.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,16 +17,15 @@ from numpy.typing import NDArray
 from app.viewer.scene.bodies.drawing import Drawing, drawing
 from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import Link
-from app.viewer.scene.meshes import FOOT, PLATE, Body, body
+from app.viewer.scene.meshes import Body, body
+from app.viewer.scene.mounting import FOOT, Holder
 from app.viewer.scene.shapes import spaced
 from kin import Robot, link_frames
 from kin.transforms import Array
 
-Obstacle = Literal["floor", "pedestal"]
-FLOOR: Obstacle = "floor"
-PEDESTAL: Obstacle = "pedestal"
+FLOOR: Holder = "floor"
 DEPTH = 0.2  # relative to the thickness of a link: what is less deep only touches
-# A sphere that is in the pedestal in most configurations belongs to the mounting of the arm.
+# A sphere beside the base that is in the mount or the floor in most configurations belongs to the mounting.
 SAMPLES, MOST = 100, 0.6
 
 
@@ -39,7 +38,7 @@ class Contact:
         point: centre of the sphere that is inside ``(3,)``, m.
     """
 
-    obstacle: Obstacle
+    obstacle: Holder
     link: int
     point: Array
 
@@ -56,27 +55,23 @@ class Clearance:
         self._robot = robot
         rows, points, radii, self._links = _spheres(robot, made, drawn)
         self._rows, self._points, self._radii = rows, np.column_stack([points, np.ones(len(points))]), radii
-        size, (x, y, top) = made.size, robot.T_world_base[:3, 3].tolist()
-        self._slack = DEPTH * size
-        self._floor = made.floor + radii  # lowest height of each centre that is clear of the floor
-        # Radius, lower and upper end of the pedestal's cylinders: column, plate, foot.
-        self._cylinders = (
-            (made.column, made.floor, top),
-            (PLATE * size, top - 0.9 * size, top),
-            (FOOT * size, made.floor, made.floor + 0.5 * size),
-        )
-        # Spheres beyond these bounds, in relation to the top of the pedestal, are clear of it.
-        self._top = np.array([[x, y, top]])
-        self._aside, self._above = (FOOT * size + radii) ** 2, radii.copy()
-        if made.column == 0.0:
-            self._aside[:] = -1.0
-            return
+        mount = made.mount
+        self._mount, self._slack = mount, DEPTH * made.size
+        self._floor = mount.floor + radii  # lowest height of each centre that is clear of the floor
+        # Spheres beyond these bounds, in the frame of the mount, are clear of it.
+        far = max((block.far for block in mount.blocks), default=-math.inf)
+        self._aside = np.where(far + radii > 0.0, far + radii, 0.0) ** 2
+        self._above = max((block.high for block in mount.blocks), default=-math.inf) + radii
         q = robot.random_q(np.random.default_rng(11), SAMPLES)
-        every = np.arange(len(radii))
-        inside = [
-            self._in_pedestal(self._place(frames) - self._top, every) > 0.0 for frames in link_frames(robot, q)
-        ]
-        self._aside[np.mean(inside, axis=0) > MOST] = -1.0
+        places = [self._place(frames) for frames in link_frames(robot, q)]
+        held, below, every = [], [], np.arange(len(radii))
+        for points in places:
+            local = self._local(points)
+            beside = np.hypot(local[:, 0], local[:, 1]) < FOOT * made.size + radii
+            held.append(beside & (self._inside(local, every) > 0.0))
+            below.append(beside & (points[:, 2] < self._floor))
+        self._aside[np.mean(held, axis=0) > MOST] = -1.0
+        self._floor[np.mean(below, axis=0) > MOST] = -math.inf
 
     def at(self, q: Array) -> Contact | None:
         """The deepest contact at a configuration ``(n,)``; None if there is none."""
@@ -84,35 +79,38 @@ class Clearance:
         below = self._floor - points[:, 2]
         k = int(below.argmax())
         deepest, obstacle = float(below[k]), FLOOR
-        local = points - self._top
+        local = self._local(points)
         x, y, z = local.T
         near = np.flatnonzero((x * x + y * y < self._aside) & (z < self._above))
         if len(near):
-            inside = self._in_pedestal(local, near)
+            inside = self._inside(local, near)
             i = int(inside.argmax())
             if inside[i] > deepest:
-                deepest, obstacle, k = float(inside[i]), PEDESTAL, int(near[i])
+                deepest, obstacle, k = float(inside[i]), self._mount.holder, int(near[i])
         if deepest <= self._slack:
             return None
         return Contact(obstacle, int(self._links[k]), points[k])
+
+    def _local(self, points: Array) -> Array:
+        """Points ``(k, 3)`` in the frame of the mount."""
+        local: Array = (points - self._mount.frame[:3, 3]) @ self._mount.frame[:3, :3]
+        return local
 
     def _place(self, frames: Array) -> Array:
         """Centres ``(k, 3)`` of the spheres."""
         centres: Array = (frames[self._rows, :3] @ self._points[:, :, None])[:, :, 0]
         return centres
 
-    def _in_pedestal(self, local: Array, chosen: NDArray[np.int64]) -> Array:
-        """How deep each chosen sphere is inside the pedestal, at most its radius; negative outside.
+    def _inside(self, local: Array, chosen: NDArray[np.int64]) -> Array:
+        """How deep each chosen sphere is inside the mount, at most its radius; negative outside.
 
-        `local`: centres ``(k, 3)`` in relation to the top of the pedestal.
+        `local`: centres ``(k, 3)`` in the frame of the mount.
         """
         x, y, z = local[chosen].T
-        aside = np.hypot(x, y)
-        z = z + self._top[0, 2]
         nearest = np.full(len(z), np.inf)
-        for radius, low, high in self._cylinders:
-            across = np.maximum(aside - radius, 0.0)
-            along = np.maximum(np.maximum(low - z, z - high), 0.0)
+        for block in self._mount.blocks:
+            across = block.across(x, y)
+            along = np.maximum(np.maximum(block.low - z, z - block.high), 0.0)
             nearest = np.minimum(nearest, across * across + along * along)
         depth: Array = self._radii[chosen] - np.sqrt(nearest)
         return depth

@@ -1,4 +1,4 @@
-"""The floor below an arm: a grid with a scale, and a soft shadow where the pedestal stands."""
+"""The floor below an arm: a grid with a scale, and a soft shadow where the arm stands."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Floor:
             height=width,
             cell_size=unit,
             section_size=section,
-            position=(0.0, 0.0, body.floor),
+            position=(0.0, 0.0, body.mount.floor),
             fade_distance=0.5 * width,
             fade_strength=1.6,
             fade_from="origin",
@@ -55,14 +55,19 @@ class Floor:
             **(DARK if dark else LIGHT),
         )
         wide = 15.0 * body.size
-        above = body.floor + 0.02 * body.size
-        self._shadow = scene.add_image(
-            f"{root}-shadow", _spot(), wide, wide, position=(x, y, above), cast_shadow=False, receive_shadow=False
-        )
+        above = body.mount.floor + 0.02 * body.size
+        self.nodes: list[viser.SceneNodeHandle] = [self._grid]
+        if body.mount.stands and body.mount.kind != "table":
+            shadow, at = _spot(), (x, y, above)
+            self.nodes.append(
+                scene.add_image(
+                    f"{root}-shadow", shadow, wide, wide, position=at, cast_shadow=False, receive_shadow=False
+                )
+            )
         # The bar lies along x, in front of the arm in the default view.
-        at = np.array([x + 0.1 * body.radius, y + 0.42 * body.radius, above])
-        end, tick = at + np.array([self.scale, 0.0, 0.0]), np.array([0.0, 0.03 * body.radius, 0.0])
-        bar = np.array([[at, end], [at - tick, at + tick], [end - tick, end + tick]], np.float32)
+        begin = np.array([x + 0.1 * body.radius, y + 0.42 * body.radius, above])
+        end, tick = begin + np.array([self.scale, 0.0, 0.0]), np.array([0.0, 0.03 * body.radius, 0.0])
+        bar = np.array([[begin, end], [begin - tick, begin + tick], [end - tick, end + tick]], np.float32)
         self._bar = scene.add_line_segments(
             f"{root}-scale", bar, INK_DARK if dark else INK_LIGHT, thickness=2.0, thickness_units="screen"
         )
@@ -70,11 +75,11 @@ class Floor:
             scene,
             f"{root}-scale/length",
             "",
-            position=(at + end) / 2.0 + 2.0 * tick,
+            position=(begin + end) / 2.0 + 2.0 * tick,
             scale=0.9,
             anchor="center-center",
         )
-        self.nodes: list[viser.SceneNodeHandle] = [self._grid, self._shadow, self._bar]
+        self.nodes.append(self._bar)
 
     def show(self, visible: bool) -> None:
         """Show or hide the floor."""

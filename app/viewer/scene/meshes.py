@@ -22,7 +22,8 @@ import numpy as np
 from app.viewer.scene.bodies.drawing import drawing
 from app.viewer.scene.bodies.parts import Color, Part, joint_color
 from app.viewer.scene.chain import Chain, Link, chain, link_poses
-from app.viewer.scene.shapes import Solid, ball, box, cone, cylinder, merged, placed, tube
+from app.viewer.scene.mounting import Mount, mount_of
+from app.viewer.scene.shapes import Solid, ball, box, cone, cylinder, merged, tube
 from kin import Robot, link_frames
 from kin.transforms import Array
 
@@ -30,11 +31,7 @@ LINK_COLOR: Color = (214, 218, 224)
 TRIM_COLOR: Color = (58, 64, 74)
 TOOL_COLOR: Color = (136, 144, 158)  # three times as light as a dark page, and as dark as a light one
 APPROACH_COLOR: Color = (214, 39, 120)
-PEDESTAL_COLOR: Color = (126, 134, 147)
-PROBES = 8000
 MOST_AT_A_POINT = 4  # drums at one point, beyond which no further one is longer
-PEDESTAL = 0.12  # height of a pedestal, relative to the reach
-COLUMN, PLATE, FOOT = 1.6, 2.3, 3.4  # radii of its column, plate and foot, relative to the thickness of a link
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +42,7 @@ class Body:
         chain: the links.
         parts: per link (base first), its meshes.
         gripper: the tool's meshes in the tool frame, z being the approach direction.
-        pedestal: supports the base, in world coordinates.
-        column: radius of the pedestal's column (m) below an upright base; 0 if the base hangs or is tilted.
-        floor: height of the floor (m), below the arm at home; the arm may reach lower.
-        foot: where the pedestal stands ``(3,)``.
+        mount: what holds the base, and the floor.
         center, radius: the sphere ``(3,)``, m that the camera should show.
         size: radius of the thickest link (m), the unit of all decoration.
         radii: radius (m) of each link's tube, base first.
@@ -57,10 +51,7 @@ class Body:
     chain: Chain
     parts: tuple[tuple[Part, ...], ...]
     gripper: tuple[Part, ...]
-    pedestal: Part
-    column: float
-    floor: float
-    foot: Array
+    mount: Mount
     center: Array
     radius: float
     size: float
@@ -82,13 +73,10 @@ def body(robot: Robot) -> Body:
         crowd = min(crowd + 1, MOST_AT_A_POINT) if crowded else 0
         held = grip if all(len(after.path) < 2 for after in links.links[link.index + 2 :]) else 0.0
         parts.append(_link_parts(link, radii[link.index + 1], crowd, held, links))
-    floor = _floor(robot, size)
-    center, radius = _view_sphere(robot, floor, size)
+    mount = mount_of(robot, size)
+    center, radius = _view_sphere(robot, mount, size)
     hand = _gripper(min(size, grip / 2), grip)
-    pedestal = _pedestal(robot, size, floor)
-    column = COLUMN * size if _upright(robot) else 0.0
-    foot = np.array([*robot.T_world_base[:2, 3], floor if column else robot.T_world_base[2, 3]])
-    return Body(links, tuple(parts), hand, pedestal, column, floor, foot, center, radius, size, radii)
+    return Body(links, tuple(parts), hand, mount, center, radius, size, radii)
 
 
 def _thickness(robot: Robot, links: Chain) -> float:
@@ -217,52 +205,12 @@ def _gripper(size: float, grip: float) -> tuple[Part, ...]:
     )
 
 
-def _upright(robot: Robot) -> bool:
-    return bool(robot.T_world_base[2, 2] > 0.7)
-
-
-def _floor(robot: Robot, size: float) -> float:
-    """Height of the floor: a short pedestal below an upright base, and below the arm at home.
-
-    An arm that can go deeper may pass through the floor. A tilted or hanging arm stays above it.
-    """
-    lowest = float(_extent(robot)[0][2]) - 2.5 * size
-    base = float(robot.T_world_base[2, 3])
-    floor = min(lowest, base - 3 * size)
-    if _upright(robot):
-        home = float(link_frames(robot, robot.q_home)[:, 2, 3].min()) - 1.8 * size
-        floor = max(floor, min(base - max(PEDESTAL * robot.reach, 3 * size), home))
-    return math.floor(floor / 0.05) * 0.05
-
-
-def _pedestal(robot: Robot, size: float, floor: float) -> Part:
-    """A plate at the base, and a column down to the floor; that of a hanging base leads up."""
-    base = robot.T_world_base
-    top = float(base[2, 3])
-    plate = placed(cylinder(PLATE * size, -0.9 * size, 0.0), base)
-    foot = np.eye(4)
-    foot[:2, 3] = base[:2, 3]
-    if base[2, 2] < -0.7:
-        column = [cylinder(COLUMN * size, top + 0.4 * size, top + 6.0 * size, bevel=0.02)]
-    else:
-        column = [
-            cylinder(COLUMN * size, floor, top - 0.4 * size, bevel=0.02),
-            cylinder(FOOT * size, floor, floor + 0.5 * size),
-        ]
-    return Part("pedestal", merged([plate, *(placed(part, foot) for part in column)]), PEDESTAL_COLOR)
-
-
-def _extent(robot: Robot) -> Array:
-    """Lowest and highest coordinates ``(2, 3)`` of the arm's frames, in a fixed sample of configurations."""
-    q = robot.random_q(np.random.default_rng(7), PROBES)
-    points = link_frames(robot, q)[..., :3, 3].reshape(-1, 3)
-    return np.array([points.min(axis=0), points.max(axis=0)])
-
-
-def _view_sphere(robot: Robot, floor: float, size: float) -> tuple[Array, float]:
-    """A sphere around the arm at home and its pedestal."""
+def _view_sphere(robot: Robot, mount: Mount, size: float) -> tuple[Array, float]:
+    """A sphere around the arm at home and what it is mounted on."""
     points = [robot.T_world_base[None, :3, 3], link_frames(robot, robot.q_home)[:, :3, 3]]
-    points.append(np.array([[*robot.T_world_base[:2, 3], floor]]))
+    points.append(mount.foot[None])
+    if mount.kind in ("table", "ceiling"):
+        points.append(np.maximum(mount.part.mesh.bounds, [-np.inf, -np.inf, mount.foot[2]]))
     drawn = drawing(robot)
     if drawn is not None:
         poses = link_poses(robot, robot.q_home[None])[0]

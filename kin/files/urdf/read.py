@@ -36,9 +36,10 @@ from kin.files.urdf.poses import motion_of
 from kin.files.urdf.tree import Tip, UrdfJoint, UrdfTree, read_tree
 from kin.fk import fk
 from kin.frames import matrix_of
-from kin.robot import DEFAULT_LIMITS, Joint, Robot
+from kin.robot import DEFAULT_LIMITS, Joint, Mounting, Robot
 from kin.transforms import Array
 
+_UPRIGHT = 0.7  # of the height of a vertical axis of unit length
 EXACT = 1e-12  # a larger difference, per metre of reach, is noted
 
 
@@ -203,6 +204,8 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
         home=tuple(0.5 * sum(joint.limits or (0.0,)) for joint in joints),
         base=table.base,
         tool=table.tool,
+        mounting=_mounting(chain[0]),
+        floor=0.0,
     )
     if robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3])) > MAX_REACH:
         expected = f"at most {MAX_REACH:g} m with the base"
@@ -227,6 +230,14 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
         samples=SAMPLES,
     )
     return UrdfRobot(robot, report)
+
+
+def _mounting(first: UrdfJoint) -> Mounting:
+    """What the arm is mounted on: the floor, unless a fixed joint of the link `world` turns its root."""
+    if first.moves or first.parent != "world":
+        return "floor"
+    up = matrix_of(*first.origin())[2][2]
+    return "floor" if up > _UPRIGHT else "ceiling" if up < -_UPRIGHT else "wall"
 
 
 def _source(tree: UrdfTree) -> str:

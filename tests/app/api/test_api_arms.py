@@ -196,6 +196,9 @@ def test_equations_of_an_arm_sent_along(client):
         ({"colour": "red"}, "robot.colour", "convention"),
         ({"home": {"q": [500, 0, 0, 0, 0]}}, "robot.home.q[0]", "inside the limits"),
         ({"base": {"matrix": [[1]]}}, "robot.base.matrix", "four rows"),
+        ({"mounting": "sky"}, "robot.mounting", '"ceiling"'),
+        ({"floor": "deep"}, "robot.floor", "a finite number"),
+        ({"floor": [0]}, "robot.floor", "a finite number"),
     ],
 )
 def test_an_error_in_a_sent_arm_names_the_field(client, change, field, valid):
@@ -210,6 +213,18 @@ def test_a_sent_arm_is_an_object(client, robot):
     problem = post(client, "ik", {**TARGET, "robot": robot}, 422)
     assert problem["errors"][0]["field"] == "robot"
     assert post(client, "ik", TARGET, 422)["errors"][0]["field"] == "robot"
+
+
+def test_mounting_and_floor_of_an_arm(client):
+    answer = client.get("/api/v1/robots/gen3").json()
+    assert (answer["mounting"], answer["floor"]) == ("floor", 0.0)
+    answer = client.get("/api/v1/robots/ur5").json()
+    assert (answer["mounting"], answer["floor"]) == (None, None)
+    sent = {**EXAMPLE, "mounting": "wall", "floor": -750}
+    assert post(client, "fk", {"robot": sent, "q": Q}) == post(client, "fk", {"robot": EXAMPLE, "q": Q})
+    found = post(client, "robots/import", {"urdf": kin.to_urdf("ur5")})
+    assert (found["description"]["mounting"], found["description"]["floor"]) == ("floor", 0)
+    assert (found["robot"]["mounting"], found["robot"]["floor"]) == ("floor", 0.0)
 
 
 def test_nan_in_a_sent_arm_is_refused(client):

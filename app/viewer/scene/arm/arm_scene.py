@@ -193,11 +193,11 @@ class ArmScene:
             self._gap.points = np.array([[tool, target]], dtype=np.float32)
 
     def contact_at(self, q: Array) -> Contact | None:
-        """Where the arm, as it is drawn, passes through pedestal or floor at a configuration ``(n,)``."""
+        """Where the arm, as it is drawn, passes through its mount or the floor at a configuration ``(n,)``."""
         return (self._skeleton_clear if self._bare else self._clear).at(q)
 
     def show_contact(self, contact: Contact | None, target: Array | None = None) -> str:
-        """Mark where the arm passes through pedestal or floor; returns the sentence at the mark, or "".
+        """Mark where the arm passes through its mount or the floor; returns the sentence at the mark, or "".
 
         `target`: a missed target ``(3,)``, whose number the sentence must not cover.
         """
@@ -272,7 +272,7 @@ class ArmScene:
     def _build_arm(self) -> None:
         root = self._scene.add_frame(self._root, show_axes=False)
         self._top.append(root)
-        self._add(self._root, self.body.pedestal)
+        self._add(self._root, self.body.mount.part)
         self._frames = ArmFrames(self._scene, self._root, self.robot, self.body, 0.5 * GIZMO * self.body.radius)
         self._frames.add(self._root, -1, self.robot.T_world_base)
         name = self._root

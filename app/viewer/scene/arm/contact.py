@@ -1,4 +1,4 @@
-"""The mark where the arm passes through pedestal or floor."""
+"""The mark where the arm passes through what it is mounted on, or through the floor."""
 
 from __future__ import annotations
 

@@ -16,9 +16,11 @@ from app.viewer.meshes.links import capsules_for
 from app.viewer.own_arm import NAME, OF_MAKER, OwnArm, own_arm
 from app.viewer.panel.entry import read_cell
 from app.viewer.panel.rotations import roll_pitch_yaw
+from app.viewer.scene.meshes import body
+from app.viewer.scene.mounting import turn_of
 from kin import InputError, KinematicsError, Robot, RobotFileError
 from kin.files.read import PER
-from kin.robot import PEAK_FIELDS
+from kin.robot import MOUNTINGS, PEAK_FIELDS
 from kin.typed import ReadError, cut
 from kin.units import Units
 
@@ -29,6 +31,7 @@ NUMBERS = ("theta", "d", "a", "alpha", "low", "high")
 MOTION = ("home", *(key for key in PEAK_FIELDS if key in PER))  # of a joint, besides the table
 COLUMNS = (*NUMBERS, "name", "kind", *MOTION)
 FRAMES = ("tool", "base")
+PLACE = ("mounting", "floor")  # of the arm in the room, besides its base
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 KINDS = ("revolute", "prismatic", "fixed")
 NEW_LINK = 100  # mm: the length of a new row, so that it is seen
@@ -53,7 +56,7 @@ def name_of(cell: Cell) -> str:
         return f"row {where + 1}, {_SHOWN.get(column, column)}"
     if where.startswith("frame-"):
         return f"frame {int(where[6:]) + 1}, {column}"
-    return "name" if where == "arm" else f"{where}, {column}"
+    return column if where == "arm" else f"{where}, {column}"
 
 
 def fields_of(robot: Robot, own: OwnArm | None) -> tuple[Fields, str]:
@@ -80,7 +83,7 @@ def typed(robot: Robot, own: OwnArm | None, texts: Mapping[Cell, str], units: Un
             if isinstance(where, int):
                 _type_row(data, robot, where, column, text, units)
             elif where == "arm":
-                data["name"] = text
+                _type_arm(data, robot, column, text, units)
             else:
                 _type_frame(data, robot, where, column, text, units)
         except ReadError as error:
@@ -210,6 +213,33 @@ def _type_motion(data: Fields, robot: Robot, index: int, column: str, text: str,
         data["rows"][index][column] = quantity(given, units, turning) + PER[column]
 
 
+def _type_arm(data: Fields, robot: Robot, column: str, text: str, units: Units) -> None:
+    """The name of the arm, what it is mounted on, or the height of the floor; without a text that is assumed."""
+    if column == "mounting":
+        _mount(data, robot, text)
+    elif column == "floor":
+        data.pop("floor", None)
+        if text.strip():
+            data["floor"] = quantity(text, units, False)
+    else:
+        data["name"] = text
+
+
+def _mount(data: Fields, robot: Robot, kind: str) -> None:
+    """Mount the arm on something else: it is turned with its base, which stays where it is."""
+    if kind not in MOUNTINGS:
+        raise ReadError(f"“{cut(kind)}” is none of " + ", ".join(MOUNTINGS))
+    before, T = body(robot).mount, robot.T_world_base.copy()
+    if kind != before.kind:
+        data.pop("floor", None)
+    data["mounting"] = kind
+    T[:3, :3] = turn_of(kind) @ turn_of(before.kind).T @ T[:3, :3]
+    data.pop("base", None)
+    turned = kin.robot_to_dict(robot.with_base(T + 0.0))  # without zeros that are negative
+    if "base" in turned:
+        data["base"] = turned["base"]
+
+
 def _type_frame(data: Fields, robot: Robot, frame: str, axis: str, text: str, units: Units) -> None:
     if "xyz" not in data.get(frame, {}) or "rpy" not in data[frame]:
         values = frame_values(robot, frame)
@@ -253,7 +283,7 @@ def part_of(cell: Cell) -> str:
     where, column = cell
     if isinstance(where, int):
         return "motion" if column in MOTION else "table"
-    return "start" if where == "arm" else "frames"
+    return "start" if cell == ("arm", "name") else "frames"
 
 
 def alike(one: Robot, other: Robot, named: bool) -> bool:

@@ -291,6 +291,8 @@ class RobotTab(Feature):
         self._wrong.pop(cell, None)
         if column == "kind":
             editing, before = "kind", {}
+        if column == "mounting":
+            editing = column  # the fields of the base and of the floor are written again
         for texts in ({**before, cell: text}, {cell: text}):
             try:
                 own = edits.typed(robot, self._own, texts, units)
@@ -306,7 +308,8 @@ class RobotTab(Feature):
 
     def _cell(self, where: int | str, column: str) -> Cell:
         """A cell of the page; raises `InputError` if there is none."""
-        valid = edits.COLUMNS if isinstance(where, int) else ("name",) if where == "arm" else edits.AXES
+        columns = {"arm": ("name", *edits.PLACE)}
+        valid = edits.COLUMNS if isinstance(where, int) else columns.get(where, edits.AXES)
         rows = range(len(self.stage.now.robot.rows))
         if where not in (rows if isinstance(where, int) else ("arm", *edits.FRAMES)) or column not in valid:
             raise InputError("cell", (where, column), "a cell of the table")

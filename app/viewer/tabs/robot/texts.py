@@ -12,7 +12,7 @@ from kin.units import Unit
 MOST = 64  # texts that are kept
 IN_LINK = 800  # characters of all texts and their cells in a link; longer ones stay in the page
 _PLAIN = re.compile(r"\s*[-+−]?[0-9]*[.,]?[0-9]*\s*")  # shown as any number is
-_CELL = re.compile(r"([0-9]{1,2}|tool|base|frame-[0-9]) ([a-z]{1,12})")
+_CELL = re.compile(r"([0-9]{1,2}|arm|tool|base|frame-[0-9]) ([a-z]{1,12})")
 
 
 class Texts:
@@ -24,7 +24,7 @@ class Texts:
     def remember(self, cell: Cell, text: str) -> None:
         """A valid text was typed."""
         self._texts.pop(cell, None)
-        if cell[1] not in ("kind", "name") and not _PLAIN.fullmatch(text):
+        if cell[1] not in ("kind", "name", "mounting") and not _PLAIN.fullmatch(text):
             self._texts[cell] = text.strip()
         while len(self._texts) > MOST:
             del self._texts[next(iter(self._texts))]

@@ -11,6 +11,7 @@ from app.shared.answers.inspection import InspectionAnswer
 from app.viewer.frames import MOST as MOST_FRAMES
 from app.viewer.frames import Frames
 from app.viewer.meshes.archive import MB, MOST_BYTES
+from app.viewer.scene.meshes import body
 from app.viewer.tabs.robot.edits import (
     ANGLES,
     AXES,
@@ -30,11 +31,19 @@ from app.viewer.views.templates import render
 from kin import Joint, Robot
 from kin.dh import SAMPLES, largest_difference
 from kin.files.read import PER
+from kin.robot import MOUNTINGS
 from kin.units import Unit, Units, power
 
 FILE, LINK = "your own file", "a link"  # what an arm was made from, besides examples and robots
 MOST_TIPS = 50  # links of a URDF to choose from
 DECIMALS = 6  # of a degree or a millimetre, in a cell
+MOUNTING_TITLES: dict[str, str] = {
+    "pedestal": "on a pedestal",
+    "floor": "on the floor",
+    "table": "on a table",
+    "wall": "at a wall",
+    "ceiling": "under a ceiling",
+}
 KIND_TITLES = {"revolute": "turns", "prismatic": "slides", "fixed": "fixed"}
 _HEADS = {
     "kind": ("joint", "Whether the joint of this row turns (revolute), slides (prismatic) or does not move"),
@@ -260,7 +269,16 @@ def frames(robot: Robot, units: Units, page: Frames, texts: Texts) -> str:
     length, angle = units.lengths.name, units.angles.name
     own, fixed = rows[len(FRAMES) :], rows[: len(FRAMES)]
     full = len(own) >= MOST_FRAMES
-    return render("robot/frames", heads=AXES, rows=fixed, workpieces=own, full=full, length=length, angle=angle)
+    mount = body(robot).mount
+    held = None if robot.floor is None else _text(("arm", "floor"), robot.floor, units, False, texts)
+    place = {
+        "mountings": [(key, MOUNTING_TITLES[key]) for key in MOUNTINGS],
+        "mounting": mount.kind,
+        "floor": held or "",
+        "hint": text_of(mount.floor, units.lengths),
+    }
+    shown = {"place": place, "workpieces": own, "full": full, "length": length, "angle": angle}
+    return render("robot/frames", heads=AXES, rows=fixed, **shown)
 
 
 def files(waiting: Source | None, busy: Busy | None, meshes: str, heavy: bool) -> str:

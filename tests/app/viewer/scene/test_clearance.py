@@ -12,6 +12,7 @@ from app.viewer.scene.bodies.drawing import drawing
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.clearance import clearance
 from app.viewer.scene.meshes import body
+from app.viewer.scene.mounting import COLUMN
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -45,17 +46,17 @@ def test_contacts_agree_with_the_meshes(robot: kin.Robot, skeleton: bool) -> Non
     for q in robot.random_q(np.random.default_rng(4), 60):
         contact = test.at(q)
         parts = drawn(robot, q, skeleton)
-        depth = max(made.floor - vertices[:, 2].min() for _, vertices in parts)
+        depth = max(made.mount.floor - vertices[:, 2].min() for _, vertices in parts)
         if contact is None:
             assert depth < 0.8 * made.size, "a part under the floor is found"
             for index, vertices in parts[len(parts) // 2 :]:
                 x, y, z = (vertices - robot.T_world_base[:3, 3]).T
-                core = (np.hypot(x, y) < 0.5 * made.column) & (z < -made.size) & (z > made.floor)
+                core = (np.hypot(x, y) < 0.5 * COLUMN * made.size) & (z < -made.size) & (z > made.mount.floor)
                 assert not core.any(), f"link {index + 1} is inside the column"
         elif contact.obstacle == "floor":
             assert depth > 0.0
             low = min(v[:, 2].min() for index, v in parts if index == contact.link)
-            assert low < made.floor + 0.3 * made.size, "the link that is named is the one under the floor"
+            assert low < made.mount.floor + 0.3 * made.size, "the link that is named is the one under the floor"
         else:
             aside = np.hypot(*(contact.point - robot.T_world_base[:3, 3])[:2])
             assert aside < 6.0 * made.size

@@ -442,11 +442,13 @@ def test_the_camera_returns_from_below_the_floor_and_from_far_aside(port: int) -
         ):
             orbit(tab, np.array([position, look_at, camera.UP]))
             tab.wait(
-                lambda look_at=look_at: not np.allclose(shown(tab)[1], look_at) or shown(tab)[0][2] > made.floor
+                lambda look_at=look_at: (
+                    not np.allclose(shown(tab)[1], look_at) or shown(tab)[0][2] > made.mount.floor
+                )
             )
             tab.settle(quiet=0.8)
             there = shown(tab)
-            assert there[0][2] > made.floor
+            assert there[0][2] > made.mount.floor
             assert np.linalg.norm(there[1] - made.center) < 3.01 * made.radius
             assert np.linalg.norm(there[0] - there[1]) == pytest.approx(
                 np.linalg.norm(position - look_at), rel=1e-6

@@ -131,34 +131,36 @@ def test_the_last_small_step_is_not_dropped(server: viser.ViserServer) -> None:
 @pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
 def test_bodies_are_valid_and_above_the_floor(robot: kin.Robot) -> None:
     made = body(robot)
-    for part in [made.pedestal, *made.gripper, *(p for parts in made.parts for p in parts)]:
+    for part in [made.mount.part, *made.gripper, *(p for parts in made.parts for p in parts)]:
         assert np.isfinite(part.mesh.vertices).all(), part.name
         assert part.mesh.faces.max() < len(part.mesh.vertices)
         assert trimesh.Trimesh(*part.mesh, process=False).area > 0
     base = robot.T_world_base
-    upright = base[2, 2] > 0.7
+    upright = bool(base[2, 2] > 0.7) or robot.mounting == "floor"
     q = robot.q_home[None] if upright else robot.random_q(np.random.default_rng(3), 4000)
-    assert kin.link_frames(robot, q)[..., 2, 3].min() - made.size > made.floor
-    assert (made.column > 0) == upright
+    assert kin.link_frames(robot, q)[..., 2, 3].min() - made.size > made.mount.floor
+    assert made.mount.stands == (upright or base[2, 2] > -0.7), "a tilted one stands, too"
     lowest_home = kin.link_frames(robot, robot.q_home)[:, 2, 3].min()
-    if upright and lowest_home > base[2, 3]:
-        assert base[2, 3] - made.floor < 0.2 * robot.reach + 3 * made.size + 0.05, "the pedestal is short"
-    assert made.pedestal.mesh.bounds[0, 2] == pytest.approx(made.floor)
+    if upright and made.mount.kind == "pedestal" and lowest_home > base[2, 3]:
+        assert base[2, 3] - made.mount.floor < 0.2 * robot.reach + 3 * made.size + 0.05, "the pedestal is short"
+    if made.mount.stands:
+        assert made.mount.part.mesh.bounds[0, 2] == pytest.approx(made.mount.floor)
     assert len(made.parts) == robot.n + 1
     for link in made.parts[1:]:
         assert {"housing", "axis"} <= {part.name for part in link}, "each joint shows itself and its axis"
 
 
-def test_a_hanging_arm_hangs_from_a_column() -> None:
+def test_a_hanging_arm_hangs_from_a_ceiling() -> None:
     down = robot_of(
         "standard", ("1", "revolute", 0, 0.2, 0, 90), ("2", "revolute", 0, 0, 0.3, 0),
         extra="[base]\nxyz = [0, 0, 1.5]\nrpy = [180, 0, 0]\n",
     )  # fmt: skip
     made = body(down)
-    assert made.column == 0.0
-    assert made.pedestal.mesh.bounds[0, 2] > 1.49, "nothing stands where the arm moves"
-    assert made.pedestal.mesh.bounds[1, 2] > 1.5
-    assert made.floor < 1.5 - 0.5
+    assert made.mount.kind == "ceiling"
+    assert not made.mount.stands
+    assert made.mount.part.mesh.bounds[0, 2] > 1.49, "nothing stands where the arm moves"
+    assert made.mount.part.mesh.bounds[1, 2] > 1.5
+    assert made.mount.floor < 1.5 - 0.5
 
 
 def test_the_floor_names_its_scale_and_the_gizmo_stands_free(server: viser.ViserServer) -> None:

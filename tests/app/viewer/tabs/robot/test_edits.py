@@ -158,6 +158,40 @@ def test_a_tool_moves_the_tool_point_and_a_base_the_whole_arm():
     assert frame_values(based.robot, "base") == (0.5, 0.0, 0.0, 0.0, 0.0, math.pi / 2)
 
 
+def test_another_mounting_turns_the_arm_with_its_base_and_back():
+    q, placed = UR5.q_home, UR5.with_base(kin.from_xyz_rpy([0.1, 0.2, 0.3], [0.0, 0.0, 0.4]))
+    own, T = None, kin.fk(placed, q)
+    robot = placed
+    for mounting, turn in (
+        ("ceiling", [math.pi, 0.0, 0.0]),
+        ("wall", [0.0, math.pi / 2, 0.0]),
+        ("table", [0.0] * 3),
+    ):
+        own = type_in(robot, (("arm", "mounting"), mounting), own=own)
+        robot = own.robot
+        assert robot.mounting == mounting
+        about = kin.from_xyz_rpy([0.0, 0.0, 0.0], turn)[:3, :3]
+        expected = about @ (T[:3, 3] - [0.1, 0.2, 0.3]) + [0.1, 0.2, 0.3]
+        assert np.abs(kin.fk(robot, q)[:3, 3] - expected).max() < 1e-12
+        assert np.abs(kin.fk(robot, q)[:3, :3] - about @ T[:3, :3]).max() < 1e-12
+    assert np.abs(robot.T_world_base - placed.T_world_base).max() < 1e-15
+
+
+def test_the_floor_is_typed_emptied_and_forgotten_with_the_mounting():
+    own = type_in(UR5, (("arm", "floor"), "-25 cm"))
+    assert (own.robot.floor, own.robot.mounting) == (-0.25, None)
+    assert type_in(own.robot, (("arm", "floor"), " "), own=own).robot.floor is None
+    hanging = type_in(own.robot, (("arm", "mounting"), "ceiling"), own=own)
+    assert hanging.robot.floor is None, "the floor of a pedestal is none of a ceiling"
+    for column, text, words in (
+        ("mounting", "sky", "“sky” is none of pedestal"),
+        ("floor", "deep", "not a number"),
+    ):
+        with pytest.raises(EditError, match=words) as caught:
+            type_in(UR5, (("arm", column), text))
+        assert caught.value.cell == ("arm", column)
+
+
 def test_rows_are_added_moved_and_removed():
     robot = UR5
     added = changed_rows(robot, None, lambda rows: add_row(rows, 2, robot.units))

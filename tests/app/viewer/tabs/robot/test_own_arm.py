@@ -70,6 +70,18 @@ def test_a_link_of_a_planar_example_with_its_former_lengths_still_opens():
     assert [row.a for row in own.robot.rows] == [0.4, 0.3]
 
 
+def test_mounting_and_floor_are_in_the_link_and_arms_without_them_are_as_before():
+    plain = own_arm(PRESETS["wrist-6r"])
+    assert {"m", "z"}.isdisjoint(pack(plain))
+    for mounting, floor in (("wall", -0.31), ("table", None), (None, 0.2)):
+        robot = replace(plain.robot, mounting=mounting, floor=floor)
+        own = own_arm(kin.robot_to_dict(robot))
+        back = unpack(json.loads(json.dumps(pack(own))))
+        assert back == own
+        assert (back.robot.mounting, back.robot.floor) == (mounting, floor)
+        assert back.robot.id != plain.robot.id
+
+
 def test_a_page_with_an_own_arm_is_restored_from_its_link():
     own = own_arm(PRESETS["wrist-6r"], "wrist-6r")
     q = own.robot.random_q(np.random.default_rng(1))
@@ -141,6 +153,11 @@ GOOD = pack(own_arm(PRESETS["planar-2r"]))
         ({"b": {"xyz": [50000, 0, 0]}, "u": "m"}, "base.xyz"),
         ({"t": {"matrix": [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}}, "tool.matrix"),
         ({"t": 7}, "tool"),
+        ({"m": "sky"}, "mounting"),
+        ({"m": ["wall"]}, "mounting"),
+        ({"z": math.inf}, "floor"),
+        ({"z": "low"}, "floor"),
+        ({"z": 2000, "u": "m"}, "floor"),
     ],
 )
 def test_what_is_no_arm_is_refused_by_field_and_the_rest_of_the_link_is_kept(changes, field):

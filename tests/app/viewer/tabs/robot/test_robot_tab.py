@@ -17,6 +17,7 @@ import kin
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
 from app.viewer.own_arm import own_arm, pack
+from app.viewer.scene.meshes import body
 from app.viewer.session.events import SHORT_PAUSE
 from app.viewer.session.state import PageState, decode, encode
 from app.viewer.tabs.robot import files
@@ -197,6 +198,26 @@ def test_what_is_wrong_with_a_frame_is_said_below_the_frames(port: int) -> None:
         assert "Tool, x: “5o” is not a number" in part(tab, "wrong-frames")
         assert list(wrong(tab)) == ["tool x"]
         assert "5o" not in part(tab, "wrong").partition(">")[2]
+
+
+def test_the_mounting_is_chosen_and_the_floor_is_typed(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        assert '<option value="pedestal" selected>' in part(tab, "frames")
+        assumed = re.search(r'data-cell="arm floor" value="" placeholder="(.*?)"', part(tab, "frames"))
+        assert assumed is not None
+        assert float(assumed[1].replace("−", "-")) == pytest.approx(1000.0 * body(PIONEER).mount.floor)
+        type_in(tab, "arm", "mounting", "ceiling")
+        assert '<option value="ceiling" selected>' in part(tab, "frames")
+        assert (cell(tab, "base roll"), tab.script["undo"]) == ("180", "Mounting")
+        type_in(tab, "arm", "floor", "-800")
+        type_in(tab, "arm", "floor", "-8oo")
+        assert "Floor: “-8oo” is not a number" in part(tab, "wrong-frames")
+        own = saved(tab).own
+        assert own is not None
+        assert (own.robot.mounting, own.robot.floor) == ("ceiling", -0.8)
+        floor = next(name for name in tab.nodes if name.endswith("-floor"))
+        assert tab.local(floor)[2, 3] == pytest.approx(-0.8)
 
 
 def test_a_wrong_cell_is_marked_and_the_last_valid_arm_stays(port: int) -> None:
