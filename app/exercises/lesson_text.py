@@ -17,6 +17,7 @@ same fields::
     end = "moved"
     figure = "speeds"
     drawn = { pose = "moved", joint = 1 }
+    arm = { when = "not turns(1)", id = "ur5" }
 
     [steps.question]
     kind = "number"
@@ -25,7 +26,8 @@ same fields::
     withheld = ["jacobian"]
 
 Poses and figures are the lesson's own. The scene shows `end` with the right answer; `drawn` is a pose that shows a
-wrong one, with the answer as the value of a joint. What is `withheld` is nowhere to be seen before.
+wrong one, with the answer as the value of a joint. What is `withheld` is nowhere to be seen before. `arm` is one
+of the library that shows what this one cannot; a button changes to it.
 
 Texts may be lists of alternatives with `when`, and so may questions. Steps and questions of the check with `when`
 are left out where it does not hold.
@@ -68,6 +70,7 @@ class StepText:
     Attributes:
         questions: alternatives, of which the first whose condition holds is asked; there may be none.
         drawn: how a wrong joint value is drawn: the pose that has it, and the number of the joint.
+        arm: when another arm is offered, and its id.
     """
 
     when: Expression
@@ -80,6 +83,7 @@ class StepText:
     end: str
     figure: str
     drawn: tuple[str, int] | None
+    arm: tuple[Expression, str] | None
 
 
 @dataclass(frozen=True)
@@ -174,6 +178,7 @@ def _step(fields: Fields) -> StepText:
         fields.text("end", _NONE),
         fields.text("figure", _NONE),
         _drawn(fields.sub("drawn")) if fields.has("drawn") else None,
+        _arm(fields.sub("arm")) if fields.has("arm") else None,
     )
     fields.done()
     return step
@@ -181,6 +186,12 @@ def _step(fields: Fields) -> StepText:
 
 def _drawn(fields: Fields) -> tuple[str, int]:
     found = fields.text("pose"), fields.whole("joint", 1, MOST_JOINTS)
+    fields.done()
+    return found
+
+
+def _arm(fields: Fields) -> tuple[Expression, str]:
+    found = fields.expression("when", "1"), fields.choice("id", kin.builtin_robots())
     fields.done()
     return found
 

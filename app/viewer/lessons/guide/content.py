@@ -114,4 +114,5 @@ class _Maker:
             self.named("figure", text.figure, self.facts.figures),
             withheld=frozenset() if asked is None else asked.withheld,
             drawn=None if text.drawn is None else self.drawn(*text.drawn),
+            arm="" if text.arm is None or not self.holds(text.arm[0]) else text.arm[1],
         )

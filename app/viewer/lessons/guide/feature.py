@@ -41,7 +41,7 @@ class Guide(Feature):
     key = "guide"
     title = "Lesson"
     shared = True
-    messages = frozenset({"go", "answer", "fields", "posture", "pick", "reveal", "pose", "restart"})
+    messages = frozenset({"go", "answer", "fields", "posture", "pick", "reveal", "pose", "arm", "restart"})
 
     def __init__(self, stage: Stage, lesson: type[Lesson], state: dict[str, object] | None = None) -> None:
         super().__init__(stage)
@@ -92,6 +92,10 @@ class Guide(Feature):
                 self._move_to_end(question)
             case ("pose", int()):
                 self._bring()
+            case ("arm", int()):
+                if robot_id := self._offered:
+                    self.stage.change_robot(self.stage.store.get(robot_id))
+                    return
             case ("restart", int()):
                 progress.restart()
                 self._sheets.clear()
@@ -112,8 +116,20 @@ class Guide(Feature):
         """The index of the step on show."""
         return self._progress.at
 
+    @property
+    def _offered(self) -> str:
+        """The id of the arm that the step on show offers instead of this one; "": none."""
+        steps, at = self._progress.outline.steps, self._progress.at
+        return steps[at].arm if at < len(steps) else ""
+
     def step_name(self, key: Hashable) -> str:
-        names = {"go": "Step", "pose": "Pose of the step", "reveal": "Answer shown", "restart": "Answers cleared"}
+        names = {
+            "go": "Step",
+            "pose": "Pose of the step",
+            "arm": "Robot",
+            "reveal": "Answer shown",
+            "restart": "Answers cleared",
+        }
         return names.get(str(key[0]), "Answer") if isinstance(key, tuple) else "Joint sliders"
 
     def on_robot(self) -> None:
@@ -226,7 +242,9 @@ class Guide(Feature):
             activity.pass_lesson(self._lesson.key, self.stage.now.robot.id)
         open_ = [key for key, _ in progress.outline.questions() if self._is_on_show(key)]
         update_html(self._goal, views.goal_html(self._lesson.title, progress.outline.goal))
-        update_html(self._steps, views.steps_html(progress, {key: self._sheet(key) for key in open_}))
+        offered = self.stage.store.get(self._offered).name if self._offered else ""
+        sheets = {key: self._sheet(key) for key in open_}
+        update_html(self._steps, views.steps_html(progress, sheets, offered))
         forms = {key: progress.question(key).asked() for key in open_ if not progress.is_closed(key)}
         self._draw_ghost([key for key, asked in forms.items() if asked.form == "frame"])
         self._draw_answer()

@@ -96,6 +96,7 @@ class Step:
         practice: what to see or to do on the page then, in words that follow `shown`.
         figure: a figure that belongs to `shown`.
         drawn: what the scene shows of a wrong answer, beside what it shows anyway.
+        arm: the id of an arm of the library that shows what the arm on show cannot; "": it can.
         withheld: facts that nothing in the page shows while the question is open:
             names of `app.viewer.activity.activity.FACTS`.
     """
@@ -110,6 +111,7 @@ class Step:
     figure: Markup | None = None
     withheld: frozenset[str] = frozenset()
     drawn: Drawn | None = None
+    arm: str = ""
 
 
 @dataclass(frozen=True)

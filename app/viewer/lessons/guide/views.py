@@ -23,11 +23,12 @@ def goal_html(lesson: str, goal: str) -> str:
     return render("guide/goal", lesson=lesson, goal=goal)
 
 
-def steps_html(progress: Progress, sheets: dict[str, Sheet]) -> str:
+def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "") -> str:
     """The step on show, or the check.
 
     Args:
         sheets: what was entered, by the key of the question.
+        arm: the name of the arm that the step offers instead of this one.
     """
     steps, at = progress.outline.steps, progress.at
     marks = []
@@ -53,6 +54,7 @@ def steps_html(progress: Progress, sheets: dict[str, Sheet]) -> str:
         marks=marks,
         at=at,
         step=step,
+        arm=arm,
         question=None if step.question is None else _question(progress, key, step.question, sheets),
         open=step.question is None or progress.is_closed(key),
     )

@@ -49,6 +49,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     theta, back = axis_angle(R)[1], inverse(T)[:3, 3]
     k = int(np.argmax(np.abs(back)))
     numbers = {
+        "upright": np.sort(np.abs(R[:, 2]))[1] < 1e-6,
         "row": row + 1,
         "entry": R[row, 2],
         "exchanged": R[2, row],

@@ -191,6 +191,37 @@ def test_a_wrong_angle_is_drawn_beside_the_arm(server: int) -> None:
         tab.wait(lambda: is_at(tab, planar, end.q))
 
 
+def test_an_arm_that_can_is_offered_and_undo_goes_back(server: int) -> None:
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.choose(UR5.name)
+        tab.set("Lesson", "Redundancy")
+        tab.wait(lambda: "1. Joints and conditions" in tab.html)
+        assert 'data-guide-do="arm"' not in tab.html, "it would say that this arm has no self-motion"
+        press(tab, ["reveal", "1", 1])
+        tab.wait(lambda: "Change to KUKA LBR iiwa 14" in tab.html)
+        press(tab, ["arm", 2])
+        iiwa = STORE.get("iiwa14")
+        tab.wait(lambda: "The arm has 7 joints" in tab.html and is_at(tab, iiwa, iiwa.q_home))
+        press(tab, ["reveal", "1", 3])
+        tab.wait(lambda: "One such motion is a slider below." in tab.html)
+        assert 'data-guide-do="arm"' not in tab.html
+        press(tab, ["arm", 4])  # a late press
+        tab.say("undo", None)
+        tab.say("undo", None)
+        tab.wait(lambda: "Change to KUKA LBR iiwa 14" in tab.html and is_at(tab, UR5, UR5.q_home))
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+def test_an_offered_arm_shows_what_the_other_cannot(lesson: Any) -> None:
+    for robot in map(STORE.get, ("ur5", "planar2r", "scara")):
+        for step in lesson.outline(robot, DEGREES).steps:
+            if step.arm:
+                assert step.arm != robot.id
+                there = lesson.outline(STORE.get(step.arm), DEGREES).steps
+                assert [other.arm for other in there if other.title == step.title] == [""]
+
+
 def asked(form: str, units: Units) -> Question:
     exercise = parse_exercise(HEAD + BODIES[form])
     return exercise.kind.ask("?", exercise.variant(0), units)
