@@ -29,8 +29,11 @@ class SumsLesson(Lesson):
     @staticmethod
     def outline(robot, units):
         question = Choice("1 + 1?", (Option("2", "Counted.", True), Option("3", "One too many.")))
-        step = Step("Two", f"At the {robot.name}.", question, "It is 2.")
-        return Outline("You can count.", (step,), (question,))
+        steps = (
+            Step("Two", f"At the {robot.name}.", question, "It is 2."),
+            Step("Again", "Once more.", question, "It is 2."),
+        )
+        return Outline("You can count.", steps, (question, question))
 """
 TAB = """
 from app.viewer.feature import Feature

@@ -18,7 +18,7 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from app.api.problems import ProblemError, respond
-from app.shared.answers.frames import HEIGHT, MODES, WIDTH, frame
+from app.shared.answers.embedding import HEIGHT, MODES, WIDTH, frame
 from app.shared.problems import shorten_text
 from app.shared.security import origin_allowed
 

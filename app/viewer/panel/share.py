@@ -9,7 +9,7 @@ from __future__ import annotations
 import viser
 
 from app.exports.snippets import SNIPPETS, Moment
-from app.shared.answers.frames import MODES, frame
+from app.shared.answers.embedding import MODES, frame
 from app.viewer.panel import Post, assign, listen, update_html
 from app.viewer.views.templates import render
 from kin import InputError

@@ -1,6 +1,6 @@
 """Sentences about IK answers, made from codes and numbers in the reader's units.
 
-This is the only place where answers of :mod:`kin.ik` become words. An `Explanation` has a title and a detail
+This is where answers of :mod:`kin.ik` become sentences. An `Explanation` has a title and a detail
 for a page that sets them apart; its `text` is one line.
 """
 
@@ -120,8 +120,13 @@ def _title(details: Details, headline: str, units: Units) -> str:
         case OrientationNotMet():
             return "Orientation not possible here"
         case OutOfReach(distance, restriction) if distance > 0.0:
-            return f"Out of reach by {units.distance(distance)}{_while(restriction)}"
+            return _beyond(units.distance(distance), restriction)
     return headline
+
+
+def _beyond(distance: str, restriction: Restriction | None) -> str:
+    """The headline of a target that is out of reach by a distance in words, or by one that is not known."""
+    return f"Out of reach{distance and f' by {distance}'}{_while(restriction)}"
 
 
 def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str, str]:
@@ -158,8 +163,8 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
             off = f"the closest configuration is off by {length(position)} and {angle(rotation)}"
             return headline, "; ".join(filter(None, (off, _possible(restriction, "they can be met"))))
         case OutOfReach(distance, restriction):
-            by = f" by {length(distance)}" if distance > 0.0 else ""
-            return f"Out of reach{by}{_while(restriction)}", _out_of_reach(restriction, cause, units)
+            off = length(distance) if distance > 0.0 else ""
+            return _beyond(off, restriction), _out_of_reach(restriction, cause, units)
         case OrientationNotMet():
             held = f"The arm cannot hold this orientation at this point{_while(details.restriction)}"
             parts = _orientation(details, units), _possible(details.restriction, "it can")
