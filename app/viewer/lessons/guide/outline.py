@@ -73,14 +73,18 @@ class Drawn:
     Attributes:
         q: the configuration ``(n,)`` of the copy, apart from this joint.
         joint: the index of the joint.
+        sense, offset: a typed value is sense · joint value + offset.
     """
 
     q: Configuration
     joint: int
+    sense: float = 1.0
+    offset: float = 0.0
 
     def at(self, value: float) -> Configuration:
         """The configuration with a typed value (rad or m)."""
-        return tuple(value if i == self.joint else other for i, other in enumerate(self.q))
+        own = self.sense * (value - self.offset)
+        return tuple(own if i == self.joint else other for i, other in enumerate(self.q))
 
 
 @dataclass(frozen=True)

@@ -68,6 +68,20 @@ class Exercise:
         """The branch of these signs."""
         return next(branch for branch in self.branches if branch.derivation.signs == signs)
 
+    @property
+    def way_back(self) -> Branch | None:
+        """Where to go on if the branch that is followed ends: the branch most like it that leads to the target,
+        within the limits if there is one.
+        """
+        if self.followed.q is not None:
+            return None
+
+        def apart(branch: Branch) -> tuple[bool, int]:
+            pairs = zip(branch.derivation.signs, self.signs, strict=True)
+            return not branch.available, sum(a != b for a, b in pairs)
+
+        return min((branch for branch in self.branches if branch.q is not None), key=apart, default=None)
+
     def beside(self, split: int) -> Branch:
         """The branch with the other sign at a split."""
         return self.branch(flipped(self.signs, split))

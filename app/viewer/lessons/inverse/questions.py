@@ -7,6 +7,7 @@ from functools import lru_cache
 
 from app.viewer.lessons.guide.outline import (
     Choice,
+    Drawn,
     Mistake,
     Number,
     Option,
@@ -79,22 +80,37 @@ def _step(given: Exercise, key: StepKey, units: Units) -> Step:
         limits = _limits(given)
         return Step(words.title(arm, key), text, limits, "", Pose(start), end, shown, withheld=POSTURES)
     if found is None:
-        failed = given.followed.derivation.failed
-        where = "" if failed is None else f" It ends at the step “{words.title(given.arm, failed.key)}”."
-        return Step(
-            words.title(arm, key), f"The branch that you follow does not get here.{where}", pose=Pose(start)
-        )
+        ended = given.followed.derivation.failed
+        where = "" if ended is None else f" It ends at the step “{words.title(given.arm, ended.key)}”."
+        text = f"The branch that you follow does not get here.{where}{_way_back(given)}"
+        return Step(words.title(arm, key), text, pose=Pose(start))
     if found.failure is not None:
-        return Step(words.title(arm, key), f"{text} {words.failure_text(found, units)}", pose=Pose(start))
+        text = f"{text} {words.failure_text(found, units)}{_way_back(given)}"
+        return Step(words.title(arm, key), text, pose=Pose(start))
     asked, special = _question(given, found, units), words.special_text(arm, found)
+    turn = asked is not None and asked.unit == units.angles
     return Step(
         words.title(arm, key),
         f"{text} {special}".rstrip(),
         asked,
         pose=Pose(start),
         practice=_shown(given, found),
-        withheld=TURNS if asked is not None and asked.unit == units.angles else frozenset(),
+        withheld=TURNS if turn else frozenset(),
+        drawn=_drawn(given, key) if turn else None,
     )
+
+
+def _way_back(given: Exercise) -> str:
+    back = given.way_back
+    return "" if back is None else f" To go on, press “{words.follow(back.number)}” below."
+
+
+def _drawn(given: Exercise, key: StepKey) -> Drawn:
+    """A wrong angle is drawn as the posture of the branch with it; if the branch ends, as that of the arm."""
+    arm, branch = given.arm, given.followed
+    joint = int(mistakes.split_name(key, branch.derivation)[1:]) - 1
+    q = as_configuration(given.q if branch.q is None else branch.q)
+    return Drawn(q, joint, float(arm.sense[joint]), float(arm.offset[joint]))
 
 
 def _target(given: Exercise, units: Units) -> str:

@@ -91,6 +91,11 @@ def title(arm: Arm, key: StepKey) -> str:
     return TITLES[key]
 
 
+def follow(number: int) -> str:
+    """The label of the button that leads back to a branch."""
+    return f"Follow branch {number}"
+
+
 def step_text(arm: Arm, key: StepKey, units: Units) -> str:
     """What a step does."""
     text = _TEXTS.get((arm.family, key)) or _TEXTS[None, key]

@@ -100,7 +100,7 @@ def seen(tab: FakeBrowser, outline: Outline, before: set[str]) -> Iterator[tuple
         sent = [m.get("updates") or m.get("props") or {} for m in tab.log[start:] if m.get("uuid") not in before]
         words = [texts(m["props"]) for m in [*own, *tab.nodes.values()]] + [texts(props) for props in sent]
         step = None if key.startswith("c") else outline.steps[at]
-        stated = [question.prompt, *(told.text for told in (() if step is None else outline.steps[: at + 1]))]
+        stated = [question.prompt, *(one.text for one in (() if step is None else outline.steps[: at + 1]))]
         stated += [q.prompt for _, q in outline.questions()] if step is None else []
         stated += [o.text for _, q in outline.questions() if isinstance(q, Choice) for o in q.options]
         yield key, Seen(question, numbers(" ".join(stated)), numbers(" ".join(words)))

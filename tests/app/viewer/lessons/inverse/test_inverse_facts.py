@@ -13,12 +13,17 @@ from bare_page import STORE, bare_page
 
 import kin
 from app.viewer.arm import Arm
+from app.viewer.lessons.guide.outline import Number
+from app.viewer.lessons.inverse.derive import all_signs
 from app.viewer.lessons.inverse.facts import InverseFacts
 from app.viewer.lessons.inverse.lesson import InverseLesson
+from app.viewer.lessons.inverse.questions import outline_of
 from app.viewer.lessons.inverse.settings import InverseSettings
 from kin import Robot
 from kin.transforms import Array
+from kin.units import Units
 
+UNITS = Units()
 # How many of the last joints turn about the wrist centre.
 WRISTS = {
     "planar2r": 0,
@@ -153,6 +158,35 @@ def test_numbers_are_on_show_when_they_are_answered_or_wanted(robot: Robot) -> N
     answered = (True, *[False] * (count - 1))
     assert replace(known, answered=answered).opened == answered
     assert replace(known, settings=replace(known.settings, all=True)).opened == (True,) * count
+
+
+@ARMS
+def test_a_wrong_angle_is_drawn_as_the_posture_that_has_it(robot: Robot) -> None:
+    for signs in all_signs(facts(robot, 0).derived):
+        known = facts(robot, 0)
+        known = replace(known, settings=replace(known.settings, signs=signs))
+        asked, q = known.exercise, np.array(known.settings.q)
+        q = q if asked.followed.q is None else asked.followed.q
+        for step in outline_of(asked, UNITS).steps:
+            if step.drawn is None:
+                continue
+            assert isinstance(step.question, Number)
+            i, right = step.drawn.joint, step.question.answer
+            if asked.followed.q is not None:
+                off = np.array(step.drawn.at(right)) - q
+                assert np.abs(np.exp(1j * off) - 1.0).max() < 1e-9, "the right value is no other posture"
+            for wrong in (right + 0.4, -right, right * 180.0 / math.pi):
+                drawn = np.array(step.drawn.at(wrong))
+                assert np.array_equal(np.delete(drawn, i), np.delete(np.array(step.drawn.q), i))
+                # The tool has turned about this axis, by as much as the answer is wrong.
+                point, omega = axis(robot, q, i)
+                back = np.array(step.drawn.at(right))
+                moved, there = numpy_arm.pose(robot, drawn), numpy_arm.pose(robot, back)
+                turn = float(known.derived.sense[i]) * (wrong - right)
+                arm, now = there[:3, 3] - point, moved[:3, 3] - point
+                level, across = arm - arm @ omega * omega, np.cross(omega, arm)
+                expected = arm @ omega * omega + math.cos(turn) * level + math.sin(turn) * across
+                assert now == pytest.approx(expected, abs=1e-6)
 
 
 # The page

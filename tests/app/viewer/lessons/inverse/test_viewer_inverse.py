@@ -477,6 +477,39 @@ def test_a_typed_way_is_followed_to_its_posture(port: int) -> None:
         assert not any(name.startswith("/inverse-") for name in tab.nodes)
 
 
+def test_a_branch_that_ends_says_how_to_go_on(port: int) -> None:
+    arm = of(PIONEER)
+    given = exercise(arm, example(arm))
+    ended = exercise(arm, example(arm), flipped(given.signs, 0))
+    assert ended.followed.q is None
+    assert ended.way_back is not None
+    assert ended.way_back.derivation.signs == given.signs, "the one whose limits it keeps"
+    back = f"Follow branch {ended.way_back.number}"
+    assert [back in step.text for step in outline_of(ended, UNITS).steps] == [
+        False,
+        False,
+        True,
+        True,
+        True,
+        False,
+    ]
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.choose(PIONEER.name)
+        tab.set("Lesson", "Inverse kinematics step by step")
+        tab.wait(lambda: "data-derivation" in tab.html)
+        say(tab, "go", 1)
+        say(tab, "fields", [["-90"]], "2")
+        tab.wait(lambda: followed(tab) == ended.followed.name)
+        assert not any(m["props"].get("label") == back for m in tab.gui.values())
+        say(tab, "go", 2)
+        tab.wait(lambda: any(m["props"].get("label") == back for m in tab.gui.values()))
+        press(tab, back)
+        tab.wait(lambda: followed(tab) == given.followed.name)
+        tab.wait(lambda: 'data-question="3"' in tab.html)
+        assert not any(m["props"].get("label") == back for m in tab.gui.values())
+
+
 def test_an_arm_without_a_derivation_offers_others(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -491,3 +524,32 @@ def test_an_arm_without_a_derivation_offers_others(port: int) -> None:
         tab.set("All numbers", True)
         tab.wait(lambda: "data-derived-result" in tab.html)
         assert all_signs(of(SRS))[0] == (1, 1, 1)
+
+
+@pytest.mark.parametrize("robot", [PUMA, SRS], ids=lambda robot: robot.id)
+def test_a_wrong_angle_is_drawn_beside_the_arm(port: int, robot: Robot) -> None:
+    arm = of(robot)
+    given = exercise(arm, example(arm))
+    step = keys_of(arm).index("elbow")
+    asked = outline_of(given, UNITS).steps[step]
+    assert asked.drawn is not None
+
+    def copies(tab: FakeBrowser) -> dict[str, str]:
+        names = [name for name in tab.nodes if name.startswith("/answer-") and tab.visible.get(name, True)]
+        return {name.rpartition("/")[2]: name for name in names}
+
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.choose(robot.name)
+        tab.set("Lesson", "Inverse kinematics step by step")
+        tab.wait(lambda: "data-derivation" in tab.html)
+        say(tab, "go", step)
+        tab.wait(lambda: f"{step + 1}. {asked.title}" in tab.html)
+        say(tab, "fields", [["17.0"]], str(step + 1))
+        tab.wait(lambda: {"arm", "words"} <= copies(tab).keys())
+        tool = kin.fk(robot, np.array(asked.drawn.at(math.radians(17.0))))[:3, 3]
+        assert np.linalg.norm(tool - given.T[:3, 3]) > 0.05
+        tab.wait(lambda: np.allclose(tab.poses[copies(tab)["words"]]["position"], tool, atol=1e-6))
+        tab.wait(lambda: np.allclose(tab.tool_pose(), given.T, atol=1e-6))
+        say(tab, "reveal", None, str(step + 1))
+        tab.wait(lambda: "words" not in copies(tab))
