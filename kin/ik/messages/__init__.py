@@ -297,4 +297,8 @@ def _orientation(details: OrientationNotMet, units: Units) -> str:
 def _singular(found: tuple[Singularity, ...], which: str, units: Units) -> str:
     """A sentence about a singular configuration; singularities of the closed form alone do not count."""
     real = [s for s in found if s.kind != "algorithmic"]
-    return f"{which} configuration is singular: {short(real[0], units)}." if real else ""
+    if not real:
+        return ""
+    aligned = short(real[0], units)
+    what = f"the {aligned} vanishes" if real[0].condition == "smallest singular value" else aligned
+    return f"{which} configuration is singular: {what}."

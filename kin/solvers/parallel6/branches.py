@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.kernels.fk import sine_cosine
 from kin.kernels.simd import atan2
 from kin.solvers.blocks import Entries, solve_each
 from kin.solvers.canonical import canonical, signed_box
@@ -77,7 +78,7 @@ def _shoulder(
     y = (ca * wz - params[BESIDE]) / sa
     on_axis = math.sqrt(wx * wx + wy * wy) < _SINGULAR
     t1 = _facing(params, M, box) if on_axis else atan2(wy, wx) - atan2(y, x)
-    c1, s1 = math.cos(t1), math.sin(t1)
+    s1, c1 = sine_cosine(t1)
     v0, v1, v2 = c1 * r10 - s1 * r00, c1 * r11 - s1 * r01, c1 * r12 - s1 * r02
     m00, m01, m02 = c1 * r00 + s1 * r10, c1 * r01 + s1 * r11, c1 * r02 + s1 * r12
     m10, m11, m12, m22 = ca * v0 + sa * r20, ca * v1 + sa * r21, ca * v2 + sa * r22, ca * r22 - sa * v2
@@ -101,8 +102,12 @@ def _shoulder(
     lever = abs(y) + abs(params[A4]) + abs(params[D5])
     slack = _REACH + lever * min(_ROUNDING_OF_DOUBLE_ROOT, _ROUNDING / max(abs(x), _ROUNDING))
     gap = math.inf
+    sine = math.sqrt(m02 * m02 + m12 * m12)
+    cA, sA = m02 / sine, m12 / sine
+    aimed = atan2(m12, m02), atan2(sine, m22), atan2(cA * m10 - sA * m00, cA * m11 - sA * m01)
     for flip in range(2):
-        miss = _arm(params, wrist, (m00, m01, m02, m10, m11, m12, m22), 4 * right + flip, slack, box, out)
+        m = (m00, m01, m02, m10, m11, m12, m22)
+        miss = _arm(params, wrist, m, aimed, 4 * right + flip, slack, box, out)
         gap = min(gap, miss)
     return gap, found
 
@@ -112,6 +117,7 @@ def _arm(
     params: Array,
     wrist: tuple[float, float, float],
     m: tuple[float, float, float, float, float, float, float],
+    aimed: tuple[float, float, float],
     branch: int,
     slack: float,
     box: Array,
@@ -120,7 +126,7 @@ def _arm(
     """out[branch], out[branch + 2] ← elbow up and down of one shoulder and wrist; by how much they miss, metres.
 
     wrist: θ1, and W in the plane of axes 2, 3, 4; m: entries of the rotation after axis 1, without the third row's
-    first two.
+    first two; aimed: its angles A, B, C with sin B > 0.
     """
     t1, u, v = wrist
     m00, m01, m02, m10, m11, m12, m22 = m
@@ -128,8 +134,7 @@ def _arm(
     sine = math.sqrt(m02 * m02 + m12 * m12)
     cA, sA = m02 / sine, m12 / sine
     flip, turned = (1.0, 0.0) if branch & 1 == 0 else (-1.0, math.pi)
-    A, B = atan2(m12, m02) + turned, flip * atan2(sine, m22)
-    C = atan2(cA * m10 - sA * m00, cA * m11 - sA * m01) + turned
+    A, B, C = aimed[0] + turned, flip * aimed[1], aimed[2] + turned
     px, py = u - flip * (a4 * cA - d5 * sA), v - flip * (a4 * sA + d5 * cA)
     miss, bend, _, k1, k2 = two_links(px, py, a2, a3)
     if miss > _REACH and miss * sine < _ROUNDING:

@@ -64,19 +64,17 @@ def _least_inside(box: Array, elbow: int, out: Array) -> float:
 
 @jit
 def _elbow(
-    arm: Array, M: Array, triangle: Array, box: Array, elbow: int, request: tuple[float, float, bool, int],
-    W: Array, arcs: Array, found: int, out: Array,
+    parts: Array, theta4: float, box: Array, request: tuple[float, float, bool, int], W: Array, arcs: Array,
+    found: int, out: Array,
 ) -> int:  # fmt: skip
-    """out ``(8, 8)`` ← the four branches with one sign of sin θ4, canonical; returns the number of intervals.
+    """out ``(8, 8)`` ← the four branches with one θ4, canonical; returns the number of intervals.
 
-    request: the arm angle that is preferred, the one that is requested or NaN, whether the limits count, and how
-    many joints are to move little.
+    parts: as from `affine`. request: the arm angle that is preferred, the one that is requested or NaN, whether
+    the limits count, and how many joints are to move little.
     """
     preferred, value, respect_limits, joints = request
     free = math.isnan(value)
-    theta4 = sign_of(elbow, 0) * triangle[SHAPE, 2]
-    parts = np.empty((2, 3, 3, 3))
-    affine(arm, M, triangle, sign_of(elbow, 0), parts)
+    elbow = 1 if theta4 < 0.0 else 0
     limits, count, filled = lay_out(parts, box, respect_limits, free, W)
     # Shoulder and wrist are independent: each is weighed once per arm angle and sign.
     weigh(parts, 0, 3, filled, box, W)
@@ -122,11 +120,12 @@ def solve(
     request = preferred, value, respect_limits, 6 if free_roll else 7
     bend = triangle[SHAPE, 2]
     first = 1 if nearest_only and bend > 0.0 and _elbow_step(-bend, box) < _elbow_step(bend, box) else 0
-    found = _elbow(arm, M, triangle, box, first, request, W, arcs, 0, out)
-    if bend > 0.0 and not (
-        nearest_only and _elbow_step(-sign_of(first, 0) * bend, box) > _least_inside(box, first, out)
-    ):
-        found = _elbow(arm, M, triangle, box, 1 - first, request, W, arcs, found, out)
+    parts, sign = np.empty((2, 3, 3, 3)), sign_of(first, 0)
+    affine(arm, M, triangle, sign, parts)
+    found = _elbow(parts, sign * bend, box, request, W, arcs, 0, out)
+    if bend > 0.0 and not (nearest_only and _elbow_step(-sign * bend, box) > _least_inside(box, first, out)):
+        affine(arm, M, triangle, -sign, parts)
+        found = _elbow(parts, -sign * bend, box, request, W, arcs, found, out)
     for branch in range(8):
         for i in range(7):
             out[branch, i] = wrap(out[branch, i] - arm[OFFSET + i])

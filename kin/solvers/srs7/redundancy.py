@@ -19,7 +19,6 @@ from kin.solvers.common import (
     LOW,
     NEAR,
     add_extremes,
-    extend_arcs,
     lay_probes,
     nearest_image,
     nearest_in_arcs,
@@ -210,14 +209,18 @@ def intervals(
     is feasible, the tested one with the least excess over the limits.
     """
     shoulder, wrist = W[SHOULDER_MISFIT + (branch >> 2)], W[WRIST_MISFIT + (branch & 1)]
-    first, inside = found, 0
+    first, changes, inside, turns = found, 0, False, W[FIRST]
     if elbow_misfit == 0.0:
+        # Where the arm angles that are inside begin and end: without a jump, as nothing foretells it.
         for j in range(limits):
-            inside += 1 if shoulder[j] + wrist[j] == 0.0 else 0
-    if inside > 0:
-        for j in range(limits):
-            if shoulder[j] + wrist[j] == 0.0 and found < arcs.shape[0]:
-                found = extend_arcs(arcs, first, found, branch, W[PSI], j, limits)
+            now = shoulder[j] + wrist[j] == 0.0
+            turns[changes] = j
+            changes += 1 if now != inside else 0
+            inside = now
+    if changes > 0:
+        turns[changes] = limits
+        for k in range(0, changes, 2):
+            found = _with_run(arcs, first, found, branch, W[PSI], (int(turns[k]), int(turns[k + 1]), limits))
         return nearest_in_arcs(arcs, first, found, preferred), found
     psi, best = preferred, math.inf
     for j in range(limits):
@@ -225,6 +228,28 @@ def intervals(
         if misfit < best:
             best, psi = misfit, W[PSI, j]
     return psi, found
+
+
+@jit
+def _with_run(arcs: Array, first: int, found: int, branch: int, psi: Array, run: tuple[int, int, int]) -> int:
+    """Append the arc of the arm angles psi[begin:end], or join it to the last one; returns the number of arcs.
+
+    run: begin, end, and how many arm angles there are; those at even places are limits, the others middles.
+    """
+    begin, end, count = run
+    low = psi[begin - begin % 2]
+    last = end - end % 2
+    high = psi[last] if last < count else psi[0] + TURN
+    if end % 2 == 1:
+        high = psi[end - 1]
+    if count == 1:
+        low, high = -math.pi, math.pi
+    if found > first and low <= arcs[found - 1, 2]:
+        arcs[found - 1, 2] = max(high, arcs[found - 1, 2])
+    elif found < arcs.shape[0]:
+        arcs[found, 0], arcs[found, 1], arcs[found, 2] = branch, low, high
+        found += 1
+    return found
 
 
 @jit
