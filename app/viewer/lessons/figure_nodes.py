@@ -1,12 +1,17 @@
-"""Parts of figures as nodes: what `figures` draws, declared.
+"""Parts of figures in the scene: lines, dimensions, angles, points and faces, each with its label, as nodes.
 
-A figure remembers only where its labels are, so that they stay there while there is room::
+A figure remembers only where its labels are. A label that would cover another one of its figure, as seen in the
+default view, takes the next of a few places, and stays there while that is free::
 
     self.figure = FigureNodes(body(robot).size)            # for each arm
 
     def scene(self):
         with self.figure as figure:
             return [*figure.line("normal", a, b, "x₁", RED), *figure.dimension("upper", c, d, "l₁", units, aside)]
+
+The links of an arm hide what is inside them: call ``stage.see_through(True)`` while a figure is on show. Labels
+are in front of everything, on a plate of their own, so they are readable in light and dark. Dimensions and angles
+are beside what they measure, at a distance from the arm, and their values are in the reader's units.
 """
 
 from __future__ import annotations

@@ -45,10 +45,6 @@ class Labels:
     def __contains__(self, key: Hashable) -> bool:
         return key in self._shown
 
-    def at(self, key: Hashable) -> Array:
-        """Where the label is ``(3,)``."""
-        return self._shown[key][1]
-
     def place(self, key: Hashable, text: str, places: Sequence[Array]) -> Array:
         """The first of these points ``(3,)`` that has room for a label; where it is comes first."""
         first = self._shown[key][0] if key in self._shown else 0
@@ -60,10 +56,6 @@ class Labels:
         best = max(rooms, key=rooms.__getitem__)
         self._shown[key] = best, places[best], text
         return places[best]
-
-    def leave(self, key: Hashable) -> None:
-        """A label is no longer on show, and takes no room."""
-        self._shown.pop(key, None)
 
     def keep(self, keys: Collection[Hashable]) -> None:
         """Only these labels are on show."""

@@ -11,6 +11,7 @@ from typing import cast, get_args
 
 from app.shared.computations import Subscription
 from app.shared.memory.answers import AnswerMemory
+from app.viewer.declared.scene import SceneView
 from app.viewer.feature import Stage
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post, assign, listen, update_html
@@ -45,6 +46,7 @@ class Comparing:
         self._reader: Subscription[Comparison] | None = None
         self._found: Comparison | None = None
         self._stopped = False
+        self._view = SceneView(stage.client.scene, "compare", post)
         self._overlay: Overlay | None = None
         self._joint = 0
         gui = stage.client.gui
@@ -189,7 +191,7 @@ class Comparing:
         if self._overlay is None and found.first is not None:
             self._joint = max(found.first.joints, default=min(arm.robot.n, other.robot.n))
         self._hide()
-        self._overlay = Overlay(self._stage.client.scene, other.robot, arm.robot, found)
+        self._overlay = Overlay(self._view, other.robot, arm.robot, found)
         self._joint = min(self._joint, self._most - 1)
         self._walk.max = self._most
         assign(self._walk, self._joint + 1)

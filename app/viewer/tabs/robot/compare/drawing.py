@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import count
-
-import numpy as np
-import viser
-
+from app.viewer.declared.scene import SceneView
+from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.figure_shapes import BLUE, VERMILION
-from app.viewer.lessons.figures import Figure
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.meshes import body
-from app.viewer.skeleton import cylinder, places, skeleton
+from app.viewer.skeleton import ghost
 from kin import Comparison, Robot
 from kin.axes import inverse
 from kin.comparison import Mapping
@@ -21,7 +17,6 @@ from kin.transforms import Array, wxyz_from_rotation
 GHOST = VERMILION
 OPACITY = 0.5
 REACH = 0.3  # of an axis to both sides, relative to the radius of the sphere around the arm
-_NUMBERS = count(1)
 
 
 class Overlay:
@@ -31,44 +26,31 @@ class Overlay:
     kind, stay at its home.
     """
 
-    def __init__(self, scene: viser.SceneApi, other: Robot, shown: Robot, found: Comparison) -> None:
-        self._other, self._shown = other, shown
+    def __init__(self, view: SceneView, other: Robot, shown: Robot, found: Comparison) -> None:
+        self._view, self._other, self._shown = view, other, shown
         self._mapping = mapping_of(found, shown.n)
-        self._reach = REACH * body(shown).radius
-        root = f"/compare-{next(_NUMBERS)}"
-        base = inverse(self._mapping.base)
-        self._base = base
-        self._top = scene.add_frame(
-            root, show_axes=False, position=base[:3, 3], wxyz=wxyz_from_rotation(base[:3, :3])
-        )
-        bones, (vertices, faces) = skeleton(other), cylinder()
-        many = len(bones.links)
-        self._ghost = scene.add_batched_meshes_simple(
-            f"{root}/ghost", vertices, faces, batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (many, 1)),
-            batched_positions=np.zeros((many, 3)), batched_scales=bones.scales, batched_colors=GHOST,
-            opacity=OPACITY, lod="off", cast_shadow=False, receive_shadow=False,
-        )  # fmt: skip
-        self._figure = Figure(scene, f"{root}-axes", body(shown).size)
-        self._axes = self._figure.line("yours", BLUE), self._figure.line("the other", GHOST)
+        self._base = inverse(self._mapping.base)
+        self._figure = FigureNodes(body(shown).size)
 
     def show(self, q: Array, joint: int) -> None:
         """Draw both arms with the arm on show at `q` ``(n,)``, and the axes of one joint."""
+        base, reach = self._base, REACH * body(self._shown).radius
         there = ghost_q(self._other, self._shown, self._mapping, q)
-        positions, wxyz, _ = places(self._other, there[None])
-        self._ghost.batched_positions = positions[0].astype(np.float32)
-        self._ghost.batched_wxyzs = wxyz[0].astype(np.float32)
-        mine, other = self._axes
-        if joint < self._shown.n:
-            T = link_poses(self._shown, q[None])[0, joint + 1]
-            mine.show_axis(T[:3, 3], T[:3, 2], self._reach, f"{joint + 1}: yours")
-        if joint < self._other.n:
-            T = self._base @ link_poses(self._other, there[None])[0, joint + 1]
-            other.show_axis(T[:3, 3], -T[:3, 2], self._reach, f"{joint + 1}: the other")
+        copy = ghost("ghost", self._other, there, GHOST, OPACITY)
+        copy.position, copy.wxyz = base[:3, 3], wxyz_from_rotation(base[:3, :3])
+        nodes = [copy]
+        with self._figure as figure:
+            if joint < self._shown.n:
+                T = link_poses(self._shown, q[None])[0, joint + 1]
+                nodes += figure.axis("yours", T[:3, 3], T[:3, 2], reach, f"{joint + 1}: yours", BLUE)
+            if joint < self._other.n:
+                T = base @ link_poses(self._other, there[None])[0, joint + 1]
+                nodes += figure.axis("other", T[:3, 3], -T[:3, 2], reach, f"{joint + 1}: the other", GHOST)
+        self._view.show(nodes)
 
     def remove(self) -> None:
         """Remove everything from the scene."""
-        self._top.remove()
-        self._figure.remove()
+        self._view.remove()
 
 
 def ghost_q(other: Robot, shown: Robot, mapping: Mapping, q: Array) -> Array:
