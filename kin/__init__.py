@@ -72,7 +72,7 @@ from kin.motion import (
     program_from_dict,
     program_to_dict,
 )
-from kin.notebook import show
+from kin.notebook import connect, show
 from kin.path import PathGap, PathJump, PathPostures, PathResult, path_postures, solve_path
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
@@ -168,6 +168,7 @@ __all__ = [
     "clearance",
     "compare",
     "configuration_at",
+    "connect",
     "convert",
     "examine_urdf",
     "exp_screw",

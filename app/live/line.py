@@ -19,8 +19,9 @@ from app.shared.problems import Problem
 from kin import Robot
 
 VALUES: Final = ("q", "target", "result", "contacts", "program")  # what a program may subscribe to
+MOVES, DRAWS = EVENTS = ("live", "drawn")  # what a page is to take: what undo restores, and what it does not
 MERGED: Final = "draw"  # of this kind the newest value of each name is kept
-QUIET: Final = frozenset({"measured", "draw", "clear", "drives"})  # changes nothing that undo restores
+QUIET: Final = frozenset({"measured", "draw", "clear"})  # changes nothing that undo restores
 LETTERS: Final = 64  # answers that may wait for a program; older ones are dropped
 REVOKED: Final = "The page has withdrawn the code."
 LEFT: Final = "The page was closed."
@@ -46,15 +47,15 @@ class Program:
         wake: called after each change of what it wants, from any thread.
         delay: seconds that a message and its answer were under way; None: not known yet.
         wants: of `VALUES`, what it has subscribed to.
-        rate: messages of the last second.
+        rate: how many messages came within the last second.
     """
 
     name: str
     session: str
     wake: Callable[[], None]
     delay: Callable[[], float | None] = lambda: None
+    rate: Callable[[], int] = lambda: 0
     wants: frozenset[str] = frozenset()
-    rate: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class Line:
     Args:
         code: of the page.
         robot: on show.
-        post: queues an event for the page: ``"live"``, or ``"drawn"`` if nothing changes that undo restores.
+        post: queues an event for the page, one of `EVENTS`.
     """
 
     def __init__(self, code: str, robot: Robot, post: Post) -> None:
@@ -88,7 +89,7 @@ class Line:
         self._post = post
         self._lock = threading.Lock()
         self._program: Program | None = None
-        self._parcel = Parcel()
+        self._parcels = {key: Parcel() for key in EVENTS}
         self._values: dict[str, tuple[int, Any]] = {}
         self._count = 0
         self._letters: deque[Letter] = deque(maxlen=LETTERS)
@@ -111,7 +112,7 @@ class Line:
             self._letters.clear()
         if before is not None:
             before.wake()
-        self._post("drawn", None)
+        self._post(DRAWS, None)
 
     def disconnect(self, program: Program) -> None:
         """The connection of a program has ended; what it has drawn goes with it, unless it is connected again."""
@@ -119,23 +120,29 @@ class Line:
             if self._program is not program:
                 return
             self._program = None
-            self._parcel = Parcel({"clear": True, "measured": None, "drives": ""})
-        self._post("drawn", None)
+            self._parcels[DRAWS] = Parcel({"clear": True, "measured": None})
+        self._post(DRAWS, None)
 
     def send(self, values: Mapping[str, Any], number: int | None = None) -> None:
         """Pass on what a message of the program holds."""
+        quiet = {name: value for name, value in values.items() if name in QUIET}
+        moving = {name: value for name, value in values.items() if name not in QUIET}
         with self._lock:
-            waiting = self._parcel.values
-            for name, value in values.items():
-                if name == MERGED:
-                    value = {**waiting.get(name, {}), **value}
-                elif name == "clear":
-                    waiting.pop(MERGED, None)
-                waiting.pop(name, None)
-                waiting[name] = value
+            for key, some in ((DRAWS, quiet), (MOVES, moving)):
+                waiting = self._parcels[key].values
+                for name, value in some.items():
+                    if name == MERGED:
+                        value = {**waiting.get(name, {}), **value}
+                    elif name == "clear":
+                        waiting.pop(MERGED, None)
+                    waiting.pop(name, None)
+                    waiting[name] = value
             if number is not None:
-                self._parcel.numbers.append(number)
-        self._post("drawn" if QUIET.issuperset(values) else "live", None)
+                self._parcels[MOVES if moving else DRAWS].numbers.append(number)
+        if quiet:
+            self._post(DRAWS, None)
+        if moving:
+            self._post(MOVES, None)
 
     def news(self, known: Mapping[str, int]) -> dict[str, tuple[int, Any]]:
         """What has changed for the program since it saw these numbers of changes, with the numbers of now."""
@@ -156,10 +163,10 @@ class Line:
 
     # The page
 
-    def take(self) -> Parcel:
-        """What the program has sent since the last call."""
+    def take(self, key: str) -> Parcel:
+        """What the program has sent for this event of the page since the last call."""
         with self._lock:
-            parcel, self._parcel = self._parcel, Parcel()
+            parcel, self._parcels[key] = self._parcels[key], Parcel()
         return parcel
 
     def publish(self, name: str, value: object, anew: bool = True) -> None:
@@ -208,9 +215,6 @@ class Lines:
         self._lock = threading.Lock()
         self._lines: dict[str, Line] = {}
         self._reserved: set[str] = set()
-
-    def __len__(self) -> int:
-        return len(self._lines)
 
     def reserve(self, code: str) -> None:
         """Keep a code for the page whose address has it."""

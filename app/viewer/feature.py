@@ -14,6 +14,7 @@ from typing import ClassVar, Protocol
 import viser
 
 from app.exports.snippets import Service
+from app.live import Door
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
@@ -42,6 +43,7 @@ class Stage(Protocol):
     bodies: Bodies
     frames: Frames  # the workpieces, and the frame in which poses are shown
     activity: Activity  # what is open, and what is withheld
+    door: Door  # the line to a program, if there is one
 
     @property
     def client(self) -> viser.ClientHandle:

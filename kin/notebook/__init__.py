@@ -1,7 +1,7 @@
-"""`show`: an arm in the output of a notebook's cell.
+"""`show`: an arm in the output of a notebook's cell; `connect`: a page of the viewer that is open in a browser.
 
-The core draws nothing. The service, which is installed with it, does: it is looked up by name when `show` is
-called, so that nothing here depends on it.
+The core draws nothing and knows no network. The service, which is installed with it, does: it is looked up by name
+when one of the two is called, so that nothing here depends on it.
 """
 
 from __future__ import annotations
@@ -53,8 +53,35 @@ def show(
     Raises:
         KinematicsError: for an invalid argument, or if the service is not installed or does not start.
     """
+    return _service("notebook", "show").show(robot, q, path, seconds, panel, width, height, address)
+
+
+def connect(
+    address: str, code: str, *, name: str | None = None, token: str | None = None, rate: float = 30.0
+) -> Any:
+    """Connect this program to a page of the viewer: move its arm, and hear what is done there.
+
+    Args:
+        address: of the service, as in the browser: ``"http://localhost:8000"``.
+        code: of the page: in its tab *Program*, *Connect a program* shows it.
+        name: of this program, which the page shows; None: the name of its file.
+        token: the service's access token, if it needs one.
+        rate: how often a second the page reports what it shows, at most (0.1 to 60).
+
+    Returns:
+        The page. Assign ``q``, ``target``, ``measured`` or ``robot``, read ``q``, ``target``, ``result``,
+        ``contacts``; ``play(motion)``, ``draw.line(name, points)``, ``events()``, ``close()``, from any thread.
+
+    Raises:
+        KinematicsError: there is no service or no such page, another program is connected, or the service is not
+            installed here.
+    """
+    return _service("live.client", "connect").Page(address, code, name, token, rate)
+
+
+def _service(module: str, function: str) -> Any:
+    """A module of the service, which is installed beside the core or not."""
     for package in _PACKAGES:
-        if find_spec(package) is not None and find_spec(f"{package}.notebook") is not None:
-            service = import_module(f"{package}.notebook")
-            return service.show(robot, q, path, seconds, panel, width, height, address)
-    raise KinematicsError("kin.show needs the service of Kinboard: pip install kinboard")
+        if find_spec(package) is not None and find_spec(f"{package}.{module.partition('.')[0]}") is not None:
+            return import_module(f"{package}.{module}")
+    raise KinematicsError(f"kin.{function} needs the service of Kinboard: pip install kinboard")

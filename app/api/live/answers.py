@@ -8,12 +8,12 @@ from typing import Any
 from app.api.live.messages import MOST_BYTES, MOST_RATE
 from app.shared.answers.details import ContactAnswer
 from app.shared.answers.ik import ik_answer
-from kin import Robot
+from kin import Robot, robot_to_dict
 from kin.transforms import wxyz_from_rotation
 
 
 def robot_answer(robot: Robot) -> dict[str, Any]:
-    """The arm on show: its id, its name, and its joints."""
+    """The arm on show: its id, its name, its joints, and the fields of a robot file."""
     joints = [
         {
             "name": joint.name,
@@ -23,7 +23,7 @@ def robot_answer(robot: Robot) -> dict[str, Any]:
         }
         for joint, turns, low, high in zip(robot.joints, robot.revolute, robot.lower, robot.upper, strict=True)
     ]
-    return {"id": robot.id, "name": robot.name, "joints": joints}
+    return {"id": robot.id, "name": robot.name, "joints": joints, "description": robot_to_dict(robot)}
 
 
 def welcome(code: str, robot: Robot, most: float) -> dict[str, Any]:

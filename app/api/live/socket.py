@@ -115,7 +115,7 @@ class Conversation:
         session = query.get("session", "")[:LONGEST_SESSION] or str(id(self))
         delay: Callable[[], float | None] = visitor.scope.get("state", {}).get(DELAY, lambda: None)
         self._program = Program(
-            "".join(c for c in name if c.isprintable()) or DEFAULT_NAME, session, self._wake, delay
+            "".join(c for c in name if c.isprintable()) or DEFAULT_NAME, session, self._wake, delay, self._rate
         )
         try:
             line.connect(self._program)
@@ -144,6 +144,11 @@ class Conversation:
         with contextlib.suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self._woken.set)
 
+    def _rate(self) -> int:
+        """How many messages came within the last second; called by any thread."""
+        since = self._loop.time() - 1.0
+        return sum(time > since for time in list(self._times))
+
     # What the program sends
 
     async def _listen(self) -> None:
@@ -166,7 +171,6 @@ class Conversation:
         self._times.append(now)
         while self._times[0] < now - 1.0:
             self._times.popleft()
-        self._program.rate = float(len(self._times))
         self._left = min(BURST, self._left + RATE * (now - self._since))
         self._since = now
         if self._waiting is not None or self._left < 1.0:
@@ -254,13 +258,14 @@ class Conversation:
                 await _close(self._visitor, DONE, reason)
                 return
             now = self._loop.time()
-            if now < next_news:
+            letters = self._line.letters()
+            if now < next_news and not letters:
                 self._loop.call_later(next_news - now, self._woken.set)
-            elif values := self._line.news(self._known):
+            elif values := self._line.news(self._known):  # before `done`: what was done has been heard then
                 next_news = now + self._interval
                 self._known.update({name: number for name, (number, _) in values.items()})
                 await self._send(news({name: value for name, (_, value) in values.items()}))
-            for letter in self._line.letters():  # these wait for no interval
+            for letter in letters:
                 self._own.append(_letter(letter.number, letter.problem))
             while self._own:
                 await self._send(self._own.popleft())

@@ -46,6 +46,8 @@ class ClassroomPage(MemberPage):
     def _act(self, key: Hashable, value: object) -> None:
         if self._member is None or self._member.admit(key, value):
             super()._act(key, value)
+        elif key == "live":
+            self.live.refuse(self._member.refusal("live"))
 
     def _step(self, batch: list[tuple[Hashable, object]]) -> None:
         due = self._persistence.due

@@ -58,6 +58,8 @@ RULES: Final[dict[str, Rule]] = {
     "random": Rule("Random", act=True),
     "recall": Rule("Move target to tool", act=True),
     "shown": Rule(step=False),
+    "live": Rule("Connected program", gradual=LONG_PAUSE, act=True),
+    "drawn": Rule(step=False),
     # Typed, and keys
     "field": Rule("Typed value", message=True, answered=True, act=True),
     "target": Rule("Typed target", message=True, answered=True, act=True),

@@ -17,11 +17,13 @@ import viser
 import kin
 from app.classroom.results.keys import result_key
 from app.exports.snippets import Service
+from app.live import Door
 from app.shared.security import Rights
 from app.viewer.activity.activity import Activity
 from app.viewer.feature import Feature
 from app.viewer.frames import Frames
 from app.viewer.labels import size_labels, text_factor
+from app.viewer.live.feature import Connect
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.obstacles.feature import ObstaclesFeature
 from app.viewer.own_arm import OwnArm
@@ -38,6 +40,7 @@ from app.viewer.session.controller import ArmController
 from app.viewer.session.events import LINK
 from app.viewer.session.forms import Forms
 from app.viewer.session.lessons import LessonChoice
+from app.viewer.session.live import LiveInput
 from app.viewer.session.looks import Looks
 from app.viewer.session.numbers import Numbers
 from app.viewer.session.persistence import Persistence
@@ -48,6 +51,7 @@ from app.viewer.session.services import Services
 from app.viewer.session.state import PageState, without_arm
 from app.viewer.session.worker.worker import Worker
 from app.viewer.tabs import TABS
+from app.viewer.tabs.program.tab import ProgramTab
 from app.viewer.views.templates import render
 from app.viewer.viser_outbox import in_one_frame
 from kin import IKResult, Robot, Task
@@ -91,6 +95,7 @@ class VisitorPage(ShownArm, Worker):
         self.view, self.units, self.system_dark = ViewState(), DEFAULT_UNITS, False
         self.client, self._pace = client, services.pace
         self._welcome, self._looking = welcome, rights is Rights.LOOK
+        self.door = Door(services.lines, self.post, self._looking)
         self._persistence = Persistence(self, token, self._guard, rights)
         self.offered: tuple[type[Feature], ...] = TABS
         self._tabs: list[Feature] = []
@@ -111,7 +116,8 @@ class VisitorPage(ShownArm, Worker):
             self._activity_changed,
         )
         self.looks = Looks(self)
-        self._actions = Actions(self)
+        self.live = LiveInput(self)
+        self._actions = Actions(self, self.live)
         self._preparing = Preparing(self, services.preparation)
 
     # Stage: what features may use
@@ -306,6 +312,7 @@ class VisitorPage(ShownArm, Worker):
                 self.status.fail(next((feature.failure for feature in self.features if feature.failure), ""))
             if batch and self._persistence.urgent and not self._inbox.waits:  # what waits may open more
                 self._save()  # in the same frame, so that nothing is on show that a reload would lose
+            self.live.publish(self._result)
             self.client.flush()
             self.numbers.update()
         if batch or (played and not self.arm.playing):
@@ -367,8 +374,11 @@ class VisitorPage(ShownArm, Worker):
             self._use_robot(robot, saved.q)
             self.forms = Forms(gui, self.panel, self, self._library.offered(self.store.robots), self.post)
             self.lessons = LessonChoice(gui, self.panel.learn, self.panel.sheet, self, self.post)
-            containers: list[viser.GuiFolderHandle | viser.GuiTabHandle] = [self.panel.obstacles, *self.panel.tabs]
+            tabs = self.panel.tabs
+            containers: list[viser.GuiFolderHandle | viser.GuiTabHandle] = [self.panel.obstacles, *tabs]
             features: tuple[type[Feature], ...] = (ObstaclesFeature, *self.offered)
+            if ProgramTab in self.offered:
+                features, containers = (*features, Connect), [*containers, tabs[self.offered.index(ProgramTab)]]
             for tab, container in zip(features, containers, strict=True):
                 with container:
                     self._tabs.append(tab(self))

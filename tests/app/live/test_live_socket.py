@@ -52,10 +52,10 @@ class Page:
             self.take()
 
     def take(self) -> None:
-        parcel = self.line.take()
-        self.taken |= parcel.values
-        for number in parcel.numbers:
-            self.line.write(number)
+        for parcel in map(self.line.take, ("live", "drawn")):
+            self.taken |= parcel.values
+            for number in parcel.numbers:
+                self.line.write(number)
 
 
 @pytest.fixture
@@ -366,7 +366,8 @@ def test_delay_and_rate_are_measured(page, port):
         heard(program, "welcome")
         for _ in range(10):
             say(program, q=[0.1] * 6)
-        wait_for(lambda: page.line.program is not None and page.line.program.rate == 10.0)
+        wait_for(lambda: page.line.program is not None and page.line.program.rate() == 10)
         assert page.line.program is not None
         wait_for(lambda: page.line.program.delay() is not None, 10.0)
+        assert page.line.program.rate() == 0
         assert 0.0 < (page.line.program.delay() or 0.0) < 1.0

@@ -21,26 +21,31 @@ from app.viewer.session.actions.typed import TypedInput
 from app.viewer.session.choices import PageChoices
 from app.viewer.session.events import MESSAGES, RULES, belongs_before, pause_within
 from app.viewer.session.history import History, Step, same, without_results
+from app.viewer.session.live import LiveInput
 from app.viewer.session.parts import Page
 from app.viewer.session.persistence import link_notice
 from app.viewer.session.state import PageState, decode
 from kin.units import Units
 
+BURST = ("live",)  # the gesture of a program
+
 
 class Actions:
     """Handles the events of one page, and keeps its `history`."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: Page, live: LiveInput) -> None:
         self._page = page
         self.history = History()
         self._gesture: tuple[object, ...] | None = None  # the control of the last step, while it may go on
         self._changed_at = 0.0
+        self._live_until = 0.0  # until when the burst of a program may go on
         typed = TypedInput(page)
         self._arm = ArmControls(page, typed)
         # Events by the first part of their key. A handler takes the other parts, and the value.
         self._handlers: dict[str, Callable[..., Any]] = {
             **self._arm.handlers,
             **LookControls(page).handlers,
+            **live.handlers,
             "grab": self._on_grab,
             "feature": self._on_feature,
             "news": self._on_feature,
@@ -98,11 +103,20 @@ class Actions:
         finally:
             if not same(before, self._page.snapshot()):
                 self.history.record(_label(gesture, self._page.features), before)
-                self._gesture, self._changed_at = gesture, now
+                if gesture == BURST:
+                    self._live_until = now + RULES["live"].gradual
+                else:
+                    self._gesture, self._changed_at = gesture, now
                 self._show_history()
 
     def _continues(self, gesture: tuple[object, ...], value: object, now: float) -> bool:
         """Whether an event belongs to the same step as the one before."""
+        if gesture == BURST:  # what the visitor does meanwhile are steps of their own within the burst
+            if now > self._live_until:
+                return False
+            self._live_until = now + RULES["live"].gradual
+            self.history.proceed()
+            return True
         if belongs_before(gesture):
             self.history.proceed()
             return True
@@ -155,7 +169,7 @@ class Actions:
     def show(self, state: PageState) -> None:
         """Show another state, except for the viewpoint unless the robot is another one."""
         page = self._page
-        self._gesture = None
+        self._gesture, self._live_until = None, 0.0
         self.history.arrive()
         if state.units != page.units:
             page.looks.use_units(state.units)

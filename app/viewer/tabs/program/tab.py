@@ -36,7 +36,7 @@ from app.viewer.tabs.program.views import KINDS
 from app.viewer.tabs.program.ways import Ways
 from app.viewer.tabs.workspace.background import run_in_background
 from kin import InputError, KinematicsError
-from kin.motion import Motion
+from kin.motion import Motion, Program
 from kin.warmup import MOTIONS
 
 REPLAN = 0.2  # s without a change of the obstacles until the motion is planned again
@@ -73,6 +73,7 @@ class ProgramTab(Feature):
         self._other: Motion | None = None
         self._screen = Screen(stage)
         self._ways = Ways(stage, self._screen.way, self.post)
+        self._progress: dict[str, object] = {}
         self._refresh()
 
     def handle(self, key: Hashable, value: object) -> None:
@@ -88,6 +89,45 @@ class ProgramTab(Feature):
 
     def step_name(self, key: Hashable) -> str:
         return _LABELS.get(str(key[0]), self.title) if isinstance(key, tuple) else self.title
+
+    # What a connected program does
+
+    def load(self, program: Program, name: str) -> None:
+        """Take a program in place of the one on show; raises `InputError`, and nothing has changed then."""
+        arm = self.stage.now
+        items = items_of(program, arm.robot, arm.goal)
+        self._use(items, None)
+        if self._items != items:
+            raise InputError("program", changes.counted(items), "programs of all arms that fit into a link")
+        if self._fault is None:
+            self.stage.notify(Notice("hand", f"A program from {name}", changes.counted(items)))
+
+    def start(self, on: bool) -> None:
+        """Play from the beginning, or stop; raises `InputError` if nothing can be played."""
+        self._playback.stop()
+        if not on:
+            return
+        self._player.time = 0.0
+        self._play(None)
+        if not self._player.playing:
+            words = "no program" if self._fault is None else self._fault.words
+            raise InputError("play", words, "a program of at least two poses that can be driven")
+
+    @property
+    def progress(self) -> dict[str, object]:
+        """Whether a program plays, and where it is; the same object while that is the same."""
+        player, whole = self._player, self._fault is None and self._whole is not None
+        duration = self._playback.duration
+        found: dict[str, object] = {
+            "items": len(self._items),
+            "playing": player.playing,
+            "time": player.time,
+            "duration": duration,
+        }
+        found["complete"] = whole
+        if found != self._progress:
+            self._progress = found
+        return self._progress
 
     # Reports of the session
 

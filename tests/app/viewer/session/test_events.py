@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from app.live import EVENTS
 from app.viewer.session.events import (
     LINK,
     LONG_PAUSE,
@@ -82,7 +83,7 @@ def sent() -> set[str]:
 
 def events() -> set[str]:
     """The names of all events, without what only wraps a message."""
-    found = {LINK} | sent()
+    found = {LINK, *EVENTS} | sent()
     for path in VIEWER.rglob("*.py"):
         inside = path.relative_to(VIEWER).parts[0] in OF_THE_PAGE
         found |= set(posted(path.read_text(encoding="utf-8"), inside))

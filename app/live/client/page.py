@@ -1,0 +1,322 @@
+"""A page of the viewer, as an object: assign what it should show, read what it shows."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import kin
+from app.live.client.connection import Connection, Message, RefusedError
+from app.live.client.drawing import Drawing
+from kin import InputError, KinematicsError, Motion, Obstacle, Program, Robot
+from kin.transforms import Array, from_position_wxyz
+
+VALUES: Final = ("q", "target", "result", "contacts", "program")
+RATE: Final = 30.0  # news a second
+TIMEOUT: Final = 10.0  # s for an answer
+SLACK: Final = 1e-6  # rad or m beyond a limit
+KEPT: Final = 256  # events of a kind that cannot be replaced which wait for a slow reader
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that has happened in the page.
+
+    Attributes:
+        kind: ``"q"``, ``"target"``, ``"result"``, ``"contacts"``, ``"program"``, ``"robot"``; ``"problem"`` for a
+            value that was refused later; ``"disconnected"`` and ``"connected"``.
+        value: as the property of that name has it; of a problem, the `RefusedError`.
+    """
+
+    kind: str
+    value: Any = None
+
+
+class Page:
+    """A page that this program is connected to. Every method may be called by any thread.
+
+    Use it as a context manager, or call `close`. After a lost connection it comes back by itself, and shows again
+    what it has drawn; once the page has ended the connection, every use raises `KinematicsError` with the reason.
+
+    Args:
+        address, code, name, token: as for `kin.connect`.
+        rate: how often a second the page is to report what it shows, at most.
+    """
+
+    def __init__(
+        self, address: str, code: str, name: str | None = None, token: str | None = None, rate: float = RATE
+    ) -> None:
+        self._lock = threading.Condition()
+        self._values: dict[str, Any] = {}
+        self._sent: int | None = None  # number of the newest configuration that is not answered
+        self._refused: RefusedError | None = None
+        self._measured: Array | None = None
+        self._rate = rate
+        self._readers: list[_Reader] = []
+        self._robot: Robot
+        self.draw = Drawing(self._draw)
+        name = name or Path(sys.argv[0] or "").name or "Python"
+        self._connection = Connection(address, code, name, token, self._take, self._beginning)
+        with self._lock:
+            if not self._lock.wait_for(lambda: "q" in self._values or bool(self._connection.ended), TIMEOUT):
+                self._connection.close()
+                raise KinematicsError("the page does not say what it shows")
+
+    # What it shows
+
+    @property
+    def robot(self) -> Robot:
+        """The arm on show. Assign the id of one of the service's, or an arm, to show another one."""
+        self._check()
+        return self._robot
+
+    @robot.setter
+    def robot(self, robot: str | Robot) -> None:
+        sent = robot if isinstance(robot, str) else kin.robot_to_dict(robot)
+        if isinstance(robot, Robot) and kin.builtin_robots().get(robot.id) == robot:
+            sent = robot.id
+        self._ask(robot=sent)
+
+    @property
+    def q(self) -> Array:
+        """The configuration ``(n,)``, radians (metres): what was assigned last, or done in the page since.
+
+        Assigning returns at once; of values that follow each other faster than 100 a second only the newest are
+        sent. Raises `kin.InputError` for a value that does not fit the arm or its limits.
+        """
+        self._check()
+        with self._lock:
+            return np.array(self._values["q"])
+
+    @q.setter
+    def q(self, value: ArrayLike) -> None:
+        robot = self._robot
+        q = robot.check_q(value)
+        inside = (q >= robot.lower - SLACK) & (q <= robot.upper + SLACK)
+        if not inside.all():
+            i = int(np.argmin(inside))
+            low, high = robot.lower[i], robot.upper[i]
+            raise InputError(f"q[{i}]", float(q[i]), f"{low:.6g} to {high:.6g}, the limits of the joint")
+        with self._lock:
+            refused, self._refused = self._refused, None
+            if refused is None:
+                self._sent = self._connection.stream(q=robot.clip(q).tolist())
+                self._values["q"] = robot.clip(q)
+        if refused is not None:
+            raise refused
+
+    @property
+    def measured(self) -> Array | None:
+        """Where a real arm is ``(n,)``: a ghost beside the one that is commanded. None: there is none."""
+        return None if self._measured is None else self._measured.copy()
+
+    @measured.setter
+    def measured(self, value: ArrayLike | None) -> None:
+        q = None if value is None else self._robot.check_q(value, "measured")
+        self._connection.stream(measured=None if q is None else q.tolist())
+        self._measured = q
+
+    @property
+    def target(self) -> Array | None:
+        """The pose ``(4, 4)`` that the arm is asked for; None while it follows the tool.
+
+        Assign a pose ``(4, 4)``, or a point ``(3,)`` that keeps the orientation; it returns when `q` and `result`
+        are those of this target.
+        """
+        self._check()
+        with self._lock:
+            return self._values.get("target")
+
+    @target.setter
+    def target(self, value: ArrayLike) -> None:
+        given = np.asarray(value, dtype=float)
+        if given.shape not in ((3,), (4, 4)) or not np.isfinite(given).all():
+            raise InputError("target", value, "a pose (4, 4) or a point (3,) of finite numbers")
+        self._ask(target={"position" if given.ndim == 1 else "matrix": given.tolist()})
+
+    @property
+    def result(self) -> dict[str, Any] | None:
+        """The last answer of inverse kinematics, as REST gives it; None while a question asks for it."""
+        found = self._value("result")
+        return None if found is None else dict(found)
+
+    @property
+    def contacts(self) -> list[dict[str, Any]]:
+        """What the arm touches, the deepest first, as REST gives it."""
+        return list(self._value("contacts") or ())
+
+    @property
+    def program(self) -> dict[str, Any]:
+        """The program of the page: how many ``items``, ``playing``, ``time``, ``duration``, ``complete``."""
+        return dict(self._value("program") or {})
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a connection now."""
+        return self._connection.connected and not self._connection.ended
+
+    # What it does
+
+    def play(self, motion: Motion | Program | Mapping[str, Any] | None = None) -> None:
+        """Show a program in the tab *Program* and play it; None: the one that is there."""
+        if isinstance(motion, Motion):
+            motion = motion.program
+        if isinstance(motion, Program):
+            motion = kin.program_to_dict(motion)
+        self._ask(**({} if motion is None else {"program": motion}), play=True)
+
+    def stop(self) -> None:
+        """Stop the program that is played."""
+        self._ask(play=False)
+
+    def place(self, obstacles: Sequence[Obstacle | Mapping[str, Any]]) -> None:
+        """Place these obstacles, in place of all that there are."""
+        self._ask(obstacles=[_plain(each) for each in obstacles])
+
+    def events(self) -> Iterator[Event]:
+        """What happens in the page from now on; ends when the page is closed.
+
+        A slow reader gets the newest value of each kind.
+        """
+        reader = _Reader()
+        with self._lock:
+            self._readers.append(reader)
+        return self._read(reader)
+
+    def _read(self, reader: _Reader) -> Iterator[Event]:
+        try:
+            while True:
+                with self._lock:
+                    self._lock.wait_for(lambda: bool(reader.waiting) or bool(self._connection.ended))
+                    if not reader.waiting:
+                        return
+                    event = reader.waiting.popleft()
+                yield event
+        finally:
+            with self._lock:
+                self._readers.remove(reader)
+
+    def close(self) -> None:
+        """End the connection. What the program has drawn leaves the page."""
+        self._connection.close()
+        with self._lock:
+            self._lock.notify_all()
+
+    def __enter__(self) -> Page:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        state = "connected" if self.connected else self._connection.ended or "not connected"
+        return f"<Page with {self._robot.name}, {state}>"
+
+    # The connection
+
+    def _check(self) -> None:
+        if self._connection.ended:
+            raise KinematicsError(f"the connection to the page has ended: {self._connection.ended}")
+
+    def _value(self, name: str) -> Any:
+        self._check()
+        with self._lock:
+            return self._values.get(name)
+
+    def _ask(self, **fields: Any) -> None:
+        with self._lock:
+            self._sent = None
+        self._connection.request(TIMEOUT, **fields)
+
+    def _draw(self, **fields: Any) -> None:
+        self._connection.request(TIMEOUT, **fields)
+
+    def _beginning(self) -> list[Message]:
+        """What is sent after each connection."""
+        found: list[Message] = [{"subscribe": {"values": list(VALUES), "rate": self._rate}}]
+        if self._measured is not None:
+            found.append({"measured": self._measured.tolist()})
+        return found + [{"draw": {name: drawn}} for name, drawn in self.draw.shown.items()]
+
+    def _take(self, message: Message) -> None:
+        """Take a message of the page; called by the thread that receives."""
+        kind = message["type"]
+        with self._lock:
+            if kind == "welcome":
+                self._robot = robot_of(message["robot"])
+                self._tell(Event("connected"))
+            elif kind == "news":
+                for name, value in message.items():
+                    if name != "type":
+                        self._hear(name, value)
+            elif kind in ("done", "problem") and message.get("id") == self._sent:
+                self._sent = None
+            if kind == "problem" and not message.get("asked"):
+                self._refused = RefusedError(message["problem"])
+                self._tell(Event("problem", self._refused))
+            elif kind == "disconnected":
+                self._sent = None
+                self._tell(Event("disconnected"))
+            self._lock.notify_all()
+
+    def _hear(self, name: str, value: Any) -> None:
+        if name == "robot":
+            self._robot = value = robot_of(value)
+            self._measured = None
+            self._sent = None
+        elif name == "q":
+            if self._sent is not None and "q" in self._values:
+                return  # a newer one is on its way there
+            self._values["q"] = value = np.array(value)
+        else:
+            if name == "target" and value is not None:
+                value = from_position_wxyz(value["position"], value["wxyz"])
+            self._values[name] = value
+        self._tell(Event(name, value))
+
+    def _tell(self, event: Event) -> None:
+        for reader in self._readers:
+            reader.add(event)
+
+
+class _Reader:
+    """The events that wait for one reader."""
+
+    def __init__(self) -> None:
+        self.waiting: deque[Event] = deque(maxlen=KEPT)
+
+    def add(self, event: Event) -> None:
+        if event.kind in VALUES:
+            older = next((each for each in self.waiting if each.kind == event.kind), None)
+            if older is not None:
+                self.waiting.remove(older)
+        self.waiting.append(event)
+
+
+def robot_of(described: Mapping[str, Any]) -> Robot:
+    """The arm that a page describes."""
+    known = kin.builtin_robots().get(described["id"])
+    if known is not None and kin.robot_to_dict(known) == described["description"]:
+        return known
+    return kin.robot_from_dict(described["description"])
+
+
+def _plain(obstacle: Obstacle | Mapping[str, Any]) -> dict[str, Any]:
+    if not isinstance(obstacle, Obstacle):
+        return dict(obstacle)
+    return {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in asdict(obstacle).items()
+        if value is not None
+    }

@@ -1,0 +1,55 @@
+"""The HTML of *Connect a program*."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.classroom.tokens import show_code
+from app.live import Program
+from app.viewer.panel.share import box_html
+from app.viewer.views.templates import render
+from kin import Robot
+from kin.transforms import Array
+from kin.units import Units
+
+
+def about() -> str:
+    """What the button is for."""
+    return render("live/about")
+
+
+def websocket(address: str, code: str) -> str:
+    """The address of the websocket with a page, at a service whose address ends with a slash."""
+    return f"{address.replace('http', 'ws', 1)}api/v1/live/{show_code(code)}"
+
+
+def code(code: str, address: str) -> str:
+    """The code of the page, and where programs find it."""
+    box = box_html(websocket(address, code), "Copy address", wrap=True)
+    return render("live/code", code=show_code(code), address=address, box=box)
+
+
+def state_of(program: Program | None) -> tuple[str, int, str]:
+    """Who is connected, how many messages came within the last second, and the delay in words."""
+    if program is None:
+        return "", 0, ""
+    delay = program.delay()
+    return program.name, program.rate(), "" if delay is None else f"{max(1e3 * delay, 0.1):.1f}"
+
+
+def state(name: str, rate: int, delay: str) -> str:
+    """Who is connected, in the words of the page."""
+    return render("live/state", name=name, rate=rate, delay=delay)
+
+
+def measured(robot: Robot, gap: bytes, q: bytes, units: Units) -> str:
+    """The measured joint values, and by how much they are beyond those on show."""
+    rows = []
+    for joint, turns, value, apart in zip(robot.joints, robot.revolute, _values(q), _values(gap), strict=True):
+        unit = units.of(bool(turns))
+        rows.append((joint.name, unit.number(value), unit.number(apart), unit.suffix))
+    return render("live/measured", rows=rows)
+
+
+def _values(data: bytes) -> Array:
+    return np.frombuffer(data)

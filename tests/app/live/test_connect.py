@@ -1,0 +1,253 @@
+"""`kin.connect` against a page of the viewer: values both ways, threads, lost connections, refusals."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from live_server import wait_for
+
+import kin
+from app.live.client import Event, RefusedError
+
+DOCUMENT = (Path(__file__).parents[3] / "docs/connect.md").read_text(encoding="utf-8")
+ARM = kin.get_robot("ur5")
+Q = np.array([0.3, -1.2, 1.4, -0.4, 0.5, 0.2])
+
+
+def code_of(page: FakeBrowser) -> str:
+    page.send("GuiUpdateMessage", uuid=page.element("Connect a program"), updates={"value": True})
+    page.wait(lambda: "data-live-code" in page.html)
+    found = re.search(r"data-live-code>([A-Z0-9-]+)<", page.html)
+    assert found is not None
+    return found[1]
+
+
+@pytest.fixture
+def code(page) -> str:
+    return code_of(page)
+
+
+@pytest.fixture
+def arm(viewer, code) -> Iterator[Any]:
+    with kin.connect(f"http://127.0.0.1:{viewer}", code, name="arm.py", rate=60) as arm:
+        yield arm
+
+
+def shown(page: FakeBrowser, T: np.ndarray) -> None:
+    page.wait(lambda: bool(np.allclose(page.tool_pose(), T, atol=1e-5)))
+
+
+def test_what_is_assigned_is_shown_and_what_is_dragged_is_read(page, arm):
+    assert arm.robot == ARM
+    assert arm.connected
+    arm.q = Q
+    assert arm.q.tolist() == Q.tolist()
+    shown(page, kin.fk(ARM, Q))
+    T = kin.fk(ARM, Q)
+    T[2, 3] += 0.05
+    page.grab()
+    page.drag(T)
+    page.release()
+    wait_for(lambda: np.allclose(kin.fk(ARM, arm.q), T, atol=1e-6))
+    assert not np.allclose(arm.q, Q)
+
+
+def test_a_target_is_answered_when_it_has_been_assigned(page, arm):
+    arm.q = Q
+    T = kin.fk(ARM, Q + 0.1)
+    arm.target = T
+    assert arm.result["status"] == "solved"
+    assert arm.result["solutions"][0]["q"] == pytest.approx((Q + 0.1).tolist(), abs=1e-6)
+    arm.target = [9.0, 0.0, 0.0]
+    assert arm.result["status"] != "solved"
+    assert arm.target[:3, 3].tolist() == [9.0, 0.0, 0.0]
+
+
+def test_a_fast_program_ends_where_it_says(page, arm):
+    """Ten thousand a second: no error, and the last one is on show."""
+    began = time.monotonic()
+    for k in range(5000):
+        arm.q = Q + 1e-4 * k * np.array([1, 0, 0, 0, 0, 0])
+        time.sleep(max(0.0, began + 1e-4 * k - time.monotonic()))
+    assert arm.q[0] == pytest.approx(Q[0] + 0.4999)
+    shown(page, kin.fk(ARM, Q + np.array([0.4999, 0, 0, 0, 0, 0])))
+    arm.q = Q  # nothing was refused
+    time.sleep(0.1)
+    arm.q = Q
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("q", [0.0] * 5, "expected 6 joint values in radians"),
+        ("q", [0.0, np.nan, 0, 0, 0, 0], "finite"),
+        ("q", [0.0, 99.0, 0, 0, 0, 0], "q[1]: got 99.0, expected -6.28319 to 6.28319"),
+        ("measured", [0.0], "measured"),
+        ("target", [0.0, 0.0], "a pose (4, 4) or a point (3,)"),
+        ("target", np.full((4, 4), 7.0), "target.matrix"),
+        ("robot", "ur500", "expected one of"),
+    ],
+)
+def test_what_does_not_fit_is_refused_by_name(page, arm, name, value, words):
+    before = arm.q
+    with pytest.raises(kin.KinematicsError) as refused:
+        setattr(arm, name, value)
+    assert words in str(refused.value)
+    assert arm.q.tolist() == before.tolist()
+    arm.q = Q
+    shown(page, kin.fk(ARM, Q))
+
+
+def test_another_arm_comes_with_its_table(page, arm):
+    arm.robot = "pioneer5"
+    assert arm.robot == kin.get_robot("pioneer5")
+    own = kin.Robot.from_dh([[0.0, 0.0, 0.3, 0.0], [0.0, 0.0, 0.2, 0.0]])
+    arm.robot = own
+    assert arm.robot.n == 2
+    arm.q = [0.2, 0.3]
+    wait_for(lambda: arm.q.tolist() == [0.2, 0.3])
+    page.wait(lambda: len(page.sliders_in("Joints")) == 2)
+
+
+def test_a_motion_is_played_and_its_events_are_heard(page, arm):
+    arm.q = Q
+    program = kin.Program((kin.Ptp(kin.JointTarget(Q)), kin.Ptp(kin.JointTarget(Q + 0.2))))
+    events = arm.events()
+    arm.play(kin.plan_motion(ARM, program, Q))
+    playing = [event.value["playing"] for event in until(events, "program", lambda value: value["time"] > 0.1)]
+    assert playing[-1]
+    until(events, "program", lambda value: not value["playing"] and value["time"] > 0.1)
+    wait_for(lambda: np.allclose(arm.q, Q + 0.2, atol=1e-6))
+    arm.play()
+    arm.stop()
+    assert not arm.program["playing"]
+
+
+def until(events: Iterator[Event], kind: str, condition: Any) -> list[Event]:
+    """The events of a kind up to the one that fulfils a condition."""
+    found = []
+    for event in events:
+        if event.kind == kind:
+            found.append(event)
+            if condition(event.value):
+                return found
+    raise AssertionError("the events have ended")
+
+
+def test_obstacles_contacts_and_drawings(page, arm):
+    arm.q = Q
+    elbow = kin.link_frames(ARM, Q)[3, :3, 3]
+    arm.place([kin.Obstacle("sphere", xyz=tuple(elbow), radius=0.1)])
+    wait_for(lambda: bool(arm.contacts))
+    assert arm.contacts[0]["obstacle"] == 0
+    arm.place([])
+    wait_for(lambda: not arm.contacts)
+    arm.draw.line("wall", [[0, 0, 0], [1, 0, 0]])
+    arm.draw.points("scan", np.random.default_rng(1).random((50, 3)), color="#2b8a3e")
+    arm.draw.frame("goal", kin.fk(ARM, Q))
+    arm.draw.label("name", [0, 0, 1], "goal")
+    page.wait(lambda: len(drawn(page)) == 4)
+    arm.draw.remove("scan")
+    page.wait(lambda: len(drawn(page)) == 3)
+    with pytest.raises(kin.InputError, match="at least 2 points"):
+        arm.draw.line("wall", [[0, 0, 0]])
+    with pytest.raises(RefusedError, match="color"):
+        arm.draw.line("wall", [[0, 0, 0], [1, 0, 0]], color="red")
+    with pytest.raises(kin.KinematicsError, match="at most 65536"):
+        arm.draw.points("cloud", np.random.default_rng(1).random((5000, 3)))
+    arm.draw.clear()
+    page.wait(lambda: not drawn(page))
+
+
+def drawn(page: FakeBrowser) -> list[str]:
+    return [n for n in page.nodes if re.search(r"/connect-\d+/drawn", n) and page.visible.get(n, True)]
+
+
+def test_a_lost_connection_comes_back_with_what_was_drawn(page, arm):
+    arm.draw.label("name", [0, 0, 1], "goal")
+    arm.measured = Q
+    page.wait(lambda: len(drawn(page)) == 1)
+    events = arm.events()
+    arm._connection._socket.socket.close()  # as a network does that fails
+    until(events, "disconnected", lambda _: True)
+    until(events, "connected", lambda _: True)
+    page.wait(lambda: len(drawn(page)) == 1 and "data-live-measured" in page.html)
+    arm.q = Q
+    shown(page, kin.fk(ARM, Q))
+
+
+def test_many_threads_may_use_it(page, arm):
+    failed: list[BaseException] = []
+
+    def work(k: int) -> None:
+        try:
+            for i in range(20):
+                arm.q = Q + 0.001 * i
+                arm.draw.label(f"label {k}", [0, 0, 0.1 * k], str(i))
+                assert arm.q.shape == (6,)
+        except BaseException as error:  # noqa: BLE001 - shown by the test
+            failed.append(error)
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failed
+    page.wait(lambda: len(drawn(page)) == 4)
+    shown(page, kin.fk(ARM, Q + 0.019))
+
+
+def test_a_withdrawn_code_is_said_by_every_use(page, arm):
+    events = arm.events()
+    page.send("GuiUpdateMessage", uuid=page.element("Withdraw the code"), updates={"value": True})
+    for _ in events:  # ends
+        pass
+    assert not arm.connected
+    for use in (lambda: arm.q, lambda: setattr(arm, "q", Q), arm.play, lambda: arm.draw.clear()):
+        with pytest.raises(kin.KinematicsError, match="The page has withdrawn the code"):
+            use()
+
+
+def test_a_closed_page_leaves_no_thread_and_no_drawing(viewer, page, code):
+    before = threading.active_count()
+    with kin.connect(f"http://127.0.0.1:{viewer}/viewer/#s=abc", code.lower()) as arm:
+        arm.draw.label("name", [0, 0, 1], "goal")
+        page.wait(lambda: len(drawn(page)) == 1)
+        arm.q = Q
+    page.wait(lambda: not drawn(page))
+    shown(page, kin.fk(ARM, Q))  # what was assigned last has arrived
+    wait_for(lambda: not any(thread.name.startswith("kinboard-re") for thread in threading.enumerate()), 5.0)
+    assert threading.active_count() <= before + 1
+    with pytest.raises(kin.KinematicsError, match="has closed it"):
+        arm.q = Q
+
+
+def test_connections_that_cannot_be_say_why(viewer, page, code):
+    with pytest.raises(kin.KinematicsError, match=r"no connection to 127\.0\.0\.1:9"):
+        kin.connect("http://127.0.0.1:9", code)
+    with pytest.raises(kin.KinematicsError, match="such as http://localhost:8000"):
+        kin.connect("ftp://127.0.0.1", code)
+    with pytest.raises(RefusedError, match="No page has the code ACDE-FGHJ") as refused:
+        kin.connect(f"http://127.0.0.1:{viewer}", "ACDE-FGHJ")
+    assert refused.value.problem["status"] == 404
+    with (
+        kin.connect(f"http://127.0.0.1:{viewer}", code, name="first.py"),
+        pytest.raises(RefusedError, match=r"Another program is connected to this page: first\.py"),
+    ):
+        kin.connect(f"http://127.0.0.1:{viewer}", code)
+
+
+def test_the_example_of_the_documents_runs(viewer, page, code):
+    (text,) = re.findall(r"```py\n(import kin\n.*?)```", DOCUMENT, re.DOTALL)
+    text = text.replace("http://localhost:8000", f"http://127.0.0.1:{viewer}").replace("K7QF-2M4A", code)
+    exec(compile(text, "example", "exec"), {})
+    page.settle()

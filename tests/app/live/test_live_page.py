@@ -1,0 +1,275 @@
+"""A program and a page of the viewer: what the program moves is seen, undone, and heard back."""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+import kin
+from app.api.live.messages import LiveMessage
+from app.live import VALUES
+
+ROOT = Path(__file__).parents[3]
+DOCUMENT = (ROOT / "docs/connect.md").read_text(encoding="utf-8")
+ARM = kin.get_robot("ur5")
+Q = [0.3, -1.2, 1.4, -0.4, 0.5, 0.2]
+SPHERE = {"shape": "sphere", "xyz": [1.5, 0.0, 0.5], "radius": 0.1}
+MOVES = {"segments": [{"kind": "ptp", "q": Q}, {"kind": "ptp", "q": [0.5, -1.2, 1.4, -0.4, 0.5, 0.2]}]}
+
+
+class Program:
+    """A program that is connected to a page."""
+
+    def __init__(self, port: int, page: FakeBrowser, name: str = "arm.py") -> None:
+        press(page, "Connect a program")
+        page.wait(lambda: "data-live-code" in page.html)
+        found = re.search(r"data-live-code>([A-Z0-9-]+)<", page.html)
+        assert found is not None
+        self.code = found[1]
+        self._numbers = 0
+        self.heard: dict[str, Any] = {}
+        self.socket: ClientConnection = connect(
+            f"ws://127.0.0.1:{port}/api/v1/live/{self.code}?name={name}", proxy=None, max_size=None
+        )
+        self.until("welcome")
+        page.wait(lambda: f'data-live="{name}"' in page.html)
+
+    def __enter__(self) -> Program:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.socket.close()
+
+    def send(self, **message: Any) -> None:
+        self.socket.send(json.dumps(message))
+
+    def until(self, kind: str, seconds: float = 10.0) -> dict[str, Any]:
+        """The next message of this type; news on the way are noted."""
+        deadline = time.monotonic() + seconds
+        while True:
+            message = dict(json.loads(self.socket.recv(timeout=max(0.0, deadline - time.monotonic()))))
+            if message["type"] == "news":
+                self.heard |= message
+            if message["type"] == kind:
+                return message
+
+    def do(self, **message: Any) -> None:
+        """Send a message, and wait until the page shows it."""
+        self._numbers += 1
+        self.send(id=self._numbers, **message)
+        assert self.until("done")["id"] == self._numbers
+
+    def refused(self, **message: Any) -> dict[str, Any]:
+        """The problem of a message that is refused."""
+        self.send(id=0, **message)
+        return dict(self.until("problem")["problem"])
+
+    def hears(self, name: str, condition: Any, seconds: float = 10.0) -> Any:
+        """Wait for a value that fulfils a condition."""
+        deadline = time.monotonic() + seconds
+        while name not in self.heard or not condition(self.heard[name]):
+            self.until("news", deadline - time.monotonic())
+        return self.heard[name]
+
+
+def press(page: FakeBrowser, label: str) -> None:
+    page.send("GuiUpdateMessage", uuid=page.element(label), updates={"value": True})
+
+
+def undo(page: FakeBrowser) -> str:
+    return str(page.script["undo"])
+
+
+@pytest.fixture
+def program(viewer, page) -> Iterator[Program]:
+    with Program(viewer, page) as program:
+        yield program
+
+
+def test_q_moves_the_arm_and_a_burst_is_one_step_of_undo(page, program):
+    before = page.tool_pose()
+    for k in range(20):
+        program.send(q=[0.3, -1.2 + 0.01 * k, 1.4, -0.4, 0.5, 0.2])
+    program.do(q=Q)
+    page.settle()
+    assert page.tool_pose() == pytest.approx(kin.fk(ARM, Q), abs=1e-5)
+    page.wait(lambda: "arm.py" in page.html and undo(page) == "Connected program")
+    page.say("undo")
+    page.wait(lambda: bool(np.allclose(page.tool_pose(), before, atol=1e-5)))
+    assert undo(page) != "Connected program"
+
+
+def test_a_target_is_solved_as_if_it_were_dragged_and_its_answer_is_heard(page, program):
+    program.send(subscribe={"values": ["q", "target", "result", "contacts"], "rate": 60})
+    T = kin.fk(ARM, Q)
+    program.do(target={"matrix": T.tolist()})
+    result = program.hears("result", lambda found: found is not None)
+    assert result["status"] == "solved"
+    q = program.hears("q", lambda q: np.allclose(kin.fk(ARM, q), T, atol=1e-6))
+    page.settle()
+    assert page.tool_pose() == pytest.approx(kin.fk(ARM, q), abs=1e-5)
+    program.do(target={"position": [0.4, 0.1, 0.5]})
+    q = program.hears("q", lambda q: np.allclose(kin.fk(ARM, q)[:3, 3], [0.4, 0.1, 0.5], atol=1e-6))
+    assert kin.fk(ARM, q)[:3, :3] == pytest.approx(T[:3, :3], abs=1e-6)
+    program.do(target={"position": [9.0, 0.0, 0.0]})
+    assert program.hears("result", lambda found: found["status"] != "solved")["reason"]
+    assert program.hears("target", lambda target: target is not None)["position"] == pytest.approx([9, 0, 0])
+
+
+def test_what_the_visitor_drags_is_heard_and_holds_the_arm_meanwhile(page, program):
+    program.send(subscribe={"values": ["q", "target"], "rate": 60})
+    program.do(q=Q)
+    T = kin.fk(ARM, Q)
+    T[2, 3] += 0.05
+    page.grab()
+    page.drag(T)
+    q = program.hears("q", lambda q: np.allclose(kin.fk(ARM, q), T, atol=1e-5))
+    said = program.refused(q=Q)
+    assert said["status"] == 409
+    assert said["detail"] == "The visitor holds the target."
+    page.release()
+    page.settle()
+    program.do(q=Q)
+    program.hears("q", lambda found: np.allclose(found, Q))
+    assert not np.allclose(q, Q)
+
+
+def test_another_arm_obstacles_and_contacts(page, program):
+    program.send(subscribe={"values": ["contacts", "q"], "rate": 60})
+    program.do(robot="pioneer5", q=[1.0, 0.5, 0.5, 0.5, 0.5])
+    page.wait(lambda: page.value("Robot") == kin.get_robot("pioneer5").name)
+    program.do(robot="ur5", q=Q)
+    elbow = kin.link_frames(ARM, np.array(Q))[3, :3, 3]
+    program.do(obstacles=[SPHERE | {"xyz": elbow.tolist()}])
+    contacts = program.hears("contacts", bool)
+    assert contacts[0]["obstacle"] == 0
+    program.do(obstacles=[])
+    assert program.hears("contacts", lambda found: not found) == []
+
+
+def test_an_own_arm_is_shown_and_described(page, program):
+    rows = [{"name": "a", "a": 0.3}, {"name": "b", "a": 0.2}]
+    table = {"name": "Two bars", "convention": "standard", "units": {"length": "m", "angle": "deg"}, "rows": rows}
+    program.do(robot=table, q=[0.1, 0.2])
+    robot = program.hears("robot", lambda robot: robot["name"] == "Two bars")
+    assert [joint["name"] for joint in robot["joints"]] == ["a", "b"]
+    error = program.refused(q=Q)["errors"][0]
+    assert error["expected"].startswith("2 values")
+
+
+def test_a_program_is_loaded_played_and_heard(page, program):
+    program.send(subscribe={"values": ["program", "q"], "rate": 60})
+    program.do(program=MOVES, play=True)
+    assert program.hears("program", lambda found: found["playing"])["items"] == 2
+    ended = program.hears("program", lambda found: not found["playing"] and found["time"] > 0.0)
+    assert ended["time"] == pytest.approx(ended["duration"])
+    assert program.hears("q", lambda q: np.allclose(q, MOVES["segments"][1]["q"], atol=1e-4))
+    page.say("undo")
+    assert program.hears("program", lambda found: found["items"] == 0)
+    assert program.refused(play=True)["errors"][0]["field"] == "play"
+
+
+def test_an_impossible_program_changes_nothing(page, program):
+    program.send(subscribe={"values": ["program"], "rate": 60})
+    program.do(program=MOVES)
+    far = {"segments": [{"kind": "ptp", "position": [9.0, 0.0, 0.0]}]}
+    assert program.refused(program=far)["errors"]
+    assert program.hears("program", bool)["items"] == 2
+
+
+def test_drawings_come_change_and_go_with_the_program(page, program):
+    def drawn() -> list[str]:
+        return sorted(
+            m["type"]
+            for n, m in page.nodes.items()
+            if re.search(r"/connect-\d+/drawn", n) and page.visible.get(n, True)
+        )
+
+    line = {"kind": "line", "points": [[0, 0, 0], [1, 0, 0], [1, 1, 0]]}
+    points = {"kind": "points", "points": [[0.1 * k, 0, 0.2] for k in range(10)], "color": "#00ff00"}
+    frame = {"kind": "frame", "position": [0.2, 0.2, 0.2]}
+    label = {"kind": "label", "position": [0.2, 0.2, 0.4], "text": "goal"}
+    program.do(draw={"wall": line, "scan": points, "place": frame, "name": label})
+    page.wait(lambda: len(drawn()) == 4)
+    assert [kind.removesuffix("Message") for kind in drawn()] == ["Frame", "Label", "LineSegments", "PointCloud"]
+    program.do(draw={"wall": None, "scan": points | {"color": "#ff0000"}})
+    page.wait(lambda: len(drawn()) == 3)
+    said = program.refused(draw={f"point {k}": label for k in range(101)})
+    assert said["errors"][0]["expected"] == "at most 100 in a page"
+    program.do(q=Q)
+    page.settle()
+    assert len(drawn()) == 3
+    program.socket.close()
+    page.wait(lambda: not drawn())
+
+
+def test_a_measured_arm_is_a_ghost_with_a_difference_per_joint(page, program):
+    def ghosts() -> list[dict[str, Any]]:
+        return [m for n, m in page.nodes.items() if n.endswith("/measured") and page.visible.get(n, True)]
+
+    program.do(q=Q)
+    program.do(measured=[Q[0] + np.radians(2.0), *Q[1:]])
+    page.wait(lambda: len(ghosts()) == 1 and "data-live-measured" in page.html)
+    rows = re.findall(
+        r"<tr><th>([^<]+)</th>((?:<td[^>]*>[^<]*</td>)+)", page.html.split("data-live-measured", 1)[1]
+    )
+    gaps = {name: re.findall(r"<td[^>]*>([^<]*)</td>", cells)[1] for name, cells in rows[1:7]}
+    assert list(gaps.values()) == ["2.0", "0.0", "0.0", "0.0", "0.0", "0.0"]
+    program.do(measured=None)
+    page.wait(lambda: not ghosts() and "data-live-measured" not in page.html)
+
+
+def test_a_withdrawn_code_ends_the_connection(page, program):
+    program.do(measured=Q)
+    press(page, "Withdraw the code")
+    assert program.until("end")["reason"] == "The page has withdrawn the code."
+    with pytest.raises(ConnectionClosed):
+        program.socket.recv(timeout=10)
+    page.wait(lambda: "data-live-code" not in page.html and "data-live-measured" not in page.html)
+
+
+def test_a_page_that_leaves_ends_the_connection(viewer):
+    page = FakeBrowser(viewer)
+    page.wait(
+        lambda: bool(page.gui) and any(m["props"].get("label") == "Connect a program" for m in page.gui.values())
+    )
+    with Program(viewer, page) as program:
+        page.close()
+        assert program.until("end")["reason"] == "The page was closed."
+
+
+def test_no_link_holds_a_code(page, program):
+    program.do(q=Q, draw={"a": {"kind": "label", "position": [0, 0, 1], "text": "secret"}})
+    stored = page.stored()
+    assert program.code.replace("-", "") not in stored
+    assert "secret" not in stored
+
+
+def test_the_example_of_the_documents_runs(viewer, page, program, capsys):
+    program.socket.close()
+    page.wait(lambda: 'data-live=""' in page.html)
+    (code,) = re.findall(r"```py\n(import json.*?)```", DOCUMENT, re.DOTALL)
+    code = code.replace("127.0.0.1:8000", f"127.0.0.1:{viewer}").replace("K7QF-2M4A", program.code)
+    exec(compile(code, "example", "exec"), {})
+    assert capsys.readouterr().out.startswith("UR5 ['")
+    page.settle()
+    assert page.tool_pose() == pytest.approx(kin.fk(ARM, [0.0, -1.2, 1.4, -0.99, 0.5, 0.0]), abs=1e-5)
+
+
+def test_the_documents_have_the_schema_and_every_field():
+    written = (ROOT / "docs/live-schema.json").read_text(encoding="utf-8")
+    schema = LiveMessage.model_json_schema()
+    assert json.loads(written) == schema, "python scripts/live_schema.py writes it anew"
+    sent, heard = DOCUMENT.split("### What a program hears")
+    assert set(re.findall(r"^\| `(\w+)` \|", sent, re.MULTILINE)) == set(schema["properties"])
+    assert set(VALUES) < set(re.findall(r"^\| `(\w+)` \|", heard, re.MULTILINE))
