@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from app.exercises.typed import read_number
+from app.exercises.typed import read_number, units_like
 from kin import InputError
 from kin.transforms import Array
 from kin.typed import LONGEST
@@ -275,10 +275,8 @@ class Number(Question):
         """What is wrong with an answer that is no known mistake."""
         if (self._is_count or not self.ordered) and (answer < 0.0 or abs(answer - round(answer)) > WHOLE):
             return "The answer is a whole number, and not negative."
-        if slip := self.slip(answer):
+        if slip := self.slip(answer) or self._relation(answer):
             return slip
-        if self._near(-answer, self.answer):
-            return "The size is right, the sign is not."
         if self.whole_turns or not self.ordered:
             return ""
         if answer * self.answer < 0.0:
@@ -287,11 +285,38 @@ class Number(Question):
         return f"{size} {'large' if abs(answer) > abs(self.answer) else 'small'}."
 
     def slip(self, answer: float) -> str:
-        """What the typed number would be right in: another unit; "" if in none."""
+        """What the typed number would be right in: another unit, whatever its sign; "" if in none."""
         typed_number = answer * self.unit.scale
         for name, scale, words in _other_units(self.unit):
-            if typed_number and abs(typed_number / scale - self.answer) <= self.tolerance:
-                return f"This is the value in {words}. The unit is {_words(self.unit)}; or type {name} after it."
+            for sign, remark in ((1.0, ""), (-1.0, ", with the wrong sign")):
+                if typed_number and abs(sign * typed_number / scale - self.answer) <= self.tolerance:
+                    unit = _words(self.unit)
+                    return f"This is the value in {words}{remark}. The unit is {unit}; or type {name} after it."
+        return ""
+
+    def _relation(self, answer: float) -> str:
+        """How an answer is related to the right value, if it is in a way that mistakes lead to; "" otherwise."""
+        if self._near(-answer, self.answer):
+            return "The size is right, the sign is not."
+        if self._is_count or not self.ordered:
+            return ""
+        if self.unit.is_angle:
+            turn = 2.0 * math.pi
+            for value, words in (
+                (answer + turn, "A whole turn is missing."),
+                (answer - turn, "This is a whole turn too much."),
+                (0.5 * math.pi - answer, "The two angles make a right angle: were sine and cosine exchanged?"),
+                (math.pi - answer, "The two angles make half a turn: is it the other angle of the two lines?"),
+            ):
+                if self._near(value, self.answer):
+                    return words
+        elif self.unit == PLAIN and abs(answer) <= 1.0 and abs(self.answer) <= 1.0:
+            other = math.sqrt(1.0 - answer * answer)
+            if abs(self.answer) > self.tolerance and self._near(math.copysign(other, self.answer), self.answer):
+                return "The squares of this and of the right value add up to 1: were sine and cosine exchanged?"
+        for factor, words in ((2.0, "half"), (0.5, "twice")):
+            if answer and self._near(factor * answer, self.answer):
+                return f"This is {words} the right value."
         return ""
 
     @property
@@ -325,11 +350,13 @@ def _other_units(unit: Unit) -> list[tuple[str, float, str]]:
     for family in (angles, lengths):
         if unit.name in [name for name, *_ in family]:
             return [row for row in family if row[0] != unit.name]
-    return []
+    others = [(name, 1.0 / size, name) for name, size in units_like(unit).items()]
+    return [row for row in others if not math.isclose(row[1], unit.scale)]
 
 
 def _words(unit: Unit) -> str:
-    return {"°": "degrees", "rad": "radians", "mm": "millimetres", "cm": "centimetres", "m": "metres"}[unit.name]
+    known = {"°": "degrees", "rad": "radians", "mm": "millimetres", "cm": "centimetres", "m": "metres"}
+    return known.get(unit.name, unit.name)
 
 
 WHOLE = 0.1  # accepted error of a count

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from app.exercises.exercise import Exercise, VariantError
 from app.exercises.fields import ExerciseFileError
 from app.exercises.files import Find, parse_exercise
-from app.exercises.kinds.number import MEASURES, OTHER, SCALES, NumberKind
+from app.exercises.kinds.number import MEASURES, OTHER, RATE, SCALES, NumberKind
 from app.exercises.variant import Quantity, Variant, unit_of
 from kin import KinematicsError
 from kin.units import Units, general
@@ -118,6 +118,6 @@ def _said(exercise: Exercise, name: str, value: float, units: Units) -> str:
         shown = unit_of(MEASURES.get(kind.unit, ""), units)
         if shown is not None:
             return f"{general(value * shown.scale, 5)}{shown.suffix}"
-        suffix = f" {kind.unit}" if kind.unit in OTHER else ""
+        suffix = f" {kind.unit}" if kind.unit in (*OTHER, RATE) else ""
         return general(value / SCALES.get(kind.unit, 1.0), 5) + suffix
     return general(value, 5)

@@ -2,8 +2,23 @@
 
 from __future__ import annotations
 
+import math
+import re
+
 from kin.typed import ReadError, read, valid
-from kin.units import Unit
+from kin.units import PLAIN, Unit
+
+# Units of one quantity each, and what one of them is in SI units. Angles and lengths are in `kin.units`.
+QUANTITIES: tuple[dict[str, float], ...] = (
+    {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
+    {"rad/s": 1.0, "°/s": math.radians(1.0), "deg/s": math.radians(1.0)},
+    {"m/rad": 1.0, "cm/rad": 1e-2, "mm/rad": 1e-3},
+    {"N·m": 1.0, "N·mm": 1e-3},
+    {"N": 1.0, "kN": 1e3},
+    {"s": 1.0, "ms": 1e-3},
+    {"kg": 1.0, "g": 1e-3},
+    {"J": 1.0, "kJ": 1e3},
+)
 
 
 class EntryError(ReadError):
@@ -16,7 +31,7 @@ class EntryError(ReadError):
 
 
 def read_number(text: str, unit: Unit) -> float:
-    """A typed number in radians, metres, or as it is if `unit` is neither of an angle nor of a length.
+    """A typed number in radians, metres or SI units.
 
     Args:
         unit: of numbers without a unit.
@@ -24,8 +39,28 @@ def read_number(text: str, unit: Unit) -> float:
     Raises:
         EntryError: not a number, or another kind of unit.
     """
+    known = units_like(unit)
     try:
-        return read(text, unit)
+        if not known:
+            return read(text, unit)
+        name, number = _unit_at_end(text, known)
+        return read(number, PLAIN) * known[name or unit.name]
     except ReadError as error:
-        detail = error.sentence + ("" if error.readings else f" Valid: {valid(unit)}.")
+        names = f"{valid(PLAIN)}; units: {', '.join(known)}" if known else valid(unit)
+        said = error.sentence.replace("; units: none", "") if known else error.sentence
+        detail = said if error.readings else f"{said} Valid: {names}."
         raise EntryError("The answer was not read", detail, error.readings) from None
+
+
+def units_like(unit: Unit) -> dict[str, float]:
+    """The units of the same quantity, and what one of them is in SI units; none for angles, lengths and counts."""
+    return next((known for known in QUANTITIES if unit.name in known), {})
+
+
+def _unit_at_end(text: str, known: dict[str, float]) -> tuple[str, str]:
+    """The unit that ends a text, or "", and the text before it. ``N m`` is ``N·m``; blanks may be anywhere."""
+    for name in sorted(known, key=len, reverse=True):
+        pattern = name.replace("/", r"\s*/\s*").replace("·", r"\s*[·⋅∙.*]?\s*")
+        if found := re.search(rf"(?<![a-zA-Zµ°/·]){pattern}\s*$", text):
+            return name, text[: found.start()]
+    return "", text

@@ -14,8 +14,11 @@ from app.exercises.questions import WHOLE, Asked, Mistake, Number, Question, Ver
 from app.exercises.variant import Variant
 from kin.units import PLAIN, Unit, Units
 
+RATE = "deg/s"  # in the angles of the reader; rad/s is not
 # Units of a file, and what one of them is in radians, metres or SI.
-SCALES = {"deg": math.pi / 180, "rad": 1.0, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "": 1.0, "count": 1.0, "joint": 1.0}
+_DEGREE = math.pi / 180
+_PLAIN = dict.fromkeys(("", "count", "joint"), 1.0)
+SCALES = {"deg": _DEGREE, "rad": 1.0, "mm": 1e-3, "cm": 1e-2, "m": 1.0, **_PLAIN, RATE: _DEGREE}
 MEASURES = {"deg": "angle", "rad": "angle", "mm": "length", "cm": "length", "m": "length"}
 OTHER = {"m/s": 3, "m/rad": 3, "rad/s": 3, "N": 2, "N·m": 2, "s": 3, "kg": 3, "J": 3}  # decimals
 _PERCENT = re.compile(r"(\d+(?:\.\d+)?) ?%")
@@ -80,6 +83,8 @@ class NumberKind(Kind):
                 return units.angles
             case "length":
                 return units.lengths
+        if self.unit == RATE:
+            return Unit(f"{units.angles.name}/s", units.angles.scale, units.angles.finer)
         return Unit(self.unit, 1.0, OTHER[self.unit]) if self.unit in OTHER else PLAIN
 
     def _questions(self, variant: Variant, units: Units) -> list[Number]:

@@ -59,7 +59,6 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "closest_shown": lengths.brief(OFFSETS[0]),
         "rates": ", ".join(rates),
         "distances": ", ".join(map(lengths.brief, OFFSETS)),
-        "angle_unit": angles.name,
         "hertz": f"{hertz:.3g}",
         "swings_shown": f"{swings:.0f}",
         "cost": f"{found['S-curve'].duration - found['trapezoidal'].duration:.2g}",
