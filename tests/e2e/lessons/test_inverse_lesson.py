@@ -13,7 +13,6 @@ import kin
 from app.viewer.lessons.inverse.arm import arm_of
 from app.viewer.lessons.inverse.drawing import room
 from app.viewer.lessons.inverse.exercise import example, exercise
-from app.viewer.lessons.inverse.questions import keys_of
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -66,7 +65,7 @@ def test_a_derivation_by_keyboard_and_mouse(desktop: Tab) -> None:
     expect(page.locator("[data-derived-result=reached]")).to_contain_text("All joints are within their limits.")
     expect(page.locator('[data-tree="1"] [data-state="inside"]')).to_have_count(1)
     w = page.locator('[data-derived="centre"] [data-line="w"]')
-    shown = room(arm, given.followed.derivation, keys_of(arm))
+    shown = room(arm, given.followed.derivation, arm.keys)
     tab.drag_arrow(PIONEER, given.T, axis=2, lengths=-0.3, room=shown)
     expect(w).not_to_contain_text("208.6")
     tab.rest()

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 import kin
+from app.viewer.lessons.inverse.sheet import StepKey
 from app.viewer.lessons.postures.planar import is_planar
 from kin import Robot
 from kin.axes import inverse, is_zero
@@ -54,6 +55,15 @@ class Arm:
     lengths: dict[str, float]
     reference: Array
     names: tuple[str, ...] = ()
+
+    @property
+    def keys(self) -> tuple[StepKey, ...]:
+        """The steps of its derivation."""
+        if self.family == "planar":
+            return ("centre", "elbow", "theta1", *(("last",) if self.robot.n == 3 else ()), "joints")
+        if self.family == "srs7":
+            return "centre", "elbow", "circle", "shoulder", "wrist", "joints"
+        return "centre", "theta1", "elbow", "theta2", "wrist", "joints"
 
     @property
     def splits(self) -> int:

@@ -12,7 +12,6 @@ from app.viewer.lessons.guide.outline import Configuration
 from app.viewer.lessons.inverse.arm import Arm, arm_of
 from app.viewer.lessons.inverse.derive import Signs, arm_angle
 from app.viewer.lessons.inverse.exercise import Branch, Exercise, all_branches, exercise
-from app.viewer.lessons.inverse.questions import keys_of
 from app.viewer.lessons.inverse.settings import InverseSettings
 from app.viewer.lessons.inverse.sheet import StepKey
 from app.viewer.lessons.inverse.tree import Node, tree
@@ -46,7 +45,7 @@ class InverseFacts(Facts[InverseSettings]):
     @property
     def keys(self) -> tuple[StepKey, ...]:
         """The steps of the derivation."""
-        return keys_of(self.derived)
+        return self.derived.keys
 
     @property
     def opened(self) -> tuple[bool, ...]:

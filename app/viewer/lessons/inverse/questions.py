@@ -3,35 +3,28 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 from app.viewer.lessons.guide.outline import (
-    Choice,
     Drawn,
     Mistake,
     Number,
-    Option,
     Outline,
     Pose,
-    Question,
     Step,
     Way,
     apart,
     count,
-    one_right,
 )
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.inverse import mistakes, words
-from app.viewer.lessons.inverse.arm import Arm, arm_of
+from app.viewer.lessons.inverse.arm import arm_of
 from app.viewer.lessons.inverse.exercise import Exercise, example, exercise, part_of
 from app.viewer.lessons.inverse.sheet import DerivedStep, StepKey
 from kin import Robot
 from kin.units import Units, fixed
 
-GOAL = (
-    "You can solve the inverse kinematics of an arm by hand, step by step, and say where each solution comes from "
-    "and where the derivation ends."
-)
 POSTURES = frozenset({"postures"})  # withheld while it is asked how many of them there are
 TURNS = frozenset({"angles"})  # and while joint angles are asked, of which roll, pitch and yaw may be sums
 LENGTH, ANGLE = 0.001, math.radians(0.5)
@@ -46,58 +39,37 @@ _METHODS: dict[StepKey, str] = {
 def outline(robot: Robot, units: Units) -> Outline:
     """The outline for this arm, with a target near its home."""
     arm = arm_of(robot)
-    return _others(robot) if arm is None else outline_of(exercise(arm, example(arm)), units)
-
-
-def keys_of(arm: Arm) -> tuple[StepKey, ...]:
-    """The steps of an arm's derivation."""
-    if arm.family == "planar":
-        return ("centre", "elbow", "theta1", *(("last",) if arm.robot.n == 3 else ()), "joints")
-    if arm.family == "srs7":
-        return "centre", "elbow", "circle", "shoulder", "wrist", "joints"
-    return "centre", "theta1", "elbow", "theta2", "wrist", "joints"
+    return words.texts(robot, units) if arm is None else outline_of(exercise(arm, example(arm)), units)
 
 
 def outline_of(given: Exercise, units: Units) -> Outline:
     """The outline for a target and the branch that is followed."""
-    steps = tuple(_step(given, key, units) for key in keys_of(given.arm))
-    return Outline(GOAL, steps, _check(given, units), pose=Pose(as_configuration(given.q)))
+    told, keys = words.texts(given.arm.robot, units), given.arm.keys
+    steps = tuple(_step(given, key, step, units) for key, step in zip(keys, told.steps, strict=True))
+    return replace(told, steps=steps, pose=Pose(as_configuration(given.q)))
 
 
-def _step(given: Exercise, key: StepKey, units: Units) -> Step:
-    arm, found = given.arm, given.followed.derivation.step(key)
-    text = words.step_text(arm, key, units)
+def _step(given: Exercise, key: StepKey, step: Step, units: Units) -> Step:
+    """A step of the file with what the derivation adds to it."""
+    branch, text = given.followed, step.text + words.counts(given.arm, key, units)
+    found, ended = branch.derivation.step(key), branch.derivation.failed
     if key == "centre":
         text = f"{_target(given, units)} {text}"
-    start = as_configuration(given.q)
     if key == "joints":
-        end = (
-            Pose(as_configuration(given.followed.q))
-            if given.followed.available and given.followed.q is not None
-            else None
-        )
-        shown = f"The numbers below lead to the branch {given.followed.name}. Choose another one with Follow."
-        limits = _limits(given)
-        return Step(words.title(arm, key), text, limits, "", Pose(start), end, shown, withheld=POSTURES)
+        end = Pose(as_configuration(branch.q)) if branch.available and branch.q is not None else None
+        practice = f"The numbers below lead to the branch {branch.name}. Choose another one with Follow."
+        asked = _limits(given)
+        return replace(step, text=text, question=asked, end=end, practice=practice, withheld=POSTURES)
     if found is None:
-        ended = given.followed.derivation.failed
         where = "" if ended is None else f" It ends at the step “{words.title(given.arm, ended.key)}”."
-        text = f"The branch that you follow does not get here.{where}{_way_back(given)}"
-        return Step(words.title(arm, key), text, pose=Pose(start))
+        return replace(step, text=f"The branch that you follow does not get here.{where}{_way_back(given)}")
     if found.failure is not None:
-        text = f"{text} {words.failure_text(found, units)}{_way_back(given)}"
-        return Step(words.title(arm, key), text, pose=Pose(start))
-    asked, special = _question(given, found, units), words.special_text(arm, found)
-    turn = asked is not None and asked.unit == units.angles
-    return Step(
-        words.title(arm, key),
-        f"{text} {special}".rstrip(),
-        asked,
-        pose=Pose(start),
-        practice=_shown(given, found),
-        withheld=TURNS if turn else frozenset(),
-        drawn=_drawn(given, key) if turn else None,
-    )
+        return replace(step, text=f"{text} {words.failure_text(found, units)}{_way_back(given)}")
+    question, text = _question(given, found, units), f"{text} {words.special_text(given.arm, found)}".rstrip()
+    step = replace(step, text=text, question=question, practice=_shown(given, found))
+    if question is None or question.unit != units.angles:
+        return step
+    return replace(step, withheld=TURNS, drawn=_drawn(given, key))
 
 
 def _way_back(given: Exercise) -> str:
@@ -251,131 +223,3 @@ def _limits(given: Exercise) -> Number:
             (len(given.branches), "That is the number of all choices of signs."),
         ],
     )
-
-
-# The check
-
-
-def _check(given: Exercise, units: Units) -> tuple[Question, ...]:
-    return _beyond(given), _singular(given), _dependence(given)
-
-
-def _beyond(given: Exercise) -> Choice:
-    elbow = (
-        words.sub(mistakes.split_name("elbow", given.followed.derivation))
-        if given.followed.q is not None
-        else "of the elbow"
-    )
-    return one_right(
-        f"The target moves away until the formula gives cos {elbow} = 1.2. What does that mean?",
-        (
-            "The derivation ends at this step.",
-            "No real angle has this cosine: the triangle does not close, the target is too far away.",
-        ),
-        [
-            (f"{elbow} is a little above 0.", "cos 0 = 1 is the largest cosine: arccos 1.2 does not exist."),
-            ("The other elbow reaches it.", "Both elbows come from the same cosine."),
-            ("The wrist makes up for it.", "The wrist does not move the wrist centre."),
-        ],
-        1,
-    )
-
-
-def _singular(given: Exercise) -> Choice:
-    family, b = given.arm.family, given.arm.lengths.get("b", 0.0)
-    if family == "planar":
-        right = ("They become one.", "arccos 1 = 0, and +0 is −0: the stretched arm.")
-        wrong = [
-            ("They move apart.", "θ₂ and −θ₂ both go to 0."),
-            ("Both disappear before.", "They exist up to cos θ₂ = 1."),
-        ]
-        return one_right("The arm is stretched out, cos θ₂ = 1. What becomes of the two elbows?", right, wrong, 1)
-    if family == "srs7":
-        right = ("The reference of ψ.", "No elbow is the highest one then. The arm itself is not singular there.")
-        wrong = [
-            ("The length D.", "D is the distance from the shoulder, which is not zero."),
-            ("θ₄.", "θ₄ depends on D alone."),
-        ]
-        return one_right("The wrist centre is on axis 1. What is undetermined?", right, wrong, 1)
-    if b:
-        right = (
-            "No solution, from the second step on.",
-            "r² − b² is negative: no plane at the distance b contains w.",
-        )
-        wrong = [
-            ("Both shoulders reach it.", "They become one at r = b and disappear below it."),
-            ("θ₁ is free.", "That would be so for b = 0 and r = 0."),
-        ]
-        return one_right(
-            "The wrist centre is nearer to axis 1 than b. What does the derivation give?", right, wrong, 1
-        )
-    right = ("θ₁.", "atan2(0, 0) has no value: seen from above, w is a point on the axis.")
-    wrong = [("θ₃.", "θ₃ depends on D alone."), ("None of them.", "Look at the step with atan2(w_y, w_x).")]
-    return one_right("The wrist centre is on axis 1. Which angle is free?", right, wrong, 1)
-
-
-def _dependence(given: Exercise) -> Choice:
-    if given.arm.family == "planar":
-        return Choice(
-            "Which joints change the distance D?",
-            (
-                Option(
-                    "Joint 2 only", "D is a side of the triangle of two links; only its angle changes it.", True
-                ),
-                Option("Joint 1 only", "Joint 1 turns the whole triangle."),
-                Option("Joints 1 and 2", "Joint 1 turns the whole triangle and leaves its sides."),
-            ),
-        )
-    return Choice(
-        "Only the direction of the tool changes, and the wrist centre stays. Which steps have to be done again?",
-        (
-            Option("Only the wrist", "The steps before depend on the wrist centre alone.", True),
-            Option("All steps", "The wrist centre has not moved, so the arm keeps its angles."),
-            Option("All but the first", "The triangle depends on the wrist centre alone."),
-        ),
-    )
-
-
-def _others(robot: Robot) -> Outline:
-    """For arms without a derivation in this lesson."""
-    meet = one_right(
-        "Which arms can be solved step by step, position first?",
-        (
-            "Those whose last axes meet in one point",
-            "Turning about them leaves this point, the wrist centre, in place: the other joints place it alone.",
-        ),
-        [
-            ("Those with at most three joints", "PUMA has six and is solved step by step."),
-            ("Those without joint limits", "Limits sort out branches at the end; they do not make the formulas."),
-        ],
-        0,
-    )
-    text = (
-        f"{robot.name} is none of the arms of this lesson. It derives planar arms with two or three joints, elbow "
-        "arms with a wrist of two axes (Pioneer arm) or of three axes that meet (PUMA, IRB 120), and arms with a "
-        "spherical shoulder and wrist (S-R-S, iiwa)."
-    )
-    check = one_right(
-        "A cosine of an angle is known. How many angles are there between −180° and 180°?",
-        ("Two, of either sign", "cos θ = cos(−θ): this is where elbow up and elbow down come from."),
-        [("One", "cos θ = cos(−θ)."), ("None if it is negative", "Then the angles are larger than 90°.")],
-        0,
-    )
-    again = one_right(
-        "The formula gives a cosine of 1.2. What does that mean?",
-        (
-            "The target is out of reach.",
-            "No real angle has this cosine: the triangle of the links does not close.",
-        ),
-        [
-            ("The angle is 1.2 rad.", "The cosine is 1.2, not the angle."),
-            ("The arm is singular.", "It would be at exactly 1."),
-        ],
-        1,
-    )
-    first = Step("Which arms", text, meet, practice="Choose one below to derive its angles.")
-    rest = (
-        "Arms without such a point are solved by elimination or by numeric steps. Postures shows their solutions."
-    )
-    home = Pose(as_configuration(robot.q_home))
-    return Outline(GOAL, (first, Step("All other arms", rest)), (check, again), pose=home)

@@ -1,81 +1,24 @@
-"""The words of the lesson: what each step does, and what its failures and special cases mean."""
+"""The words of the lesson that its derivations choose: what their failures and special cases mean.
+
+Those that depend on the arm alone are in ``lesson.toml``.
+"""
 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
-from app.viewer.lessons.inverse.arm import Arm, Family
+from app.exercises.variant import Quantity
+from app.viewer.lessons.guide.content import LessonFacts, outline_of
+from app.viewer.lessons.guide.outline import Outline, Pose
+from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.inverse.arm import Arm, arm_of
 from app.viewer.lessons.inverse.sheet import DerivedStep, StepKey
+from kin import Robot
 from kin.axes import is_zero
-from kin.units import Units, fixed
+from kin.units import DEFAULT_UNITS, Units, fixed
 
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-TITLES: dict[StepKey, str] = {
-    "centre": "The wrist centre",
-    "theta1": "θ₁ from above",
-    "elbow": "The triangle and the cosine rule",
-    "theta2": "θ₂ in the plane of the arm",
-    "circle": "The elbow on its circle",
-    "shoulder": "The shoulder",
-    "wrist": "The wrist",
-    "last": "The last joint",
-    "joints": "All branches",
-}
-_CENTRE = (
-    "The joints of the wrist do not move the wrist centre w. So go back from the tool point p against the "
-    "approach direction a: position and direction are then solved one after the other."
-)
-_TEXTS: dict[tuple[Family | None, StepKey], str] = {
-    (None, "centre"): _CENTRE,
-    (
-        "planar",
-        "theta1",
-    ): "The line from joint 1 to the end of link 2 has a known direction. β is the angle between "
-    "this line and link 1.",
-    (
-        "wrist5",
-        "theta1",
-    ): "Look along axis 1 from above. The arm is a line through the axis, so θ₁ is the direction of "
-    "w, or the opposite one if the arm leans over backwards.",
-    (
-        "wrist6",
-        "theta1",
-    ): "Look along axis 1 from above. θ₁ turns the plane of the arm until it contains w: in front "
-    "of the axis or behind it.",
-    (
-        None,
-        "elbow",
-    ): "Two links and the line D between their ends form a triangle. All three sides are known, so the "
-    "cosine rule gives the angle at the elbow. A cosine belongs to two angles: two elbows.",
-    (
-        None,
-        "theta2",
-    ): "The line from joint 2 to w points down by atan2(h, ρ). β is the angle between this line and the "
-    "upper arm.",
-    (
-        "srs7",
-        "circle",
-    ): "With D fixed, the elbow can still move on a circle about the line from shoulder to wrist. The "
-    "arm angle ψ says where on it; at ψ = 0 the elbow is highest.",
-    (
-        "srs7",
-        "shoulder",
-    ): "Joints 1 to 3 point the upper arm along k, and turn it until the axis of the elbow is j. A "
-    "direction can be reached in two ways: θ₁ and θ₂, or θ₁ + 180° and −θ₂.",
-    ("wrist5", "wrist"): "R₀₃ is known now. u = R₀₃ᵀ a is the approach direction as the forearm sees it, and two "
-    "joints point the tool along it: in two ways.",
-    (
-        None,
-        "wrist",
-    ): "What the first joints have not turned is left to the wrist: N, the rotation as the forearm sees "
-    "it. It is Rz Ry Rz of the three wrist angles, in two ways.",
-    ("planar", "last"): "The tool points along φ, which is the sum of the three angles.",
-    (
-        None,
-        "joints",
-    ): "Each choice of a sign is a fork, and each way through the forks is a branch. Not all of them are "
-    "within the joint limits.",
-}
 
 
 def sub(name: str) -> str:
@@ -83,12 +26,33 @@ def sub(name: str) -> str:
     return name.translate(SUBSCRIPTS)
 
 
+@lru_cache(maxsize=64)
+def texts(robot: Robot, units: Units) -> Outline:
+    """Goal, steps and check of the file, without what the derivation of a target adds."""
+    return outline_of("inverse", robot, units, _facts(robot))
+
+
+def _facts(robot: Robot) -> LessonFacts:
+    """What the file declares."""
+    arm = arm_of(robot)
+    family, beside = (None, 0.0) if arm is None else (arm.family, arm.lengths.get("b", 0.0))
+    numbers: dict[str, float | Quantity] = {
+        "derived": float(arm is not None),
+        "planar": float(family == "planar"),
+        "five": float(family == "wrist5"),
+        "ball": float(family == "srs7"),
+        "joints": float(robot.n),
+        "offset": float(beside != 0.0),
+        "beside": Quantity(beside, "length"),
+    }
+    elbow = sub(f"θ{2 if family == 'planar' else 4 if family == 'srs7' else 3}")
+    home = Pose(as_configuration(robot.q_home))
+    return LessonFacts(numbers, words={"elbow": elbow, "arm": robot.name}, poses={"home": home})
+
+
 def title(arm: Arm, key: StepKey) -> str:
     """The title of a step."""
-    if arm.family == "planar" and key in ("centre", "theta1"):
-        centre = "Back along the last link" if arm.robot.n == 3 else "The distance"
-        return centre if key == "centre" else "θ₁"
-    return TITLES[key]
+    return texts(arm.robot, DEFAULT_UNITS).steps[arm.keys.index(key)].title
 
 
 def follow(number: int) -> str:
@@ -96,17 +60,8 @@ def follow(number: int) -> str:
     return f"Follow branch {number}"
 
 
-def step_text(arm: Arm, key: StepKey, units: Units) -> str:
-    """What a step does."""
-    text = _TEXTS.get((arm.family, key)) or _TEXTS[None, key]
-    if arm.family == "planar" and key == "centre":
-        text = (
-            "The last link ends at the tool. Go back along it: what is left is an arm with two links."
-            if arm.robot.n == 3
-            else "The tool point is the end of link 2. Its distance from joint 1 is all that the elbow can change."
-        )
-    if arm.lengths.get("b") and key == "theta1":
-        text += f" The plane passes the axis at b = {units.lengths.text(arm.lengths['b'])}."
+def counts(arm: Arm, key: StepKey, units: Units) -> str:
+    """How the sliders of the joints that a step finds count, as a sentence; "" if as the formulas do."""
     numbers: dict[StepKey, tuple[int, ...]] = {"theta1": (1,)}
     numbers["elbow"] = (2 if arm.family == "planar" else 3 + (arm.family == "srs7"),)
     numbers |= {
@@ -115,7 +70,7 @@ def step_text(arm: Arm, key: StepKey, units: Units) -> str:
         "wrist": tuple(range(4 + (arm.family == "srs7"), arm.robot.n + 1)),
     }
     shifts = [shift for number in numbers.get(key, ()) if (shift := conversion(arm, number, units))]
-    return text + (f" The slider counts otherwise: {', '.join(shifts)}." if shifts else "")
+    return f" The slider counts otherwise: {', '.join(shifts)}." if shifts else ""
 
 
 def conversion(arm: Arm, number: int, units: Units) -> str:

@@ -22,7 +22,7 @@ from app.viewer.lessons.inverse import formulas, views, words
 from app.viewer.lessons.inverse.arm import Arm, arm_of
 from app.viewer.lessons.inverse.derive import all_signs, arm_angle, branches, derive, row_of, signs_of
 from app.viewer.lessons.inverse.exercise import Exercise, all_branches, error_of, example, exercise, flipped
-from app.viewer.lessons.inverse.questions import keys_of, outline, outline_of
+from app.viewer.lessons.inverse.questions import outline, outline_of
 from app.viewer.lessons.inverse.shapes import Angle, Length, joints_of, shapes
 from app.viewer.lessons.inverse.sheet import Derivation
 from app.viewer.lessons.inverse.tree import tree
@@ -113,7 +113,7 @@ def test_what_is_shown_is_what_was_computed(robot: Robot) -> None:
             assert np.allclose(again, line.value, atol=1e-12), line.text
         assert "<math" in formulas.mathml(line.name, line.text)
         assert views.value_text(line, UNITS)
-    assert [step.key for step in found.steps] == list(keys_of(arm))
+    assert [step.key for step in found.steps] == list(arm.keys)
     theta = np.array([found.number(f"θ{i + 1}") for i in range(robot.n)])
     assert turn(theta, arm.angles(given.q)) < 1e-9
 
@@ -124,7 +124,7 @@ def test_figures_measure_the_numbers(robot: Robot) -> None:
     given = exercise(arm, example(arm))
     origins = kin.link_frames(robot, given.q)[:, :3, 3]
     seen = set()
-    for key in keys_of(arm):
+    for key in arm.keys:
         for shape in shapes(arm, given.followed.derivation, key):
             if isinstance(shape, Length):
                 value = given.followed.derivation.values[shape.name]
@@ -147,7 +147,7 @@ def test_figures_say_what_the_questions_ask_on_every_branch(robot: Robot) -> Non
     arm, seen = of(robot), 0
     for signs in all_signs(arm):
         given = exercise(arm, example(arm), signs)
-        for key, step in zip(keys_of(arm), outline_of(given, UNITS).steps, strict=True):
+        for key, step in zip(arm.keys, outline_of(given, UNITS).steps, strict=True):
             names = re.findall("θ[₁-₇]|[Dρ](?=,|, | of|\\?)", step.question.prompt if step.question else "")
             for shape in shapes(arm, given.followed.derivation, key):
                 if isinstance(step.question, Number) and names[:1] == [words.sub(shape.name)]:
@@ -237,7 +237,7 @@ def test_an_aligned_wrist_keeps_an_angle(robot: Robot) -> None:
     assert step is not None
     assert words.special_text(arm, step).startswith("Singular:")
     asked = outline_of(exercise(arm, q), UNITS)
-    assert asked.steps[keys_of(arm).index("wrist")].question is None, "nothing is asked about a free angle"
+    assert asked.steps[arm.keys.index("wrist")].question is None, "nothing is asked about a free angle"
 
 
 def test_a_wrist_centre_of_an_srs_arm_on_axis_1() -> None:
@@ -323,7 +323,7 @@ def test_every_branch_is_a_leaf_of_the_tree_or_ends_before(robot: Robot) -> None
     leaves = {node.leaf.number for node in nodes if node.leaf is not None}
     assert {branch.number for branch in given.branches if branch.q is not None} <= leaves
     assert sum(node.followed for node in nodes) == arm.splits
-    everything = dict.fromkeys(keys_of(arm), True)
+    everything = dict.fromkeys(arm.keys, True)
     inside = sum(branch.available for branch in given.branches)
     assert views.tree_html(arm, nodes, inside, everything, UNITS).count('data-state="inside"') == inside
 
@@ -530,7 +530,7 @@ def test_an_arm_without_a_derivation_offers_others(port: int) -> None:
 def test_a_wrong_angle_is_drawn_beside_the_arm(port: int, robot: Robot) -> None:
     arm = of(robot)
     given = exercise(arm, example(arm))
-    step = keys_of(arm).index("elbow")
+    step = arm.keys.index("elbow")
     asked = outline_of(given, UNITS).steps[step]
     assert asked.drawn is not None
 
