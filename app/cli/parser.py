@@ -88,10 +88,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(command: Command, arguments: argparse.Namespace) -> int:
     if command.interpreted and not (command.compiled_with and getattr(arguments, command.compiled_with)):
         disable_compiler()
-    with no_collections():
-        run = command.load()
     try:
+        with no_collections():
+            run = command.load()
         return run(arguments)
+    except ModuleNotFoundError as error:
+        if not error.name or error.name.partition(".")[0] in ("app", "kin"):
+            raise
+        print(
+            f"kinboard: `{arguments.parser.prog}` needs {error.name}, which is not installed. Install Kinboard "
+            "with its dependencies, `pip install .` in its folder: without them (`--no-deps`), only the Python "
+            "package kin works.",
+            file=sys.stderr,
+        )
+        return 2
     except Exception as error:
         from kin import KinematicsError  # loaded already if it was raised
 

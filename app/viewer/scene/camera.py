@@ -28,6 +28,7 @@ from app.viewer.scene.viewpoints import (
     contains,
     distance_to_see,
     place,
+    rightward,
 )
 from kin.transforms import Array
 
@@ -224,6 +225,10 @@ class VisitorCamera:
     def place(self, point: Array, length: float) -> tuple[float, float, float]:
         """Where a point ``(3,)`` will be in the picture, and how long a length there; see `viewpoints`."""
         return place(self._viewpoint, self._aspect, point, length)
+
+    def rightward(self, start: Array, end: Array) -> bool:
+        """Whether the end ``(3,)`` of a segment will be to the right of its start in the picture."""
+        return rightward(self._viewpoint, start, end)
 
     def fit(self, spheres: Sequence[Sphere], points: Array | None = None) -> None:
         """Make the default view show these spheres and points ``(n, 3)`` as well; a `chosen` view stays."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from app.viewer.labels import add_label
 from app.viewer.scene.meshes import Body
+from app.viewer.viser_patches import assign
 from kin.transforms import Array
 from kin.units import Units
 
@@ -24,6 +25,7 @@ INK_LIGHT, INK_DARK = (70, 80, 94), (176, 186, 200)
 WIDTH = 10.0  # of the grid, in radii of the sphere around the arm; it fades out before
 SCALES = (0.1, 0.2, 0.5, 1.0)  # lengths of the scale bar, m
 SHADOW_PIXELS = 96
+BESIDE = 0.06  # distance of the length from the end of the bar, in lengths of the bar
 
 
 class Floor:
@@ -32,6 +34,10 @@ class Floor:
     Args:
         root: prefix of the nodes' names.
         base: position ``(3,)`` of the arm's base.
+
+    Attributes:
+        scale: length of the scale bar (m).
+        ends: its ends ``(3,)``.
     """
 
     def __init__(self, scene: viser.SceneApi, root: str, body: Body, base: Array, dark: bool) -> None:
@@ -68,6 +74,7 @@ class Floor:
         begin = np.array([x + 0.1 * body.radius, y + 0.42 * body.radius, above])
         end, tick = begin + np.array([self.scale, 0.0, 0.0]), np.array([0.0, 0.03 * body.radius, 0.0])
         bar = np.array([[begin, end], [begin - tick, begin + tick], [end - tick, end + tick]], np.float32)
+        self.ends: tuple[Array, Array] = (begin, end)
         self._bar = scene.add_line_segments(
             f"{root}-scale", bar, INK_DARK if dark else INK_LIGHT, thickness=2.0, thickness_units="screen"
         )
@@ -75,9 +82,9 @@ class Floor:
             scene,
             f"{root}-scale/length",
             "",
-            position=(begin + end) / 2.0 + 2.0 * tick,
+            position=end,
             scale=0.9,
-            anchor="center-center",
+            anchor="center-left",
         )
         self.nodes.append(self._bar)
 
@@ -96,6 +103,15 @@ class Floor:
     def use_units(self, units: Units) -> None:
         """Name the length of the scale bar in these units."""
         self._label.text = units.lengths.brief(self.scale)
+
+    def turn_label(self, rightward: bool) -> None:
+        """Put the length beside the right end of the bar in the picture, where it never covers the bar.
+
+        `rightward`: whether the right end is the second of `ends`.
+        """
+        start, end = self.ends
+        beside = BESIDE * (end - start)
+        assign(self._label, end + beside if rightward else start - beside)
 
 
 @cache

@@ -402,6 +402,8 @@ class VisitorPage(ShownArm, Worker):
         self.looks.apply()
         self.arm.scene.size_gizmo(self.camera.small)
         self.camera.aim(self.arm.scene.body, kin.link_frames(robot, self.arm.goal)[:, :3, 3], glide)
+        floor = self.arm.scene.floor
+        floor.turn_label(self.camera.rightward(*floor.ends))
 
     def _make_sliders(self) -> JointSliders:
         folders = [self.panel.joints] if self._more_joints is None else [self.panel.joints, self._more_joints]

@@ -46,6 +46,37 @@ def answer(capsys, *words, code=0):
     return json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
 
 
+SLIM = """
+import sys
+
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("pydantic", "fastapi", "uvicorn", "viser", "msgspec", "trimesh"):
+            raise ModuleNotFoundError(name, name=name)
+
+sys.meta_path.insert(0, Missing())
+from app.cli.parser import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize("command", ["serve", "robots"])
+def test_without_its_dependencies_a_command_says_what_to_install(command):
+    done = subprocess.run(
+        [sys.executable, "-c", SLIM, command], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert re.match(rf"kinboard: `kinboard {command}` needs \w+, which is not installed\. ", done.stderr)
+    assert "`pip install .`" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_module_of_kinboard_that_is_missing_is_a_fault_and_no_advice(monkeypatch):
+    monkeypatch.setitem(sys.modules, "app.cli.robots", None)
+    with pytest.raises(ModuleNotFoundError):
+        parser.main(["robots"])
+
+
 # -- arguments -------------------------------------------------------------------------------------------------
 
 

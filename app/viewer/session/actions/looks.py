@@ -48,7 +48,9 @@ class LookControls:
         self._on_look(None)
 
     def _on_look(self, _: object) -> None:
-        self._page.arm.scene.size_gizmo(self._page.camera.small)
+        scene, camera = self._page.arm.scene, self._page.camera
+        scene.size_gizmo(camera.small)
+        scene.floor.turn_label(camera.rightward(*scene.floor.ends))
 
     def _look_from(self, side: object, _: object = None) -> None:
         if side not in SIDES:

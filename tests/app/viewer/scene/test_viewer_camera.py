@@ -116,7 +116,11 @@ def test_the_camera_is_stored_when_it_stops_and_restored(port: int) -> None:
         assert tab.kept == []
         orbit(tab, ASIDE)
         assert np.abs(rest(tab).camera - ASIDE).max() < 1e-9
-        assert {m["type"] for m in tab.log[sent:]} == {"LocalStorageSetItemMessage", "GuiUpdateMessage"}
+        seen = {m["type"] for m in tab.log[sent:]}
+        assert seen == {"LocalStorageSetItemMessage", "GuiUpdateMessage", "SetPositionMessage"}
+        (bar,) = (name for name in tab.nodes if name.endswith("-scale/length"))
+        moved = [m["name"] for m in tab.log[sent:] if m["type"] == "SetPositionMessage"]
+        assert moved == [bar], "the bar's other end is on the right"
         text = tab.kept[-1]
     with FakeBrowser(port, memory=memory(text)) as tab:
         tab.settle()

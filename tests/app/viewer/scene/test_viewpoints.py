@@ -10,7 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from app.viewer.scene.viewpoints import DIRECTIONS, FOV, SIDES, UP, between, contains, distance_to_see, place
+from app.viewer.scene.viewpoints import (
+    DIRECTIONS,
+    FOV,
+    SIDES,
+    UP,
+    between,
+    contains,
+    distance_to_see,
+    place,
+    rightward,
+)
 
 POINT = arrays(float, 3, elements=st.floats(-3.0, 3.0))
 
@@ -75,3 +85,12 @@ def test_a_place_in_the_picture_is_measured_from_its_middle(aspect: float) -> No
     assert np.allclose(place(viewpoint, aspect, np.array([0.0, 0.0, narrow]), 0.0), [0.0, 1.0, 0.0])
     x, y, _ = place(viewpoint, aspect, np.array([5.0, 0.1, 0.0]), 1.0)
     assert max(abs(x), abs(y)) > 10.0, "behind the camera"
+
+
+@given(POINT, POINT, st.floats(0.0, 2.0 * math.pi), st.floats(-0.4, 1.5))
+def test_rightward_is_what_the_picture_shows(start: np.ndarray, end: np.ndarray, turn: float, rise: float) -> None:
+    out = (math.cos(turn) * math.cos(rise), math.sin(turn) * math.cos(rise), math.sin(rise))
+    viewpoint = from_side(out, 9.0)
+    left, right = (place(viewpoint, 1.5, point, 1.0)[0] for point in (start, end))
+    if abs(right - left) > 1e-9:
+        assert rightward(viewpoint, start, end) == (right > left)
