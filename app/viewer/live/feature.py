@@ -127,7 +127,8 @@ class Connect(DeclaredFeature[NoSettings, ConnectFacts]):
         return [*found, Button("Withdraw the code", self.event(self.on_close), hint, key="close")]
 
     def scene(self) -> Sequence[SceneNode | Lazy]:
-        found: list[SceneNode | Lazy] = [Lazy("drawings", nodes, (tuple(self._drawings.values()),))]
+        drawn = tuple(self._drawings.values())
+        found: list[SceneNode | Lazy] = [Lazy("drawings", nodes, (drawn,))] if drawn else []
         if self._measured is not None:
             found.append(ghost("measured", self.stage.now.robot, self._measured, GHOST, OPACITY))
         return found
