@@ -27,12 +27,13 @@ __all__ = [
     "install_problem_handlers",
 ]
 
+# Routes are tried one after another: those that are asked most come first.
 _MODULES = (
+    fk,
+    ik,
     robots,
     files,
     compare,
-    fk,
-    ik,
     path,
     motion,
     way,

@@ -8,11 +8,15 @@ all that the family can have, at this target and at those within η: then none i
 Elsewhere the two arms may differ. Where the exact arm has fewer postures than its family, targets a little off
 show whether more are near. Close to folds, postures are looked for along the directions in which the arm barely
 moves, from two sets of starts. Where both find the same, the answer is agreed, not proved.
+
+Where they do not, the elimination for any arm with six joints is asked, which knows nothing of the family: of the
+table as it is. What it certifies, and what was found here is among, is agreed.
 """
 
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +27,8 @@ from kin.robot import Robot
 from kin.solvers.common import TURN, UNBOUNDED
 from kin.solvers.contract import POSE, ClosedForm, Completeness
 from kin.solvers.curves import curves_among
+from kin.solvers.general6 import General6
+from kin.solvers.general6 import match as general
 from kin.solvers.numeric import each_of
 from kin.transforms import Array
 
@@ -36,6 +42,7 @@ _NEAR = 1e-4  # of the arm's size: a descent that stalled with less error may be
 _NEWTON = 8
 _CLOSE = 0.02  # rad: how far Newton's steps may lead
 _STEP = 1e-3  # rad, of second differences
+_AMONG = 1e-4  # rad: beside a fold, a posture found by descent is so far from the exact one
 _DOUBLE = 1e-5  # smallest singular value of a posture whose twin may be the same in floating point
 _SHARES = np.array([0.003, -0.01, 0.03, -0.1, 0.3, -1.0, 3.0])  # rad along a weak direction
 
@@ -54,6 +61,40 @@ class SixJoints:
             starts: the same, the missing ones from targets close by.
             q: the starts moved onto the target; NaN, or as they were, where that failed.
         """
+        found, known = self._by_continuation(T, exact, starts, q)
+        return (found, known) if known != "unknown" else self._by_elimination(T, found)
+
+    @cached_property
+    def _general(self) -> General6 | None:
+        """The elimination for the table as it is."""
+        return general(self.robot)
+
+    def _by_elimination(self, T: Array, q: Array) -> tuple[Array, Completeness]:
+        """The rows q ``(k, 6)`` and those that an elimination finds; agreed if it certifies that these are all."""
+        if self._general is None:
+            return q, "unknown"
+        out = np.empty((len(self._general.branches), 6))
+        known = self._general.add_missing(T, np.zeros(6), out)
+        rows, curves = self._without_curves(T, out[~np.isnan(out[:, 0])])
+        rows = rows[np.abs(fk(self.robot, rows) - T).max(axis=(1, 2), initial=0.0) < _MET]
+        there = ~np.isnan(q[:, 0])
+        there[there] = np.abs(fk(self.robot, q[there]) - T).max(axis=(1, 2), initial=0.0) < _MET
+        nearest = [_apart(rows, row) for row in q[there]] if len(rows) else []
+        among = len(nearest) == int(there.sum()) and all(apart.min() < _AMONG for apart in nearest)
+        sure = known == "proved" or (known == "agreed" and len(rows) == there.sum())
+        if curves or not (sure and among and 0 < len(rows) <= len(q) and len(rows) % 2 == 0):
+            return self._in_rows(q, there, rows), "unknown"
+        # The exact ones, each in the row of the posture that was found near it.
+        exact = np.full_like(q, math.nan)
+        for place, apart in zip(np.flatnonzero(there).tolist(), nearest, strict=True):
+            exact[place] = rows[int(apart.argmin())]
+        for i in np.flatnonzero(there)[1:].tolist():
+            if (_apart(exact[:i][there[:i]], exact[i]) < _SAME).any():
+                exact[i], there[i] = math.nan, False
+        return self._in_rows(exact, there, rows), "agreed"
+
+    def _by_continuation(self, T: Array, exact: Array, starts: Array, q: Array) -> tuple[Array, Completeness]:
+        """`completed` from the postures of the exact arm alone."""
         given = ~np.isnan(starts[:, 0])
         there = given & ~np.isnan(q[:, 0])
         there[there] = np.abs(fk(self.robot, q[there]) - T).max(axis=(1, 2), initial=0.0) < _MET

@@ -195,6 +195,25 @@ def test_near_folds_nothing_is_missing_that_is_proved(robot):
     near_folds(robot, TARGETS)
 
 
+@pytest.mark.parametrize("seed", [28, 160, 710, 1092])
+def test_what_continuation_leaves_open_an_elimination_of_the_table_settles(seed):
+    """Targets of the PUMA of which continuation has no posture, too many, or one pair too few."""
+    robot = next(each for each in FAMILIES if each.id == "puma560-1.5708")
+    q = np.random.default_rng(1).uniform(-PI, PI, (1500, 6))[seed]
+    found, known = candidates(robot, kin.fk(robot, q), np.zeros(6))
+    assert (len(found), known) == (8, "agreed")
+    assert apart(found, q).min() < 1e-8
+
+
+@pytest.mark.parametrize("seed", [537, 958])
+def test_postures_that_only_the_elimination_finds_are_listed_though_nothing_certifies_them(seed):
+    robot = next(each for each in FAMILIES if each.id == "puma560-1.5708")
+    q = np.random.default_rng(1).uniform(-PI, PI, (1500, 6))[seed]
+    found, known = candidates(robot, kin.fk(robot, q), np.zeros(6))
+    assert (len(found), known) == (8, "unknown")
+    assert apart(found, q).min() < 1e-8
+
+
 def test_no_posture_at_the_corner_of_the_reach_is_not_called_complete():
     """Elbow stretched and wrist nearest to axis 1: the exact arm reaches the pose by no motion along one axis."""
     robot = next(each for each in FAMILIES if each.id == "puma560-1.5708")
