@@ -19,6 +19,10 @@ same fields::
     drawn = { pose = "moved", joint = 1 }
     arm = { when = "not turns(1)", id = "ur5" }
 
+    [steps.estimate]
+    kind = "choice"
+    …
+
     [steps.question]
     kind = "number"
     prompt = "How fast is the tool point?"
@@ -27,7 +31,8 @@ same fields::
 
 Poses and figures are the lesson's own. The scene shows `end` with the right answer; `drawn` is a pose that shows a
 wrong one, with the answer as the value of a joint. What is `withheld` is nowhere to be seen before. `arm` is one
-of the library that shows what this one cannot; a button changes to it.
+of the library that shows what this one cannot; a button changes to it. An `estimate` is asked before the question:
+it is a choice that looking answers.
 
 Texts may be lists of alternatives with `when`, and so may questions. Steps and questions of the check with `when`
 are left out where it does not hold.
@@ -69,6 +74,7 @@ class StepText:
 
     Attributes:
         questions: alternatives, of which the first whose condition holds is asked; there may be none.
+        estimate: what is asked before, as `questions`.
         drawn: how a wrong joint value is drawn: the pose that has it, and the number of the joint.
         arm: when another arm is offered, and its id.
     """
@@ -76,6 +82,7 @@ class StepText:
     when: Expression
     title: Words
     text: Words
+    estimate: tuple[QuestionText, ...]
     questions: tuple[QuestionText, ...]
     shown: Words
     practice: Words
@@ -162,16 +169,12 @@ def _facts(fields: Fields) -> dict[str, str]:
 
 
 def _step(fields: Fields) -> StepText:
-    question = fields.get("question")
-    if isinstance(question, list):
-        questions = tuple(_question(item) for item in fields.tables("question", 1))
-    else:
-        questions = () if question is None else (_question(fields.sub("question")),)
     step = StepText(
         fields.expression("when", "1"),
         fields.words("title"),
         fields.words("text"),
-        questions,
+        _asked(fields, "estimate"),
+        _asked(fields, "question"),
         fields.words("shown", ""),
         fields.words("practice", ""),
         fields.text("pose", _NONE),
@@ -182,6 +185,14 @@ def _step(fields: Fields) -> StepText:
     )
     fields.done()
     return step
+
+
+def _asked(fields: Fields, name: str) -> tuple[QuestionText, ...]:
+    """A question, or alternatives of it; none if there is none."""
+    question = fields.get(name)
+    if isinstance(question, list):
+        return tuple(_question(item) for item in fields.tables(name, 1))
+    return () if question is None else (_question(fields.sub(name)),)
 
 
 def _drawn(fields: Fields) -> tuple[str, int]:

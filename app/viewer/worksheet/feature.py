@@ -96,7 +96,8 @@ def parts_of(outline: guide.Outline) -> tuple[Part, ...]:
     """Steps and check of a lesson, for paper."""
     parts = []
     for number, step in enumerate(outline.steps, 1):
-        questions = () if step.question is None else (_question(step.question, step.shown),)
+        before = () if step.estimate is None else (_question(step.estimate, ""),)
+        questions = before if step.question is None else (*before, _question(step.question, step.shown))
         parts.append(Part(f"{number}. {step.title}", step.text, questions))
     return (*parts, Part("Check", "", tuple(_question(question) for question in outline.check)))
 

@@ -99,7 +99,7 @@ class _Maker:
         return Drawn(pose.q, joint - 1)
 
     def step(self, text: StepText) -> Step:
-        asked = self.first(text.questions)
+        asked, before = self.first(text.questions), self.first(text.estimate)
         title, body, shown, practice = (
             self.variant.text(one, self.units) for one in (text.title, text.text, text.shown, text.practice)
         )
@@ -114,5 +114,6 @@ class _Maker:
             self.named("figure", text.figure, self.facts.figures),
             withheld=frozenset() if asked is None else asked.withheld,
             drawn=None if text.drawn is None else self.drawn(*text.drawn),
+            estimate=None if before is None else self.question(before),
             arm="" if text.arm is None or not self.holds(text.arm[0]) else text.arm[1],
         )

@@ -254,7 +254,9 @@ class Guide(Feature):
 
     def _is_on_show(self, key: str) -> bool:
         at = self._progress.at
-        return key.startswith("c") if at == len(self._progress.outline.steps) else key == str(at + 1)
+        return (
+            key.startswith("c") if at == len(self._progress.outline.steps) else key in (str(at + 1), f"e{at + 1}")
+        )
 
     def _draw_ghost(self, keys: list[str]) -> None:
         """The frame that is placed for the first of these questions."""

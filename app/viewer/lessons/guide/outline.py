@@ -100,6 +100,7 @@ class Step:
         practice: what to see or to do on the page then, in words that follow `shown`.
         figure: a figure that belongs to `shown`.
         drawn: what the scene shows of a wrong answer, beside what it shows anyway.
+        estimate: what is asked before the question, and answered by looking.
         arm: the id of an arm of the library that shows what the arm on show cannot; "": it can.
         withheld: facts that nothing in the page shows while the question is open:
             names of `app.viewer.activity.activity.FACTS`.
@@ -115,6 +116,7 @@ class Step:
     figure: Markup | None = None
     withheld: frozenset[str] = frozenset()
     drawn: Drawn | None = None
+    estimate: Question | None = None
     arm: str = ""
 
 
@@ -139,8 +141,11 @@ class Outline:
         return self.pose if step is None or step.pose is None else step.pose
 
     def questions(self) -> Iterator[tuple[str, Question]]:
-        """Every question with its key: the number of its step, or c and its number in the check."""
+        """Every question with its key: the number of its step, e and this number for an estimate, or c and its
+        number in the check."""
         for number, step in enumerate(self.steps, 1):
+            if step.estimate is not None:
+                yield f"e{number}", step.estimate
             if step.question is not None:
                 yield str(number), step.question
         for number, question in enumerate(self.check, 1):

@@ -48,7 +48,9 @@ def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "") -> s
             "guide/check", marks=marks, at=at, questions=questions, right=right, count=count,
             done=all(question["closed"] for question in questions),
         )  # fmt: skip
-    step, key = steps[at], str(at + 1)
+    step, key, before = steps[at], str(at + 1), f"e{at + 1}"
+    closed = step.question is None or progress.is_closed(key)
+    estimate = step.estimate if not closed or progress.mark(before) != "open" else None
     return render(
         "guide/step",
         marks=marks,
@@ -56,7 +58,8 @@ def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "") -> s
         step=step,
         arm=arm,
         question=None if step.question is None else _question(progress, key, step.question, sheets),
-        open=step.question is None or progress.is_closed(key),
+        estimate=None if estimate is None else _question(progress, before, estimate, sheets),
+        open=closed,
     )
 
 

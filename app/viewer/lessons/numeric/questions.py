@@ -52,6 +52,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "joints": robot.n,
         "rows": len(problem.rows),
         "far": np.linalg.norm(there - here),
+        "part": np.linalg.norm(there - here) / robot.reach,
         "sum": np.abs(there - here).sum(),
         "newton": newton.count,
         "transpose": transpose.count,

@@ -331,8 +331,9 @@ def words(step: Step) -> list[str]:
     found = [step.text, step.shown, step.practice]
     if step.question is not None:
         found += [step.question.prompt, step.question.solution()]
-    if isinstance(step.question, Choice):
-        found += [text for option in step.question.options for text in (option.text, option.reason)]
+    for each in (step.estimate, step.question):
+        if isinstance(each, Choice):
+            found += [each.prompt, *(text for option in each.options for text in (option.text, option.reason))]
     return found
 
 
@@ -468,6 +469,23 @@ ELSEWHERE = {
 }
 
 
+# What is to be seen: how many of the options before the right one do not hold.
+
+
+def place(value: float, *steps: float) -> int:
+    return sum(value > step for step in steps)
+
+
+ESTIMATES: dict[str, Callable[[Here], int]] = {
+    "rotations": lambda h: place(-h.T[2, 2], -0.1, 0.1),
+    "numeric": lambda h: place(float(np.linalg.norm(aim(h) - h.T[:3, 3])) / h.robot.reach, 0.1, 0.5),
+    "equations": lambda h: place(-h.T[2, 3], -1e-3, 1e-3),
+    "redundancy": lambda h: int(at_rest(h, 6) == 0),
+    "velocity": lambda h: 0 if abs(h.J[2, 0]) > 1e-6 else 1 if float(np.linalg.norm(h.J[:3, 0])) > 1e-3 else 2,
+    "trajectories": lambda h: 1,
+}
+
+
 def scenes(robot: Robot, outline: Outline) -> list[Here]:
     found, start = [], outline.pose_of(0)
     assert start is not None
@@ -500,6 +518,19 @@ def test_answers_are_those_of_the_scene(lesson: Any, robot: Robot) -> None:
         away = question.answer - given
         away = math.remainder(away, math.tau) if question.whole_turns else away
         assert abs(away) <= slack, (name, question.answer, given)
+
+
+@pytest.mark.parametrize("robot", ARMS)
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+def test_estimates_are_those_of_the_scene(lesson: Any, robot: Robot) -> None:
+    first, *others = scenes(robot, lesson.outline(robot, Units()))
+    assert all(h.step.estimate is None for h in others)
+    if lesson.key not in ESTIMATES:
+        assert first.step.estimate is None
+        return
+    assert isinstance(first.step.estimate, Choice)
+    rights = [i for i, option in enumerate(first.step.estimate.options) if option.right]
+    assert rights == [ESTIMATES[lesson.key](first)]
 
 
 @pytest.mark.parametrize("robot", ARMS)

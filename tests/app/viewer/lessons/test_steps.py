@@ -22,7 +22,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
-from app.viewer.lessons.guide.outline import Number, Outline, Pose, Step
+from app.viewer.lessons.guide.outline import Choice, Number, Outline, Pose, Step
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.panel.joints import label
@@ -189,6 +189,47 @@ def test_a_wrong_angle_is_drawn_beside_the_arm(server: int) -> None:
         end = outline.steps[at].end
         assert end is not None
         tab.wait(lambda: is_at(tab, planar, end.q))
+
+
+def test_an_estimate_comes_before_the_question_and_ends_with_it(server: int) -> None:
+    outline = VelocityLesson.outline(UR5, DEGREES)
+    estimate = outline.steps[0].estimate
+    assert isinstance(estimate, Choice)
+    right = estimate.right()
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.choose(UR5.name)
+        tab.set("Lesson", "Velocity")
+        tab.wait(lambda: 'data-question="e1"' in tab.html)
+        assert tab.html.index('data-question="e1"') < tab.html.index('data-question="1"')
+        assert 'data-question-key="e1">Show the answer' not in tab.html
+        wrong = next(i for i in range(len(estimate.options)) if i != right)
+        press(tab, ["answer", "e1", 1], wrong)
+        tab.wait(lambda: "Not quite" in tab.html)
+        assert "data-asked" in tab.html, "the estimate shows nothing that the question asks"
+        press(tab, ["answer", "e1", 2], right)
+        tab.wait(lambda: estimate.options[right].reason in tab.html)
+        assert "data-asked" in tab.html
+        press(tab, ["reveal", "1", 3])
+        tab.wait(lambda: "data-asked" not in tab.html)
+        assert 'data-question="e1"' in tab.html, "what was answered stays"
+        press(tab, ["restart", 4])
+        tab.wait(lambda: "data-asked" in tab.html)
+        press(tab, ["reveal", "1", 5])
+        tab.wait(lambda: "data-asked" not in tab.html)
+        assert 'data-question="e1"' not in tab.html, "an estimate after the answer is none"
+
+
+def test_an_old_link_keeps_its_answers() -> None:
+    outline = VelocityLesson.outline(UR5, DEGREES)
+    progress = Progress(outline)
+    progress.restore({"step": 1, "given": {"1": dict(outline.questions())["1"].right()}, "revealed": ["2"]})
+    assert (progress.at, progress.mark("1"), progress.mark("2"), progress.mark("e1")) == (
+        1,
+        "right",
+        "shown",
+        "open",
+    )
 
 
 def test_an_arm_that_can_is_offered_and_undo_goes_back(server: int) -> None:
