@@ -24,7 +24,7 @@ from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.status import Notice
 from app.viewer.skeleton import ghost
-from kin import InputError, fk
+from kin import InputError, Robot, fk
 from kin.transforms import from_position_wxyz
 
 WRONG, OPACITY = (213, 94, 0), 0.42  # of a copy of the arm that has a wrong answer
@@ -48,6 +48,7 @@ class Guide(Feature):
         self._lesson = lesson
         self._sheets: dict[str, Sheet] = {}
         self._progress = Progress(self._outline())
+        self._arms: dict[Robot, Progress] = {stage.now.robot: self._progress}  # what was answered on each
         self._drawing = Drawing(stage.client.scene, self.post)
         self._copies = SceneView(stage.client.scene, "answer", self.post)
         gui = stage.client.gui
@@ -133,9 +134,12 @@ class Guide(Feature):
         return names.get(str(key[0]), "Answer") if isinstance(key, tuple) else "Joint sliders"
 
     def on_robot(self) -> None:
-        at = self._progress.at
-        self._progress = Progress(self._outline())
-        self._progress.at = min(at, len(self._progress.outline.steps))
+        # Other numbers are asked on another arm, and answers stay with theirs.
+        at, outline = self._progress.at, self._outline()
+        self._arms = {arm: progress for arm, progress in self._arms.items() if progress.begun}
+        self._progress = self._arms.setdefault(self.stage.now.robot, Progress(outline))
+        self._progress.use(outline)
+        self._progress.at = min(at, len(outline.steps))
         self._sheets.clear()
         self._copies.remove()
         self._show()

@@ -103,6 +103,11 @@ class Progress:
         return self.mark(key) in ("right", "shown")
 
     @property
+    def begun(self) -> bool:
+        """Whether there is an answer."""
+        return bool(self.given or self.revealed)
+
+    @property
     def withheld(self) -> frozenset[str]:
         """Facts that the page must not show now, because the open question asks for them."""
         steps, key = self.outline.steps, str(self.at + 1)

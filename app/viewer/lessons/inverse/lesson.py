@@ -33,6 +33,7 @@ from app.viewer.lessons.inverse.settings import InverseSettings
 from app.viewer.lessons.inverse.sheet import StepKey
 from app.viewer.panel.status import Notice
 from app.viewer.scene.meshes import body
+from kin import Robot
 
 ARMS = ("planar2r", "planar3r", "pioneer5", "puma560", "redundant7-craig")
 FOLLOW_HINT = "The branch that the numbers and the figure follow, by its number in the tree"
@@ -55,9 +56,13 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
 
     def __init__(self, stage: Stage) -> None:
         self._restart = self._drawn = False
+        self._arms: dict[Robot, InverseSettings] = {}  # what was asked and followed on other arms
         super().__init__(stage)
 
     def started(self) -> None:
+        self._robot = self.stage.now.robot
+        if (own := self._arms.get(self._robot)) is not None:
+            self.change(q=own.q, signs=own.signs, taken=own.taken)
         self._at, self._answered = 0, tuple[bool, ...]()
         self._figure = FigureNodes(body(self.stage.now.robot).size)
         self._figure_of: StepKey = "centre"
@@ -119,7 +124,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
     # The steps
 
     def on_steps(self, progress: Progress) -> Outline | None:
-        if self.facts.robot is not self.stage.now.robot or not self.facts.exists:
+        if self._robot is not self.stage.now.robot or not self.facts.exists:
             return None
         if self._restart:
             progress.restart()
@@ -191,6 +196,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         self.wake()
 
     def on_robot(self) -> None:
+        self._arms[self._robot] = self.settings
         super().on_robot()
         self.stage.activity.changed()
 

@@ -44,9 +44,9 @@ def outline(robot: Robot, units: Units) -> Outline:
 
 def outline_of(given: Exercise, units: Units) -> Outline:
     """The outline for a target and the branch that is followed."""
-    told, keys = words.texts(given.arm.robot, units), given.arm.keys
-    steps = tuple(_step(given, key, step, units) for key, step in zip(keys, told.steps, strict=True))
-    return replace(told, steps=steps, pose=Pose(as_configuration(given.q)))
+    texts, keys = words.texts(given.arm.robot, units), given.arm.keys
+    steps = tuple(_step(given, key, step, units) for key, step in zip(keys, texts.steps, strict=True))
+    return replace(texts, steps=steps, pose=Pose(as_configuration(given.q)))
 
 
 def _step(given: Exercise, key: StepKey, step: Step, units: Units) -> Step:

@@ -145,6 +145,31 @@ def test_another_robot_comes_to_the_pose_of_the_open_step(server: int) -> None:
         tab.wait(lambda: is_at(tab, UR5, pose.q))
 
 
+def test_answers_stay_with_the_arm_that_they_are_about(server: int) -> None:
+    question = VelocityLesson.outline(UR5, DEGREES).steps[0].question
+    assert isinstance(question, Number)
+    away = STORE.get("puma560")
+
+    def mark(tab: FakeBrowser, robot: Robot, answered: bool) -> None:
+        asked = VelocityLesson.outline(robot, DEGREES).steps[0].question
+        assert asked is not None
+        tab.wait(lambda: asked.prompt in tab.html and ("answered right" in tab.html) == answered)
+
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.choose(UR5.name)
+        tab.set("Lesson", "Velocity")
+        tab.wait(lambda: "1. A column" in tab.html)
+        press(tab, ["fields", "1", 1], [[question.value_text]])
+        mark(tab, UR5, True)
+        tab.choose(away.name)
+        mark(tab, away, False)
+        assert "data-asked" in tab.html, "the numbers of this arm are asked"
+        tab.choose(UR5.name)
+        mark(tab, UR5, True)
+        assert "data-asked" not in tab.html
+
+
 def test_a_wrong_angle_is_drawn_beside_the_arm(server: int) -> None:
     planar = kin.get_robot("planar2r")
     lesson = next(each for each in LESSONS if each.key == "postures")
