@@ -25,6 +25,7 @@ from app.service.main import create_app
 from app.shared.settings import Settings
 from app.viewer.lessons import LESSONS
 from kin.ik.results import Cause
+from kin.units import Units
 
 ROOT = Path(__file__).parents[1]
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -202,6 +203,24 @@ def test_the_page_of_arms_is_the_one_that_its_script_writes():
 def test_every_lesson_has_its_section():
     lessons = PAGES["docs/teaching.md"].partition("\n## Lessons\n")[2].partition("\n## ")[0]
     assert re.findall("^### (.+)$", lessons, re.MULTILINE) == ["Worksheets", *(lesson.title for lesson in LESSONS)]
+
+
+def test_each_part_of_a_goal_has_steps_that_ask_for_it():
+    asked, goals = {}, {}
+    for lesson in LESSONS:
+        outlines = [lesson.outline(kin.get_robot(name), Units()) for name in ("puma560", "planar2r", "iiwa14")]
+        asked[lesson.title] = {step.title for outline in outlines for step in outline.steps if step.question}
+        goals[lesson.title] = outlines[0].goal
+    seen, title = dict.fromkeys(goals, ""), ""
+    for first, goal, steps in table(PAGES["docs/teaching.md"], "lesson | after it, you can …"):
+        title = first or title
+        assert goal in goals[title]
+        assert steps == "check" or set(steps.split(", ")) <= asked[title], steps
+        seen[title] += f"{goal} "
+    for title, goal in goals.items():
+        words = re.findall(r"\w+", goal.removeprefix("You can "))
+        left = [word for word in words if word not in re.findall(r"\w+", seen[title])]
+        assert set(left) <= {"and"}, f"{title}: no row of the table says {left}"
 
 
 @pytest.mark.parametrize(
