@@ -157,7 +157,8 @@ class SixJoints:
     def _errors(self, T: Array, q: Array) -> Array:
         """Twists ``(k, 6)`` that would bring the tool from where it is onto the target, lengths in arm sizes."""
         at = fk(self.robot, q)
-        turn = 0.5 * np.cross(at[:, :3, :3], T[:3, :3], axis=1).sum(axis=2)
+        back = at[:, :3, :3] @ T[:3, :3].T  # the rotation that is left, turned round
+        turn = 0.5 * np.stack([back[:, b, c] - back[:, c, b] for b, c in ((1, 2), (2, 0), (0, 1))], axis=1)
         return np.concatenate([(T[:3, 3] - at[:, :3, 3]) / self.size, turn], axis=1)
 
     def _newton(self, T: Array, q: Array) -> tuple[Array, Flags]:
@@ -220,7 +221,8 @@ def _apart(a: Array, b: Array) -> Array:
 def _unique(rows: Array) -> Array:
     """The configurations ``(k, 6)``, each once."""
     kept: list[int] = []
-    for i, row in enumerate(rows):
-        if (_apart(rows[kept], row) > _SAME).all():
+    same = np.abs((rows[:, None] - rows + math.pi) % TURN - math.pi).max(axis=2, initial=0.0) <= _SAME
+    for i in range(len(rows)):
+        if not same[i, kept].any():
             kept.append(i)
     return np.ascontiguousarray(rows[kept])

@@ -195,21 +195,32 @@ def test_near_folds_nothing_is_missing_that_is_proved(robot):
     near_folds(robot, TARGETS)
 
 
-@pytest.mark.parametrize("seed", [28, 160, 710, 1092])
-def test_what_continuation_leaves_open_an_elimination_of_the_table_settles(seed):
-    """Targets of the PUMA of which continuation has no posture, too many, or one pair too few."""
-    robot = next(each for each in FAMILIES if each.id == "puma560-1.5708")
-    q = np.random.default_rng(1).uniform(-PI, PI, (1500, 6))[seed]
-    found, known = candidates(robot, kin.fk(robot, q), np.zeros(6))
+PUMA = next(each for each in FAMILIES if each.id == "puma560-1.5708")
+
+
+def test_the_error_of_a_posture_is_the_motion_that_removes_it():
+    form = closed_form_of(PUMA)
+    rng = np.random.default_rng(4)
+    q = rng.uniform(-PI, PI, (8, 6))
+    step = 1e-5 * rng.normal(size=(8, 6))
+    for at, by in zip(q, step, strict=True):
+        search, T = form._six, kin.fk(PUMA, at + by)
+        assert np.abs(search._errors(T, (at + by)[None])).max() < 1e-15
+        assert np.abs(search._errors(T, at[None])[0] - search._jacobian(at[None])[0] @ by).max() < 1e-8
+
+
+@pytest.mark.parametrize("place", [28, 160, 190, 537, 710, 1092])
+def test_doubt_about_targets_of_a_rounded_puma_is_settled(place):
+    """By Newton's steps, or by the elimination where continuation has too few postures, or none (28, 160, 190)."""
+    q = np.random.default_rng(1).uniform(-PI, PI, (1500, 6))[place]
+    found, known = candidates(PUMA, kin.fk(PUMA, q), np.zeros(6))
     assert (len(found), known) == (8, "agreed")
-    assert apart(found, q).min() < 1e-8
+    assert apart(found, q).min() < 1e-6
 
 
-@pytest.mark.parametrize("seed", [537, 958])
-def test_postures_that_only_the_elimination_finds_are_listed_though_nothing_certifies_them(seed):
-    robot = next(each for each in FAMILIES if each.id == "puma560-1.5708")
-    q = np.random.default_rng(1).uniform(-PI, PI, (1500, 6))[seed]
-    found, known = candidates(robot, kin.fk(robot, q), np.zeros(6))
+def test_postures_that_nothing_certifies_are_listed_all_the_same():
+    q = np.random.default_rng(1).uniform(-PI, PI, (1500, 6))[958]
+    found, known = candidates(PUMA, kin.fk(PUMA, q), np.zeros(6))
     assert (len(found), known) == (8, "unknown")
     assert apart(found, q).min() < 1e-8
 
