@@ -42,9 +42,6 @@ class Labels:
         self._size = size
         self._shown: dict[Hashable, tuple[int, Array, str]] = {}
 
-    def __contains__(self, key: Hashable) -> bool:
-        return key in self._shown
-
     def place(self, key: Hashable, text: str, places: Sequence[Array]) -> Array:
         """The first of these points ``(3,)`` that has room for a label; where it is comes first."""
         first = self._shown[key][0] if key in self._shown else 0
