@@ -38,7 +38,7 @@ from kin.motion.planning.collisions import checked
 from kin.motion.program import Segment, Target, kind_of
 from kin.motion.results import Refusal, SegmentTimes
 from kin.transforms import Array
-from kin.units import Units
+from kin.units import Units, typeset
 
 _MET = 1e-6  # m
 _LOOKS = 200  # times in a spline at which its distance from a point is looked at
@@ -157,11 +157,11 @@ class Plan:
         return next((i for i, end in enumerate(self.ends) if time <= end), len(self.ends))
 
     def explain(self, units: Units) -> str:
-        """Why the motion is refused, with the numbers of the list; "" if it is not."""
+        """Why the motion is refused, with the numbers of the list, as the page writes them; "" if it is not."""
         refusal = self.motion.refusal
         if refusal is None:
             return ""
-        return replace(refusal, segment=self.item_of(refusal.segment)).explain(units)
+        return typeset(replace(refusal, segment=self.item_of(refusal.segment)).explain(units))
 
     def notes(self, units: Units) -> str:
         """What is worth knowing of what can be driven, with the numbers of the list.

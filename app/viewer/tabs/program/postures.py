@@ -22,7 +22,7 @@ from app.viewer.views.templates import render
 from kin import IKOptions, PathPostures
 from kin.motion import segment_poses
 from kin.path.postures import STATES, Reason, State
-from kin.units import Units
+from kin.units import Units, typeset
 
 PLACES = 80  # along the way
 WIDTH, LEFT, RIGHT, ROW, GAP, TOP, BOTTOM = 320.0, 18.0, 4.0, 15.0, 4.0, 4.0, 18.0
@@ -99,19 +99,19 @@ def _words(found: PathPostures) -> str:
     count, through = len(found.postures), len(found.through)
     if through:
         return f"The arm gets through in {through} of {count} postures. A click on one starts there."
-    return found.reason
+    return typeset(found.reason)
 
 
 def _row(found: PathPostures, row: int, units: Units) -> dict[str, object]:
     """A posture in words: how far it leads, and what ends it."""
     reach, last = int(found.reach[0, row]), len(found.reach) - 1
     if reach < 0:
-        reason = found.reasons.get((0, row), Reason()).explain(units)
+        reason = typeset(found.reasons.get((0, row), Reason()).explain(units))
         text = f"not at the start: {reason}" if reason else "not at the start: the pose cannot be met so"
     elif reach == last:
         text = "the whole way"
     else:
-        reason = found.reasons.get((reach + 1, row), Reason()).explain(units)
+        reason = typeset(found.reasons.get((reach + 1, row), Reason()).explain(units))
         text = f"to {100.0 * reach / max(last, 1):.0f} %" + (f": {reason}" if reason else "")
     return {
         "name": short(found.postures[row]), "text": text, "can": reach >= 0, "row": row,
@@ -136,7 +136,7 @@ def _svg(found: PathPostures, index: int, units: Units) -> Markup:
         able = found.reach[0, stretch.posture] >= 0
         does = f' data-program-do="begin" data-argument="{stretch.posture}" data-index="{index}"' if able else ""
         middle = (stretch.first + stretch.last + 1) // 2
-        reason = found.reasons.get((middle, stretch.posture), Reason()).explain(units)
+        reason = typeset(found.reasons.get((middle, stretch.posture), Reason()).explain(units))
         name = LEGEND[stretch.state] + (f": {reason}" if reason else "")
         parts.append(
             f'<rect class="kb-posture kb-posture-{stretch.state.replace(" ", "-")}" x="{x:.2f}" y="{y:.1f}" '

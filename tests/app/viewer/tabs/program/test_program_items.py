@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +25,9 @@ from app.viewer.tabs.program.playback import Player
 from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.program.views import QUANTITIES, assumption, comparison
 from kin import InputError
+from kin.ik.details import OrientationNotMet
 from kin.motion import limits_of
+from kin.motion.details import NotReached
 from kin.units import DEFAULT_UNITS
 
 PIONEER, UR5, SCARA = (kin.get_robot(name) for name in ("pioneer5", "ur5", "scara"))
@@ -219,6 +222,21 @@ def test_refusals_and_notes_have_the_numbers_of_the_list() -> None:
         assert found.motion.refusal is not None
         assert found.motion.refusal.segment == 3
         assert "Segment 5 (LIN" in found.explain(DEFAULT_UNITS)
+
+
+def test_small_numbers_of_a_refusal_are_written_as_the_page_writes_numbers() -> None:
+    far = replace(BENT[5], q=tuple(UR5.clip(UR5.q_home + 1.5).tolist()), blend=0.01)
+    found = plan((*BENT[:4], far), UR5, loop=False)
+    assert found is not None
+    refusal = found.motion.refusal
+    assert refusal is not None
+    reached = refusal.details
+    assert isinstance(reached, NotReached)
+    assert isinstance(reached.details, OrientationNotMet)
+    near = reached.details._replace(position_error=1e-4, rotation_error=math.radians(0.037))
+    refusal = replace(refusal, details=reached._replace(details=near))
+    found = replace(found, motion=replace(found.motion, refusal=refusal))
+    assert "off by 0.1 mm and 3.7·10⁻²°" in found.explain(DEFAULT_UNITS)
 
 
 @pytest.mark.parametrize("choice", list(CHOICES))
