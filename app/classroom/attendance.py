@@ -158,12 +158,17 @@ class Attendance:
         """Whether students may not move their arms."""
         self._tell_state(frozen=on)
 
-    def send_task(self, exercise: str | None) -> None:
-        """Set an exercise for all, which ends following and freezing; None: there is none any more."""
+    def send_task(self, exercise: str | None, own: str = "") -> None:
+        """Set an exercise for all, which ends following and freezing; None: there is none any more.
+
+        Args:
+            own: the text of an exercise that only the teacher's page has.
+        """
         if exercise is None:
             self._tell_state(task=None)
         else:
-            self._tell_state(task={"exercise": exercise[:200], "at": now()}, follow=False, frozen=False)
+            task = {"exercise": exercise[:200], "at": now(), **({"own": own} if own else {})}
+            self._tell_state(task=task, follow=False, frozen=False)
 
     def send_course(self, packed: str) -> None:
         """Set a packed course for all, which ends the task, following and freezing; empty: there is none."""

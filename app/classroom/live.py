@@ -187,7 +187,7 @@ class LiveRoom:
             page=row["page"],
             follow=bool(state.get("follow")),
             frozen=bool(state.get("frozen")),
-            task=None if task is None else Task(task["exercise"], task["at"]),
+            task=None if task is None else Task(task["exercise"], task["at"], task.get("own", "")),
             shown=self._shown(),
             poll=self._poll(present, None if mine is None else mine.row),
             course=state.get("course") or "",

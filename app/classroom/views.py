@@ -95,10 +95,12 @@ class Task:
     Attributes:
         exercise: id of the exercise.
         at: when, in seconds since 1970; the same exercise set again is another task.
+        own: its text, if only the teacher's page has it.
     """
 
     exercise: str
     at: float
+    own: str = ""
 
 
 @dataclass(frozen=True)

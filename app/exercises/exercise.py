@@ -86,6 +86,7 @@ class Exercise:
         kind: its question.
         expressions: all of the file; each has a value in every variant.
         file: where it was read, for messages.
+        source: the text of the file.
         builtin: whether it belongs to the package.
     """
 
@@ -107,6 +108,7 @@ class Exercise:
     kind: Kind
     expressions: tuple[Expression, ...] = ()
     file: str = ""
+    source: str = ""
     builtin: bool = False
 
     @property

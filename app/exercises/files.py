@@ -81,6 +81,7 @@ def parse_exercise(text: str, file: str = "exercise", find: Find = get_robot, bu
         question,
         tuple(fields.found),
         file,
+        text,
         builtin,
     )
     fields.done()

@@ -376,17 +376,19 @@ def without_row(draft: Draft, path: str, index: int) -> Draft:
     return made
 
 
-def to_toml(draft: Draft) -> str:
-    """The file of a draft."""
-    lines = [f"{_key(name)} = {_toml(value)}" for name, value in draft.items() if not isinstance(value, dict)]
+def to_toml(draft: Draft, under: str = "") -> str:
+    """The file of a draft, or its part of a file that has it `under` a list of tables of this name."""
+    above = f"{under}." if under else ""
+    lines = [f"[[{under}]]"] if under else []
+    lines += [f"{_key(name)} = {_toml(value)}" for name, value in draft.items() if not isinstance(value, dict)]
     for name, table in draft.items():
         if isinstance(table, dict):
             lists = {key: value for key, value in table.items() if _is_tables(value)}
-            lines += ["", f"[{_key(name)}]"]
+            lines += ["", f"[{above}{_key(name)}]"]
             lines += [f"{_key(key)} = {_toml(value)}" for key, value in table.items() if key not in lists]
             for key, rows in lists.items():
                 for row in rows:
-                    lines += ["", f"[[{_key(name)}.{_key(key)}]]"]
+                    lines += ["", f"[[{above}{_key(name)}.{_key(key)}]]"]
                     lines += [f"{_key(each)} = {_toml(value)}" for each, value in row.items()]
     return "\n".join(lines) + "\n"
 

@@ -1,15 +1,19 @@
 """Courses: an ordered list of lessons and exercises with short texts, as a TOML file or in a link.
 
-Pure: no page, no storage. A course names exercises and lessons; it contains no answers.
+Pure: no page, no storage. A course names exercises and lessons. It may bring exercises along that a teacher has
+written; in links and pages these are sealed, so that nothing there contains an answer.
 """
 
-from app.classroom.courses.course import Course, Item, parse_item
+from app.classroom.courses.course import Course, Item, Own, parse_item
 from app.classroom.courses.files import Courses, course_of, load_course, parse_course, to_data, to_toml
+from app.classroom.courses.sealing import Seal
 
 __all__ = [
     "Course",
     "Courses",
     "Item",
+    "Own",
+    "Seal",
     "course_of",
     "load_course",
     "parse_course",

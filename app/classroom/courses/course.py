@@ -1,13 +1,19 @@
-"""A course: its items in order. Courses are immutable; every change gives a new one."""
+"""A course: its items in order, and the exercises that it brings along.
+
+Courses are immutable; every change gives a new one.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
+
+from app.exercises import Exercise
 
 ItemKind = Literal["lesson", "exercise"]
 MOST_ITEMS = 40
+MOST_OWN = 8  # exercises that a course brings along
 LONGEST = {"title": 80, "about": 300, "note": 400}  # characters of each text
 
 
@@ -30,6 +36,14 @@ class Item:
 
 
 @dataclass(frozen=True)
+class Own:
+    """An exercise that a course brings along: its text, by which two are the same."""
+
+    text: str
+    exercise: Exercise = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True)
 class Course:
     """An ordered list of lessons and exercises.
 
@@ -37,12 +51,14 @@ class Course:
         title, about: shown above the list.
         items: in order.
         answers: whether students may ask for the answer of an exercise that they have not solved.
+        own: the exercises that it brings along.
     """
 
     title: str
     about: str = ""
     items: tuple[Item, ...] = ()
     answers: bool = True
+    own: tuple[Own, ...] = ()
 
     @property
     def exercises(self) -> tuple[str, ...]:
@@ -52,7 +68,7 @@ class Course:
     @property
     def fingerprint(self) -> bytes:
         """Four bytes that tell it from other courses, by title and items; texts about these do not matter."""
-        parts = [self.title, *(f"{item.kind}:{item.key}" for item in self.items)]
+        parts = [self.title, *(f"{item.kind}:{item.key}" for item in self.items), *(one.text for one in self.own)]
         return hashlib.sha256("\n".join(parts).encode()).digest()[:4]
 
     def added(self, item: Item) -> Course:
@@ -61,7 +77,14 @@ class Course:
 
     def removed(self, index: int) -> Course:
         """Without an item."""
-        return replace(self, items=self.items[:index] + self.items[index + 1 :])
+        fewer = replace(self, items=self.items[:index] + self.items[index + 1 :])
+        return replace(fewer, own=tuple(one for one in self.own if one.exercise.id in fewer.exercises))
+
+    def bringing(self, exercise: Exercise) -> Course:
+        """With an exercise that it brings along, in place of one with the same id, and as an item."""
+        others = tuple(one for one in self.own if one.exercise.id != exercise.id)
+        course = replace(self, own=(*others, Own(exercise.source, exercise)))
+        return course if exercise.id in self.exercises else course.added(Item("exercise", exercise.id))
 
     def moved(self, index: int, to: int) -> Course:
         """With an item at another place; beyond the ends: nothing changes."""

@@ -8,20 +8,23 @@ from __future__ import annotations
 
 import json
 import re
+import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from difflib import get_close_matches
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
-from app.classroom.courses.course import LONGEST, Course, Item
-from app.exercises import ExerciseFileError, Exercises
+from app.classroom.courses.course import LONGEST, MOST_OWN, Course, Item, Own
+from app.classroom.courses.sealing import TAG, Seal
+from app.exercises import Exercise, ExerciseFileError, Exercises, Shelf, VariantError, form, parse_exercise
 from app.exercises.fields import Fields, text_of, toml_of
 from app.exercises.lessons import LESSONS
-from kin import KinematicsError, Robot, get_robot
+from kin import InputError, KinematicsError, Robot, get_robot
 
 BUILTIN = Path(__file__).parent / "library"
-MOST_BYTES = 6000  # of a course as JSON: links and pages keep it
+MOST_BYTES = 8000  # of a course as JSON: links and pages keep it
 MOST_IN_FILE = 16_000  # bytes of a file that a page opens
 
 Find = Callable[[str], Robot]
@@ -39,13 +42,16 @@ class _CourseFields(Fields):
         return text
 
 
-def course_of(data: object, exercises: Exercises, file: str = "course", find: Find = get_robot) -> Course:
+def course_of(
+    data: object, exercises: Exercises, file: str = "course", find: Find = get_robot, seal: Seal | None = None
+) -> Course:
     """The course of a file's or a link's fields.
 
     Args:
         exercises: those of the service; the course may name no others.
         file: the name in messages.
         find: gives the arm of an id.
+        seal: opens the exercises that the course brings along sealed; None: it brings none of these.
 
     Raises:
         ExerciseFileError: naming the file, the field, the value and what would be valid.
@@ -53,19 +59,32 @@ def course_of(data: object, exercises: Exercises, file: str = "course", find: Fi
     fields = _CourseFields(file, data)
     title, about = fields.text("title"), fields.text("about", "")
     answers = fields.flag("answers", True)
-    items = tuple(_item(each, exercises, find) for each in fields.tables("item"))
+    own = _own(fields, exercises, find, seal)
+    known = Shelf(exercises)
+    known.put(one.exercise for one in own)
+    items = tuple(_item(each, known, find) for each in fields.tables("item"))
     fields.done()
-    course = Course(title, about, items, answers)
-    size = len(json.dumps(to_data(course), ensure_ascii=False, separators=(",", ":")).encode())
+    course = Course(title, about, items, answers, own)
+    plain = json.dumps(to_data(replace(course, own=())), ensure_ascii=False, separators=(",", ":"))
+    size = len(plain.encode()) + sum(_sealed_size(one.text) for one in own)
     if size > MOST_BYTES:
-        raise fields.refuse("item", f"{size} bytes", f"at most {MOST_BYTES} bytes in all: shorten the notes")
+        raise fields.refuse("item", f"{size} bytes", f"at most {MOST_BYTES} bytes in all: shorten the texts")
     return course
 
 
 def parse_course(text: str, exercises: Exercises, file: str = "course", find: Find = get_robot) -> Course:
-    """The course described by TOML text; raises `ExerciseFileError`. It has an item at least."""
+    """The course described by TOML text; raises `ExerciseFileError`.
+
+    It has an item at least, and the exercises that it brings along can be solved.
+    """
     data = toml_of(text, file)
     course = course_of(data, exercises, file, find)
+    for i, one in enumerate(course.own):
+        try:
+            one.exercise.verify()
+        except VariantError as error:
+            field = f"own[{i}].{error.field or 'answer'}"
+            raise ExerciseFileError(file, field, str(error), "an exercise that can be solved") from None
     if not course.items:
         raise ExerciseFileError(file, "item", data.get("item"), "at least one [[item]]: a lesson or an exercise")
     return course
@@ -76,8 +95,13 @@ def load_course(path: Path | str, exercises: Exercises, find: Find = get_robot) 
     return parse_course(text_of(path), exercises, str(path), find)
 
 
-def to_data(course: Course) -> dict[str, Any]:
-    """A course as JSON, with the fields of a file."""
+def to_data(course: Course, seal: Seal | None = None) -> dict[str, Any]:
+    """A course as JSON, with the fields of a file.
+
+    Args:
+        seal: closes the exercises that the course brings along, for what a browser keeps; None: they are plain. It
+            raises `KinematicsError` without a secret.
+    """
     items = []
     for item in course.items:
         row: dict[str, str] = {item.kind: item.key}
@@ -88,15 +112,19 @@ def to_data(course: Course) -> dict[str, Any]:
         data["about"] = course.about
     if not course.answers:
         data["answers"] = False
-    return data | {"item": items}
+    data["item"] = items
+    if course.own:
+        data["own"] = [form.read(one.text) if seal is None else seal.close(one.text) for one in course.own]
+    return data
 
 
 def to_toml(course: Course) -> str:
     """A course as a file."""
     data = to_data(course)
-    lines = [f"{name} = {_value(value)}" for name, value in data.items() if name != "item"]
+    lines = [f"{name} = {_value(value)}" for name, value in data.items() if name not in ("item", "own")]
     for row in data["item"]:
         lines += ["", "[[item]]", *(f"{name} = {_value(text)}" for name, text in row.items())]
+    lines += [f"\n{form.to_toml(one, 'own')}".rstrip("\n") for one in data.get("own", ())]
     return "\n".join(lines) + "\n"
 
 
@@ -134,6 +162,45 @@ class Courses:
                 raise ExerciseFileError(str(folder), "folder", str(error), "a folder that can be read") from error
             found += [(path, load_course(path, self.exercises, self.find)) for path in paths]
         return found
+
+
+def _own(fields: Fields, exercises: Exercises, find: Find, seal: Seal | None) -> tuple[Own, ...]:
+    """The exercises that a course brings along: tables, or sealed texts."""
+    found: dict[str, Own] = {}
+    for i, given in enumerate(fields.items("own")):
+        name = f"own[{i}]"
+        if len(found) >= MOST_OWN:
+            raise fields.refuse(name, "one more exercise", f"at most {MOST_OWN} in a course")
+        if isinstance(given, dict):
+            text = form.to_toml(given)
+        elif isinstance(given, str) and seal is not None:
+            try:
+                text = seal.open(given)
+            except InputError as error:
+                raise fields.refuse(name, given, error.expected) from None
+        else:
+            raise fields.refuse(name, given, "a table with the fields of an exercise")
+        try:
+            exercise = _parsed(text, find)
+        except ExerciseFileError as error:
+            made = fields.refuse(f"{name}.{error.field}", None, error.expected)
+            made.value, made.args = error.value, (f"{fields.file}: {name}.{error.field}: got {error.value}, "
+                                                  f"expected {error.expected}",)  # fmt: skip
+            raise made from None
+        if exercise.id in found or exercises.get(exercise.id) is not None:
+            raise fields.refuse(f"{name}.id", exercise.id, "an id that no other exercise has")
+        found[exercise.id] = Own(text, exercise)
+    return tuple(found.values())
+
+
+@lru_cache(maxsize=256)  # a course is read with each change of it, and its exercises stay the same objects
+def _parsed(text: str, find: Find) -> Exercise:
+    return parse_exercise(text, "course", find)
+
+
+def _sealed_size(text: str) -> int:
+    """How many characters a sealed text has."""
+    return 4 * (TAG + len(zlib.compress(text.encode(), 9)) + 2) // 3
 
 
 def _item(fields: Fields, exercises: Exercises, find: Find) -> Item:

@@ -18,7 +18,9 @@ from app.viewer.activity.practice import Practice
 from app.viewer.activity.progress import Progress
 from kin import KinematicsError
 
-EXERCISES: Final = "exercises"  # the key under which the exercises are opened
+# The keys under which the exercises are opened, and where one is written.
+EXERCISES: Final = "exercises"
+AUTHOR: Final = "author"
 
 # What questions may withhold, and what is then absent from panel, scene, read-out and messages.
 FACTS: Final = {
@@ -90,6 +92,8 @@ class Activity:
         practice: what has been done of the exercises, and which one is open.
         progress: the open course and its item on show.
         sent: the course that the teacher of the room sent.
+        draft: the exercise that is written in this page.
+        lent: an exercise that the room brings along.
         task: the exercise that the teacher of the room sent.
         note: a sentence below the verdict: whether the answer is stored.
         asked: what the open question of a lesson withholds.
@@ -100,9 +104,11 @@ class Activity:
         self.courses, self.exercises = courses, Shelf(courses.exercises)
         self.secret, self.changed = secret, changed
         self.practice = Practice(self.exercises)
-        self.progress = Progress(courses, self.practice)
+        self.progress = Progress(courses, self.practice, secret)
         self.lesson: str | None = None
         self.sent: Course | None = None
+        self.draft: Exercise | None = None
+        self.lent: Exercise | None = None
         self.task: Exercise | None = None
         self.note = ""
         self.asked: frozenset[str] = frozenset()
@@ -153,6 +159,13 @@ class Activity:
         self.progress.at = None
         self.changed()
 
+    def stock(self) -> None:
+        """Have the exercises that courses and room bring along, and the one that is written here."""
+        courses = filter(None, (self.sent, self.progress.course))
+        brought = [one.exercise for course in courses for one in course.own]
+        self.exercises.put([*brought, *filter(None, (self.lent, self.draft))])
+        self.practice.look_again()
+
     # Where exercises are done
 
     def enter_course(self) -> None:
@@ -161,6 +174,7 @@ class Activity:
         Where there is no place for the secret, they are as without a course; a request for a result code then gets
         the reason.
         """
+        self.stock()
         place = None
         with suppress(KinematicsError):
             place = self.progress.place(self.secret)

@@ -16,6 +16,7 @@ from kin import InputError
 Mark = Literal["open", "wrong", "right", "shown"]
 MARKS: tuple[Mark, ...] = get_args(Mark)
 MARK_OF: dict[Settled, Mark] = {"open": "open", "right": "right", "shown": "shown"}
+LONGEST_ID = 40  # characters, as in files
 MOST = 100_000  # attempts, seconds, variants
 
 
@@ -70,6 +71,7 @@ class Practice:
         self.seed = random.randrange(1, MOST)
         self.at: Exercise | None = None
         self.records: dict[str, Record] = {}
+        self._wanted: object = None  # what a restored state has open, if it is not there yet
         self._place: Place | None = None
         self._elsewhere: dict[str, dict[str, Record]] = {}  # records of this page in other places, by label
         self._claims: dict[str, Claim] = {}  # what was restored for other places
@@ -108,7 +110,11 @@ class Practice:
         exercise = self._exercises.get(exercise_id)
         if exercise is None:
             raise InputError("exercise", exercise_id, "the id of an exercise")
-        self.at = exercise
+        self.at, self._wanted = exercise, None
+
+    def close(self) -> None:
+        """Show the list."""
+        self.at = self._wanted = None
 
     def after(self, exercise: Exercise) -> Exercise | None:
         """The next one in the list; None after the last one."""
@@ -198,16 +204,22 @@ class Practice:
         if _is_count(seed):
             self.seed = seed  # type: ignore[assignment]
         self.at = self._exercises.get(state.get("at"))
+        self._wanted = state.get("at")
         records: dict[str, Record] = {}
         for key, entry in done.items() if isinstance(done, dict) else ():
             valid = isinstance(entry, list) and len(entry) == 6 and all(map(_is_count, entry))
-            if self._exercises.get(key) is not None and valid and entry[0] < len(MARKS):
+            if len(key) <= LONGEST_ID and valid and entry[0] < len(MARKS):  # a course may bring it along later
                 records[key] = Record(MARKS[entry[0]], *entry[1:])
         claim = Claim(_claim(seed, done), state.get("proof"), records)
         if label == self._label:
             self._take(claim)
         elif isinstance(label, str):
             self._claims = {label[:LABEL]: claim}
+
+    def look_again(self) -> None:
+        """There may be other exercises: open what a restored state has open, if it is there now."""
+        if self.at is None and (found := self._exercises.get(self._wanted)) is not None:
+            self.at, self._wanted = found, None
 
     def _take(self, claim: Claim) -> None:
         """Take restored records as far as they are proven; an answer that this page has shown stays shown."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from datetime import UTC, datetime
 
-from app.classroom.courses import Course, Courses, Item, course_of, to_data
+from app.classroom.courses import Course, Courses, Item, Seal, course_of, to_data
 from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.results import Outcome, write_code
-from app.exercises import Exercises
+from app.exercises import Exercise
 from app.viewer.activity.places import Place
 from app.viewer.activity.practice import Mark, Practice
 from kin import InputError
@@ -25,8 +25,9 @@ class Progress:
         alias: the name in the result code.
     """
 
-    def __init__(self, courses: Courses, practice: Practice) -> None:
+    def __init__(self, courses: Courses, practice: Practice, secret: Callable[[], bytes]) -> None:
         self._courses = courses
+        self._seal = Seal(secret)
         self._practice = practice
         self.course: Course | None = None
         self.at: int | None = None
@@ -34,24 +35,36 @@ class Progress:
         self.passed: set[int] = set()
         self.alias = ""
 
+    def read(self, data: object, file: str = "course") -> Course:
+        """A course as a link or a room has it; raises `ExerciseFileError`, or what the secret raises."""
+        return course_of(data, self._courses.exercises, file, self._courses.find, self._seal)
+
+    def packed(self, course: Course) -> dict[str, object]:
+        """A course for a link or a room; raises what the secret raises if it brings exercises along."""
+        return to_data(course, self._seal)
+
     def open(self, course: Course) -> None:
-        """Begin a course."""
+        """Begin a course; raises what the secret raises if it brings exercises along."""
+        self.packed(course)
         self.course = course
         self._begin()
 
     def edit(self, course: Course) -> None:
-        """The course was changed: places and what was seen no longer fit."""
-        if course.items != self._now.items:
+        """The course was changed: places and what was seen no longer fit. Raises `ExerciseFileError` as `read`."""
+        course = self.read(self.packed(course))  # the same limits as a file's
+        if (course.items, course.own) != (self._now.items, self._now.own):
             self._begin()
         self.course = course
 
     def _begin(self) -> None:
         self.at, self.seen, self.passed = None, set(), set()
 
-    @property
-    def exercises(self) -> Exercises:
-        """Those of the service."""
-        return self._courses.exercises
+    def bring(self, exercise: Exercise) -> Course:
+        """Have the open course bring an exercise along, or a new one; raises `ExerciseFileError` if it is full."""
+        if self.course is None:
+            self.open(Course("My course"))
+        self.edit(self._now.bringing(exercise))
+        return self._now
 
     @property
     def seated(self) -> bool:
@@ -142,7 +155,7 @@ class Progress:
             return {}
         at = -1 if self.at is None else self.at
         indices = {"seen": sorted(self.seen), "passed": sorted(self.passed)}
-        return {"course": to_data(self.course), "at": at, "alias": self.alias, **indices}
+        return {"course": self.packed(self.course), "at": at, "alias": self.alias, **indices}
 
     def restore(self, state: dict[str, object]) -> None:
         """Take what `state` returned; raises `ExerciseFileError` for a course that is not valid here."""
@@ -150,7 +163,7 @@ class Progress:
         self._begin()
         if "course" not in state:
             return
-        course = course_of(state["course"], self._courses.exercises, "link", self._courses.find)
+        course = self.read(state["course"], "link")
         at, alias = state.get("at"), state.get("alias")
         self.course = course
         if type(at) is int and 0 <= at < len(course.items):

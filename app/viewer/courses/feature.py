@@ -9,12 +9,11 @@ from dataclasses import replace
 
 import viser
 
-from app.classroom.courses import Course, Item, course_of, parse_course, parse_item, to_data, to_toml
+from app.classroom.courses import Course, Item, parse_course, parse_item, to_toml
 from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import read_code
 from app.classroom.results.codes import clean_alias
-from app.exercises import ExerciseFileError
 from app.viewer.activity.activity import EXERCISES
 from app.viewer.courses import views
 from app.viewer.courses.views import Desk
@@ -73,8 +72,9 @@ class CourseFeature(Feature):
         if not packed:
             self.stage.activity.sent = None
             return False
-        course = course_of(json.loads(packed), self._courses.exercises, "course", self._courses.find)
+        course = self._progress.read(json.loads(packed))
         self.stage.activity.sent = course
+        self.stage.activity.stock()
         if course == self._progress.course:
             return False
         self._open(course)
@@ -189,13 +189,13 @@ class CourseFeature(Feature):
                     changed = course.moved(value, value - 1 if name == "up" else value + 1)
             case _:
                 raise InputError("course", name, "a control of the editor")
-        data = to_data(changed)  # the same limits as a file's
-        self._progress.edit(course_of(data, self._courses.exercises, "course", self._courses.find))
+        self._progress.edit(changed)
         self.stage.activity.enter_course()
         self._desk.link = ""
 
     def _set(self, course: Course, what: str, text: str) -> Course:
         """A typed text, or one more item."""
+        known = self.stage.activity.exercises
         if what == "title":
             return replace(course, title=text or "My course")
         if what == "about":
@@ -204,7 +204,8 @@ class CourseFeature(Feature):
             item = parse_item(text)
             if item is None or len(course.items) >= MOST_ITEMS:
                 raise InputError("item", text, f"a lesson or an exercise; at most {MOST_ITEMS} in a course")
-            return course.added(item)
+            exercise = known.get(item.key) if item.kind == "exercise" and known.is_own(item.key) else None
+            return course.added(item) if exercise is None else course.bringing(exercise)
         name, _, index = what.partition("-")
         if not index.isdecimal() or int(index) >= len(course.items):
             raise InputError("item", what, "the index of an item")
@@ -226,7 +227,7 @@ class CourseFeature(Feature):
         course = self._progress.course
         if course is None:
             return ""
-        return self.stage.link_to({self.key: {"course": to_data(course)}}, self.key)
+        return self.stage.link_to({self.key: {"course": self._progress.packed(course)}}, self.key)
 
     # The page
 
@@ -239,7 +240,7 @@ class CourseFeature(Feature):
     def restore(self, state: dict[str, object]) -> None:
         try:
             self._progress.restore(state)
-        except ExerciseFileError as error:
+        except KinematicsError as error:
             self.stage.notify(Notice("error", "The course cannot be used", str(error)))
         self.stage.activity.enter_course()
         if self.shown:
@@ -247,13 +248,13 @@ class CourseFeature(Feature):
         self._update()
 
     def on_activity(self) -> None:
-        update_html(self._bar, views.bar_html(self._progress))
+        update_html(self._bar, views.bar_html(self._progress, self.stage.activity.exercises))
 
     def _update(self) -> None:
-        update_html(self._bar, views.bar_html(self._progress))
+        update_html(self._bar, views.bar_html(self._progress, self.stage.activity.exercises))
         if self._page is None:
             return
         if self._progress.course is None:
             update_html(self._page, views.chooser_html(self._courses, self._desk, self._progress.seated))
         else:
-            update_html(self._page, views.course_html(self._progress, self._desk))
+            update_html(self._page, views.course_html(self._progress, self.stage.activity.exercises, self._desk))

@@ -10,6 +10,7 @@ from app.classroom.courses import Courses, Item
 from app.classroom.courses.course import LONGEST, MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import Outcome
+from app.exercises import Exercises
 from app.viewer.activity.practice import Mark
 from app.viewer.activity.progress import Progress
 from app.viewer.exercises.views import MARKS
@@ -48,13 +49,13 @@ class Desk:
     errs: str = ""
 
 
-def bar_html(progress: Progress) -> str:
+def bar_html(progress: Progress, known: Exercises) -> str:
     """The bar above a lesson or exercise of a course; empty in the list."""
     course, at, item = progress.course, progress.at, progress.item
     if course is None or at is None or item is None:
         return ""
     return render(
-        "course/bar", course=course, number=at + 1, count=len(course.items), title=_title(progress, item),
+        "course/bar", course=course, number=at + 1, count=len(course.items), title=_title(known, item),
         note=item.note, marks=_marks(progress), at=at,
     )  # fmt: skip
 
@@ -67,21 +68,19 @@ def chooser_html(courses: Courses, desk: Desk, seated: bool) -> str:
     )  # fmt: skip
 
 
-def course_html(progress: Progress, desk: Desk) -> str:
+def course_html(progress: Progress, known: Exercises, desk: Desk) -> str:
     """The list of an open course, or its editor."""
     course = progress.course
     assert course is not None
     rows = [
-        {"index": i, "kind": item.kind, "title": _title(progress, item), "own": item.title, "note": item.note,
+        {"index": i, "kind": item.kind, "title": _title(known, item), "own": item.title, "note": item.note,
          "mark": mark, "name": course.items[i].key}
         for i, (item, mark) in enumerate(zip(course.items, _marks(progress), strict=True))
     ]  # fmt: skip
     done = sum(row["mark"]["color"] == "green" for row in rows)  # type: ignore[index]
     link = Markup(box_html(desk.link, "Copy link", wrap=True)) if desk.link else ""
     if desk.editing:
-        exercises = [
-            (topic, [(one.id, one.title) for one in members]) for topic, members in progress.exercises.topics()
-        ]
+        exercises = [(topic, [(one.id, one.title) for one in members]) for topic, members in known.topics()]
         return render(
             "course/edit", course=course, rows=rows, longest=LONGEST, full=len(rows) >= MOST_ITEMS, link=link,
             lessons=[(lesson.key, lesson.title) for lesson in LESSONS], exercises=exercises, desk=desk,
@@ -107,13 +106,13 @@ def said(outcome: Outcome | None, courses: Courses) -> str:
     )
 
 
-def _title(progress: Progress, item: Item) -> str:
+def _title(known: Exercises, item: Item) -> str:
     """What an item is called."""
     if item.title:
         return item.title
     if item.kind == "lesson":
         return next((lesson.title for lesson in LESSONS if lesson.key == item.key), item.key)
-    exercise = progress.exercises.get(item.key)
+    exercise = known.get(item.key)
     return item.key if exercise is None else exercise.title
 
 

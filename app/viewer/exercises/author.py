@@ -14,10 +14,9 @@ from functools import cached_property, lru_cache
 import kin
 from app.exercises import Exercise, ExerciseFileError, Exercises, Trial, Variant, tried
 from app.exercises import form as forms
-from app.exercises.fields import text_of
 from app.exercises.files import MOST_BYTES, Find, parse_exercise
 from app.exercises.kinds import KINDS
-from app.viewer.activity.activity import EXERCISES
+from app.viewer.activity.activity import AUTHOR, EXERCISES
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.fields import Settings
@@ -79,11 +78,11 @@ def _trial(draft: str, exercises: Exercises, find: Find) -> Trial:
 class Author(DeclaredFeature[AuthorSettings, Drafted]):
     """It lives as long as the page, so that the draft is kept while it is tried; `show` and `hide` it."""
 
-    key = "author"
+    key = AUTHOR
     title = "Write an exercise"
     about = "For teachers: your own question, from a kind or from any exercise."
     settings_of, facts_of = AuthorSettings, Drafted
-    messages = frozenset({"set", "add", "drop", "look", "pose", "try", "save", "close", "upload"})
+    messages = frozenset({"set", "add", "drop", "look", "pose", "try", "save", "bring", "close", "upload"})
 
     def __init__(self, stage: Stage) -> None:
         self.shown = False
@@ -144,9 +143,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
                 self._error = views.Refusal()
                 try:
                     self._act(name, rest, value)
-                except ExerciseFileError as error:
-                    self._error = views.Refusal(error.field, f"got {error.value}, expected {error.expected}")
-                except InputError as error:
+                except (ExerciseFileError, InputError) as error:
                     self._error = views.Refusal(error.field, f"got {error.value}, expected {error.expected}")
             case _:
                 super().handle(key, value)
@@ -174,7 +171,9 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
                 self._try(one)
             case "save", [int()], _ if (one := self.facts.exercise) is not None:
                 self._save(one)
-            case (("try" | "save"), [int()], _):
+            case "bring", [int()], _ if (one := self.facts.exercise) is not None:
+                self._bring(one)
+            case (("try" | "save" | "bring"), [int()], _):
                 pass  # the form says what is wrong
             case _:
                 raise InputError("exercise", name, "a control of the form")
@@ -187,8 +186,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
             one = next((each for each in known.all if each.kind.name == kind), None)
         if one is None:
             raise InputError("exercise", origin, "the id of an exercise, or one of the kinds " + ", ".join(KINDS))
-        text = self.settings.draft if known.is_own(one.id) else text_of(one.file)
-        data = forms.read(text)
+        data = forms.read(one.source)
         if not known.is_own(one.id):
             data["id"] = _free(one.id, known)
             data["title"] = f"{one.title} (mine)"[:80]
@@ -247,6 +245,14 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         self.stage.post("lesson", "Exercises")
         self.stage.post(("feature", EXERCISES, ("open", exercise.id, 0)), None)
 
+    def _bring(self, exercise: Exercise) -> None:
+        """Into the open course, or a new one."""
+        activity = self.stage.activity
+        course = activity.progress.bring(exercise)
+        activity.enter_course()
+        detail = "Its link and its file bring the exercise along; the link hides the answer."
+        self.stage.notify(Notice("hand", f"In the course {course.title}", detail))
+
     def _save(self, exercise: Exercise) -> None:
         name = f"{exercise.id}.toml"
         self.stage.client.send_file_download(name, self.settings.draft.encode(), save_immediately=True)
@@ -254,8 +260,8 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
 
     def _offer(self) -> None:
         """The page's exercises have the draft, as long as it is one."""
-        one = self.facts.exercise
-        self.stage.activity.exercises.put(() if one is None else (one,))
+        self.stage.activity.draft = self.facts.exercise
+        self.stage.activity.stock()
 
     # Feature
 
@@ -274,6 +280,8 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         return super().state() if self.settings.draft else {}
 
     def restore(self, state: dict[str, object]) -> None:
+        if self.stage.activity.practice.seated:
+            return  # the draft of a teacher who leads the class has the answer
         super().restore({"draft": "", **state})
         self.look_again()
         self._offer()

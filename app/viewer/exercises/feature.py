@@ -100,7 +100,7 @@ class Practising(Feature):
             return
         match key:
             case ("list", int()):
-                self._practice.at = None
+                self._practice.close()
                 self._undraw()
             case ("open", str(exercise_id), int()):
                 self.open(exercise_id)
@@ -191,7 +191,8 @@ class Practising(Feature):
         try:
             self._variant = self._practice.variant(exercise)
         except VariantError as error:  # of an operator's file that was not checked
-            self._practice.at, self._variant = None, None
+            self._practice.close()
+            self._variant = None
             self.stage.notify(Notice("error", f"{exercise.title} cannot be used", str(error)))
             return
         if move:

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.viewer.activity.activity import EXERCISES
+from app.viewer.activity.activity import AUTHOR, EXERCISES
 from app.viewer.feature import Feature
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.own_arm import OwnArm
@@ -38,8 +38,9 @@ def decoded(text: str, robots: Sequence[Robot]) -> PageState:
 
 
 def shared(state: PageState, features: Iterable[Feature]) -> PageState:
-    """What followers see of the leader's page, which has these features."""
-    names = {feature.key for feature in features if feature.shared or feature.key == state.lesson}
+    """What followers see of the leader's page, which has these features. A draft of an exercise has the answer."""
+    open_here = state.lesson if state.lesson != AUTHOR else None
+    names = {feature.key for feature in features if feature.shared or feature.key == open_here}
     return replace(state, features={key: value for key, value in state.features.items() if key in names})
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from app.classroom.clock import now
 from app.classroom.views import NewAttempt
-from app.exercises import Exercise
+from app.exercises import Exercise, ExerciseFileError, parse_exercise
 from app.viewer.activity.activity import EXERCISES, GivenUp, Judged
 from app.viewer.activity.places import Place
 from app.viewer.feature import Stage
@@ -63,11 +63,17 @@ class Student(Member):
         place = Place(f"seat {ticket.room} {ticket.seat}", self.attendance.secret(), seat=True)
         self.activity.take_seat(place, self)  # before what is stored of exercises in the browser is restored
 
+    def handle(self, key: Hashable, value: object) -> None:
+        if key == STORED:  # an answer that was sent twice is no news of the room, but this page has counted it
+            self._take_room()
+        super().handle(key, value)
+
     def take_news(self) -> None:
         if self.room.closed:
             self._end()
             return
         task, activity = self.activity.task, self.activity
+        self._borrow()
         if self.room.seat is not None:
             activity.know(self.room.seat.work, bool(self._submissions.waiting))
         activity.task = None if self.room.task is None else activity.exercises.get(self.room.task.exercise)
@@ -90,6 +96,19 @@ class Student(Member):
             before = None if self.leader else self.page.snapshot()
             self._pause()
             self.follow(lead.leader, lead.page, "What the class shows", before)
+
+    def _borrow(self) -> None:
+        """Have the exercise that the teacher wrote, if it is the task."""
+        text = "" if self.room.task is None else self.room.task.own
+        if not text or (self.activity.lent is not None and self.activity.lent.source == text):
+            return
+        try:
+            self.activity.lent = parse_exercise(text, "task", self.stage.store.get)
+        except ExerciseFileError as error:  # of a service with other arms
+            self.page.status.show(Notice("error", "The task cannot be used", str(error)))
+            return
+        self.activity.stock()
+        self.activity.changed()
 
     def _end(self) -> None:
         """The seat was removed, or the room has ended: nobody leads this page, and its work stays."""

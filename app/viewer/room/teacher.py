@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 
 from app.classroom.clock import now
-from app.classroom.courses import Course, to_data
+from app.classroom.courses import Course
 from app.classroom.standing import standing
 from app.classroom.views import RoomView, SeatView, in_one_line
 from app.exercises import Exercise
@@ -166,7 +166,8 @@ class Teacher(Member):
         if exercise is None:
             raise InputError("task", texts[0], "the id of an exercise")
         self._chosen = exercise
-        self.attendance.send_task(exercise.id)
+        own = self.page.activity.exercises.is_own(exercise.id)
+        self.attendance.send_task(exercise.id, exercise.source if own else "")
         self.page.status.show(Notice("hand", f"Sent: {exercise.title}", "All work on it by themselves now."))
 
     def _send_course(self, index: str) -> None:
@@ -175,7 +176,7 @@ class Teacher(Member):
         if not index.isdecimal() or int(index) >= len(offered):
             raise InputError("course", index, f"0 to {len(offered) - 1}")
         course = offered[int(index)]
-        self.attendance.send_course(json.dumps(to_data(course)))
+        self.attendance.send_course(json.dumps(self.page.activity.progress.packed(course)))
         self.page.status.show(Notice("hand", f"Sent: {course.title}", "All follow it by themselves now."))
 
     @property

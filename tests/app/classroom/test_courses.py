@@ -78,7 +78,7 @@ def test_the_built_in_courses_are_valid() -> None:
         (('title = "Week 1"', 'title = ""'), "title: got '', expected a text of 1 to"),
         (('title = "Week 1"', f'title = "{"x" * 81}"'), "title: .* a text of 1 to 80 characters"),
         (('about = "Two links."', 'about = "a\\u0007b"'), "about: .* without control characters"),
-        (("[[item]]", "[[items]]"), "items: .* no such field; valid are title, about, answers, item"),
+        (("[[item]]", "[[items]]"), "items: .* no such field; valid are title, about, answers, own, item"),
         (("[[item]]", "[[item]"), "file: .* expected valid TOML"),
     ],
 )  # fmt: skip
@@ -89,7 +89,7 @@ def test_a_wrong_file_is_refused_by_field_value_and_what_is_valid(change: tuple[
 
 def test_a_course_too_long_for_a_link_is_refused() -> None:
     long = "ä" * LONGEST["note"]
-    data = {"title": "Long", "item": [{"lesson": "dh", "note": long}] * 9}
+    data = {"title": "Long", "item": [{"lesson": "dh", "note": long}] * 12}
     with pytest.raises(ExerciseFileError, match=f"at most {MOST_BYTES} bytes"):
         course_of(data, ALL)
     with pytest.raises(ExerciseFileError, match="0 to 40 items"):

@@ -139,3 +139,29 @@ def test_hostile_messages_and_files_change_nothing(server: int) -> None:
         with FakeBrowser(server, memory=stored(junk)) as tab:
             tab.wait(lambda: tab.value("Lesson") == "Write an exercise")
             tab.settle()
+
+
+def test_an_exercise_goes_into_a_course_whose_link_hides_the_answer(tmp_path: Path) -> None:
+    with serve_viewer(ViewerServer(Store(), Settings(data=tmp_path), Clouds())) as server:
+        with FakeBrowser(server, memory=stored(to_toml(DRAFT))) as tab:
+            tab.wait(lambda: 'value="My own"' in tab.html)
+            press(tab, ["bring", 1])
+            tab.wait(lambda: "In the course My course" in shown(tab))
+            press(tab, ["close", 2])
+            tab.set("Lesson", "Courses")
+            tab.wait(lambda: 'data-course="follow"' in tab.html and "My own" in shown(tab))
+            tab.say("feature", ["course", ["link", 3], None])
+            tab.wait(lambda: "#s=" in tab.html)
+            tab.wait(lambda: any("course" in decode(text, [SOURCE.robot]).features for text in tab.kept[-1:]))
+            features = decode(tab.kept[-1], [SOURCE.robot]).features
+        assert DRAFT["answer"]["method"] not in json.dumps(features)
+        memory = encode(PageState(lesson="course", features={"course": {"course": features["course"]["course"]}}))
+        with FakeBrowser(server, memory=json.dumps({"address": "http://127.0.0.1/", "state": memory})) as tab:
+            tab.wait(lambda: 'data-course="follow"' in tab.html and "My own" in shown(tab))
+            tab.say("feature", ["course", ["next", 1], None])
+            tab.wait(lambda: 'data-exercise="my-own"' in tab.html)
+            assert DRAFT["answer"]["method"] not in str(tab.log)
+        foreign = {"course": {"course": {"title": "T", "own": ["AAAA"], "item": []}}}
+        text = encode(PageState(lesson="course", features=foreign))
+        with FakeBrowser(server, memory=json.dumps({"address": "http://127.0.0.1/", "state": text})) as tab:
+            tab.wait(lambda: "The course cannot be used" in shown(tab) and "has sealed" in shown(tab))
