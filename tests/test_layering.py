@@ -107,9 +107,10 @@ RULES: dict[str, set[str]] = {
         *("app.api.problems", "app.bench.board", "app.classroom", "app.service.web", "app.shared"),
     },
     "app/notebook": {
-        *("kin", "numpy", "app.notebook", "app.viewer.own_arm", "app.viewer.session.state"),
+        *("kin", "numpy", "app.classroom.tokens", "app.live.client", "app.notebook"),
+        *("app.viewer.own_arm", "app.viewer.session.state"),
     },
-    "app/notebook/child.py": {"app.service.main", "app.shared.settings", "app.viewer.shown"},
+    "app/notebook/child.py": {"app.live", "app.service.main", "app.shared.settings", "app.viewer.shown"},
     "app/cli": {
         "kin",
         "numpy",

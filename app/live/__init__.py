@@ -5,6 +5,17 @@ with this code talk to the page, and :mod:`app.viewer.live` lets the page answer
 """
 
 from app.live.codes import code_in, home_of
-from app.live.line import EVENTS, VALUES, BusyLineError, Door, Line, Lines, Program
+from app.live.line import EVENTS, RESERVED, VALUES, BusyLineError, Door, Line, Lines, Program
 
-__all__ = ["EVENTS", "VALUES", "BusyLineError", "Door", "Line", "Lines", "Program", "code_in", "home_of"]
+__all__ = [
+    "EVENTS",
+    "RESERVED",
+    "VALUES",
+    "BusyLineError",
+    "Door",
+    "Line",
+    "Lines",
+    "Program",
+    "code_in",
+    "home_of",
+]

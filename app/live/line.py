@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -27,6 +27,8 @@ REVOKED: Final = "The page has withdrawn the code."
 LEFT: Final = "The page was closed."
 
 Post = Callable[[str, object], None]
+
+RESERVED: Final[set[str]] = set()  # codes of pages that have them in their address, such as those of a notebook
 
 
 class BusyLineError(Exception):
@@ -214,23 +216,12 @@ class Lines:
         self._place, self._places = place, places
         self._lock = threading.Lock()
         self._lines: dict[str, Line] = {}
-        self._reserved: set[str] = set()
-
-    def reserve(self, code: str) -> None:
-        """Keep a code for the page whose address has it."""
-        with self._lock:
-            self._reserved.add(code)
-
-    def is_reserved(self, code: str) -> bool:
-        """Whether a page with this code in its address opens a line at once."""
-        return code in self._reserved
 
     def open(self, robot: Robot, post: Post, code: str = "") -> Line:
         """A new line of a page that shows this robot; with a reserved code, in place of an earlier page."""
         with self._lock:
-            taken: Collection[str] = {*self._lines, *self._reserved}
-            if code not in self._reserved:
-                code = unused_code(taken, self._place, self._places)
+            if code not in RESERVED:
+                code = unused_code({*self._lines, *RESERVED}, self._place, self._places)
             before = self._lines.get(code)
             line = self._lines[code] = Line(code, robot, post)
         if before is not None:

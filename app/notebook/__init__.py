@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import html
 import os
-import secrets
 import threading
 from typing import Any
 
@@ -17,10 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import kin
+from app.classroom.tokens import new_code
+from app.live.client import Page
 from app.notebook.process import ServiceProcess
 from app.viewer.own_arm import OwnArm, own_arm
 from app.viewer.session.state import PageState, encode
-from kin import InputError, Robot
+from kin import InputError, KinematicsError, Robot
 from kin.named import robot_of
 from kin.transforms import Array
 
@@ -49,8 +50,9 @@ class ArmView:
         self._q = q
         self._size = size
         self._service = running()
-        self._key = secrets.token_urlsafe(16)
-        self._state = encode(_page(robot, q))
+        self._key = new_code() + new_code()
+        self._page: Page | None = None
+        self._state = encode(_starting(robot, q))
         mode = "panel" if panel else "1"
         base = address.replace("{port}", str(self._service.port))
         self._send([q], 0.0)
@@ -62,15 +64,35 @@ class ArmView:
         return f"{self._address}#s={self._state}"
 
     @property
+    def page(self) -> Page:
+        """The page in the frame that was shown last: what `kin.connect` returns, with target, result, events.
+
+        Raises `KinematicsError` while no frame is open.
+        """
+        if self._page is None or not self._page.connected:
+            self._page = Page(f"http://127.0.0.1:{self._service.port}", self._key, "The notebook")
+        return self._page
+
+    @property
     def q(self) -> Array:
-        """The configuration ``(n,)`` that was shown last; what is dragged in the page is not reported."""
+        """The configuration ``(n,)`` on show: what was assigned last, or done in the frame since."""
+        if (page := self._open_page()) is not None and page.robot.n == self.robot.n:
+            self._q = page.q
         return self._q.copy()
 
     @q.setter
     def q(self, value: ArrayLike) -> None:
         self._q = _configuration(self.robot, value)
-        self._state = encode(_page(self.robot, self._q))
+        self._state = encode(_starting(self.robot, self._q))
         self._send([self._q], 0.0)
+        if (page := self._open_page()) is not None and page.robot.n == self.robot.n:
+            page.q = self._q
+
+    def _open_page(self) -> Page | None:
+        try:
+            return self.page
+        except KinematicsError:
+            return None  # no frame is open
 
     def play(self, path: ArrayLike, seconds: float = 4.0) -> None:
         """Move through the configurations `path` ``(k, n)`` in this time, on all pages that show the arm."""
@@ -81,7 +103,7 @@ class ArmView:
         at = np.linspace(0.0, len(steps) - 1.0, count)
         smooth = np.stack([np.interp(at, np.arange(len(steps)), column) for column in steps.T], axis=1)
         self._q = smooth[-1]
-        self._state = encode(_page(self.robot, smooth[0]))
+        self._state = encode(_starting(self.robot, smooth[0]))
         self._send(list(smooth), seconds)
 
     def _send(self, steps: list[Array], seconds: float) -> None:
@@ -132,7 +154,7 @@ def _path(robot: Robot, value: Any) -> Array:
     return np.stack(steps)
 
 
-def _page(robot: Robot, q: Array) -> PageState:
+def _starting(robot: Robot, q: Array) -> PageState:
     if kin.builtin_robots().get(robot.id) == robot:
         return PageState(robot=robot.id, q=q)
     own: OwnArm = own_arm(kin.robot_to_dict(robot))

@@ -13,6 +13,7 @@ import threading
 from collections.abc import Iterable
 from typing import Any
 
+from app.live import RESERVED
 from app.service.main import run
 from app.shared.settings import Settings
 from app.viewer.shown import SHOWN
@@ -25,6 +26,7 @@ def follow(lines: Iterable[str]) -> None:
     """Move arms as the lines say."""
     for line in lines:
         command = json.loads(line)
+        RESERVED.add(command["key"])  # the kernel may connect to the pages that show the arm
         SHOWN.play(command["key"], command["path"], command["seconds"])
 
 

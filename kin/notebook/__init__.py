@@ -47,8 +47,8 @@ def show(
             machine than the browser.
 
     Returns:
-        The arm on show: assign its ``q`` to move it, call its ``play(path, seconds)``; ``url`` is the address of
-        the page.
+        The arm on show: assign its ``q`` to move it, or read it after a drag; call its ``play(path, seconds)``;
+        ``page`` is its page as `connect` returns it, ``url`` the address.
 
     Raises:
         KinematicsError: for an invalid argument, or if the service is not installed or does not start.

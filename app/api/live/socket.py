@@ -24,7 +24,7 @@ from app.api.live.messages import USUAL_RATE, Message, id_of, read
 from app.api.problems import ProblemError, internal_error, invalid
 from app.api.work import Deadline
 from app.classroom.tokens import read_code, show_code
-from app.live import BusyLineError, Line, Lines, Program
+from app.live import RESERVED, BusyLineError, Line, Lines, Program
 from app.live.codes import LONGEST, is_code
 from app.shared.answers.answer import as_json
 from app.shared.clients import client_of
@@ -85,7 +85,8 @@ async def _find(lines: Lines, tries: Tries, client: str, code: str) -> Line:
         line = lines.find(code)
         if line is not None:
             return line
-        tries.wrong(client)
+        if code not in RESERVED:  # its page is not open yet
+            tries.wrong(client)
         expected = "the code of an open page" if is_code(code) else "8 letters and digits, such as K7QF-2M4A"
         error = FieldError(field="code", value=show(show_code(code)), expected=expected)
         hint = "Press Connect a program in the tab Program of the page; the code is there."

@@ -51,6 +51,7 @@ class Persistence:
         system_dark: whether the visitor's system was dark when the page was opened.
         text_size: name of the text size with which it was opened.
         embedded: how the page is embedded, as `StoredPage.embedded`.
+        shown: key of an arm that a notebook moves, and the code of the page for it; empty: there is none.
         due: when the state is to be saved if nothing more happens (`time.perf_counter`'s); None: it is saved.
         led: whether another page leads this one, which adds no entries to the browser's history then.
     """
@@ -66,7 +67,7 @@ class Persistence:
         self.stored = PageState()
         self.system_dark = False
         self.text_size = "Normal"
-        self.embedded = ""
+        self.embedded = self.shown = ""
         self._saved = ""
         self._state = PageState()
         self._opened: Hashable = None  # of the saved state, as `LessonChoice.opened`
@@ -90,6 +91,7 @@ class Persistence:
         self._address = stored.address or LOCAL
         self.system_dark, self.text_size, self.embedded = stored.dark, stored.text_size, stored.embedded
         if stored.shown:
+            self.shown = stored.shown
             SHOWN.join(stored.shown, self._page.post)
         saved = decode(stored.state, self._page.store.robots)
         if self._rights.compute:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import re
 import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
@@ -15,7 +17,9 @@ from fake_browser import FakeBrowser
 from live_server import wait_for
 
 import kin
+from app import notebook
 from app.live.client import Event, RefusedError
+from app.notebook import child
 
 DOCUMENT = (Path(__file__).parents[3] / "docs/connect.md").read_text(encoding="utf-8")
 ARM = kin.get_robot("ur5")
@@ -251,3 +255,45 @@ def test_the_example_of_the_documents_runs(viewer, page, code):
     text = text.replace("http://localhost:8000", f"http://127.0.0.1:{viewer}").replace("K7QF-2M4A", code)
     exec(compile(text, "example", "exec"), {})
     page.settle()
+
+
+class InProcess:
+    """Stands for the process that serves a notebook: a viewer of the test's own."""
+
+    alive = True
+
+    def __init__(self, port: int) -> None:
+        self.port = port
+
+    def send(self, command: dict[str, Any]) -> None:
+        child.follow([json.dumps(command)])
+
+
+def test_a_notebook_reads_what_is_dragged_in_its_frame(viewer, monkeypatch):
+    monkeypatch.setattr(notebook, "_service", InProcess(viewer))
+    arm = notebook.show("ur5", Q, None, 4.0, True, 400, 300, None)
+    assert arm.q.tolist() == Q.tolist()  # no frame is open
+    for _ in range(40):  # which is no guess
+        with pytest.raises(RefusedError, match="No page has the code"):
+            _ = arm.page
+    parts = urlsplit(arm.url)
+    stored = {
+        "state": parse_qs(parts.fragment)["s"][0],
+        "shown": parse_qs(parts.query)["shown"][0],
+        "address": f"http://127.0.0.1:{viewer}/",
+    }
+    with FakeBrowser(viewer, memory=json.dumps(stored)) as page:
+        page.wait(lambda: "data-live-code" in page.html)
+        shown(page, kin.fk(ARM, Q))
+        T = kin.fk(ARM, Q)
+        T[2, 3] += 0.05
+        page.grab()
+        page.drag(T)
+        page.release()
+        wait_for(lambda: np.allclose(kin.fk(ARM, arm.q), T, atol=1e-6))
+        arm.q = Q + 0.1
+        assert arm.q.tolist() == (Q + 0.1).tolist()
+        shown(page, kin.fk(ARM, Q + 0.1))
+        arm.page.target = kin.fk(ARM, Q)
+        assert arm.page.result["status"] == "solved"
+        arm.page.close()

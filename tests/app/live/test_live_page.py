@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,8 +18,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 import kin
-from app.api.live.messages import LiveMessage
 from app.live import VALUES
+from app.service.main import create_app
+from app.shared.settings import Settings
 
 ROOT = Path(__file__).parents[3]
 DOCUMENT = (ROOT / "docs/connect.md").read_text(encoding="utf-8")
@@ -266,10 +269,19 @@ def test_the_example_of_the_documents_runs(viewer, page, program, capsys):
     assert page.tool_pose() == pytest.approx(kin.fk(ARM, [0.0, -1.2, 1.4, -0.99, 0.5, 0.0]), abs=1e-5)
 
 
+def app_schemas() -> set[str]:
+    """What the service's OpenAPI document describes."""
+    return set(create_app(Settings()).openapi()["components"]["schemas"])
+
+
 def test_the_documents_have_the_schema_and_every_field():
     written = (ROOT / "docs/live-schema.json").read_text(encoding="utf-8")
-    schema = LiveMessage.model_json_schema()
-    assert json.loads(written) == schema, "python scripts/live_schema.py writes it anew"
+    run = [sys.executable, "-c", "import sys; from scripts.live_schema import schema; sys.stdout.write(schema())"]
+    anew = subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert written == anew, "python scripts/live_schema.py writes it anew"
+    schema, defined = json.loads(written), app_schemas()
+    names = set(re.findall(r"/openapi.json#/components/schemas/(\w+)", written))
+    assert {"RobotDescription", "Target", "ObstacleBody"} <= names <= defined
     sent, heard = DOCUMENT.split("### What a program hears")
     assert set(re.findall(r"^\| `(\w+)` \|", sent, re.MULTILINE)) == set(schema["properties"])
     assert set(VALUES) < set(re.findall(r"^\| `(\w+)` \|", heard, re.MULTILINE))

@@ -14,9 +14,9 @@ HZ = 20.0  # what a browser sends
 _PATIENCE = 5.0  # seconds for the last answers
 
 
-async def connected(service: Service, count: int) -> list[Visitor]:
+async def connected(service: Service, count: int, kind: type[Visitor] = Visitor) -> list[Visitor]:
     """Visitors with whole pages, who came one after the other."""
-    visitors = [Visitor() for _ in range(count)]
+    visitors = [kind() for _ in range(count)]
     for visitor in visitors:
         await visitor.connect(service.port)
     for visitor in visitors:
@@ -40,10 +40,12 @@ async def hand(visitor: Visitor, begin: float, seconds: float, hz: float) -> flo
     return late
 
 
-async def measure(service: Service, count: int, seconds: float, hz: float = HZ) -> dict[str, Any]:
+async def measure(
+    service: Service, count: int, seconds: float, hz: float = HZ, kind: type[Visitor] = Visitor
+) -> dict[str, Any]:
     """So many at a time, evenly out of step."""
     empty = service.usage()
-    visitors = await connected(service, count)
+    visitors = await connected(service, count, kind)
     full = service.usage()
     began, spent = time.perf_counter(), time.process_time()
     start = began + 0.1

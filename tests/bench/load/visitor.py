@@ -118,16 +118,20 @@ class Visitor:
         if self._waiting and self._sent % (2 * _TURN) == _TURN:
             return False
         self._sent += 1
-        half = 0.5 * STEP * _swung(self._sent)
+        self._waiting.append((self._sent, time.perf_counter()))
+        self._turn_to(STEP * _swung(self._sent))
+        return True
+
+    def _turn_to(self, angle: float) -> None:
+        """Ask for another angle of the base joint."""
+        half = 0.5 * angle
         c, s = math.cos(2 * half), math.sin(2 * half)
         x, y, z = self._position
         turn = (math.cos(half), 0.0, 0.0, math.sin(half))
-        self._waiting.append((self._sent, time.perf_counter()))
         self.send(
             "TransformControlsUpdateMessage", name=self.gizmo["name"], owner=self.gizmo["owner"],
             position=(c * x - s * y, s * x + c * y, z), wxyz=_product(turn, self._wxyz),
         )  # fmt: skip
-        return True
 
     def watch(self, leader: Visitor) -> None:
         """Expect a picture for the event that another visitor has just sent, whose arm this page shows."""
@@ -170,8 +174,7 @@ class Visitor:
     def _heard(self, data: bytes) -> None:
         now = self.last = time.perf_counter()
         self.bytes += len(data)
-        size, packed = int.from_bytes(data[:8], "little"), int.from_bytes(data[8:16], "little")
-        said = _decode(_unpack(data[16 : 16 + packed], max_output_size=size))
+        said = decoded(data)
         for message in said["messages"]:
             kind = message["type"]
             if kind == "SetOrientationMessage":
@@ -201,6 +204,12 @@ class Visitor:
 
     def _pose(self, name: str) -> dict[str, Any]:
         return self._poses.setdefault(name, {"position": (0.0, 0.0, 0.0), "wxyz": (1.0, 0.0, 0.0, 0.0)})
+
+
+def decoded(data: bytes) -> Any:
+    """A frame of the page: its messages."""
+    size, packed = int.from_bytes(data[:8], "little"), int.from_bytes(data[8:16], "little")
+    return _decode(_unpack(data[16 : 16 + packed], max_output_size=size))
 
 
 def _swung(along: float) -> float:
