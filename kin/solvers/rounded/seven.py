@@ -38,7 +38,7 @@ _MOVED, _MOVED_BY = 0.1, 100.0  # rad, or times the rounding: a row that moves f
 _ENDS, _MIDDLE = np.array([0.0, 1.0]), np.array([0.5])  # shares of an interval
 _SHARES = np.array([0.5, 0.02, 0.98])  # where curves are begun
 _ALIKE = 1e-7  # rad: intervals with ends this close are one
-_CLEAR = 0.5  # of the distance of the next branch's row: a posture closer than that to a row is of its branch
+_CLEAR = 0.5  # of the distance of the next row: closer than that, a posture is of the branch of the nearest row
 _SAME = 1e-8  # rad: postures this close are one
 _FREE = (math.nan,)
 
@@ -88,7 +88,8 @@ class Rounded7(Rounded):
         else:
             bits = _choose()(self.robot.model, p.T, setting, limits, arcs, places, rows)
             missed = (bits >> np.arange(8)) & 1 > 0
-            known[arcs[:, 0].astype(int)] = True
+            within = np.isin(np.arange(8), arcs[:, 0])  # a row outside the limits may be lost
+            known = within if p.respect_limits else known | within
         sure &= not (missed & known).any() and _are_apart(rows[:, :7])
         gap, obstacle = 0.0, None
         if np.isnan(rows[:, 0]).all():
@@ -262,8 +263,12 @@ class Rounded7(Rounded):
         away[np.isnan(away)] = math.inf
         order = np.argsort(away, axis=1)
         nearest, next_one = np.take_along_axis(away, order, axis=1)[:, :2].T
-        best = int(np.argmin(np.where(np.isfinite(nearest), nearest / np.maximum(next_one, 1e-300), math.inf)))
-        return float(order[best, 0]), bool(nearest[best] < _CLEAR * next_one[best])
+        known = np.flatnonzero(np.isfinite(nearest))
+        if not known.size:
+            return float(self.branch_of(postures[2])), False
+        best = known[np.argmin(nearest[known] / np.maximum(next_one[known], 1e-300))]
+        clear = nearest[best] < _CLEAR * next_one[best] or order[best, 0] == self.branch_of(postures[best])
+        return float(order[best, 0]), bool(clear)
 
     def _in_span(self, p: SolverInput, low: float, high: float) -> tuple[float, float]:
         """An interval at the whole turn at which the range of the parameter has it."""

@@ -254,6 +254,8 @@ def test_a_followed_interval_belongs_to_the_branch_of_its_posture_that_is_clear_
         ("gen3 1.57", (-1.807653, 1.253057, -2.146223, -1.598254, -1.347517, 0.487404, 2.113698)),
         # Following a curve ended before it had come from outside the limits to its first interval.
         ("iiwa14 1.57", (2.464489, 0.713379, 1.144468, -1.408516, -2.825301, -1.819765, 2.837233)),
+        # At a fold of the typed table, the arm that was meant has no row at all.
+        ("xarm7-urdf 1.5708", (-5.798085, 0.856477, -0.54751, 3.505769, 4.212046, 0.168799, 5.952437)),
     ],
 )
 def test_followed_curves_keep_every_interval(name, q):
@@ -265,3 +267,13 @@ def test_followed_curves_keep_every_interval(name, q):
     dense = judge.postures(T, q, np.random.default_rng(3), values=25, random=40)
     assert len(dense) >= 30
     assert [p.tolist() for p in dense if not judge.lists(T, found, p)] == []
+
+
+def test_a_branch_without_any_row_inside_the_limits_leaves_no_doubt():
+    """A Panda's elbow that would have to bend backwards: rows beyond the limits need not be on the typed table."""
+    robot, exact = arm_named("panda 1.5708")
+    for q in robot.random_q(np.random.default_rng(2), 100):
+        T = kin.fk(robot, q)
+        found = kin.solve_ik(robot, T)
+        assert found.complete
+        assert {s.branch for s in found.solutions} == {s.branch for s in kin.solve_ik(exact, T).solutions}
