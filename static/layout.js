@@ -141,16 +141,30 @@
   let wished = NaN; // width of the last visit, until the panel has it
   try { wished = Number(localStorage.getItem(WIDTH) ?? NaN); } catch { /* see above */ }
 
-  let fresh = !(wished >= LEAST); // the first visit of this browser
+  const chosen = () => { try { return Number(localStorage.getItem(WIDTH)) >= LEAST; } catch { return false; } };
+
+  // Where the visitor has chosen no width, it follows that of the window: from one width of the window and the panel to
+  // the next, in proportion between them.
+  const STANDARD = [[1180, 344], [1280, 380], [1440, 440], [1920, 520]];
+  function standard() {
+    const next = STANDARD.findIndex(([wide]) => wide >= innerWidth);
+    if (next <= 0) return next ? STANDARD.at(-1)[1] : STANDARD[0][1];
+    const [[wide, panel], [wider, more]] = STANDARD.slice(next - 1, next + 1);
+    return panel + (more - panel) * (innerWidth - wide) / (wider - wide);
+  }
+  const usual = () => Math.min(Math.round(SIZES[root.dataset.kbText] * standard()), innerWidth / 2);
+
+  let fresh = !(wished >= LEAST); // nobody has chosen a width in this browser
 
   function keepWidth() {
     const docked = viserPage.region();
     const width = docked?.node.offsetWidth ?? 0;
     if (width < LEAST) return;
     Object.assign(docked.edge, { ariaValueMin: String(LEAST), ariaValueMax: String(innerWidth), ariaValueNow: String(width) });
-    if (fresh) {
+    if (root.dataset.kbEmbed) return; // another page has placed it
+    if (fresh && !NARROW.matches) {
       fresh = false;
-      if (size !== "Normal" && !NARROW.matches) wished = SIZES[size] * width;
+      wished = usual();
     }
     if (wished >= LEAST) {
       const change = Math.min(wished, innerWidth / 2) - width;
@@ -158,19 +172,31 @@
       if (Math.abs(change) > 1) requestAnimationFrame(() => viserPage.widen(change));
       return;
     }
-    try { localStorage.setItem(WIDTH, String(width)); } catch { /* see above */ }
+    try {
+      if (Math.abs(width - usual()) < 2) localStorage.removeItem(WIDTH);
+      else localStorage.setItem(WIDTH, String(width));
+    } catch { /* see above */ }
   }
+  let follows = 0; // a window that is being made wider sends many events
+  addEventListener("resize", () => {
+    clearTimeout(follows);
+    if (NARROW.matches || root.dataset.kbEmbed || chosen()) return;
+    follows = setTimeout(() => {
+      const width = viserPage.region()?.node.offsetWidth ?? 0;
+      if (width >= LEAST && Math.abs(usual() - width) > 1) viserPage.widen(usual() - width);
+    }, 150);
+  });
 
   // The size of the text. All lengths of the panel follow the page's font size, and so does its width.
 
   function chooseSize(name) {
     const width = viserPage.region()?.node.offsetWidth ?? 0;
-    const factor = SIZES[name] / SIZES[size];
+    const [factor, kept] = [SIZES[name] / SIZES[size], chosen()];
     size = name;
     try { localStorage.setItem(TEXT, size); } catch { /* see above */ }
     place();
     markSize();
-    if (width >= LEAST && factor !== 1) viserPage.widen(Math.min(factor * width, innerWidth / 2) - width);
+    if (width >= LEAST && factor !== 1) viserPage.widen((kept ? Math.min(factor * width, innerWidth / 2) : usual()) - width);
   }
 
   /** Labels in the scene have the size of the text too: the server draws them. A new panel has not heard of it. */

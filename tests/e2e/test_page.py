@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from page import Tab
-from playwright.sync_api import expect
+from playwright.sync_api import Browser, expect
 
 import kin
 from app.viewer.panel.joints import label
@@ -171,6 +171,36 @@ def test_the_panel_is_made_wider_at_its_edge(desktop: Tab) -> None:
     tab.page.wait_for_function(f"Math.abs({width} - {before}) < 3")
     expect(tab.status).to_have_attribute("data-status", "hand")
     tab.dismiss_notice()
+
+
+def test_the_panel_is_as_wide_as_the_window_allows_until_a_width_is_chosen(browser: Browser, address: str) -> None:
+    tab = Tab(browser, address, 1920, 760)  # in a higher window, texts are large
+    width = "document.querySelector('[data-dock-region=right]').offsetWidth"
+    for wide, panel in ((1920, 520), (1440, 440), (1280, 380)):
+        tab.page.set_viewport_size({"width": wide, "height": 760})
+        tab.page.wait_for_function(f"Math.abs({width} - {panel}) < 3")
+    tab.page.wait_for_function("localStorage.getItem('kinboard-panel-width') === null")
+    tab.page.locator("[data-dock-region-resize=right]").focus()
+    tab.page.keyboard.press("ArrowLeft")
+    tab.page.wait_for_function("Math.abs(Number(localStorage.getItem('kinboard-panel-width')) - 404) < 3")
+    tab.page.set_viewport_size({"width": 1920, "height": 760})
+    tab.page.wait_for_timeout(
+        600
+    )  # nothing may happen: longer than the page waits for a window that is being drawn
+    assert abs(tab.page.evaluate(width) - 404) < 3, "the width that was chosen stays"
+    tab.close()
+
+
+def test_the_menu_of_robots_shows_their_pictures_and_makers(desktop: Tab) -> None:
+    page = desktop.page
+    desktop.row("Robot").locator("input:visible").first.click()
+    option = page.get_by_role("option", name="UR5", exact=True).and_(page.locator("[data-combobox-option]"))
+    expect(option).to_have_attribute("data-kb-maker", "Universal Robots")
+    picture = option.evaluate("node => getComputedStyle(node).backgroundImage")
+    address = picture.removeprefix('url("').removesuffix('")')
+    assert page.request.get(address).headers["content-type"] == "image/webp"
+    page.keyboard.press("Escape")
+    expect(option).to_be_hidden()
 
 
 def test_axes_in_a_corner_point_as_those_of_the_world(desktop: Tab, phone: Tab) -> None:

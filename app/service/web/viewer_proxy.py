@@ -59,6 +59,7 @@ _SCRIPTS = (
     b"viewer",
     b"input",
     b"robot",
+    b"robot_menu",
     b"upload",
     b"program",
     b"lesson",

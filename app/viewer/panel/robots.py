@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 
 import viser
 
 from app.shared.finding import find_robots
 from app.viewer.own_arm import OwnArm, label
-from app.viewer.panel import Post, assign, listen
-from kin import InputError, Robot
+from app.viewer.panel import Post, assign, listen, update_html
+from app.viewer.views.templates import render
+from kin import InputError, Robot, builtin_robots
 
 FIND_HINT = (
     "Shortens the menu Robot to arms that all words fit: a part of id, name, maker or solver, joints:6, "
@@ -27,9 +29,11 @@ class RobotMenu:
         self._options = self._named(own)
         self._shown = robot
         self._query = ""
+        self._about = gui.add_html("")
         self._menu = gui.add_dropdown("Robot", tuple(self._options), initial_value=self._name(robot))
         self._field: viser.GuiInputHandle[str] | None = None
         listen(self._menu, post, "robot")
+        self._describe()
 
     def add_field(self, gui: viser.GuiApi, post: Post) -> None:
         """Add the field that shortens the menu, in the container that is open."""
@@ -62,10 +66,20 @@ class RobotMenu:
         if names != tuple(self._menu.options):
             self._menu.options = names
 
+    def _describe(self) -> None:
+        """Tell ``static/robot_menu.js`` the picture and the maker of each."""
+        pictured = builtin_robots()
+        about = {
+            name: (robot.id if pictured.get(robot.id) == robot else "", robot.maker)
+            for name, robot in self._options.items()
+        }
+        update_html(self._about, render("panel/robots", robots=json.dumps(about)))
+
     def show(self, robot: Robot, own: OwnArm | None) -> None:
         """Show this robot, and offer this arm of the visitor's own besides those of the service."""
         self._shown = robot
         self._options = self._named(own)
+        self._describe()
         self._offer()
         assign(self._menu, self._name(robot))
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import html
+import json
+import re
 from collections.abc import Iterator
 
 import pytest
@@ -9,10 +12,13 @@ from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 import kin
+from app.service.web.pages import static_folder
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.viewer.own_arm import label, own_arm
 from app.viewer.server import ViewerServer
+from app.viewer.tabs.robot.presets import PRESETS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -29,6 +35,23 @@ def port() -> Iterator[int]:
 
 def offered(tab: FakeBrowser) -> set[str]:
     return set(tab.gui[tab.element("Robot")]["props"]["options"])
+
+
+def test_the_page_knows_pictures_and_makers(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        said = re.search(r'data-robots="([^"]*)"', tab.html)
+        assert said is not None
+        about = json.loads(html.unescape(said[1]))
+        assert about == {robot.name: [robot.id, robot.maker] for robot in STORE.robots}
+        for picture, _ in about.values():
+            assert (static_folder() / "robots" / f"{picture}.webp").is_file()
+        own = own_arm(PRESETS["wrist-6r"])
+        tab.say("feature", ["robot", ["start"], "wrist-6r"])
+        tab.wait(lambda: html.escape(label(own.robot)) in tab.html)
+        said = re.search(r'data-robots="([^"]*)"', tab.html)
+        assert said is not None
+        assert json.loads(html.unescape(said[1]))[label(own.robot)] == ["", ""], "nobody has drawn it"
 
 
 def test_words_shorten_the_menu_and_the_arm_on_show_stays(port: int) -> None:
