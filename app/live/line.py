@@ -171,6 +171,11 @@ class Line:
             parcel, self._parcels[key] = self._parcels[key], Parcel()
         return parcel
 
+    def waiting(self, name: str) -> Any:
+        """What the program has sent under this name, and the page has not taken yet; None: nothing."""
+        with self._lock:
+            return self._parcels[MOVES].values.get(name)
+
     def publish(self, name: str, value: object, anew: bool = True) -> None:
         """What the page shows now; unless `anew`, only where it is another object than before."""
         with self._lock:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from app.exercises.typed import EntryError
 from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.panel.entry import read_value
 from app.viewer.panel.fields import field, fields_html, limit_marks, shown
@@ -21,6 +22,7 @@ from kin.transforms import Array
 from kin.units import Unit, Units, general
 
 DIGITS = 2
+REMEMBERED = 200  # fields of sliders, also of those that were replaced
 # Marks the label of a locked joint; invisible. static/input.js presses such a button, on which viewer.css draws a
 # padlock.
 LOCKED = "\N{WORD JOINER}"
@@ -62,6 +64,8 @@ class JointSliders:
 
     Args:
         folders: each gets a slider per joint; all show the same values.
+        before: the sliders that these replace. What is typed into one of their fields counts for the same joint:
+            the page may send it when they are gone.
     """
 
     def __init__(
@@ -73,11 +77,13 @@ class JointSliders:
         locked: Sequence[bool],
         units: Units,
         post: Post,
+        before: JointSliders | None = None,
     ) -> None:
         self.robot = robot
         self._units = units
         self._held = 0  # index of the folder whose slider was moved last
-        self._fields: dict[str, dict[str, Any]] = {}
+        # Of each field: index and kind of its joint, and the unit of what is typed there.
+        self._fields: dict[object, tuple[int, str, Unit]] = {} if before is None else before._fields
         self._sliders: list[list[viser.GuiSliderHandle[float]]] = []
         self._others: list[Any] = []  # controls besides sliders
         self._locks: list[viser.GuiButtonGroupHandle] = []
@@ -87,9 +93,12 @@ class JointSliders:
                 locks = gui.add_button_group("Locked", lock_buttons(locked), hint=LOCK_HINT)
                 fields = dict(field(slider, self._unit(i)) for i, slider in enumerate(self._sliders[-1]))
                 self._others.append(gui.add_html(fields_html(fields)))
-            self._fields |= fields
+            joints = [(i, joint.kind, self._unit(i)) for i, joint in enumerate(robot.joints)]
+            self._fields |= zip(fields, joints, strict=True)
             self._locks.append(locks)
             self._listen_locks(locks, post)
+        while len(self._fields) > max(REMEMBERED, len(folders) * robot.n):
+            del self._fields[next(iter(self._fields))]
 
     def _slider(self, gui: viser.GuiApi, i: int, q: Array, place: int, post: Post) -> viser.GuiSliderHandle[float]:
         joint, unit = self.robot.joints[i], self._unit(i)
@@ -109,14 +118,21 @@ class JointSliders:
         return slider
 
     def index_of(self, uuid: object) -> int | None:
-        """The joint whose slider has this id; None if there is none."""
-        found = next((i for i, key in enumerate(self._fields) if key == uuid), None)
-        return None if found is None else found % self.robot.n
+        """The joint whose slider has, or had, this id; None if there is none."""
+        found = self._fields.get(uuid) if isinstance(uuid, str) else None
+        return None if found is None else found[0]
 
-    def read_text(self, index: int, text: str) -> float:
-        """A typed value in radians or metres; raises `EntryError` unless it is within the limits."""
+    def read_text(self, uuid: object, text: str) -> float:
+        """What was typed beside the slider with this id, in radians or metres.
+
+        Raises:
+            EntryError: it is not within the limits, or the arm on show has no such joint.
+        """
+        index, kind, unit = self._fields[uuid]
+        if index >= self.robot.n or self.robot.joints[index].kind != kind:
+            raise EntryError(f"Joint {index + 1} was not changed", f"The {self.robot.name} has no such joint.")
         limits = self.robot.joints[index].limits or (-math.pi, math.pi)
-        return read_value(text, f"Joint {index + 1}", self._unit(index), limits)
+        return read_value(text, f"Joint {index + 1}", unit, limits)
 
     def read(self, index: int, value: object, place: int = 0) -> float:
         """A slider's value in radians or metres, within the limits; raises `InputError` for anything else.

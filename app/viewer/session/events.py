@@ -32,6 +32,7 @@ class Rule:
         act: whether it moves the arm or opens something, which ends a lead and is refused in a class that is
             frozen. Of a feature's events only messages count: features also post what they have computed.
         replaces: whether nobody waits any more for another robot, or for a stored state.
+        follows: whether it is meant for a stored state that the page cannot show yet, and waits for it.
     """
 
     label: str = ""
@@ -41,6 +42,7 @@ class Rule:
     answered: bool = False
     act: bool = False
     replaces: bool = False
+    follows: bool = False
 
 
 RULES: Final[dict[str, Rule]] = {
@@ -58,11 +60,11 @@ RULES: Final[dict[str, Rule]] = {
     "random": Rule("Random", act=True),
     "recall": Rule("Move target to tool", act=True),
     "shown": Rule(step=False),
-    "live": Rule("Connected program", gradual=LONG_PAUSE, act=True),
+    "live": Rule("Connected program", gradual=LONG_PAUSE, act=True, follows=True),
     "drawn": Rule(step=False),
     # Typed, and keys
-    "field": Rule("Typed value", message=True, answered=True, act=True),
-    "target": Rule("Typed target", message=True, answered=True, act=True),
+    "field": Rule("Typed value", message=True, answered=True, act=True, follows=True),
+    "target": Rule("Typed target", message=True, answered=True, act=True, follows=True),
     "nudge": Rule("Target moved by keys", gradual=SHORT_PAUSE, message=True, act=True),
     "jog": Rule("Jog", gradual=LONG_PAUSE, message=True, act=True),
     "snap": Rule(step=False, message=True),

@@ -410,4 +410,7 @@ class VisitorPage(ShownArm, Worker):
     def _make_sliders(self) -> JointSliders:
         folders = [self.panel.joints] if self._more_joints is None else [self.panel.joints, self._more_joints]
         arm = self.arm
-        return JointSliders(self.client.gui, folders, arm.robot, arm.goal, arm.locks, self.units, self.post)
+        before = getattr(self, "sliders", None)
+        return JointSliders(
+            self.client.gui, folders, arm.robot, arm.goal, arm.locks, self.units, self.post, before
+        )

@@ -2,6 +2,9 @@
 
 Compiling takes seconds. If an event were handled before that, the page would stand still without a reason. So it
 is held, the status card says what is being prepared, and the page can be used meanwhile.
+
+A page that opens with a stored state of such an arm shows another arm until then. Joint values and targets typed
+meanwhile, and what a program sends, are meant for the stored state: they wait too, and are applied to it.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.viewer.feature import Feature, message_of
+from app.viewer.own_arm import own_arm
 from app.viewer.session.events import LINK, RULES, name_of
 from app.viewer.session.lessons import lesson_titled, lesson_with_key
 from app.viewer.session.parts import Page
@@ -50,8 +54,12 @@ class Preparing:
         if self._preparation.complete and not self._held:
             return True
         event = key[1] if isinstance(key, tuple) and key[0] == "message" else key
-        if (rule := RULES.get(name_of(key))) is not None and rule.replaces:
-            self._held = {name: held for name, held in self._held.items() if not RULES[name_of(name)].replaces}
+        rule = RULES.get(name_of(key))
+        if rule is not None and rule.replaces:
+            self._give_up(key)
+        elif rule is not None and rule.follows and (state := self._held.get(LINK)) is not None:
+            self._hold(key, _Held(key, value, state.parts, state.what))
+            return False
         try:
             parts, what = self._needs(event, value)
         except InputError:  # who handles it says what is wrong
@@ -74,15 +82,26 @@ class Preparing:
         """Post the events that can be handled by now, and show how far the others are."""
         for name, held in list(self._held.items()):
             if self._preparation.ready(held.parts):
-                del self._held[name]
+                if name != LINK:  # which is waited for until it is handled
+                    del self._held[name]
                 self._page.post(held.key, held.value)
         self._show()
+
+    def _give_up(self, key: Hashable) -> None:
+        """Drop what an event replaces, and what is meant for a stored state that will not be shown."""
+        linked = LINK in self._held and key != LINK
+        for name in list(self._held):
+            rule = RULES[name_of(name)]
+            if rule.replaces or (linked and rule.follows):
+                del self._held[name]
+                if name == "live":  # a program learns what became of it
+                    self._page.post(name, None)
 
     def _hold(self, event: Hashable, held: _Held) -> None:
         self._held.pop(event, None)
         self._held[event] = held
         while len(self._held) > HELD:
-            del self._held[next(iter(self._held))]
+            del self._held[next(name for name in self._held if name != LINK)]
         self._preparation.want(held.parts)
         self._show()
 
@@ -94,8 +113,9 @@ class Preparing:
         held = list(self._held.values())[-1]
         done, of = self._preparation.steps(held.parts)
         step = f"step {min(done + 1, of)} of {of}"
+        follows = " Joint values and targets typed meanwhile are applied then." if LINK in self._held else ""
         self._page.status.wait(
-            f"Preparing {held.what} for the first time on this machine: {step}. This continues by itself."
+            f"Preparing {held.what} for the first time on this machine: {step}. This continues by itself.{follows}"
         )
 
     def _needs(self, event: Hashable, value: object) -> tuple[tuple[str, ...], str]:
@@ -105,6 +125,13 @@ class Preparing:
         match event:
             case "robot":
                 robot = page.panel.robots.read(value)
+                return (_parts(robot, page.lessons.shown) if robot != arm.robot else ()), f"the {robot.name}"
+            case "live":
+                line = page.door.line
+                sent = None if line is None else line.waiting("robot")
+                if sent is None:
+                    return (), ""
+                robot = sent if isinstance(sent, Robot) else own_arm(sent).robot
                 return (_parts(robot, page.lessons.shown) if robot != arm.robot else ()), f"the {robot.name}"
             case "lesson":
                 chosen = lesson_titled(value)

@@ -49,12 +49,12 @@ class TypedInput:
             case _:
                 raise kin.InputError("field", value, "an id and a text")
         if joint is not None:
-            self._answer(number, lambda: self._set_joint(joint, text))
+            self._answer(number, lambda: self._set_joint(joint, uuid, text))
         elif name is not None:
             self._answer(number, lambda: self.slide(name, page.posture.read_text(name, text), held=False))
 
-    def _set_joint(self, joint: int, text: str) -> None:
-        self._page.arm.move_joint(joint, self._page.sliders.read_text(joint, text), held=False)
+    def _set_joint(self, joint: int, uuid: object, text: str) -> None:
+        self._page.arm.move_joint(joint, self._page.sliders.read_text(uuid, text), held=False)
         self._page.status.show(BY_HAND)
 
     def set_target(self, number: int, value: object) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Collection, Iterator
 
 import numpy as np
@@ -11,10 +12,14 @@ from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 import kin
+from app.live import Lines
+from app.live.codes import read_code
+from app.live.line import Letter, Line, Program
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.arm import Arm
+from app.viewer.panel.joints import label
 from app.viewer.server import ViewerServer
 from app.viewer.session.preparing import HELD, Preparing
 from app.viewer.session.state import PageState, encode
@@ -23,7 +28,7 @@ from kin.warmup import COLLISIONS, MOTIONS, all_of, parts
 from kin.warmup.preparation import Preparation
 
 STORE = Store()
-PIONEER, UR5, PLANAR = STORE.get("pioneer5"), STORE.get("ur5"), STORE.get("planar3r")
+PIONEER, UR5, PLANAR, PUMA, SCARA = map(STORE.get, ("pioneer5", "ur5", "planar3r", "puma560", "scara"))
 
 
 @pytest.fixture
@@ -35,8 +40,13 @@ def preparation() -> Preparation:
 
 
 @pytest.fixture
-def port(preparation: Preparation) -> Iterator[int]:
-    with serve_viewer(ViewerServer(STORE, Settings(), Clouds(), preparation=preparation)) as port:
+def lines() -> Lines:
+    return Lines()
+
+
+@pytest.fixture
+def port(preparation: Preparation, lines: Lines) -> Iterator[int]:
+    with serve_viewer(ViewerServer(STORE, Settings(), Clouds(), lines=lines, preparation=preparation)) as port:
         yield port
 
 
@@ -132,6 +142,117 @@ def test_a_link_to_what_is_compiled_opens_at_once(port):
         tab.settle()
         assert tab.value("Lesson") == "Screws"
         assert "Preparing" not in tab.html
+
+
+def sliders(tab: FakeBrowser, name: str) -> list[str]:
+    """The ids of the sliders with this label, one in each folder that shows the joints."""
+    return [uuid for uuid, m in tab.gui.items() if m["type"] == "GuiSliderMessage" and m["props"]["label"] == name]
+
+
+def program(tab: FakeBrowser, lines: Lines) -> Line:
+    """The line of the page, with a program connected to it."""
+    tab.settle()
+    tab.send("GuiUpdateMessage", uuid=tab.element("Connect a program"), updates={"value": True})
+    tab.wait(lambda: "data-live-code" in tab.html)
+    found = re.search(r"data-live-code>([A-Z0-9-]+)<", tab.html)
+    assert found is not None
+    line = lines.find(read_code(found[1]))
+    assert line is not None
+    line.connect(Program("arm.py", "session", lambda: None))
+    return line
+
+
+def test_what_is_typed_before_the_arm_of_a_link_is_compiled_is_applied_to_that_arm(port, preparation):
+    link = encode(PageState(robot="puma560", lesson="velocity"))
+    with FakeBrowser(port, memory=json.dumps({"state": link})) as tab:
+        waits_for(tab, "the PUMA 560")
+        assert "Joint values and targets typed meanwhile are applied then." in tab.html
+        (wrist,), (turn,), (bend,) = (sliders(tab, label(PIONEER, i)) for i in (4, 3, 1))
+        tab.say("field", [wrist, "12.5"])
+        tab.say("field", [turn, "7"])
+        last = tab.say("field", [bend, "1000"])
+        tab.settle()
+        assert np.allclose(tab.tool_pose(), kin.fk(PIONEER, PIONEER.q_home)), "they are not meant for this arm"
+        compile_parts(preparation, parts())
+        tab.wait(lambda: "Preparing" not in tab.html and tab.script["reply"][0] == last)
+        tab.settle()
+        assert tab.value("Robot") == PUMA.name
+        assert tab.value("Lesson") == "Velocity"
+        for index, degrees in ((4, 12.5), (3, 7)):
+            shown = [tab.values[uuid] for uuid in sliders(tab, label(PUMA, index))]
+            assert shown
+            assert set(shown) == {degrees}
+        assert "Joint 2 was not changed" in tab.script["reply"][1], "this arm has no such angle"
+
+
+def test_a_target_typed_before_the_arm_of_a_link_is_compiled_is_solved_with_that_arm(port, preparation):
+    T = kin.fk(UR5, UR5.q_home)
+    T[:3, 3] += (0.02, -0.03, 0.01)
+    with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(robot="ur5"))})) as tab:
+        waits_for(tab, "the UR5")
+        tab.say("target", ["position", " ".join(f"{1000 * v:.6f}" for v in T[:3, 3])])
+        compile_parts(preparation, parts())
+        tab.wait(lambda: "Preparing" not in tab.html)
+        tab.settle()
+        assert np.allclose(tab.tool_pose(), T, atol=1e-6)
+
+
+def test_another_robot_ends_the_waiting_of_what_was_typed_for_a_link(port, preparation):
+    with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(robot="ur5"))})) as tab:
+        waits_for(tab, "the UR5")
+        tab.say("field", [tab.element(label(PIONEER, 1)), "45"])
+        tab.set("Robot", PLANAR.name)
+        waits_for(tab, f"the {PLANAR.name}")
+        assert "typed meanwhile" not in tab.html
+        compile_parts(preparation, parts())
+        tab.wait(lambda: "Preparing" not in tab.html)
+        tab.settle()
+        assert np.allclose(tab.tool_pose(), kin.fk(PLANAR, PLANAR.q_home))
+
+
+def test_what_a_program_sends_waits_for_the_arm_of_a_link(port, preparation, lines):
+    q = SCARA.q_home + 0.05
+    with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(robot="scara"))})) as tab:
+        waits_for(tab, f"the {SCARA.name}")
+        line = program(tab, lines)
+        line.send({"q": q}, 1)
+        tab.settle()
+        assert line.letters() == []
+        compile_parts(preparation, parts())
+        tab.wait(lambda: "Preparing" not in tab.html)
+        tab.settle()
+        assert np.allclose(tab.tool_pose(), kin.fk(SCARA, q))
+        assert line.letters() == [Letter(1)]
+
+
+def test_a_program_that_sends_q_for_a_link_is_answered_if_another_robot_is_chosen(port, preparation, lines):
+    with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(robot="scara"))})) as tab:
+        waits_for(tab, f"the {SCARA.name}")
+        line = program(tab, lines)
+        line.send({"q": SCARA.q_home}, 1)
+        tab.settle()
+        tab.set("Robot", PLANAR.name)
+        waits_for(tab, f"the {PLANAR.name}")
+        tab.settle()
+        (letter,) = line.letters()
+        assert letter.number == 1
+        assert letter.problem is not None, "it has too many values for the arm on show"
+
+
+def test_a_robot_that_a_program_sends_waits_for_its_kernels(port, preparation, lines):
+    q = UR5.q_home + 0.1
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        line = program(tab, lines)
+        line.send({"robot": UR5, "q": q}, 1)
+        waits_for(tab, "the UR5")
+        assert tab.value("Robot") == PIONEER.name
+        assert line.letters() == []
+        compile_parts(preparation, (COLLISIONS, family_of(UR5)))
+        tab.wait(lambda: "Preparing" not in tab.html)
+        tab.settle()
+        assert np.allclose(tab.tool_pose(), kin.fk(UR5, q))
+        assert line.letters() == [Letter(1)]
 
 
 def test_an_impatient_visitor_fills_no_memory(preparation):

@@ -57,6 +57,23 @@ def test_a_typed_joint_value_keeps_its_digits(port: int) -> None:
         assert tab.script["reply"] == [1, "", []]
 
 
+def test_a_value_typed_into_a_field_that_was_replaced_counts_for_the_same_joint(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        elbow, third = (tab.element(label(PIONEER, i)) for i in (1, 2))
+        tab.set("Radians", True)
+        tab.wait(lambda: tab.element(label(PIONEER, 1)) != elbow)
+        tab.say("field", [elbow, "45"])
+        q = PIONEER.q_home.copy()
+        q[1] = math.radians(45)  # it was typed into a field in degrees
+        arrives(tab, kin.fk(PIONEER, q), 1e-12)
+        tab.choose(SCARA.name)
+        number = tab.say("field", [third, "45"])
+        tab.wait(lambda: tab.script["reply"][0] == number)
+        assert tab.script["reply"][1] == f"Joint 3 was not changed. The {SCARA.name} has no such joint."
+        arrives(tab, kin.fk(SCARA, SCARA.q_home))
+
+
 @pytest.mark.parametrize("text", ["abc", "NaN", "  ", "200", "-5", "1e999"])
 def test_an_invalid_joint_value_is_named_and_moves_nothing(port: int, text: str) -> None:
     with FakeBrowser(port) as tab:
@@ -143,6 +160,7 @@ def test_a_point_and_a_direction_set_the_task_to_both(port: int) -> None:
         tab.say("target", ["pose", f"{x} {y} {z} along 0 0.6 -0.8"])
         tab.wait(lambda: tab.value("Target must match") == "Point + approach")
         tab.wait(lambda: np.allclose(1000 * tab.tool_pose()[:3, 3], (x, y, z), atol=1e-3))
+        tab.settle()  # on its way, the point may be right before the direction is
         assert np.allclose(tab.tool_pose()[:3, 2], (0.0, 0.6, -0.8), atol=1e-6)
 
 
