@@ -139,7 +139,8 @@ def test_the_newest_value_wins_and_drawings_are_merged(page, port):
         for k in range(20):
             say(program, q=[0.01 * k] * 6)
             say(program, draw={f"point {k % 3}": {"kind": "label", "position": [0, 0, k], "text": "p"}})
-        wait_for(lambda: page.posts.count("live") == 20 and page.posts.count("drawn") >= 20)
+        # One more is drawn: the page is woken when the program connects.
+        wait_for(lambda: page.posts.count("live") == 20 and page.posts.count("drawn") == 21)
         page.take()
         assert page.taken["q"].tolist() == pytest.approx([0.19] * 6)
         assert {name: each["position"][2] for name, each in page.taken["draw"].items()} == {
