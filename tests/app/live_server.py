@@ -6,11 +6,12 @@ import asyncio
 import socket
 import threading
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterable, Iterator
 from contextlib import asynccontextmanager, contextmanager
 
 import uvicorn
 from fastapi import FastAPI
+from starlette.routing import BaseRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.service.server import server_config
@@ -51,8 +52,11 @@ def without_viewer(app: FastAPI) -> ASGIApp:
 
 
 @contextmanager
-def serve_viewer(viewer: ViewerServer) -> Iterator[int]:
-    """Start a viewer and serve it under ``/viewer``; yields the port, and stops the viewer at the end."""
+def serve_viewer(viewer: ViewerServer, routes: Iterable[BaseRoute] = (), **state: object) -> Iterator[int]:
+    """Start a viewer and serve it under ``/viewer``, beside further routes that need such a `state` of the app.
+
+    Yields the port, and stops the viewer at the end.
+    """
     loops: list[asyncio.AbstractEventLoop] = []
     bridge = ViewerBridge()
 
@@ -62,7 +66,9 @@ def serve_viewer(viewer: ViewerServer) -> Iterator[int]:
         yield
 
     app = FastAPI(lifespan=lifespan)
-    app.router.routes.extend(bridge.routes())
+    for name, value in state.items():
+        setattr(app.state, name, value)
+    app.router.routes.extend([*routes, *bridge.routes()])
     with serve(app) as port:
         viewer.start(loops[0])
         bridge.viewer = viewer
