@@ -16,12 +16,13 @@ from typing import Any, Protocol
 
 from fastapi import WebSocket
 from starlette.concurrency import run_in_threadpool
-from starlette.websockets import WebSocketDisconnect, WebSocketState
+from starlette.websockets import WebSocketDisconnect
 
 from app.api.body import LARGE, versioned
 from app.api.live.answers import news, welcome
 from app.api.live.messages import USUAL_RATE, Message, id_of, read
 from app.api.problems import ProblemError, internal_error, invalid
+from app.api.websockets import DONE, FAILED, POLICY, accept, close
 from app.api.work import Deadline
 from app.classroom.tokens import read_code, show_code
 from app.live import RESERVED, BusyLineError, Line, Lines, Program
@@ -30,7 +31,6 @@ from app.shared.answers.answer import as_json
 from app.shared.clients import client_of
 from app.shared.connection import DELAY
 from app.shared.problems import FieldError, Problem, show
-from app.shared.security import origin_allowed
 
 logger = logging.getLogger("kinboard.live")
 router = versioned("live")
@@ -39,9 +39,6 @@ RATE, BURST = 120.0, 120.0  # messages of a program that are read a second, and 
 SAID_AGAIN = 1.0  # s between two complaints of the same kind
 DEFAULT_NAME = "A program"
 LONGEST_NAME, LONGEST_SESSION = 40, 64  # characters
-
-DONE, POLICY, UNSUPPORTED, FAILED = 1000, 1008, 1003, 1011  # close codes of RFC 6455
-_LONGEST_REASON = 123  # bytes
 
 
 class Tries(Protocol):
@@ -58,11 +55,8 @@ class Tries(Protocol):
 async def live(visitor: WebSocket, code: str) -> None:
     """A program and the page with this code."""
     state = visitor.app.state
-    if not origin_allowed(visitor.headers, state.settings.allowed_origins):
-        logger.warning("rejected a websocket from a page of %.200r", visitor.headers.get("origin"))
-        await visitor.close()  # before the handshake: a 403
+    if not await accept(visitor, logger):
         return
-    await visitor.accept()
     try:
         line = await _find(state.lines, state.tries, client_of(visitor.scope), code)
         conversation = Conversation(visitor, line)
@@ -75,7 +69,7 @@ async def live(visitor: WebSocket, code: str) -> None:
         pass
     except Exception:
         logger.exception("the connection of a program failed")
-        await _close(visitor, FAILED, "Internal error.")
+        await close(visitor, FAILED, "Internal error.")
 
 
 async def _find(lines: Lines, tries: Tries, client: str, code: str) -> Line:
@@ -256,7 +250,7 @@ class Conversation:
             if self._line.ended or self._line.program is not self._program:
                 reason = self._line.ended or "The program has connected again."
                 await self._send({"type": "end", "reason": reason})
-                await _close(self._visitor, DONE, reason)
+                await close(self._visitor, DONE, reason)
                 return
             now = self._loop.time()
             letters = self._line.letters()
@@ -286,10 +280,4 @@ async def _refuse(visitor: WebSocket, problem: Problem) -> None:
     """Send the problem document, then close with its detail."""
     with contextlib.suppress(WebSocketDisconnect):
         await visitor.send_text(as_json(_letter(None, problem)).decode())
-    await _close(visitor, POLICY, problem.detail)
-
-
-async def _close(visitor: WebSocket, code: int, reason: str) -> None:
-    if visitor.client_state is WebSocketState.CONNECTED:
-        with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # left in this very moment
-            await visitor.close(code, reason.encode()[:_LONGEST_REASON].decode(errors="ignore"))
+    await close(visitor, POLICY, problem.detail)

@@ -16,11 +16,12 @@ from typing import Any
 
 from fastapi import WebSocket
 from starlette.concurrency import run_in_threadpool
-from starlette.websockets import WebSocketDisconnect, WebSocketState
+from starlette.websockets import WebSocketDisconnect
 
 from app.api.arms.operation import with_robot
 from app.api.body import parsed, versioned
 from app.api.problems import ProblemError, invalid, unknown_robot
+from app.api.websockets import DONE, FAILED, LATER, POLICY, UNSUPPORTED, accept, close
 from app.api.work import Deadline
 from app.api.workspace.query import CloudQuery, read_cloud_query, validated
 from app.api.workspace.streaming import ThreadedGenerator
@@ -30,7 +31,6 @@ from app.shared.clouds import Cloud
 from app.shared.metrics import STREAMED
 from app.shared.places import Place
 from app.shared.problems import FieldError, Problem
-from app.shared.security import origin_allowed
 from kin import Robot, UnknownRobotError
 
 logger = logging.getLogger("kinboard.workspace")
@@ -38,10 +38,6 @@ router = versioned("workspace")
 
 PATIENCE = 10.0  # seconds for the first message of a client that sends its arm along
 PROGRESS_EVERY = 0.1  # seconds between two progress messages
-
-# Close codes of RFC 6455.
-DONE, POLICY, UNSUPPORTED, FAILED, LATER = 1000, 1008, 1003, 1011, 1013
-_LONGEST = 123  # bytes of a close reason
 
 SentCloud = with_robot(CloudQuery)
 
@@ -98,12 +94,8 @@ def _read(text: str, deadline: Deadline) -> tuple[CloudQuery, Robot]:
 async def _serve(visitor: WebSocket, described: Callable[[], Awaitable[tuple[CloudQuery, Robot]]]) -> None:
     """One client's cloud; errors are sent as problems."""
     state = visitor.app.state
-    if not origin_allowed(visitor.headers, state.settings.allowed_origins):
-        logger.warning("rejected a websocket from a page of %.200r", visitor.headers.get("origin"))
-        await visitor.close()  # before the handshake: a 403
+    if not await accept(visitor, logger):
         return
-    # Browsers give a page no reason for a rejected handshake, so it is accepted and the problem sent as a message.
-    await visitor.accept()
     ending: _Ending = None
     try:
         query, robot = await described()
@@ -119,9 +111,8 @@ async def _serve(visitor: WebSocket, described: Callable[[], Awaitable[tuple[Clo
     except Exception:
         logger.exception("a workspace stream failed")
         ending = FAILED, "Internal error."
-    if ending is not None and visitor.client_state is WebSocketState.CONNECTED:
-        with contextlib.suppress(WebSocketDisconnect, RuntimeError):  # left in this very moment
-            await visitor.close(*ending)
+    if ending is not None:
+        await close(visitor, *ending)
 
 
 async def _carry(visitor: WebSocket, place: Place, cloud: Cloud, with_q: bool) -> _Ending:
@@ -176,11 +167,10 @@ async def _listen(visitor: WebSocket) -> _Ending:
 
 
 async def _refuse(visitor: WebSocket, problem: Problem) -> _Ending:
-    """Send the problem document, then close with its detail, cut to the length of a close reason."""
+    """Send the problem document; how to close with its detail."""
     with contextlib.suppress(WebSocketDisconnect):
         await _send_text(visitor, type="problem", problem=problem.model_dump())
-    reason = problem.detail.encode()[:_LONGEST].decode(errors="ignore")
-    return LATER if problem.status == 503 else POLICY, reason
+    return LATER if problem.status == 503 else POLICY, problem.detail
 
 
 async def _send_text(visitor: WebSocket, **message: Any) -> None:
