@@ -58,7 +58,7 @@ def solve_approach(form: ClosedForm, problem: SolverInput, sense: float) -> Cand
     rolls = sense * (value - found.values[:, 0])
     found.q[there, 6] = value
     spans = np.array([(i, low, high) for i in np.flatnonzero(there)], dtype=np.float64).reshape(-1, 3)
-    values = np.column_stack([_wrapped(rolls), np.where(there, value, math.nan)])
+    values = np.column_stack([wrapped(rolls), np.where(there, value, math.nan)])
     return replace(found, values=values, arcs=(_rolls(found.arcs[0], value, sense), spans))
 
 
@@ -68,6 +68,6 @@ def _rolls(arcs: Array, value: float, sense: float) -> Array:
     return np.column_stack([arcs[:, :1], ends])
 
 
-def _wrapped(angles: Array) -> Array:
+def wrapped(angles: Array) -> Array:
     """The same angles in (−π, π]."""
     return math.pi - (math.pi - angles) % (2.0 * math.pi)

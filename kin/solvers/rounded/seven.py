@@ -188,12 +188,16 @@ class Rounded7(Rounded):
         if not m:
             return np.empty((0, k, 7))
         values = (arcs[:, 1:2] + shares * (arcs[:, 2:] - arcs[:, 1:2])).ravel()
-        T = np.empty((m * k, 4, 4))
-        T[:] = p.T
-        out = np.empty((m * k, 8, 7))
-        self._start.many(self._start.params, T, values, p.seed, out)
         branch = np.repeat(arcs[:, 0].astype(int), k)
-        return np.asarray(out[np.arange(m * k), branch].reshape(m, k, 7))
+        return np.asarray(self._all_at(p, values)[np.arange(m * k), branch].reshape(m, k, 7))
+
+    def _all_at(self, p: SolverInput, values: Array) -> Array:
+        """Rows ``(k, 8, 7)`` of the arm that was meant, of all branches at values ``(k,)`` of the parameter."""
+        T = np.empty((len(values), 4, 4))
+        T[:] = p.T
+        out = np.empty((len(values), 8, 7))
+        self._start.many(self._start.params, T, values, p.seed, out)
+        return out
 
     def _move_rows(self, p: SolverInput, setting: Array, rows: Array) -> None:
         """Move rows ``(8, 7)`` onto the target at the requested value, in place."""
@@ -207,7 +211,7 @@ class Rounded7(Rounded):
         self._move_rows(p, setting, q)
         half = 0.5 * (p.upper - p.lower)
         middle = np.add(p.lower, half, where=np.isfinite(half), out=np.zeros_like(half))
-        off = np.abs(math.pi - (math.pi - (q - middle)) % TURN)
+        off = np.abs(rolled.wrapped(q - middle))
         inside = np.flatnonzero(((off <= half + TOLERANCES.limit) | (half >= math.pi)).all(axis=1))
         arcs = np.column_stack([inside, np.full((len(inside), 2), value)]).astype(np.float64)
         return arcs, np.repeat(q[inside][:, None], 3, axis=1)
@@ -255,11 +259,7 @@ class Rounded7(Rounded):
         It is that of the nearest row of the arm that was meant, where the next one is farthest away: at a fold two
         branches meet, and the signs that name them may differ between the two tables.
         """
-        rows = np.empty((3, 8, 7))
-        T = np.empty((3, 4, 4))
-        T[:] = p.T
-        self._start.many(self._start.params, T, values, p.seed, rows)
-        away = np.abs(math.pi - (math.pi - (rows - postures[:, None])) % TURN).max(axis=2)
+        away = np.abs(rolled.wrapped(self._all_at(p, values) - postures[:, None])).max(axis=2)
         away[np.isnan(away)] = math.inf
         order = np.argsort(away, axis=1)
         nearest, next_one = np.take_along_axis(away, order, axis=1)[:, :2].T
@@ -295,7 +295,7 @@ class Rounded7(Rounded):
 
 def _are_apart(rows: Array) -> bool:
     """Whether no posture is given to two branches, of rows ``(8, 7)`` that are NaN where a branch has none."""
-    away = np.abs(math.pi - (math.pi - (rows[:, None] - rows)) % TURN).max(axis=2)
+    away = np.abs(rolled.wrapped(rows[:, None] - rows)).max(axis=2)
     return int((away < _SAME).sum()) == int(np.isfinite(rows[:, 0]).sum())
 
 
