@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 import socket
@@ -23,6 +24,7 @@ class Postgres:
         with socket.create_server(("127.0.0.1", 0)) as free:
             self.port = free.getsockname()[1]
         self._programs, self._folder = programs, folder
+        self._numbers = itertools.count(1)
         self._user = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if os.geteuid() == 0 else {}
         if self._user:
             os.chown(folder, NOBODY, NOBODY)
@@ -46,8 +48,9 @@ class Postgres:
         """As a power failure would: without saying goodbye."""
         self._run("pg_ctl", "-D", self._folder / "data", "-w", "-m", "immediate", "stop")
 
-    def create(self, name: str) -> str:
-        """The URL of a new database."""
+    def create(self) -> str:
+        """The URL of a new database, of another name each time: a test that is run again needs a new one."""
+        name = f"kinboard_{next(self._numbers)}"
         url = self.url("postgres").replace("postgresql:", "postgresql+psycopg:")
         engine = create_engine(url, isolation_level="AUTOCOMMIT")
         with engine.connect() as connection:

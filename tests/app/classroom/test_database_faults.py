@@ -114,7 +114,7 @@ def test_the_start_names_a_newer_database_and_the_service_runs(teacher, tmp_path
 
 def test_postgres_of_a_newer_version(tmp_path, caplog) -> None:
     with running() as server:
-        url = server.create("newer")
+        url = server.create()
         hub = Hub(tmp_path, url)
         hub.rooms.open("Class", 3600.0)
         hub.close()

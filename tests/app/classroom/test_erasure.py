@@ -250,7 +250,7 @@ def test_a_service_erases_as_soon_as_the_reader_lets_go(tmp_path, monkeypatch, c
 
 def test_postgres_deletes_and_nothing_is_called_erased(tmp_path) -> None:
     with running() as server:
-        hub = Hub(tmp_path, server.create("erasure"))
+        hub = Hub(tmp_path, server.create())
         room = hub.rooms.open("Class", 3600.0)
         student = hub.attend(hub.rooms.join(room.code, "Ada"), nothing)
         hub.rooms.end(room.id)

@@ -35,7 +35,7 @@ def hub(request, tmp_path) -> Iterator[Hub]:
     """A hub that has not opened its database yet, which is new."""
     url = None
     if request.param == "postgresql":
-        url = request.getfixturevalue("server").create(f"t{abs(hash(request.node.name))}")
+        url = request.getfixturevalue("server").create()
     hub = Hub(tmp_path, url)
     yield hub
     hub.close()

@@ -23,9 +23,9 @@ def server() -> Iterator[Postgres]:
 
 
 @pytest.fixture
-def database(server, request) -> str:
+def database(server) -> str:
     """A new database's URL."""
-    return server.create(f"t{abs(hash(request.node.name))}")
+    return server.create()
 
 
 @pytest.fixture

@@ -155,7 +155,7 @@ def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str,
     with running_postgres() as server:
         found["databases"] = databases.compare(server, seconds)
         print(table(f"lesson: a page sent {HZ:g} times a second, from process to process", found["databases"]))
-        with served(workers, server.create("lesson")) as running:
+        with served(workers, server.create()) as running:
             found["follow, PostgreSQL"] = asyncio.run(follow(*running, count, seconds))
             print(table(f"{drags}, PostgreSQL", [found["follow, PostgreSQL"]]))
     return found

@@ -35,8 +35,8 @@ def compare(server: Postgres | None, seconds: float) -> list[dict[str, Any]]:
     with tempfile.TemporaryDirectory(prefix="kinboard-databases-") as folder:
         rows = [{"database": "SQLite", **_measure(Path(folder), None, "polling", None, seconds)}]
         ways: tuple[Way, ...] = () if server is None else get_args(Way)
-        for i, way in enumerate(ways):
-            url = server.create(f"way{i}")
+        for way in ways:
+            url = server.create()
             rows.append({"database": "PostgreSQL", **_measure(Path(folder), url, way, server.pid, seconds)})
     return rows
 
