@@ -44,6 +44,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.path not in LONG)
 
 
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Say why each test that is run again failed: the plugin that runs it again tells its name alone."""
+    for report in terminalreporter.stats.get("rerun", ()):
+        terminalreporter.section(f"run again: {report.nodeid} ({report.when})")
+        terminalreporter.line(report.longreprtext)
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option that renews ``tests/data/snapshots``."""
     parser.addoption(

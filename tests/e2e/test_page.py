@@ -58,6 +58,16 @@ UNDER_THE_SCROLLBAR = """() => {
 }"""
 
 
+# Notes the colours of the cover that a page shows while it loads, however short that is.
+COVERS = """
+window.covers = [];
+new MutationObserver(() => {
+  const colour = document.documentElement.dataset.kbCover;
+  if (colour && window.covers.at(-1) !== colour) window.covers.push(colour);
+}).observe(document, {attributes: true, subtree: true, attributeFilter: ["data-kb-cover"]});
+"""
+
+
 def test_the_page_follows_the_colours_of_the_system(tab: Tab) -> None:
     page, root = tab.page, tab.page.locator("html")
     tab.open("View")
@@ -65,10 +75,11 @@ def test_the_page_follows_the_colours_of_the_system(tab: Tab) -> None:
     for scheme in ("dark", "light", "dark"):
         page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
         expect(root).to_have_attribute("data-mantine-color-scheme", scheme)
-    page.reload(wait_until="commit")
-    expect(root).to_have_attribute("data-kb-cover", "dark")
-    expect(root).not_to_have_attribute("data-kb-cover", "dark")
+    page.add_init_script(COVERS)
+    page.reload()
     expect(root).to_have_attribute("data-mantine-color-scheme", "dark")
+    expect(root).not_to_have_attribute("data-kb-cover", "dark")
+    assert page.evaluate("window.covers") == ["dark"]
     tab.dismiss_notice()
     tab.open("View")
     tab.choose("Page colours", "Light")
