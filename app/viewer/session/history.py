@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from app.viewer.session.state import KEY, KEY_REPLACE, KEY_RETURN, PageState, encode
+from app.viewer.session.state import KEY, KEY_REPLACE, KEY_RETURN, PageState, equal
 
 LIMIT = 100  # steps; older ones are forgotten
 # The part of a feature's state that is a result and not a setting: undo neither repeats nor clears it.
@@ -87,7 +87,7 @@ def _travel(source: list[Step], sink: list[Step], present: PageState) -> Step | 
 
 def same(a: PageState, b: PageState) -> bool:
     """Whether two states differ in nothing that undo restores: viewpoints and drawn results do not count."""
-    return encode(_settings(a)) == encode(_settings(b))
+    return equal(_settings(a), _settings(b))
 
 
 def _settings(state: PageState) -> PageState:

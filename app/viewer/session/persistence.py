@@ -9,7 +9,7 @@ stored is a `PageState`.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 
 from app.exports.snippets import LOCAL, Moment, Service
@@ -29,6 +29,7 @@ from app.viewer.session.state import (
     decode,
     encode,
     read_stored_page,
+    write,
 )
 from app.viewer.shown import SHOWN
 
@@ -69,6 +70,7 @@ class Persistence:
         self.text_size = "Normal"
         self.embedded = self.shown = ""
         self._saved = ""
+        self._left_out: tuple[str, ...] = ()  # of the saved state
         self._state = PageState()
         self._opened: Hashable = None  # of the saved state, as `LessonChoice.opened`
         self._share: SharePanel
@@ -133,7 +135,7 @@ class Persistence:
         """Take the present state as saved, and return it; from now on `share` offers the saved state."""
         self._share = share
         self._state = self.snapshot()
-        self._saved, self._opened = encode(self._state), self._page.lessons.opened
+        self._saved, self._opened = self._written(self._state), self._page.lessons.opened
         self._update_share()
         return self._saved
 
@@ -162,13 +164,22 @@ class Persistence:
         self._page.camera.look()
         self._page.camera.lead_back()
         state = self.snapshot()
-        text, self._opened = encode(state), self._page.lessons.opened
+        text, self._opened = self._written(state), self._page.lessons.opened
         if text != self._saved:
             replaces = self.led or (key != KEY_RETURN and same(state, self._state))
             self._saved, self._state = text, state
             self._page.client.local_storage.set_item(KEY_REPLACE if replaces else key, text)
             self._update_share()
             self._page.client.flush()
+
+    def _written(self, state: PageState) -> str:
+        """The text of a state; the page says when there is no room for something."""
+        text, left_out = write(state)
+        if left_out != self._left_out:
+            self._left_out = left_out
+            if left_out:
+                self._page.notify(too_long(left_out, {one.key: one.title for one in self._page.features}))
+        return text
 
     def snapshot(self) -> PageState:
         """The present state."""
@@ -213,6 +224,20 @@ class Persistence:
             avoid,
         )
         self._share.show(f"{self._address}viewer/#s={self._saved}", moment, "table" in page.activity.withheld)
+
+
+def too_long(left_out: Sequence[str], titles: Mapping[str, str]) -> Notice:
+    """What the address of a page and a reload leave out.
+
+    Args:
+        titles: of features, by key.
+    """
+    names = ", ".join(titles.get(key, key).lower() for key in left_out)
+    detail = (
+        f"The address of this page has no room for: {names}. A link or a reload leaves that out. "
+        "Save it as a file, or make it shorter."
+    )
+    return Notice("error", "Too long for a link", detail)
 
 
 def link_notice(saved: PageState) -> Notice | None:

@@ -1,9 +1,9 @@
 """The state of a page as a short text: the page's URL holds it, and a reload restores it.
 
-The text is JSON in base64url, so that any URL may carry it. It contains only what differs from a fresh page;
-everything else takes the defaults of the page that opens it. The text may come from an old version of this
-program, truncated by a mail client, or from somebody with bad intentions. So `decode` never raises; it ignores
-what it cannot use.
+The text is JSON in base64url, so that any URL may carry it; a long one is compressed. It contains only what
+differs from a fresh page; everything else takes the defaults of the page that opens it. The text may come from an
+old version of this program, truncated by a mail client, or from somebody with bad intentions. So `decode` never
+raises; it ignores what it cannot use.
 
 ``static/viewer.js`` stores the text for its own tab: viser's calls that read and write a browser's `localStorage`
 are redirected there.
@@ -15,9 +15,10 @@ import base64
 import json
 import math
 import re
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, get_args
+from typing import Any, Final, NamedTuple, get_args
 
 import numpy as np
 
@@ -40,6 +41,9 @@ VERSION = 1
 # under the others, it replaces the present entry (another viewpoint) or returns to the entry with this state.
 KEY, KEY_REPLACE, KEY_RETURN = "kinboard", "kinboard-replace", "kinboard-return"
 MAX_TEXT = 16_000  # characters; the bridge refuses messages of 64 KiB
+LONG = 2000  # characters; longer texts are compressed
+COMPRESSED = "z"  # begins a compressed text; base64 of JSON never begins with it
+MOST_BYTES = 64_000  # of JSON that is unpacked from a text
 # Nine digits are a nanometre: a shared configuration is practically exact, in half the text.
 DIGITS = 9
 CAMERA_DIGITS = 4  # of metres; finer differences are invisible
@@ -122,11 +126,44 @@ def without_arm(state: PageState) -> PageState:
     )  # fmt: skip
 
 
+class Written(NamedTuple):
+    """A state as a text, and the keys of the features, or "obstacles", that it had no room for."""
+
+    text: str
+    left_out: tuple[str, ...] = ()
+
+
 def encode(state: PageState) -> str:
+    """The state as a text of letters, digits, ``-`` and ``_``, as far as there is room: see `write`."""
+    return write(state).text
+
+
+def write(state: PageState) -> Written:
     """The state as a text of letters, digits, ``-`` and ``_``.
 
-    The states of the features, then the obstacles, are left out if the text would be longer than `decode` accepts.
+    While the text would be longer than `decode` accepts, the longest state of a feature is left out; then the
+    obstacles are.
     """
+    data = _data(state)
+    text, left_out = _pack(data), list[str]()
+    for key in sorted(state.features, key=lambda key: -len(json.dumps(state.features[key]))):
+        if len(text) > MAX_TEXT:
+            left_out.append(key)
+            data["features"] = {other: one for other, one in data["features"].items() if other != key}
+            text = _pack(data)
+    if len(text) > MAX_TEXT and data.pop("obstacles", None) is not None:
+        left_out.append("obstacles")
+        text = _pack(data)
+    return Written(text, tuple(left_out))
+
+
+def equal(a: PageState, b: PageState) -> bool:
+    """Whether the texts of two states would be the same if there were room for everything."""
+    return _json(_data(a)) == _json(_data(b))
+
+
+def _data(state: PageState) -> dict[str, Any]:
+    """What differs from a fresh page, as JSON."""
     data: dict[str, Any] = {"v": VERSION}
     if state.own is not None:
         data["own"] = own_arm.pack(state.own)
@@ -158,12 +195,7 @@ def encode(state: PageState) -> str:
         data["view"] = view
     if state.features:
         data["features"] = state.features
-    text = _pack(data)
-    for key in ("features", "obstacles"):
-        if len(text) > MAX_TEXT:
-            data.pop(key, None)
-            text = _pack(data)
-    return text
+    return data
 
 
 def decode(text: str, robots: Sequence[Robot]) -> PageState:
@@ -230,18 +262,41 @@ _NAMES = {"q": "joint values", "target": "target", "task": "task", "branch": "po
 
 
 def _pack(data: dict[str, Any]) -> str:
-    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    return base64.urlsafe_b64encode(text.encode()).rstrip(b"=").decode()
+    """The text of these entries; longer than `MAX_TEXT`: there is no room for them."""
+    raw = _json(data)
+    text = _base64(raw)
+    if len(text) > LONG and len(raw) <= MOST_BYTES:
+        return COMPRESSED + _base64(zlib.compress(raw, 9))
+    return text
+
+
+def _json(data: dict[str, Any]) -> bytes:
+    return json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+
+
+def _base64(raw: bytes) -> str:
+    return base64.urlsafe_b64encode(raw).rstrip(b"=").decode()
 
 
 def _unpack(text: str) -> dict[str, Any]:
     if len(text) > MAX_TEXT:
         return {}
+    compressed = text.startswith(COMPRESSED)
+    text = text.removeprefix(COMPRESSED)
     try:
-        raw = base64.urlsafe_b64decode(text + "=" * (-len(text) % 4)).decode()
-    except ValueError:  # not base64, not UTF-8, not ASCII
+        raw = base64.urlsafe_b64decode(text + "=" * (-len(text) % 4))
+        return _parse((_unpacked(raw) if compressed else raw).decode())
+    except (ValueError, zlib.error):  # not base64, not UTF-8, not ASCII, not compressed
         return {}
-    return _parse(raw)
+
+
+def _unpacked(raw: bytes) -> bytes:
+    """Compressed bytes as they were; raises `ValueError` where they are too many or not whole."""
+    stream = zlib.decompressobj()
+    found = stream.decompress(raw, MOST_BYTES + 1)
+    if not stream.eof or len(found) > MOST_BYTES:
+        raise ValueError(f"more than {MOST_BYTES} bytes, or only a part")
+    return found
 
 
 def _parse(text: str) -> dict[str, Any]:

@@ -6,7 +6,12 @@ import base64
 import copy
 import json
 import math
+import random
+import re
+import tracemalloc
+import zlib
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -32,7 +37,17 @@ from app.viewer.server import ViewerServer
 from app.viewer.session import page
 from app.viewer.session.choices import ViewState
 from app.viewer.session.persistence import Persistence
-from app.viewer.session.state import MAX_TEXT, PageState, decode, encode, read_stored_page
+from app.viewer.session.state import (
+    LONG,
+    MAX_TEXT,
+    MOST_BYTES,
+    PageState,
+    decode,
+    encode,
+    equal,
+    read_stored_page,
+    write,
+)
 from kin.units import DEFAULT_UNITS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -196,10 +211,66 @@ def test_an_unknown_robot_is_reported_and_its_state_is_ignored():
     assert decode(packed({"v": 1, "robot": {"a": [1]}}), ROBOTS).robot is None
 
 
-def test_features_with_too_much_state_are_left_out_of_the_text():
-    text = encode(PageState("ur5", features={"talker": {"words": "x" * MAX_TEXT}}))
-    assert decode(text, ROBOTS).robot == "ur5"
-    assert decode(text, ROBOTS).features == {}
+def noise(size: int) -> str:
+    """A text that cannot be compressed."""
+    return random.Random(size).randbytes(size // 2).hex()
+
+
+def test_features_with_too_much_state_are_left_out_of_the_text_the_longest_first():
+    small, large = {"words": "x"}, {"words": noise(2 * MAX_TEXT)}
+    written = write(PageState("ur5", features={"small": small, "large": large}))
+    assert written.left_out == ("large",)
+    assert decode(written.text, ROBOTS).robot == "ur5"
+    assert decode(written.text, ROBOTS).features == {"small": small}
+    written = write(PageState("ur5", features={"a": {"words": "a" * MOST_BYTES}}))
+    assert (written.left_out, decode(written.text, ROBOTS).features) == (("a",), {}), "never more than is read"
+
+
+@pytest.mark.parametrize("size", [1, LONG // 2, LONG, 10_000, MOST_BYTES - 100])
+def test_a_long_state_is_compressed_and_comes_back(size):
+    features = {"talker": {"words": "α" + "word " * (size // 5)}}
+    text = encode(PageState("ur5", features=features))
+    assert re.fullmatch(r"[A-Za-z0-9_-]*", text)
+    assert len(text) <= MAX_TEXT
+    assert decode(text, ROBOTS).features == features
+    assert encode(decode(text, ROBOTS)) == text
+
+
+def test_states_that_differ_only_in_what_has_no_room_are_not_equal():
+    one, other = (PageState("ur5", features={"talker": {"words": word + noise(2 * MAX_TEXT)}}) for word in "ab")
+    assert encode(one) == encode(other)
+    assert not equal(one, other)
+    assert equal(one, replace(one))
+
+
+def bomb(size: int, keep: slice = slice(None), after: bytes = b"") -> str:
+    raw = zlib.compress(b'{"v":1,"lesson":"' + b"x" * size + b'"}', 9)
+    return "z" + base64.urlsafe_b64encode(raw[keep] + after).rstrip(b"=").decode()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("z", "zzzz", "z" * MAX_TEXT, "zé", "z" + packed({"v": 1, "lesson": "dh"})),
+        *(bomb(MOST_BYTES), bomb(8_000_000), bomb(10, slice(-3)), bomb(10, slice(2, None))),
+        "z" + base64.urlsafe_b64encode(zlib.compress(b"[" * 60_000)).decode(),
+        "z" + base64.urlsafe_b64encode(zlib.compress(b"\xff\xfe")).decode(),
+    ],
+    ids=range(11),
+)
+def test_what_is_not_a_compressed_state_restores_nothing(text):
+    tracemalloc.start()
+    state = decode(text, ROBOTS)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert state.unreadable
+    assert peak < 2_000_000, "a link of a few kilobytes must not fill the memory"
+
+
+def test_a_compressed_state_as_long_as_allowed_is_read():
+    text = bomb(MOST_BYTES - len(b'{"v":1,"lesson":""}'))
+    assert len(decode(text, ROBOTS).lesson) == MOST_BYTES - len(b'{"v":1,"lesson":""}')
+    assert decode(bomb(MOST_BYTES - len(b'{"v":1,"lesson":"')), ROBOTS).unreadable
 
 
 @pytest.mark.parametrize(
@@ -289,6 +360,9 @@ def test_every_text_of_a_state_can_be_sent_to_a_page(text):
 # In a session
 
 
+TALKS = 9  # counts, of a state that is too long for a link
+
+
 class Counter(Feature):
     key = "counter"
     title = "Counter"
@@ -302,7 +376,8 @@ class Counter(Feature):
         self._slider.value = value
 
     def state(self):
-        return {"count": self._slider.value} if self._slider.value else {}
+        count = self._slider.value
+        return {"count": count, **({"talk": noise(2 * MAX_TEXT)} if count == TALKS else {})} if count else {}
 
     def restore(self, state):
         count = state.get("count")
@@ -444,6 +519,17 @@ def test_a_hostile_state_reaches_its_page(port, caplog, text):
         assert tab.value("Robot")
     assert "cannot be sent" not in caplog.text
     assert "Traceback" not in caplog.text
+
+
+def test_a_page_that_is_too_long_for_its_address_says_so(port):
+    with FakeBrowser(port, memory=remembering(encode(PageState("ur5")))) as tab:
+        tab.settle()
+        tab.set("Count", TALKS)
+        tab.wait(lambda: "has no room for: counter" in tab.html)
+        assert "Too long for a link" in tab.html
+        assert kept(tab).features == {}
+        tab.set("Count", 5)
+        assert kept(tab).features == {"counter": {"count": 5}}
 
 
 def test_a_feature_that_fails_to_restore_does_not_affect_the_rest(port, caplog):
