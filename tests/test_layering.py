@@ -108,7 +108,7 @@ RULES: dict[str, set[str]] = {
     },
     "app/notebook": {
         *("kin", "numpy", "app.classroom.tokens", "app.live.client", "app.notebook"),
-        *("app.viewer.own_arm", "app.viewer.session.state"),
+        "app.viewer.session.state",
     },
     "app/notebook/child.py": {"app.live", "app.service.main", "app.shared.settings", "app.viewer.shown"},
     "app/cli": {
@@ -133,6 +133,7 @@ RULES: dict[str, set[str]] = {
     "app/cli/xacro/expressions.py": {"xacro"},
     "app/cli/startup.py": set(),
     "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.service.main", "app.shared"},
+    "app/cli/open.py": {"app.classroom.tokens", "app.cli", "app.live", "app.viewer.session.state"},
 }
 
 MODULES = sorted(

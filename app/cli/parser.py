@@ -180,6 +180,12 @@ def _load_serve() -> Run:
     return run
 
 
+def _load_open() -> Run:
+    from app.cli.open import run
+
+    return run
+
+
 def _load_fk() -> Run:
     from app.cli.fk import run
 
@@ -294,6 +300,7 @@ def _load_lti() -> Run:
 
 COMMANDS = (
     Command(declare.add_serve, _load_serve),
+    Command(declare.add_open, _load_open),
     Command(declare.add_fk, _load_fk, interpreted=True, compiled_with="configurations"),
     Command(declare.add_ik, _load_ik),
     Command(declare.add_move, _load_move),

@@ -5,7 +5,8 @@ from __future__ import annotations
 import gc
 import sys
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -19,9 +20,20 @@ SECRET = ("token", "database_url")  # logs keep what is printed
 
 def run(arguments: Namespace) -> int:
     """Serve until Ctrl-C; 2 for an invalid setting."""
-    given = {name: value for name in FLAGS if (value := getattr(arguments, name)) is not None}
+    settings = read_settings({name: value for name in FLAGS if (value := getattr(arguments, name)) is not None})
+    if settings is None:
+        return 2
+    run_service = import_service()
     try:
-        settings = Settings(**given)
+        return run_service(settings, open_browser=arguments.open)
+    finally:
+        gc.unfreeze()
+
+
+def read_settings(given: Mapping[str, Any]) -> Settings | None:
+    """The settings of the environment and these values of flags; None: some are invalid, which is printed."""
+    try:
+        return Settings(**given)
     except ValidationError as error:
         for item in error.errors():
             name = str(item["loc"][0]) if item["loc"] else "settings"
@@ -29,12 +41,7 @@ def run(arguments: Namespace) -> int:
             where = f"--{name.replace('_', '-')} or {variable}" if name in FLAGS else variable
             got = "a value that is not shown" if name in SECRET else repr(item["input"])
             print(f"kinboard: {where}: got {got}: {item['msg']}", file=sys.stderr)
-        return 2
-    run_service = import_service()
-    try:
-        return run_service(settings, open_browser=arguments.open)
-    finally:
-        gc.unfreeze()
+        return None
 
 
 def import_service() -> Callable[..., int]:

@@ -5,7 +5,7 @@ with this code talk to the page, and :mod:`app.viewer.live` lets the page answer
 """
 
 from app.live.codes import code_in, home_of
-from app.live.line import EVENTS, RESERVED, VALUES, BusyLineError, Door, Line, Lines, Program
+from app.live.line import EVENTS, RESERVED, VALUES, BusyLineError, Door, Line, Lines, Program, invite, reserved
 
 __all__ = [
     "EVENTS",
@@ -18,4 +18,6 @@ __all__ = [
     "Program",
     "code_in",
     "home_of",
+    "invite",
+    "reserved",
 ]

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from app.classroom.tokens import new_code
 from app.live.codes import unused_code
 from app.shared.problems import Problem
 from kin import Robot
@@ -28,7 +29,25 @@ LEFT: Final = "The page was closed."
 
 Post = Callable[[str, object], None]
 
-RESERVED: Final[set[str]] = set()  # codes of pages that have them in their address, such as those of a notebook
+RESERVED: Final[set[str]] = set()  # codes of pages that are still to be opened, such as those of a notebook
+TICKETS: Final[dict[str, str]] = {}  # of these, the codes of pages with a ticket in their address, by the ticket
+
+
+def reserved(key: str) -> str:
+    """The code that is reserved for a page with `key` in its address, or empty.
+
+    The key is the code, which any page may have again, or a ticket. A ticket counts once: other users of the
+    machine may read the address that a browser is started with.
+    """
+    return key if key in RESERVED else TICKETS.pop(key, "")
+
+
+def invite() -> tuple[str, str]:
+    """Reserve a code for one page of this process; returns the ticket for its address, and the code."""
+    ticket, code = new_code() + new_code(), unused_code(RESERVED)
+    RESERVED.add(code)
+    TICKETS[ticket] = code
+    return ticket, code
 
 
 class BusyLineError(Exception):

@@ -19,8 +19,7 @@ import kin
 from app.classroom.tokens import new_code
 from app.live.client import Page
 from app.notebook.process import ServiceProcess
-from app.viewer.own_arm import OwnArm, own_arm
-from app.viewer.session.state import PageState, encode
+from app.viewer.session.state import encode, with_arm
 from kin import InputError, KinematicsError, Robot
 from kin.named import robot_of
 from kin.transforms import Array
@@ -52,7 +51,7 @@ class ArmView:
         self._service = running()
         self._key = new_code() + new_code()
         self._page: Page | None = None
-        self._state = encode(_starting(robot, q))
+        self._state = _state_of(robot, q)
         mode = "panel" if panel else "1"
         base = address.replace("{port}", str(self._service.port))
         self._send([q], 0.0)
@@ -83,7 +82,7 @@ class ArmView:
     @q.setter
     def q(self, value: ArrayLike) -> None:
         self._q = _configuration(self.robot, value)
-        self._state = encode(_starting(self.robot, self._q))
+        self._state = _state_of(self.robot, self._q)
         self._send([self._q], 0.0)
         if (page := self._open_page()) is not None and page.robot.n == self.robot.n:
             page.q = self._q
@@ -103,7 +102,7 @@ class ArmView:
         at = np.linspace(0.0, len(steps) - 1.0, count)
         smooth = np.stack([np.interp(at, np.arange(len(steps)), column) for column in steps.T], axis=1)
         self._q = smooth[-1]
-        self._state = encode(_starting(self.robot, smooth[0]))
+        self._state = _state_of(self.robot, smooth[0])
         self._send(list(smooth), seconds)
 
     def _send(self, steps: list[Array], seconds: float) -> None:
@@ -154,8 +153,5 @@ def _path(robot: Robot, value: Any) -> Array:
     return np.stack(steps)
 
 
-def _starting(robot: Robot, q: Array) -> PageState:
-    if kin.builtin_robots().get(robot.id) == robot:
-        return PageState(robot=robot.id, q=q)
-    own: OwnArm = own_arm(kin.robot_to_dict(robot))
-    return PageState(robot=own.robot.id, own=own, q=q)
+def _state_of(robot: Robot, q: Array) -> str:
+    return encode(with_arm(robot, q, kin.builtin_robots().values()))

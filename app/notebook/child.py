@@ -34,12 +34,7 @@ def main() -> int:
     """Serve until the input ends."""
     environment: dict[str, Any] = {}
     given = Settings(**environment)
-    settings = given.model_copy(
-        update={
-            "host": "127.0.0.1", "port": 0, "workers": 1, "rest_workers": 0, "token": None, "read_only": False,
-            "root_path": "", "frame_ancestors": (*NOTEBOOKS, *given.frame_ancestors),
-        }
-    )  # fmt: skip
+    settings = given.on_this_machine().model_copy(update={"frame_ancestors": (*NOTEBOOKS, *given.frame_ancestors)})
 
     def until_closed() -> None:
         try:

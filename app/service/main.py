@@ -206,8 +206,12 @@ def _add_middleware(app: FastAPI, settings: Settings, guests: Guests) -> None:
     app.add_middleware(PathPrefix, prefix=settings.root_path)
 
 
-def run(settings: Settings, open_browser: bool = False) -> int:
-    """Serve until Ctrl-C or SIGTERM, which ends this process; returns 1 with a message if it could not start."""
+def run(settings: Settings, open_browser: bool = False, page: str = "", words: str = "") -> int:
+    """Serve until Ctrl-C or SIGTERM, which ends this process; returns 1 with a message if it could not start.
+
+    Args:
+        open_browser, page, words: as for `Greeting`.
+    """
     try:
         listeners = listen(settings)
     except OSError as error:
@@ -239,7 +243,7 @@ def run(settings: Settings, open_browser: bool = False) -> int:
         clock.now()  # processes that start later, after the clock was set, count from here too
         port = listeners[0].getsockname()[1]
         others = url_for_others(settings.host, port, clean_prefix(settings.root_path))
-        greeting = Greeting(url_of(settings, port), open_browser, others)
+        greeting = Greeting(url_of(settings, port), open_browser, others, page, words)
         partners = settings.rest_workers if SUPPORTED else 0
         try:
             parts = members(listeners, partners, shared_bytes)

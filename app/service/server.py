@@ -187,25 +187,35 @@ class Server(uvicorn.Server):
 
 
 class Greeting:
-    """Prints the address, and that for other machines if there is one; opens it in the browser if requested."""
+    """Prints the address, and that for other machines if there is one; opens a page in the browser if requested.
 
-    def __init__(self, url: str, open_browser: bool, others: str | None = None) -> None:
+    Args:
+        page: its path below the address.
+        words: printed after the address; ``{url}`` in them stands for it.
+    """
+
+    def __init__(
+        self, url: str, open_browser: bool, others: str | None = None, page: str = "", words: str = ""
+    ) -> None:
         self._url = url
         self._others = others
         self._open_browser = open_browser
+        self._page, self._words = url + page, words.replace("{url}", url)
         self._out = sys.stdout  # now, because starting viser redirects sys.stdout for a moment in another thread
 
     def show(self) -> None:
         print(f"Kinboard {__version__} is at {self._url}  (Ctrl-C to stop)", file=self._out, flush=True)
         if self._others is not None:
             print(f"Other machines on this network open {self._others}", file=self._out, flush=True)
+        if self._words:
+            print(self._words, file=self._out, flush=True)
         if self._open_browser:
             # A browser in a terminal returns only when it is closed.
             threading.Thread(target=self._open, name="kinboard-browser", daemon=True).start()
 
     def _open(self) -> None:
-        if not webbrowser.open(self._url):
-            print("No browser could be opened; open the address yourself.", file=self._out, flush=True)
+        if not webbrowser.open(self._page):
+            print(f"No browser could be opened; open {self._page} yourself.", file=self._out, flush=True)
 
 
 def listen(settings: Settings) -> list[socket.socket]:

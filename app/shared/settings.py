@@ -190,6 +190,15 @@ class Settings(BaseSettings):
         Proxies(values)  # raises ValueError
         return values
 
+    def on_this_machine(self) -> Settings:
+        """These settings for one process on a free port that only this machine reaches, without a token."""
+        return self.model_copy(
+            update={
+                "host": "127.0.0.1", "port": 0, "workers": 1, "rest_workers": 0, "token": None, "read_only": False,
+                "root_path": "",
+            }
+        )  # fmt: skip
+
     @property
     def data_folder(self) -> Path:
         """The folder for the database of classrooms, whether or not it exists."""

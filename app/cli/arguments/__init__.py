@@ -53,6 +53,14 @@ def add_serve(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     return parser
 
 
+def add_open(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard open``."""
+    about = "open a page in the browser, and print the code with which a program connects to it"
+    parser = _command(commands, "open", about, parents.robots, takes_robot=False)
+    parser.add_argument("robot", metavar="ROBOT", nargs="?", help=f"{ROBOT_HELP}; default: that of a new page")
+    return parser
+
+
 def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard fk``."""
     parser = _command(

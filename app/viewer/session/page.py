@@ -17,7 +17,7 @@ import viser
 import kin
 from app.classroom.results.keys import result_key
 from app.exports.snippets import Service
-from app.live import RESERVED, Door
+from app.live import Door, reserved
 from app.shared.security import Rights
 from app.viewer.activity.activity import Activity
 from app.viewer.feature import Feature
@@ -372,8 +372,8 @@ class VisitorPage(ShownArm, Worker):
             self.status = self.panel.status
             self.posture = PosturePanel(self, self.panel.posture, self.post)
             self._use_robot(robot, saved.q)
-            if self._persistence.shown in RESERVED:
-                self.door.open(robot, self._persistence.shown)
+            if code := reserved(self._persistence.shown):
+                self.door.open(robot, code)
             self.forms = Forms(gui, self.panel, self, self._library.offered(self.store.robots), self.post)
             self.lessons = LessonChoice(gui, self.panel.learn, self.panel.sheet, self, self.post)
             tabs = self.panel.tabs

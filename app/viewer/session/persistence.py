@@ -52,7 +52,7 @@ class Persistence:
         system_dark: whether the visitor's system was dark when the page was opened.
         text_size: name of the text size with which it was opened.
         embedded: how the page is embedded, as `StoredPage.embedded`.
-        shown: key of an arm that a notebook moves, and the code of the page for it; empty: there is none.
+        shown: key of an arm that a notebook moves, or what `app.live.reserved` takes; empty: there is none.
         due: when the state is to be saved if nothing more happens (`time.perf_counter`'s); None: it is saved.
         led: whether another page leads this one, which adds no entries to the browser's history then.
     """

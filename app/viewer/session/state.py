@@ -16,7 +16,7 @@ import json
 import math
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple, get_args
 
@@ -32,7 +32,7 @@ from app.viewer.panel.entry import FARTHEST
 from app.viewer.panel.script import read_json
 from app.viewer.scene.viewpoints import UP
 from app.viewer.session.choices import ViewState
-from kin import KinematicsError, Robot, Task, branch_names
+from kin import KinematicsError, Robot, Task, branch_names, robot_to_dict
 from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS, LENGTHS, Units
 
@@ -106,7 +106,8 @@ class StoredPage:
         state: the encoded state.
         dark: whether the visitor's system is dark.
         text_size: the name of the text size.
-        shown: key of an arm that is moved from outside of the page, as `app.viewer.shown` has it.
+        shown: key in the address: of an arm that is moved from outside of the page (`app.viewer.shown`), or of the
+            code that is reserved for the page (`app.live.reserved`).
         embedded: how the page is embedded in another: ``"scene"``, ``"panel"`` or not at all.
     """
 
@@ -116,6 +117,14 @@ class StoredPage:
     text_size: str = "Normal"
     embedded: str = ""
     shown: str = ""
+
+
+def with_arm(robot: Robot, q: Array | None, known: Iterable[Robot]) -> PageState:
+    """A fresh page with this arm: by its id if it is one of the `known`, else as the visitor's own."""
+    if any(each.id == robot.id and each == robot for each in known):
+        return PageState(robot=robot.id, q=q)
+    own = own_arm.own_arm(robot_to_dict(robot))
+    return PageState(robot=own.robot.id, own=own, q=q)
 
 
 def without_arm(state: PageState) -> PageState:

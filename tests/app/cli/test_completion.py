@@ -22,6 +22,7 @@ CASES = [
     (["fk", "ur5", "--format", ""], {"csv", "npy", "ndjson"}),
     (["ik", "--redun"], {"--redundancy"}),
     (["workspace", "--strategy", "u"], {"uniform"}),
+    (["open", "pio"], {"pioneer5"}),
     (["room", "o"], {"open"}),
     (["room", "open", "--ho"], {"--hours"}),
     (["completion", ""], {"bash", "zsh", "fish"}),
