@@ -132,12 +132,16 @@ RULES: dict[str, set[str]] = {
     "app/cli/xacro/expansion.py": {"xacro", "xacrodoc", "yaml", "app.shared.threads.confined", "app.cli.xacro"},
     "app/cli/xacro/expressions.py": {"xacro"},
     "app/cli/startup.py": set(),
+    # Programs that users copy: what they need of Kinboard is public.
+    "examples": {"kin", "numpy", "connecting", "recording", "mujoco"},
     "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.service.main", "app.shared"},
     "app/cli/open.py": {"app.classroom.tokens", "app.cli", "app.live", "app.viewer.session.state"},
 }
 
 MODULES = sorted(
-    path.relative_to(ROOT).as_posix() for package in ("kin", "app") for path in (ROOT / package).rglob("*.py")
+    path.relative_to(ROOT).as_posix()
+    for package in ("kin", "app", "examples")
+    for path in (ROOT / package).rglob("*.py")
 )
 
 

@@ -196,7 +196,7 @@ def viser_elsewhere(sources: Sources) -> Iterator[str]:
 
 Rule = Callable[[Sources], Iterator[str]]
 SCRIPTS = {f"static/{path.name}": path.read_text(encoding="utf-8") for path in (ROOT / "static").glob("*.js")}
-CODE = read_sources("kin", "app")
+CODE = read_sources("kin", "app", "examples")
 EVERYTHING = CODE | read_sources("tests")
 RULES: dict[Rule, Sources] = {
     crowded_folders: EVERYTHING,

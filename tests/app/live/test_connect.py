@@ -14,6 +14,7 @@ from urllib.parse import parse_qs, urlsplit
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_code import code_of
 from live_server import wait_for
 
 import kin
@@ -24,14 +25,6 @@ from app.notebook import child
 DOCUMENT = (Path(__file__).parents[3] / "docs/connect.md").read_text(encoding="utf-8")
 ARM = kin.get_robot("ur5")
 Q = np.array([0.3, -1.2, 1.4, -0.4, 0.5, 0.2])
-
-
-def code_of(page: FakeBrowser) -> str:
-    page.send("GuiUpdateMessage", uuid=page.element("Connect a program"), updates={"value": True})
-    page.wait(lambda: "data-live-code" in page.html)
-    found = re.search(r"data-live-code>([A-Z0-9-]+)<", page.html)
-    assert found is not None
-    return found[1]
 
 
 @pytest.fixture
