@@ -56,7 +56,7 @@ def check_viewer(url: str, picture: Path) -> None:
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.goto(url, timeout=WAIT)
         expect(page.locator("[data-status]")).to_have_attribute("data-status", "hand", timeout=WAIT)
-        page.locator("#webgl-software-rendering button").click()
+        page.locator("[data-slow-close]").click()
         page.wait_for_timeout(2000)
         page.screenshot(path=picture)
         browser.close()

@@ -90,11 +90,11 @@ def link(address: str, state: dict[str, object]) -> str:
 
 
 def arrive(page: Page) -> None:
-    """Wait for the page, and close viser's notice about software rendering."""
+    """Wait for the page, and close its note that the browser draws slowly."""
     expect(page.locator("[data-status]").first).to_be_visible()
-    notice = page.locator("#webgl-software-rendering button")
-    if notice.count() and notice.is_visible():
-        notice.click()
+    note = page.locator("[data-slow-close]")
+    if note.is_visible():
+        note.click()
 
 
 def join(page: Page, address: str, code: str, alias: str, q: list[float]) -> None:

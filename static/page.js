@@ -22,8 +22,19 @@
   // Without a graphics card, clouds of many points make the page stop: static/viewer.css shows a warning then.
   const gl = document.createElement("canvas").getContext("webgl");
   const renderer = gl?.getParameter(gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER);
-  root.toggleAttribute("data-kb-software", /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? ""));
+  const slow = /swiftshader|llvmpipe|software|basic render/i.test(renderer ?? "");
+  root.toggleAttribute("data-kb-software", slow);
   gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  // The status card says so, until its note is closed for good.
+  const NOTE = "kinboard-software";
+  let closed = "";
+  try { closed = localStorage.getItem(NOTE) ?? ""; } catch { /* see above */ }
+  root.toggleAttribute("data-kb-slow", slow && !closed);
+  addEventListener("click", (event) => {
+    if (!(event.target instanceof Element) || !event.target.closest("[data-slow-close]")) return;
+    root.removeAttribute("data-kb-slow");
+    try { localStorage.setItem(NOTE, "closed"); } catch { /* see above */ }
+  });
 
   /** Tell the service whether the system is dark, with the hidden check box. */
   function tell() {

@@ -67,8 +67,11 @@ ROUGH = """
 }
 """
 PLAIN = QUIET if PICTURES else QUIET + ROUGH
-# As after the first minute: the hints are closed.
-NO_HINTS = 'localStorage.setItem("kinboard-hints", "drag joint learn");'
+# As after the first minute: the hints are closed, and so is the note that the browser draws slowly.
+NO_HINTS = """
+localStorage.setItem("kinboard-hints", "drag joint learn");
+localStorage.setItem("kinboard-software", "closed");
+"""
 
 # What the console of a browser says beside errors of ours.
 EXPECTED = (
@@ -90,7 +93,13 @@ UNCHANGED = """() => {
 
 
 class Tab:
-    """One browser tab: actions on its controls, and readings of what it shows."""
+    """One browser tab: actions on its controls, and readings of what it shows.
+
+    Attributes:
+        scripts: what runs in the page first.
+    """
+
+    scripts = PLAIN + NO_HINTS
 
     def __init__(self, browser: Browser, address: str, width: int, height: int, touch: bool = False) -> None:
         self.touch = touch
@@ -100,7 +109,7 @@ class Tab:
 
     def _open(self) -> None:
         self.page = self._browser.new_page(viewport=self._size, has_touch=self.touch, is_mobile=self.touch)
-        self.page.add_init_script(PLAIN + NO_HINTS)
+        self.page.add_init_script(self.scripts)
         self.page.set_default_timeout(WAIT)
         expect.set_options(timeout=WAIT)
         self.errors: list[str] = []
@@ -109,7 +118,6 @@ class Tab:
         self.page.on("console", self._listen)
         self._arrive()
         expect(self.status).to_have_attribute("data-status", "hand")
-        self.dismiss_notice()
 
     def _listen(self, message: ConsoleMessage) -> None:
         """Keep what the page writes into the browser's console, but for what is expected there."""
@@ -124,13 +132,6 @@ class Tab:
         """Open a new page, with nothing in its storage."""
         self.page.close()
         self._open()
-
-    def dismiss_notice(self) -> None:
-        """Close viser's notice about software rendering, which a phone does not show."""
-        notice = self.page.locator("#webgl-software-rendering button")
-        expect(notice).to_have_count(1)
-        if notice.is_visible():
-            notice.click()
 
     def text(self) -> str:
         """The address and all texts and buttons of the page, as a screen reader has them."""

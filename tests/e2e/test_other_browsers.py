@@ -37,10 +37,7 @@ class Visit:
     def wait_for_arm(self) -> None:
         covered = "document.documentElement.dataset.kbCover"
         self.page.wait(f"document.querySelector('[data-status]') && !{covered} && viserPage.scene()")
-        self.page.run(
-            "window.kbErrors = []; addEventListener('error', (event) => kbErrors.push(event.message));"
-            "document.querySelector('#webgl-software-rendering button')?.click();"
-        )
+        self.page.run("window.kbErrors = []; addEventListener('error', (event) => kbErrors.push(event.message));")
 
     def row(self, label: str) -> str:
         """The line of a control."""

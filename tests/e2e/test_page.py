@@ -80,7 +80,6 @@ def test_the_page_follows_the_colours_of_the_system(tab: Tab) -> None:
     expect(root).to_have_attribute("data-mantine-color-scheme", "dark")
     expect(root).not_to_have_attribute("data-kb-cover", "dark")
     assert page.evaluate("window.covers") == ["dark"]
-    tab.dismiss_notice()
     tab.open("View")
     tab.choose("Page colours", "Light")
     expect(root).to_have_attribute("data-mantine-color-scheme", "light")
@@ -181,7 +180,6 @@ def test_the_panel_is_made_wider_at_its_edge(desktop: Tab) -> None:
     tab.page.locator("[data-dock-region-resize=right]").press("ArrowRight")
     tab.page.wait_for_function(f"Math.abs({width} - {before}) < 3")
     expect(tab.status).to_have_attribute("data-status", "hand")
-    tab.dismiss_notice()
 
 
 def test_the_panel_is_as_wide_as_the_window_allows_until_a_width_is_chosen(browser: Browser, address: str) -> None:

@@ -89,7 +89,6 @@ def is_kept(program: Tab) -> None:
     expect(rows).to_have_count(3)
     expect(rows.nth(1)).to_contain_text("above the part")
     program.wait_for_tool(at(ANGLES[1]), within=0.06)
-    program.dismiss_notice()
     page.locator("[data-program-do=clear]").click()
     expect(rows).to_have_count(0)
     page.get_by_role("button", name="Undo").click()

@@ -326,7 +326,6 @@ def test_an_arm_of_ones_own_is_typed_and_kept(tab: Tab) -> None:
     page.reload()
     expect(cell).to_have_value("2*125")
     tab.wait_for_tool(longer("250 mm"), within=0.06)
-    tab.dismiss_notice()
     page.go_back()
     tab.wait_for_tool(kin.fk(PIONEER, PIONEER.q_home)[:3, 3], within=0.06)
 

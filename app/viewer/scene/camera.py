@@ -27,7 +27,7 @@ from app.viewer.scene.viewpoints import (
     between,
     contains,
     distance_to_see,
-    place,
+    places,
     rightward,
 )
 from kin.transforms import Array
@@ -46,6 +46,7 @@ _LOWEST = 0.03  # least height of the camera above the floor, in these radii: fr
 _SMALL_PICTURE = 420  # pixels
 _ABOVE = 0.3  # room above a target for the number that is written there, in these radii
 _OUTLOOK = 5.0  # in these radii: a target farther away is not shown
+_FARTHEST_FIT = 12.0  # in these radii: what is drawn farther away is not fitted into the picture
 _SMALLEST = 0.01  # metres; viser's own limit of zooming in
 _INSIDE = 0.88  # share of the picture, in both directions, that contains the extra points: they have labels
 _RESIZED = 0.01  # relative change of the picture's narrow side that moves the camera
@@ -222,9 +223,9 @@ class VisitorCamera:
             self._glide = None
         self._send(self._aimed if share >= 1.0 else between(start, self._aimed, share))
 
-    def place(self, point: Array, length: float) -> tuple[float, float, float]:
-        """Where a point ``(3,)`` will be in the picture, and how long a length there; see `viewpoints`."""
-        return place(self._viewpoint, self._aspect, point, length)
+    def places(self, points: Array) -> Array:
+        """Where points ``(n, 3)`` will be in the picture, and how long a metre there; see `viewpoints.places`."""
+        return places(self._viewpoint, self._aspect, points)
 
     def rightward(self, start: Array, end: Array) -> bool:
         """Whether the end ``(3,)`` of a segment will be to the right of its start in the picture."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -62,6 +62,7 @@ class Chain:
     T_last_tool: Array
 
 
+@lru_cache(maxsize=64)
 def chain(robot: Robot) -> Chain:
     """The robot's rows regrouped into links."""
     links: list[Link] = []
@@ -108,6 +109,13 @@ def link_poses(robot: Robot, q: Array) -> Array:
         T = T @ link.T_parent_axis @ motion
         found[:, i + 1] = T
     return found
+
+
+def center_line(robot: Robot, q: Array) -> Array:
+    """Corners ``(k, 3)`` of the centre line of all links, base to tool, at a configuration ``(n,)``."""
+    poses = link_poses(robot, q[None])[0]
+    links = chain(robot).links
+    return np.vstack([link.path @ T[:3, :3].T + T[:3, 3] for link, T in zip(links, poses, strict=True)])
 
 
 def _steps(row: Joint, modified: bool) -> list[Array | None]:

@@ -46,15 +46,16 @@ def distance_to_see(viewpoint: Array, aspect: float, points: Array, share: float
     return float(((np.abs(seen[:, :2]) / (half * aspect, half)).max(axis=1) - ahead).max())
 
 
-def place(viewpoint: Array, aspect: float, point: Array, length: float) -> tuple[float, float, float]:
-    """Where a point ``(3,)`` is in the picture, to the right of and above the middle, and how long a length there.
+def places(viewpoint: Array, aspect: float, points: Array) -> Array:
+    """Where points ``(n, 3)`` are in the picture, and how long a metre is there: rows of x, y, length ``(n, 3)``.
 
-    The unit is half of the picture's narrow side, so that the place does not change with the picture's shape. A
-    point behind the camera is far outside.
+    x is to the right of, and y above, the middle. The unit is half of the picture's narrow side, so that a place
+    does not change with the picture's shape. A point behind the camera is far outside.
     """
-    x, y, depth = _seen(viewpoint, point[None])[0].tolist()
-    unit = max(depth, 1e-9) * math.tan(FOV / 2.0) * min(aspect, 1.0)
-    return x / unit, y / unit, length / unit
+    seen = _seen(viewpoint, points)
+    unit = np.maximum(seen[:, 2:], 1e-9) * math.tan(FOV / 2.0) * min(aspect, 1.0)
+    found: Array = np.hstack([seen[:, :2], np.ones((len(points), 1))]) / unit
+    return found
 
 
 def rightward(viewpoint: Array, start: Array, end: Array) -> bool:

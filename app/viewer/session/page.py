@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 
+import numpy as np
 import viser
 
 import kin
@@ -33,6 +34,7 @@ from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import READY, Notice, StatusLine
 from app.viewer.panel.theme import configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
+from app.viewer.scene.chain import center_line
 from app.viewer.session.actions.actions import Actions
 from app.viewer.session.actions.typed import BY_HAND
 from app.viewer.session.choices import ViewState
@@ -57,6 +59,8 @@ from app.viewer.viser_outbox import in_one_frame
 from kin import IKResult, Robot, Task
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS
+
+THICK = 2.5  # half the thickness of the widest housings, in thicknesses of the thickest link
 
 
 class VisitorPage(ShownArm, Worker):
@@ -334,14 +338,19 @@ class VisitorPage(ShownArm, Worker):
             self._actions.handle(key, value)
 
     def _show_hints(self) -> None:
-        """Tell ``static/hints.js`` where the gizmo is in the picture, and how long its arrows are there.
+        """Tell ``static/hints.js`` where gizmo and arm are in the picture.
 
-        Who may only look gets no hints.
+        Of the gizmo: its place, and how long its arrows are there. Of the arm: how thick it is there, and the
+        corners of its centre line. Who may only look gets no hints.
         """
-        gizmo = self.arm.scene.gizmo
-        x, y, length = self.camera.place(gizmo.position, gizmo.scale)
-        place = "" if self._looking else f"{x:.3f} {y:.3f} {length:.3f}"
-        update_html(self.panel.hints, render("panel/hints", place=place))
+        place = arm = ""
+        if not self._looking:
+            gizmo, shown = self.arm.scene.gizmo, self.arm.scene.body
+            line = np.vstack([gizmo.position, shown.mount.foot, center_line(self.arm.robot, self.arm.goal)])
+            (x, y, metre), *line = self.camera.places(line).tolist()
+            place = _numbers(x, y, metre * gizmo.scale)
+            arm = _numbers(metre * THICK * shown.size, *(value for point in line for value in point[:2]))
+        update_html(self.panel.hints, render("panel/hints", place=place, arm=arm))
 
     def _prepare(self) -> None:
         self._persistence.load()
@@ -414,3 +423,7 @@ class VisitorPage(ShownArm, Worker):
         return JointSliders(
             self.client.gui, folders, arm.robot, arm.goal, arm.locks, self.units, self.post, before
         )
+
+
+def _numbers(*values: float) -> str:
+    return " ".join(f"{value:.3f}" for value in values)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from page import save_picture
+from page import PLAIN, save_picture
 from playwright.sync_api import Browser, Page, expect
 from test_class import EXERCISE, Member
 
@@ -25,12 +25,14 @@ AT_REST = """(selectors) => {
   if (rest) delete window.kbBoxes;
   return rest;
 }"""
-BAR, SCENE, NOTICE, HINT = "[data-class-bar]", "canvas[data-engine]", "#webgl-software-rendering", ".kb-hint"
+BAR, SCENE, CARD, HINT = "[data-class-bar]", "canvas[data-engine]", "[data-status]", ".kb-hint"
 CORNER = 0.4  # of the picture's width, which a bar that lies over it takes at most
 
 
 class Student(Member):
-    """A student with a screen of any size, who is new: the notice and hints are not closed."""
+    """A student with a screen of any size, who is new: hints and notes are not closed."""
+
+    scripts = PLAIN
 
     def __init__(self, browser: Browser, address: str, code: str, alias: str, width: int, height: int) -> None:
         self._new_size = {"width": width, "height": height}
@@ -39,9 +41,6 @@ class Student(Member):
     def _open(self) -> None:
         self._size = self._new_size
         super()._open()
-        self.page.evaluate('localStorage.removeItem("kinboard-hints")')
-        self.page.reload()
-        expect(self.status).to_have_attribute("data-status", "hand")
 
 
 @pytest.fixture
@@ -78,11 +77,11 @@ def keeps_apart(student: Student, bar: str) -> None:
     """Wait until the bar is there, and the picture has made room for it; nothing lies on the bar."""
     page = student.page
     student.shows(bar)
-    page.wait_for_function(AT_REST, arg=[BAR, SCENE, NOTICE, HINT], polling=100)
+    page.wait_for_function(AT_REST, arg=[BAR, SCENE, CARD, HINT], polling=100)
     ours, scene = box(page, BAR), box(page, SCENE)
     assert ours is not None
     assert scene is not None
-    assert not overlap(ours, box(page, NOTICE)), "the notice lies on the bar"
+    assert not overlap(ours, box(page, CARD)), "the status card lies on the bar"
     assert not overlap(ours, box(page, HINT)), "a hint lies on the bar"
     middle = {"x": (ours["left"] + ours["right"]) / 2, "y": (ours["top"] + ours["bottom"]) / 2}
     assert page.evaluate(

@@ -18,7 +18,7 @@ from app.viewer.scene.viewpoints import (
     between,
     contains,
     distance_to_see,
-    place,
+    places,
     rightward,
 )
 
@@ -80,17 +80,17 @@ def test_the_way_between_viewpoints(
 def test_a_place_in_the_picture_is_measured_from_its_middle(aspect: float) -> None:
     viewpoint = from_side(DIRECTIONS["Front"])
     narrow = 4.0 * math.tan(FOV / 2) * min(aspect, 1.0)
-    assert np.allclose(place(viewpoint, aspect, np.zeros(3), narrow), [0.0, 0.0, 1.0])
-    assert np.allclose(place(viewpoint, aspect, np.array([0.0, narrow, 0.0]), 0.0), [1.0, 0.0, 0.0])
-    assert np.allclose(place(viewpoint, aspect, np.array([0.0, 0.0, narrow]), 0.0), [0.0, 1.0, 0.0])
-    x, y, _ = place(viewpoint, aspect, np.array([5.0, 0.1, 0.0]), 1.0)
-    assert max(abs(x), abs(y)) > 10.0, "behind the camera"
+    points = np.array([[0.0, 0.0, 0.0], [0.0, narrow, 0.0], [0.0, 0.0, narrow], [5.0, 0.1, 0.0]])
+    found = places(viewpoint, aspect, points)
+    assert np.allclose(found[:3, :2], [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    assert np.allclose(found[:3, 2] * narrow, 1.0)
+    assert np.abs(found[3, :2]).max() > 10.0, "behind the camera"
 
 
 @given(POINT, POINT, st.floats(0.0, 2.0 * math.pi), st.floats(-0.4, 1.5))
 def test_rightward_is_what_the_picture_shows(start: np.ndarray, end: np.ndarray, turn: float, rise: float) -> None:
     out = (math.cos(turn) * math.cos(rise), math.sin(turn) * math.cos(rise), math.sin(rise))
     viewpoint = from_side(out, 9.0)
-    left, right = (place(viewpoint, 1.5, point, 1.0)[0] for point in (start, end))
+    left, right = places(viewpoint, 1.5, np.array([start, end]))[:, 0]
     if abs(right - left) > 1e-9:
         assert rightward(viewpoint, start, end) == (right > left)
