@@ -150,8 +150,13 @@ class HeldResponse(Response):
     def _in_order(self) -> Iterator[bytes]:
         left = sum(map(len, self._pieces))
         while self._pieces:
-            piece = self._pieces.popleft()
-            for start in range(0, len(piece), SENT):
+            together = [self._pieces.popleft()]
+            size = len(together[0])
+            while self._pieces and size + len(self._pieces[0]) <= SENT:  # each call to send takes a while
+                together.append(self._pieces.popleft())
+                size += len(together[-1])
+            piece = b"".join(together)
+            for start in range(0, size, SENT):
                 yield piece[start : start + SENT]
             left -= len(piece)
             self._reservation.resize(left)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from functools import partial
+from collections.abc import Sequence
+from functools import cache, partial
 from typing import Annotated, Any, ClassVar
 from weakref import WeakValueDictionary
 
@@ -28,13 +29,14 @@ from app.api.schemas import (
 )
 from app.api.work import Deadline, computed
 from app.shared.answers.answer import Answer
-from app.shared.answers.ik import Brief, IkAnswer, ik_answer
+from app.shared.answers.ik import Brief, IkAnswer, WholeAnswers, ik_answer, ik_renewed
 from app.shared.metrics import SOLVE_SECONDS
 from app.shared.problems import FieldError
 from app.shared.settings import Settings
-from kin import IKOptions, Robot, Status, Task
+from kin import IKOptions, IKResult, Robot, Status, Task
 from kin.ik import branch_names, solve, solve_at_once
 from kin.ik.options import DEFAULTS
+from kin.ik.table import Table
 from kin.transforms import Array
 
 router = versioned("kinematics")
@@ -166,7 +168,7 @@ def _solve(
     count = len(body.target) if isinstance(body.target, list) else 1
     schemas.check_batch("target", count, settings)
     seeds = _seeds(robot, body, count, settings)
-    together = body.poses_of_all(body.target) if quick(names) and isinstance(body.target, list) else None
+    together = body.poses_of_all(body.target) if isinstance(body.target, list) else None
     if together is not None:
         return _solve_together(robot, body, names, together, seeds, deadline)
     targets, single = body.resolve_all(robot, body.target, settings, seeds)
@@ -175,10 +177,7 @@ def _solve(
 
     def answer(goal: Goal, seed: Array | None) -> IkAnswer | dict[str, Any]:
         deadline.check()
-        result = solve(robot, goal.T, options[goal.task], seed, goal.rounding)
-        if result.status is Status.SOLVED:
-            _ANSWERED[id(robot), goal.task] = robot
-        whole = ik_answer(result)
+        whole = _whole(robot, goal.task, solve(robot, goal.T, options[goal.task], seed, goal.rounding))
         return brief(whole, names) if names else whole
 
     def answers(some: slice) -> list[IkAnswer | dict[str, Any]]:
@@ -198,17 +197,35 @@ def _solve_together(
     seeds: list[Array | None],
     deadline: Deadline,
 ) -> Response:
-    """The fields of these names for poses ``(k, 4, 4)`` of one task, as far as possible by one compiled pass."""
+    """The answers to poses ``(k, 4, 4)`` of one task, as far as possible by one compiled pass."""
     task, T = goals
     options = body.options(task)
     given = None if body.q_seed is None else np.array(seeds)
+    whole = partial(_whole, robot, task)
 
-    def answers(some: slice) -> list[dict[str, Any]]:
-        near = None if given is None else given[some]
-        return briefly(robot, T[some], options, near, ik_answer, names, deadline.check)
+    @cache
+    def table() -> WholeAnswers[IkAnswer]:
+        return WholeAnswers(Table.of(robot, T, options, given, deadline.check), whole, ik_renewed)
 
+    def answers(some: slice) -> Sequence[IkAnswer | dict[str, Any]]:
+        if quick(names):
+            near = None if given is None else given[some]
+            return briefly(robot, T[some], options, near, whole, names, deadline.check)
+        found = table().of(some)
+        return [brief(each, names) for each in found] if names else found
+
+    size = size_of(robot, names) if quick(names) else _size(robot, options)
     with SOLVE_SECONDS.labels("rest").time():
-        return one_or_all(answers, Batch("target", len(T), False, size_of(robot, names)), deadline)
+        return one_or_all(
+            answers, Batch("target", len(T), False, size, "" if names else _advice(options)), deadline
+        )
+
+
+def _whole(robot: Robot, task: Task, result: IKResult) -> IkAnswer:
+    """The whole answer; the arm is remembered if this loaded what solves it."""
+    if result.status is Status.SOLVED:
+        _ANSWERED[id(robot), task] = robot
+    return ik_answer(result)
 
 
 def _size(robot: Robot, options: IKOptions) -> int:

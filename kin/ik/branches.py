@@ -81,10 +81,7 @@ def solve_branches(
     if code == APPROACH and "roll" in [parameter.name for parameter in redundancies]:
         x = fk(problem.robot, seed)[:3, 0]
         roll = math.atan2(float(T[:3, 1] @ x), float(T[:3, 0] @ x))
-    lower, upper = problem.lower, problem.upper
-    if not problem.respect:
-        # Limits that are ignored must not pull redundancy parameters away from the seed either.
-        lower, upper = np.full_like(lower, -_NO_LIMIT), np.full_like(upper, _NO_LIMIT)
+    lower, upper = limits_of(problem)
     found = closed_form.solve(SolverInput(T, code, values, problem.respect, seed, lower, upper, roll))
     q = found.q.copy()
     k = len(q)
@@ -94,6 +91,17 @@ def solve_branches(
         q, rows.stats, rows.closed, rows.good, rows.order[:count].tolist(), redundancies, found.values,
         list(found.arcs), found.gap, found.obstacle, found.completeness, found.further,
     )  # fmt: skip
+
+
+def limits_of(problem: IKProblem) -> tuple[Array, Array]:
+    """The limits ``(n,)`` that a closed form keeps.
+
+    Limits that are ignored must not pull redundancy parameters away from the seed either.
+    """
+    lower, upper = problem.lower, problem.upper
+    if problem.respect:
+        return lower, upper
+    return np.full_like(lower, -_NO_LIMIT), np.full_like(upper, _NO_LIMIT)
 
 
 def measure(

@@ -24,16 +24,18 @@ from app.api.schemas import POST_REFUSALS, example, reply, settings_of
 from app.api.work import Deadline, DeadlineDep
 from app.api.workspace.streaming import ComputedResponse
 from app.shared.answers.answer import Answer, as_json
-from app.shared.answers.ik import Brief, ReachableAnswer, reachable_answer
+from app.shared.answers.ik import Brief, ReachableAnswer, WholeAnswers, reachable_answer, reachable_renewed
 from app.shared.problems import Problem
 from kin import IKOptions, Robot, Task
 from kin.ik import solve
+from kin.ik.table import Table
 from kin.transforms import Array
 
 router = versioned("workspace")
 
 # Targets between two checks of the deadline and the client: one out of reach may take some ten milliseconds.
 AT_ONCE = 16
+Answers = Callable[[slice], Sequence[object]]
 
 EXAMPLES = {
     "points": example(
@@ -95,21 +97,21 @@ def reachable(
     and the computation ends when the client leaves.
     """
     names, settings = names_of(fields), settings_of(request)
-    together = None
     with deadline.turn:
-        if quick(names) and isinstance(body.target, list):
+        together = None
+        if isinstance(body.target, list):
             schemas.check_batch("target", len(body.target), settings)
             together = body.poses_of_all(body.target)
-        if together is None:
+        if together is not None:
+            answers = _answers_together(robot, body, names, together, deadline)
+            count, at_once = len(together[1]), MOST_AT_ONCE if quick(names) else AT_ONCE
+        else:
             targets, single = body.resolve_all(robot, body.target, settings)
+            answers = partial(_answers, robot, body, names, targets)
             if single:
-                return reply(_answers(robot, body, names, targets)[0])
-    if together is None:
-        pieces = _pieces(partial(_answers, robot, body, names), targets, AT_ONCE, deadline)
-    else:
-        task, T = together
-        answers = partial(_answers_together, robot, body, names, task, deadline)
-        pieces = _pieces(answers, T, MOST_AT_ONCE, deadline)
+                return reply(answers(slice(0, 1))[0])
+            count, at_once = len(targets), AT_ONCE
+    pieces = _pieces(answers, count, at_once, deadline)
     # Invalid options show in the first piece, while the status of the response can still be set.
     pieces = _resumed(next(pieces), pieces)
     return ComputedResponse(pieces, "reachable", "application/json", place=deadline.place)
@@ -120,31 +122,38 @@ def _options(body: ReachableRequest, task: Task) -> IKOptions:
 
 
 def _answers(
-    robot: Robot, body: ReachableRequest, names: tuple[str, ...], targets: list[Goal]
+    robot: Robot, body: ReachableRequest, names: tuple[str, ...], targets: list[Goal], some: slice
 ) -> list[ReachableAnswer | dict[str, Any]]:
-    options = {task: _options(body, task) for task in {goal.task for goal in targets}}
-    whole = [
-        reachable_answer(solve(robot, goal.T, options[goal.task], rounding=goal.rounding)) for goal in targets
-    ]
+    goals = targets[some]
+    options = {task: _options(body, task) for task in {goal.task for goal in goals}}
+    whole = [reachable_answer(solve(robot, goal.T, options[goal.task], rounding=goal.rounding)) for goal in goals]
     return [brief(each, names) for each in whole] if names else [*whole]
 
 
 def _answers_together(
-    robot: Robot, body: ReachableRequest, names: tuple[str, ...], task: Task, deadline: Deadline, T: Array
-) -> list[dict[str, Any]]:
-    """Of poses ``(k, 4, 4)`` of one task, as far as possible by one compiled pass."""
-    return briefly(robot, T, _options(body, task), None, reachable_answer, names, deadline.check)
+    robot: Robot, body: ReachableRequest, names: tuple[str, ...], goals: tuple[Task, Array], deadline: Deadline
+) -> Answers:
+    """Those of poses ``(k, 4, 4)`` of one task, as far as possible by one compiled pass."""
+    task, T = goals
+    options = _options(body, task)
+
+    def briefs(some: slice) -> list[dict[str, Any]]:
+        return briefly(robot, T[some], options, None, reachable_answer, names, deadline.check)
+
+    if quick(names):
+        return briefs
+    table = Table.of(robot, T, options, stop=deadline.check)
+    whole = WholeAnswers(table, reachable_answer, reachable_renewed)
+    return lambda some: [brief(each, names) for each in whole.of(some)] if names else whole.of(some)
 
 
-def _pieces(
-    answers: Callable[[Any], Sequence[object]], targets: Sequence[Goal] | Array, at_once: int, deadline: Deadline
-) -> Generator[bytes]:
+def _pieces(answers: Answers, count: int, at_once: int, deadline: Deadline) -> Generator[bytes]:
     """``{"results": [...]}`` in pieces, with the problem if not all were computed in time."""
-    for start in range(0, len(targets), at_once):
+    for start in range(0, count, at_once):
         try:
             deadline.check()
             with deadline.turn:
-                piece = as_json(answers(targets[start : start + at_once]))[1:-1]
+                piece = as_json(answers(slice(start, start + at_once)))[1:-1]
         except ProblemError as error:
             if not start:
                 raise

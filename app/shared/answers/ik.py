@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from copy import copy
 from functools import lru_cache
-from typing import Annotated, Literal
+from typing import Annotated, Generic, Literal, TypeVar
 
 from msgspec import UNSET, UnsetType
 
@@ -13,6 +15,7 @@ from kin import IKResult, PathResult, Status
 from kin.ik.details import Solved
 from kin.ik.messages import explain
 from kin.ik.results import Cause
+from kin.ik.table import Table
 from kin.solvers.contract import Completeness
 from kin.tolerances import TOLERANCES
 from kin.units import DEFAULT_UNITS
@@ -182,6 +185,60 @@ def reachable_answer(result: IKResult) -> ReachableAnswer:
         position_error=None if best is None else best.position_error,
         rotation_error=None if best is None else best.rotation_error,
     )
+
+
+Whole = TypeVar("Whole", bound=Answer)
+# Joint values, branch and figures of a solution, as in `kin.ik.table.Table`.
+Row = tuple[list[float], int, list[float]]
+Renew = Callable[[Whole, Iterator[Row], tuple[str, ...]], Whole]
+
+
+class WholeAnswers(Generic[Whole]):
+    """Whole answers to the targets of a table.
+
+    One of each kind is made from its result. The others are copies of it with other numbers.
+
+    Args:
+        table: the targets, and how their answers differ.
+        whole: makes an answer from a result.
+        renewed: makes one of another of the same kind, the solutions, and the names of all branches.
+    """
+
+    def __init__(self, table: Table, whole: Callable[[IKResult], Whole], renewed: Renew[Whole]) -> None:
+        self._table, self._whole, self._renewed = table, whole, renewed
+        self._first: dict[int, Whole] = {}
+
+    def of(self, some: slice) -> list[Whole]:
+        """The answers to some targets."""
+        table, first, renewed, branches = self._table, self._first, self._renewed, self._table.branches
+        parts = table.kinds, table.count, table.q, table.branch, table.figures
+        found = []
+        columns = zip(*(part[some].tolist() for part in parts), strict=True)
+        for i, (kind, count, q, branch, figures) in enumerate(columns, some.start):
+            if kind in first:
+                found.append(renewed(first[kind], zip(q[:count], branch, figures, strict=False), branches))
+                continue
+            found.append(self._whole(table.result(i)))
+            if kind >= 0:
+                first[kind] = found[-1]
+        return found
+
+
+def ik_renewed(answer: IkAnswer, rows: Iterator[Row], branches: tuple[str, ...]) -> IkAnswer:
+    """The answer with other solutions. All its other parts are shared, and only read."""
+    renewed = copy(answer)
+    renewed.solutions = [
+        Solution(q, branches[branch], position, rotation, overrun == 0.0, distance, [], None)
+        for q, branch, (position, rotation, distance, overrun, _) in rows
+    ]
+    return renewed
+
+
+def reachable_renewed(answer: ReachableAnswer, rows: Iterator[Row], _branches: tuple[str, ...]) -> ReachableAnswer:
+    """The answer with another configuration."""
+    renewed = copy(answer)
+    renewed.q, _branch, (renewed.position_error, renewed.rotation_error, *_rest) = next(rows)
+    return renewed
 
 
 class Brief(Answer):

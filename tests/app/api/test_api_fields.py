@@ -54,6 +54,21 @@ def test_few_fields_of_many_targets_are_those_of_whole_answers(client, robot_id,
     assert {each["status"] for each in quick} > {"solved"}
 
 
+@pytest.mark.parametrize("given", [{}, {"max_solutions": 1}, {"respect_limits": False, "max_solutions": 3}])
+@pytest.mark.parametrize("robot_id", ["pioneer5", "ur5", "iiwa14"])
+@pytest.mark.parametrize("form", ["matrix", "approach"])
+def test_answers_to_a_list_are_those_to_single_targets_to_the_byte(client, robot_id, form, given):
+    robot = kin.get_robot(robot_id)
+    T = poses(robot, 12)
+    T[3] = kin.fk(robot, np.zeros(robot.n))  # most arms are singular there
+    targets = [FORMS[form](each) for each in T]
+    for what, options in (("ik", given), ("reachable", {})):
+        path = f"/api/v1/robots/{robot_id}/{what}"
+        many = client.post(path, json={"target": targets, **options})
+        single = [client.post(path, json={"target": each, **options}).content for each in targets]
+        assert many.content == b'{"results":[' + b",".join(single) + b"]}"
+
+
 @pytest.mark.parametrize("robot_id", ["pioneer5", "ur5"])
 def test_few_fields_of_reachable_are_those_of_whole_answers(client, robot_id):
     robot = kin.get_robot(robot_id)
