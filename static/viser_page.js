@@ -28,7 +28,7 @@ const viserPage = (() => {
     messages: "div:has(> [data-answers]) + div input", // the hidden field behind our hidden HTML
   };
   // What viser calls, and how often it has since this page was loaded.
-  const HOOKS = { readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0, reportCamera: 0, writeHtml: 0 };
+  const HOOKS = { readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0, reportCamera: 0, writeHtml: 0, hear: 0 };
 
   // WebKit on Linux names the locale C as a language. viser's script would end there: no Intl knows it.
   const known = (tag) => { try { return Intl.getCanonicalLocales(tag).length > 0; } catch { return false; } };
@@ -138,8 +138,23 @@ const viserPage = (() => {
   let link = null;
   let filled = ""; // the field, as it was filled last
   const cameraWatchers = [];
+  const htmlWatchers = new Map(); // what HTML of the panel begins with → what to call
+  const workers = new WeakSet(); // that are listened to
+  function hear({ data }) {
+    if (!Array.isArray(data?.messages)) return;
+    HOOKS.hear++;
+    for (const { type: kind, props, updates } of data.messages) {
+      const html = kind === "GuiHtmlMessage" ? props.content : kind === "GuiUpdateMessage" ? updates.content : null;
+      if (typeof html !== "string") continue;
+      for (const [start, act] of htmlWatchers) if (html.startsWith(start)) act(html);
+    }
+  }
   const { postMessage } = Worker.prototype;
   Worker.prototype.postMessage = function (data, ...rest) {
+    if (!workers.has(this)) {
+      workers.add(this);
+      this.addEventListener("message", hear);
+    }
     const change = data?.type === "send" && data.message?.type === "GuiUpdateMessage" ? data.message : null;
     if (filled && change?.updates?.value === filled) {
       HOOKS.sendToWorker++;
@@ -368,6 +383,8 @@ const viserPage = (() => {
     watch,
     /** Call `act` with the camera's orientation (w, x, y, z) in the world frame when viser reports it. */
     watchCamera: (act) => { cameraWatchers.push(act); },
+    /** Call `act` with HTML of the panel that begins with `start`, when it comes: the panel itself may be folded away. */
+    watchHtml: (start, act) => { htmlWatchers.set(start, act); },
     /** Call `act` when the value of a slider changes; `thumb` is what `thumbOf` returns. */
     watchValue: (thumb, act) => { valueWatchers.set(thumb, act); },
 

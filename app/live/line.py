@@ -22,7 +22,7 @@ from kin import Robot
 VALUES: Final = ("q", "target", "result", "contacts", "program")  # what a program may subscribe to
 MOVES, DRAWS = EVENTS = ("live", "drawn")  # what a page is to take: what undo restores, and what it does not
 MERGED: Final = "draw"  # of this kind the newest value of each name is kept
-QUIET: Final = frozenset({"measured", "draw", "clear"})  # changes nothing that undo restores
+QUIET: Final = frozenset({"drives", "measured", "draw", "clear"})  # changes nothing that undo restores
 LETTERS: Final = 64  # answers that may wait for a program; older ones are dropped
 REVOKED: Final = "The page has withdrawn the code."
 LEFT: Final = "The page was closed."
@@ -141,7 +141,7 @@ class Line:
             if self._program is not program:
                 return
             self._program = None
-            self._parcels[DRAWS] = Parcel({"clear": True, "measured": None})
+            self._parcels[DRAWS] = Parcel({"drives": None, "clear": True, "measured": None})
         self._post(DRAWS, None)
 
     def send(self, values: Mapping[str, Any], number: int | None = None) -> None:

@@ -140,6 +140,9 @@ class Stage(Protocol):
     def show_legend(self, html: str) -> None:
         """Say what is drawn in the scene, on whatever tab; "" removes the legend."""
 
+    def show_driven(self, name: str) -> None:
+        """Put a frame around the whole page: a program drives something of this name with it; "" removes it."""
+
     def show_joints(self, folder: viser.GuiFolderHandle | None) -> None:
         """Show the joint sliders in this folder as well; None: in the tab Move only."""
 

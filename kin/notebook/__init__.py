@@ -57,7 +57,13 @@ def show(
 
 
 def connect(
-    address: str, code: str, *, name: str | None = None, token: str | None = None, rate: float = 30.0
+    address: str,
+    code: str,
+    *,
+    name: str | None = None,
+    token: str | None = None,
+    rate: float = 30.0,
+    drives: str | None = None,
 ) -> Any:
     """Connect this program to a page of the viewer: move its arm, and hear what is done there.
 
@@ -67,6 +73,8 @@ def connect(
         name: of this program, which the page shows; None: the name of its file.
         token: the service's access token, if it needs one.
         rate: how often a second the page reports what it shows, at most (0.1 to 60).
+        drives: what this program moves, such as ``"SO-101 at /dev/ttyACM0"``: the page has a red frame with this
+            name as long as the program is connected, or until ``page.drives = None``. None: it moves nothing.
 
     Returns:
         The page. Assign ``q``, ``target``, ``measured`` or ``robot``, read ``q``, ``target``, ``result``,
@@ -76,7 +84,7 @@ def connect(
         KinematicsError: there is no service or no such page, another program is connected, or the service is not
             installed here.
     """
-    return _service("live.client", "connect").Page(address, code, name, token, rate)
+    return _service("live.client", "connect").Page(address, code, name, token, rate, drives)
 
 
 def _service(module: str, function: str) -> Any:

@@ -33,14 +33,14 @@ class BarePage:
 
     Attributes:
         sent: the kinds of the messages to the browser.
-        notices, legend, poses: what the feature has said, and where it has sent the arm.
+        notices, legend, driven, poses: what the feature has said, and where it has sent the arm.
     """
 
     def __init__(self, server: viser.ViserServer, robot: kin.Robot) -> None:
         self.client = SimpleNamespace(gui=server.gui, scene=server.scene, camera=_camera(), client_id=0)
         self.store, self.units, self.dark, self.frame = STORE, DEFAULT_UNITS, False, 1 / 30
         self.own: Any = None
-        self.legend, self.translucent = "", False
+        self.legend, self.driven, self.translucent = "", "", False
         self.notices: list[Any] = []
         self.views: list[tuple[Any, ...]] = []
         self.events: list[tuple[Hashable, object]] = []
@@ -72,6 +72,9 @@ class BarePage:
 
     def show_legend(self, html: str) -> None:
         self.legend = html
+
+    def show_driven(self, name: str) -> None:
+        self.driven = name
 
     def see_through(self, on: bool, gizmo: bool = False) -> None:
         self.translucent = on

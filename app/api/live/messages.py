@@ -132,6 +132,11 @@ class LiveMessage(Body):
         description="Where a real arm is, drawn as a ghost beside the commanded one; null removes it. It may be "
         "outside the limits.",
     )
+    drives: _Name | None = Field(
+        None,
+        description="What the program moves beside the page, such as `SO-101 at /dev/ttyACM0`: the page has a red "
+        "frame with this name until the program leaves, or says null.",
+    )
     clear: Annotated[bool, Field(strict=True)] | None = Field(
         None, description="true: remove everything that the program has drawn, before `draw`."
     )
@@ -202,6 +207,8 @@ def read(text: str, robot: Robot, store: Store) -> Message:
         values["target"] = _target(body.target)
     if body.play is not None:
         values["play"] = body.play
+    if "drives" in given:
+        values["drives"] = None if body.drives is None else _printable(body.drives)
     if body.clear:
         values["clear"] = True
     if body.draw is not None:
@@ -210,6 +217,14 @@ def read(text: str, robot: Robot, store: Store) -> Message:
         measured = body.measured
         values["measured"] = None if measured is None else configuration(robot, measured, "measured")
     return Message(body.id, body.subscribe, values)
+
+
+def _printable(name: str) -> str:
+    """A name as the page shows it; raises 422 for one in which there is nothing to be seen."""
+    found = "".join(c for c in " ".join(name.split()) if c.isprintable())
+    if not found:
+        raise invalid(FieldError(field="drives", value=show(name), expected="a name that can be read, or null"))
+    return found
 
 
 def configuration(robot: Robot, q: list[float], field: str, within: bool = False) -> Array:

@@ -50,16 +50,24 @@ class Page:
     Args:
         address, code, name, token: as for `kin.connect`.
         rate: how often a second the page is to report what it shows, at most.
+        drives: see there.
     """
 
     def __init__(
-        self, address: str, code: str, name: str | None = None, token: str | None = None, rate: float = RATE
+        self,
+        address: str,
+        code: str,
+        name: str | None = None,
+        token: str | None = None,
+        rate: float = RATE,
+        drives: str | None = None,
     ) -> None:
         self._lock = threading.Condition()
         self._values: dict[str, Any] = {}
         self._sent: int | None = None  # number of the newest configuration that is not answered
         self._refused: RefusedError | None = None
         self._measured: Array | None = None
+        self._drives: str | None = None
         self._rate = rate
         self._readers: list[_Reader] = []
         self._robot: Robot
@@ -70,6 +78,12 @@ class Page:
             if not self._lock.wait_for(lambda: "q" in self._values or bool(self._connection.ended), TIMEOUT):
                 self._connection.close()
                 raise KinematicsError("the page does not say what it shows")
+        if drives is not None:
+            try:
+                self.drives = drives
+            except KinematicsError:
+                self._connection.close()
+                raise
 
     # What it shows
 
@@ -124,6 +138,20 @@ class Page:
         q = None if value is None else self._robot.check_q(value, "measured")
         self._connection.stream(measured=None if q is None else q.tolist())
         self._measured = q
+
+    @property
+    def drives(self) -> str | None:
+        """What this program moves, such as ``"SO-101 at /dev/ttyACM0"``; None: nothing.
+
+        Assigning returns when the page has its red frame with this name, or has it no more. The frame goes with
+        the connection, and comes back with it.
+        """
+        return self._drives
+
+    @drives.setter
+    def drives(self, name: str | None) -> None:
+        self._ask(drives=name)
+        self._drives = name
 
     @property
     def target(self) -> Array | None:
@@ -245,6 +273,8 @@ class Page:
     def _beginning(self) -> list[Message]:
         """What is sent after each connection."""
         found: list[Message] = [{"subscribe": {"values": list(VALUES), "rate": self._rate}}]
+        if self._drives is not None:
+            found.append({"drives": self._drives})
         if self._measured is not None:
             found.append({"measured": self._measured.tolist()})
         return found + [{"draw": {name: drawn}} for name, drawn in self.draw.shown.items()]

@@ -70,6 +70,7 @@ _SCRIPTS = (
     b"axes",
     b"drawer",
     b"hints",
+    b"driven",
 )
 _STYLES = (b"viewer", b"robot", b"program", b"class_tab", b"layout", b"drawer", b"hints")
 _OURS = b"".join(

@@ -62,6 +62,8 @@ class Connect(DeclaredFeature[NoSettings, ConnectFacts]):
     def use(self, values: Mapping[str, Any]) -> None:
         """Take what the program draws and measures; raises `kin.InputError`."""
         self.wake()
+        if "drives" in values:
+            self.stage.show_driven(values["drives"] or "")
         if "measured" in values:
             measured = values["measured"]
             if measured is not None:
@@ -141,4 +143,5 @@ class Connect(DeclaredFeature[NoSettings, ConnectFacts]):
         """Withdraw the code, and remove what the program has drawn."""
         self.stage.door.close()
         self._drawings, self._measured, self._was = {}, None, ""
+        self.stage.show_driven("")
         self.stage.notify(Notice("hand", "The code is withdrawn", "No program can move this page with it."))

@@ -42,6 +42,7 @@ class Panel:
         learn: the tab for lessons.
         tabs: the features' tabs.
         legend: what a lesson draws in the scene; below the tabs, so that it stays when another tab is opened.
+        driven: what a program drives with the page, for ``static/driven.js``.
         hints: where the hints of the first minute are shown in the scene.
         sheet: the page to print of a worksheet, hidden.
     """
@@ -73,6 +74,7 @@ class Panel:
             self.jog = JogPad(gui, robot)
             self.obstacles = gui.add_folder("Obstacles", expand_by_default=False)
         self.legend = gui.add_html("")
+        self.driven = gui.add_html(render("live/driven", name=""))
         self.hints = gui.add_html("")
         self.sheet = gui.add_html("")
         self.learn = group.add_tab("Learn")

@@ -169,6 +169,9 @@ class VisitorPage(ShownArm, Worker):
     def show_legend(self, html: str) -> None:
         update_html(self.panel.legend, html)
 
+    def show_driven(self, name: str) -> None:
+        update_html(self.panel.driven, render("live/driven", name=name))
+
     def show_joints(self, folder: viser.GuiFolderHandle | None) -> None:
         self._more_joints = folder
         self.renew_sliders()

@@ -68,6 +68,27 @@ def test_a_target_is_answered_when_it_has_been_assigned(page, arm):
     assert arm.target[:3, 3].tolist() == [9.0, 0.0, 0.0]
 
 
+def test_what_is_driven_is_shown_as_long_as_the_program_is_there(viewer, page, code):
+    address = f"http://127.0.0.1:{viewer}"
+    with kin.connect(address, code, drives="SO-101 at /dev/ttyACM0") as arm:
+        page.wait(lambda: 'data-driven="SO-101 at /dev/ttyACM0"' in page.html)
+        assert arm.drives == "SO-101 at /dev/ttyACM0"
+        arm.drives = None
+        page.wait(lambda: 'data-driven=""' in page.html)
+        arm.drives = "SO-101"
+        arm._connection._socket.socket.shutdown(2)  # the network fails
+        page.wait(lambda: 'data-driven=""' in page.html)
+        page.wait(lambda: 'data-driven="SO-101"' in page.html)
+        with pytest.raises(RefusedError, match="drives"):
+            arm.drives = "x" * 61
+        assert arm.drives == "SO-101"
+    page.wait(lambda: 'data-driven=""' in page.html)
+    with pytest.raises(RefusedError, match="drives"):
+        kin.connect(address, code, drives="")
+    with kin.connect(address, code):
+        pass  # the one that was refused has left
+
+
 def test_a_fast_program_ends_where_it_says(page, arm):
     """Ten thousand a second: no error, and the last one is on show."""
     began = time.monotonic()

@@ -89,6 +89,12 @@ def press(page: FakeBrowser, label: str) -> None:
     page.send("GuiUpdateMessage", uuid=page.element(label), updates={"value": True})
 
 
+def driven(page: FakeBrowser) -> str:
+    """What the page says that it drives."""
+    (name,) = re.findall(r'<div hidden data-driven="([^"]*)">', page.html)
+    return str(name)
+
+
 def undo(page: FakeBrowser) -> str:
     return str(page.script["undo"])
 
@@ -256,6 +262,36 @@ def test_no_link_holds_a_code(page, program):
     stored = page.stored()
     assert program.code.replace("-", "") not in stored
     assert "secret" not in stored
+
+
+def test_what_a_program_drives_is_said_until_it_stops_or_leaves(viewer, page, program):
+    assert driven(page) == ""
+    program.do(drives="SO-101 at <ttyACM0>")
+    page.wait(lambda: driven(page) == "SO-101 at &lt;ttyACM0&gt;")
+    assert "nothing here is a safety function" in page.html
+    for wrong in ("", "x" * 61, " \u200b ", 7, ["SO-101"]):
+        (error,) = program.refused(drives=wrong)["errors"]
+        assert error["field"] == "drives"
+    assert driven(page) == "SO-101 at &lt;ttyACM0&gt;", "a message that is refused changes nothing"
+    program.do(robot="scara", q=[0.1, 0.2, 0.1, 0.0])
+    page.wait(lambda: undo(page) == "Connected program")
+    page.say("undo")
+    page.wait(lambda: undo(page) != "Connected program")
+    assert driven(page), "nothing else ends it"
+    program.do(drives=None)
+    page.wait(lambda: driven(page) == "")
+    assert "safety function" not in page.html
+    program.do(drives="SO-101")
+    page.wait(lambda: driven(page) == "SO-101")
+    program.socket.close()
+    page.wait(lambda: driven(page) == "")
+
+
+def test_the_code_that_is_withdrawn_ends_what_is_driven(page, program):
+    program.do(drives="SO-101")
+    page.wait(lambda: driven(page) == "SO-101")
+    press(page, "Withdraw the code")
+    page.wait(lambda: driven(page) == "")
 
 
 def test_the_example_of_the_documents_runs(viewer, page, program, capsys):

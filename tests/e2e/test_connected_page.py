@@ -1,0 +1,112 @@
+"""A page that a program drives something with has a red frame, in words too, wherever its panel is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from page import Tab
+from playwright.sync_api import expect
+
+import kin
+
+pytestmark = pytest.mark.browser
+
+WORDS = "Drives: SO-101 at /dev/ttyACM0 · nothing here is a safety function"
+# The frame is at the edges of the page, its words are within the page, and nothing lies over them.
+SEEN = """() => {
+  const frame = document.getElementById("kb-driven"), words = frame.querySelector("p");
+  const style = getComputedStyle(frame), box = frame.getBoundingClientRect(), text = words.getBoundingClientRect();
+  const shown = [...words.querySelectorAll("b, span")], parts = shown.map((part) => part.getBoundingClientRect());
+  frame.style.pointerEvents = "auto"; // what lies over it would be found in its place
+  const over = parts.map(({ x, y, width, height }) => document.elementFromPoint(x + width / 2, y + height / 2));
+  frame.style.pointerEvents = "";
+  return {
+    covers: [box.left, box.top, box.right - innerWidth, box.bottom - innerHeight],
+    width: style.borderLeftWidth, color: style.borderLeftColor,
+    inside: parts.every(({ left, right, top, bottom }) =>
+      left >= 0 && right <= innerWidth && top >= 0 && bottom <= text.bottom),
+    seen: over.every((node) => words.contains(node)),
+    cut: shown.some((part) => part.scrollWidth > part.clientWidth + 1),
+    lets_through: document.elementFromPoint(2, innerHeight / 2) !== frame,
+  };
+}"""
+
+
+@pytest.fixture
+def driving(tab: Tab, address: str) -> Iterator[Any]:
+    """A program that is connected to the desktop page, and drives something."""
+    yield from connected(tab, address)
+
+
+def connected(tab: Tab, address: str) -> Iterator[Any]:
+    tab.open("Program")
+    tab.page.get_by_role("button", name="Connect a program").click()
+    code = tab.page.locator("[data-live-code]").inner_text()
+    with kin.connect(address, code, name="arm.py", drives="SO-101 at /dev/ttyACM0") as arm:
+        yield arm
+    tab.open("Program")
+    withdraw = tab.page.get_by_role("button", name="Withdraw the code")
+    withdraw.click()
+    expect(withdraw).to_have_count(0)
+
+
+def assert_framed(tab: Tab) -> None:
+    frame = tab.page.locator("#kb-driven")
+    expect(frame).to_have_text(WORDS)
+    seen = tab.page.evaluate(SEEN)
+    assert seen.pop("width") >= "4px"
+    assert seen == {
+        "covers": [0, 0, 0, 0],
+        "color": "rgb(200, 30, 30)",
+        "inside": True,
+        "seen": True,
+        "cut": False,
+        "lets_through": True,
+    }
+
+
+def test_the_frame_is_there_as_long_as_something_is_driven(tab: Tab, driving: Any) -> None:
+    frame = tab.page.locator("#kb-driven")
+    assert_framed(tab)
+    tab.open("Move")
+    assert_framed(tab)
+    tab.screenshot("driven")
+    status = tab.page.locator("[data-status]").bounding_box()
+    words = frame.locator("p").bounding_box()
+    assert status is not None
+    assert words is not None
+    assert status["y"] >= words["y"] + words["height"], "the status card makes way"
+    driving.drives = None
+    expect(frame).to_be_hidden()
+    driving.drives = "SO-101 at /dev/ttyACM0"
+    assert_framed(tab)
+    driving.close()
+    expect(frame).to_be_hidden()
+
+
+def test_the_frame_stays_and_goes_while_the_panel_is_folded_away(tab: Tab, driving: Any) -> None:
+    frame = tab.page.locator("#kb-driven")
+    tab.page.get_by_label("Collapse panel area").or_(tab.page.get_by_label("Collapse column")).first.click()
+    expect(tab.page.locator("[data-status]")).to_have_count(0)
+    assert_framed(tab)
+    driving.drives = None
+    expect(frame).to_be_hidden()
+    driving.drives = "SO-101 at /dev/ttyACM0"
+    assert_framed(tab)
+    tab.page.get_by_label("Expand").first.click()
+    expect(tab.page.locator("[data-status]")).to_be_visible()
+    assert_framed(tab)
+
+
+def test_the_words_fit_a_phone(phone: Tab, address: str) -> None:
+    phone.show(kin.get_robot("pioneer5"))
+    for arm in connected(phone, address):
+        assert_framed(phone)
+        phone.screenshot("driven-phone")
+        arm.drives = "x" * 60
+        expect(phone.page.locator("#kb-driven")).to_contain_text("x" * 60)
+        seen = phone.page.evaluate(SEEN)
+        assert seen["inside"]
+        assert seen["seen"]
