@@ -34,6 +34,8 @@ wrong one, with the answer as the value of a joint. What is `withheld` is nowher
 of the library that shows what this one cannot; a button changes to it. An `estimate` is asked before the question:
 it is a choice that looking answers.
 
+An `example` is worked on an arm of its own: :mod:`app.exercises.worked`.
+
 Texts may be lists of alternatives with `when`, and so may questions. Steps and questions of the check with `when`
 are left out where it does not hold.
 """
@@ -52,6 +54,7 @@ from app.exercises.fields import ExerciseFileError, Fields, Words, text_of, toml
 from app.exercises.kinds import KINDS
 from app.exercises.lessons import LESSONS
 from app.exercises.variant import Facts
+from app.exercises.worked import WorkedText, read_worked
 
 _FACT = re.compile(r"([a-z][a-z0-9_]*)(?:\([a-z0-9_, ]+\))?")
 MOST_JOINTS = 12
@@ -102,6 +105,7 @@ class LessonText:
         facts: what each fact is, by its name.
         words: names for texts that depend on facts.
         check: each question as alternatives.
+        example: what is shown before anything is asked.
     """
 
     file: str
@@ -110,6 +114,7 @@ class LessonText:
     words: Mapping[str, Words]
     steps: tuple[StepText, ...]
     check: tuple[tuple[QuestionText, ...], ...]
+    example: WorkedText
 
     @property
     def poses(self) -> frozenset[str]:
@@ -137,7 +142,8 @@ def parse_lesson(text: str, file: str = "lesson") -> LessonText:
     fields.get("facts"), fields.get("words")
     steps = tuple(_step(item) for item in fields.tables("steps", 1))
     check = tuple(_alternatives(item) for item in fields.tables("check", 1))
-    lesson = LessonText(file, fields.words("goal"), facts, words, steps, check)
+    example = read_worked(fields.sub("example"))
+    lesson = LessonText(file, fields.words("goal"), facts, words, steps, check, example)
     fields.done()
     known = frozenset(facts) | frozenset(Facts(one := kin.get_robot("ur5"), one.q_home))
     for expression in found:

@@ -143,6 +143,15 @@ class Stage(Protocol):
     def show_driven(self, name: str) -> None:
         """Put a frame around the whole page: a program drives something of this name with it; "" removes it."""
 
+    def show_alone(self, names: str, notice: Notice) -> None:
+        """Hide everything in the scene but nodes whose names begin with `names`, and show this in the status line.
+
+        What is hidden stays as it is, and goes on; so does the status.
+        """
+
+    def show_all(self) -> None:
+        """Show again what `show_alone` has hidden."""
+
     def show_joints(self, folder: viser.GuiFolderHandle | None) -> None:
         """Show the joint sliders in this folder as well; None: in the tab Move only."""
 

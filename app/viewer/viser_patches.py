@@ -123,16 +123,19 @@ class SceneFilter:
     def __init__(self, scene: viser.SceneApi, kept: str) -> None:
         self._scene = typing.cast(Any, scene)
         self._kept = kept
+        self._open = False
         self._send = self._scene._queue_scene_message
         for node in self._hidden():
             self._send(messages.SetSceneNodeVisibilityMessage(node.name, False))
-        self._scene._queue_scene_message = self._queue
+        self._queues = self._scene._queue_scene_message = self._queue  # the same object, to be recognised
 
     def open(self) -> None:
-        """Show again what is visible."""
-        self._scene._queue_scene_message = self._send
+        """Show again what is visible, as far as no other filter hides it."""
+        self._open = True
+        if self._scene._queue_scene_message is self._queues:
+            self._scene._queue_scene_message = self._send
         for node in self._hidden():
-            self._send(messages.SetSceneNodeVisibilityMessage(node.name, node.visible))
+            self._scene._queue_scene_message(messages.SetSceneNodeVisibilityMessage(node.name, node.visible))
 
     def _hides(self, name: str) -> bool:
         """Whether this is the name of a node at the top, below which all others are, that must not be seen."""
@@ -144,7 +147,8 @@ class SceneFilter:
         return [node for node in nodes if self._hides(node.name)]
 
     def _queue(self, message: Any) -> None:
-        if isinstance(message, messages.SetSceneNodeVisibilityMessage) and self._hides(message.name):
+        is_visibility = isinstance(message, messages.SetSceneNodeVisibilityMessage)
+        if is_visibility and not self._open and self._hides(message.name):
             message = messages.SetSceneNodeVisibilityMessage(message.name, False)
         self._send(message)
 

@@ -76,6 +76,12 @@ class BarePage:
     def show_driven(self, name: str) -> None:
         self.driven = name
 
+    def show_alone(self, names: str, notice: Any) -> None:
+        self.alone = names
+
+    def show_all(self) -> None:
+        self.alone = ""
+
     def see_through(self, on: bool, gizmo: bool = False) -> None:
         self.translucent = on
 

@@ -165,6 +165,7 @@ class StatusLine:
         self._over = False  # the visitor did something else, before the notice could be seen
         self._shown = first
         self._warning = self._waiting = self._failure = ""
+        self._cover: Notice | None = None
         self._html = gui.add_html(html(first))
 
     @property
@@ -200,7 +201,15 @@ class StatusLine:
             self._waiting = waiting
             self._write()
 
+    def cover(self, shown: Notice | None) -> None:
+        """Show this instead of everything else, which goes on below it, until the next call; None ends it."""
+        self._cover = shown
+        self._write()
+
     def _write(self) -> None:
+        if self._cover is not None:
+            show_content(self._html, html(self._cover))
+            return
         show_content(self._html, html(self._shown, self._warning, self._waiting, self._failure))
 
     def show_result(self, result: IKResult, units: Units) -> None:

@@ -56,6 +56,7 @@ from app.viewer.tabs import TABS
 from app.viewer.tabs.program.tab import ProgramTab
 from app.viewer.views.templates import render
 from app.viewer.viser_outbox import in_one_frame
+from app.viewer.viser_patches import SceneFilter
 from kin import IKResult, Robot, Task
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS
@@ -104,6 +105,8 @@ class VisitorPage(ShownArm, Worker):
         self.offered: tuple[type[Feature], ...] = TABS
         self._tabs: list[Feature] = []
         self._result: IKResult | None = None  # for the last target
+        self._legend = ""
+        self._alone: SceneFilter | None = None  # before all but what is shown alone
         # Created by the worker when it builds the page.
         self.camera: VisitorCamera
         self.posture: PosturePanel
@@ -167,7 +170,22 @@ class VisitorPage(ShownArm, Worker):
         self.status.show(notice)
 
     def show_legend(self, html: str) -> None:
-        update_html(self.panel.legend, html)
+        self._legend = html
+        if self._alone is None:
+            update_html(self.panel.legend, html)
+
+    def show_alone(self, names: str, notice: Notice) -> None:
+        self.show_all()
+        self._alone = SceneFilter(self.client.scene, names)
+        self.status.cover(notice)
+        update_html(self.panel.legend, "")
+
+    def show_all(self) -> None:
+        if self._alone is not None:
+            self._alone.open()
+            self._alone = None
+            self.status.cover(None)
+            update_html(self.panel.legend, self._legend)
 
     def show_driven(self, name: str) -> None:
         update_html(self.panel.driven, render("live/driven", name=name))
@@ -344,10 +362,10 @@ class VisitorPage(ShownArm, Worker):
         """Tell ``static/hints.js`` where gizmo and arm are in the picture.
 
         Of the gizmo: its place, and how long its arrows are there. Of the arm: how thick it is there, and the
-        corners of its centre line. Who may only look gets no hints.
+        corners of its centre line. Who may only look gets no hints, and a hidden arm none.
         """
         place = arm = ""
-        if not self._looking:
+        if not self._looking and self._alone is None:
             gizmo, shown = self.arm.scene.gizmo, self.arm.scene.body
             line = np.vstack([gizmo.position, shown.mount.foot, center_line(self.arm.robot, self.arm.goal)])
             (x, y, metre), *line = self.camera.places(line).tolist()

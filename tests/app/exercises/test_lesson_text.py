@@ -39,6 +39,10 @@ method = "Count."
 kind = "choice"
 prompt = "Many?"
 options = [{ text = "Yes", when = "x > 1", reason = "A." }, { text = "No", when = "x <= 1", reason = "B." }]
+[example]
+title = "one link"
+rows = [{ a = 0.4 }]
+steps = [{ q = [0], text = "It rests." }, { q = [1], text = "It turns." }, { text = "It rests." }]
 """
 
 
@@ -68,6 +72,7 @@ def test_every_declared_fact_is_used(key: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
+        ('[example]\ntitle = "one link"', "[example]", "example.title: got None, expected a text"),
         ('text = "There are {kind}."', 'text = "There are {kid}."', "steps[0].text: got '{kid}', expected"),
         ('value = "f(x)"', 'value = "g(x)"', "steps[0].question.value: got 'g', expected a name from [facts]"),
         ('unit = "count"', 'unit = "stone"', "steps[0].question.unit: got 'stone', expected one of"),

@@ -205,6 +205,12 @@ def test_messages_of_other_threads_wake_the_reader_in_its_own(monkeypatch):
     assert set(woken) == {threading.get_ident()}
 
 
+def seen_at_the_top(messages) -> dict[str, bool]:
+    """What the messages make visible of the nodes at the top."""
+    found = [m for m in messages if m["type"] == "SetSceneNodeVisibilityMessage" and m["name"] != "/WorldAxes"]
+    return {m["name"]: m["visible"] for m in found if m["name"].count("/") == 1}
+
+
 def test_behind_a_curtain_nothing_is_seen_and_all_is_as_its_owner_left_it(wire):
     messages, scene = wire
     shown, hidden, gone = (
@@ -216,9 +222,7 @@ def test_behind_a_curtain_nothing_is_seen_and_all_is_as_its_owner_left_it(wire):
     scene.add_light_directional("/lamp")
 
     def seen() -> dict[str, bool]:
-        """What the messages make visible of the nodes at the top."""
-        found = [m for m in messages if m["type"] == "SetSceneNodeVisibilityMessage" and m["name"] != "/WorldAxes"]
-        return {m["name"]: m["visible"] for m in found if m["name"].count("/") == 1}
+        return seen_at_the_top(messages)
 
     assert seen() == {"/shown": True, "/hidden": False, "/x": True, "/lamp": True}
     scene_filter = SceneFilter(scene, "/wall-")
@@ -237,3 +241,19 @@ def test_behind_a_curtain_nothing_is_seen_and_all_is_as_its_owner_left_it(wire):
     assert seen() == {"/shown": False, "/hidden": True, "/late": False}
     late.visible = True
     assert seen()["/late"] is True
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_two_filters_end_in_any_order(wire, first):
+    messages, scene = wire
+    for name in ("/wall-1", "/worked-1", "/arm"):
+        scene.add_frame(name)
+    filters = [SceneFilter(scene, "/wall-"), SceneFilter(scene, "/worked-")]
+    filters.pop(first).open()
+    kept, hidden = ("/wall-1", "/worked-1") if first else ("/worked-1", "/wall-1")
+    seen = seen_at_the_top(messages)
+    assert (seen[kept], seen[hidden], seen["/arm"]) == (True, False, False)
+    filters.pop().open()
+    assert seen_at_the_top(messages) == {"/wall-1": True, "/worked-1": True, "/arm": True}
+    scene.add_frame("/late")
+    assert seen_at_the_top(messages)["/late"]

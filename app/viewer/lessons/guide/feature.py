@@ -17,6 +17,8 @@ from app.viewer.exercises.drawing import GHOST, Drawing
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import views
+from app.viewer.lessons.guide.content import texts_of
+from app.viewer.lessons.guide.example_view import ExampleView
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Outline, Pose
 from app.viewer.lessons.guide.progress import Progress
@@ -25,7 +27,7 @@ from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.status import Notice
 from app.viewer.skeleton import ghost
 from kin import InputError, Robot, fk
-from kin.transforms import from_position_wxyz
+from kin.transforms import Array, from_position_wxyz
 
 WRONG, OPACITY = (213, 94, 0), 0.42  # of a copy of the arm that has a wrong answer
 JOINTS_HINT = "The sliders of the tab Move, here as well. A target is typed with Type a target, above the tabs."
@@ -41,7 +43,9 @@ class Guide(Feature):
     key = "guide"
     title = "Lesson"
     shared = True
-    messages = frozenset({"go", "answer", "fields", "posture", "pick", "reveal", "pose", "arm", "restart"})
+    messages = frozenset(
+        {"go", "answer", "fields", "posture", "pick", "reveal", "pose", "arm", "restart", "watch", "leave"}
+    )
 
     def __init__(self, stage: Stage, lesson: type[Lesson], state: dict[str, object] | None = None) -> None:
         super().__init__(stage)
@@ -53,6 +57,7 @@ class Guide(Feature):
         self._copies = SceneView(stage.client.scene, "answer", self.post)
         gui = stage.client.gui
         self._goal = gui.add_html("")
+        self._example = ExampleView(stage, texts_of(lesson.key).example)
         with gui.add_folder("Steps"):
             self._steps = gui.add_html("")
         self._joints_box = gui.add_checkbox("Joint sliders", False, hint=JOINTS_HINT)
@@ -75,6 +80,17 @@ class Guide(Feature):
     def handle(self, key: Hashable, value: object) -> None:
         progress = self._progress
         match key:
+            case ("watch", int()):
+                self._example.press(value)
+                self.due = 0.0
+                return
+            case "joints":
+                self._show_joints(bool(value))
+                return
+        self._example.close()
+        match key:
+            case ("leave", int()):
+                return
             case ("go", int()):
                 progress.go(value)
                 self._sheets.clear()
@@ -102,9 +118,6 @@ class Guide(Feature):
                 self._sheets.clear()
                 self._show()
                 self._bring()
-            case "joints":
-                self._show_joints(bool(value))
-                return
             case _ if key == GHOST and isinstance(value, list | tuple) and len(value) == 2:
                 T = from_position_wxyz(value[0], np.array(value[1]))
                 self._sheet(str(progress.at + 1)).drag(T, self.stage.units)
@@ -134,6 +147,7 @@ class Guide(Feature):
         return names.get(str(key[0]), "Answer") if isinstance(key, tuple) else "Joint sliders"
 
     def on_robot(self) -> None:
+        self._example.close()
         # Other numbers are asked on another arm, and answers stay with theirs.
         at, outline = self._progress.at, self._outline()
         self._arms = {arm: progress for arm, progress in self._arms.items() if progress.begun}
@@ -144,7 +158,14 @@ class Guide(Feature):
         self._copies.remove()
         self._show()
 
+    def on_pose(self, T_base_tool: Array) -> None:
+        self._example.on_pose()
+
+    def tick(self, now: float) -> None:
+        self.due = self._example.advance(now)
+
     def on_style(self) -> None:
+        self._example.on_style()
         self._progress.use(self._outline())
         self._sheets.clear()
         self._show()
@@ -156,6 +177,7 @@ class Guide(Feature):
         return {**self._progress.state(), "joints": self._joints is not None}
 
     def restore(self, state: dict[str, object]) -> None:
+        self._example.close()
         self._progress.restore(state)
         self._sheets.clear()
         self._show()
@@ -164,6 +186,7 @@ class Guide(Feature):
             self._show_joints(joints)
 
     def remove(self) -> None:
+        self._example.close()
         self._drawing.clear()
         self._copies.remove()
         self._show_joints(False)
