@@ -13,16 +13,16 @@ import numpy as np
 from app.exercises.variant import Quantity
 from app.exercises.worked import Drawn, Mark, configuration
 from app.viewer.declared.scene import Color, Node, arrows, axes, bars, label
-from app.viewer.lessons.dh.steps import place as walk_to
 from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.figure_shapes import AMBER, BLUE, PURPLE, SKY, clear_of
 from app.viewer.lessons.guide.example import Example
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.camera import round_points
+from app.viewer.scene.chain import rotation, translation
 from app.viewer.scene.meshes import body
 from app.viewer.scene.viewpoints import FOV
 from app.viewer.skeleton import placed, places, skeleton
-from kin import fk, jacobian, link_frames
+from kin import Robot, fk, jacobian, link_frames
 from kin.axes import cross
 from kin.transforms import Array
 from kin.units import Units
@@ -35,6 +35,27 @@ AXIS = 0.45  # of a joint axis to both sides, in these radii
 SAMPLE = 0.6  # s for which a velocity is drawn as a way
 _PATH = 25  # points of the tool's way
 _SHORT = 1e-4
+
+
+def walked(frames: Array, robot: Robot, q: Array, at: float) -> Array:
+    """The frame ``(4, 4)`` after so many motions from the base, four for each row of a standard table.
+
+    Args:
+        frames: the base and the frame of each row ``(rows + 1, 4, 4)``.
+    """
+    number = min(int(at) // 4, len(robot.rows) - 1)
+    row, T, left = robot.rows[number], frames[number], at - 4 * number
+    value = float(q[robot.joint_rows.index(number)])
+    turn, slide = (value, 0.0) if row.kind == "revolute" else (0.0, value)
+    for motion, axis, whole in (
+        (rotation, 2, row.theta + turn),
+        (translation, 2, row.d + slide),
+        (translation, 0, row.a),
+        (rotation, 0, row.alpha),
+    ):
+        T = T @ motion(axis, whole * min(max(left, 0.0), 1.0))
+        left -= 1.0
+    return np.asarray(T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +150,7 @@ class ExampleDrawing:
             for number in drawn.frames:
                 nodes += self._frame(f"frame-{number}", frames[number], str(number), FRAME)
             if drawn.walk is not None:
-                nodes += self._frame("walk", walk_to(robot, q, walk).T_0_now, "", LARGE)
+                nodes += self._frame("walk", walked(frames, robot, q, walk), "", LARGE)
             for joint in drawn.angles:
                 nodes += self._angle(joint, q, frames, units)
             for joint in drawn.columns:

@@ -25,6 +25,7 @@ from app.shared.store import Store
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.content import texts_of
 from app.viewer.lessons.guide.example import MOTION_TIME, PATIENCE, Example, ExampleStep, Player, example_of
+from app.viewer.lessons.guide.example_drawing import walked
 from app.viewer.panel.joints import label
 from app.viewer.server import ViewerServer
 from kin.units import Units
@@ -279,6 +280,21 @@ def gap(points: np.ndarray) -> float:
     """How far points leave the line from the first to the last."""
     way = (points[-1] - points[0]) / np.linalg.norm(points[-1] - points[0])
     return float(np.linalg.norm(np.cross(points - points[0], way), axis=1).max())
+
+
+def test_the_walk_ends_in_the_frames_of_the_arm() -> None:
+    text, q = text_in("dh"), np.array([0.7, 0.4])
+    robot = text.robot
+    frames = np.array([np.eye(4), *numpy_arm.frames(robot, q)])
+    for number, frame in enumerate(frames):
+        assert np.allclose(walked(frames, robot, q, 4.0 * number), frame, atol=1e-12)
+    steps = [walked(frames, robot, q, at) for at in (0.0, 1.0, 2.0, 3.0)]
+    moved = [np.linalg.inv(one) @ other for one, other in itertools.pairwise(steps)]
+    assert np.allclose(moved[0][:3, 3], 0.0)
+    assert np.allclose(moved[1][:3, 3], [0.0, 0.0, robot.rows[0].d])
+    assert np.allclose(moved[2][:3, 3], [robot.rows[0].a, 0.0, 0.0])
+    half = walked(frames, robot, q, 0.5)
+    assert math.atan2(half[1, 0], half[0, 0]) == pytest.approx(q[0] / 2)
 
 
 def test_iterates_are_those_of_newton() -> None:
