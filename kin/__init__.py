@@ -72,8 +72,21 @@ from kin.motion import (
     program_from_dict,
     program_to_dict,
 )
+from kin.motor import Motor
 from kin.notebook import connect, show
 from kin.path import PathGap, PathJump, PathPostures, PathResult, path_postures, solve_path
+from kin.readings import (
+    MotorFinding,
+    MotorMatch,
+    match_motors,
+    match_poses,
+    motors_from_lerobot,
+    motors_to_lerobot,
+    q_of_readings,
+    readings_of_q,
+    readings_of_ticks,
+    ticks_of_readings,
+)
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
 from kin.transforms import from_position_wxyz, rotation_from_wxyz, wxyz_from_rotation
@@ -125,6 +138,9 @@ __all__ = [
     "Motion",
     "MotionLimits",
     "MotionSample",
+    "Motor",
+    "MotorFinding",
+    "MotorMatch",
     "NearestLinks",
     "Obstacle",
     "PathGap",
@@ -186,6 +202,10 @@ __all__ = [
     "load_robot",
     "load_urdf",
     "manipulability",
+    "match_motors",
+    "match_poses",
+    "motors_from_lerobot",
+    "motors_to_lerobot",
     "nearest_contact",
     "nearest_links",
     "obstacle_from_dict",
@@ -195,7 +215,10 @@ __all__ = [
     "plan_motion",
     "program_from_dict",
     "program_to_dict",
+    "q_of_readings",
     "read_urdf",
+    "readings_of_q",
+    "readings_of_ticks",
     "robot_from_dict",
     "robot_from_screws",
     "robot_to_dict",
@@ -211,6 +234,7 @@ __all__ = [
     "solve_ik",
     "solve_ik_many",
     "solve_path",
+    "ticks_of_readings",
     "to_mjcf",
     "to_urdf",
     "urdf_tips",

@@ -18,13 +18,14 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from numbers import Real
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kin.checks import finite_number, one_of
 from kin.errors import InputError
+from kin.motor import Motor, checked_motors
 from kin.transforms import Array, as_transform, finite_array
 
 Convention = Literal["standard", "modified"]
@@ -76,13 +77,13 @@ class Joint:
     def __post_init__(self) -> None:
         """Check the row; numbers of any type become floats."""
         if not isinstance(self.kind, str) or self.kind not in KIND_CODES:
-            raise InputError(f"kind of {self.name}", self.kind, _one_of(*KIND_CODES))
+            raise InputError(f"kind of {self.name}", self.kind, one_of(*KIND_CODES))
         for key in ("theta", "d", "a", "alpha"):
-            object.__setattr__(self, key, _number(f"{key} of {self.name}", getattr(self, key)))
+            object.__setattr__(self, key, finite_number(f"{key} of {self.name}", getattr(self, key)))
         for key in PEAK_FIELDS:
             if (value := getattr(self, key)) is not None:
                 where = f"{key} of {self.name}"
-                if self.kind == "fixed" or not (limit := _number(where, value)) > 0.0:
+                if self.kind == "fixed" or not (limit := finite_number(where, value)) > 0.0:
                     raise InputError(where, value, "a positive number, or None for a fixed row")
                 object.__setattr__(self, key, limit)
         if self.limits is None:
@@ -94,7 +95,7 @@ class Joint:
             lower, upper = self.limits
         except (TypeError, ValueError):
             raise InputError(where, self.limits, "two numbers (lower, upper)") from None
-        lower, upper = _number(where, lower), _number(where, upper)
+        lower, upper = finite_number(where, lower), finite_number(where, upper)
         if lower > upper:
             raise InputError(where, self.limits, "the lower limit first")
         object.__setattr__(self, "limits", (lower, upper))
@@ -136,10 +137,12 @@ class Robot:
         capsules_source: where they are from.
         mounting: what the arm is mounted on, None if that is not stated. How it is turned, `base` states.
         floor: height (m) of the floor in the world frame, None if it is not stated.
+        motors: what the motors of the joints read, none if that is not stated. One whose joint is no moving row
+            moves nothing: an arm that is made from another may keep its motors.
 
     Raises:
         InputError: an unknown convention, unit or mounting, no moving joint, a home of another length, a floor
-            that is no finite number, or a base or tool that is no rigid transform.
+            that is no finite number, a base or tool that is no rigid transform, or motors of one id.
     """
 
     id: str
@@ -159,13 +162,14 @@ class Robot:
     capsules_source: str = field(default="", repr=False)
     mounting: Mounting | None = None
     floor: float | None = None
+    motors: tuple[Motor, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         """Check the fields; lists become tuples, and arrays become nested tuples."""
         if self.convention not in CONVENTIONS:
-            raise InputError("convention", self.convention, _one_of(*CONVENTIONS) + " (Craig's)")
+            raise InputError("convention", self.convention, one_of(*CONVENTIONS) + " (Craig's)")
         if not isinstance(self.units, str) or self.units not in LENGTHS:
-            raise InputError("units", self.units, _one_of(*LENGTHS))
+            raise InputError("units", self.units, one_of(*LENGTHS))
         rows = tuple(self.rows) if isinstance(self.rows, Iterable) else ()
         if not any(isinstance(row, Joint) and row.kind != "fixed" for row in rows):
             raise InputError("rows", self.rows, "Joint rows, at least one of them revolute or prismatic")
@@ -179,13 +183,14 @@ class Robot:
         object.__setattr__(self, "home", tuple(home.tolist()))
         for key in ("payload", "mass"):
             if (value := getattr(self, key)) is not None:
-                if not (weight := _number(key, value)) > 0.0:
+                if not (weight := finite_number(key, value)) > 0.0:
                     raise InputError(key, value, "a positive number of kg, or None if it is not known")
                 object.__setattr__(self, key, weight)
         if self.mounting is not None and (not isinstance(self.mounting, str) or self.mounting not in MOUNTINGS):
-            raise InputError("mounting", self.mounting, _one_of(*MOUNTINGS) + ", or None if it is not stated")
+            raise InputError("mounting", self.mounting, one_of(*MOUNTINGS) + ", or None if it is not stated")
         if self.floor is not None:
-            object.__setattr__(self, "floor", _number("floor", self.floor))
+            object.__setattr__(self, "floor", finite_number("floor", self.floor))
+        object.__setattr__(self, "motors", checked_motors(self.motors))
         for key in ("base", "tool"):
             T = getattr(self, key)
             if T is not IDENTITY:
@@ -481,21 +486,6 @@ def _row(index: int, row: Joint | Mapping[str, Any] | Sequence[float]) -> Joint:
     kind = row.get("kind", "revolute")
     defaults = {"name": f"joint {index + 1}", "limits": DEFAULT_LIMITS.get(str(kind))}
     return Joint(**{**defaults, **row})
-
-
-def _number(field: str, value: object) -> float:
-    """A finite number as a float; raises `InputError` naming the field."""
-    try:
-        number = math.nan if isinstance(value, bool) or not isinstance(value, Real) else float(value)
-    except OverflowError:  # an integer beyond the largest float
-        number = math.inf
-    if not math.isfinite(number):
-        raise InputError(field, value, "a finite number")
-    return number
-
-
-def _one_of(*choices: str) -> str:
-    return "one of " + ", ".join(f'"{choice}"' for choice in choices)
 
 
 def exact_cos_sin(angle: float) -> tuple[float, float]:

@@ -14,9 +14,11 @@ ROOT = Path(__file__).parents[1]
 # library. The longest matching row counts. A name allows what is below it too.
 MODEL = {
     "kin.axes",
+    "kin.checks",
     "kin.differential",
     "kin.errors",
     "kin.fk",
+    "kin.motor",
     "kin.named",
     "kin.robot",
     "kin.singularity",
@@ -31,6 +33,7 @@ RULES: dict[str, set[str]] = {
     "kin/differential": {"numpy", "kin.axes", "kin.differential", "kin.fk", "kin.robot", "kin.transforms"},
     "kin/files": {"numpy", "kin.collision", "kin.dh", "kin.files", "kin.fitting", "kin.frames", *MODEL},
     "kin/fitting": {"numpy", "kin.fitting", "kin.robot", "kin.transforms"},
+    "kin/readings": {"numpy", "kin.collision", "kin.readings", *MODEL},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
     "kin/ik": {"numpy", "kin.collision", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},
     "kin/collision": {"numpy", "kin.fitting", "kin.frames", "kin.kernels", "kin.collision", *MODEL},

@@ -29,6 +29,7 @@ LONGEST = 10_000  # characters of the compact form; a link holds 12 000 in all
 OF_MAKER = ("maker", "payload", "mass")  # fields that an own arm has not: nobody has built or weighed it
 _KINDS = {"revolute": "", "prismatic": "p", "fixed": "f"}
 _ROW = ("theta", "d", "a", "alpha", "limits", "kind", "name", "velocity", "effort", "acceleration", "jerk")
+_MOTOR = ("id", "sign", "offset", "unit", "name", "ticks", "lead", "range", "drive_mode", "homing_offset")
 _TOP = {
     "n": "name",
     "s": "source",
@@ -74,7 +75,9 @@ def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
     if isinstance(rows, Sequence) and not isinstance(rows, str):
         fields["rows"] = _named(rows)
         if isinstance(capsules := data.get("capsules"), Sequence):
-            fields["capsules"] = [_of_row(each, rows, fields["rows"]) for each in capsules]
+            fields["capsules"] = [_of_row(each, "row", rows, fields["rows"]) for each in capsules]
+        if isinstance(motors := data.get("motors"), Sequence) and not isinstance(motors, str):
+            fields["motors"] = [_of_row(_tidy(each), "joint", rows, fields["rows"]) for each in motors]
     robot = kin.robot_from_dict(fields, "your arm")
     if not SMALLEST <= robot.reach <= LARGEST:
         limits = f"lengths a and d (or a tool) that reach {SMALLEST * 1000:g} mm to {LARGEST:g} m"
@@ -111,17 +114,24 @@ def _named(rows: Sequence[Any]) -> list[Any]:
     return named
 
 
-def _of_row(capsule: Any, before: Sequence[Any], rows: Sequence[Any]) -> Any:
-    """A capsule with the name that its row has now; the row may be given by its index."""
-    if not isinstance(capsule, Mapping) or (row := capsule.get("row")) is None:
-        return capsule
+def _tidy(motor: Any) -> Any:
+    """A motor with a name that can be shown."""
+    if not isinstance(motor, Mapping) or not (name := clean(motor.get("name"), ROW_NAME)):
+        return motor
+    return {**motor, "name": name}
+
+
+def _of_row(part: Any, key: str, before: Sequence[Any], rows: Sequence[Any]) -> Any:
+    """A capsule or motor with the name that its row has now; the row may be given by its index."""
+    if not isinstance(part, Mapping) or (row := part.get(key)) is None:
+        return part
     if isinstance(row, str):
         row = next(
             (i for i, each in enumerate(before) if isinstance(each, Mapping) and each.get("name") == row), -1
         )
     if isinstance(row, bool) or not isinstance(row, int) or not 0 <= row < len(rows):
-        return capsule  # what is no row is refused elsewhere
-    return {**capsule, "row": rows[row].get("name") if isinstance(rows[row], Mapping) else row}
+        return part  # what is no row is refused elsewhere
+    return {**part, key: rows[row].get("name") if isinstance(rows[row], Mapping) else row}
 
 
 def _unused(name: str, taken: Set[Any]) -> str:
@@ -174,6 +184,8 @@ def unpack(value: object) -> OwnArm:
     if isinstance(capsules := value.get("k"), list):
         data["capsules"] = [_capsule(i, each) for i, each in enumerate(capsules)]
         data["capsules_source"] = value.get("ks", "")
+    if (motors := value.get("o")) is not None:
+        data["motors"] = [_motor(i, each) for i, each in enumerate(motors)] if isinstance(motors, list) else motors
     start = value.get("from", "")
     return own_arm(data, start if isinstance(start, str) else "")
 
@@ -197,6 +209,13 @@ def _capsule(index: int, given: object) -> dict[str, Any]:
     return found if row == -1 else {**found, "row": row}
 
 
+def _motor(index: int, given: object) -> dict[str, Any]:
+    if not isinstance(given, list) or not 1 <= len(given) <= len(_MOTOR) + 1:
+        raise InputError(f"motors[{index}]", given, "a list of joint, " + ", ".join(_MOTOR))
+    found = {name: item for name, item in zip(_MOTOR, given[1:], strict=False) if item is not None}
+    return found if given[0] == -1 else {**found, "joint": given[0]}
+
+
 @lru_cache(maxsize=128)
 def _text(robot: Robot) -> str:
     """The compact form as JSON, without what Reset returns to."""
@@ -217,6 +236,12 @@ def _text(robot: Robot) -> str:
             for each, item in stated
         ]
         packed["ks"] = robot.capsules_source
+    if robot.motors:
+        names = [row.name for row in robot.rows]
+        packed["o"] = [
+            _without_end([names.index(item["joint"]) if "joint" in item else -1, *map(item.get, _MOTOR)])
+            for item in data["motors"]
+        ]
     return json.dumps(packed, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
@@ -224,6 +249,11 @@ def _packed_row(row: Mapping[str, Any]) -> list[Any]:
     """The items of a row, without trailing ones that are missing."""
     items = [row.get(name, 0) for name in _ROW[:4]]
     items += [row.get("limits"), _KINDS[row.get("kind", "revolute")], row["name"], *map(row.get, _ROW[7:])]
+    return _without_end(items)
+
+
+def _without_end(items: list[Any]) -> list[Any]:
+    """The items without trailing ones that are missing."""
     while items and items[-1] is None:
         items.pop()
     return items

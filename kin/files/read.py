@@ -17,6 +17,7 @@ from kin.errors import InputError, KinematicsError, RobotFileError, shorten
 from kin.files.home import default_home
 from kin.files.numbers import LARGEST, NUMBER, scaled
 from kin.frames import matrix_of
+from kin.motor import MOTOR_UNITS, Motor, checked_motors, fit_joints
 from kin.robot import (
     CONVENTIONS,
     DEFAULT_LIMITS,
@@ -33,13 +34,16 @@ from kin.robot import (
 from kin.transforms import as_transform
 
 ANGLES = {"deg": math.pi / 180, "rad": 1.0}
-MAX_ROWS, MAX_CAPSULES = 32, 64
+MAX_ROWS, MAX_CAPSULES, MAX_MOTORS = 32, 64, 64
 MAX_REACH = 1e5  # metres; targets may have coordinates up to 1e6 m
 _TOP = {
     *("id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"),
-    *("capsules", "capsules_source", "maker", "payload", "mass", "mounting", "floor"),
+    *("capsules", "capsules_source", "maker", "payload", "mass", "mounting", "floor", "motors"),
 }
 _CAPSULE = {"row", "start", "end", "radius", "assumed"}
+_MOTOR = {
+    *("joint", "id", "name", "sign", "offset", "unit", "ticks", "lead", "range", "drive_mode", "homing_offset"),
+}
 _ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", *PEAK_FIELDS}
 _QUANTITY = re.compile(rf"\s*({NUMBER})\s*(rad|deg|°|m|cm|mm)(/s[23²³]?)?\s*")
 PER = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
@@ -235,6 +239,7 @@ class Reader:
             capsules_source=self.text(data, "capsules_source", ""),
             mounting=self.choice(data, "mounting", MOUNTINGS) if "mounting" in data else None,  # type: ignore[arg-type]
             floor=self.length_of("floor", data["floor"]) if "floor" in data else None,
+            motors=self.motors(data, joints),
         )
         if robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3])) > MAX_REACH:
             raise self.refuse(
@@ -346,6 +351,39 @@ class Reader:
             link = sum(joint.kind != "fixed" for joint in rows[: row + 1])
             found.append(Capsule(link, row, start, end, radius, assumed))
         return tuple(sorted(found, key=lambda capsule: capsule.row))
+
+    def motors(self, data: dict[str, Any], joints: Sequence[Joint]) -> tuple[Motor, ...]:
+        """The motors of the joints."""
+        given = data.get("motors", [])
+        if not isinstance(given, list) or len(given) > MAX_MOTORS:
+            shown = f"{len(given)} tables" if isinstance(given, list) else given
+            raise self.refuse("motors", shown, f"at most {MAX_MOTORS} [[motors]] tables")
+        found = tuple(self.motor(each, f"motors[{i}]") for i, each in enumerate(given))
+        try:
+            fit_joints(checked_motors(found), {joint.name: joint.kind == "prismatic" for joint in joints})
+        except InputError as error:
+            index, key = error.field.removeprefix("motors[").split("].")
+            raise self.refuse(error.field, given[int(index)].get(key), error.expected) from None
+        return found
+
+    def motor(self, data: object, where: str) -> Motor:
+        if not isinstance(data, dict):
+            raise self.refuse(where, data, "a table with joint, id, sign, offset and unit")
+        self.only_known_fields(where + ".", data, _MOTOR)
+        if "id" not in data:
+            raise self.refuse(where + ".id", None, "the number of the motor on its bus")
+        texts = {key: self.text(data, key, None, where + ".") for key in ("joint", "name") if key in data}
+        fields: dict[str, Any] = {"joint": "", **data, **texts}
+        if "offset" in data:
+            fields["offset"] = self.number(where + ".offset", data["offset"])
+        if "unit" in data:
+            fields["unit"] = self.choice(data, "unit", MOTOR_UNITS, where + ".")
+        if "lead" in data:
+            fields["lead"] = self.length_of(where + ".lead", data["lead"])
+        try:
+            return Motor(**fields)
+        except InputError as error:
+            raise self.refuse(f"{where}.{error.field}", data.get(error.field), error.expected) from None
 
     def point(self, value: object, where: str) -> tuple[float, float, float]:
         x, y, z = (self.length_of(f"{where}[{k}]", v) for k, v in enumerate(self.items(value, where, 3)))

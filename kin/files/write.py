@@ -19,6 +19,7 @@ from kin.errors import InputError
 from kin.files.numbers import scaled
 from kin.files.read import ANGLES, PER, UNLIMITED, Reader
 from kin.frames import matrix_of
+from kin.motor import STS3215, Motor
 from kin.named import robot_of
 from kin.robot import IDENTITY, LENGTHS, Capsule, Joint, Matrix, Robot, exact_cos_sin
 from kin.transforms import Array
@@ -83,7 +84,7 @@ def robot_to_toml(robot: Robot | str, length: Length | None = None, angle: Angle
         return in_degrees if len(in_degrees) <= len(in_radians) else in_radians
     data = robot_to_dict(robot, length, angle)
     home = data.pop("home")
-    tables = {key: data.pop(key, []) for key in ("rows", "capsules")}
+    tables = {key: data.pop(key, []) for key in ("rows", "motors", "capsules")}
     lines = [f"{key} = {_toml(value)}" for key, value in data.items()]
     for table, items in tables.items():
         for item in items:
@@ -148,6 +149,8 @@ class _Writer:
         data["rows"] = [self.row(row) for row in robot.rows]
         pairs = zip(robot.joints, robot.home, strict=True)
         data["home"] = {"q": [self.value(value, joint.kind == "prismatic") for joint, value in pairs]}
+        if robot.motors:
+            data["motors"] = [self.motor(each) for each in robot.motors]
         if robot.capsules:
             if robot.capsules_source:
                 data["capsules_source"] = robot.capsules_source
@@ -162,6 +165,20 @@ class _Writer:
             data["end"] = [self.value(x, True) for x in capsule.end]
         data["radius"] = self.value(capsule.radius, True)
         return data | {"assumed": True} if capsule.assumed else data
+
+    def motor(self, motor: Motor) -> dict[str, Any]:
+        """Joint, id, sign, offset and unit; what is not stated or the default is left out."""
+        data: dict[str, Any] = {"joint": motor.joint} if motor.joint else {}
+        if motor.name != motor.joint:
+            data["name"] = motor.name
+        data |= {"id": motor.id, "sign": motor.sign, "offset": _plain(motor.offset), "unit": motor.unit}
+        if motor.ticks != STS3215:
+            data["ticks"] = motor.ticks
+        if motor.lead is not None:
+            data["lead"] = self.value(motor.lead, True)
+        if motor.range is not None:
+            data["range"] = list(motor.range)
+        return data | {key: value for key in ("drive_mode", "homing_offset") if (value := getattr(motor, key))}
 
     def row(self, row: Joint) -> dict[str, Any]:
         """Fields that are zero or the default are left out."""

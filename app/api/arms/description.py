@@ -11,7 +11,8 @@ from app.api.problems import ProblemError, invalid
 from app.shared.problems import FieldError
 from kin import Robot, RobotFileError, robot_from_dict
 from kin.files.numbers import LARGEST
-from kin.files.read import ANGLES, MAX_CAPSULES, MAX_ROWS
+from kin.files.read import ANGLES, MAX_CAPSULES, MAX_MOTORS, MAX_ROWS
+from kin.motor import LARGEST_ID, MOST_TICKS, MOTOR_UNITS
 from kin.robot import LENGTHS, MOUNTINGS
 
 # What a file must state and an arm in a request need not.
@@ -123,6 +124,30 @@ EXAMPLE: dict[str, Any] = {  # the table of pioneer5, so that the examples for i
     ],
     "home": {"q": [90, 30, 60, 30, 30]},
 }
+_TICKS = {"type": "integer", "minimum": -(2**31), "maximum": 2**31}
+_MOTOR: dict[str, Any] = {
+    "type": "object",
+    "additionalProperties": False,
+    "required": ["id"],
+    "properties": {
+        "joint": {**_TEXT, "description": "Name of the row that it moves; none: the motor of a gripper, say."},
+        "id": {"type": "integer", "minimum": 0, "maximum": LARGEST_ID, "description": "Its number on the bus."},
+        "name": {**_TEXT, "description": "What its bus calls it, by default the name of the joint."},
+        "sign": {"enum": [1, -1], "description": "-1: it counts backwards. 1 by default."},
+        "offset": {**_number(["m"]), "description": "Its reading where the joint value is zero, 0 by default."},
+        "unit": {"enum": list(MOTOR_UNITS), "description": "Unit of its readings and its offset, by default deg."},
+        "ticks": {
+            "type": "integer",
+            "minimum": 2,
+            "maximum": MOST_TICKS,
+            "description": "Of a turn, 4096 by default.",
+        },
+        "lead": _quantity(_LENGTH, "Length that a slide moves in a turn, positive; for slides only."),
+        "range": _items(_TICKS, 2, "Ticks at both ends of LeRobot's calibrated range, the lower one first."),
+        "drive_mode": {"enum": [0, 1], "description": "1: the calibrated range is turned round."},
+        "homing_offset": {**_TICKS, "description": "As LeRobot's calibration states it, 0 by default."},
+    },
+}
 _SCHEMA: dict[str, Any] = {
     "type": "object",
     "description": "An arm as the fields of a robot file: a DH table with its units. `id`, `name` and `source` "
@@ -177,6 +202,12 @@ _SCHEMA: dict[str, Any] = {
             "description": "What the arm is mounted on, for drawings. How it is turned, `base` states.",
         },
         "floor": _quantity(_LENGTH, "Height of the floor in the world frame, in the length unit, for drawings."),
+        "motors": {
+            "type": "array",
+            "maxItems": MAX_MOTORS,
+            "items": _MOTOR,
+            "description": "What the motors of the joints read: offset + sign · q, with q in the motor's unit.",
+        },
         "base": {**_TRANSFORM, "description": "Constant transform before the first row."},
         "tool": {**_TRANSFORM, "description": "Constant transform after the last row."},
     },

@@ -53,6 +53,33 @@ class RowAnswer(Answer):
     """Rotation about x in radians."""
 
 
+class MotorAnswer(Answer):
+    """What the motor of a joint reads: offset + sign · q, with q in its unit."""
+
+    joint: str
+    """Name of the joint that it moves; empty for one that moves none of them, such as that of a gripper."""
+    id: int
+    """Its number on the bus."""
+    name: str
+    """What its bus calls it."""
+    sign: Literal[1, -1]
+    """-1: it counts backwards."""
+    offset: float
+    """Its reading where the joint value is zero, in its unit."""
+    unit: Literal["deg", "rad", "ticks", "range_m100_100", "range_0_100"]
+    """Degrees, radians, ticks from 0 in each turn, or LeRobot's calibrated range from -100 or 0 to 100."""
+    ticks: int
+    """Ticks of a turn."""
+    lead: float | None
+    """Metres that a slide moves in a turn; null for a joint that turns."""
+    range: list[int] | None
+    """Ticks at both ends of LeRobot's calibrated range; null if it is not calibrated."""
+    drive_mode: int
+    """That of LeRobot's calibration; 1 turns the calibrated range round."""
+    homing_offset: int
+    """That of LeRobot's calibration, which the servo subtracts itself."""
+
+
 class RobotAnswer(Answer):
     """Everything that defines an arm: T_world_tool = base · A_1 … A_m · tool, with one A per DH row.
 
@@ -85,6 +112,8 @@ class RobotAnswer(Answer):
     """What it is mounted on; null if that is not stated. How it is turned, `base` states."""
     floor: float | None
     """Height of the floor in the world frame, in metres; null if it is not stated."""
+    motors: list[MotorAnswer]
+    """What the motors of its joints read; empty if that is not stated."""
     reach: float
     """An upper bound of the tool's distance from the base origin, in metres."""
 

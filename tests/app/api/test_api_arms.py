@@ -199,6 +199,9 @@ def test_equations_of_an_arm_sent_along(client):
         ({"mounting": "sky"}, "robot.mounting", '"ceiling"'),
         ({"floor": "deep"}, "robot.floor", "a finite number"),
         ({"floor": [0]}, "robot.floor", "a finite number"),
+        ({"motors": [{"joint": "hip", "id": 1}]}, "robot.motors[0].joint", "rotating base"),
+        ({"motors": [{"id": 1}]}, "robot.motors[0].name", "a name"),
+        ({"motors": [{"joint": "shoulder", "id": 1, "sign": 2}]}, "robot.motors[0].sign", "1 or -1"),
     ],
 )
 def test_an_error_in_a_sent_arm_names_the_field(client, change, field, valid):
@@ -225,6 +228,23 @@ def test_mounting_and_floor_of_an_arm(client):
     found = post(client, "robots/import", {"urdf": kin.to_urdf("ur5")})
     assert (found["description"]["mounting"], found["description"]["floor"]) == ("floor", 0)
     assert (found["robot"]["mounting"], found["robot"]["floor"]) == ("floor", 0.0)
+
+
+def test_motors_of_an_arm(client):
+    pan, *_, gripper = client.get("/api/v1/robots/so101").json()["motors"]
+    assert (pan["joint"], pan["id"], pan["unit"], pan["range"]) == ("shoulder pan", 1, "deg", None)
+    assert (gripper["joint"], gripper["name"]) == ("", "gripper")
+    assert client.get("/api/v1/robots/ur5").json()["motors"] == []
+    motor = {
+        "joint": EXAMPLE["rows"][0]["name"],
+        "id": 1,
+        "sign": -1,
+        "offset": 12,
+        "unit": "range_0_100",
+        "range": [7, 9],
+    }
+    sent = {**EXAMPLE, "motors": [motor]}
+    assert post(client, "fk", {"robot": sent, "q": Q}) == post(client, "fk", {"robot": EXAMPLE, "q": Q})
 
 
 def test_nan_in_a_sent_arm_is_refused(client):

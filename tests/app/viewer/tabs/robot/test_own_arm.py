@@ -82,6 +82,21 @@ def test_mounting_and_floor_are_in_the_link_and_arms_without_them_are_as_before(
         assert back.robot.id != plain.robot.id
 
 
+def test_motors_are_in_the_link_with_the_names_that_the_rows_have_now():
+    so101 = kin.get_robot("so101")
+    motors = [replace(motor, range=(740, 3331), sign=-1, offset=91.4) for motor in so101.motors]
+    rows = [replace(so101.rows[0], name="shoulder\npan"), *so101.rows[1:]]
+    data = kin.robot_to_dict(replace(so101, motors=motors))
+    data["rows"][0]["name"] = rows[0].name
+    data["motors"][0]["joint"] = rows[0].name
+    own = own_arm(data)
+    assert own.robot.motors == (replace(motors[0], joint="shoulder pan"), *motors[1:])
+    back = unpack(json.loads(json.dumps(pack(own))))
+    assert back == own
+    assert back.robot.id != own_arm(kin.robot_to_dict(replace(so101, motors=()))).robot.id
+    assert "o" not in pack(own_arm(PRESETS["wrist-6r"]))
+
+
 def test_a_page_with_an_own_arm_is_restored_from_its_link():
     own = own_arm(PRESETS["wrist-6r"], "wrist-6r")
     q = own.robot.random_q(np.random.default_rng(1))
@@ -158,6 +173,14 @@ GOOD = pack(own_arm(PRESETS["planar-2r"]))
         ({"z": math.inf}, "floor"),
         ({"z": "low"}, "floor"),
         ({"z": 2000, "u": "m"}, "floor"),
+        ({"o": 7}, "motors"),
+        ({"o": [7]}, "motors[0]"),
+        ({"o": [[0] * 12]}, "motors[0]"),
+        ({"o": [[9, 1]]}, "motors[0].joint"),
+        ({"o": [[True, 1]]}, "motors[0].joint"),
+        ({"o": [[0, 1, 3]]}, "motors[0].sign"),
+        ({"o": [[0, 1], [1, 1]]}, "motors[1].id"),
+        ({"o": [[0, 1, 1, math.inf]]}, "motors[0].offset"),
     ],
 )
 def test_what_is_no_arm_is_refused_by_field_and_the_rest_of_the_link_is_kept(changes, field):

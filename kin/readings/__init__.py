@@ -1,0 +1,28 @@
+"""What the motors of an arm read: joint values and back, LeRobot's calibration, sign and zero from poses.
+
+>>> import kin, numpy as np
+>>> arm, motors = kin.get_robot("planar2r"), [kin.Motor("shoulder", 1), kin.Motor("elbow", 2, unit="ticks")]
+>>> poses = np.radians([[0.0, 0.0], [40.0, 60.0], [90.0, 20.0]])
+>>> found = kin.match_motors(arm, poses, [[91, 1040], [50, 360], [2, 810]], motors)
+>>> [finding.motor.sign for finding in found.findings]
+[-1, -1]
+"""
+
+from kin.readings.findings import MotorFinding, MotorMatch
+from kin.readings.joints import q_of_readings, readings_of_q, readings_of_ticks, ticks_of_readings
+from kin.readings.lerobot import motors_from_lerobot, motors_to_lerobot
+from kin.readings.match import match_motors
+from kin.readings.poses import match_poses
+
+__all__ = [
+    "MotorFinding",
+    "MotorMatch",
+    "match_motors",
+    "match_poses",
+    "motors_from_lerobot",
+    "motors_to_lerobot",
+    "q_of_readings",
+    "readings_of_q",
+    "readings_of_ticks",
+    "ticks_of_readings",
+]
