@@ -102,12 +102,15 @@ def typed(robot: Robot, own: OwnArm | None, texts: Mapping[Cell, str], units: Un
 def built(data: Fields, start: str, before: Robot, texts: Mapping[Cell, str] | None = None) -> OwnArm:
     """The arm of these fields. A home that is not valid any more is replaced.
 
-    It has the capsules of the arm `before`, as long as every joint moves the same link in the same way.
+    It has the capsules of the arm `before`, as long as every joint moves the same link in the same way, and those
+    of its motors whose joint is still there and of the same kind.
 
     Raises:
         EditError: with what is wrong; `texts` tells in which cell.
     """
     data = {key: value for key, value in data.items() if not key.startswith("capsules")}
+    if "motors" in data:
+        data["motors"] = [motor for motor in data["motors"] if _fits(motor, data["rows"])]
     try:
         try:
             own = own_arm(data, start)
@@ -123,6 +126,14 @@ def built(data: Fields, start: str, before: Robot, texts: Mapping[Cell, str] | N
         raise EditError(cell, f"{text}expected {error.expected}") from None
     except KinematicsError as error:
         raise EditError(None, str(error)) from None
+
+
+def _fits(motor: Fields, rows: list[Fields]) -> bool:
+    """Whether the joint of a motor is one of these rows, and slides if the motor is one of a slide."""
+    if "joint" not in motor:
+        return True
+    kinds = [row.get("kind", "revolute") for row in rows if row["name"] == motor["joint"]]
+    return kinds == ["prismatic" if "lead" in motor else "revolute"]
 
 
 def changed_rows(robot: Robot, own: OwnArm | None, change: Callable[[list[Fields]], None]) -> OwnArm:
@@ -176,6 +187,9 @@ def _type_row(data: Fields, robot: Robot, index: int, column: str, text: str, un
     row, joint = data["rows"][index], robot.rows[index]
     if column == "name":
         row["name"] = text
+        for motor in data.get("motors", []):
+            if motor.get("joint") == joint.name:
+                motor["joint"] = text
     elif column == "kind":
         row["kind"] = text
         for key in ("limits", *PEAK_FIELDS):
@@ -275,7 +289,9 @@ def converted(robot: Robot, own: OwnArm | None) -> OwnArm:
 def with_table(robot: Robot, own: OwnArm | None, other: Robot) -> OwnArm:
     """The arm with the table, base and tool of another one; raises `EditError`."""
     data, start = fields_of(robot, own)
-    return built({**kin.robot_to_dict(other), **{key: data[key] for key in ("name", "source")}}, start, robot)
+    table = kin.robot_to_dict(replace(other, motors=()))
+    kept = {key: data[key] for key in ("name", "source", "motors") if key in data}
+    return built({**table, **kept}, start, robot)
 
 
 def part_of(cell: Cell) -> str:

@@ -14,6 +14,7 @@ from app.viewer.tabs.robot.edits import (
     EditError,
     add_row,
     changed_rows,
+    converted,
     frame_values,
     move_row,
     reread,
@@ -156,6 +157,26 @@ def test_a_tool_moves_the_tool_point_and_a_base_the_whole_arm():
     assert np.abs(kin.fk(based.robot, UR5.q_home) - B @ T).max() < 1e-15
     assert frame_values(based.robot, "tool")[2:4] == (0.12, math.pi)
     assert frame_values(based.robot, "base") == (0.5, 0.0, 0.0, 0.0, 0.0, math.pi / 2)
+
+
+def test_motors_follow_their_joints_and_go_with_them():
+    so101 = kin.get_robot("so101")
+    joints = [motor.joint for motor in so101.motors]
+
+    def left(robot):
+        return [motor.joint for motor in robot.motors]
+
+    renamed = type_in(so101, ((1, "name"), "upper arm"))
+    assert left(renamed.robot) == [joints[0], "upper arm", *joints[2:]]
+    assert renamed.robot.motors[1].name == "shoulder_lift"
+    for change in ("fixed", "prismatic"):
+        changed = type_in(so101, ((1, "kind"), change))
+        assert left(changed.robot) == [joints[0], *joints[2:]]
+    removed = changed_rows(so101, None, lambda rows: rows.__delitem__(2))
+    assert left(removed.robot) == [*joints[:2], *joints[3:]]
+    moved = changed_rows(so101, None, lambda rows: move_row(rows, 0, 1))
+    assert left(moved.robot) == joints, "a motor names its joint, wherever that is"
+    assert converted(so101, None).robot.motors == so101.motors
 
 
 def test_another_mounting_turns_the_arm_with_its_base_and_back():
