@@ -136,7 +136,7 @@ RULES: dict[str, set[str]] = {
     "app/cli/xacro/expressions.py": {"xacro"},
     "app/cli/startup.py": set(),
     # Programs that users copy: what they need of Kinboard is public.
-    "examples": {"kin", "numpy", "connecting", "recording", "mujoco"},
+    "examples": {"kin", "numpy", "connecting", "driving", "recording", "mujoco", "roslibpy"},
     "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.service.main", "app.shared"},
     "app/cli/open.py": {"app.classroom.tokens", "app.cli", "app.live", "app.viewer.session.state"},
 }
