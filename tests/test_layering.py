@@ -60,7 +60,8 @@ RULES: dict[str, set[str]] = {
     "app/classroom/results": {"kin", "sqlalchemy", "app.classroom", "app.shared.spreadsheets"},
     "app/live": {"kin", "app.classroom.tokens", "app.live", "app.shared.problems"},
     # A program's end of the line needs nothing of the service.
-    "app/live/client": {"kin", "numpy", "websockets", "app.live.client"},
+    "app/live/client": {"kin", "numpy", "websockets", "app.live.client", "app.live.recording"},
+    "app/live/recording": {"kin", "numpy", "mcap", "app.live.recording"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     # A page of a recorded run needs neither the core nor other libraries.
     "app/bench/board": {"jinja2", "markupsafe", "app.bench.board"},

@@ -16,6 +16,8 @@ from typing import Any, Final
 
 from app.classroom.tokens import new_code
 from app.live.codes import unused_code
+from app.live.recording import Recording
+from app.live.recording.recording import SHOWN
 from app.shared.problems import Problem
 from kin import Robot
 
@@ -115,6 +117,12 @@ class Line:
         self._count = 0
         self._letters: deque[Letter] = deque(maxlen=LETTERS)
         self.ended = ""  # why, once it has
+        self.recording: Recording | None = None
+
+    def note(self, way: str, message: Mapping[str, Any]) -> None:
+        """Record a message of the connection, if it is recorded."""
+        if self.recording is not None:
+            self.recording.take(way, message)
 
     # The program
 
@@ -204,6 +212,8 @@ class Line:
             self._count += 1
             self._values[name] = self._count, value
             program = self._program
+        if name == "q" and self.recording is not None:
+            self.recording.add(SHOWN, {"q": value.tolist()})  # type: ignore[attr-defined]
         if program is not None and (name in program.wants or name == "robot"):
             program.wake()
 

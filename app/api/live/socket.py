@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import logging
 from collections import deque
 from collections.abc import Callable
@@ -204,6 +205,8 @@ class Conversation:
                 logger.exception("a message of a program failed")
                 self._say(id_of(text), internal_error().problem)
             else:
+                if self._line.recording is not None:
+                    self._line.note("sent", json.loads(text))
                 if message.subscription is not None:
                     self._program.wants = frozenset(message.subscription.values)
                     self._interval = 1.0 / message.subscription.rate
@@ -266,6 +269,7 @@ class Conversation:
                 await self._send(self._own.popleft())
 
     async def _send(self, message: dict[str, Any]) -> None:
+        self._line.note("heard", message)
         await self._visitor.send_text(as_json(message).decode())
 
 

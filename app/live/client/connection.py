@@ -54,6 +54,7 @@ class Connection:
         token: access token of the service.
         heard: called with each message, by the thread that receives.
         again: what is sent after each connection, in order.
+        sent: called with each message that was sent.
 
     Raises:
         KinematicsError: no connection, or the page has refused it.
@@ -67,9 +68,10 @@ class Connection:
         token: str | None,
         heard: Callable[[Message], None],
         again: Callable[[], list[Message]],
+        sent: Callable[[Message], None],
     ) -> None:
         self._uri, self._options = _where(address, code, name, token)
-        self._heard, self._again = heard, again
+        self._heard, self._again, self._sent = heard, again, sent
         self._lock = threading.Condition()
         self._outbox: list[Message] = []
         self._streams: Message | None = None  # the last of the outbox, if it still takes newer values
@@ -147,6 +149,8 @@ class Connection:
                 socket.send(json.dumps(message))
             except (ConnectionClosed, OSError):
                 lost = True
+            else:
+                self._sent(message)
             with self._lock:
                 if not lost or streams:  # what was asked is asked again, what streams is newer by then
                     self._outbox.pop(0)
@@ -218,6 +222,7 @@ class Connection:
         self._heard(first)
         for message in self._again():
             socket.send(json.dumps(message))
+            self._sent(message)
         with self._lock:
             self._socket = socket
             self._lock.notify_all()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import threading
+import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -17,6 +19,7 @@ from numpy.typing import ArrayLike
 import kin
 from app.live.client.connection import Connection, Message, RefusedError
 from app.live.client.drawing import Drawing
+from app.live.recording import Recording, read_mcap, save
 from kin import InputError, KinematicsError, Motion, Obstacle, Program, Robot
 from kin.transforms import Array, from_position_wxyz
 
@@ -70,10 +73,11 @@ class Page:
         self._drives: str | None = None
         self._rate = rate
         self._readers: list[_Reader] = []
+        self._recordings: list[Recording] = []
         self._robot: Robot
         self.draw = Drawing(self._draw)
-        name = name or Path(sys.argv[0] or "").name or "Python"
-        self._connection = Connection(address, code, name, token, self._take, self._beginning)
+        self._name = name or Path(sys.argv[0] or "").name or "Python"
+        self._connection = Connection(address, code, self._name, token, self._take, self._beginning, self._note)
         with self._lock:
             if not self._lock.wait_for(lambda: "q" in self._values or bool(self._connection.ended), TIMEOUT):
                 self._connection.close()
@@ -210,6 +214,53 @@ class Page:
         """Place these obstacles, in place of all that there are."""
         self._ask(obstacles=[_plain(each) for each in obstacles])
 
+    @contextlib.contextmanager
+    def record(
+        self, path: str | Path | None = None, seconds: float = 3600.0, megabytes: float = 256.0
+    ) -> Iterator[Recording]:
+        """Record what this program sends and hears meanwhile: ``with page.record("run.mcap") as recording: …``.
+
+        The recording has ``track()``: times, and the configurations that were commanded and measured. It ends by
+        itself when another arm is shown, or it has reached these bounds; ``recording.ended`` says why.
+
+        Args:
+            path: where it is written at the end, ``.mcap`` or ``.csv``; None: nowhere.
+        """
+        if path is not None and Path(path).suffix.lower() not in (".mcap", ".csv"):
+            raise InputError("path", str(path), "a name that ends with .mcap or .csv")
+        self._check()
+        with self._lock:
+            recording = Recording(self._robot, self._name, seconds, int(megabytes * 1e6))
+            recording.add("/heard/q", {"q": self._values["q"].tolist()})
+            self._recordings.append(recording)
+        try:
+            yield recording
+        finally:
+            recording.end()
+            with self._lock:
+                self._recordings.remove(recording)
+            if path is not None:
+                save(recording, path)
+
+    def replay(self, recording: Recording | str | Path, rate: float = 1.0) -> None:
+        """Show a recording, or that of an MCAP file, in the page, so many times as fast; returns at its end.
+
+        Raises:
+            KinematicsError: it is no recording, or of an arm with other joints than that on show.
+        """
+        if not isinstance(recording, Recording):
+            recording = read_mcap(Path(recording).read_bytes())
+        if recording.robot.n != self._robot.n or not (recording.robot.revolute == self._robot.revolute).all():
+            raise InputError("recording", f"one of the {recording.robot.name}", f"one of the {self._robot.name}")
+        if not 0.01 <= rate <= 100.0:
+            raise InputError("rate", rate, "a number from 0.01 to 100")
+        track, began = recording.track(), time.monotonic()
+        for t, q, measured in zip(track.t, track.commanded, track.measured, strict=True):
+            time.sleep(max(0.0, began + t / rate - time.monotonic()))
+            if not np.isnan(q).any():
+                self.q = self._robot.clip(q)
+            self.measured = None if np.isnan(measured).any() else measured
+
     def events(self) -> Iterator[Event]:
         """What happens in the page from now on; ends when the page is closed.
 
@@ -279,9 +330,16 @@ class Page:
             found.append({"measured": self._measured.tolist()})
         return found + [{"draw": {name: drawn}} for name, drawn in self.draw.shown.items()]
 
+    def _note(self, message: Message) -> None:
+        """Record a message that was sent."""
+        for recording in list(self._recordings):
+            recording.take("sent", message)
+
     def _take(self, message: Message) -> None:
         """Take a message of the page; called by the thread that receives."""
         kind = message["type"]
+        for recording in list(self._recordings):
+            recording.take("heard", {name: value for name, value in message.items() if name != "asked"})
         with self._lock:
             if kind == "welcome":
                 self._robot = robot_of(message["robot"])
@@ -303,6 +361,8 @@ class Page:
     def _hear(self, name: str, value: Any) -> None:
         if name == "robot":
             self._robot = value = robot_of(value)
+            for recording in self._recordings:
+                recording.end("another arm was shown")
             self._measured = None
             self._sent = None
         elif name == "q":

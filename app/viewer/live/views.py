@@ -6,6 +6,7 @@ import numpy as np
 
 from app.classroom.tokens import show_code
 from app.live import Program
+from app.viewer.live.tape import BYTES, SECONDS
 from app.viewer.panel.share import box_html
 from app.viewer.views.templates import render
 from kin import Robot
@@ -40,6 +41,21 @@ def state_of(program: Program | None) -> tuple[str, int, str]:
 def state(name: str, rate: int, delay: str) -> str:
     """Who is connected, in the words of the page."""
     return render("live/state", name=name, rate=rate, delay=delay)
+
+
+def recording(seconds: float, count: int, size: int, running: bool, why: str, other: str) -> str:
+    """How far a recording is, of how much; why it has ended by itself, and of which arm that is not on show."""
+    return render(
+        "live/recording",
+        seconds=f"{seconds:.1f}",
+        count=count,
+        size=f"{size / 1e6:.2f}",
+        running=running,
+        why=why,
+        other=other,
+        most_seconds=f"{SECONDS:g}",
+        most_size=f"{BYTES / 1e6:.0f}",
+    )
 
 
 def measured(robot: Robot, gap: bytes, q: bytes, units: Units) -> str:

@@ -1,0 +1,176 @@
+"""A recording: every message with its time, and what the arm was commanded and measured to do in it.
+
+A recording belongs to one arm, and is bounded in time and in memory: it ends by itself, and says why. Its topics
+are ``/sent/…`` and ``/heard/…`` with the name of a field or the type of a message, and ``/page/q`` for the
+configurations that the page showed.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+from weakref import WeakSet
+
+import numpy as np
+
+from kin import Robot
+from kin.transforms import Array
+
+SHOWN: Final = "/page/q"
+MEASURED: Final = "/sent/measured"
+SPOKEN: Final = ("/sent/q", "/heard/q")  # what was commanded, where the page itself was not recorded
+ENTRY: Final = 120  # bytes of an entry beside its data
+STEP: Final = 1 << 20  # bytes between two looks at all recordings of a process
+
+_shared: WeakSet[Recording] = WeakSet()
+_shared_lock = threading.Lock()
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A message: seconds since the beginning, topic, and the JSON text of an object."""
+
+    time: float
+    topic: str
+    data: bytes
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The arm over time.
+
+    Attributes:
+        t: times ``(k,)`` of changes, seconds.
+        commanded, measured: configurations ``(k, n)``, radians (metres); NaN before the first one.
+    """
+
+    t: Array
+    commanded: Array
+    measured: Array
+
+    def at(self, time: float) -> tuple[Array | None, Array | None]:
+        """What was commanded and measured at a time ``(n,)``, or at the first one; None: nothing yet."""
+        if not len(self.t):
+            return None, None
+        row = max(int(np.searchsorted(self.t, time, side="right")) - 1, 0)
+        found = self.commanded[row], self.measured[row]
+        return tuple(None if np.isnan(q).any() else q for q in found)  # type: ignore[return-value]
+
+
+class Recording:
+    """See the module. All methods are thread-safe.
+
+    Args:
+        robot: the arm.
+        name: of the program.
+        most_seconds, most_bytes: its bounds.
+        shared: bytes of all recordings of this process that have this bound; None: it does not count among them.
+        started: when it began (ns since 1970); None: now.
+
+    Attributes:
+        ended: why it has ended; None: it has not.
+        entries: the messages so far.
+        size: their bytes in memory.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        name: str = "",
+        most_seconds: float = 3600.0,
+        most_bytes: int = 256 << 20,
+        shared: int | None = None,
+        started: int | None = None,
+    ) -> None:
+        self.robot, self.name = robot, name
+        self.most_seconds, self.most_bytes = most_seconds, most_bytes
+        self.started = time.time_ns() if started is None else started
+        self.ended: str | None = None
+        self.entries: list[Entry] = []
+        self.size = 0
+        self._most_of_all = shared
+        self._began = time.monotonic()
+        self._end = 0.0
+        self._lock = threading.Lock()
+        if shared is not None:
+            with _shared_lock:
+                _shared.add(self)
+
+    @property
+    def seconds(self) -> float:
+        """How long it is."""
+        return min(time.monotonic() - self._began, self.most_seconds) if self.ended is None else self._end
+
+    def take(self, way: str, message: Mapping[str, Any]) -> None:
+        """Record a message of the connection, ``"sent"`` or ``"heard"``: each value under its own topic."""
+        if self.ended is not None:
+            return
+        number = {} if message.get("id") is None else {"id": message["id"]}
+        kind = "news" if way == "sent" else message.get("type")
+        if kind == "news":
+            for field, value in message.items():
+                if field not in ("id", "type"):
+                    self.add(f"/{way}/{field}", {field: value, **number})
+        else:
+            self.add(f"/{way}/{kind}", {name: value for name, value in message.items() if name != "type"})
+
+    def add(self, topic: str, message: Mapping[str, Any]) -> None:
+        """Record a message; it ends the recording if there is no room for it, or no time."""
+        if self.ended is not None:
+            return
+        data = json.dumps(message, separators=(",", ":")).encode()
+        now, cost = time.monotonic() - self._began, len(data) + ENTRY
+        with self._lock:
+            if now > self.most_seconds:
+                self._finish(self.most_seconds, f"it has reached {self.most_seconds:g} s, the most there may be")
+            elif self.size + cost > self.most_bytes:
+                self._finish(now, f"it has reached {self.most_bytes / 1e6:.0f} MB, the most there may be")
+            elif self.size // STEP != (self.size + cost) // STEP and self._crowded():
+                self._finish(now, "the recordings of all pages have filled the service's memory for them")
+            elif self.ended is None:
+                self.entries.append(Entry(now, topic, data))
+                self.size += cost
+
+    def end(self, why: str = "stopped") -> None:
+        """End it."""
+        with self._lock:
+            self._finish(min(time.monotonic() - self._began, self.most_seconds), why)
+
+    def restored(self, entries: list[Entry], seconds: float) -> Recording:
+        """This recording with the entries of a file."""
+        with self._lock:
+            self.entries, self.size = entries, sum(len(each.data) + ENTRY for each in entries)
+            self._finish(seconds, "read from a file")
+        return self
+
+    def _finish(self, seconds: float, why: str) -> None:
+        if self.ended is None:
+            self._end, self.ended = seconds, why
+
+    def _crowded(self) -> bool:
+        if self._most_of_all is None:
+            return False
+        with _shared_lock:
+            return sum(each.size for each in _shared) + STEP > self._most_of_all
+
+    def track(self) -> Track:
+        """The arm over time."""
+        entries, n = list(self.entries), self.robot.n
+        spoken = (SHOWN,) if any(each.topic == SHOWN for each in entries) else SPOKEN
+        unknown = np.full(n, np.nan)
+        now = {"q": unknown, "measured": unknown}
+        times, rows = [], []
+        for each in entries:
+            if each.topic not in (*spoken, MEASURED):
+                continue
+            field = each.topic.rpartition("/")[2]
+            value = json.loads(each.data)[field]
+            now[field] = unknown if value is None or len(value) != n else np.array(value, dtype=float)
+            times.append(each.time)
+            rows.append((now["q"], now["measured"]))
+        found = np.array(rows).reshape(-1, 2, n)
+        return Track(np.array(times), found[:, 0], found[:, 1])

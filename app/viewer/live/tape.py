@@ -1,0 +1,120 @@
+"""The recording of a page: it is made, saved, and played in the page with its commanded and its measured arm."""
+
+from __future__ import annotations
+
+from app.live import Line
+from app.live.recording import Recording, Track, to_csv, to_mcap
+from app.live.recording.recording import SHOWN
+from app.viewer.feature import Stage
+from app.viewer.panel.status import Notice
+from kin import InputError
+from kin.transforms import Array
+
+SECONDS, BYTES = 600.0, 16 << 20  # of one recording
+OF_ALL = 256 << 20  # bytes of the recordings of all pages of a process
+WRITERS = {"MCAP": ".mcap", "CSV": ".csv"}
+
+
+class Tape:
+    """See the module. The page's worker calls it.
+
+    Attributes:
+        recording: the last one; None: there is none.
+        time: where it is played, seconds.
+        playing: whether the time goes on.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+        self.recording: Recording | None = None
+        self.time = 0.0
+        self.playing = False
+        self._line: Line | None = None  # that is or was recorded
+        self._track: Track | None = None
+        self._stepped = 0.0
+
+    @property
+    def running(self) -> bool:
+        """Whether it is being made."""
+        return self.recording is not None and self.recording.ended is None
+
+    @property
+    def playable(self) -> bool:
+        """Whether it can be shown: it is of the arm on show, which moves in it."""
+        found = self.recording
+        return found is not None and not self.running and found.robot == self._stage.now.robot and self.seconds > 0
+
+    @property
+    def seconds(self) -> float:
+        """How long it is."""
+        return 0.0 if self.recording is None else self.recording.seconds
+
+    def begin(self, line: Line) -> None:
+        """Record from now on, in place of the last recording."""
+        self.discard()
+        arm, program = self._stage.now, line.program
+        self.recording = Recording(arm.robot, "" if program is None else program.name, SECONDS, BYTES, OF_ALL)
+        self.recording.add(SHOWN, {"q": arm.q.tolist()})
+        self._line, line.recording = line, self.recording
+
+    def end(self, why: str) -> None:
+        """End the recording; it stays, and is at its end."""
+        if self.recording is not None and self.running:
+            self.recording.end(why)
+            self.time = self.seconds
+
+    def discard(self) -> None:
+        """Forget the recording."""
+        self.end("discarded")
+        self.stop()
+        if self._line is not None:
+            self._line.recording = None
+        self.recording, self._track, self.time, self._line = None, None, 0.0, None
+
+    def save(self, kind: str) -> None:
+        """Download it."""
+        assert self.recording is not None
+        stage, file = self._stage, f"{self.recording.robot.id}-recording{WRITERS[kind]}"
+        try:
+            data = to_mcap(self.recording) if kind == "MCAP" else to_csv(self.recording).encode()
+        except InputError as error:
+            stage.notify(Notice("error", "The recording was not saved", f"This format is for {error.expected}."))
+            return
+        stage.client.send_file_download(file, data, save_immediately=True)
+        stage.notify(Notice("hand", f"{file} is saved", "Radians, metres and seconds."))
+
+    # Playing
+
+    def play(self) -> None:
+        """Go on from the present time, or begin again at the end."""
+        if self.time >= self.seconds:
+            self.time = 0.0
+        self.playing, self._stepped = True, 0.0
+        self._stage.play(True)
+
+    def stop(self) -> None:
+        """Leave the arm where it is."""
+        if self.playing:
+            self.playing = False
+            self._stage.play(False)
+
+    def advance(self, now: float) -> Array | None:
+        """Show the time that it is now while it is played; returns the measured arm."""
+        if self._stepped:
+            self.time += now - self._stepped
+        self._stepped = now
+        if self.time >= self.seconds:
+            self.stop()
+        return self.show(min(self.time, self.seconds))
+
+    def show(self, time: float) -> Array | None:
+        """Show the arm as it was commanded at a time; returns where it was measured."""
+        assert self.recording is not None
+        if self._track is None:
+            self._track = self.recording.track()
+        self.time = time
+        q, measured = self._track.at(time)
+        if q is not None:
+            q = self._stage.now.robot.clip(q)
+            self._stage.move_to(q, Notice("hand", f"The recording at {time:.2f} s"), at_once=True)
+        return measured
