@@ -14,6 +14,23 @@
 
   const parts = () => [...document.querySelectorAll("[data-wide]")].filter((node) => node.checkVisibility());
 
+  /** How high the contents of a part are, with its border and padding, whatever height it has. */
+  function contents(part) {
+    const pixels = (node, ...names) => names.reduce((sum, name) => sum + parseFloat(getComputedStyle(node)[name]), 0);
+    const shown = [...part.children].filter((node) => node.offsetHeight > 0);
+    const ends = shown.map((node) => node.getBoundingClientRect().bottom + pixels(node, "marginBottom"));
+    const start = Math.min(...shown.map((node) => node.getBoundingClientRect().top));
+    return pixels(part, "borderTopWidth", "paddingTop", "paddingBottom") + Math.max(...ends) - start;
+  }
+
+  /** Make the drawer as high as the higher one of its parts. */
+  function fit() {
+    if (!root.hasAttribute("data-kb-drawer")) return;
+    const high = `${Math.ceil(Math.max(...parts().map(contents)))}px`;
+    if (root.style.getPropertyValue("--kb-contents") !== high) root.style.setProperty("--kb-contents", high);
+  }
+  const sizes = new ResizeObserver(fit);
+
   /** The drawer is there while it is wanted, and the open tab has something for it. */
   function show() {
     const open = wanted && !SMALL.matches && parts().length > 0;
@@ -21,6 +38,9 @@
     for (const button of document.querySelectorAll("[data-wide-do]")) {
       if (button.ariaPressed !== String(open)) button.ariaPressed = String(open);
     }
+    sizes.disconnect();
+    if (open) for (const part of parts()) for (const node of part.children) sizes.observe(node);
+    fit();
   }
 
   function toggle() {

@@ -161,6 +161,9 @@ class Stage(Protocol):
         A view chosen by the visitor stays.
         """
 
+    def toward_camera(self) -> Array:
+        """A vector ``(3,)`` of the world frame that leads from what the visitor looks at to the camera."""
+
 
 class Feature:
     """One feature of one visitor. Override what is needed; build controls in ``__init__``.

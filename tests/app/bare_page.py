@@ -88,6 +88,9 @@ class BarePage:
     def fit_view(self, spheres: Any, points: Array | None = None) -> None:
         self.views.append((spheres, points))
 
+    def toward_camera(self) -> Array:
+        return np.ones(3)
+
     def play(self, on: bool) -> None:
         pass
 

@@ -29,6 +29,9 @@ def compute(tab: Tab) -> None:
 
 def test_a_map_is_drawn_and_a_click_shows_the_voxel(tab: Tab) -> None:
     compute(tab)
+    expect(tab.row("Cut").locator("input:visible").first).to_have_value("along the arm")  # it opens cut
+    tab.screenshot("capability-opens-cut")
+    tab.choose("Cut", "none")
     found = kin.capability_map(PIONEER, resolution=15, directions=24)
     shown = tab.page.locator("[data-shown]")
     expect(shown).to_have_attribute("data-shown", str(len(found.index)))

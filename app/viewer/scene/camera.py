@@ -227,6 +227,12 @@ class VisitorCamera:
         """Where points ``(n, 3)`` will be in the picture, and how long a metre there; see `viewpoints.places`."""
         return places(self._viewpoint, self._aspect, points)
 
+    @property
+    def toward(self) -> Array:
+        """From the look-at point of the picture to the camera ``(3,)``."""
+        out: Array = self._viewpoint[0] - self._viewpoint[1]
+        return out
+
     def rightward(self, start: Array, end: Array) -> bool:
         """Whether the end ``(3,)`` of a segment will be to the right of its start in the picture."""
         return rightward(self._viewpoint, start, end)

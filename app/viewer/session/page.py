@@ -197,6 +197,9 @@ class VisitorPage(ShownArm, Worker):
     def fit_view(self, spheres: Sequence[Sphere], points: Array | None = None) -> None:
         self.camera.fit(spheres, points)
 
+    def toward_camera(self) -> Array:
+        return self.camera.toward
+
     @property
     def service(self) -> Service:
         return self._persistence.service

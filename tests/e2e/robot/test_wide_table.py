@@ -12,6 +12,10 @@ pytestmark = pytest.mark.browser
 
 UR5, PIONEER = kin.get_robot("ur5"), kin.get_robot("pioneer5")
 BOTTOM = "document.querySelector('canvas[data-engine]').getBoundingClientRect().bottom"
+ROOM_BELOW = """(node) => {
+  const ends = [...node.children].map((each) => each.getBoundingClientRect().bottom);
+  return innerHeight - Math.max(...ends);
+}"""
 
 
 def box(node: Locator) -> FloatRect:
@@ -44,6 +48,8 @@ def test_the_whole_table_is_seen_below_the_scene_and_typed_into(desktop: Tab) ->
     for row in range(6):
         place = box(table.locator(f'[data-cell="{row} high"]'))
         assert place["y"] + place["height"] <= 720, "and every row"
+    assert table.evaluate("node => node.scrollHeight <= node.clientHeight"), "nothing has to be scrolled"
+    assert table.evaluate(ROOM_BELOW) < 40, "nor is there room for nothing"
     table.locator('[data-cell="0 high"]').fill("90")
     table.locator('[data-cell="0 high"]').press("Enter")
     expect(tab.row("Robot").locator("input:visible").first).to_have_value(f"My arm ({UR5.name} variant)")

@@ -11,6 +11,8 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, cast
 
+import numpy as np
+
 import kin
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
@@ -20,7 +22,7 @@ from app.viewer.scene.camera import Sphere, round_points
 from app.viewer.tabs.workspace.axes import Axes
 from app.viewer.tabs.workspace.capability.panel import Capability
 from app.viewer.tabs.workspace.cloud import CloudView
-from app.viewer.tabs.workspace.cut import Cut, cut_of
+from app.viewer.tabs.workspace.cut import Axis, Cut, cut_of
 from app.viewer.tabs.workspace.form import FIGURES, PRESETS, cloud, figures_hint, form, is_in_the_book
 from app.viewer.tabs.workspace.pick import PointPicker
 from app.viewer.tabs.workspace.said import Said
@@ -28,7 +30,7 @@ from app.viewer.tabs.workspace.section.panel import SectionPanel
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
 from app.viewer.tabs.workspace.sizes import Sizes
-from kin import Robot, Section
+from kin import CapabilityMap, Robot, Section
 from kin.transforms import Array
 from kin.warmup import CAPABILITY, CLOUDS
 
@@ -68,6 +70,8 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._section: SectionPanel | None = None
         self._axes = Axes(stage.client.scene, self._new_root)
         self._cut: Cut | None = None
+        # Whether a new map is cut open (until the visitor chooses a cut), and whether the present cut was made so.
+        self._opens, self._opened = True, False
         self._plotted = self._dotted = self._moved = 0.0
         self._tool = stage.now.T_tool[:3, 3]
         self._dot_due = False
@@ -79,6 +83,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             self._post_capability,
             self._new_root,
             self.settings.map,
+            self._open_map,
         )
         # Events by the first part of their key. A handler takes the other parts, and the value.
         self._handlers: dict[str, Callable[..., None]] = {
@@ -136,6 +141,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         robot = self.stage.now.robot
         self._tool = kin.fk(robot, robot.q_home)[:3, 3]
         self._use(self.settings.for_robot(robot))
+        self._opened = False
         self._set_cut()
         if self._section is not None:
             self._show_section(False)
@@ -178,6 +184,8 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         self._update_section(now)
         try:
             self._capability.poll(now, moving)
+            if self._opened and self._capability.empty:
+                self._cut_as(None)
             self._fit_view()
         finally:
             self.refresh()
@@ -192,6 +200,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
     def restore(self, state: dict[str, object]) -> None:
         before, robot = self.settings, self.stage.now.robot
         self._use(before.restored(state, robot))
+        self._opened = False
         if self.settings.compare not in (None, *(r.id for r in self.stage.store.robots if r != robot)):
             self._use(replace(self.settings, compare=before.compare))  # the robot is gone
         at = self.settings.at
@@ -249,6 +258,7 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
             case "size":
                 self._clouds.resize()
             case "axis":
+                self._opens = self._opened = False
                 self._set_cut()
             case "at" | "keep":
                 self._show_slabs()
@@ -351,6 +361,23 @@ class Workspace(DeclaredFeature[WorkspaceSettings, Facts[WorkspaceSettings]]):
         return found if corners is None else [*found, round_points(corners)]
 
     # Cut
+
+    def _open_map(self, found: CapabilityMap) -> None:
+        """Cut a new map, a solid, open along the arm, so that its inside is seen; a flat one has none."""
+        if self._opens and self.settings.axis is None and min(found.grid.shape) > 1:
+            self._cut_as("arm")
+
+    def _cut_as(self, axis: Axis | None) -> None:
+        """Cut without being asked, and keep the side that is farther from the camera; None: no longer."""
+        self.change(axis=axis)
+        self._use(self.settings)
+        self._set_cut()
+        self._opened = axis is not None
+        if self._cut is not None:
+            seen = float(np.array(self._cut.normal) @ self.stage.toward_camera())
+            self.change(keep="below" if seen >= 0.0 else "above")
+            self._use(self.settings)
+            self._show_slabs()
 
     def _set_cut(self) -> None:
         """Cut along the axis in the settings, near the middle, or not at all."""

@@ -20,6 +20,7 @@ from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.viewer.scene.camera import DIRECTION
 from app.viewer.server import ViewerServer
 from app.viewer.tabs.workspace import colours, cut
 from app.viewer.tabs.workspace.capability import views, voxels
@@ -140,7 +141,10 @@ class Visitor(FakeBrowser):
         ]
         return np.concatenate([np.empty((0, 3)), *found])
 
-    def compute(self) -> None:
+    def compute(self, whole: bool = True) -> None:
+        if whole:  # who has chosen no cut gets none
+            self.set("Cut", "across z (level)")
+            self.set("Cut", "none")
         self.set("Grid", f"{LENGTH} voxels long")
         self.set("Directions", "12")
         self.push("Start")
@@ -319,6 +323,35 @@ def test_the_cut_of_the_tab_applies_to_the_voxels(tab):
     tab.wait(lambda: tab.count() == (~below).sum())
     tab.set("Cut", "none")
     tab.wait(lambda: tab.count() == len(found.index))
+
+
+def test_a_new_map_opens_cut_along_the_arm_on_the_side_of_the_camera(tab):
+    found = the_map()
+    tab.compute(whole=False)
+    made = cut.cut_of([PIONEER], "arm", PIONEER.q_home)
+    along = found.centres @ np.array(made.normal)
+    toward = float(np.array(made.normal) @ DIRECTION)
+    far = along < made.middle if toward > 0.0 else along >= made.middle
+    assert 0.2 < far.mean() < 0.8
+    tab.done(int(far.sum()))
+    assert same_places(tab.centres(), found.centres[far])
+    assert tab.value("Cut") == "along the arm"
+    tab.push("Clear")
+    tab.wait(lambda: tab.value("Cut") == "none")
+
+
+def test_a_new_map_stays_whole_for_who_has_chosen_no_cut_and_where_it_is_flat(service, tab):
+    tab.compute()
+    tab.done(len(the_map().index))
+    assert tab.value("Cut") == "none"
+    flat = STORE.get("planar3r")
+    with Visitor(service[0]) as other:
+        other.settle(0.2)
+        other.set("Robot", flat.name)
+        other.settle(0.2)
+        other.compute(whole=False)
+        other.done(len(the_map(flat).index))
+        assert other.value("Cut") == "none"
 
 
 def test_a_click_describes_the_voxel_and_draws_its_directions(tab):

@@ -35,7 +35,7 @@ COST = 4  # flow control counts a voxel as this many points
 PERCENT = 100.0
 ABOUT = (
     "Capability: from how many directions the tool can approach each place. The map divides the workspace into "
-    "small cubes (voxels) and colours each by this share."
+    "small cubes (voxels) and colours each by this share. A new map is cut open along the arm."
 )
 MAP_HINT = "Start: compute the map. Stop: keep the part computed so far. Clear: remove the map."
 
@@ -48,6 +48,7 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
         post: returns the events of controls and clicks to `handle`.
         new_root: returns a prefix of node names that was never used before.
         colours: name of the colour map.
+        appears: called with the first voxels of a map that the visitor has started, before they are drawn.
     """
 
     key = "capability"
@@ -55,9 +56,16 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
     settings_of, facts_of = MapSettings, Facts
 
     def __init__(
-        self, stage: Stage, window: SendWindow, post: Post, new_root: Callable[[], str], colours: str
+        self,
+        stage: Stage,
+        window: SendWindow,
+        post: Post,
+        new_root: Callable[[], str],
+        colours: str,
+        appears: Callable[[CapabilityMap], None],
     ) -> None:
         self._window, self._to, self._new_root = window, post, new_root
+        self._appears, self._unseen = appears, False
         self._drawn_as = Look("share", colours)
         self._reader: Subscription[CapabilityMap] | None = None
         self._state: views.State = "ready"
@@ -85,7 +93,7 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
         if self._marked is not None:
             pick = Html(views.picked, (*self._marked, units), key="pick")
         events = {
-            "Start": self.event(self.compute),
+            "Start": self.event(self.on_start),
             "Stop": self.event(self._stop, "stopped"),
             "Clear": self.event(self.clear),
         }
@@ -116,6 +124,11 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
         return np.array(grid.origin) + sides / 2.0, float(sides.max()) / 2.0
 
     @property
+    def empty(self) -> bool:
+        """Whether there is no map, and none is being computed."""
+        return self._found is None and self._reader is None
+
+    @property
     def wait(self) -> float | None:
         """Seconds until the next poll, as `Feature.due`."""
         return POLL if self._reader is not None or self._old else None
@@ -131,11 +144,19 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
             if reader.finished:
                 self._finish(reader)
             self._stale = True
+        if self._unseen and self._found is not None and len(self._found.index):
+            self._unseen = False
+            self._appears(self._found)
         if self._old and self._found is not None and now - self._drawn >= REDRAW and self._window.is_open(moving):
             self._drawn = now
             self._draw_map(self._found)
         if self._stale:
             self.refresh()
+
+    def on_start(self) -> None:
+        """Compute a map for a visitor, who sees it for the first time."""
+        self.compute()
+        self._unseen = True
 
     def compute(self) -> None:
         """Compute the map of the selected robot, and draw it while it grows."""
@@ -158,7 +179,7 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
         if self._voxels is not None:
             self._voxels.remove()
         self._voxels = self._found = None
-        self._old = False
+        self._old = self._unseen = False
         self._state, self._blocks = "ready", (0, 0)
         self._forget_pick()
         self._stale = True
