@@ -88,6 +88,7 @@
       text: document.documentElement.dataset.kbText,
       embedded: mode,
       shown: query.get("shown") ?? "",
+      zone: -new Date().getTimezoneOffset(),
       dark: matchMedia("(prefers-color-scheme: dark)").matches,
     });
   }

@@ -31,6 +31,7 @@ class Kind(ABC):
         name: as in files.
         about: one sentence for the documentation.
         shows_posture: whether the arm may stand at the exercise's configuration before the answer.
+        in_words: whether its text asks it by itself, without the scene and without the arm as the answer.
         withholds: facts that nothing in the page shows while the question is open, because they are the answer:
             see `app.viewer.activity.activity.Activity.withheld`.
     """
@@ -38,6 +39,7 @@ class Kind(ABC):
     name: ClassVar[str]
     about: ClassVar[str]
     shows_posture: ClassVar[bool] = False
+    in_words: ClassVar[bool] = False
     withholds: ClassVar[frozenset[str]] = frozenset()
 
     @classmethod

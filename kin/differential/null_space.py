@@ -76,7 +76,7 @@ def secondary(robot: Robot, q: Array, task: Task, goal: Goal) -> Array:
     if goal == "limits":
         half = 0.5 * (robot.upper - robot.lower)
         bounded = np.isfinite(half)
-        middle = np.where(bounded, 0.5 * (robot.lower + robot.upper), 0.0)
+        middle = 0.5 * (np.where(bounded, robot.lower, 0.0) + np.where(bounded, robot.upper, 0.0))
         return np.asarray(np.where(bounded, (middle - q) / np.where(bounded, half, 1.0) ** 2, 0.0))
     rank = null_space(robot, q, task).rank
     near = q + _STEP * np.concatenate([np.eye(robot.n), -np.eye(robot.n)])

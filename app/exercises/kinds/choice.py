@@ -19,6 +19,7 @@ class ChoiceKind(Kind):
 
     name: ClassVar[str] = "choice"
     about: ClassVar[str] = "One of several answers is chosen; each has its reason."
+    in_words: ClassVar[bool] = True
 
     options: tuple[tuple[str, Expression, Words, Expression], ...]
     shuffle: bool

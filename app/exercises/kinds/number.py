@@ -37,6 +37,7 @@ class NumberKind(Kind):
 
     name: ClassVar[str] = "number"
     about: ClassVar[str] = "A number or a vector is typed; a unit may follow it."
+    in_words: ClassVar[bool] = True
 
     values: tuple[Expression, ...]
     labels: tuple[str, ...]

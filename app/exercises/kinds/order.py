@@ -28,6 +28,7 @@ class OrderKind(Kind):
 
     name: ClassVar[str] = "order"
     about: ClassVar[str] = "Motions are put in order; every order with the same product is right."
+    in_words: ClassVar[bool] = True
 
     motions: tuple[Elementary, ...]
     fixed_axes: bool

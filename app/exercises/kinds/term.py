@@ -34,6 +34,7 @@ class TermKind(Kind):
 
     name: ClassVar[str] = "term"
     about: ClassVar[str] = "An equation is printed with one wrong term, which is to be found."
+    in_words: ClassVar[bool] = True
     shows_posture: ClassVar[bool] = True
 
     entry: Expression

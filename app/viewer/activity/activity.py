@@ -16,11 +16,13 @@ from app.exercises import Exercise, Shelf, Verdict
 from app.viewer.activity.places import Place
 from app.viewer.activity.practice import Practice
 from app.viewer.activity.progress import Progress
+from app.viewer.activity.review import Review, question_key
 from kin import KinematicsError
 
-# The keys under which the exercises are opened, and where one is written.
+# The keys under which the exercises are opened, where one is written, and where what was missed is asked again.
 EXERCISES: Final = "exercises"
 AUTHOR: Final = "author"
+REVIEW: Final = "review"
 
 # What questions may withhold, and what is then absent from panel, scene, read-out and messages.
 FACTS: Final = {
@@ -91,6 +93,8 @@ class Activity:
         lesson: the key of what the tab *Learn* shows: a lesson, the exercises or the courses; None: the overview.
         practice: what has been done of the exercises, and which one is open.
         progress: the open course and its item on show.
+        review: what was missed, and when it is asked again.
+        asked_again: exercises that are asked again, with numbers and marks of their own, which nobody else sees.
         sent: the course that the teacher of the room sent.
         draft: the exercise that is written in this page.
         lent: an exercise that the room brings along.
@@ -105,6 +109,8 @@ class Activity:
         self.secret, self.changed = secret, changed
         self.practice = Practice(self.exercises)
         self.progress = Progress(courses, self.practice, secret)
+        self.review = Review()
+        self.asked_again = Practice(self.exercises)
         self.lesson: str | None = None
         self.sent: Course | None = None
         self.draft: Exercise | None = None
@@ -123,20 +129,33 @@ class Activity:
         return self.practice.at if self.lesson == EXERCISES else None
 
     @property
+    def opens_exercise(self) -> bool:
+        """Whether an exercise is on show, as a task or as one that is asked again."""
+        practice = self._open_practice
+        return practice is not None and practice.at is not None
+
+    @property
     def opened(self) -> Hashable:
         """What is open and how far it has come: what a reload brings back, however soon it comes."""
-        exercise = self.exercise
-        record = None if exercise is None else self.practice.record(exercise)
+        practice = self._open_practice
+        exercise = None if practice is None else practice.at
+        record = None if practice is None or exercise is None else practice.record(exercise)
         done = None if record is None else (record.mark, record.attempts, record.hints, record.variant)
         return self.lesson, None if exercise is None else exercise.id, done, self.progress.at
 
     @property
     def withheld(self) -> frozenset[str]:
         """The names of `FACTS` that nothing in the page shows now, because an open question asks for them."""
-        exercise = self.exercise
-        if exercise is None or self.practice.record(exercise).closed:
+        practice = self._open_practice
+        exercise = None if practice is None else practice.at
+        if practice is None or exercise is None or practice.record(exercise).closed:
             return self.asked
         return self.asked | exercise.kind.withholds
+
+    @property
+    def _open_practice(self) -> Practice | None:
+        """What the exercise on show belongs to, if the tab *Learn* shows exercises."""
+        return {EXERCISES: self.practice, REVIEW: self.asked_again}.get(self.lesson or "")
 
     @property
     def offered(self) -> tuple[Course, ...]:
@@ -185,6 +204,7 @@ class Activity:
         """This is a student's page in a room from now on."""
         self._seat = seat
         self.practice.enter(place)
+        self.review.enter(place.label)
 
     # Answers
 
@@ -203,6 +223,7 @@ class Activity:
     ) -> None:
         """An answer was judged while the right one was not on show; `sending` as in `Judged`."""
         self.practice.take(exercise, verdict, seconds)
+        self.take_exercise(exercise, verdict.right)
         if self._seat is not None:
             self._seat.submit(Judged(exercise, self.practice.seed_of(exercise), given, verdict, seconds, sending))
 
@@ -212,7 +233,20 @@ class Activity:
         if not self.reveals(exercise) or (self._seat is not None and not self._seat.give_up(given_up)):
             return False
         self.practice.give_up(exercise)
+        self.take_exercise(exercise, right=False)
         return True
+
+    def take_exercise(self, exercise: Exercise, right: bool) -> None:
+        """An exercise was answered, or its answer shown: what was missed comes back.
+
+        Only exercises of the service do; others may be gone by then.
+        """
+        if self.courses.exercises.get(exercise.id) is not None:
+            self.review.take(exercise.id, right)
+
+    def take_question(self, lesson: str, question: str, robot_id: str, right: bool) -> None:
+        """A question of a lesson was answered about this arm, or its answer shown."""
+        self.review.take(question_key(lesson, question), right, robot_id)
 
     def pass_lesson(self, key: str, robot_id: str) -> None:
         """The check of a lesson was passed on this arm."""

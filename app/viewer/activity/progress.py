@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from datetime import UTC, datetime
 
 from app.classroom.courses import Course, Courses, Item, Seal, course_of, to_data
@@ -10,8 +10,11 @@ from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.results import Outcome, write_code
 from app.exercises import Exercise
 from app.viewer.activity.places import Place
-from app.viewer.activity.practice import Mark, Practice
+from app.viewer.activity.practice import MARKS, Mark, Practice
 from kin import InputError
+
+MOST_BACK = 2  # exercises that a course asks at its end
+HARDEST = 2  # level of these
 
 
 class Progress:
@@ -23,6 +26,7 @@ class Progress:
         seen: the indices of the lessons that were left with *Next*.
         passed: the indices of the lessons whose check was passed.
         alias: the name in the result code.
+        back: the ids of the exercises that the course asks at its end, with what has become of each.
     """
 
     def __init__(self, courses: Courses, practice: Practice, secret: Callable[[], bytes]) -> None:
@@ -34,6 +38,7 @@ class Progress:
         self.seen: set[int] = set()
         self.passed: set[int] = set()
         self.alias = ""
+        self.back: dict[str, Mark] = {}
 
     def read(self, data: object, file: str = "course") -> Course:
         """A course as a link or a room has it; raises `ExerciseFileError`, or what the secret raises."""
@@ -57,7 +62,7 @@ class Progress:
         self.course = course
 
     def _begin(self) -> None:
-        self.at, self.seen, self.passed = None, set(), set()
+        self.at, self.seen, self.passed, self.back = None, set(), set(), {}
 
     def bring(self, exercise: Exercise) -> Course:
         """Have the open course bring an exercise along, or a new one; raises `ExerciseFileError` if it is full."""
@@ -114,6 +119,39 @@ class Progress:
         self.passed |= passed
         return news
 
+    def ask_back(
+        self, missed: Collection[str], lessons: Collection[str], shown: Callable[[Exercise], bool]
+    ) -> None:
+        """Choose what the course asks at its end, once something of it is done: exercises of its lessons.
+
+        Args:
+            missed: the ids of exercises that were missed: these come first.
+            lessons: the keys of lessons in which something was missed: their exercises come next.
+            shown: whether the answer of an exercise may be shown.
+        """
+        course = self.course
+        if self.back or course is None or all(self.mark(i) == "open" for i in range(len(course.items))):
+            return
+        known = self._courses.exercises
+        taught = {item.key for item in course.items if item.kind == "lesson"}
+        taught |= {one.lesson for one in map(known.get, course.exercises) if one is not None}
+        found = [one for one in known.all if one.lesson in taught and one.level <= HARDEST and shown(one)]
+
+        def rank(one: Exercise) -> tuple[bool, bool, bool]:
+            return one.id not in missed, one.lesson not in lessons, one.id in course.exercises
+
+        chosen: list[Exercise] = []
+        while found and len(chosen) < MOST_BACK:
+            used = {one.lesson for one in chosen}
+            chosen.append(best := min(found, key=lambda one: (*rank(one), one.lesson in used)))
+            found.remove(best)
+        self.back = {one.id: "open" for one in chosen}
+
+    def look_back(self, exercise_id: str, mark: Mark) -> None:
+        """An exercise was asked again."""
+        if exercise_id in self.back:
+            self.back[exercise_id] = mark
+
     def first_open(self) -> int:
         """The first item that is not done; the first one if all are."""
         marks = [self.mark(i) for i in range(len(self._now.items))]
@@ -155,7 +193,8 @@ class Progress:
             return {}
         at = -1 if self.at is None else self.at
         indices = {"seen": sorted(self.seen), "passed": sorted(self.passed)}
-        return {"course": self.packed(self.course), "at": at, "alias": self.alias, **indices}
+        back = {"back": dict(self.back)} if self.back else {}
+        return {"course": self.packed(self.course), "at": at, "alias": self.alias, **indices, **back}
 
     def restore(self, state: dict[str, object]) -> None:
         """Take what `state` returned; raises `ExerciseFileError` for a course that is not valid here."""
@@ -170,6 +209,12 @@ class Progress:
             self.at = at
         self.seen, self.passed = (_indices(state.get(name), len(course.items)) for name in ("seen", "passed"))
         self.alias = alias[:100] if isinstance(alias, str) else ""
+        back = state.get("back")
+        self.back = {
+            key: mark
+            for key, mark in list(back.items() if isinstance(back, dict) else ())[:MOST_BACK]
+            if mark in MARKS and self._courses.exercises.get(key) is not None
+        }
 
     @property
     def _now(self) -> Course:

@@ -14,7 +14,7 @@ from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import read_code
 from app.classroom.results.codes import clean_alias
-from app.viewer.activity.activity import EXERCISES
+from app.viewer.activity.activity import EXERCISES, REVIEW
 from app.viewer.courses import views
 from app.viewer.courses.views import Desk
 from app.viewer.feature import Feature, Stage
@@ -35,7 +35,7 @@ class CourseFeature(Feature):
     about = "New here? Begin with the course First steps. Make your own courses, and check results."
     messages = frozenset(
         {"pick", "new", "close", "upload", "edit", "done", "set", "up", "down", "delete", "answers", "go", "next",
-         "back", "list", "download", "link", "fields"}
+         "back", "list", "download", "link", "fields", "recall"}
     )  # fmt: skip
 
     def __init__(self, stage: Stage) -> None:
@@ -120,6 +120,9 @@ class CourseFeature(Feature):
                 desk.editing, desk.link, desk.code = name == "edit", "", ""
             case "go", int():
                 self._go(progress.go(value))
+            case "recall", _ if rest and rest[0] in progress.back:
+                self.stage.post("lesson", "Review")
+                self.stage.post(("feature", REVIEW, ("open", str(rest[0]), 0)), None)
             case "fields", [[str(text)]]:
                 self._take(rest[0], text)
             case (("set" | "up" | "down" | "delete" | "answers"), _) if desk.editing:
@@ -257,4 +260,11 @@ class CourseFeature(Feature):
         if self._progress.course is None:
             update_html(self._page, views.chooser_html(self._courses, self._desk, self._progress.seated))
         else:
+            self._ask_back()
             update_html(self._page, views.course_html(self._progress, self.stage.activity.exercises, self._desk))
+
+    def _ask_back(self) -> None:
+        activity = self.stage.activity
+        missed = activity.review.missed.values()
+        asked = {one.key for one in missed if not one.lesson}, {one.lesson for one in missed}
+        self._progress.ask_back(*asked, lambda one: activity.reveals(one) and one != activity.task)

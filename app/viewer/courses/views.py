@@ -90,6 +90,10 @@ def course_html(progress: Progress, known: Exercises, desk: Desk) -> str:
         "course/follow", course=course, rows=rows, done=done, desk=desk, link=link, code=code,
         alias=progress.alias, begun=any(row["mark"]["symbol"] for row in rows), outcome=progress.outcome(),  # type: ignore[index]
         seated=progress.seated,
+        back=[
+            {"key": key, "title": _title(known, Item("exercise", key)), "mark": MARKS[mark]}
+            for key, mark in progress.back.items()
+        ],
     )  # fmt: skip
 
 

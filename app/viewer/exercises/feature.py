@@ -10,10 +10,10 @@ import numpy as np
 import viser
 
 import kin
-from app.exercises import Asked, Exercise, Variant, VariantError
+from app.exercises import Asked, Exercise, Variant, VariantError, Verdict
 from app.exercises.typed import EntryError
 from app.viewer.activity.activity import EXERCISES
-from app.viewer.activity.practice import Record
+from app.viewer.activity.practice import Practice, Record
 from app.viewer.exercises import views
 from app.viewer.exercises.drawing import GHOST, SIZE, Drawing
 from app.viewer.exercises.sheet import Sheet
@@ -36,13 +36,14 @@ class Practising(Feature):
     key = EXERCISES
     title = "Exercises"
     about = "Questions with your own numbers, hints and reasons."
+    door = views.DOOR
     messages = frozenset(
         {"open", "list", "answer", "fields", "posture", "place", "pick", "hint", "reveal", "again", "scene"}
     )
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: Stage, practice: Practice | None = None) -> None:
         super().__init__(stage)
-        self._practice = stage.activity.practice
+        self._practice = stage.activity.practice if practice is None else practice
         self._sheet = Sheet()
         self._variant: Variant | None = None
         self._seed = 0  # of the numbers on show
@@ -115,7 +116,7 @@ class Practising(Feature):
             case ("hint", int()):
                 record.hints = min(record.hints + 1, len(exercise.hints))
             case ("reveal", int()):
-                if not record.closed and self.stage.activity.give_up(exercise, time.perf_counter() - self._since):
+                if not record.closed and self._give_up(exercise, time.perf_counter() - self._since):
                     self._sheet.verdict, self._sheet.error = None, ""
                     self._show_answer()
             case ("again", int()):
@@ -145,7 +146,7 @@ class Practising(Feature):
         self._update()
 
     def on_activity(self) -> None:
-        exercise = self.stage.activity.exercise
+        exercise = self._practice.at
         if not self.shown or exercise is None:
             return
         if self._practice.seed_of(exercise) != self._seed:  # another place was entered
@@ -270,9 +271,26 @@ class Practising(Feature):
             return
         sheet.verdict = verdict
         seconds, self._since = time.perf_counter() - self._since, time.perf_counter()
-        self.stage.activity.answer(exercise, given, verdict, seconds, sending)
+        self._take(exercise, given, verdict, seconds, sending)
         if verdict.right:
             self._show_answer()
+
+    def _take(self, exercise: Exercise, given: object, verdict: Verdict, seconds: float, sending: str) -> None:
+        """An answer was judged; `sending` as in `Judged`."""
+        self.stage.activity.answer(exercise, given, verdict, seconds, sending)
+
+    def _give_up(self, exercise: Exercise, seconds: float) -> bool:
+        """The answer is to be shown, after so many seconds; False: it must not be."""
+        return self.stage.activity.give_up(exercise, seconds)
+
+    def _following(self, exercise: Exercise) -> views.Following | None:
+        """What comes after an exercise that is done."""
+        after = None if self.stage.activity.leads(exercise) else self._practice.after(exercise)
+        return None if after is None else views.Following(after.id, "Next exercise")
+
+    def _list(self) -> str:
+        """What is on show while no exercise is."""
+        return views.list_html(self.stage.activity.exercises, self._practice)
 
     def _show_answer(self) -> None:
         """Let the scene show it."""
@@ -304,17 +322,20 @@ class Practising(Feature):
         exercise, practice, units = self._practice.at, self._practice, self.stage.units
         activity, self._note = self.stage.activity, self.stage.activity.note
         if exercise is None or self._variant is None:
-            contents = [views.list_html(activity.exercises, practice), "", ""]
+            contents = [self._list(), "", ""]
         else:
             self._shown = replace(practice.record(exercise))
             variant, closed = self._variant, self._shown.closed
             contents = [
                 views.task_html(
                     exercise, variant, units, self.stage.now.robot == exercise.robot, self._shown.variant,
-                    activity.exercises.is_own(exercise.id) and not practice.seated,
+                    activity.exercises.is_own(exercise.id) and not practice.seated, self.door,
                 ),
-                views.question_html(self._asked, self._sheet, closed),
-                views.foot_html(exercise, variant, units, self._sheet, activity),
+                views.question_html(self._asked, self._sheet, closed, self.door),
+                views.foot_html(
+                    exercise, variant, units, self._sheet, activity, self._shown, self._following(exercise),
+                    self.door,
+                ),
             ]  # fmt: skip
         posture = exercise is not None and self._asked.form == "posture"
         self._show_joints(posture and exercise is not None and not practice.record(exercise).closed)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from app.exercises import Asked, Exercise, Exercises, Variant
-from app.viewer.activity.activity import Activity
+from app.viewer.activity.activity import EXERCISES, Activity
 from app.viewer.activity.practice import Mark, Practice, Record
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.views.templates import render
@@ -42,7 +42,27 @@ def list_html(exercises: Exercises, practice: Practice) -> str:
     return render("exercises/list", topics=topics, total=total, solved=solved)
 
 
-def task_html(exercise: Exercise, variant: Variant, units: Units, at_home: bool, count: int, own: bool) -> str:
+@dataclass(frozen=True)
+class Door:
+    """Where an exercise is opened.
+
+    Attributes:
+        feature: the key of what gets its events.
+        back: what the button that leads back says.
+        counts: whether the marks count: a room stores the answers, and there may be other numbers.
+    """
+
+    feature: str
+    back: str
+    counts: bool = True
+
+
+DOOR = Door(EXERCISES, "All exercises")
+
+
+def task_html(
+    exercise: Exercise, variant: Variant, units: Units, at_home: bool, count: int, own: bool, door: Door
+) -> str:
     """The head of an exercise: title and text.
 
     Args:
@@ -52,7 +72,7 @@ def task_html(exercise: Exercise, variant: Variant, units: Units, at_home: bool,
     """
     return render(
         "exercises/task", exercise=exercise, level=LEVELS[exercise.level], text=variant.text(exercise.text, units),
-        at_home=at_home, count=count, own=own,
+        at_home=at_home, count=count, own=own, door=door,
     )  # fmt: skip
 
 
@@ -97,9 +117,17 @@ def entry_of(
     return Entry(asked, key, rows, text, places, sheet.chosen, closed, rights, complete, bool(sheet.error))
 
 
-def question_html(asked: Asked, sheet: Sheet, closed: bool) -> str:
+def question_html(asked: Asked, sheet: Sheet, closed: bool, door: Door = DOOR) -> str:
     """The fields, options or buttons of the answer."""
-    return render("exercises/question", entry=entry_of(asked, sheet, closed))
+    return render("exercises/question", entry=entry_of(asked, sheet, closed), door=door)
+
+
+@dataclass(frozen=True)
+class Following:
+    """What a button opens when an exercise is done: a key, and the words on the button."""
+
+    key: str
+    words: str
 
 
 def foot_html(
@@ -108,10 +136,11 @@ def foot_html(
     units: Units,
     sheet: Sheet,
     activity: Activity,
+    record: Record,
+    following: Following | None,
+    door: Door,
 ) -> str:
     """Verdict, hints, solution and what can be done next."""
-    record = activity.practice.record(exercise)
-    following = None if activity.leads(exercise) else activity.practice.after(exercise)
     hints = [variant.text(hint, units) for hint in exercise.hints[: record.hints]]
     verdict = sheet.verdict
     title, color, detail = "", "", ""
@@ -129,8 +158,8 @@ def foot_html(
         credit=0 if verdict is None or verdict.right else round(100 * verdict.credit),
         more_hints=len(exercise.hints) - record.hints, record=record, time=_time(record.seconds),
         solution=exercise.solution(variant, units) if record.closed else "", following=following,
-        varies=bool(exercise.vary), may_reveal=activity.reveals(exercise), note=activity.note,
-        seated=activity.practice.seated,
+        varies=bool(exercise.vary), may_reveal=activity.reveals(exercise),
+        note=activity.note if door.counts else "", seated=activity.practice.seated and door.counts, door=door,
     )  # fmt: skip
 
 

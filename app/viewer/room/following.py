@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.viewer.activity.activity import AUTHOR, EXERCISES
+from app.viewer.activity.activity import AUTHOR, EXERCISES, REVIEW
 from app.viewer.feature import Feature
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.own_arm import OwnArm
@@ -24,6 +24,7 @@ from kin import Obstacle, Robot
 from kin.transforms import Array
 
 SAME_VIEW = 1e-3  # tolerance of viewpoints, metres
+OWN = (EXERCISES, REVIEW)  # what is everybody's own
 
 
 @lru_cache(maxsize=128)
@@ -38,8 +39,11 @@ def decoded(text: str, robots: Sequence[Robot]) -> PageState:
 
 
 def shared(state: PageState, features: Iterable[Feature]) -> PageState:
-    """What followers see of the leader's page, which has these features. A draft of an exercise has the answer."""
-    open_here = state.lesson if state.lesson != AUTHOR else None
+    """What followers see of the leader's page, which has these features.
+
+    The draft of an exercise has its answer, and what the leader has missed is nobody's business.
+    """
+    open_here = state.lesson if state.lesson not in (AUTHOR, REVIEW) else None
     names = {feature.key for feature in features if feature.shared or feature.key == open_here}
     return replace(state, features={key: value for key, value in state.features.items() if key in names})
 
@@ -120,8 +124,8 @@ class Follower:
     def _show_lesson(self, last: PageState | None, state: PageState) -> None:
         """Open the leader's lesson, and show the states of what the leader sees. Exercises are everybody's own."""
         page = self._page
-        lesson = None if state.lesson == EXERCISES else state.lesson
-        before = None if last is None or last.lesson == EXERCISES else last.lesson
+        lesson = None if state.lesson in OWN else state.lesson
+        before = None if last is None or last.lesson in OWN else last.lesson
         if lesson != before:
             page.guard(lambda: page.lessons.open(lesson, state.features.get(Guide.key)))
         for feature in page.features:

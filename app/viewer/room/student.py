@@ -10,7 +10,7 @@ from typing import NamedTuple
 from app.classroom.clock import now
 from app.classroom.views import NewAttempt
 from app.exercises import Exercise, ExerciseFileError, parse_exercise
-from app.viewer.activity.activity import EXERCISES, GivenUp, Judged
+from app.viewer.activity.activity import EXERCISES, REVIEW, GivenUp, Judged
 from app.viewer.activity.places import Place
 from app.viewer.feature import Stage
 from app.viewer.panel import update_html
@@ -51,7 +51,7 @@ class Student(Member):
         self._task_at: float | None = None
         self._over = False  # it was said that this page is no longer in the room
         self._first = True
-        self._paused = False  # an exercise was open when somebody began to lead
+        self._paused = ""  # where an exercise was open when somebody began to lead
         self._course: tuple[str, float] | None = None  # the room's, and when it was sent; None: not known yet
         self._open_tab = 0
         self._read = ""  # the question whose result was read
@@ -151,8 +151,8 @@ class Student(Member):
 
     def _pause(self) -> None:
         """While somebody leads, no exercise stands beside another arm."""
-        if self.activity.exercise is not None:
-            self._paused = True
+        if self.activity.opens_exercise:
+            self._paused = self.activity.lesson or ""
             self.page.lessons.open(None)
 
     def _resume(self, gone: bool) -> None:
@@ -161,11 +161,11 @@ class Student(Member):
         Args:
             gone: whether the student had stopped following, and may have opened something else.
         """
-        paused, self._paused = self._paused, False
+        paused, self._paused = self._paused, ""
         if not paused or (gone and self.activity.lesson is not None):
             return
         before = self._arm
-        self.page.lessons.open(EXERCISES)
+        self.page.lessons.open(paused)
         if self._arm != before:
             self.follower.drop_obstacles()
         self._open_tab += 1
@@ -325,15 +325,16 @@ class Student(Member):
     def bar(self) -> str:
         away = self.activity.task is not None and self.activity.exercise != self.activity.task
         return views.student_bar(
-            self.room, self.mode, self._open_tab, self.activity.task, away, self._read, self._paused
+            self.room, self.mode, self._open_tab, self.activity.task, away, self._read, self._paused != ""
         )
 
     def state(self) -> dict[str, object]:
-        return {"paused": True} if self._paused else {}
+        return {"paused": True if self._paused == EXERCISES else self._paused} if self._paused else {}
 
     def restore(self, state: dict[str, object]) -> None:
         if self._first:  # as the page was stored; undo changes nothing about who leads
-            self._paused = state.get("paused") is True
+            paused = state.get("paused")
+            self._paused = EXERCISES if paused is True else REVIEW if paused == REVIEW else ""
 
     @property
     def mode(self) -> views.Mode:

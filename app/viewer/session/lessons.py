@@ -17,12 +17,13 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import Post, assign, listen
+from app.viewer.review.feature import Reviewing
 from app.viewer.views.templates import render
 from app.viewer.worksheet.feature import Worksheets
 from kin import InputError
 
 NONE = "None"
-MORE: tuple[type[Feature], ...] = (Practising, CourseFeature, Author)
+MORE: tuple[type[Feature], ...] = (Practising, CourseFeature, Author)  # Reviewing has a row of its own
 KEPT = 50  # lessons of which the progress is kept, in the order in which they were left
 HINT = "The drawings of a lesson stay in the scene while other tabs are open."
 
@@ -37,7 +38,7 @@ class LessonChoice:
         shown: the open lesson.
         guide: its goal, steps and questions.
         sheets: the worksheet of the lesson, or of the arm.
-        author, exercises, courses: which live as long as the page.
+        author, exercises, courses, reviewing: which live as long as the page.
     """
 
     def __init__(
@@ -58,6 +59,7 @@ class LessonChoice:
             self.courses = CourseFeature(stage)
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
             self.author = Author(stage)
+            self.reviewing = Reviewing(stage)
             self._overview: viser.GuiHtmlHandle | None = gui.add_html(_overview())
             self.sheets: Worksheets | None = Worksheets(stage, None, page)
         listen(self._choice, post, "lesson")
@@ -93,7 +95,7 @@ class LessonChoice:
 
     def _show(self, chosen: type[Feature] | None, steps: dict[str, object] | None) -> None:
         """Build what was chosen, in the container that is open; None: the overview."""
-        activity, always = self._stage.activity, (self.exercises, self.courses, self.author)
+        activity, always = self._stage.activity, (self.exercises, self.courses, self.author, self.reviewing)
         if chosen is None:
             self._overview = self._gui.add_html(_overview())
         elif issubclass(chosen, Lesson):
@@ -112,8 +114,11 @@ class LessonChoice:
 
     @property
     def features(self) -> list[Feature]:
-        """The open lesson, its guide and its worksheet, the exercises and the courses."""
-        every = (self.guide, self.shown, self.sheets, self.author, self.exercises, self.courses)
+        """The open lesson, its guide and its worksheet, the exercises and the courses.
+
+        They are restored in this order: a course asks what was missed.
+        """
+        every = (self.guide, self.shown, self.sheets, self.author, self.exercises, self.reviewing, self.courses)
         return [feature for feature in every if feature is not None]
 
     @property
@@ -140,6 +145,7 @@ class LessonChoice:
         self.exercises.hide()
         self.courses.hide()
         self.author.hide()
+        self.reviewing.hide()
         if self.shown is not None and self.guide is not None:
             self._keep(self.shown.key, self.guide.state())
             self.shown.remove()
@@ -164,7 +170,7 @@ class LessonChoice:
 
 def choices() -> tuple[type[Feature], ...]:
     """What the tab offers. All but the lessons live as long as the page."""
-    return (*LESSONS, *MORE)
+    return (*LESSONS, *MORE, Reviewing)
 
 
 def lesson_titled(title: object) -> type[Lesson] | None:

@@ -92,6 +92,7 @@ class Persistence:
             stored = StoredPage()
         self._address = stored.address or LOCAL
         self.system_dark, self.text_size, self.embedded = stored.dark, stored.text_size, stored.embedded
+        self._page.activity.review.zone = stored.zone
         if stored.shown:
             self.shown = stored.shown
             SHOWN.join(stored.shown, self._page.post)

@@ -23,6 +23,7 @@ from typing import Any, Final, NamedTuple, get_args
 import numpy as np
 
 from app.viewer import frames, own_arm
+from app.viewer.activity.review import FARTHEST_ZONE
 from app.viewer.frames import Frames
 from app.viewer.labels import TEXT_SIZES
 from app.viewer.obstacles import placed
@@ -108,6 +109,7 @@ class StoredPage:
         text_size: the name of the text size.
         shown: key in the address: of an arm that is moved from outside of the page (`app.viewer.shown`), or of the
             code that is reserved for the page (`app.live.reserved`).
+        zone: minutes by which the visitor's clock is ahead of UTC.
         embedded: how the page is embedded in another: ``"scene"``, ``"panel"`` or not at all.
     """
 
@@ -117,6 +119,7 @@ class StoredPage:
     text_size: str = "Normal"
     embedded: str = ""
     shown: str = ""
+    zone: int = 0
 
 
 def with_arm(robot: Robot, q: Array | None, known: Iterable[Robot]) -> PageState:
@@ -263,7 +266,9 @@ def read_stored_page(text: str | None) -> StoredPage:
     embedded = next((mode for mode in EMBEDDED if mode == data.get("embedded")), "")
     shown = data.get("shown")
     shown = shown if isinstance(shown, str) else ""
-    return StoredPage(str(address) if usable else "", state, data.get("dark") is True, size, embedded, shown)
+    zone = data.get("zone")
+    zone = zone if type(zone) is int and abs(zone) <= FARTHEST_ZONE else 0
+    return StoredPage(str(address) if usable else "", state, data.get("dark") is True, size, embedded, shown, zone)
 
 
 _TASKS: tuple[Task, ...] = get_args(Task)

@@ -666,3 +666,17 @@ def drive(v: Numbers, labels: list[str]) -> object:
         'units = { length = "mm", angle = "deg" }\n[[segments]]\nkind = "lin"\n'
         f"position = [{x}, {y}, {z}]\n{speed}"
     )
+
+
+@solves("screw-moment")
+def screw_moment(v: Numbers, labels: list[str]) -> object:
+    p, angle = np.array([v["px"], v["py"], 0.0]), 1e-6  # the origin, turned about the axis by a small angle
+    moved = turn("z", angle)[:3, :3] @ -p + p
+    return plain(*(moved / angle)[:2])
+
+
+@solves("newton-step")
+def newton_step(v: Numbers, labels: list[str]) -> object:
+    step = 1e-6
+    J = (turn("z", step) @ np.array([v["r"], 0.0, 0.0, 1.0]))[1] / step
+    return plain(v["e"] / J / DEG)

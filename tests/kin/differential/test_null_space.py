@@ -97,6 +97,14 @@ def test_secondary_goals_improve_while_the_tool_stays() -> None:
                 assert off[1] < off[0]
 
 
+def test_a_joint_without_limits_is_not_led_to_their_middle() -> None:
+    robot = kin.get_robot("ur3")
+    endless = ~np.isfinite(robot.upper - robot.lower)
+    assert endless.any()
+    z = secondary(robot, robot.q_home + 0.1, "pose", "limits")
+    assert np.array_equal(z == 0.0, endless)
+
+
 def test_locked_joints_stay() -> None:
     ur5, T = kin.get_robot("ur5"), kin.fk("ur5", kin.get_robot("ur5").q_home)
     assert free_motions(ur5, "position") == 3

@@ -16,7 +16,7 @@ from app.viewer.declared.scene import Node, SceneView, label
 from app.viewer.exercises.drawing import GHOST, Drawing
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
-from app.viewer.lessons.guide import views
+from app.viewer.lessons.guide import earlier, views
 from app.viewer.lessons.guide.content import texts_of
 from app.viewer.lessons.guide.example_view import ExampleView
 from app.viewer.lessons.guide.lesson import Lesson
@@ -44,7 +44,20 @@ class Guide(Feature):
     title = "Lesson"
     shared = True
     messages = frozenset(
-        {"go", "answer", "fields", "posture", "pick", "reveal", "pose", "arm", "restart", "watch", "leave"}
+        {
+            "go",
+            "answer",
+            "fields",
+            "posture",
+            "pick",
+            "reveal",
+            "pose",
+            "arm",
+            "restart",
+            "again",
+            "watch",
+            "leave",
+        }
     )
 
     def __init__(self, stage: Stage, lesson: type[Lesson], state: dict[str, object] | None = None) -> None:
@@ -52,6 +65,7 @@ class Guide(Feature):
         self._lesson = lesson
         self._sheets: dict[str, Sheet] = {}
         self._progress = Progress(self._outline())
+        self._earlier: dict[Progress, tuple[earlier.Drawn, ...]] = {}  # what each check asks of earlier lessons
         self._arms: dict[Robot, Progress] = {stage.now.robot: self._progress}  # what was answered on each
         self._drawing = Drawing(stage.client.scene, self.post)
         self._copies = SceneView(stage.client.scene, "answer", self.post)
@@ -103,7 +117,9 @@ class Guide(Feature):
                 if not progress.is_closed(question):
                     self._sheet(question).pick(value, len(asked.labels))
             case ("reveal", str(question), int()):
-                progress.reveal(question)
+                if not progress.is_closed(question):
+                    progress.reveal(question)
+                    self._note(question, right=False)
                 self._sheets.pop(question, None)
                 self._show()
                 self._move_to_end(question)
@@ -113,8 +129,15 @@ class Guide(Feature):
                 if robot_id := self._offered:
                     self.stage.change_robot(self.stage.store.get(robot_id))
                     return
+            case ("again", str(question), int()):
+                progress.again(question)
+                self._sheets.clear()
+                self._show()
+                self._bring()
             case ("restart", int()):
                 progress.restart()
+                self._earlier.pop(progress, None)
+                progress.ask_also({})
                 self._sheets.clear()
                 self._show()
                 self._bring()
@@ -152,6 +175,7 @@ class Guide(Feature):
         at, outline = self._progress.at, self._outline()
         self._arms = {arm: progress for arm, progress in self._arms.items() if progress.begun}
         self._progress = self._arms.setdefault(self.stage.now.robot, Progress(outline))
+        self._earlier = {one: drawn for one, drawn in self._earlier.items() if one in self._arms.values()}
         self._progress.use(outline)
         self._progress.at = min(at, len(outline.steps))
         self._sheets.clear()
@@ -167,6 +191,7 @@ class Guide(Feature):
     def on_style(self) -> None:
         self._example.on_style()
         self._progress.use(self._outline())
+        self._ask_earlier()
         self._sheets.clear()
         self._show()
 
@@ -174,10 +199,18 @@ class Guide(Feature):
         self._show()
 
     def state(self) -> dict[str, object]:
-        return {**self._progress.state(), "joints": self._joints is not None}
+        drawn = [list(one) for one in self._earlier.get(self._progress, ())]
+        return {
+            **self._progress.state(),
+            "joints": self._joints is not None,
+            **({"earlier": drawn} if drawn else {}),
+        }
 
     def restore(self, state: dict[str, object]) -> None:
         self._example.close()
+        exercises = self.stage.activity.courses.exercises
+        self._earlier[self._progress] = earlier.read(state.get("earlier"), exercises)
+        self._ask_earlier()
         self._progress.restore(state)
         self._sheets.clear()
         self._show()
@@ -191,6 +224,11 @@ class Guide(Feature):
         self._copies.remove()
         self._show_joints(False)
         self.stage.activity.asked = frozenset()
+
+    def _ask_earlier(self) -> None:
+        """Let the check ask what was chosen of earlier lessons, in the reader's units."""
+        drawn, exercises = self._earlier.get(self._progress, ()), self.stage.activity.courses.exercises
+        self._progress.ask_also(earlier.questions(drawn, exercises, self.stage.units))
 
     def _outline(self) -> Outline:
         return self._lesson.outline(self.stage.now.robot, self.stage.units)
@@ -230,9 +268,20 @@ class Guide(Feature):
         except EntryError as error:
             sheet.error = error.detail if error.title == "The answer was not read" else str(error)
             return
+        self._note(key, verdict.right)
         if verdict.right:
             self._show()
             self._move_to_end(key)
+
+    def _note(self, key: str, right: bool) -> None:
+        """An answer was judged or shown: what was missed comes back. An estimate may be wrong."""
+        activity, drawn = self.stage.activity, self._earlier.get(self._progress, ())
+        if key in self._progress.earlier:
+            exercise = activity.courses.exercises.get(drawn[int(key[1:]) - 1][0])
+            assert exercise is not None
+            activity.take_exercise(exercise, right)
+        elif not key.startswith("e"):
+            activity.take_question(self._lesson.key, key, self.stage.now.robot.id, right)
 
     # The scene
 
@@ -261,13 +310,16 @@ class Guide(Feature):
         if self._shown is not None and (outline := self._shown.on_steps(self._progress)) is not None:
             self._progress.use(outline)
         progress, activity = self._progress, self.stage.activity
+        if progress.at == len(progress.outline.steps) and not self._earlier.get(progress):
+            self._earlier[progress] = earlier.choose(self._lesson.key, activity)
+            self._ask_earlier()
         if activity.asked != progress.withheld:  # before anything is shown that would give it away
             activity.asked = progress.withheld
             activity.changed()
         right, count = progress.score
         if right == count > 0:
             activity.pass_lesson(self._lesson.key, self.stage.now.robot.id)
-        open_ = [key for key, _ in progress.outline.questions() if self._is_on_show(key)]
+        open_ = [key for key in progress.questions if self._is_on_show(key)]
         update_html(self._goal, views.goal_html(self._lesson.title, progress.outline.goal))
         offered = self.stage.store.get(self._offered).name if self._offered else ""
         sheets = {key: self._sheet(key) for key in open_}
@@ -281,9 +333,7 @@ class Guide(Feature):
 
     def _is_on_show(self, key: str) -> bool:
         at = self._progress.at
-        return (
-            key.startswith("c") if at == len(self._progress.outline.steps) else key in (str(at + 1), f"e{at + 1}")
-        )
+        return key[0] in "cr" if at == len(self._progress.outline.steps) else key in (str(at + 1), f"e{at + 1}")
 
     def _draw_ghost(self, keys: list[str]) -> None:
         """The frame that is placed for the first of these questions."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 from app.exercises.questions import Verdict
@@ -21,6 +22,7 @@ class Progress:
         given: the last answer to each question, by its key, as `Question.read` returns it.
         revealed: keys of the questions whose answers were requested before they were right.
         misses: how many wrong answers each question got.
+        earlier: what the check asks of earlier lessons, by key; it does not count for passing.
     """
 
     def __init__(self, outline: Outline) -> None:
@@ -28,13 +30,24 @@ class Progress:
         self.given: dict[str, Any] = {}
         self.revealed: set[str] = set()
         self.misses: dict[str, int] = {}
+        self.earlier: dict[str, Question] = {}
         self.use(outline)
 
     def use(self, outline: Outline) -> None:
         """Go on with the same lesson in other units."""
         self.outline = outline
-        self._questions = dict(outline.questions())
+        self._questions = {**dict(outline.questions()), **self.earlier}
         self._judged: dict[str, tuple[object, Verdict]] = {}
+
+    def ask_also(self, earlier: Mapping[str, Question]) -> None:
+        """Let the check ask these of earlier lessons."""
+        self.earlier = dict(earlier)
+        self.use(self.outline)
+
+    @property
+    def questions(self) -> Mapping[str, Question]:
+        """Every question by its key: those of the outline, then those of earlier lessons."""
+        return self._questions
 
     def question(self, key: object) -> Question:
         """The question with this key; raises `kin.InputError` for another key."""
@@ -72,6 +85,15 @@ class Progress:
         self.given.clear()
         self.revealed.clear()
         self.misses.clear()
+
+    def again(self, key: object) -> None:
+        """Go to a question, and ask it as if it had not been answered; raises `kin.InputError` for another key."""
+        self.question(key)
+        name, step = str(key), str(key).removeprefix("e")
+        self.at = int(step) - 1 if step.isdecimal() else len(self.outline.steps)
+        self.given.pop(name, None)
+        self.revealed.discard(name)
+        self.misses.pop(name, None)
 
     def verdict(self, key: str) -> Verdict | None:
         """The verdict on the last answer; None if there is none."""

@@ -39,14 +39,14 @@ def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "") -> s
         )
     right, count = progress.score
     if at == len(steps):
-        questions = [
-            _question(progress, key, question, sheets)
-            for key, question in progress.outline.questions()
-            if key.startswith("c")
-        ]
+        asked, earlier = (
+            [_question(progress, key, one, sheets) for key, one in progress.questions.items() if key[0] == letter]
+            for letter in "cr"
+        )
         return render(
-            "guide/check", marks=marks, at=at, questions=questions, right=right, count=count,
-            done=all(question["closed"] for question in questions),
+            "guide/check", marks=marks, at=at, questions=asked, right=right, count=count, earlier=earlier,
+            recalled=sum(progress.mark(str(one["key"])) == "right" for one in earlier),
+            done=all(question["closed"] for question in asked),
         )  # fmt: skip
     step, key, before = steps[at], str(at + 1), f"e{at + 1}"
     closed = step.question is None or progress.is_closed(key)

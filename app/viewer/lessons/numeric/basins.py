@@ -75,7 +75,7 @@ def turned_within(robot: Robot, q: Array) -> Array:
     """A configuration ``(n,)`` with each revolute joint turned by whole turns to the middle of its limits."""
     turn = 2.0 * math.pi
     bounded = robot.revolute & np.isfinite(robot.lower) & np.isfinite(robot.upper)
-    middle = np.where(bounded, 0.5 * (robot.lower + robot.upper), 0.0)
+    middle = 0.5 * (np.where(bounded, robot.lower, 0.0) + np.where(bounded, robot.upper, 0.0))
     return np.where(bounded, q - turn * np.round((q - middle) / turn), q)
 
 
