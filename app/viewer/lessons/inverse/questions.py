@@ -6,10 +6,14 @@ import math
 from dataclasses import replace
 from functools import lru_cache
 
+import numpy as np
+
 from app.viewer.lessons.guide.outline import (
+    Choice,
     Drawn,
     Mistake,
     Number,
+    Option,
     Outline,
     Pose,
     Step,
@@ -27,6 +31,7 @@ from kin.units import Units, fixed
 
 POSTURES = frozenset({"postures"})  # withheld while it is asked how many of them there are
 TURNS = frozenset({"angles"})  # and while joint angles are asked, of which roll, pitch and yaw may be sums
+HALF, LEVEL = 0.5, 0.3  # of the reach, and of the vertical part of a direction: what an estimate tells apart
 LENGTH, ANGLE = 0.001, math.radians(0.5)
 _METHODS: dict[StepKey, str] = {
     "theta2": "θ₂ = atan2(h, ρ) − β, with β = atan2(forearm · sin θ₃, upper arm + forearm · cos θ₃).",
@@ -54,7 +59,7 @@ def _step(given: Exercise, key: StepKey, step: Step, units: Units) -> Step:
     branch, text = given.followed, step.text + words.counts(given.arm, key, units)
     found, ended = branch.derivation.step(key), branch.derivation.failed
     if key == "centre":
-        text = f"{_target(given, units)} {text}"
+        text, step = f"{_target(given, units)} {text}", replace(step, estimate=_estimate(given))
     if key == "joints":
         end = Pose(as_configuration(branch.q)) if branch.available and branch.q is not None else None
         practice = f"The numbers below lead to the branch {branch.name}. Choose another one with Follow."
@@ -97,6 +102,28 @@ def _target(given: Exercise, units: Units) -> str:
         return f"{text}."
     direction = ", ".join(fixed(v(f"a_{axis}")) for axis in axes)
     return f"{text}, a = ({direction})."
+
+
+def _estimate(given: Exercise) -> Choice:
+    """What is seen of the target: how far a planar arm is stretched, or where another one points its tool."""
+    if given.arm.family == "planar":
+        far = float(np.linalg.norm(given.T[:3, 3] - given.arm.robot.T_world_base[:3, 3])) / given.arm.robot.reach
+        why = "The elbow is what changes this distance: joint 1 turns the arm as a whole."
+        found = (
+            ("Less than half as far from joint 1 as it could be", far < HALF),
+            ("Half as far or more", far >= HALF),
+        )
+        return Choice(
+            "Look at the arm, whose tool is at the target: how far is the tool from joint 1?",
+            tuple(Option(text, why, right) for text, right in found),
+        )
+    up = float(given.T[2, 2])
+    why = "The wrist centre is on the other side of the tool: back from where it points."
+    directions = (("Up", up > LEVEL), ("Level, or nearly so", abs(up) <= LEVEL), ("Down", up < -LEVEL))
+    return Choice(
+        "Look at the arm, whose tool is at the target: which way does the tool point?",
+        tuple(Option(text, why, right) for text, right in directions),
+    )
 
 
 def _shown(given: Exercise, found: DerivedStep) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Configuration, Outline, Pose
-from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.guide.poses import as_configuration, distance
 from app.viewer.lessons.postures import planar
 from app.viewer.scene.chain import rotation
 from kin import IKOptions, IKSolution, Robot, Status, branch_names, branch_of, fk, jacobian
@@ -84,6 +84,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "found": known.found,
         "free": free,
         "moving": robot.n - free,
+        "stretched": distance(fk(robot, robot.q_home), robot.T_world_base) / robot.reach,
         "beyond": BEYOND,
         "rank_at_home": known.rank,
         # With fewer joints there may be a single one.

@@ -15,6 +15,7 @@ from kin import Robot, screws
 from kin.transforms import Array
 from kin.units import Units, fixed
 
+UPRIGHT = 0.999  # of the vertical part of a direction
 SPACE = {"form": "space", "axes": "zero"}
 _INDICES = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
@@ -35,6 +36,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "component": float(direction[axis]),
         "slides": next((i + 1.0 for i in range(n) if not robot.revolute[i]), 0.0),
         "last": float(n),
+        "upright": float((np.abs(np.where(robot.revolute, found.S[2], found.S[5])) > UPRIGHT).sum()),
         "body": float(np.linalg.norm(found.B[3:, -1])),
     }
     words = {"axis": "xyz"[axis], "last_low": str(n).translate(_INDICES)}
