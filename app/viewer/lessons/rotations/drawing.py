@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from itertools import pairwise
 
 import numpy as np
@@ -28,11 +29,13 @@ def room(robot: Robot) -> Sphere:
     return _anchor(robot), ROOM * body(robot).radius
 
 
-def frames(facts: RotationsFacts, figure: FigureNodes) -> list[Node]:
-    """The frames that the settings show."""
+def frames(facts: RotationsFacts, figure: FigureNodes, click: tuple[Hashable, ...]) -> list[Node]:
+    """The frames that the settings show; `click` is the event of a click on the turned frame."""
     length = LENGTH * body(facts.robot).radius
     with figure:
-        shown = (_chain if facts.settings.chained else _rotation)(facts, figure, length)
+        shown = (
+            _chain(facts, figure, length) if facts.settings.chained else _rotation(facts, figure, length, click)
+        )
     fixed = _frame("fixed", np.eye(4), 0.8 * length, THIN)
     name = label("fixed-name", "{0}", np.array([0.0, 0.0, 0.92 * length]))
     return [frame("beside", fixed, name, *shown, position=_anchor(facts.robot))]
@@ -49,11 +52,15 @@ def _frame(key: str, T: Array, length: float, thick: float) -> Node:
     return axes(key, T, length, thick * length)
 
 
-def _rotation(facts: RotationsFacts, figure: FigureNodes, length: float) -> list[Node]:
+def _rotation(
+    facts: RotationsFacts, figure: FigureNodes, length: float, click: tuple[Hashable, ...]
+) -> list[Node]:
     """The turned frame, the axes of the three turns, and the axis of the whole rotation."""
     T = np.eye(4)
     T[:3, :3] = R = facts.R
-    nodes = [_frame("turned", T, length, THICK), label("turned-name", "{1}", 1.12 * length * R[:, 2])]
+    turned = _frame("turned", T, length, THICK)
+    turned.click = click
+    nodes = [turned, label("turned-name", "{1}", 1.12 * length * R[:, 2])]
     for k, way in enumerate(facts.convention.axes_now(facts.settings.angles)):
         # About fixed axes, later turns carry the axis of an earlier one along.
         text = f"{ORDER[k]} {facts.convention.axes[k]}{', carried' if facts.convention.fixed and k < 2 else ''}"

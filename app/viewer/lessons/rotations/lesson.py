@@ -6,13 +6,16 @@ quaternion or a matrix, or taken from the tool.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 from app.exercises.typed import EntryError
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Lazy
+from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.rotations import views
@@ -21,12 +24,15 @@ from app.viewer.lessons.rotations.facts import BY_KEY, RotationsFacts
 from app.viewer.lessons.rotations.frames import MOST, Motion, swapped
 from app.viewer.lessons.rotations.questions import outline
 from app.viewer.lessons.rotations.settings import MOTIONS, RotationsSettings
+from app.viewer.lessons.rotations.turning import FRAME, Turning
 from app.viewer.lessons.rotations.typed import read_rotation
 from app.viewer.panel.status import Notice
 from app.viewer.scene.meshes import body
 from kin.transforms import Array
 
 ACT_HINT = "Set: take the typed numbers. From tool: the orientation of the tool. To target: turn the target so."
+TURN_HINT = "Shows this turn of the frame beside the arm, or all three. A click on the frame shows all."
+TURNS = {"1st": (0, 0), "2nd": (1, 1), "3rd": (2, 2), "All": (0, 2)}
 CHAIN_HINT = "Add: append the motion. Remove: the last one. Swap: the last two. Clear: all."
 
 
@@ -44,8 +50,13 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
 
     def started(self) -> None:
         self._error = ""
+        self._turning: Turning | None = None
         self._figure = FigureNodes(body(self.stage.now.robot).size)
         self.stage.fit_view([room(self.stage.now.robot)])
+
+    def restore(self, state: dict[str, object]) -> None:
+        self._turning = None
+        super().restore(state)
 
     def remove(self) -> None:
         super().remove()
@@ -56,6 +67,8 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
     def panel(self) -> Sequence[Node]:
         f, s, units = self.read, self.settings, self.stage.units
         uses = {"Set": self.on_set, "From tool": self.on_from_tool, "To target": self.on_to_target}
+        turned = {name: self.event(self.on_turn, *which) for name, which in TURNS.items()}
+        at = None if self._turning is None else self._turning.turn(time.perf_counter())
         changes = {"Add": self.on_add, "Remove": self.on_remove, "Swap": self.on_swap, "Clear": self.on_clear}
         turns = MOTIONS[s.motion][0]
         return [
@@ -65,6 +78,8 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
                 Control("convention"),
                 Html(views.convention_html, (f.convention,)),
                 *(self._angle(k) for k in range(3)),
+                Buttons("Turn", turned, TURN_HINT),
+                Html(views.turning_html, (f.convention, at)),
                 Html(views.lock_html, (f.convention, s.angles, units)),
                 Html(views.rotation_html, (f.convention, s.angles, units)),
                 Control("typed"),
@@ -86,13 +101,37 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
         return Control(f"angles.{k}", label=views.turn_name(convention, k), of=convention)
 
     def scene(self) -> Sequence[Lazy]:
-        return [Lazy("frames", lambda settings: frames(self.facts, self._figure), (self.settings,))]
+        shown = self.settings
+        if self._turning is not None:
+            shown = replace(shown, angles=self._turning.angles(shown.angles, time.perf_counter()))
+        return [Lazy("frames", self._frames, (shown,))]
+
+    def _frames(self, shown: RotationsSettings) -> list[SceneNode]:
+        return frames(RotationsFacts(shown, self.stage.now), self._figure, self.event(self.on_turn, 0, 2))
 
     # Events
 
     def changed(self, path: str) -> None:
+        self._turning = None
         if path == "convention":  # the same rotation in another convention
             self._turn_to(self.facts.R)
+            self.on_turn(0, 2)
+
+    def on_turn(self, first: int, last: int) -> None:
+        """Show how these turns of the convention turn the frame, unless they are asked for; nothing changes."""
+        if self.hides("forms") or self.settings.chained:
+            return
+        self._turning = Turning(first, last, time.perf_counter())
+
+    def advance(self, now: float) -> float | None:
+        if self._turning is None:
+            return None
+        if self._turning.turn(now) > self._turning.last:
+            self._turning = None
+            self.wake()
+            return None
+        self.draw()
+        return FRAME
 
     def on_from_tool(self) -> None:
         self._error = ""

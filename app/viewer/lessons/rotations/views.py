@@ -42,6 +42,13 @@ def convention_html(convention: Convention) -> str:
     return render("rotations/convention", name=convention.name, formula=convention.formula)
 
 
+def turning_html(convention: Convention, at: int | None) -> str:
+    """Which turn the frame beside the arm is making; "" if it stands."""
+    if at is None or at > 2:
+        return ""
+    return render("rotations/turning", number=at + 1, turn=turn_name(convention, at))
+
+
 def lock_html(convention: Convention, angles: Angles, units: Units) -> str:
     """How far the convention is from its gimbal lock."""
     room = convention.room(angles)

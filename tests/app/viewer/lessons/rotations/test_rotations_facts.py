@@ -9,11 +9,15 @@ import pytest
 from bare_page import STORE, bare_page
 
 from app.viewer.arm import Arm
+from app.viewer.declared.scene import Node
 from app.viewer.lessons.rotations.conventions import CONVENTIONS
 from app.viewer.lessons.rotations.facts import RotationsFacts
 from app.viewer.lessons.rotations.frames import Motion
 from app.viewer.lessons.rotations.lesson import RotationsLesson
 from app.viewer.lessons.rotations.settings import RotationsSettings
+from app.viewer.lessons.rotations.turning import REST, TIME, Turning
+from app.viewer.lessons.rotations.views import turning_html
+from kin.transforms import from_position_wxyz
 
 ROBOT = STORE.get("ur5")
 
@@ -60,7 +64,9 @@ def test_frames_of_a_chain_are_products_from_the_left_and_from_the_right() -> No
             assert place == pytest.approx(T, abs=1e-12)
 
 
-def test_another_convention_keeps_the_rotation_even_in_one_batch_of_events() -> None:
+def test_another_convention_keeps_the_rotation_even_in_one_batch_of_events(monkeypatch) -> None:
+    for name in ("TIME", "REST"):
+        monkeypatch.setattr(f"app.viewer.lessons.rotations.turning.{name}", 1e-3)
     with bare_page(ROBOT) as page:
         lesson = page.open(RotationsLesson)
         for convention in CONVENTIONS:
@@ -74,3 +80,77 @@ def test_another_convention_keeps_the_rotation_even_in_one_batch_of_events() -> 
         page.set("Angles", "Z-Y-X moving")
         page.rest()
         assert lesson.facts.R[:, 0] == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS, ids=lambda each: each.key)
+def test_turns_are_shown_one_after_another_about_their_axes(convention) -> None:
+    angles, turning, R = (0.4, -0.7, 1.1), Turning(0, 2, 10.0), np.eye(3)
+    for k, (axis, angle) in enumerate(zip(convention.axes, angles, strict=True)):
+        begun, way = 10.0 + k * (TIME + REST), "xyz".index(axis)
+        before = R
+        for share in (0.0, 0.3, 0.9):  # about the same axis all the time
+            now = begun + share * TIME
+            assert turning.turn(now) == k
+            shown = convention.rotation(turning.angles(angles, now))
+            step = shown @ before.T if convention.fixed else before.T @ shown
+            part = math.copysign(math.acos(min(1.0, (np.trace(step) - 1) / 2)), angle)
+            assert step == pytest.approx(turned(way, part), abs=1e-7)
+            assert abs(part) < abs(angle)
+        turn = turned(way, angle)
+        R = turn @ R if convention.fixed else R @ turn
+        for now in (begun + TIME, begun + TIME + 0.9 * REST):
+            assert convention.rotation(turning.angles(angles, now)) == pytest.approx(R, abs=1e-12)
+    assert turning.turn(10.0 + 3 * (TIME + REST) + 1e-6) == 3
+    assert pytest.approx(convention.rotation(angles), abs=1e-12) == R
+
+
+def turned_frame(lesson: RotationsLesson) -> Node:
+    """The frame beside the arm, as it is drawn now."""
+    (lazy,) = lesson.scene()
+    (beside,) = lazy.view(*lazy.args)
+    return next(node for node in beside.children if node.key == "turned")
+
+
+def rotation_of(node: Node) -> np.ndarray:
+    return np.asarray(from_position_wxyz((0, 0, 0), node.wxyz)[:3, :3])
+
+
+@pytest.mark.parametrize("by", ["click", "convention", "button"])
+def test_the_frame_turns_when_it_is_clicked_or_a_convention_is_chosen(monkeypatch, by: str) -> None:
+    monkeypatch.setattr("app.viewer.lessons.rotations.turning.TIME", 0.2)
+    monkeypatch.setattr("app.viewer.lessons.rotations.turning.REST", 0.1)
+    with bare_page(ROBOT) as page:
+        lesson = page.open(RotationsLesson)
+        R, seen = lesson.facts.R, []
+        draw = lesson.draw
+        monkeypatch.setattr(lesson, "draw", lambda: (draw(), seen.append(rotation_of(turned_frame(lesson)))))
+        assert turned_frame(lesson).click == ("on_turn", 0, 2)
+        assert np.allclose(rotation_of(turned_frame(lesson)), R)
+        match by:
+            case "click":
+                lesson.post(("do", turned_frame(lesson).click, 0, 0))
+            case "convention":
+                page.set("Angles", "Z-Y-Z moving")
+            case "button":
+                page.set("Turn", "2nd")
+        page.rest()
+        assert len(seen) > 3
+        assert not any(np.allclose(each, R, atol=1e-3) for each in seen[:2])
+        assert np.allclose(rotation_of(turned_frame(lesson)), R), "and ends where it was"
+        assert np.allclose(lesson.facts.R, R)
+
+
+def test_a_question_about_the_forms_shows_no_turn() -> None:
+    with bare_page(ROBOT) as page:
+        lesson = page.open(RotationsLesson)
+        page.activity.withheld = frozenset({"forms"})
+        lesson.on_activity()
+        lesson.post(("do", ("on_turn", 0, 2), 0, 0))
+        page.rest()
+        assert np.allclose(rotation_of(turned_frame(lesson)), lesson.facts.R)
+        page.activity.withheld = frozenset()
+
+
+def test_the_turn_that_is_shown_is_named() -> None:
+    assert "turn 2: β about y′." in turning_html(facts(convention="zyz-moving").convention, 1)
+    assert turning_html(facts().convention, None) == turning_html(facts().convention, 3) == ""
