@@ -14,6 +14,7 @@ from app.exercises import Exercise
 ItemKind = Literal["lesson", "exercise"]
 MOST_ITEMS = 40
 MOST_OWN = 8  # exercises that a course brings along
+MOST_PAIRS = 10  # exercises that are compared
 LONGEST = {"title": 80, "about": 300, "note": 400}  # characters of each text
 
 
@@ -52,6 +53,7 @@ class Course:
         items: in order.
         answers: whether students may ask for the answer of an exercise that they have not solved.
         own: the exercises that it brings along.
+        before, after: the ids of exercises of the course that are compared in the results of a room, pair by pair.
     """
 
     title: str
@@ -59,6 +61,8 @@ class Course:
     items: tuple[Item, ...] = ()
     answers: bool = True
     own: tuple[Own, ...] = ()
+    before: tuple[str, ...] = ()
+    after: tuple[str, ...] = ()
 
     @property
     def exercises(self) -> tuple[str, ...]:
@@ -78,7 +82,16 @@ class Course:
     def removed(self, index: int) -> Course:
         """Without an item."""
         fewer = replace(self, items=self.items[:index] + self.items[index + 1 :])
+        for before, after in zip(self.before, self.after, strict=True):
+            if not {before, after} <= {*fewer.exercises}:
+                fewer = fewer.comparing("", after)
         return replace(fewer, own=tuple(one for one in self.own if one.exercise.id in fewer.exercises))
+
+    def comparing(self, before: str, after: str) -> Course:
+        """With a pair, in place of one with the same exercise after; no exercise before: without such a pair."""
+        kept = [pair for pair in zip(self.before, self.after, strict=True) if pair[1] != after]
+        pairs = [*kept, (before, after)] if before else kept
+        return replace(self, before=tuple(one for one, _ in pairs), after=tuple(one for _, one in pairs))
 
     def bringing(self, exercise: Exercise) -> Course:
         """With an exercise that it brings along, in place of one with the same id, and as an item."""

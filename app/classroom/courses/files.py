@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
-from app.classroom.courses.course import LONGEST, MOST_OWN, Course, Item, Own
+from app.classroom.courses.course import LONGEST, MOST_OWN, MOST_PAIRS, Course, Item, Own
 from app.classroom.courses.sealing import TAG, Seal
 from app.exercises import Exercise, ExerciseFileError, Exercises, Shelf, VariantError, form, parse_exercise
 from app.exercises.fields import Fields, text_of, toml_of
@@ -63,8 +63,9 @@ def course_of(
     known = Shelf(exercises)
     known.put(one.exercise for one in own)
     items = tuple(_item(each, known, find) for each in fields.tables("item"))
+    before, after = _pairs(fields, items)
     fields.done()
-    course = Course(title, about, items, answers, own)
+    course = Course(title, about, items, answers, own, before, after)
     plain = json.dumps(to_data(replace(course, own=())), ensure_ascii=False, separators=(",", ":"))
     size = len(plain.encode()) + sum(_sealed_size(one.text) for one in own)
     if size > MOST_BYTES:
@@ -112,6 +113,8 @@ def to_data(course: Course, seal: Seal | None = None) -> dict[str, Any]:
         data["about"] = course.about
     if not course.answers:
         data["answers"] = False
+    if course.before:
+        data |= {"before": list(course.before), "after": list(course.after)}
     data["item"] = items
     if course.own:
         data["own"] = [form.read(one.text) if seal is None else seal.close(one.text) for one in course.own]
@@ -232,6 +235,30 @@ def _exercise(fields: Fields, exercises: Exercises) -> str:
     raise fields.refuse("exercise", key, f"the id of an exercise of this service{hint}")
 
 
+def _pairs(fields: Fields, items: tuple[Item, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The exercises before and after: of the course, each once, and each pair in the order of the course."""
+    before, after = fields.texts("before"), fields.texts("after")
+    places = {item.key: i for i, item in reversed([*enumerate(items)]) if item.kind == "exercise"}
+    if len(before) > MOST_PAIRS:
+        raise fields.refuse("before", f"{len(before)} exercises", f"at most {MOST_PAIRS}")
+    if len(before) != len(after):
+        valid = f"as many exercises as before has ({len(before)}): they are compared pair by pair"
+        raise fields.refuse("after", f"{len(after)} exercises", valid)
+    for name, keys in (("before", before), ("after", after)):
+        for i, key in enumerate(keys):
+            if key not in places:
+                raise fields.refuse(f"{name}[{i}]", key, "the id of an exercise that is an item of this course")
+            if (*before, *after).count(key) > 1:
+                raise fields.refuse(f"{name}[{i}]", key, "an exercise that is in before or after once")
+    for i, (first, second) in enumerate(zip(before, after, strict=True)):
+        if places[first] > places[second]:
+            raise fields.refuse(f"after[{i}]", second, f"an item that comes after {first} in the course")
+    return before, after
+
+
 def _value(value: object) -> str:
-    """A text or a flag in TOML; texts have no control characters, so that JSON's escapes are TOML's."""
+    """A text, a flag or a list of texts in TOML.
+
+    Texts have no control characters, so that JSON's escapes are TOML's.
+    """
     return json.dumps(value, ensure_ascii=False)

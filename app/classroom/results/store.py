@@ -42,6 +42,13 @@ def task_of(database: Database, room: str) -> str:
     return str((state.get("task") or {}).get("exercise", ""))
 
 
+def course_of_room(database: Database, room: str) -> str:
+    """The course that a room follows, as JSON, or empty."""
+    with database.read() as connection:
+        state = connection.scalar(select(Room.state).where(Room.id == room)) or {}
+    return str(state.get("course") or "")
+
+
 def pages_of(database: Database, room: str, answers: bool = True, size: int = PAGE) -> Iterator[list[Attempt]]:
     """The attempts of a room's present seats in the order of time, `size` at a time.
 

@@ -96,7 +96,9 @@ class CourseFeature(Feature):
             except KinematicsError as error:
                 text = str(error)
                 self._desk.error, self._desk.errs = f"{text[:1].upper()}{text[1:]}.", self._desk.errs or "file"
-        if name != "set" or (rest and rest[0] == "add"):  # what was typed is on the screen already
+        if (
+            name != "set" or self._desk.error or (rest and str(rest[0]).startswith(("add", "before-")))
+        ):  # what was typed is on the screen already
             self._update()
 
     def _act(self, name: object, rest: list[object], value: object) -> None:
@@ -212,6 +214,11 @@ class CourseFeature(Feature):
         name, _, index = what.partition("-")
         if not index.isdecimal() or int(index) >= len(course.items):
             raise InputError("item", what, "the index of an item")
+        if name == "before":
+            after = course.items[int(index)]
+            if after.kind != "exercise":
+                raise InputError("before", text, "a step with an exercise")
+            return course.comparing(text, after.key)
         if name == "note":
             return course.changed(int(index), note=text)
         return course.changed(int(index), title=text)

@@ -77,6 +77,16 @@ def course_html(progress: Progress, known: Exercises, desk: Desk) -> str:
          "mark": mark, "name": course.items[i].key}
         for i, (item, mark) in enumerate(zip(course.items, _marks(progress), strict=True))
     ]  # fmt: skip
+    partner = dict(zip(course.after, course.before, strict=True))
+    taken = {*course.before, *course.after}
+    for i, row in enumerate(rows):
+        row["before"] = partner.get(str(row["name"]), "")
+        row["earlier"] = [
+            (one["name"], f"{j + 1}. {one['title']}")
+            for j, one in enumerate(rows[:i])
+            if one["kind"] == "exercise" and (one["name"] not in taken or one["name"] == row["before"])
+        ]
+        row["free"] = row["kind"] == "exercise" and row["name"] not in course.before
     done = sum(row["mark"]["color"] == "green" for row in rows)  # type: ignore[index]
     link = Markup(box_html(desk.link, "Copy link", wrap=True)) if desk.link else ""
     if desk.editing:

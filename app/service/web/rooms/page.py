@@ -52,7 +52,16 @@ def room_page(request: Request, status: int = 200, **values: object) -> HTMLResp
 
 def results_page(request: Request, status: int = 200, **values: object) -> HTMLResponse:
     """The teacher's page of results; values that are not given are empty."""
-    known: dict[str, object] = {"room": None, "rows": (), "counts": {}, "more": 0, "attempts": 0, "problem": ""}
+    known: dict[str, object] = {
+        "room": None,
+        "rows": (),
+        "counts": {},
+        "more": 0,
+        "attempts": 0,
+        "problem": "",
+        "pairs": (),
+        "gains": (),
+    }
     guard_teacher(request.scope)
     text = _template("results.html").render(**{**known, **values, "root": "../"})
     return HTMLResponse(text, status, headers={"cache-control": "no-store"})

@@ -17,6 +17,7 @@ from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, Role
 from app.classroom.clock import now
 from app.classroom.courses import Courses
+from app.classroom.results.gains import Gain, Gains, Pair, csv_of_gains, gains, pairs_of
 from app.classroom.results.table import Row, csv_of, rows
 from app.classroom.work import Attempt
 from app.service.web.rooms.page import results_page
@@ -38,16 +39,22 @@ class Results:
     async def show(self, request: Request) -> Response:
         """The table; its script asks for this page again and again."""
         try:
-            room, task, table, attempts = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
+            room, task, table, attempts, compared = await run_in_threadpool(
+                self._read, request.cookies.get(COOKIE, "")
+            )
         except ClassroomUnavailable as error:
             return results_page(request, 503, problem=str(error))
         shown = await run_in_threadpool(lambda: [self._shown(row) for row in table[:MOST]])
         states = ("stuck", "gave up", "not begun", "at it", "solved", "has not come")
         counted = [row for row in table if not task or row.exercise == task]
         counts = {state: sum(row.state == state for row in counted) for state in states}
+        pairs, found = compared
+        titles = await run_in_threadpool(lambda: self._titles) if pairs else {}
         return results_page(
-            request, room=room, rows=shown, counts=counts, more=len(table) - len(shown), attempts=attempts
-        )
+            request, room=room, rows=shown, counts=counts, more=len(table) - len(shown), attempts=attempts,
+            pairs=[[titles.get(key, key) for key in pair] for pair in pairs],
+            gains=[_compared(row) for row in found[: MOST + 1]],
+        )  # fmt: skip
 
     def _shown(self, row: Row) -> dict[str, object]:
         """A row as the page has it."""
@@ -82,14 +89,33 @@ class Results:
         texts = csv_of(chain([first], pages), titles)
         return _Download(_encoded(texts), media_type="text/csv; charset=utf-8", headers=headers)
 
-    def _read(self, token: str) -> tuple[OpenRoom, str, list[Row], int]:
-        """The room of the teacher's cookie, its task and table, and the number of attempts; raises 403."""
-        from app.classroom.results.store import attempts_of, members_of, task_of  # imports SQLAlchemy
+    async def download_gains(self, request: Request) -> Response:
+        """A row for each pair of exercises and student, and for the class."""
+        try:
+            room, _, _, _, (pairs, found) = await run_in_threadpool(self._read, request.cookies.get(COOKIE, ""))
+        except ClassroomUnavailable as error:
+            raise ProblemError(503, "busy", str(error)) from None
+        headers = {
+            "content-disposition": f'attachment; filename="gains-{room.code.lower()}.csv"',
+            "cache-control": "no-store",
+        }
+        text = csv_of_gains(found, pairs)
+        return Response(codecs.BOM_UTF8 + text.encode(), media_type="text/csv; charset=utf-8", headers=headers)
+
+    def _read(self, token: str) -> tuple[OpenRoom, str, list[Row], int, tuple[list[Pair], list[Gains]]]:
+        """The room of the teacher's cookie, its task and table, the number of attempts, what its course compares.
+
+        Raises:
+            ProblemError: 403.
+        """
+        from app.classroom.results.store import attempts_of, course_of_room, members_of, task_of  # SQLAlchemy
 
         room, database = self._room(token), self._hub.database
         attempts = attempts_of(database, room.id, answers=False)
         task = task_of(database, room.id)
-        return room, task, rows(members_of(database, room.id), attempts, task, now()), len(attempts)
+        members, pairs = members_of(database, room.id), pairs_of(course_of_room(database, room.id))
+        compared = pairs, gains(members, attempts, pairs) if pairs else []
+        return room, task, rows(members, attempts, task, now()), len(attempts), compared
 
     def _room(self, token: str) -> OpenRoom:
         """The room of the teacher's cookie; raises 403."""
@@ -104,6 +130,19 @@ class Results:
     @property
     def _titles(self) -> dict[str, str]:
         return {one.id: one.title for one in self._courses().exercises.all}
+
+
+def _compared(row: Gains) -> dict[str, object]:
+    """A row of gains as the page has it."""
+    alias = "" if row.member is None else row.member.alias
+    return {"alias": alias, "compared": [_in_words(one) for one in (*row.items, row.whole)]}
+
+
+def _in_words(one: Gain) -> dict[str, object]:
+    scores = ["–" if value is None else f"{100 * value:.0f} %" for value in (one.before, one.after)]
+    both = one.before is not None and one.after is not None
+    gain = f"{one.gain:.2f}".replace("-", "−") if one.gain is not None else "all right before" if both else ""
+    return {"before": scores[0], "after": scores[1], "gain": gain, "students": one.students}
 
 
 class _Download(StreamingResponse):

@@ -49,6 +49,7 @@ def room_routes(
         Route("/room/qr.svg", pages.qr, methods=["GET"]),
         Route("/room/results", results.show, methods=["GET"]),
         Route("/room/results.csv", results.download, methods=["GET"]),
+        Route("/room/gains.csv", results.download_gains, methods=["GET"]),
         Route("/room/leave", pages.leave, methods=["POST"]),
         Route("/room/end", pages.end, methods=["POST"]),
         Route("/room/ended", pages.ended, methods=["GET"]),

@@ -272,6 +272,29 @@ def test_a_seat_is_not_left_for_a_course() -> None:
     assert practice.seed_of(fixed) == seed, "where nothing is drawn, other numbers are no other task"
 
 
+def test_a_teacher_pairs_exercises_before_and_after(server: int) -> None:
+    with FakeBrowser(server, memory=opened({"course": {}})) as tab:
+        tab.wait(lambda: "New course" in shown(tab))
+        press(tab, "course", ["new", 1])
+        tab.wait(lambda: bool(block(tab, "edit")))
+        for serial, name in enumerate(("exercise:two-elbows", "lesson:dh", "exercise:other-wrist"), 2):
+            press(tab, "course", ["set", "add", serial], name)
+        tab.wait(lambda: block(tab, "edit").count("data-course-row") == 3)
+        assert block(tab, "edit").count("Did they learn?") == 1, "only the later exercise has an earlier one"
+        press(tab, "course", ["set", "before-2", 5], "two-elbows")
+        tab.wait(lambda: 'value="two-elbows" selected' in tab.html)
+        press(tab, "course", ["up", 6], 2)
+        press(tab, "course", ["up", 7], 1)
+        tab.wait(lambda: "expected an item that comes after two-elbows in the course" in shown(tab))
+        assert block(tab, "edit").count("data-course-row") == 3
+        press(tab, "course", ["set", "before-1", 8], "no-such")
+        tab.wait(lambda: "before[0]: got 'no-such'" in shown(tab))
+        press(tab, "course", ["done", 9])
+        tab.wait(lambda: "0 of 3 done" in block(tab, "follow"))
+        kept = decode(tab.stored(), [get_robot("puma560")]).features["course"]["course"]
+        assert (kept["before"], kept["after"]) == (["two-elbows"], ["other-wrist"])
+
+
 def test_a_teacher_makes_a_course(server: int) -> None:
     with FakeBrowser(server, memory=opened({"course": {}})) as tab:
         tab.wait(lambda: all(course.title in shown(tab) for course in Courses(ALL).all))

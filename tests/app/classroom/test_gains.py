@@ -1,0 +1,170 @@
+"""Before and after: first answers, the normalised gain, and what happens where it has no value."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+from sqlalchemy import update
+
+from app.classroom import COOKIE, NewAttempt, Ticket, tables
+from app.classroom.courses import Course, Item, parse_course, to_data, to_toml
+from app.classroom.results.gains import COLUMNS, Gain, csv_of_gains, gains, pairs_of
+from app.classroom.results.table import Member
+from app.classroom.work import ANSWER_SHOWN, Attempt
+from app.cli.parser import main
+from app.exercises import ExerciseFileError, Exercises
+from app.service.main import create_app
+from app.shared.settings import Settings
+
+ALL = Exercises()
+PAIRS = [("two-elbows", "other-wrist"), ("swing", "row-distance")]
+ITEMS = tuple(Item("exercise", key) for key in ("two-elbows", "swing", "other-wrist", "row-distance"))
+COURSE = Course("Week 1", items=ITEMS, before=("two-elbows", "swing"), after=("other-wrist", "row-distance"))
+MEMBERS = [Member(f"s{i}", f"Student {i}", i) for i in (1, 2, 3, 4)]
+
+
+def attempt(seat: int, exercise: str, score: float, at: float, verdict: str = "") -> Attempt:
+    return Attempt(f"s{seat}", f"Student {seat}", exercise, int(at), None, verdict, score, at, at, seat)
+
+
+def test_first_answers_give_the_gains_of_items_students_and_class() -> None:
+    attempts = [
+        attempt(1, "two-elbows", 0.2, 1), attempt(1, "two-elbows", 1.0, 2), attempt(1, "swing", 0.0, 3),
+        attempt(2, "two-elbows", 1.0, 4), attempt(2, "swing", 0.5, 5), attempt(3, "swing", 0.25, 6),
+        attempt(1, "other-wrist", 0.6, 7), attempt(1, "other-wrist", 1.0, 8), attempt(1, "row-distance", 1.0, 9),
+        attempt(2, "other-wrist", 0.5, 10), attempt(2, "row-distance", 0.0, 11, ANSWER_SHOWN),
+        attempt(2, "row-distance", 1.0, 12),
+    ]  # fmt: skip
+    group, one, two, three = gains(MEMBERS, attempts, PAIRS)
+    assert [row.member for row in (group, one, two, three)] == [None, *MEMBERS[:3]], "nobody without an answer"
+
+    assert one.items[0].gain == pytest.approx((0.6 - 0.2) / (1 - 0.2))
+    assert one.items[1].gain == 1.0
+    assert one.whole.gain == pytest.approx(((0.6 + 1.0) / 2 - 0.1) / (1 - 0.1))
+    assert (two.items[0].before, two.items[0].after, two.items[0].gain) == (1.0, 0.5, None), "nothing was missing"
+    assert two.items[1].gain == pytest.approx((0.0 - 0.5) / (1 - 0.5)), "who has it shown first has scored 0"
+    assert two.whole.gain == pytest.approx((0.25 - 0.75) / (1 - 0.75))
+    assert (three.items[1].before, three.items[1].after, three.items[1].gain) == (0.25, None, None)
+    assert (three.whole.before, three.whole.students) == (None, 0)
+
+    assert (group.items[0].before, group.items[0].after, group.items[0].students) == (0.6, 0.55, 2)
+    assert group.items[0].gain == pytest.approx((0.55 - 0.6) / (1 - 0.6)), "of the means, not the mean of gains"
+    assert group.items[1].gain == pytest.approx((0.5 - 0.25) / (1 - 0.25))
+    before, after = (0.1 + 0.75) / 2, (0.8 + 0.25) / 2
+    assert group.whole.gain == pytest.approx((after - before) / (1 - before))
+    assert group.whole.students == 2
+
+
+def test_without_answers_there_is_no_gain() -> None:
+    (group,) = gains(MEMBERS, [], PAIRS)
+    assert (group.whole, group.items[0].gain) == (Gain(None, None, 0), None)
+    assert Gain(1.0, 1.0, 1).gain is None
+    assert Gain(1.0 - 1e-12, 0.0, 1).gain is None, "no division by what is left of rounding"
+
+
+def test_the_file_has_items_students_and_class() -> None:
+    attempts = [attempt(1, "two-elbows", 0.2, 1), attempt(1, "other-wrist", 0.6, 2)]
+    members = [Member("s1", "=cmd()", 1)]
+    found = list(csv.DictReader(io.StringIO(csv_of_gains(gains(members, attempts, PAIRS), PAIRS))))
+    assert tuple(found[0]) == COLUMNS
+    assert [(row["student"], row["item"]) for row in found] == [
+        *(("class", "1"), ("class", "2"), ("class", "all"), ("1", "1"), ("1", "2"), ("1", "all"))
+    ]
+    assert found[3]["alias"] == "'=cmd()"
+    assert [found[3][name] for name in ("before", "after", "score_before", "score_after", "gain")] == [
+        *("two-elbows", "other-wrist", "0.200", "0.600", "0.500")
+    ]
+    assert (found[4]["gain"], found[4]["students"]) == ("", "0")
+
+
+# In courses
+
+
+def test_files_and_links_keep_what_is_compared() -> None:
+    assert parse_course(to_toml(COURSE), ALL) == COURSE
+    assert pairs_of(json.dumps(to_data(COURSE))) == PAIRS
+    assert pairs_of("") == pairs_of(json.dumps(to_data(Course("Mine")))) == []
+    assert "before" not in to_toml(Course("Mine", items=ITEMS))
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "field", "words"),
+    [
+        (["two-elbows"], [], "after", "as many exercises as before has"),
+        (["two-elbow"], ["swing"], "before[0]", "an item of this course"),
+        (["two-elbows"], ["puma-wrist"], "after[0]", "an item of this course"),
+        (["two-elbows"], ["two-elbows"], "before[0]", "once"),
+        (["two-elbows", "two-elbows"], ["swing", "other-wrist"], "before[0]", "once"),
+        (["swing"], ["two-elbows"], "after[0]", "comes after swing"),
+        ("two-elbows", ["swing"], "before", "a list"),
+        ([5], ["swing"], "before[0]", "a text"),
+    ],
+)
+def test_mistakes_are_named(
+    before: object, after: object, field: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plain = to_toml(Course("Week 1", items=ITEMS))
+    text = plain.replace("[[item]]", f"before = {json.dumps(before)}\nafter = {json.dumps(after)}\n\n[[item]]", 1)
+    with pytest.raises(ExerciseFileError, match=words) as caught:
+        parse_course(text, ALL)
+    assert f"{field}:" in str(caught.value)
+    path = tmp_path / "week.toml"
+    path.write_text(text, encoding="utf-8")
+    assert main(["check", str(path)]) != 0
+    out = capsys.readouterr()
+    assert words in out.out + out.err
+
+
+def test_a_pair_goes_with_its_exercises() -> None:
+    fewer = COURSE.removed(1)
+    assert (fewer.before, fewer.after) == (("two-elbows",), ("other-wrist",))
+    other = COURSE.comparing("two-elbows", "row-distance")
+    assert other.before == ("two-elbows", "two-elbows"), "a file refuses that, and so does the editor"
+    assert COURSE.comparing("", "other-wrist").before == ("swing",)
+
+
+# In a room
+
+
+@pytest.fixture
+def service(tmp_path: Path) -> Iterator[object]:
+    app = create_app(Settings(data=tmp_path))
+    yield app
+    app.state.classroom.close()
+
+
+def test_the_results_of_a_room_show_both_and_the_gain(service: object) -> None:
+    hub = service.state.classroom  # type: ignore[attr-defined]
+    room = hub.rooms.open("Class", 3600.0)
+
+    def browser(ticket: Ticket) -> TestClient:
+        cookies = {COOKIE: hub.rooms.tokens.sign(ticket)}
+        return TestClient(service, base_url="http://school.example", cookies=cookies)  # type: ignore[arg-type]
+
+    teacher = browser(Ticket(room.id))
+    assert "Did they learn?" not in teacher.get("/room/results").text
+    with hub.database.write() as connection:
+        state = {"course": json.dumps(to_data(COURSE))}
+        connection.execute(update(tables.Room).where(tables.Room.id == room.id).values(state=state))
+    ada = hub.rooms.join(room.code, "<b>Ada")
+    for exercise, score in (("two-elbows", 0.25), ("two-elbows", 1.0), ("other-wrist", 0.7)):
+        hub.rooms.submit(ada, NewAttempt(exercise, 7, ["30"], "Too large.", score, started=0.0))
+    page = teacher.get("/room/results").text
+    assert "Did they learn?" in page
+    assert "Both elbows → " in page
+    assert "25 % → 70 %" in page
+    assert f"g = {(0.7 - 0.25) / (1 - 0.25):.2f}" in page
+    assert "1 answered both" in page
+    assert "<b>Ada" not in page
+    answer = teacher.get("/room/gains.csv")
+    assert answer.headers["content-type"].startswith("text/csv")
+    rows = list(csv.DictReader(io.StringIO(answer.content.decode("utf-8-sig"))))
+    assert [row["gain"] for row in rows if row["student"] == "1"] == ["0.600", "", "0.600"]
+    for path in ("/room/results", "/room/gains.csv"):
+        assert browser(ada).get(path).status_code == 403
