@@ -73,7 +73,7 @@ from kin.motion import (
     program_to_dict,
 )
 from kin.motor import Motor
-from kin.notebook import connect, show
+from kin.notebook import connect, save_page, show
 from kin.path import PathGap, PathJump, PathPostures, PathResult, path_postures, solve_path
 from kin.readings import (
     MotorFinding,
@@ -225,6 +225,7 @@ __all__ = [
     "robot_to_toml",
     "rotation_from_wxyz",
     "sample_workspace",
+    "save_page",
     "save_robot",
     "screws",
     "section",

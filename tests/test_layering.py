@@ -44,7 +44,7 @@ RULES: dict[str, set[str]] = {
     },
     "kin/way": {"numpy", "ompl", "kin.collision", "kin.ik", "kin.motion", "kin.way", *MODEL},
     # It looks the service up by name when it is called.
-    "kin/notebook": {"numpy", "kin.errors", "kin.robot"},
+    "kin/notebook": {"numpy", "kin.errors", "kin.motion", "kin.robot"},
     "kin/workspace": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.workspace", *MODEL},
     "app": {"app", "kin"},
     "app/shared": {
@@ -130,6 +130,7 @@ RULES: dict[str, set[str]] = {
     "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
     "app/cli/arguments": {"app.cli.arguments", "app.shared.options"},
     "app/cli/bodies.py": {"kin", "app.viewer.meshes"},
+    "app/cli/page.py": {"kin", "app.cli", "app.exports", "app.viewer.scene.bodies", "app.viewer.takehome"},
     "app/cli/classroom": {"kin", "app.classroom", "app.cli", "app.exercises", "app.shared"},
     "app/cli/classroom/arguments.py": set(),
     "app/cli/xacro": {"kin", "app.cli.xacro"},

@@ -26,7 +26,7 @@ METHODS = sorted(
     if value.__module__.startswith("kin.")
 )
 # What has no example that can run here: a notebook, and what only fills the cache of compiled kernels.
-NO_EXAMPLE = {"connect", "show", "warm_up", "warm_up_rest"}
+NO_EXAMPLE = {"connect", "save_page", "show", "warm_up", "warm_up_rest"}
 # Nothing that they may be given is refused.
 NEVER_RAISES = {
     *("builtin_robots", "capability_join", "classic_robots", "warm_up", "warm_up_rest", "wxyz_from_rotation"),

@@ -225,9 +225,9 @@ def _load_check() -> Run:
 
 
 def _load_compare() -> Run:
-    from app.cli.compare import run
+    from app.cli.robots import run_compare
 
-    return run
+    return run_compare
 
 
 def _load_doctor() -> Run:
@@ -244,6 +244,12 @@ def _load_move() -> Run:
 
 def _load_way() -> Run:
     from app.cli.way import run
+
+    return run
+
+
+def _load_page() -> Run:
+    from app.cli.page import run
 
     return run
 
@@ -305,6 +311,7 @@ COMMANDS = (
     Command(declare.add_ik, _load_ik),
     Command(declare.add_move, _load_move),
     Command(declare.add_way, _load_way),
+    Command(declare.add_page, _load_page),
     Command(declare.add_robots, _load_robots, interpreted=True),
     Command(declare.add_workspace, _load_workspace),
     Command(add_room, _load_room),

@@ -60,13 +60,13 @@ def mounted_robot_of(arguments: Namespace) -> Robot:
     """The robot of the argument ``ROBOT`` with the base and the tool of ``--base`` and ``--tool``, as in REST."""
     robot, units = robot_of(arguments), units_of(arguments)
     if arguments.base is not None:
-        robot = robot.with_base(_pose(arguments.base, "--base", units) @ robot.T_world_base)
+        robot = robot.with_base(pose_of(arguments.base, "--base", units) @ robot.T_world_base)
     if arguments.tool is not None:
-        robot = robot.with_mounted(_pose(arguments.tool, "--tool", units))
+        robot = robot.with_mounted(pose_of(arguments.tool, "--tool", units))
     return robot
 
 
-def _pose(texts: list[str], field: str, units: Units) -> Array:
+def pose_of(texts: list[str], field: str, units: Units) -> Array:
     """X, Y, Z, ROLL, PITCH, YAW as a transform ``(4, 4)``."""
     values = [quantity(text, units.of(k >= 3), field) for k, text in enumerate(texts)]
     return from_xyz_rpy(values[:3], values[3:])
@@ -145,7 +145,7 @@ def workpieces_of(arguments: Namespace) -> dict[str, Array]:
     for name, texts in arguments.workpiece:
         if name in workpieces or name in FRAMES:
             raise InputError("--workpiece", name, f"names other than {', '.join(FRAMES)}, each once")
-        workpieces[name] = _pose(texts, f"--workpiece {name}", units_of(arguments))
+        workpieces[name] = pose_of(texts, f"--workpiece {name}", units_of(arguments))
     return workpieces
 
 

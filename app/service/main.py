@@ -48,7 +48,7 @@ from app.service.web.failures import Failures
 from app.service.web.hosts import LOCAL_NAMES, Hosts
 from app.service.web.lti import PlatformsRefused, check_platforms, lti_routes
 from app.service.web.observe import Observe, write_to_stderr
-from app.service.web.pages import page_routes, static_folder
+from app.service.web.pages import page_routes
 from app.service.web.prefix import PathPrefix, clean_prefix
 from app.service.web.rooms import room_routes, sweeping
 from app.service.web.rooms.guests import Guests
@@ -66,6 +66,7 @@ from app.shared.metrics import count_together, forget_process
 from app.shared.places import Places
 from app.shared.security import SecurityHeaders
 from app.shared.settings import Settings
+from app.shared.static_folder import static_folder
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.shared.threads import end_process, pin

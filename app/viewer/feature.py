@@ -73,6 +73,10 @@ class Stage(Protocol):
     def service(self) -> Service:
         """Where this page has come from, for code that asks the service."""
 
+    @property
+    def link(self) -> str:
+        """A link to this page as it is."""
+
     def link_to(self, features: dict[str, dict[str, object]], lesson: str) -> str:
         """A link to a page with nothing but these states of features, at this lesson."""
 

@@ -1,7 +1,7 @@
-"""`show`: an arm in the output of a notebook's cell; `connect`: a page of the viewer that is open in a browser.
+"""`show`: an arm in a notebook; `connect`: a page that is open in a browser; `save_page`: an arm as a web page.
 
 The core draws nothing and knows no network. The service, which is installed with it, does: it is looked up by name
-when one of the two is called, so that nothing here depends on it.
+when one of these is called, so that nothing here depends on it.
 """
 
 from __future__ import annotations
@@ -9,12 +9,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Any
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
 from kin.errors import KinematicsError
 from kin.robot import Robot
+
+if TYPE_CHECKING:
+    from kin.motion import Motion
 
 # The service's name in an installation, and in a checkout.
 _PACKAGES = ("kinboard", "app")
@@ -85,6 +90,38 @@ def connect(
             installed here.
     """
     return _service("live.client", "connect").Page(address, code, name, token, rate, drives)
+
+
+def save_page(
+    robot: Robot | str,
+    path: str | PathLike[str],
+    q: ArrayLike | None = None,
+    *,
+    target: ArrayLike | None = None,
+    motion: Motion | None = None,
+    link: str = "",
+) -> Path:
+    """Write an arm as one web page that needs no server and no internet: a file of at most 2 MB.
+
+    The page has a slider for each joint, the pose of the tool, the DH table and its frames; with a target the
+    postures that meet it, with a motion a program to play. Its forward kinematics are its own.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        path: of the file, such as ``"ur5.html"``; a file that is there is replaced.
+        q: configuration ``(n,)`` that the page opens with, radians (metres); None: the arm's home configuration.
+        target: pose of the tool ``(4, 4)``, metres.
+        motion: of the same arm, from `plan_motion`.
+        link: address of the full page, which the file names; "": none.
+
+    Returns:
+        The path of the file.
+
+    Raises:
+        KinematicsError: an argument is invalid, nothing of the motion can be driven, or the service is missing.
+        OSError: the file cannot be written.
+    """
+    return Path(_service("viewer.takehome", "save_page").save_page(robot, path, q, target, motion, link))
 
 
 def _service(module: str, function: str) -> Any:

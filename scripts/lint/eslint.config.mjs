@@ -12,12 +12,13 @@ export default [
   js.configs.recommended,
   stylistic.configs.customize({ quotes: "double", semi: true, braceStyle: "1tbs", arrowParens: true, quoteProps: "as-needed" }),
   {
-    files: ["static/*.js"],
+    files: ["static/*.js", "static/takehome/*.js"],
     languageOptions: {
       ecmaVersion: 2023,
       sourceType: "script",
-      // static/viser_page.js comes first in viser's page, and docs.js after the library of docs.html.
-      globals: { ...globals.browser, viserPage: "readonly", SwaggerUIBundle: "readonly" },
+      // static/viser_page.js comes first in viser's page, docs.js after the library of docs.html, and three.js first in
+      // a saved page.
+      globals: { ...globals.browser, viserPage: "readonly", SwaggerUIBundle: "readonly", THREE: "readonly" },
     },
     linterOptions: { reportUnusedDisableDirectives: "error" },
     rules: {

@@ -230,6 +230,27 @@ def add_way(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     return parser
 
 
+def add_page(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard page``."""
+    parser = _command(
+        commands, "page", "an arm as one web page that needs no server: sliders, postures, a program",
+        parents.robots, parents.output, parents.mounts,
+    )  # fmt: skip
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="file to write (default: ROBOT.html); - is standard output"
+    )
+    parser.add_argument(
+        "--q", nargs="+", metavar="Q", help=f"joint values to open with (default: home); {UNITS_NOTE}"
+    )
+    parser.add_argument(
+        "--target", nargs=6, metavar=(*XYZ, "ROLL", "PITCH", "YAW"),
+        help=f"pose of the tool whose postures can be stepped through; {UNITS_NOTE}",
+    )  # fmt: skip
+    parser.add_argument("--program", metavar="FILE", help="program to play (TOML), with its own units")
+    parser.add_argument("--link", metavar="URL", default="", help="address of the full page, which the file names")
+    return parser
+
+
 def add_robots(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard robots``."""
     parser = _command(

@@ -16,14 +16,8 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Message, Receive, Scope, Send
 
 from app.api.problems import ProblemError, respond
+from app.shared.static_folder import static_folder
 from kin import __version__, builtin_robots, classic_robots
-
-
-def static_folder() -> Path:
-    """The folder of static files: next to the package in a checkout, inside it when installed."""
-    package = Path(__file__).parents[2]
-    installed = package / "_static"
-    return installed if installed.is_dir() else package.parent / "static"
 
 
 def page_routes() -> list[BaseRoute]:

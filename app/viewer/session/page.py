@@ -204,6 +204,10 @@ class VisitorPage(ShownArm, Worker):
     def service(self) -> Service:
         return self._persistence.service
 
+    @property
+    def link(self) -> str:
+        return self._persistence.link
+
     def link_to(self, features: dict[str, dict[str, object]], lesson: str) -> str:
         return self._persistence.link_to(features, lesson)
 

@@ -203,6 +203,11 @@ class Persistence:
             camera=page.camera.chosen,
         )
 
+    @property
+    def link(self) -> str:
+        """A link to the page as it was last saved."""
+        return f"{self._address}viewer/#s={self._saved}"
+
     def link_to(self, features: dict[str, dict[str, object]], lesson: str) -> str:
         """A link to a page with nothing but these states of features, at this lesson."""
         return f"{self._address}viewer/#s={encode(PageState(lesson=lesson, features=features))}"
@@ -224,7 +229,7 @@ class Persistence:
             arm.obstacles,
             avoid,
         )
-        self._share.show(f"{self._address}viewer/#s={self._saved}", moment, "table" in page.activity.withheld)
+        self._share.show(self.link, moment, "table" in page.activity.withheld)
 
 
 def too_long(left_out: Sequence[str], titles: Mapping[str, str]) -> Notice:

@@ -17,6 +17,7 @@ from app.viewer.lessons.guide import outline as guide
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
+from app.viewer.takehome.sending import send_page
 from app.viewer.views.templates import render
 from app.viewer.worksheet.views import page_html
 from kin import InputError
@@ -40,7 +41,7 @@ class Worksheets(Feature):
     key = "sheet"
     title = "Worksheet"
     acts = False
-    messages = frozenset({"page", *FILES})
+    messages = frozenset({"page", "web", *FILES})
 
     def __init__(
         self, stage: Stage, lesson: Lesson | None, page: viser.GuiHtmlHandle, folder: bool = True
@@ -59,6 +60,8 @@ class Worksheets(Feature):
             case ("page", int(serial)):
                 page = render("sheet/withheld") if self._withheld else page_html(self.sheet())
                 update_html(self._page, render("sheet/handed", page=page, serial=serial))
+            case ("web", int()):
+                send_page(self.stage)
             case (str(name), int()) if name in FILES and self._withheld:
                 words = "The worksheet would contain the table that the open exercise asks for."
                 self.stage.notify(Notice("advice", "Not now", words))
@@ -69,7 +72,7 @@ class Worksheets(Feature):
                 file = f"{named(sheet.robot).id}-{what}.{suffix}"
                 self.stage.client.send_file_download(file, write(sheet).encode(), save_immediately=True)
             case _:
-                raise InputError("worksheet", key, "one of page, " + ", ".join(FILES))
+                raise InputError("worksheet", key, "one of page, web, " + ", ".join(FILES))
 
     @property
     def _withheld(self) -> bool:

@@ -35,6 +35,7 @@ from app.viewer.tabs.program.screen import Screen
 from app.viewer.tabs.program.views import KINDS
 from app.viewer.tabs.program.ways import Ways
 from app.viewer.tabs.workspace.background import run_in_background
+from app.viewer.takehome.sending import send_page
 from kin import InputError, KinematicsError
 from kin.motion import Motion, Program
 from kin.warmup import MOTIONS
@@ -518,16 +519,15 @@ class ProgramTab(Feature):
             return
         robot = self.stage.now.robot if self._key != KEY else named(self.stage.now.robot)
         program = replace(self._plan.motion.program, name=robot.name[:100])
-        name = f"{robot.id}-program.toml"
-        self.stage.client.send_file_download(name, toml_of(program, robot.name).encode(), save_immediately=True)
+        name, data = f"{robot.id}-program.toml", toml_of(program, robot.name).encode()
+        self.stage.client.send_file_download(name, data, save_immediately=True)
         self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
 
     def _save(self, name: object) -> None:
         """Download the motion over time, or the part of it that can be driven."""
         if self._motion is None:
             return
-        own = self._key == KEY
-        motion = replace(self._motion, robot=named(self._motion.robot)) if own else self._motion
+        motion = self._motion if self._key != KEY else replace(self._motion, robot=named(self._motion.robot))
         try:
             file, data, sampled = motion_file(motion, name)
         except InputError as error:
@@ -584,6 +584,7 @@ _HANDLERS: dict[str, Callable[[ProgramTab, object], None]] = {
     "language": ProgramTab._set_language,
     "download": ProgramTab._download,
     "save": ProgramTab._save,
+    "page": lambda tab, _: send_page(tab.stage, tab._motion),
     "close-postures": ProgramTab._close_postures,
     "charted": ProgramTab._charted,
     "search": lambda tab, _: tab._ways.start(),

@@ -12,7 +12,7 @@ import viser
 from arms import CLASSICS
 
 import kin
-from app.service.web.pages import static_folder
+from app.shared.static_folder import static_folder
 from app.shared.store import Store
 from app.viewer.panel import joints, readout, rotations, status
 from app.viewer.scene import camera

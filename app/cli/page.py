@@ -1,0 +1,44 @@
+"""``kinboard page``: an arm as one web page that needs no server."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+from app.cli.terminal import configuration, mounted_robot_of, pose_of, print_json, units_of
+from app.exports.save import opened
+from app.viewer.scene.bodies.drawing import drawing
+from app.viewer.takehome.page import SavedArm, web_page
+from kin import InputError, Robot, plan_motion
+from kin.motion import Motion, parse_program
+from kin.transforms import Array
+
+
+def run(arguments: Namespace) -> int:
+    """Write the page, and say where; 1 if its program cannot be driven."""
+    robot, units = mounted_robot_of(arguments), units_of(arguments)
+    q = robot.q_home if arguments.q is None else configuration(robot, arguments.q, "--q", units)
+    target = None if arguments.target is None else pose_of(arguments.target, "--target", units)
+    motion = None if arguments.program is None else _motion(robot, arguments.program, q)
+    page = web_page(SavedArm(robot, q, drawing(robot), target, motion=motion, units=units, link=arguments.link))
+    file = arguments.output or f"{robot.id}.html"
+    data = page.encode()
+    try:
+        with opened(file) as written:
+            written.write(data)
+    except OSError as error:
+        raise InputError("--output", file, f"a file that can be written ({error})") from None
+    if file != "-":
+        if arguments.json:
+            print_json({"file": file, "bytes": len(data)})
+        else:
+            print(f"{file}: {len(data) / 1000:.0f} kB, opens in any browser, without a server or internet")
+    return 0
+
+
+def _motion(robot: Robot, path: str, q_start: Array) -> Motion:
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError("--program", path, f"a program that can be read ({error})") from None
+    return plan_motion(robot, parse_program(text, robot), q_start)

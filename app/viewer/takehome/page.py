@@ -1,0 +1,265 @@
+"""One arm as one HTML file: sliders, pose, DH table, the postures of a target and a program, without a server.
+
+The file holds the arm as data and a script that moves it. The script computes forward kinematics itself, from the
+same constants as the scene of the viewer (:mod:`app.viewer.scene.chain`), so each slider answers at once; inverse
+kinematics and programs are solved here, and the file holds their answers. Its parts are in ``static/takehome``:
+``page.html``, ``page.css`` and ``page.js``; three.js is in ``static/vendor/three``.
+
+Nothing is loaded from elsewhere, which a content security policy in the file makes certain.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup, escape
+from numpy.typing import ArrayLike, NDArray
+
+from app.shared.static_folder import static_folder
+from app.viewer.panel.posture import short
+from app.viewer.scene.bodies.drawing import Drawing, drawing
+from app.viewer.scene.bodies.parts import Part, joint_color
+from app.viewer.scene.chain import chain
+from app.viewer.scene.meshes import Body, body
+from kin import IKOptions, InputError, Motion, Robot, __version__, solve_ik
+from kin.named import robot_of
+from kin.transforms import Array
+from kin.units import DEFAULT_UNITS, Units
+
+LARGEST = 2_000_000  # bytes of a file: what learning platforms and mail take without a question
+HIGHLIGHTED = "The highlighted value of a row moves with its joint."
+RATE = 60.0  # of the samples of a program, per second
+MOST_SAMPLES = 3000  # of a program: a longer one has fewer a second
+_STEPS = 65535  # of a coordinate of a mesh, over the size of the mesh
+_OPTIONS = IKOptions()
+_HIDDEN = ("axis", "approach")  # parts of a generated body that show how a joint moves, not how the arm looks
+
+
+@dataclass(frozen=True, eq=False)
+class SavedArm:
+    """What a saved page shows.
+
+    Attributes:
+        robot: the arm.
+        q: its configuration ``(n,)``, radians (metres).
+        drawn: the body that it is drawn with; None: the one made from its table.
+        target: a pose of the tool ``(4, 4)`` whose postures can be stepped through; None: none.
+        options: how the target is solved.
+        motion: a program to play; None: none.
+        units: of the numbers on the page.
+        link: address of the full page with the same arm; "": there is none.
+    """
+
+    robot: Robot
+    q: Array
+    drawn: Drawing | None = None
+    target: ArrayLike | None = None
+    options: IKOptions = _OPTIONS
+    motion: Motion | None = None
+    units: Units = DEFAULT_UNITS
+    link: str = ""
+
+
+def save_page(
+    robot: Robot | str,
+    path: str | os.PathLike[str],
+    q: ArrayLike | None = None,
+    target: ArrayLike | None = None,
+    motion: Motion | None = None,
+    link: str = "",
+) -> Path:
+    """As `kin.save_page`."""
+    robot = robot_of(robot)
+    if motion is not None and motion.robot != robot:
+        raise InputError("motion", motion.robot.name, f"a motion of the same arm, {robot.name}")
+    at = robot.q_home if q is None else robot.check_q(q)
+    file = Path(path)
+    file.write_text(
+        web_page(SavedArm(robot, at, drawing(robot), target, motion=motion, link=link)), encoding="utf-8"
+    )
+    return file
+
+
+def web_page(saved: SavedArm) -> str:
+    """The file, of at most `LARGEST` bytes.
+
+    A body with more triangles than there is room for gives way to the one made from the table.
+
+    Raises:
+        InputError: a link that is no address of a web page, or a program with nothing to drive.
+    """
+    if saved.link and not saved.link.startswith(("http://", "https://")):
+        raise InputError("link", saved.link, "an address that begins with http:// or https://")
+    page = _page(saved, saved.drawn)
+    if saved.drawn is not None and len(page.encode()) > LARGEST:
+        page = _page(saved, None)
+    return page
+
+
+def _page(saved: SavedArm, drawn: Drawing | None) -> str:
+    robot = saved.robot
+    link = Markup(' <a href="{}">Open in Kinboard</a>').format(saved.link) if saved.link else ""
+    source = Markup('<p class="quiet">Source of the numbers: {}</p>').format(robot.source) if robot.source else ""
+    parts = {
+        "title": escape(robot.name),
+        "about": f"{robot.n} joint{'s' * (robot.n != 1)}",
+        "source": source,
+        "version": escape(__version__),
+        "link": link,
+        "data": _as_script(_data(saved, drawn)),
+        "style": _text("takehome/page.css"),
+        "three": _text("vendor/three/three.min.js"),
+        "script": _text("takehome/page.js"),
+    }
+    pieces = _text("takehome/page.html").split("{{ ")
+    filled = [pieces[0]]
+    for piece in pieces[1:]:
+        name, _, rest = piece.partition(" }}")
+        filled += [str(parts[name]), rest]
+    return "".join(filled)
+
+
+@cache
+def _text(name: str) -> str:
+    return (static_folder() / name).read_text(encoding="utf-8")
+
+
+def _as_script(data: dict[str, Any]) -> str:
+    """JSON that nothing in it can end: a name may contain ``</script>``."""
+    text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+    return text.replace("<", "\\u003c")
+
+
+def _data(saved: SavedArm, drawn: Drawing | None) -> dict[str, Any]:
+    robot, made = saved.robot, body(saved.robot)
+    return {
+        "title": robot.name,
+        "units": {"degrees": saved.units.degrees, "length": saved.units.length},
+        "robot": arm_data(robot),
+        "q": saved.q.tolist(),
+        "parts": [_mesh(part, link, T) for part, link, T in _parts(made, drawn)],
+        "frames": [
+            {"link": link.index + 1, "pose": T.ravel().tolist()}
+            for link in made.chain.links
+            for _, T in link.frames
+        ],
+        "center": made.center.tolist(),
+        "radius": made.radius,
+        "size": made.size,
+        "floor": made.mount.floor,
+        "target": None if saved.target is None else _target(saved, saved.target),
+        "program": None if saved.motion is None else _program(saved.motion),
+    }
+
+
+def arm_data(robot: Robot) -> dict[str, Any]:
+    """Joints, constants and rows of an arm as the script takes them."""
+    found = chain(robot)
+    return {
+        "joints": [
+            {
+                "name": joint.name,
+                "turns": joint.kind == "revolute",
+                "lower": low,
+                "upper": high,
+                "home": home,
+                "color": joint_color(i),
+                "axis": link.T_parent_axis.ravel().tolist(),
+            }
+            for i, (joint, link, low, high, home) in enumerate(
+                zip(robot.joints, found.links[1:], *_ranges(robot), robot.home, strict=True)
+            )
+        ],
+        "tool": found.T_last_tool.ravel().tolist(),
+        "rows": _rows(robot),
+        "convention": f"{robot.convention.capitalize()} convention. {HIGHLIGHTED}",
+    }
+
+
+def _ranges(robot: Robot) -> tuple[list[float], list[float]]:
+    """What the sliders reach: the limits, or one turn to either side of an arm that has none."""
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -math.pi)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, math.pi)
+    return lower.tolist(), upper.tolist()
+
+
+def _rows(robot: Robot) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    joint = 0
+    for row in robot.rows:
+        moves = {"revolute": "theta", "prismatic": "d"}.get(row.kind)
+        numbers = {"theta": row.theta, "d": row.d, "a": row.a, "alpha": row.alpha}
+        rows.append({"name": row.name, "moves": moves, "joint": joint if moves else None, **numbers})
+        joint += moves is not None
+    return rows
+
+
+def _parts(made: Body, drawn: Drawing | None) -> list[tuple[Part, int, Array | None]]:
+    """Each mesh, the link that carries it (0: the base), and its pose there; None: as the link's."""
+    found: list[tuple[Part, int, Array | None]] = [(made.mount.part, 0, None)]
+    if drawn is not None:
+        return [*found, *((part, k, None) for k, parts in enumerate(drawn.parts) for part in parts)]
+    for link, parts in zip(made.chain.links, made.parts, strict=True):
+        for part in parts:
+            if part.name not in _HIDDEN:
+                fixed = part.fixed_to_parent
+                found.append(
+                    (part, link.index if fixed else link.index + 1, link.T_parent_axis if fixed else None)
+                )
+    last = len(made.chain.links) - 1
+    return [*found, (made.gripper[0], last, made.chain.T_last_tool)]
+
+
+def _mesh(part: Part, link: int, T: Array | None) -> dict[str, Any]:
+    """A mesh as text: its coordinates as 16-bit steps over the size of the mesh, some micrometres each."""
+    vertices, faces = np.asarray(part.mesh.vertices, dtype=float), np.asarray(part.mesh.faces)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    step = np.maximum(high - low, 1e-9) / _STEPS
+    wide = len(vertices) > _STEPS
+    return {
+        "link": link,
+        "pose": None if T is None else T.ravel().tolist(),
+        "color": part.color,
+        "double": part.double_sided,
+        "wide": wide,
+        "low": low.tolist(),
+        "step": step.tolist(),
+        "vertices": _base64(np.rint((vertices - low) / step).astype("<u2")),
+        "faces": _base64(faces.astype("<u4" if wide else "<u2")),
+    }
+
+
+def _target(saved: SavedArm, target: ArrayLike) -> dict[str, Any]:
+    result = solve_ik(saved.robot, target, q_seed=saved.q, options=saved.options)
+    postures = [{"q": each.q.tolist(), "name": short(each.branch)} for each in result.solutions]
+    return {
+        "pose": np.asarray(target, dtype=float).ravel().tolist(),
+        "reason": result.explain(saved.units).text,
+        "postures": postures,
+    }
+
+
+def _program(motion: Motion) -> dict[str, Any]:
+    driven = motion.driven
+    if driven is None:
+        raise InputError("motion", motion.reason, "a program that can be driven, at least in part")
+    count = int(min(MOST_SAMPLES, max(2.0, math.ceil(driven.duration * RATE) + 1.0)))
+    times = np.linspace(0.0, driven.duration, count)
+    return {
+        "name": "Program" if motion.planned else "Program, as far as it can be driven",
+        "times": times.tolist(),
+        "q": _base64(driven.sample(times).q.astype("<f8")),
+    }
+
+
+def _base64(values: NDArray[Any] | Sequence[float]) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode()

@@ -1,0 +1,26 @@
+"""*Web page* in the tabs *View*, *Learn* and *Program*: the arm on show as a file for the visitor."""
+
+from __future__ import annotations
+
+from app.exports.snippets import named
+from app.viewer.feature import Stage
+from app.viewer.panel.status import Notice
+from app.viewer.takehome.page import SavedArm, web_page
+from kin import Motion
+
+OPEN = Notice("advice", "Not now", "The page would contain what the open question asks for.")
+
+
+def send_page(stage: Stage, motion: Motion | None = None) -> None:
+    """Download the arm as it is, with the postures of its target and, if there is one, a motion to play."""
+    if stage.activity.withheld:
+        stage.notify(OPEN)
+        return
+    arm = stage.now
+    robot = named(arm.robot)
+    drawn = stage.bodies.of(arm.robot, stage.own)
+    page = web_page(SavedArm(robot, arm.goal, drawn, arm.aim, arm.options, motion, stage.units, stage.link))
+    file = f"{robot.id}.html"
+    stage.client.send_file_download(file, page.encode(), save_immediately=True)
+    words = "It needs no server: open it from a disk, send it, or put it into a learning platform."
+    stage.notify(Notice("hand", f"{file} is saved", words))
