@@ -6,9 +6,9 @@ joints move alike over three poses: if two motors are exchanged, their readings 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
-from itertools import combinations
 
 import numpy as np
 
@@ -24,7 +24,8 @@ _NEAR, _FAR = math.radians(40.0), math.radians(100.0)  # between these a joint m
 _INSIDE = 0.06  # share of a joint's range that is left at either limit
 _WIDEST = 0.75 * math.pi  # from the middle of a joint's range
 _LEAST = 0.6  # share of a joint's range that it moves at least, where that is less than `_NEAR`
-_STARTS, _SETS, _TRIES = 60, 6, 300  # poses to begin with, sets from each, steps for each set
+_STARTS, _SETS, _TRIES = 60, 6, 100  # poses to begin with, sets from each, steps for each set
+_CHECKS = 3000  # configurations that are looked at
 _APART = 0.001  # m between links, and above the floor
 
 
@@ -52,7 +53,7 @@ def match_poses(robot: Robot | str, count: int = 3, allowed: Callable[[Array], b
     robot = robot_of(robot)
     if count not in COUNTS:
         raise InputError("count", count, "2 or 3 poses")
-    allowed = allowed or (lambda q: _free(robot, q))
+    allowed = _counted(allowed or (lambda q: _free(robot, q)))
     low, high = _range(robot)
     rng = np.random.default_rng(1)
     starts = [np.clip(robot.q_home, low, high), *rng.uniform(low, high, (_STARTS, robot.n))]
@@ -66,6 +67,12 @@ def match_poses(robot: Robot | str, count: int = 3, allowed: Callable[[Array], b
     raise InputError("robot", robot.id, "an arm that can move each joint clearly without touching anything")
 
 
+def _counted(allowed: Callable[[Array], bool]) -> Callable[[Array], bool]:
+    """The same; after so many configurations none is allowed, so that a hopeless search ends."""
+    left = itertools.count(_CHECKS, -1)
+    return lambda q: next(left) > 0 and allowed(q)
+
+
 def _from(
     robot: Robot, start: Array, count: int, rng: np.random.Generator, allowed: Callable[[Array], bool]
 ) -> Array | None:
@@ -75,9 +82,16 @@ def _from(
     least, most = np.minimum(near, _LEAST * (high - low)), np.minimum(far, high - low)
     poses = [start]
     for _ in range(_TRIES):
-        step = rng.uniform(least, np.maximum(most, least)) * rng.choice([-1.0, 1.0], start.shape)
-        q = poses[-1] + np.where((poses[-1] + step < low) | (poses[-1] + step > high), -step, step)
-        if np.all((q >= low) & (q <= high)) and allowed(q):
+        up, down = np.minimum(high - poses[-1], most), np.minimum(poses[-1] - low, most)
+        if np.any((up < least) & (down < least)):  # a joint is too far in the middle of its range
+            poses.pop()
+            if not poses:
+                return None
+            continue
+        rises = (down < least) | ((up >= least) & (rng.random(start.shape) < 0.5))
+        step = rng.uniform(least, np.where(rises, up, down))
+        q = poses[-1] + np.where(rises, step, -step)
+        if allowed(q):
             poses.append(q)
             if len(poses) == count:
                 return np.array(poses)
@@ -101,7 +115,9 @@ def _apart(robot: Robot, poses: Array) -> float:
         np.diff(way) / scale
         for way, scale in zip(poses.T, np.where(robot.revolute, 1.0, robot.reach), strict=True)
     ]
-    pairs = [min(float(np.linalg.norm(a - b)), float(np.linalg.norm(a + b))) for a, b in combinations(ways, 2)]
+    pairs = [
+        min(float(np.linalg.norm(a - b)), float(np.linalg.norm(a + b))) for a, b in itertools.combinations(ways, 2)
+    ]
     return min(pairs, default=math.inf)
 
 

@@ -54,6 +54,8 @@ from app.viewer.session.state import PageState, without_arm
 from app.viewer.session.worker.worker import Worker
 from app.viewer.tabs import TABS
 from app.viewer.tabs.program.tab import ProgramTab
+from app.viewer.tabs.robot.motors.feature import Motors
+from app.viewer.tabs.robot.tab import RobotTab
 from app.viewer.views.templates import render
 from app.viewer.viser_outbox import in_one_frame
 from app.viewer.viser_patches import SceneFilter
@@ -416,6 +418,8 @@ class VisitorPage(ShownArm, Worker):
             tabs = self.panel.tabs
             containers: list[viser.GuiFolderHandle | viser.GuiTabHandle] = [self.panel.obstacles, *tabs]
             features: tuple[type[Feature], ...] = (ObstaclesFeature, *self.offered)
+            if RobotTab in self.offered:
+                features, containers = (*features, Motors), [*containers, tabs[self.offered.index(RobotTab)]]
             if ProgramTab in self.offered:
                 features, containers = (*features, Connect), [*containers, tabs[self.offered.index(ProgramTab)]]
             for tab, container in zip(features, containers, strict=True):

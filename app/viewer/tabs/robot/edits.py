@@ -7,7 +7,7 @@ typed value has its own unit there, so that the other numbers stay exactly as th
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from app.viewer.panel.entry import read_cell
 from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.scene.meshes import body
 from app.viewer.scene.mounting import turn_of
-from kin import InputError, KinematicsError, Robot, RobotFileError
+from kin import InputError, KinematicsError, Motor, Robot, RobotFileError
 from kin.files.read import PER
 from kin.robot import MOUNTINGS, PEAK_FIELDS
 from kin.typed import ReadError, cut
@@ -290,8 +290,15 @@ def with_table(robot: Robot, own: OwnArm | None, other: Robot) -> OwnArm:
     """The arm with the table, base and tool of another one; raises `EditError`."""
     data, start = fields_of(robot, own)
     table = kin.robot_to_dict(replace(other, motors=()))
-    kept = {key: data[key] for key in ("name", "source", "motors") if key in data}
+    kept: Fields = {key: data[key] for key in ("name", "source", "motors") if key in data}
     return built({**table, **kept}, start, robot)
+
+
+def with_motors(robot: Robot, own: OwnArm | None, motors: Sequence[Motor]) -> OwnArm:
+    """The arm with these motors; raises `EditError`, or `kin.InputError` for motors that do not fit it."""
+    data, start = fields_of(robot, own)
+    data["motors"] = kin.robot_to_dict(replace(robot, motors=tuple(motors))).get("motors", [])
+    return built(data, start, robot)
 
 
 def part_of(cell: Cell) -> str:

@@ -1,0 +1,234 @@
+"""*Motors* in the tab *Robot*: a table, the fields of one motor, LeRobot's calibration, and *Match motors*."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import kin
+from app.viewer.declared.facts import Facts
+from app.viewer.declared.feature import DeclaredFeature
+from app.viewer.declared.fields import Settings, choice, number, text
+from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
+from app.viewer.feature import Stage
+from app.viewer.panel.status import Notice
+from app.viewer.tabs.robot import edits
+from app.viewer.tabs.robot.edits import EditError
+from app.viewer.tabs.robot.motors import views
+from app.viewer.tabs.robot.motors.run import COUNT, Run, begun, readings_of
+from kin import InputError, Motor, Robot
+from kin.motor import LARGEST_ID
+
+FIELDS = ("id", "sign", "offset", "unit", "lead")
+LEAD = 0.01  # m in a turn of the motor of a slide, until it is stated
+SAVED = "LeRobot reads it from its folder of calibrations, under the name of the arm."
+READ_HINT = "Numbers with spaces or commas between them, as a script prints them"
+
+
+def _listed(robot: Robot) -> dict[str, int]:
+    """The motors of an arm by what a list calls them."""
+    return {f"{motor.id} · {motor.joint or motor.name}": i for i, motor in enumerate(robot.motors)} or {"none": 0}
+
+
+@dataclass(frozen=True)
+class MotorSettings(Settings):
+    """What is typed: the motors themselves are the arm's, and in its link."""
+
+    chosen: int = choice("Motor", _listed, 0, link=False, renew=False)
+    id: int = number("Number on the bus", 1, (0, LARGEST_ID), whole=True, link=False)
+    sign: int = choice("Counts", {"as the joint": 1, "backwards": -1}, 1, link=False)
+    offset: float = number("Zero at", 0.0, (-999_999.0, 999_999.0), digits=3, coarse=0, link=False)
+    unit: str = choice("Reads", {words: unit for unit, words in views.UNITS.items()}, "deg", link=False)
+    lead: float = number("A turn moves it", LEAD, (1e-6, 100.0), "length", link=False)
+    readings: str = text("Readings", hint=READ_HINT, longest=2000, link=False)
+    calibration: str = text(
+        "LeRobot's calibration", hint="The text of its JSON file, pasted", longest=100_000, link=False
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class MotorFacts(Facts[MotorSettings]):
+    """The arm, and the run of *Match motors*."""
+
+    run: Run | None = None
+
+    @property
+    def motor(self) -> Motor | None:
+        """The one whose fields are shown."""
+        motors = self.robot.motors
+        return motors[min(self.settings.chosen, len(motors) - 1)] if motors else None
+
+
+class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
+    """See the module."""
+
+    key = "motors"
+    title = "Motors"
+    settings_of, facts_of = MotorSettings, MotorFacts
+    undo: ClassVar[dict[str, str]] = {"on_use": "Motors matched", "on_add": "Motors", "on_remove": "Motors"}
+
+    def __init__(self, stage: Stage) -> None:
+        self._run: Run | None = None
+        super().__init__(stage)
+
+    def started(self) -> None:
+        if self._run is not None and not self._run.of(self.stage.now.robot):
+            self._run = None
+
+    def besides(self) -> tuple[object, ...]:
+        return (self._run,)
+
+    def look(self) -> MotorFacts:
+        return MotorFacts(self.settings, self.stage.now, self._run)
+
+    # What is shown
+
+    def panel(self) -> Sequence[Node]:
+        return [Folder("Motors", self.unless_asked("table", *self._nodes()), open=False)]
+
+    def _nodes(self) -> list[Node]:
+        f, robot = self.read, self.read.robot
+        if f.run is not None:
+            return self._run_nodes(f.run)
+        add = Button(
+            "Add motors", self.event(self.on_add), "One of each joint, in degrees, with the numbers 1, 2, …"
+        )
+        calibration = Control("calibration")
+        if f.motor is None:
+            return [Html(views.nothing, (robot,), key="none"), add, calibration]
+        names = FIELDS if f.motor.lead is not None else FIELDS[:-1]
+        fields = [Control(name, value=getattr(f.motor, name), of=(robot.id, f.motor.id)) for name in names]
+        acts = {"Match motors": self.event(self.on_match), "Remove motors": self.event(self.on_remove)}
+        save = Button("Save LeRobot's file", self.event(self.on_save), "The calibration of these motors, as JSON")
+        return [
+            Html(views.table, (robot.motors, f.motor.id), key="table"),
+            Control("chosen", value=robot.motors.index(f.motor), of=robot.id),
+            *fields,
+            Buttons("All motors", acts, "Shows three poses, and finds signs and zeros from what is read in them"),
+            calibration,
+            *([save] if any(motor.range for motor in robot.motors) else []),
+        ]
+
+    def _run_nodes(self, run: Run) -> list[Node]:
+        if run.match is not None:
+            acts = {
+                "Use": self.event(self.on_use),
+                "Back": self.event(self.on_to, COUNT - 1),
+                "Close": self.event(self.on_stop),
+            }
+            useful = any(finding.status == "matched" for finding in run.match.findings)
+            offered = tuple(name for name in acts if useful or name != "Use")
+            hint = "Writes the signs and zeros of the matched motors into the arm"
+            return [Html(views.result, (run,), key="result"), Buttons("Result", acts, hint, offered, key="ready")]
+        two = sum(values is not None for values in run.readings[: run.at]) >= 2
+        acts = {
+            "Back": self.event(self.on_to, run.at - 1),
+            "Find signs and zeros" if run.is_last else "Next pose": self.event(self.on_next),
+            "Find from two": self.event(self.on_solve),
+            "Stop": self.event(self.on_stop),
+        }
+        offered = tuple(name for name in acts if (name != "Back" or run.at) and (name != "Find from two" or two))
+        return [
+            Html(views.pose, (run, self.stage.units), key="pose"),
+            Control("readings", of=run.at),
+            Buttons("Poses", acts, offered=offered, of=run.at, key="poses"),
+        ]
+
+    # Events
+
+    def changed(self, path: str) -> None:
+        motor = self.look().motor
+        if path == "calibration" and self.settings.calibration.strip():
+            typed = self.settings.calibration
+            self.change(calibration="")
+            self._write = True
+            self._use(kin.motors_from_lerobot(self.stage.now.robot, typed), "The calibration is used")
+        elif path in FIELDS and motor is not None:
+            self._write = True  # a field whose text was refused shows what counts
+            changed = replace(motor, **{path: getattr(self.settings, path)})
+            if changed != motor:
+                self._use([changed if each.id == motor.id else each for each in self.stage.now.robot.motors])
+
+    def on_add(self) -> None:
+        """A motor of each joint."""
+        joints = self.stage.now.robot.joints
+        leads = [LEAD if joint.kind == "prismatic" else None for joint in joints]
+        self._use(
+            [
+                Motor(joint.name, i + 1, lead=lead)
+                for i, (joint, lead) in enumerate(zip(joints, leads, strict=True))
+            ]
+        )
+
+    def on_remove(self) -> None:
+        """The arm without motors."""
+        self._use([])
+
+    def on_match(self) -> None:
+        """Show the first pose."""
+        self._run = begun(self.stage.now.robot, self.stage.now.obstacles)
+        self.stage.fit_view((), self._run.points)
+        self._show_pose()
+
+    def on_next(self) -> None:
+        """Take the readings of this pose, and show the next one, or what they say after the last."""
+        assert self._run is not None
+        run = self._run.read(readings_of(self.settings.readings, self._run.robot))
+        if run.is_last:
+            self._run = run.solved()
+        else:
+            self._run = run.to(run.at + 1)
+            self._show_pose()
+
+    def on_solve(self) -> None:
+        """Find signs and zeros from the poses that are read."""
+        assert self._run is not None
+        self._run = self._run.solved()
+
+    def on_to(self, at: int) -> None:
+        """Show another pose."""
+        assert self._run is not None
+        self._run = self._run.to(at)
+        self._show_pose()
+
+    def on_use(self) -> None:
+        """Write what has been found into the arm."""
+        assert self._run is not None
+        assert self._run.match is not None
+        motors = self._run.match.motors
+        self.on_stop()
+        self._use(motors, "Signs and zeros are in the arm")
+
+    def on_stop(self) -> None:
+        """End the run."""
+        self._run = None
+        self.stage.fit_view(())
+
+    def on_save(self) -> None:
+        """Save LeRobot's calibration."""
+        data = json.dumps(kin.motors_to_lerobot(self.stage.now.robot), indent=4)
+        self.stage.client.send_file_download("calibration.json", data.encode(), save_immediately=True)
+        self.stage.notify(Notice("hand", "calibration.json is saved", SAVED))
+
+    def _show_pose(self) -> None:
+        """Move the arm to the pose of the run; what was read in it before is in the field."""
+        assert self._run is not None
+        run = self._run
+        known = run.readings[run.at]
+        self.change(readings="" if known is None else " ".join(f"{value:.10g}" for value in known))
+        self._write = True
+        words = "Put your arm as this one, then type what its motors read. Tab Robot."
+        self.stage.move_to(run.poses[run.at], Notice("hand", f"Pose {run.at + 1} of {COUNT}", words))
+
+    def _use(self, motors: Sequence[Motor], done: str = "") -> None:
+        """The arm with these motors becomes the visitor's own; raises `InputError`."""
+        robot, own = self.stage.now.robot, self.stage.own
+        try:
+            made = edits.with_motors(robot, own if own is not None and own.robot == robot else None, motors)
+        except EditError as error:
+            raise InputError("motors", "this", error.message) from None
+        self.stage.edit_arm(made)
+        if done:
+            self.stage.notify(Notice("hand", done, "The arm is your own. Save TOML keeps it in a file."))
