@@ -2,8 +2,8 @@
 
 Most answers of an arm without a redundancy parameter differ in numbers only: the solutions are isolated, the best
 one is at no singularity, and everything else follows from how many there are. One compiled pass finds these
-targets and writes their solutions into arrays. Whoever needs all of such an answer makes it once, for one target
-of each *kind*, and copies it for the others. All other targets are answered one by one, as :func:`kin.ik.solve`
+targets and writes their solutions into arrays. To have all of such an answer, make it once, for one target
+of each *kind*, and copy it for the others. All other targets are answered one by one, as :func:`kin.ik.solve`
 does.
 """
 

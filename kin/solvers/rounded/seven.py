@@ -17,7 +17,7 @@ import numpy as np
 
 from kin.axes import size
 from kin.fk import fk
-from kin.kernels.compile import MODEL, direct
+from kin.kernels.compile import MODEL, direct, record, row_of
 from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import OFFSET, UPPER_ARM, at_every_turn, turn_around
@@ -28,7 +28,7 @@ from kin.solvers.rounded.closed_form import Flags, Rounded
 from kin.solvers.rounded.ends import joined, move_ends
 from kin.solvers.rounded.motion import FRAME, JOINT, MOST, OFF, SETTING, SPAN, WANTED, set_frame
 from kin.solvers.rounded.rows import choose_rows, move_rows
-from kin.solvers.rounded.tracing import PIECES, trace
+from kin.solvers.rounded.tracing import CURVES, PATHS, PIECES, Paths, trace
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -104,8 +104,8 @@ class Rounded7(Rounded):
         p = SolverInput(fk(self.robot, q), POSE, _FREE, True, q, self.robot.lower.copy(), self.robot.upper.copy())
         self.solve(p)
         self.solve(replace(p, values=(float(q[self._joint]) if self._joint >= 0 else 0.0,)))
-        pieces, postures = np.empty((PIECES, 3)), np.empty((PIECES, 3, 7))
-        trace(self.robot.model, p.T, self._set(p), self._widened(p), self._move, q.copy(), pieces, postures)
+        found = _Found()
+        found.follow(self.robot.model, p.T, self._set(p), self._widened(p), self._move, q)
 
     def _in_one_turn(self, problem: SolverInput) -> SolverInput:
         """The same with contiguous arrays, and the limits of the parameter's joint at most one turn apart."""
@@ -232,7 +232,7 @@ class Rounded7(Rounded):
         """
         sure = moved[2][moved[0][:, 0].astype(int)] > 0.0
         arcs, places, certain = [(a, b, c) for a, b, c in moved[0][sure].tolist()], list(moved[1][sure]), True
-        pieces, postures = np.empty((PIECES, 3)), np.empty((PIECES, 3, 7))
+        found = _Found()
         for intervals, shares in ((inner, _MIDDLE), (outer, _SHARES)):
             doubtful = intervals[moved[2][intervals[:, 0].astype(int)] == 0.0]
             starts = self._postures(p, doubtful, shares)
@@ -240,35 +240,42 @@ class Rounded7(Rounded):
                 for share, start in zip(shares.tolist(), row, strict=True):
                     if math.isnan(start[0]) or _is_known(arcs, branch, low + share * (high - low)):
                         continue
-                    count = trace(
-                        self.robot.model, p.T, setting, limits, 3.0 * self._move, start.copy(), pieces, postures
-                    )
+                    count = found.follow(self.robot.model, p.T, setting, limits, 3.0 * self._move, start)
                     certain &= count >= 0
-                    for k in range(count):
-                        ends = self._in_span(p, *pieces[k, :2].tolist())
-                        whose, clear = self._whose(p, pieces[k], postures[k])
-                        certain &= clear
+                    if count <= 0:
+                        continue
+                    pieces, postures = found.pieces[:count], found.postures[:count]
+                    branches, clear = self._whose(p, pieces, postures)
+                    certain &= clear
+                    for whose, piece, posture in zip(branches, pieces.tolist(), postures, strict=True):
+                        ends = self._in_span(p, *piece[:2])
                         if not any(whose == b and _are_alike(ends, (x, y)) for b, x, y in arcs):
                             arcs.append((whose, *ends))
-                            places.append(postures[k].copy())
+                            places.append(posture.copy())
         return np.array(arcs).reshape(-1, 3), np.array(places).reshape(-1, 3, 7), certain
 
-    def _whose(self, p: SolverInput, values: Array, postures: Array) -> tuple[float, bool]:
-        """The branch of a piece with these values ``(3,)`` and postures ``(3, 7)``, and whether that is clear.
+    def _whose(self, p: SolverInput, values: Array, postures: Array) -> tuple[list[float], bool]:
+        """The branches of pieces with these values ``(k, 3)`` and postures ``(k, 3, 7)``; whether all are clear.
 
-        It is that of the nearest row of the arm that was meant, where the next one is farthest away: at a fold two
-        branches meet, and the signs that name them may differ between the two tables.
+        That of a piece is the one of the nearest row of the arm that was meant, where the next one is farthest
+        away: at a fold two branches meet, and the signs that name them may differ between the two tables.
         """
-        away = np.abs(rolled.wrapped(self._all_at(p, values) - postures[:, None])).max(axis=2)
+        k = np.arange(len(values))
+        rows = self._all_at(p, values.ravel()).reshape(-1, 3, 8, 7)
+        away = np.abs(rolled.wrapped(rows - postures[:, :, None])).max(axis=3)
         away[np.isnan(away)] = math.inf
-        order = np.argsort(away, axis=1)
-        nearest, next_one = np.take_along_axis(away, order, axis=1)[:, :2].T
-        known = np.flatnonzero(np.isfinite(nearest))
-        if not known.size:
-            return float(self.branch_of(postures[2])), False
-        best = known[np.argmin(nearest[known] / np.maximum(next_one[known], 1e-300))]
-        clear = nearest[best] < _CLEAR * next_one[best] or order[best, 0] == self.branch_of(postures[best])
-        return float(order[best, 0]), bool(clear)
+        first = away.argmin(axis=2)
+        nearest, next_one = np.moveaxis(np.partition(away, 1, axis=2)[:, :, :2], 2, 0)
+        known = np.isfinite(nearest)
+        share = np.divide(nearest, np.maximum(next_one, 1e-300), out=np.full(nearest.shape, math.inf), where=known)
+        best = share.argmin(axis=1)
+        branches, clear = first[k, best].tolist(), share[k, best] < _CLEAR
+        for i in np.flatnonzero(~clear).tolist():
+            if known[i].any():
+                clear[i] = branches[i] == self.branch_of(postures[i, best[i]])
+            else:
+                branches[i] = self.branch_of(postures[i, 2])
+        return branches, bool(clear.all())
 
     def _in_span(self, p: SolverInput, low: float, high: float) -> tuple[float, float]:
         """An interval at the whole turn at which the range of the parameter has it."""
@@ -291,6 +298,19 @@ class Rounded7(Rounded):
             return True
 
         return WrappedKernels(form.params, one, many, self._kernels, form)
+
+
+class _Found:
+    """What following the curves of one target finds, and the curves."""
+
+    def __init__(self) -> None:
+        self.pieces, self.postures = np.empty((PIECES, 3)), np.empty((PIECES, 3, 7))
+        self._paths = Paths(np.empty((PATHS, 14)), np.zeros(1 + CURVES, dtype=np.int64))
+
+    def follow(self, model: Array, T: Array, setting: Array, limits: Array, margin: float, start: Array) -> int:
+        """How many pieces of the curve through a posture are now in `pieces` and `postures`, see `trace`."""
+        goal = model, T, setting, limits, margin, np.array(start)
+        return _trace()(*goal, self._paths, self.pieces, self.postures)
 
 
 def _are_apart(rows: Array) -> bool:
@@ -319,3 +339,9 @@ def _ends() -> Callable[[Array, Array, Array, Array, Array, Array, Array, Array,
 def _choose() -> Callable[[Array, Array, Array, Array, Array, Array, Array], int]:
     """`choose_rows` without type dispatch."""
     return direct(choose_rows, MODEL, (4, 4), 1, 2, 2, 3, 2)
+
+
+@cache
+def _trace() -> Callable[..., int]:
+    """`trace` without type dispatch."""
+    return direct(trace, MODEL, (4, 4), 1, 2, float, 1, record(Paths, 2, row_of(int)), 2, 3)

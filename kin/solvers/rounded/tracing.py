@@ -6,29 +6,52 @@ closed: tangent steps, shortened where the curve bends, each followed by Newton'
 curve every joint is a cubic in the length. Its roots are where the joint meets a limit, and those of the
 derivative of the given joint are folds; Newton's method makes each such *event* exact. Between neighbouring events
 nothing changes, so one posture decides whether a piece is feasible.
+
+A step is halved where the cubics decide by their error only. Many starts are on the same few curves, so the points
+of a curve are kept: a start that is on one of them has nothing to add.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kin.kernels.compile import jit
 from kin.solvers.common import wrap
 from kin.solvers.rounded.ends import is_inside, slack_of
-from kin.solvers.rounded.motion import FOLD, LAND, Point, Task, arrive, dial_of, new_point, task_of
+from kin.solvers.rounded.motion import FOLD, LAND, Point, Task, arrive, dial_of, look, new_point, task_of
 from kin.transforms import Array
 
 PIECES = 128
 _EVENTS = 32  # in one step at most
 _STEP, _FIRST, _LEAST = 0.15, 0.05, 1e-6  # rad of all joints together
 _STRAIGHT, _TURN = 0.995, 0.95  # cosines between tangents: of a step that may grow, and of one that is too long
-_POINTS = 6000
-_PASSED = 1.05  # times the chord of a step: the curve, in shorter steps, is past its end
+_POINTS = 6000  # of a curve, from its start to one side
+PATHS, CURVES = 16384, 64  # points and curves that are kept
+_LANDINGS, _NEAR = 12, 1e-7  # steps; rad: the last one, to go on from there
+_MISSED = 1e-6  # m and rad: an error that such a step can remove
+_ERROR, _SPLITS = 0.02, 6  # of a cubic, times the fourth power of its length; how often a step is halved
+_BESIDE, _SAME = 1e-3, 1e-7  # rad from the cubics, and from the curve: a posture on it
 _EMPTY = 1e-12  # rad: what is between two events as close as that is no piece
 FAILED, OPEN, CLOSED = range(3)
+Whole = NDArray[np.int64]
 Curve = tuple[Array, Array, Array, Array]  # two points (7,) and the tangents there
+
+
+class Paths(NamedTuple):
+    """The curves of one target that have been followed; arrays are written to.
+
+    Attributes:
+        points: ``(PATHS, 14)`` points, and tangents of one sense, curve after curve.
+        ends: ``(1 + CURVES,)`` how many curves there are, and where each ends. Without room for another one, all
+            are forgotten.
+    """
+
+    points: Array
+    ends: Whole
 
 
 @jit
@@ -46,19 +69,43 @@ def _least_slack(limits: tuple[Array, Array], y: Array) -> float:
 
 
 @jit
-def _advance(task: Task, curve: Curve, h: float, sense: float, p: Point) -> float:
-    """Fill the second point of the curve, a step ahead of the first; returns the length to try next, 0 if none."""
+def _land(task: Task, y: Array, p: Point) -> bool:
+    """As `arrive` onto the curve, within some 1e-10 rad only; p ← as by `look` within `_NEAR` of y."""
+    for _ in range(_LANDINGS):
+        miss = look(task, y, p)
+        size = 0.0
+        for i in range(7):
+            size = max(size, abs(p.x[i]))
+        if not (miss < 1.0 and size < 1.0):
+            return False
+        for i in range(7):
+            y[i] += p.x[i]
+        if size < _NEAR:
+            return miss < _MISSED
+    return False
+
+
+@jit
+def _advance(task: Task, curve: Curve, bend: Array, h: float, sense: float, p: Point) -> float:
+    """Fill the second point of the curve, a step ahead of the first; returns the length to try next, 0 if none.
+
+    bend ``(7,)``: the derivative of the tangent, about; it becomes that of this step.
+    """
     y0, n0, y1, n1 = curve
     while h > _LEAST:
         for i in range(7):
-            y1[i] = y0[i] + h * n0[i]
-        if arrive(task, LAND, 0.0, y1, p):
-            dot, off = 0.0, 0.0
+            y1[i] = y0[i] + h * (n0[i] + 0.5 * h * bend[i])
+        if _land(task, y1, p):
+            dot, off, length = 0.0, 0.0, 0.0
             for i in range(7):
                 n1[i] = sense * p.n[i]
                 dot += n0[i] * n1[i]
                 off = max(off, abs(y1[i] - y0[i] - h * n0[i]))
+                length += (y1[i] - y0[i]) ** 2
             if dot > _TURN and off < 0.3 * h:
+                length = math.sqrt(length)
+                for i in range(7):
+                    bend[i] = (n1[i] - n0[i]) / length
                 return min(1.5 * h, _STEP) if dot > _STRAIGHT else h
         h *= 0.5
     return 0.0
@@ -183,7 +230,31 @@ def _events_between(task: Task, limits: tuple[Array, Array], curve: Curve, event
             centre = curve[0][c] - wrap(curve[0][c] - middle)
             count = _crossings(curve, c, centre - half, stops, n, events, count)
             count = _crossings(curve, c, centre + half, stops, n, events, count)
+            if math.pi - half < _STEP:  # a step may pass both limits of a joint that lacks little of a whole turn
+                count = _crossings(curve, c, centre - 2.0 * math.pi + half, stops, n, events, count)
+                count = _crossings(curve, c, centre + 2.0 * math.pi - half, stops, n, events, count)
     return count
+
+
+@jit
+def _is_close_call(task: Task, limits: tuple[Array, Array], curve: Curve) -> bool:
+    """Whether the cubics decide by no more than their error that a joint meets a limit or turns back."""
+    lower, upper = limits
+    stops, length = np.empty(4), _length(curve)
+    error = _ERROR * length**4
+    for c in range(7):
+        a, b, d = _cubic(curve, c)
+        turns = 0.0 < -b < 3.0 * d or 0.0 > -b > 3.0 * d
+        if c == task.joint and turns and abs(a - b * b / (3.0 * d)) < 4.0 * error:
+            return True
+        half, middle = 0.5 * (upper[c] - lower[c]), 0.5 * (upper[c] + lower[c])
+        if half < math.pi:
+            for i in range(1, _turning(a, b, d, stops) - 1):
+                s = stops[i]
+                off = abs(wrap(curve[0][c] + s * (a + s * (b + s * d)) - middle))
+                if abs(off - half) < error:
+                    return True
+    return False
 
 
 @jit
@@ -201,88 +272,177 @@ def _closes(curve: Curve, start: Array, tangent: Array) -> bool:
 
 
 @jit
-def _far_end(
-    task: Task, limits: tuple[Array, Array], margin: float, curve: Curve, sense: float
-) -> tuple[int, float]:
-    """Follow the curve from its first point, which becomes the last one.
+def _walk(
+    task: Task, limits: tuple[Array, Array], margin: float, start: tuple[Array, Array], sense: float, out: Array
+) -> tuple[int, int]:
+    """Follow the curve from a point and its tangent, in the sense of the tangent or against it.
 
-    Returns why it ended, and the length of the last step.
+    out ``(m, 14)`` ← further points, and tangents of the same sense. Returns why it ended, and how many they are.
     """
-    p = new_point()
-    start, tangent = curve[0].copy(), curve[1].copy()
+    p, tangent, bend = new_point(), np.empty(7), np.zeros(7)
+    for i in range(7):
+        tangent[i] = sense * start[1][i]
+    curve = (start[0].copy(), tangent.copy(), np.empty(7), np.empty(7))
     h = _FIRST
-    for count in range(_POINTS):
-        h = _advance(task, curve, h, sense, p)
+    for count in range(out.shape[0]):
+        h = _advance(task, curve, bend, h, sense, p)
         if h == 0.0:
-            return FAILED, 0.0
-        if count > 2 and _closes(curve, start, tangent):
-            return CLOSED, 0.0
-        length = _length(curve)
-        _copy(curve[2], curve[0])
-        _copy(curve[3], curve[1])
+            return FAILED, count
+        if count > 2 and _closes(curve, start[0], tangent):
+            return CLOSED, count
+        for i in range(7):
+            curve[0][i] = out[count, i] = curve[2][i]
+            curve[1][i] = curve[3][i]
+            out[count, 7 + i] = sense * curve[3][i]
         if _least_slack(limits, curve[0]) < -margin:
-            return OPEN, length
-    return FAILED, 0.0
+            return OPEN, count + 1
+    return FAILED, out.shape[0]
+
+
+@jit
+def _load(path: Array, k: int, curve: Curve) -> None:
+    """The points k and k + 1 of a path as a curve."""
+    for i in range(7):
+        curve[0][i], curve[1][i] = path[k, i], path[k, 7 + i]
+        curve[2][i], curve[3][i] = path[k + 1, i], path[k + 1, 7 + i]
+
+
+@jit
+def _is_on(task: Task, path: Array, y: Array) -> bool:
+    """Whether a posture y ``(7,)`` of the target is on the curve with the points `path` ``(m, 14)``."""
+    curve, u, p = (np.empty(7), np.empty(7), np.empty(7), np.empty(7)), np.empty(7), new_point()
+    for k in range(path.shape[0] - 1):
+        if not abs(wrap(y[0] - path[k, 0])) < 2.0 * _STEP:
+            continue
+        along = squared = 0.0
+        for i in range(7):
+            d = wrap(y[i] - path[k, i])
+            along += d * path[k, 7 + i]
+            squared += d * d
+        if not (squared < 4.0 * _STEP * _STEP and along > -_BESIDE):
+            continue
+        _load(path, k, curve)
+        length = _length(curve)
+        if not along < length + _BESIDE:
+            continue
+        s = along / length
+        for _ in range(3):
+            _at(curve, s, u)
+            for i in range(7):
+                s += wrap(y[i] - u[i]) * curve[1 if s < 0.5 else 3][i] / length
+        _at(curve, s, u)
+        off = 0.0
+        for i in range(7):
+            off = max(off, abs(wrap(y[i] - u[i])))
+        if not off < _BESIDE:
+            continue
+        for _ in range(3):
+            if not _land(task, u, p):
+                break
+            ahead = off = 0.0
+            for i in range(7):
+                d = wrap(y[i] - u[i])
+                ahead += d * p.n[i]
+                off = max(off, abs(d))
+            if off < _SAME:
+                return True
+            for i in range(7):
+                u[i] += ahead * p.n[i]
+    return False
 
 
 @jit
 def trace(
-    model: Array, T: Array, setting: Array, box: Array, margin: float, start: Array, arcs: Array, places: Array
-) -> int:
+    model: Array, T: Array, setting: Array, box: Array, margin: float, start: Array, paths: Paths, arcs: Array,
+    places: Array,
+) -> int:  # fmt: skip
     """The feasible intervals of the redundancy parameter on the curve through a posture; their number, −1 if lost.
 
-    arcs ``(PIECES, 3)`` ← their ends and a value inside; places ``(PIECES, 3, 7)`` ← the postures there.
-    An interval that is whole turns of the parameter has the same posture in all three.
+    None if the posture is on a curve that has been followed. arcs ``(PIECES, 3)`` ← their ends and a value inside;
+    places ``(PIECES, 3, 7)`` ← the postures there. An interval that is whole turns of the parameter has the same
+    posture in all three.
 
     Args:
         model, T, setting: as for `task_of`.
         box: ``(≥ 2, 7)`` lower and upper limits.
         margin: radians by which a joint may be outside its limits on the way.
         start: ``(7,)`` a posture close to the curve.
+        paths: the curves that have been followed; this one is added.
     """
     task, limits = task_of(model, T, setting), (box[0], box[1])
     y, p = start.copy(), new_point()
     if not arrive(task, LAND, 0.0, y, p):
         return -1
-    curve = (y, np.empty(7), np.empty(7), np.empty(7))
-    for i in range(7):
-        curve[1][i] = -p.n[i]
     if _least_slack(limits, y) < -margin:
         return 0
-    kind, outside = _far_end(task, limits, margin, curve, -1.0)
+    first, points, ends = 0, paths.points, paths.ends
+    for k in range(ends[0]):
+        if _is_on(task, points[first : ends[1 + k]], y):
+            return 0
+        first = ends[1 + k]
+    tangent, back = p.n.copy(), np.empty((_POINTS, 14))
+    kind, count = _walk(task, limits, margin, (y, tangent), -1.0, back)
     if kind == FAILED:
         return -1
+    if first + count + 2 + _POINTS > points.shape[0] or ends[0] == ends.shape[0] - 1:
+        first = ends[0] = 0
+    at = first
+    for k in range(count - 1, -1, -1):
+        points[at] = back[k]
+        at += 1
     for i in range(7):
-        curve[1][i] = -curve[1][i]
-    return _record(task, limits, margin, curve, kind == CLOSED, outside, arcs, places)
+        points[at, i], points[at, 7 + i] = y[i], tangent[i]
+    at += 1
+    if kind == CLOSED:
+        for i in range(7):
+            points[at, i], points[at, 7 + i] = y[i] + wrap(back[count - 1, i] - y[i]), back[count - 1, 7 + i]
+        at += 1
+    else:
+        other, more = _walk(task, limits, margin, (y, tangent), 1.0, points[at : at + _POINTS])
+        if other != OPEN:
+            return -1
+        at += more
+    found = _record(task, limits, points[first:at], kind == CLOSED, arcs, places)
+    if found >= 0:
+        ends[0] += 1
+        ends[ends[0]] = at
+    return found
 
 
 @jit
-def _record(
-    task: Task,
-    limits: tuple[Array, Array],
-    margin: float,
-    curve: Curve,
-    closed: bool,
-    outside: float,
-    arcs: Array,
-    places: Array,
-) -> int:
-    """Follow the curve from its first point and write down its feasible pieces, see `trace`.
-
-    outside: length at the beginning of an open curve that may be outside the margin.
-    """
-    p, events, at, best = new_point(), np.empty((_EVENTS, 3)), np.empty(7), curve[0].copy()
-    start, tangent, piece = curve[0].copy(), curve[1].copy(), curve[0].copy()
-    value = dial_of(task, start)
-    first, score, there = value, -math.inf, math.inf
-    begun, around, found = not closed, False, 0
-    travelled = 0.0
-    h = _FIRST
-    for count in range(_POINTS):
-        h = _advance(task, curve, h, 1.0, p)
-        if h == 0.0:
-            return -1
+def _record(task: Task, limits: tuple[Array, Array], path: Array, closed: bool, arcs: Array, places: Array) -> int:
+    """Write down the feasible pieces of a path ``(m, 14)``, see `trace`; a closed one ends where it begins."""
+    p, events, at = new_point(), np.empty((_EVENTS, 3)), np.empty(7)
+    curve = (np.empty(7), np.empty(7), np.empty(7), np.empty(7))
+    _load(path, 0, curve)
+    best, piece = curve[0].copy(), curve[0].copy()
+    value = dial_of(task, piece)
+    first, score = value, -math.inf
+    begun, around, found, k = not closed, False, 0, 0
+    ahead, left = np.empty((_SPLITS, 14)), 0
+    while True:
+        if left == 0 and k == path.shape[0] - 1:
+            if not begun and is_inside(limits[0], limits[1], best, -1):
+                return _put(task, (value - 2.0 * math.pi, value), (best, best, best), arcs, places, found)
+            if around or not (closed and begun):
+                return found
+            around, k = True, 0  # a closed curve: on to its first event
+        if left == 0:
+            _load(path, k, curve)
+            k += 1
+        else:
+            left -= 1
+            for i in range(7):
+                curve[0][i], curve[1][i] = curve[2][i], curve[3][i]
+                curve[2][i], curve[3][i] = ahead[left, i], ahead[left, 7 + i]
+        while left < _SPLITS and _is_close_call(task, limits, curve):
+            _at(curve, 0.5, at)
+            if not _land(task, at, p):
+                return -1
+            for i in range(7):
+                ahead[left, i], ahead[left, 7 + i] = curve[2][i], curve[3][i]
+                curve[2][i], curve[3][i] = at[i], p.n[i]
+            left += 1
         n = _events_between(task, limits, curve, events)
         done = 0.0
         for i in range(n):
@@ -302,21 +462,8 @@ def _record(
                 return found
             begun, value, first, score = True, there, there, -math.inf
             _copy(at, piece)
-        there = dial_of(task, curve[2])
-        value += wrap(there - value)
+        value += wrap(dial_of(task, curve[2]) - value)
         score = _clearer(limits, curve[2], _rate(task, curve, 1.0), score, best)
-        if closed and count > 2 and not around and _closes(curve, start, tangent):
-            if not begun:
-                if is_inside(limits[0], limits[1], best, -1):
-                    return _put(task, (value - 2.0 * math.pi, value), (best, best, best), arcs, places, found)
-                return found
-            around = True
-        travelled += _length(curve)
-        if not closed and travelled > _PASSED * outside and _least_slack(limits, curve[2]) < -margin:
-            return found
-        _copy(curve[2], curve[0])
-        _copy(curve[3], curve[1])
-    return -1
 
 
 @jit

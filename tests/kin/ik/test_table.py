@@ -19,7 +19,7 @@ ARMS = [
 arms = pytest.mark.parametrize(("robot", "task"), ARMS, ids=lambda part: getattr(part, "id", part))
 
 
-def told(result):
+def apart_from_solutions(result):
     """All of an answer but its solutions."""
     names = (
         "status", "cause", "details", "completeness", "closest", "blocked", "distance", "nearest_orientation",
@@ -58,7 +58,7 @@ def test_answers_of_one_kind_differ_in_their_solutions_only(robot, task, given):
         result = kin.solve_ik(robot, T[i], options=options, q_seed=seeds[i])
         if kind >= 0:
             assert_same_solutions(table, i, result)
-            assert told(result) == told(first.setdefault(kind, result))
+            assert apart_from_solutions(result) == apart_from_solutions(first.setdefault(kind, result))
         else:
             assert table.result(i).status is result.status
     assert (table.kinds >= 0).sum() > 50

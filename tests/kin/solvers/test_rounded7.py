@@ -277,3 +277,19 @@ def test_a_branch_without_any_row_inside_the_limits_leaves_no_doubt():
         found = kin.solve_ik(robot, T)
         assert found.complete
         assert {s.branch for s in found.solutions} == {s.branch for s in kin.solve_ik(exact, T).solutions}
+
+
+@pytest.mark.parametrize(("name", "target"), [("iiwa14 1.57", 40), ("iiwa14 1.57", 44), ("rm75-urdf 1.5708", 6)])
+def test_followed_intervals_leave_out_what_a_step_passes(name, target):
+    """A joint that lacks less of a whole turn than a step is long went out of its limits and in again unseen."""
+    robot, _ = arm_named(name)
+    T = kin.fk(robot, robot.random_q(np.random.default_rng(2), 60)[target])
+    found = kin.solve_ik(robot, T)
+    intervals = {s.branch: s.redundancy[0].intervals for s in found.solutions}
+    outside = 0
+    for psi in np.linspace(-PI + 1e-3, PI - 1e-3, 400):
+        there = {s.branch for s in kin.solve_ik(robot, T, redundancy=float(psi)).solutions}
+        claimed = {b for b, spans in intervals.items() if any(low <= psi <= high for low, high in spans)}
+        assert there == claimed, psi
+        outside += len(there) < 8
+    assert outside > 20
