@@ -36,6 +36,7 @@ from app.shared.notes import Notes
 
 logger = logging.getLogger("kinboard.viewer")
 _encode = msgspec.msgpack.Encoder().encode
+_PLAIN = frozenset({str, bool, int, float})
 
 
 class LoopWaker:
@@ -227,9 +228,10 @@ def _encodable(value: Any) -> Any:
 
 
 def fields_of(message: Message, binary: list[memoryview]) -> dict[str, Any]:
-    """A message as viser's `as_serializable_dict` has it; poses, most of a drag, without its type checks.
+    """A message as viser's `as_serializable_dict` has it; what most of a drag consists of without its type checks.
 
-    `app.viewer.viser_patches.assign` makes them, of Python's own numbers.
+    These are poses, which `app.viewer.viser_patches.assign` makes of Python's own numbers, and updates with values
+    of Python's own types.
     """
     if type(message) is messages.SetOrientationMessage:
         name, owner = message.name, message.owner
@@ -237,7 +239,17 @@ def fields_of(message: Message, binary: list[memoryview]) -> dict[str, Any]:
     if type(message) is messages.SetPositionMessage:
         name, owner = message.name, message.owner
         return {"name": name, "position": message.position, "owner": owner, "type": "SetPositionMessage"}
+    if type(message) is messages.GuiUpdateMessage and _plain(message.updates):
+        return {"uuid": message.uuid, "updates": message.updates, "type": "GuiUpdateMessage"}
+    if type(message) is messages.SceneNodeUpdateMessage and _plain(message.updates):
+        name, owner = message.name, message.owner
+        return {"name": name, "updates": message.updates, "owner": owner, "type": "SceneNodeUpdateMessage"}
     return message.as_serializable_dict(binary)
+
+
+def _plain(updates: dict[str, Any]) -> bool:
+    """Whether viser would send these values as they are."""
+    return all(type(value) in _PLAIN for value in updates.values())
 
 
 @contextlib.contextmanager
@@ -263,8 +275,13 @@ def missing_names() -> list[str]:
     found += [f"AsyncMessageBuffer.{name}" for name in methods if not hasattr(AsyncMessageBuffer, name)]
     if not hasattr(_infra, "_append_aligned_buffers"):
         found.append("_infra._append_aligned_buffers")
-    poses = ((messages.SetOrientationMessage, "wxyz"), (messages.SetPositionMessage, "position"))
-    for kind, value in poses:
-        if tuple(kind.__dataclass_fields__) != ("name", value, "owner"):
-            found.append(f"{kind.__name__}(name, {value}, owner)")
+    kinds = {
+        messages.SetOrientationMessage: ("name", "wxyz", "owner"),
+        messages.SetPositionMessage: ("name", "position", "owner"),
+        messages.GuiUpdateMessage: ("uuid", "updates"),
+        messages.SceneNodeUpdateMessage: ("name", "updates", "owner"),
+    }
+    for kind, fields in kinds.items():
+        if tuple(kind.__dataclass_fields__) != fields:
+            found.append(f"{kind.__name__}({', '.join(fields)})")
     return found

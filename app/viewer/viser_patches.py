@@ -105,6 +105,21 @@ def show_content(element: viser.GuiHtmlHandle, content: str) -> None:
         props.content = content
 
 
+def show_text(label: viser.LabelHandle, text: str) -> None:
+    """Show another text in a label; an unchanged one is not sent.
+
+    Raises:
+        RuntimeError: the label has been removed.
+    """
+    state = label._impl
+    if state.removed:
+        raise RuntimeError(f"{state.name} was removed and cannot be written")
+    props: Any = state.props
+    if text != props.text:
+        props.text = text
+        state.api._queue_scene_message(messages.SceneNodeUpdateMessage(state.name, {"text": text}))
+
+
 def is_removed(node: viser.SceneNodeHandle) -> bool:
     """Whether a node is no longer in the scene, so that its properties cannot be set."""
     return bool(node._impl.removed)

@@ -89,7 +89,9 @@ class BranchChoice:
 
     def withhold(self, on: bool) -> None:
         """Show neither the names nor the present branch."""
-        self._choice.visible = self._line.visible = not on
+        for part in (self._choice, self._line):
+            if part.visible == on:
+                part.visible = not on
 
     def remove(self) -> None:
         """Remove it from the panel."""

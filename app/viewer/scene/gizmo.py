@@ -47,7 +47,7 @@ def listen(handle: viser.TransformControlsHandle, ring: bool, post: Post) -> Non
 
 def travel(start: Array, T: Array, units: Units) -> str:
     """How far a pose ``(4, 4)`` is from another one, and how far it is turned, for a label."""
-    parts = [units.distance(float(np.linalg.norm(T[:3, 3] - start[:3, 3])))]
+    parts = [units.distance(math.dist(T[:3, 3].tolist(), start[:3, 3].tolist()))]
     angle = rotation_angle(T[:3, :3], start[:3, :3])
     if angle > _TURNED:
         parts.append(units.angle(angle))

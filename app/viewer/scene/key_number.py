@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from app.viewer.labels import add_label
-from app.viewer.viser_patches import assign
+from app.viewer.viser_patches import assign, show_text
 from kin.transforms import Array
 
 Anchor = Literal["bottom-center", "top-center"]
@@ -47,8 +47,7 @@ class KeyNumber:
     def show(self, text: str, point: Array, radius: float) -> None:
         """Write beside a point ``(3,)``, for an arm in a sphere of this radius (m); "" hides the text."""
         if text:
-            if self._label.text != text:
-                self._label.text = text
+            show_text(self._label, text)
             assign(self._label, point + np.array([0.0, 0.0, self._height * radius]))
         if self._label.visible != bool(text):
             self._label.visible = bool(text)

@@ -127,6 +127,9 @@ def every_kind() -> list[Message]:
         place,
         messages.GuiUpdateMessage("a-b", {"value": 12.5}),
         messages.GuiUpdateMessage("c-d", {"content": "<b>θ₁ = 1°</b>"}),
+        messages.GuiUpdateMessage("e-f", {"value": np.float32(0.5), "marks": ((1, "a"),)}),
+        messages.SceneNodeUpdateMessage("/travel", {"text": "Δ 12 mm", "font_screen_scale": 1.3}),
+        messages.SceneNodeUpdateMessage("/gap", {"points": np.zeros((1, 2, 3), np.float32)}),
         messages.SetSceneNodeVisibilityMessage("/arm", np.bool_(False)),  # type: ignore[arg-type]
         points,
         messages.RemoveSceneNodeMessage("/old"),

@@ -22,6 +22,7 @@ from app.viewer.viser_patches import (
     keep_private,
     set_events_in_their_loop,
     show_content,
+    show_text,
     show_value,
 )
 
@@ -158,6 +159,22 @@ def test_html_is_sent_as_the_setter_sends_it_and_unchanged_html_is_not(wire, mon
     handle.remove()
     with pytest.raises(RuntimeError, match="GuiHtmlHandle was removed"):
         show_content(handle, "late")
+
+
+def test_text_of_a_label_is_sent_as_by_its_setter_and_once(wire):
+    messages, scene = wire
+    shown = []
+    for show in (lambda handle, text: setattr(handle, "text", text), show_text):
+        label = scene.add_label("/label", "old")
+        messages.clear()
+        show(label, "Δ 1 mm")
+        show(label, "Δ 1 mm")
+        (message,) = messages
+        shown.append((message, label.text))
+    assert shown[0] == shown[1]
+    label.remove()
+    with pytest.raises(RuntimeError, match="/label was removed"):
+        show_text(label, "late")
 
 
 def test_hints_are_looked_up_once_and_are_the_same(wire, monkeypatch):

@@ -187,7 +187,9 @@ class ArmScene:
 
         The arrow of the approach direction is drawn then, too; otherwise it would cover the gizmo's.
         """
-        self._gap.visible = self._approach.visible = target is not None
+        for node in (self._gap, self._approach):
+            if node.visible != (target is not None):
+                node.visible = target is not None
         self._show_ghost()
         if target is not None:
             self._gap.points = np.array([[tool, target]], dtype=np.float32)
