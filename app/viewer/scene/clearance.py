@@ -64,14 +64,17 @@ class Clearance:
         self._above = max((block.high for block in mount.blocks), default=-math.inf) + radii
         q = robot.random_q(np.random.default_rng(11), SAMPLES)
         places = [self._place(frames) for frames in link_frames(robot, q)]
-        held, below, every = [], [], np.arange(len(radii))
+        held, below, off, every = [], [], [], np.arange(len(radii))
         for points in places:
             local = self._local(points)
-            beside = np.hypot(local[:, 0], local[:, 1]) < FOOT * made.size + radii
+            off.append(np.hypot(local[:, 0], local[:, 1]))
+            beside = off[-1] < FOOT * made.size + radii
             held.append(beside & (self._inside(local, every) > 0.0))
             below.append(beside & (points[:, 2] < self._floor))
-        self._aside[np.mean(held, axis=0) > MOST] = -1.0
-        self._floor[np.mean(below, axis=0) > MOST] = -math.inf
+        # What only turns about the mount's axis and slides along it is guided by the mount: a lift in its column.
+        guided = (np.ptp(off, axis=0) < 1e-6) & (np.max(off, axis=0) < FOOT * made.size + radii)
+        self._aside[guided | (np.mean(held, axis=0) > MOST)] = -1.0
+        self._floor[guided | (np.mean(below, axis=0) > MOST)] = -math.inf
 
     def at(self, q: Array) -> Contact | None:
         """The deepest contact at a configuration ``(n,)``; None if there is none."""

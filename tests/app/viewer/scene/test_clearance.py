@@ -77,6 +77,24 @@ def test_a_contact_is_named() -> None:
     assert any(c is not None and c.text(pioneer).startswith("The gripper") for c in found)
 
 
+@pytest.mark.parametrize("name", ["gantry", "prr", "rpp", "cylindrical"])
+def test_a_lift_is_guided_by_its_column_and_passes_through_nothing(name: str) -> None:
+    robot = kin.get_robot(name)
+    test = clearance(robot)
+    assert test.at(robot.q_home) is None
+    found = [test.at(q) for q in robot.random_q(np.random.default_rng(1), 100)]
+    assert all(contact is None or contact.link > 1 for contact in found)
+
+
+def test_a_slide_beside_the_column_is_guided_by_nothing() -> None:
+    slide = {"kind": "prismatic", "a": 0.1, "limits": (-2.0, 0.0)}
+    beside = kin.Robot.from_dh([(0.0, 0.3, 0.6, 0.0), slide])
+    found = [clearance(beside).at(np.array([0.0, z])) for z in (0.0, -2.0)]
+    assert found[0] is None
+    assert found[1] is not None
+    assert found[1].obstacle == "floor"
+
+
 def test_the_page_marks_a_contact_and_says_so(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
