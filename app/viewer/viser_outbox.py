@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import dataclasses
 import itertools
 import logging
 import math
@@ -275,13 +276,13 @@ def missing_names() -> list[str]:
     found += [f"AsyncMessageBuffer.{name}" for name in methods if not hasattr(AsyncMessageBuffer, name)]
     if not hasattr(_infra, "_append_aligned_buffers"):
         found.append("_infra._append_aligned_buffers")
-    kinds = {
+    kinds: dict[type[Any], tuple[str, ...]] = {
         messages.SetOrientationMessage: ("name", "wxyz", "owner"),
         messages.SetPositionMessage: ("name", "position", "owner"),
         messages.GuiUpdateMessage: ("uuid", "updates"),
         messages.SceneNodeUpdateMessage: ("name", "updates", "owner"),
     }
-    for kind, fields in kinds.items():
-        if tuple(kind.__dataclass_fields__) != fields:
-            found.append(f"{kind.__name__}({', '.join(fields)})")
+    for kind, names in kinds.items():
+        if tuple(field.name for field in dataclasses.fields(kind)) != names:
+            found.append(f"{kind.__name__}({', '.join(names)})")
     return found
