@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -24,7 +24,7 @@ from kin import Robot
 VALUES: Final = ("q", "target", "result", "contacts", "program")  # what a program may subscribe to
 MOVES, DRAWS = EVENTS = ("live", "drawn")  # what a page is to take: what undo restores, and what it does not
 MERGED: Final = "draw"  # of this kind the newest value of each name is kept
-QUIET: Final = frozenset({"drives", "measured", "draw", "clear"})  # changes nothing that undo restores
+QUIET: Final = frozenset({"drives", "readings", "measured", "draw", "clear"})  # changes nothing that undo restores
 LETTERS: Final = 64  # answers that may wait for a program; older ones are dropped
 REVOKED: Final = "The page has withdrawn the code."
 LEFT: Final = "The page was closed."
@@ -117,6 +117,7 @@ class Line:
         self._count = 0
         self._letters: deque[Letter] = deque(maxlen=LETTERS)
         self.ended = ""  # why, once it has
+        self.readings: Sequence[float] | None = None  # the newest ones of the motors of a real arm
         self.recording: Recording | None = None
 
     def note(self, way: str, message: Mapping[str, Any]) -> None:
@@ -148,7 +149,7 @@ class Line:
         with self._lock:
             if self._program is not program:
                 return
-            self._program = None
+            self._program, self.readings = None, None
             self._parcels[DRAWS] = Parcel({"drives": None, "clear": True, "measured": None})
         self._post(DRAWS, None)
 
@@ -157,6 +158,7 @@ class Line:
         quiet = {name: value for name, value in values.items() if name in QUIET}
         moving = {name: value for name, value in values.items() if name not in QUIET}
         with self._lock:
+            self.readings = quiet.get("readings", self.readings)
             for key, some in ((DRAWS, quiet), (MOVES, moving)):
                 waiting = self._parcels[key].values
                 for name, value in some.items():

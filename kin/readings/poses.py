@@ -35,8 +35,8 @@ def match_poses(robot: Robot | str, count: int = 3, allowed: Callable[[Array], b
     Args:
         robot: the arm, or the id of a built-in one.
         count: 2 or 3. With two, sign and zero are found; a third one shows which reading is wrong.
-        allowed: whether a configuration ``(n,)`` may be shown, besides the limits. By default no link touches
-            another one and none is below the floor, if the arm's `floor` is stated.
+        allowed: whether a configuration ``(n,)``, radians (metres), may be shown. By default no link touches
+            another one, and none is below the floor, if the arm's `floor` is stated.
 
     Returns:
         ``(count, n)`` radians (metres), the same for each call.

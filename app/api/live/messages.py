@@ -22,8 +22,9 @@ from app.api.workspace.query import validated
 from app.live import VALUES
 from app.shared.problems import FieldError, from_input_error, show
 from app.shared.store import Store
-from kin import InputError, Robot, UnknownRobotError, program_from_dict
+from kin import InputError, Robot, UnknownRobotError, program_from_dict, q_of_readings
 from kin.collision.obstacles import MOST_OBSTACLES, checked_obstacles
+from kin.readings.joints import moving_motors
 from kin.transforms import Array
 
 MOST_BYTES = 64 * 1024  # of a message
@@ -132,6 +133,11 @@ class LiveMessage(Body):
         description="Where a real arm is, drawn as a ghost beside the commanded one; null removes it. It may be "
         "outside the limits.",
     )
+    readings: Configuration | None = Field(
+        None,
+        description="What the motors of a real arm read, one of each motor that moves a joint, in their order and "
+        "units. The page shows the arm as `measured`, and *Match motors* takes them; null removes them.",
+    )
     drives: _Name | None = Field(
         None,
         description="What the program moves beside the page, such as `SO-101 at /dev/ttyACM0`: the page has a red "
@@ -213,10 +219,29 @@ def read(text: str, robot: Robot, store: Store) -> Message:
         values["clear"] = True
     if body.draw is not None:
         values["draw"] = {name: None if each is None else each.model_dump() for name, each in body.draw.items()}
+    if "readings" in given:
+        values |= _read_motors(robot, body.readings)
     if "measured" in given:
         measured = body.measured
         values["measured"] = None if measured is None else configuration(robot, measured, "measured")
     return Message(body.id, body.subscribe, values)
+
+
+def _read_motors(robot: Robot, readings: list[float] | None) -> dict[str, Any]:
+    """The readings and, where each joint has a motor, the configuration that they mean; raises 422."""
+    if readings is None:
+        return {"readings": None, "measured": None}
+    try:
+        motors = moving_motors(robot)
+    except InputError as error:
+        raise invalid(FieldError(field="readings", value=show(readings), expected=error.expected)) from None
+    if len(readings) != len(motors):
+        names = ", ".join(f"{motor.id} {motor.joint}" for motor in motors)
+        expected = f"{len(motors)} values, of the motors {names}"
+        raise invalid(FieldError(field="readings", value=f"{len(readings)} values", expected=expected))
+    driven = {motor.joint for motor in motors}
+    known = all(joint.name in driven for joint in robot.joints)
+    return {"readings": readings, **({"measured": q_of_readings(robot, readings)} if known else {})}
 
 
 def _printable(name: str) -> str:

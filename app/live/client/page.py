@@ -21,7 +21,8 @@ from app.live.client.connection import Connection, Message, RefusedError
 from app.live.client.drawing import Drawing
 from app.live.recording import Recording, read_mcap, save
 from kin import InputError, KinematicsError, Motion, Obstacle, Program, Robot
-from kin.transforms import Array, from_position_wxyz
+from kin.readings.joints import moving_motors
+from kin.transforms import Array, finite_array, from_position_wxyz
 
 VALUES: Final = ("q", "target", "result", "contacts", "program")
 RATE: Final = 30.0  # news a second
@@ -70,6 +71,7 @@ class Page:
         self._sent: int | None = None  # number of the newest configuration that is not answered
         self._refused: RefusedError | None = None
         self._measured: Array | None = None
+        self._readings: Array | None = None
         self._drives: str | None = None
         self._rate = rate
         self._readers: list[_Reader] = []
@@ -142,6 +144,21 @@ class Page:
         q = None if value is None else self._robot.check_q(value, "measured")
         self._connection.stream(measured=None if q is None else q.tolist())
         self._measured = q
+
+    @property
+    def readings(self) -> Array | None:
+        """What the motors of a real arm read ``(m,)``, in their order and units, as for `kin.q_of_readings`.
+
+        The page shows the arm as `measured`, and *Match motors* takes them. None: they are not known.
+        """
+        return None if self._readings is None else self._readings.copy()
+
+    @readings.setter
+    def readings(self, value: ArrayLike | None) -> None:
+        motors = moving_motors(self._robot)
+        read = None if value is None else finite_array("readings", value, (len(motors),))
+        self._connection.stream(readings=None if read is None else read.tolist())
+        self._readings = read
 
     @property
     def drives(self) -> str | None:
@@ -363,7 +380,7 @@ class Page:
             self._robot = value = robot_of(value)
             for recording in self._recordings:
                 recording.end("another arm was shown")
-            self._measured = None
+            self._measured = self._readings = None
             self._sent = None
         elif name == "q":
             if self._sent is not None and "q" in self._values:

@@ -23,6 +23,7 @@ _NUMBERS = {"type": "array", "items": {"type": "number"}}
 _TYPES: dict[str, dict[str, Any]] = {
     "q": _NUMBERS,
     "measured": {"anyOf": [_NUMBERS, {"type": "null"}]},
+    "readings": {"anyOf": [_NUMBERS, {"type": "null"}]},
     "drives": {"type": ["string", "null"]},
     "play": {"type": "boolean"},
     "clear": {"type": "boolean"},

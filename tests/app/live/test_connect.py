@@ -135,6 +135,24 @@ def test_another_arm_comes_with_its_table(page, arm):
     page.wait(lambda: len(page.sliders_in("Joints")) == 2)
 
 
+def test_readings_of_motors_show_the_real_arm_and_match_motors_takes_them(page, arm):
+    with pytest.raises(kin.InputError, match="an arm with motors"):
+        arm.readings = [1.0] * 6
+    arm.robot = "so101"
+    with pytest.raises(kin.InputError, match="readings"):
+        arm.readings = [1.0] * 6
+    arm.readings = [10.0, -20.0, 30.0, 40.0, -50.0]
+    page.wait(lambda: "data-live-measured" in page.html)
+    page.settle()
+    page.set("All motors", "Match motors")
+    page.wait(lambda: 'data-motors-pose="1"' in page.html)
+    page.settle()
+    arm.readings = [10.5, -20.0, 30.0, 40.0, -50.25]
+    page.settle()
+    page.set("Poses", "Read program")
+    page.wait(lambda: page.value("Readings") == "10.5 -20 30 40 -50.25")
+
+
 def test_a_motion_is_played_and_its_events_are_heard(page, arm):
     arm.q = Q
     program = kin.Program((kin.Ptp(kin.JointTarget(Q)), kin.Ptp(kin.JointTarget(Q + 0.2))))

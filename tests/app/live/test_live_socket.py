@@ -132,6 +132,19 @@ def test_a_program_is_welcomed_and_its_values_reach_the_page(page, port):
     assert page.taken["measured"] is None
 
 
+def test_readings_of_motors_are_kept_and_shown_as_the_measured_arm(page, port):
+    with call(port, page.line.code) as program:
+        heard(program, "welcome")
+        say(program, id=1, robot="so101", readings=[10.0, 20.0, -30.0, 40.0, 50.0])
+        assert heard(program, "done") == {"type": "done", "id": 1}
+        assert np.degrees(page.taken["measured"]).round(9).tolist() == [10.0, 20.0, -30.0, 40.0, 50.0]
+        assert page.line.readings == [10.0, 20.0, -30.0, 40.0, 50.0]
+        say(program, id=2, robot="so101", readings=None)
+        assert heard(program, "done") == {"type": "done", "id": 2}
+        assert page.taken["measured"] is None
+        assert page.line.readings is None
+
+
 def test_the_newest_value_wins_and_drawings_are_merged(page, port):
     with call(port, page.line.code) as program:
         heard(program, "welcome")
@@ -161,6 +174,9 @@ def test_the_newest_value_wins_and_drawings_are_merged(page, port):
         ({"target": {"position": [0, 0, 0], "frame": "tool"}}, "target.frame", "tool", "world"),
         ({"target": {"position": [0, 0, 1], "wxyz": [0, 0, 0, 0]}}, "target.wxyz", "0", ""),
         ({"measured": [1.0]}, "measured", "1 values", "6 values"),
+        ({"readings": [1.0] * 6}, "readings", "1.0", "an arm with motors"),
+        ({"robot": "so101", "readings": [1.0] * 6}, "readings", "6 values", "of the motors 1 shoulder pan, 2"),
+        ({"readings": ["a"]}, "readings", "a", ""),
         ({"robot": "ur500"}, "robot", "ur500", "one of"),
         ({"robot": {"rows": []}}, "robot", "", ""),
         ({"obstacles": [{"shape": "ball"}]}, "obstacles[0].shape", "ball", "box"),

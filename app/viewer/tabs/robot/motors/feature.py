@@ -20,9 +20,11 @@ from app.viewer.tabs.robot.motors import views
 from app.viewer.tabs.robot.motors.run import COUNT, Run, begun, readings_of
 from kin import InputError, Motor, Robot
 from kin.motor import LARGEST_ID
+from kin.readings.joints import moving_motors
 
 FIELDS = ("id", "sign", "offset", "unit", "lead")
 LEAD = 0.01  # m in a turn of the motor of a slide, until it is stated
+LOOK_AGAIN = 0.5  # s
 SAVED = "LeRobot reads it from its folder of calibrations, under the name of the arm."
 READ_HINT = "Numbers with spaces or commas between them, as a script prints them"
 
@@ -78,7 +80,19 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
             self._run = None
 
     def besides(self) -> tuple[object, ...]:
-        return (self._run,)
+        return self._run, self._streamed() is not None
+
+    def advance(self, now: float) -> float | None:
+        """During a run, look now and then whether a program sends readings."""
+        return LOOK_AGAIN if self._run is not None else None
+
+    def _streamed(self) -> tuple[float, ...] | None:
+        """What a connected program says that the motors read, if it has as many as the run."""
+        line = self.stage.door.line
+        if self._run is None or line is None or line.readings is None:
+            return None
+        found = tuple(line.readings)
+        return found if len(found) == len(moving_motors(self._run.robot)) else None
 
     def look(self) -> MotorFacts:
         return MotorFacts(self.settings, self.stage.now, self._run)
@@ -126,10 +140,12 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
         acts = {
             "Back": self.event(self.on_to, run.at - 1),
             "Find signs and zeros" if run.is_last else "Next pose": self.event(self.on_next),
+            "Read program": self.event(self.on_read),
             "Find from two": self.event(self.on_solve),
             "Stop": self.event(self.on_stop),
         }
-        offered = tuple(name for name in acts if (name != "Back" or run.at) and (name != "Find from two" or two))
+        absent = {"Back": run.at == 0, "Find from two": not two, "Read program": self._streamed() is None}
+        offered = tuple(name for name in acts if not absent.get(name))
         return [
             Html(views.pose, (run, self.stage.units), key="pose"),
             Control("readings", of=run.at),
@@ -182,6 +198,11 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
             self._run = run.to(run.at + 1)
             self._show_pose()
 
+    def on_read(self) -> None:
+        """Take the newest readings of a connected program."""
+        if (found := self._streamed()) is not None:
+            self._write_readings(found)
+
     def on_solve(self) -> None:
         """Find signs and zeros from the poses that are read."""
         assert self._run is not None
@@ -216,11 +237,14 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
         """Move the arm to the pose of the run; what was read in it before is in the field."""
         assert self._run is not None
         run = self._run
-        known = run.readings[run.at]
-        self.change(readings="" if known is None else " ".join(f"{value:.10g}" for value in known))
-        self._write = True
+        self._write_readings(run.readings[run.at])
         words = "Put your arm as this one, then type what its motors read. Tab Robot."
         self.stage.move_to(run.poses[run.at], Notice("hand", f"Pose {run.at + 1} of {COUNT}", words))
+
+    def _write_readings(self, values: Sequence[float] | None) -> None:
+        """Write readings into the field."""
+        self.change(readings=" ".join(f"{value:.10g}" for value in values or ()))
+        self._write = True
 
     def _use(self, motors: Sequence[Motor], done: str = "") -> None:
         """The arm with these motors becomes the visitor's own; raises `InputError`."""
