@@ -138,7 +138,17 @@ RULES: dict[str, set[str]] = {
     "app/cli/xacro/expressions.py": {"xacro"},
     "app/cli/startup.py": set(),
     # Programs that users copy: what they need of Kinboard is public.
-    "examples": {"kin", "numpy", "connecting", "driving", "recording", "mujoco", "roslibpy"},
+    "examples": {
+        "kin",
+        "numpy",
+        "connecting",
+        "driving",
+        "recording",
+        "mujoco",
+        "roslibpy",
+        "scservo_sdk",
+        "serial",
+    },
     "app/cli/serve.py": {"pydantic", "app.cli.startup", "app.service.main", "app.shared"},
     "app/cli/open.py": {"app.classroom.tokens", "app.cli", "app.live", "app.viewer.session.state"},
 }

@@ -112,7 +112,8 @@ def test_a_program_of_the_page_is_followed_and_measured(viewer, page, tmp_path, 
     page.wait(lambda: any(" N m of " in text for text in drawn(page, "LabelMessage")))
     assert len(drawn(page, "LineSegmentsMessage")) == 2
     assert len(drawn(page, "PointCloudMessage")) == 1
-    page.wait(lambda: not thread.is_alive())
+    thread.join(30.0)
+    page.settle()
     assert codes == [0]
     said = capsys.readouterr().out
     assert "Payload: 2 kg at the tool." in said
@@ -180,6 +181,7 @@ def test_another_arm_of_the_page_is_simulated_in_its_place(viewer, page, capsys)
     assert "invented for shoulder, elbow, quill, tool turn" in simulated()[1]
     page.wait(lambda: "data-live-measured" in page.html)
     page.send("GuiUpdateMessage", uuid=page.element("Withdraw the code"), updates={"value": True})
-    page.wait(lambda: not thread.is_alive())
+    thread.join(30.0)
+    page.settle()
     assert codes == [1]
     assert "The page has withdrawn the code." in capsys.readouterr().err

@@ -42,11 +42,16 @@ class Run:
     def alive(self) -> bool:
         return self._thread.is_alive()
 
+    def wait(self) -> None:
+        """Wait for the end."""
+        self._thread.join(30.0)
+        assert not self.alive
+
     def end(self, page) -> None:
         """Withdraw the code, and wait for the end."""
         if self.alive:
             page.send("GuiUpdateMessage", uuid=page.element("Withdraw the code"), updates={"value": True})
-        page.wait(lambda: not self.alive)
+        self.wait()
 
 
 @pytest.fixture
@@ -60,6 +65,7 @@ def run(viewer, page, bridge):
     yield started
     for each in runs:
         each.end(page)
+    page.settle()
 
 
 @pytest.fixture
@@ -112,7 +118,7 @@ def test_a_driven_arm_follows_slowly_and_starts_where_it_is(page, bridge, run, p
 def test_without_a_yes_nothing_moves(page, bridge, run, monkeypatch, capsys, answer):
     monkeypatch.setattr("builtins.input", lambda _: answer)
     started = run("--drive")
-    page.wait(lambda: not started.alive)
+    started.wait()
     assert started.codes == [1]
     assert "not confirmed: the arm was not moved" in capsys.readouterr().err
     assert bridge.received == []
@@ -131,7 +137,7 @@ def test_a_silent_arm_is_not_moved_any_further(page, bridge, run, patient, monke
     started = driven(page, bridge, run, capsys)
     monkeypatch.setattr(driving, "ARM_LOST", 0.5)
     bridge.silent = True
-    page.wait(lambda: not started.alive)
+    started.wait()
     assert started.codes == [1]
     assert "the arm has said nothing for 0.5 s" in capsys.readouterr().err
     assert bridge.q[NAMES[0]] < np.radians(45.0)
@@ -153,7 +159,7 @@ def test_a_page_that_leaves_stops_the_arm(page, bridge, run, patient, capsys):
 def test_an_arm_that_is_held_is_not_pushed(page, bridge, run, patient, capsys):
     started = driven(page, bridge, run, capsys, "--speed", "60")
     bridge.stuck = True
-    page.wait(lambda: not started.alive)
+    started.wait()
     assert started.codes == [1]
     assert "base is" in (said := capsys.readouterr().err)
     assert "behind: something holds it" in said
@@ -164,7 +170,7 @@ def test_an_arm_that_is_held_is_not_pushed(page, bridge, run, patient, capsys):
 def test_another_arm_in_the_page_stops(page, bridge, run, patient, capsys):
     started = driven(page, bridge, run, capsys)
     page.set("Robot", kin.get_robot("panda").name)
-    page.wait(lambda: not started.alive)
+    started.wait()
     assert started.codes == [1]
     assert "the page shows" in capsys.readouterr().err
 
@@ -174,7 +180,7 @@ def test_a_lost_rosbridge_stops(viewer, page, patient, monkeypatch, capsys):
         started = Run(viewer, page, bridge, "--joints", ",".join(NAMES), "--drive", "--yes")
         page.wait(lambda: "The arm follows the page." in capsys.readouterr().out)
         monkeypatch.setattr(driving, "ARM_LOST", 0.5)
-    page.wait(lambda: not started.alive)
+    started.wait()
     assert started.codes == [1]
     assert "the arm has said nothing for 0.5 s" in capsys.readouterr().err
 
@@ -182,7 +188,7 @@ def test_a_lost_rosbridge_stops(viewer, page, patient, monkeypatch, capsys):
 def test_joints_of_other_names_are_listed(viewer, page, bridge, monkeypatch, capsys):
     monkeypatch.setattr(ros2_arm, "WAITING", 0.2)
     started = Run(viewer, page, bridge)
-    page.wait(lambda: not started.alive)
+    started.wait()
     said = capsys.readouterr().err
     assert started.codes == [1]
     assert "/joint_states says nothing of base, shoulder, elbow, wrist 1, wrist 2, wrist 3" in said

@@ -1,0 +1,328 @@
+"""An SO-100 or SO-101 beside the arm of a page, over the bus of its Feetech servos.
+
+    pip install '.[so101]'
+    python examples/so101_arm.py K7QF-2M4A --port /dev/ttyACM0 --calibration my_arm.json
+
+The ghost of the page is where the encoders say that the arm is; nothing is written to the bus. With `--drive` the
+arm follows the page.
+"""
+
+from __future__ import annotations
+
+import errno
+import sys
+import time
+from argparse import Namespace
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import connecting
+import driving
+import numpy as np
+from numpy.typing import NDArray
+
+import kin
+
+try:
+    import scservo_sdk
+    from serial.tools.list_ports import comports
+except ImportError:
+    raise SystemExit(
+        "so101_arm.py needs feetech-servo-sdk: pip install '.[so101]' in the folder of Kinboard"
+    ) from None
+
+GONE: tuple[type[Exception], ...] = (OSError,)  # what is raised once a port is gone
+with suppress(ImportError):  # Windows has no such module
+    import termios
+
+    GONE += (termios.error,)
+
+NAME: Final = "so101_arm.py"
+BAUD: Final = 1_000_000
+CYCLE: Final = 0.02  # s
+TRIES: Final = 3  # of a packet, before its servo counts as lost
+RESTING: Final = 0.5  # s between two tries of a bus whose servos do not answer
+
+# Registers of the STS series, two bytes little-endian but for the first.
+TORQUE_ENABLE, GOAL_POSITION, PRESENT_POSITION = 40, 42, 56
+MODELS: Final = {777: "STS3215", 2825: "STS3250"}
+TURN: Final = 4096  # ticks
+# Bits of a status packet, in the order of their values.
+ERRORS: Final = ("voltage", "encoder", "temperature", "current", "", "load")
+
+Array = NDArray[np.float64]
+
+
+class BusError(kin.KinematicsError):
+    """A servo does not answer, or the port is gone."""
+
+
+class Bus:
+    """Servos on a serial port.
+
+    Args:
+        port: its name, such as ``/dev/ttyACM0``.
+        motors: the servos, by their ids.
+
+    Raises:
+        BusError: the port cannot be opened.
+    """
+
+    def __init__(self, port: str, motors: Sequence[kin.Motor]) -> None:
+        self.port, self._motors = port, motors
+        self._handler = scservo_sdk.PortHandler(port)
+        self._packets = scservo_sdk.PacketHandler(0)  # little-endian
+        self._handler.baudrate = BAUD
+        try:
+            self._handler.openPort()
+        except (OSError, ValueError) as error:  # SerialException is an OSError
+            raise BusError(port_problem(port, error)) from None
+
+    def _ask(self, motor: kin.Motor, work: Callable[[], tuple[Any, int, int]], tolerant: bool = False) -> Any:
+        """Do something to which a servo answers, again if its answer is broken; `tolerant` of its errors."""
+        result = 0
+        for _ in range(TRIES):
+            try:
+                self._handler.ser.reset_input_buffer()  # what is left of a broken answer
+                value, result, error = work()
+            except IndexError:  # an answer that is shorter than what was asked for
+                result = scservo_sdk.COMM_RX_CORRUPT
+                continue
+            except GONE as gone:
+                raise BusError(f"the bus at {self.port} is gone: {gone}") from None
+            finally:
+                self._handler.is_using = False
+            if result == scservo_sdk.COMM_SUCCESS:
+                if error and not tolerant:
+                    bits = [name for i, name in enumerate(ERRORS) if error >> i & 1 and name]
+                    raise BusError(f"{named(motor)} reports an error: {', '.join(bits) or f'bits {error:#x}'}")
+                return value
+        why = "does not answer" if result == scservo_sdk.COMM_RX_TIMEOUT else "answers with broken packets only"
+        raise BusError(f"{named(motor)} {why}")
+
+    def check(self) -> None:
+        """Ask all servos what they are; raises `BusError` with every one that is missing or of another kind."""
+        missing, found = [], []
+        for motor in self._motors:
+            try:
+                model = self._ask(motor, lambda: self._packets.ping(self._handler, motor.id))  # noqa: B023
+            except BusError as error:
+                if "gone" in str(error):
+                    raise
+                missing.append(str(error))
+            else:
+                found.append(named(motor))
+                if model not in MODELS:
+                    known = " or ".join(f"{name} ({number})" for number, name in MODELS.items())
+                    raise BusError(f"{named(motor)} is of model {model}, expected {known}: its registers differ")
+        if missing:
+            raise BusError(
+                f"{'; '.join(missing)}. "
+                + (f"{', '.join(found)} answered" if found else "No servo answered: is the arm's power on?")
+            )
+
+    def positions(self) -> Array:
+        """Where the servos are ``(m,)``, ticks."""
+        return np.array([self._read(motor, PRESENT_POSITION) for motor in self._motors], dtype=float)
+
+    def _read(self, motor: kin.Motor, address: int, tolerant: bool = False) -> int:
+        read = self._packets.read2ByteTxRx
+        value = int(self._ask(motor, lambda: read(self._handler, motor.id, address), tolerant))
+        if value >= TURN:
+            raise BusError(f"{named(motor)} says {value}, expected a position from 0 to {TURN - 1}")
+        return value
+
+    def hold(self) -> list[str]:
+        """Let the servos hold where they are now; returns why each of those that cannot be reached cannot."""
+        goals, lost = {}, []
+        for motor in self._motors:
+            try:
+                goals[motor.id] = self._read(motor, PRESENT_POSITION, tolerant=True)
+            except BusError as error:
+                lost.append(str(error))
+        if goals:
+            self.move(goals)
+        return lost
+
+    def move(self, goals: Mapping[int, float]) -> None:
+        """Set goals by the ids of their servos, ticks, in one packet, which none of them answers."""
+        group = scservo_sdk.GroupSyncWrite(self._handler, self._packets, GOAL_POSITION, 2)
+        for number, goal in goals.items():
+            group.addParam(number, list(int(goal).to_bytes(2, "little")))
+        try:
+            if group.txPacket() != scservo_sdk.COMM_SUCCESS:
+                raise BusError(f"the bus at {self.port} took no goals")
+        except GONE as gone:
+            raise BusError(f"the bus at {self.port} is gone: {gone}") from None
+        finally:
+            self._handler.is_using = False
+
+    def switch(self, on: bool) -> None:
+        """Switch the torque of all servos."""
+        write = self._packets.write1ByteTxRx
+        for motor in self._motors:
+            self._ask(motor, lambda: (None, *write(self._handler, motor.id, TORQUE_ENABLE, int(on))))  # noqa: B023
+
+    def close(self) -> None:
+        """Close the port; the servos stay as they are."""
+        self._handler.closePort()
+
+
+def named(motor: kin.Motor) -> str:
+    """A motor in words."""
+    return f"motor {motor.id} ({motor.name or motor.joint})"
+
+
+def port_problem(port: str, error: Exception) -> str:
+    """Why a port cannot be opened, and what to do about it."""
+    number = getattr(error, "errno", None)
+    if number in (errno.EACCES, errno.EPERM):
+        return f"no permission to use {port}: sudo usermod -aG dialout $USER, then log in again"
+    if number == errno.ENOENT or "could not open" in str(error):
+        ports = ", ".join(sorted(each.device for each in comports())) or "none"
+        return f"there is no port {port}. Ports of this machine: {ports}"
+    return f"{port} cannot be opened: {error}"
+
+
+def motors_of(robot: kin.Robot, options: Namespace) -> kin.Robot:
+    """The arm with motors whose ticks are understood; raises `kin.KinematicsError`."""
+    if options.calibration is not None:
+        text = Path(options.calibration).read_text(encoding="utf-8")
+        if not robot.motors:
+            print("The page's arm states no motors: signs + and zeros in the middle of the ranges are assumed.")
+        robot = replace(robot, motors=kin.motors_from_lerobot(robot, text))
+    moving = [motor for motor in robot.motors if motor.joint]
+    bare = [motor for motor in moving if motor.range is None and motor.unit != "ticks"]
+    if bare or {motor.joint for motor in moving} != {joint.name for joint in robot.joints}:
+        lacking = f"no calibrated range of {', '.join(map(named, bare))}" if bare else "not a motor for each joint"
+        raise kin.KinematicsError(
+            f"{robot.name} has {lacking}: --calibration FILE.json gives those of LeRobot, which keeps them in "
+            "~/.cache/huggingface/lerobot/calibration/robots"
+        )
+    return robot
+
+
+class Servos:
+    """The servos of an arm, in joint values.
+
+    Args:
+        bus: with the motors that move a joint.
+        robot: the arm with these motors.
+    """
+
+    def __init__(self, bus: Bus, robot: kin.Robot, motors: Sequence[kin.Motor]) -> None:
+        self._bus, self._robot, self._motors = bus, robot, motors
+        ends = [motor.range or (0, motor.ticks - 1) for motor in motors]
+        self._ends = np.array(ends, dtype=float).T
+
+    def read(self) -> Array:
+        """The configuration of the arm ``(n,)``, radians."""
+        readings = kin.readings_of_ticks(self._motors, self._bus.positions())
+        return kin.q_of_readings(self._robot, readings)
+
+    def write(self, q: Array) -> None:
+        """Lead the servos to a configuration ``(n,)``, within their calibrated ranges."""
+        ticks = kin.ticks_of_readings(self._motors, kin.readings_of_q(self._robot, q))
+        ids = [motor.id for motor in self._motors]
+        self._bus.move(dict(zip(ids, np.clip(ticks, *self._ends).tolist(), strict=True)))
+
+    @property
+    def limits(self) -> tuple[Array, Array]:
+        """The configurations ``(n,)`` at the ends of the calibrated ranges: lower and upper ones."""
+        ends = kin.q_of_readings(self._robot, kin.readings_of_ticks(self._motors, self._ends))
+        return ends.min(axis=0), ends.max(axis=0)
+
+
+def work(page: Any, options: Namespace) -> None:
+    """Show where the arm is, and let it follow, until the connection to the page ends."""
+    arm = page.robot
+    robot = motors_of(arm, options)
+    motors = [motor for motor in robot.motors if motor.joint]
+    bus = Bus(options.port, motors)
+    try:
+        bus.check()
+        servos = Servos(bus, robot, motors)
+        print(f"{len(motors)} servos answer at {options.port}.", flush=True)
+        if options.drive:
+            drive(page, arm, bus, servos, options)
+        else:
+            mirror(page, arm, servos, options)
+    finally:
+        bus.close()
+
+
+def mirror(page: Any, arm: kin.Robot, servos: Servos, options: Namespace) -> None:
+    """Read the servos again and again, and nothing else."""
+    began, lost = time.monotonic(), ""
+    while options.seconds is None or time.monotonic() - began < options.seconds:
+        if page.robot != arm:
+            raise kin.KinematicsError(f"the page shows {page.robot.name} now: start again for this arm")
+        try:
+            page.measured = servos.read()
+        except BusError as error:
+            if "gone" in str(error):
+                raise
+            if str(error) != lost:
+                lost = str(error)
+                print(f"{lost}. The ghost is hidden meanwhile.", flush=True)
+            page.measured = None
+            time.sleep(RESTING)
+        else:
+            if lost:
+                print("All servos answer again.", flush=True)
+            lost = ""
+        time.sleep(CYCLE)
+
+
+def drive(page: Any, arm: kin.Robot, bus: Bus, servos: Servos, options: Namespace) -> None:
+    """Let the arm follow the page, from where it is."""
+    driving.confirm(f"The arm at {options.port}", options)
+    if lost := bus.hold():  # the goal first: a servo that is switched on goes to its last one
+        raise BusError("; ".join(lost))
+    bus.switch(True)
+    guide: driving.Guide | None = None
+    began = time.monotonic()
+    try:
+        guide = driving.Guide(page, f"{arm.name} at {options.port}", options.speed, servos.read(), servos.limits)
+        print("The arm follows the page.", flush=True)
+        while options.seconds is None or time.monotonic() - began < options.seconds:
+            q, heard = servos.read(), time.monotonic()
+            page.measured = q
+            servos.write(guide.step(q, heard))
+            time.sleep(CYCLE)
+    finally:
+        if guide is not None:
+            guide.end()
+        stop(bus, options)
+
+
+def stop(bus: Bus, options: Namespace) -> None:
+    """Hold the arm where it is, or release it."""
+    try:
+        if options.release:
+            bus.switch(False)
+            print("The motors are off.", flush=True)
+            return
+        lost = bus.hold()
+    except BusError as error:
+        lost = [str(error)]
+    for why in lost:
+        print(f"{why}. It goes on to its last goal, which is close by.", file=sys.stderr)
+    print("The arm holds its place: its motors stay on until its power is off.", flush=True)
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the program; returns its exit code."""
+    parser = connecting.parser("Show where an SO-100 or SO-101 is; with --drive it follows the page.")
+    parser.add_argument("--port", required=True, help="serial port of the arm, such as /dev/ttyACM0 or COM3")
+    parser.add_argument("--calibration", metavar="FILE.json", help="of this arm, as LeRobot writes it")
+    driving.add_options(parser)
+    parser.add_argument("--release", action="store_true", help="with --drive: switch the motors off at the end")
+    return connecting.main(parser, work, NAME, words)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
