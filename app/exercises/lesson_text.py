@@ -30,9 +30,10 @@ same fields::
     withheld = ["jacobian"]
 
 Poses and figures are the lesson's own. The scene shows `end` with the right answer; `drawn` is a pose that shows a
-wrong one, with the answer as the value of a joint. What is `withheld` is nowhere to be seen before. `arm` is one
-of the library that shows what this one cannot; a button changes to it. An `estimate` is asked before the question:
-it is a choice that looking answers.
+wrong one, with the answer as the value of a joint. Of lengths, it is two points: a bar as long as the answer leads
+from one towards the other, as in ``{ from = "tool", to = "target" }``. What is `withheld` is nowhere to be seen
+before. `arm` is one of the library that shows what this one cannot; a button changes to it. An `estimate` is asked
+before the question: it is a choice that looking answers.
 
 An `example` is worked on an arm of its own: :mod:`app.exercises.worked`.
 
@@ -58,6 +59,7 @@ from app.exercises.worked import WorkedText, read_worked
 
 _FACT = re.compile(r"([a-z][a-z0-9_]*)(?:\([a-z0-9_, ]+\))?")
 MOST_JOINTS = 12
+POINTS = ("tool", "end", "target")  # of the tool at the pose of a step, or at its end, and the step's target
 _NONE = ""  # the name of no pose and of no figure
 
 
@@ -72,13 +74,21 @@ class QuestionText:
 
 
 @dataclass(frozen=True)
+class BarText:
+    """How lengths are drawn: from a point in the direction of another, each one of `POINTS` or its coordinates."""
+
+    start: str | tuple[Expression, ...]
+    end: str | tuple[Expression, ...]
+
+
+@dataclass(frozen=True)
 class StepText:
     """A step, as in `app.viewer.lessons.guide.outline.Step`; `pose`, `end` and `figure` are names of the lesson's.
 
     Attributes:
         questions: alternatives, of which the first whose condition holds is asked; there may be none.
         estimate: what is asked before, as `questions`.
-        drawn: how a wrong joint value is drawn: the pose that has it, and the number of the joint.
+        drawn: how an answer is drawn: a joint value as the pose that has it, with the number of the joint.
         arm: when another arm is offered, and its id.
     """
 
@@ -92,7 +102,7 @@ class StepText:
     pose: str
     end: str
     figure: str
-    drawn: tuple[str, int] | None
+    drawn: tuple[str, int] | BarText | None
     arm: tuple[Expression, str] | None
 
 
@@ -119,7 +129,7 @@ class LessonText:
     @property
     def poses(self) -> frozenset[str]:
         """The names of all poses."""
-        drawn = [step.drawn[0] for step in self.steps if step.drawn is not None]
+        drawn = [step.drawn[0] for step in self.steps if isinstance(step.drawn, tuple)]
         return frozenset(name for step in self.steps for name in (step.pose, step.end) if name) | {*drawn}
 
 
@@ -201,10 +211,23 @@ def _asked(fields: Fields, name: str) -> tuple[QuestionText, ...]:
     return () if question is None else (_question(fields.sub(name)),)
 
 
-def _drawn(fields: Fields) -> tuple[str, int]:
+def _drawn(fields: Fields) -> tuple[str, int] | BarText:
+    if fields.has("from"):
+        bar = BarText(_point(fields, "from"), _point(fields, "to"))
+        fields.done()
+        return bar
     found = fields.text("pose"), fields.whole("joint", 1, MOST_JOINTS)
     fields.done()
     return found
+
+
+def _point(fields: Fields, name: str) -> str | tuple[Expression, ...]:
+    if isinstance(fields.get(name), str):
+        return fields.choice(name, POINTS)
+    at = fields.expressions(name, 3)
+    if len(at) != 3:
+        raise fields.refuse(name, fields.get(name), f"x, y and z, or one of {', '.join(POINTS)}")
+    return at
 
 
 def _arm(fields: Fields) -> tuple[Expression, str]:

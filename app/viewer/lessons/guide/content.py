@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TypeVar
 
+import numpy as np
 from markupsafe import Markup
 
 from app.exercises.expressions import Expression, Function
 from app.exercises.fields import ExerciseFileError
-from app.exercises.lesson_text import LessonText, QuestionText, StepText, lesson_files, load_lesson
+from app.exercises.lesson_text import BarText, LessonText, QuestionText, StepText, lesson_files, load_lesson
 from app.exercises.variant import Quantity, Variant
-from app.viewer.lessons.guide.outline import Drawn, Outline, Pose, Question, Step
-from kin import Robot
+from app.viewer.lessons.guide.outline import Bar, Drawn, Outline, Pose, Question, Step
+from kin import Robot, fk
 from kin.units import Units
 
 T = TypeVar("T")
@@ -91,7 +92,30 @@ class _Maker:
             raise ExerciseFileError(self.file, field, name, f"one of {', '.join(sorted(offered))}")
         return offered.get(name)
 
-    def drawn(self, name: str, joint: int) -> Drawn:
+    def drawn(self, text: StepText) -> Drawn | Bar | None:
+        """How answers to a step are drawn."""
+        match text.drawn:
+            case BarText():
+                start = self._point(text, text.drawn.start)
+                return Bar(start, self._point(text, text.drawn.end))
+            case (name, joint):
+                return self._joint(name, joint)
+        return None
+
+    def _point(self, text: StepText, given: str | tuple[Expression, ...]) -> tuple[float, ...]:
+        """A point ``(3,)``: of the arm at the pose of the step, or of the lesson."""
+        pose = self.named("pose", text.pose or "home", self.facts.poses)
+        assert pose is not None
+        if given == "end":
+            pose = self.named("end", text.end, self.facts.poses) or pose
+        if given == "target" and "target" in pose.drawing:
+            return tuple(np.reshape(np.array(pose.drawing["target"], float), (4, 4))[:3, 3].tolist())
+        if isinstance(given, str):
+            return tuple(fk(self.variant.robot, np.array(pose.q))[:3, 3].tolist())
+        there = replace(self.variant, q=np.array(pose.q))
+        return tuple(there.number(each) for each in given)
+
+    def _joint(self, name: str, joint: int) -> Drawn:
         """How a wrong value of a joint is drawn, which counts from 1."""
         pose = self.named("drawn.pose", name, self.facts.poses)
         if pose is None or joint > len(pose.q):
@@ -113,7 +137,7 @@ class _Maker:
             practice,
             self.named("figure", text.figure, self.facts.figures),
             withheld=frozenset() if asked is None else asked.withheld,
-            drawn=None if text.drawn is None else self.drawn(*text.drawn),
+            drawn=self.drawn(text),
             estimate=None if before is None else self.question(before),
             arm="" if text.arm is None or not self.holds(text.arm[0]) else text.arm[1],
         )

@@ -12,11 +12,12 @@ import numpy as np
 import viser
 
 from app.exercises.typed import EntryError
-from app.viewer.declared.scene import Node, SceneView, label
+from app.viewer.declared.scene import Node, SceneView
 from app.viewer.exercises.drawing import GHOST, Drawing
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import earlier, views
+from app.viewer.lessons.guide.answer_drawing import answer_nodes
 from app.viewer.lessons.guide.content import texts_of
 from app.viewer.lessons.guide.example_view import ExampleView
 from app.viewer.lessons.guide.lesson import Lesson
@@ -25,11 +26,9 @@ from app.viewer.lessons.guide.progress import Progress
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.status import Notice
-from app.viewer.skeleton import ghost
-from kin import InputError, Robot, fk
+from kin import InputError, Robot
 from kin.transforms import Array, from_position_wxyz
 
-WRONG, OPACITY = (213, 94, 0), 0.42  # of a copy of the arm that has a wrong answer
 JOINTS_HINT = "The sliders of the tab Move, here as well. A target is typed with Type a target, above the tabs."
 
 
@@ -343,17 +342,12 @@ class Guide(Feature):
             self._drawing.ghost(self._sheet(keys[0]).ghost, self.stage.now.robot.reach)
 
     def _draw_answer(self) -> None:
-        """What is wrong with the answer to the step on show, if the step says how it is drawn."""
+        """Where the last answer to the step on show leads, if the step says how it is drawn."""
         progress = self._progress
-        steps, key = progress.outline.steps, str(progress.at + 1)
-        drawn = steps[progress.at].drawn if progress.at < len(steps) else None
-        given, nodes = progress.given.get(key), list[Node]()
-        if drawn is not None and given is not None and not progress.is_closed(key):
-            robot, q = self.stage.now.robot, np.array(drawn.at(given))
-            nodes = [
-                ghost("arm", robot, q, WRONG, OPACITY),
-                label("words", "your answer", fk(robot, q)[:3, 3], anchor=None),
-            ]
+        steps, key, nodes = progress.outline.steps, str(progress.at + 1), list[Node]()
+        if progress.at < len(steps):
+            robot, closed = self.stage.now.robot, progress.is_closed(key)
+            nodes = answer_nodes(robot, steps[progress.at], progress.given.get(key), closed)
         self._copies.show(nodes)
 
     def _show_joints(self, on: bool) -> None:

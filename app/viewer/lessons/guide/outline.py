@@ -31,6 +31,7 @@ __all__ = [
     "LEAST",
     "PLAIN",
     "WHOLE",
+    "Bar",
     "Choice",
     "Configuration",
     "Drawn",
@@ -88,6 +89,19 @@ class Drawn:
 
 
 @dataclass(frozen=True)
+class Bar:
+    """How a length, or a speed as the way in a second, is drawn: as a bar that is as long.
+
+    Attributes:
+        start: where it begins, ``(3,)`` (m).
+        end: where the right one leads; only the direction counts.
+    """
+
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Step:
     """One step of a lesson. Opening it brings the scene to its pose, as one step of undo.
 
@@ -99,7 +113,7 @@ class Step:
         end: what the scene shows when the answer is revealed.
         practice: what to see or to do on the page then, in words that follow `shown`.
         figure: a figure that belongs to `shown`.
-        drawn: what the scene shows of a wrong answer, beside what it shows anyway.
+        drawn: what the scene shows of an answer, beside what it shows anyway.
         estimate: what is asked before the question, and answered by looking.
         arm: the id of an arm of the library that shows what the arm on show cannot; "": it can.
         withheld: facts that nothing in the page shows while the question is open:
@@ -115,7 +129,7 @@ class Step:
     practice: str = ""
     figure: Markup | None = None
     withheld: frozenset[str] = frozenset()
-    drawn: Drawn | None = None
+    drawn: Drawn | Bar | None = None
     estimate: Question | None = None
     arm: str = ""
 

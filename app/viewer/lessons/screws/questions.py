@@ -41,7 +41,12 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     }
     words = {"axis": "xyz"[axis], "last_low": str(n).translate(_INDICES)}
     far_numbers, far_words = _far(robot, found.S, units)
-    functions = {"turns": lambda joint: float(robot.revolute[int(joint) - 1])}
+    joint = far_joint(found.S)
+    nearest = np.zeros(3) if joint < 0 else foot(found.S[:, joint])
+    functions = {
+        "turns": lambda joint: float(robot.revolute[int(joint) - 1]),
+        "foot": lambda coordinate: float(nearest[int(coordinate) - 1]),
+    }
     home, zeros = as_configuration(robot.q_home), np.zeros(n)
     zero = as_configuration(zeros) if robot.in_limits(zeros) else home
     poses = {"home": Pose(home), "zero": Pose(zero, drawing=SPACE)}

@@ -1,0 +1,161 @@
+"""A student's answer acts: which kinds are drawn in the scene, and that they lead where they say.
+
+`ACTS` lists the questions of all steps whose answer is a length, a speed or an angle. Choices and counts are not drawn.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from arms import CLASSICS
+from fake_browser import FakeBrowser
+from live_server import serve_viewer
+
+import kin
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.lessons import LESSONS
+from app.viewer.lessons.guide.answer_drawing import DASHES, FARTHEST, answer_nodes
+from app.viewer.lessons.guide.outline import Bar, Drawn, Number, Step
+from app.viewer.server import ViewerServer
+from kin.units import Units
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+
+STORE = Store()
+UR5 = STORE.get("ur5")
+BAR, ARM = "a bar", "a copy of the arm"
+ACTS: dict[tuple[str, str], str] = {
+    ("dh", "Row # as a distance"): BAR,
+    ("dh", "A joint and its column"): BAR,
+    ("screws", "How far the axis is"): BAR,
+    ("equations", "The tool point"): BAR,
+    ("numeric", "The error"): BAR,
+    ("velocity", "A column"): BAR,
+    ("postures", "By hand: the ring"): BAR,
+    ("postures", "By hand: the other elbow"): ARM,
+    ("inverse", "θ₁ from above"): ARM,
+    ("inverse", "The triangle and the cosine rule"): ARM,
+    ("inverse", "θ₂ in the plane of the arm"): ARM,
+    ("inverse", "The wrist"): ARM,
+    ("inverse", "The shoulder"): ARM,
+    ("inverse", "θ₁"): ARM,
+    ("inverse", "The last joint"): ARM,
+    # Not drawn, and why.
+    ("rotations", "Roll pitch yaw"): "one of three angles: what the frame does depends on the two others",
+    ("rotations", "The same in Z-Y-Z"): "one of three angles: what the frame does depends on the two others",
+    ("rotations", "Axis and angle"): "its axis would give the answer of the next step away",
+    ("rotations", "T⁻¹"): "one coordinate of a point",
+    ("screws", "Body form"): "seen from the tool, which is not where the screws are drawn",
+    ("inverse", "The wrist centre"): "one coordinate of a point",
+    ("inverse", "Back along the last link"): "one coordinate of a point",
+    ("inverse", "The elbow on its circle"): "the radius of a circle that the step draws afterwards",
+    ("inverse", "The distance"): "the lesson draws it itself, as the side D of the triangle",
+    ("postures", "By hand: the triangle"): "an angle without its sign",
+    ("numeric", "Near a singularity"): "of no pose: the largest step that damping allows",
+    ("trajectories", "Past a singularity"): "a rate, at another place than the arm is",
+}
+
+
+def steps() -> Iterator[tuple[kin.Robot, tuple[str, str], Step]]:
+    for robot in CLASSICS:
+        for lesson in LESSONS:
+            for step in lesson.outline(robot, Units()).steps:
+                if isinstance(step.question, Number):
+                    yield robot, (lesson.key, re.sub(r"\d+", "#", step.title)), step
+
+
+def is_measured(step: Step) -> bool:
+    assert isinstance(step.question, Number)
+    unit = step.question.unit
+    return unit.is_length or unit.is_angle or unit.name in ("m/s", "°/s")
+
+
+def test_the_list_of_answers_that_act_is_complete() -> None:
+    found: dict[tuple[str, str], set[str]] = {}
+    for _, name, step in steps():
+        if is_measured(step):
+            kind = {Bar: BAR, Drawn: ARM}.get(type(step.drawn), "none")  # type: ignore[call-overload]
+            found.setdefault(name, set()).add(kind)
+    assert found.keys() == ACTS.keys()
+    assert {name: kinds for name, kinds in found.items() if kinds != {ACTS[name]} and kinds != {"none"}} == {}
+    assert {name for name, kinds in found.items() if kinds == {"none"}} == {
+        name for name, how in ACTS.items() if how not in (BAR, ARM)
+    }
+
+
+def test_a_right_bar_leads_from_one_point_to_the_other() -> None:
+    count = 0
+    for robot, name, step in steps():
+        if not isinstance(step.drawn, Bar) or not is_measured(step) or name[1] == "By hand: the ring":
+            continue
+        assert isinstance(step.question, Number)
+        far = float(np.linalg.norm(np.subtract(step.drawn.end, step.drawn.start)))
+        assert far == pytest.approx(step.question.answer, abs=1e-6 + 0.1 * step.question.tolerance), (
+            robot.id,
+            name,
+        )
+        count += 1
+    assert count > 60
+
+
+def test_true_and_wrong_differ_in_colour_line_and_length() -> None:
+    outline = next(lesson for lesson in LESSONS if lesson.key == "equations").outline(UR5, Units())
+    step = next(each for each in outline.steps if each.title == "The tool point")
+    assert isinstance(step.question, Number)
+    assert isinstance(step.drawn, Bar)
+    right, wrong = step.question.answer, 0.7 * step.question.answer
+    assert answer_nodes(UR5, step, None, closed=False) == []
+    shown = {node.key: node for node in answer_nodes(UR5, step, wrong, closed=False)}
+    assert shown.keys() == {"wrong", "wrong-words"}, "the right one is not given away"
+    assert shown["wrong-words"].props["text"] == f"your answer: {step.question.unit.text(wrong)}"
+    assert [node.key for node in answer_nodes(UR5, step, right, closed=True)] == ["right", "right-words"]
+    both = {node.key: node for node in answer_nodes(UR5, step, wrong, closed=True)}
+    assert len(both) == 4
+    lines = {key: both[key].props["points"] for key in ("wrong", "right")}
+    assert (len(lines["wrong"]), len(lines["right"])) == (DASHES, 1), "broken and whole"
+    assert both["wrong"].props["colors"] != both["right"].props["colors"]
+    for key, value in (("wrong", wrong), ("right", right)):
+        assert np.linalg.norm(lines[key][-1][1] - lines[key][0][0]) == pytest.approx(value, rel=1e-5)
+    assert np.allclose(lines["right"][0], [step.drawn.start, step.drawn.end], atol=1e-6)
+
+
+@pytest.mark.parametrize("given", [1e300, -1e300, 0.0])
+def test_answers_of_any_size_stay_in_the_picture(given: float) -> None:
+    outline = next(lesson for lesson in LESSONS if lesson.key == "equations").outline(UR5, Units())
+    step = next(each for each in outline.steps if each.title == "The tool point")
+    bar, words = answer_nodes(UR5, step, given, closed=False)
+    points = bar.props["points"]
+    assert np.isfinite(points).all()
+    assert np.abs(points).max() < (FARTHEST + 1) * UR5.reach
+    assert "your answer" in words.props["text"]
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[int]:
+    with serve_viewer(ViewerServer(STORE, Settings(), Clouds())) as port:
+        yield port
+
+
+def test_a_typed_length_is_drawn_and_the_right_one_only_when_it_is_on_show(server: int) -> None:
+    def nodes(tab: FakeBrowser) -> set[str]:
+        found = (name for name in tab.nodes if name.startswith("/answer-") and tab.visible.get(name, True))
+        return {name.split("/")[-1].partition("~")[0] for name in found} - {""}
+
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.choose(UR5.name)
+        tab.set("Lesson", "Numeric IK")
+        tab.wait(lambda: "1. The error" in tab.html)
+        tab.say("feature", ["guide", ["fields", "1", 1], [["0.9 m"]]])
+        tab.wait(lambda: "wrong" in nodes(tab))
+        assert "right" not in nodes(tab)
+        assert any("your answer: 900" in str(m["props"].get("text")) for m in tab.nodes.values())
+        tab.say("feature", ["guide", ["reveal", "1", 2], None])
+        tab.wait(lambda: {"wrong", "right"} <= nodes(tab))
+        tab.say("feature", ["guide", ["go", 3], 1])
+        tab.wait(lambda: not nodes(tab) & {"wrong", "right"})
