@@ -1,6 +1,7 @@
 """A student's answer acts: which kinds are drawn in the scene, and that they lead where they say.
 
-`ACTS` lists the questions of all steps whose answer is a length, a speed or an angle. Choices and counts are not drawn.
+`ACTS` lists the questions of all steps whose answer is a length, a speed or an angle. Choices and counts are not
+drawn.
 """
 
 from __future__ import annotations
@@ -48,13 +49,13 @@ ACTS: dict[tuple[str, str], str] = {
     # Not drawn, and why.
     ("rotations", "Roll pitch yaw"): "one of three angles: what the frame does depends on the two others",
     ("rotations", "The same in Z-Y-Z"): "one of three angles: what the frame does depends on the two others",
-    ("rotations", "Axis and angle"): "its axis would give the answer of the next step away",
+    ("rotations", "Axis and angle"): "it would take a frame that is turned about the axis of the whole rotation",
     ("rotations", "T⁻¹"): "one coordinate of a point",
     ("screws", "Body form"): "seen from the tool, which is not where the screws are drawn",
     ("inverse", "The wrist centre"): "one coordinate of a point",
     ("inverse", "Back along the last link"): "one coordinate of a point",
-    ("inverse", "The elbow on its circle"): "the radius of a circle that the step draws afterwards",
-    ("inverse", "The distance"): "the lesson draws it itself, as the side D of the triangle",
+    ("inverse", "The elbow on its circle"): "the radius of a circle, which has no direction",
+    ("inverse", "The distance"): "made by the code of the lesson, which draws angles only",
     ("postures", "By hand: the triangle"): "an angle without its sign",
     ("numeric", "Near a singularity"): "of no pose: the largest step that damping allows",
     ("trajectories", "Past a singularity"): "a rate, at another place than the arm is",
