@@ -38,6 +38,9 @@ PIECE: Final = 512  # bytes parsed before frames are counted: at most 85 frames
 MAX_FRAGMENTS: Final = 64  # of one message
 ROOM_PING: Final = 2.0  # seconds from an answer to the next ping, of a browser in a room: who is away is soon seen
 LIVE_PING: Final = 2.0  # the same of a page's program: the page shows how long an answer takes
+MAX_LIVE: Final = 2 << 20  # bytes of a program's message: what is too large is refused in words, up to this size
+SMALL: Final = 64 * 1024  # bytes of a message that costs no more than any other
+LARGE_COST: Final = 1 / 8192  # of each byte of a larger one, in messages: 1 MiB costs half a second of them
 LINGER: Final = 5.0  # seconds between two looks whether a line is still slow
 
 
@@ -154,6 +157,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
                 self.scope["state"][SILENCE] = self._silence
                 self.scope["state"][DELAY] = self._delay
                 if LIVE in event.path:
+                    self.conn.max_message_size = MAX_LIVE
                     self.ping_interval = min(LIVE_PING, self.ping_interval or LIVE_PING)
                 if any(COOKIE in value for value in event.headers.get_all("Cookie")):
                     self.ping_interval = min(ROOM_PING, self.ping_interval or ROOM_PING)
@@ -174,15 +178,15 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         self.transport.close()
 
     def handle_text(self, event: Frame) -> None:
-        self._spend(1.0 if event.fin else CONTROL_COST)
+        self._spend(_cost(event, 1.0 if event.fin else CONTROL_COST))
         super().handle_text(event)
 
     def handle_bytes(self, event: Frame) -> None:
-        self._spend(1.0 if event.fin else CONTROL_COST)
+        self._spend(_cost(event, 1.0 if event.fin else CONTROL_COST))
         super().handle_bytes(event)
 
     def handle_cont(self, event: Frame) -> None:
-        self._spend(CONTROL_COST)
+        self._spend(_cost(event, CONTROL_COST))
         super().handle_cont(event)
         if len(self.frames) > MAX_FRAGMENTS:
             self.conn.fail(CloseCode.MESSAGE_TOO_BIG, f"more than {MAX_FRAGMENTS} fragments")
@@ -240,6 +244,12 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
     def _note_unread(self) -> None:
         seconds = f"{self.guard.send_timeout:g} s (KINBOARD_SEND_TIMEOUT)"
         self.guard.note("unread", f"{self._host} read nothing from a websocket for {seconds} and is disconnected")
+
+
+def _cost(event: Frame, least: float) -> float:
+    """What a frame costs, in messages."""
+    size = len(event.data)
+    return least if size <= SMALL else max(least, size * LARGE_COST)
 
 
 def _is_utf8(data: bytes) -> bool:

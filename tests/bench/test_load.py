@@ -188,6 +188,16 @@ def test_a_siege_counts_what_visitors_and_attackers_met(service, monkeypatch):
     assert not any("lost" in wrong for wrong in report["left behind"])
 
 
+def test_programs_of_pages_attack(service, monkeypatch):
+    monkeypatch.setattr(attackers, "FLOOD", 2.0)
+    rounds = {attack.name: attack.round for attack in attackers.ATTACKS}
+    guessing, flooding = (attackers.Attacker(service.port, "", f"127.0.1.{k}") for k in (1, 2))
+    asyncio.run(rounds["codes of pages"](guessing))
+    assert guessing.statuses["101"] == 10
+    asyncio.run(rounds["programs of pages"](flooding))
+    assert flooding.sent > 2e6, "messages of 1 MB were sent, and taken"
+
+
 def late(port: int, token: str, seconds: float, report: Connection, *_: object) -> None:
     """Attackers who get few turns."""
     report.send(None)

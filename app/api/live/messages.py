@@ -167,7 +167,9 @@ class Message:
 
 
 def id_of(text: str) -> int | None:
-    """The `id` of a message that is wrong in another field."""
+    """The `id` of a message that is wrong in another field; None also for one that is too large to be read."""
+    if len(text) > MOST_BYTES:
+        return None
     try:
         found = parsed(text.encode("utf-8", "replace"))
     except ProblemError:
@@ -179,13 +181,12 @@ def id_of(text: str) -> int | None:
 def read(text: str, robot: Robot, store: Store) -> Message:
     """Read a message for a page that shows this robot; raises `ProblemError` naming the field."""
     if len(text) > MOST_BYTES or len(text.encode("utf-8", "replace")) > MOST_BYTES:
-        error = FieldError(
-            field="message", value=f"{len(text)} characters", expected=f"at most {MOST_BYTES} bytes"
-        )
+        size = len(text.encode("utf-8", "replace"))
+        error = FieldError(field="message", value=f"{size} bytes", expected=f"at most {MOST_BYTES} bytes")
         raise ProblemError(
             413,
             "body-too-large",
-            f"The message is larger than {MOST_BYTES} bytes.",
+            f"The message has {size} bytes, more than {MOST_BYTES}.",
             "Send less at a time.",
             [error],
         )

@@ -21,7 +21,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from app.api.body import LARGE, versioned
 from app.api.live.answers import news, welcome
-from app.api.live.messages import USUAL_RATE, Message, id_of, read
+from app.api.live.messages import MOST_BYTES, USUAL_RATE, Message, id_of, read
 from app.api.problems import ProblemError, internal_error, invalid
 from app.api.websockets import DONE, FAILED, POLICY, accept, close
 from app.api.work import Deadline
@@ -219,7 +219,7 @@ class Conversation:
 
     async def _message(self, text: str) -> Message:
         state, robot = self._visitor.app.state, self._line.robot
-        if len(text) < LARGE:
+        if len(text) < LARGE or len(text) > MOST_BYTES:  # that is refused at once
             return read(text, robot, state.store)
 
         def in_turn() -> Message:

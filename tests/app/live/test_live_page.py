@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from live_server import wait_for
+from playwright._impl._driver import compute_driver_executable
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
@@ -303,6 +305,27 @@ def test_the_example_of_the_documents_runs(viewer, page, program, capsys):
     assert capsys.readouterr().out.startswith("UR5 ['")
     page.settle()
     assert page.tool_pose() == pytest.approx(kin.fk(ARM, [0.0, -1.2, 1.4, -0.99, 0.5, 0.0]), abs=1e-5)
+
+
+def test_the_example_in_javascript_runs(viewer, page, program, tmp_path):
+    program.socket.close()
+    page.wait(lambda: 'data-live=""' in page.html)
+    (code,) = re.findall(r"```js\n(.*?)```", DOCUMENT, re.DOTALL)
+    script = tmp_path / "first.js"
+    script.write_text(code.replace("127.0.0.1:8000", f"127.0.0.1:{viewer}").replace("K7QF-2M4A", program.code))
+    node = compute_driver_executable()[0]  # of Playwright
+    said = tmp_path / "said"
+    with said.open("w") as out, subprocess.Popen([node, script], stdout=out, stderr=out) as process:
+        try:
+            page.wait(lambda: 'data-live="first.js"' in page.html)
+            page.wait(lambda: bool(np.allclose(page.tool_pose(), kin.fk(ARM, [0.1] * 6), atol=1e-5)))
+            wait_for(lambda: re.search(r"\[\s*(0\.1,\s*){5}0\.1\s*\]", said.read_text()) is not None)
+            page.say("undo")  # the visitor changes it, and the program hears that
+            wait_for(lambda: re.search(r"\[\s*3\.14\d*,[^\]]*\]\s*$", said.read_text()) is not None)
+            press(page, "Withdraw the code")
+            assert process.wait(20) == 0, "it ends with its connection"
+        finally:
+            process.kill()
 
 
 def app_schemas() -> set[str]:

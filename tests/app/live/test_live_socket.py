@@ -241,13 +241,38 @@ def test_large_messages_are_refused_and_huge_ones_end_the_connection(page, port)
         said = heard(program, "problem")["problem"]
         assert said["type"].endswith("body-too-large")
         assert said["errors"][0]["expected"] == "at most 65536 bytes"
-        program.send(json.dumps({"q": [0.0] * 200_000}))
+        for size in (1_000_000, 2 << 20):
+            text = json.dumps({"id": 5, "draw": {}})
+            program.send(text + " " * (size - len(text)))
+            said = heard(program, "problem")["problem"]
+            assert said["status"] == 413
+            assert said["errors"][0] == {
+                "field": "message",
+                "value": f"{size} bytes",
+                "expected": "at most 65536 bytes",
+            }
+        say(program, id=6, q=[0.3] * 6)
+        assert heard(program, "done")["id"] == 6
+        page.taken.clear()
+        program.send(json.dumps({"q": [0.0] * 500_000}))
         with pytest.raises(ConnectionClosed) as end:
             heard(program, "done")
         assert end.value.rcvd is not None
         assert end.value.rcvd.code == 1009
     wait_for(lambda: page.line.program is None)
     assert "q" not in page.taken
+
+
+def test_large_messages_wait_for_their_turn(page, port):
+    """A message of 2 MiB costs as much as 256 others: two may come at once, the next ones one a second."""
+    with call(port, page.line.code) as program:
+        heard(program, "welcome")
+        began = time.monotonic()
+        for _ in range(4):
+            program.send(" " * (2 << 20))
+        for _ in range(4):
+            assert heard(program, "problem")["problem"]["status"] == 413
+        assert time.monotonic() - began > 1.0
 
 
 def test_too_many_messages_a_second_are_refused_aloud_and_the_last_one_counts(page, port):

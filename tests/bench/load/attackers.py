@@ -23,6 +23,7 @@ from multiprocessing.connection import Connection
 
 import msgspec
 
+from load.live import Programmed
 from load.raw import frame, handshake, request
 from load.visitor import SUBPROTOCOL, Visitor
 
@@ -299,6 +300,32 @@ async def _reconnect(attacker: Attacker) -> None:
         await attacker.read(connection, until_closed=False)
 
 
+LIVE = "/api/v1/live/"
+
+
+async def _codes(attacker: Attacker) -> None:
+    """Programs that try codes of pages, ten a round; every second round without a token."""
+    token = attacker.token if attacker.rounds % 2 else ""
+    for _ in range(10):
+        code = "".join(random.choices("ABCDEFGHJKLMNPQRSTUVWXYZ23456789", k=8))
+        async with attacker.line(handshake(f"{LIVE}{code}?name=guess", token=token)) as connection:
+            for _ in ("handshake", "problem"):
+                await attacker.read(connection, until_closed=False)
+
+
+async def _program(attacker: Attacker) -> None:
+    """A program of a page of its own: too many messages, then messages of 1 MB; it reads no answers."""
+    visitor = Programmed(attacker.token, attacker.source)
+    try:
+        await visitor.connect(attacker.port)
+        attacker.sent += await visitor.flood(FLOOD / 2, json.dumps({"q": [0.1] * 5, "id": 1}))
+        attacker.sent += await visitor.flood(
+            FLOOD / 2, json.dumps({"draw": {"a": {"points": [[0.1] * 3] * 70_000}}})
+        )
+    finally:
+        visitor.close()
+
+
 STREAM = f"{API}/pioneer5/workspace/stream?n=50000000"
 ATTACKS = (
     Attack("requests sent ahead", _pipeline, 4, 0.1),
@@ -321,6 +348,8 @@ ATTACKS = (
     Attack("frames, stream", _frames(STREAM, True), 2, 0.5),
     Attack("malformed messages", _malformed, 2, 0.5),
     Attack("reconnects", _reconnect, 2, 0.25),
+    Attack("codes of pages", _codes, 2, 0.5),
+    Attack("programs of pages", _program, 2, 0.5),
 )
 
 

@@ -8,6 +8,7 @@ import re
 from typing import Any
 
 from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
 
 from load import table
 from load.drag import measure
@@ -21,10 +22,10 @@ _CODE = re.compile(r"data-live-code>([A-Z0-9-]+)<")
 class Programmed(Visitor):
     """A tab whose arm a program moves, as far as the hand of a visitor would."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    def __init__(self, token: str = "", source: str = "127.0.0.1") -> None:
+        super().__init__(token, source)
         self._code = ""
-        self._program: ClientConnection
+        self._program: ClientConnection | None = None
         self._q: list[float] = []
         self._sending: set[asyncio.Task[None]] = set()
 
@@ -37,11 +38,27 @@ class Programmed(Visitor):
             while not self._code:
                 await asyncio.sleep(0.02)
         address = f"ws://127.0.0.1:{port}/api/v1/live/{self._code}?name=load"
-        self._program = await connect(address, proxy=None, compression=None)
+        headers = {"Authorization": f"Bearer {self._token}"} if self._token else {}
+        self._program = await connect(
+            address, proxy=None, compression=None, additional_headers=headers, local_addr=(self._source, 0)
+        )
         joints = json.loads(await self._program.recv())["robot"]["joints"]
         self._q = [0.5 * (joint["lower"] + joint["upper"]) for joint in joints]
         await self._program.send(json.dumps({"q": self._q}))
         await asyncio.sleep(0.3)
+
+    async def flood(self, seconds: float, text: str) -> int:
+        """Send the same message over and over, as fast as it is taken; answers are not read. Returns the bytes."""
+        assert self._program is not None
+        sent = 0
+        try:
+            async with asyncio.timeout(seconds):
+                while True:
+                    await self._program.send(text)
+                    sent += len(text)
+        except (TimeoutError, ConnectionClosed):
+            pass
+        return sent
 
     def grab(self) -> None:
         """Take the arm as it is."""
@@ -52,11 +69,13 @@ class Programmed(Visitor):
         """Nothing is held."""
 
     def close(self) -> None:
-        """End the program, then the tab."""
-        self._program.transport.abort()
+        """End the program, if it is connected, then the tab."""
+        if self._program is not None:
+            self._program.transport.abort()
         super().close()
 
     def _turn_to(self, angle: float) -> None:
+        assert self._program is not None
         q = [self._q[0] + angle, *self._q[1:]]
         task = asyncio.ensure_future(self._program.send(json.dumps({"q": q})))
         self._sending.add(task)
