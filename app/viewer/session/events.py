@@ -83,7 +83,7 @@ RULES: Final[dict[str, Rule]] = {
     "looked": Rule(step=False),
     "resized": Rule(step=False),
     # What is open, and the history
-    "lesson": Rule("Lesson", message=True, act=True),
+    "lesson": Rule("Lesson", message=True, act=True, follows=True),
     "feature": Rule(message=True, act=True),
     "news": Rule(step=False),
     "undo": Rule(step=False, message=True, act=True, replaces=True),

@@ -4,7 +4,8 @@ Compiling takes seconds. If an event were handled before that, the page would st
 is held, the status card says what is being prepared, and the page can be used meanwhile.
 
 A page that opens with a stored state of such an arm shows another arm until then. Joint values and targets typed
-meanwhile, and what a program sends, are meant for the stored state: they wait too, and are applied to it.
+meanwhile, what a program sends, and a lesson that is chosen are meant for the stored state: they wait too, and are
+applied to it.
 """
 
 from __future__ import annotations
@@ -93,9 +94,11 @@ class Preparing:
         for name in list(self._held):
             rule = RULES[name_of(name)]
             if rule.replaces or (linked and rule.follows):
-                del self._held[name]
+                held = self._held.pop(name)
                 if name == "live":  # a program learns what became of it
                     self._page.post(name, None)
+                elif name_of(name) == "lesson":  # which any arm can have
+                    self._page.post(held.key, held.value)
 
     def _hold(self, event: Hashable, held: _Held) -> None:
         self._held.pop(event, None)
@@ -113,7 +116,11 @@ class Preparing:
         held = list(self._held.values())[-1]
         done, of = self._preparation.steps(held.parts)
         step = f"step {min(done + 1, of)} of {of}"
-        follows = " Joint values and targets typed meanwhile are applied then." if LINK in self._held else ""
+        follows = (
+            " Typed joint values and targets, and the lesson you choose, are applied then."
+            if LINK in self._held
+            else ""
+        )
         self._page.status.wait(
             f"Preparing {held.what} for the first time on this machine: {step}. This continues by itself.{follows}"
         )

@@ -166,7 +166,7 @@ def test_what_is_typed_before_the_arm_of_a_link_is_compiled_is_applied_to_that_a
     link = encode(PageState(robot="puma560", lesson="velocity"))
     with FakeBrowser(port, memory=json.dumps({"state": link})) as tab:
         waits_for(tab, "the PUMA 560")
-        assert "Joint values and targets typed meanwhile are applied then." in tab.html
+        assert "Typed joint values and targets, and the lesson you choose, are applied then." in tab.html
         (wrist,), (turn,), (bend,) = (sliders(tab, label(PIONEER, i)) for i in (4, 3, 1))
         tab.say("field", [wrist, "12.5"])
         tab.say("field", [turn, "7"])
@@ -197,13 +197,38 @@ def test_a_target_typed_before_the_arm_of_a_link_is_compiled_is_solved_with_that
         assert np.allclose(tab.tool_pose(), T, atol=1e-6)
 
 
+def test_a_lesson_chosen_before_the_arm_of_a_link_is_compiled_opens_with_that_arm(port, preparation):
+    link = encode(PageState(robot="puma560", lesson="velocity"))
+    with FakeBrowser(port, memory=json.dumps({"state": link})) as tab:
+        waits_for(tab, "the PUMA 560")
+        tab.set("Lesson", "Screws")
+        tab.settle()
+        compile_parts(preparation, parts())
+        tab.wait(lambda: "Preparing" not in tab.html)
+        tab.settle()
+        assert tab.value("Robot") == PUMA.name
+        assert tab.value("Lesson") == "Screws", "it is not lost to that of the link"
+        assert 'data-lesson="Screws"' in tab.html
+
+
+def test_a_lesson_chosen_for_a_link_opens_with_another_robot_that_is_chosen_instead(port, preparation):
+    with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(robot="ur5"))})) as tab:
+        waits_for(tab, "the UR5")
+        tab.set("Lesson", "Screws")
+        tab.set("Robot", PLANAR.name)
+        waits_for(tab, f"the {PLANAR.name}")
+        compile_parts(preparation, parts())
+        tab.wait(lambda: "Preparing" not in tab.html and 'data-lesson="Screws"' in tab.html)
+        assert tab.value("Robot") == PLANAR.name
+
+
 def test_another_robot_ends_the_waiting_of_what_was_typed_for_a_link(port, preparation):
     with FakeBrowser(port, memory=json.dumps({"state": encode(PageState(robot="ur5"))})) as tab:
         waits_for(tab, "the UR5")
         tab.say("field", [tab.element(label(PIONEER, 1)), "45"])
         tab.set("Robot", PLANAR.name)
         waits_for(tab, f"the {PLANAR.name}")
-        assert "typed meanwhile" not in tab.html
+        assert "applied then" not in tab.html
         compile_parts(preparation, parts())
         tab.wait(lambda: "Preparing" not in tab.html)
         tab.settle()
