@@ -88,7 +88,8 @@ class Rounded7(Rounded):
         else:
             bits = _choose()(self.robot.model, p.T, setting, limits, arcs, places, rows)
             missed = (bits >> np.arange(8)) & 1 > 0
-            within = np.isin(np.arange(8), arcs[:, 0])  # a row outside the limits may be lost
+            within = np.zeros(8, dtype=bool)
+            within[arcs[:, 0].astype(int)] = True  # a row outside the limits may be lost
             known = within if p.respect_limits else known | within
         sure &= not (missed & known).any() and _are_apart(rows[:, :7])
         gap, obstacle = 0.0, None
