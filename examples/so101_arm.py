@@ -187,6 +187,11 @@ def port_problem(port: str, error: Exception) -> str:
     return f"{port} cannot be opened: {error}"
 
 
+def moving(robot: kin.Robot) -> list[kin.Motor]:
+    """The motors that move a joint."""
+    return [motor for motor in robot.motors if motor.joint]
+
+
 def motors_of(robot: kin.Robot, options: Namespace) -> kin.Robot:
     """The arm with motors whose ticks are understood; raises `kin.KinematicsError`."""
     if options.calibration is not None:
@@ -194,9 +199,8 @@ def motors_of(robot: kin.Robot, options: Namespace) -> kin.Robot:
         if not robot.motors:
             print("The page's arm states no motors: signs + and zeros in the middle of the ranges are assumed.")
         robot = replace(robot, motors=kin.motors_from_lerobot(robot, text))
-    moving = [motor for motor in robot.motors if motor.joint]
-    bare = [motor for motor in moving if motor.range is None and motor.unit != "ticks"]
-    if bare or {motor.joint for motor in moving} != {joint.name for joint in robot.joints}:
+    bare = [motor for motor in moving(robot) if motor.range is None and motor.unit != "ticks"]
+    if bare or {motor.joint for motor in moving(robot)} != {joint.name for joint in robot.joints}:
         lacking = f"no calibrated range of {', '.join(map(named, bare))}" if bare else "not a motor for each joint"
         raise kin.KinematicsError(
             f"{robot.name} has {lacking}: --calibration FILE.json gives those of LeRobot, which keeps them in "
@@ -213,15 +217,30 @@ class Servos:
         robot: the arm with these motors.
     """
 
-    def __init__(self, bus: Bus, robot: kin.Robot, motors: Sequence[kin.Motor]) -> None:
-        self._bus, self._robot, self._motors = bus, robot, motors
-        ends = [motor.range or (0, motor.ticks - 1) for motor in motors]
+    def __init__(self, bus: Bus, robot: kin.Robot) -> None:
+        self._bus, self._robot = bus, robot
+        self._motors = moving(robot)
+        ends = [motor.range or (0, motor.ticks - 1) for motor in self._motors]
         self._ends = np.array(ends, dtype=float).T
 
     def read(self) -> Array:
         """The configuration of the arm ``(n,)``, radians."""
-        readings = kin.readings_of_ticks(self._motors, self._bus.positions())
-        return kin.q_of_readings(self._robot, readings)
+        return kin.q_of_readings(self._robot, self._readings())
+
+    def _readings(self) -> Array:
+        return kin.readings_of_ticks(self._motors, self._bus.positions())
+
+    def show(self, page: Any, shown: kin.Robot) -> None:
+        """Send where the arm is: as readings, for *Match motors*, where the page's arm has these motors."""
+        readings = self._readings()
+        own = {
+            (motor.id, motor.joint, motor.unit): value for motor, value in zip(self._motors, readings, strict=True)
+        }
+        theirs = [(motor.id, motor.joint, motor.unit) for motor in moving(shown)]
+        if theirs and set(theirs) == set(own):
+            page.readings = [own[motor] for motor in theirs]
+        else:
+            page.measured = kin.q_of_readings(self._robot, readings)
 
     def write(self, q: Array) -> None:
         """Lead the servos to a configuration ``(n,)``, within their calibrated ranges."""
@@ -240,41 +259,53 @@ def work(page: Any, options: Namespace) -> None:
     """Show where the arm is, and let it follow, until the connection to the page ends."""
     arm = page.robot
     robot = motors_of(arm, options)
-    motors = [motor for motor in robot.motors if motor.joint]
-    bus = Bus(options.port, motors)
+    bus = Bus(options.port, moving(robot))
     try:
         bus.check()
-        servos = Servos(bus, robot, motors)
-        print(f"{len(motors)} servos answer at {options.port}.", flush=True)
+        servos = Servos(bus, robot)
+        print(f"{robot.n} servos answer at {options.port}.", flush=True)
         if options.drive:
             drive(page, arm, bus, servos, options)
         else:
-            mirror(page, arm, servos, options)
+            mirror(page, arm, bus, options)
     finally:
         bus.close()
 
 
-def mirror(page: Any, arm: kin.Robot, servos: Servos, options: Namespace) -> None:
-    """Read the servos again and again, and nothing else."""
+def mirror(page: Any, arm: kin.Robot, bus: Bus, options: Namespace) -> None:
+    """Read the servos again and again, and nothing else; the page may change the signs and zeros of its motors."""
     began, lost = time.monotonic(), ""
+    servos, shown = Servos(bus, motors_of(arm, options)), arm
     while options.seconds is None or time.monotonic() - began < options.seconds:
-        if page.robot != arm:
-            raise kin.KinematicsError(f"the page shows {page.robot.name} now: start again for this arm")
+        if (now := page.robot) != shown:
+            if [joint.name for joint in now.joints] != [joint.name for joint in arm.joints]:
+                raise kin.KinematicsError(f"the page shows {now.name} now: start again for this arm")
+            servos, shown = Servos(bus, motors_of(now, options)), now
         try:
-            page.measured = servos.read()
+            servos.show(page, shown)
+        except kin.InputError:
+            if page.robot == shown:
+                raise  # else the page has just changed its arm
         except BusError as error:
             if "gone" in str(error):
                 raise
             if str(error) != lost:
                 lost = str(error)
                 print(f"{lost}. The ghost is hidden meanwhile.", flush=True)
-            page.measured = None
+            hide(page, shown)
             time.sleep(RESTING)
         else:
             if lost:
                 print("All servos answer again.", flush=True)
             lost = ""
         time.sleep(CYCLE)
+
+
+def hide(page: Any, shown: kin.Robot) -> None:
+    """Remove the ghost: nobody knows where the arm is."""
+    if moving(shown):
+        page.readings = None
+    page.measured = None
 
 
 def drive(page: Any, arm: kin.Robot, bus: Bus, servos: Servos, options: Namespace) -> None:

@@ -126,6 +126,19 @@ def test_the_mirror_shows_the_encoders_and_writes_nothing(page, bus, run):
     assert bus.refused == []
 
 
+def test_match_motors_takes_what_the_servos_read(page, bus, run):
+    run()
+    page.wait(lambda: shows(page, bus))
+    page.set("All motors", "Match motors")
+    page.wait(lambda: 'data-motors-pose="1"' in page.html)
+    page.wait(lambda: "Read program" in str(page.gui[page.element("Poses")]["props"]))
+    page.set("Poses", "Read program")
+    page.wait(lambda: page.value("Readings") != "")
+    found = [float(word) for word in page.value("Readings").split()]
+    assert found == pytest.approx(degrees(dict(enumerate(TICKS, 1))) * 4096.0 / 4095.0, abs=1e-6)
+    assert bus.written == []
+
+
 def test_broken_packets_are_asked_for_again(page, bus, run, capsys):
     started = run()
     page.wait(lambda: shows(page, bus))
