@@ -97,7 +97,7 @@ def press(page, name, *index, value=None):
 def test_a_program_of_the_page_is_followed_and_measured(viewer, page, tmp_path, capsys):
     """The ghost is behind the commanded arm; the terminal has the errors, the files have all values."""
     plot, table = tmp_path / "tracking.svg", tmp_path / "tracking.csv"
-    words = [code_of(page), "--address", f"http://127.0.0.1:{viewer}", "--payload", "2", "--seconds", "4.5"]
+    words = [code_of(page), "--address", f"http://127.0.0.1:{viewer}", "--payload", "2"]
     codes = []
     thread = threading.Thread(
         target=lambda: codes.append(mujoco_arm.main([*words, "--plot", str(plot), "--csv", str(table)]))
@@ -112,10 +112,18 @@ def test_a_program_of_the_page_is_followed_and_measured(viewer, page, tmp_path, 
     page.wait(lambda: any(" N m of " in text for text in drawn(page, "LabelMessage")))
     assert len(drawn(page, "LineSegmentsMessage")) == 2
     assert len(drawn(page, "PointCloudMessage")) == 1
+    said = ""
+
+    def measured() -> bool:
+        nonlocal said
+        said += capsys.readouterr().out
+        return "Saved: " in said
+
+    page.wait(measured)
+    page.send("GuiUpdateMessage", uuid=page.element("Withdraw the code"), updates={"value": True})
     thread.join(30.0)
     page.settle()
-    assert codes == [0]
-    said = capsys.readouterr().out
+    assert codes == [1]
     assert "Payload: 2 kg at the tool." in said
     assert re.search(r"Program 1: .* Largest error: \d+\.\d° at \w+.* N m of (150|28) N m\.", said), said
     with table.open() as stream:
@@ -128,7 +136,7 @@ def test_a_program_of_the_page_is_followed_and_measured(viewer, page, tmp_path, 
     assert commanded[-1] == pytest.approx(FAR + 0.4, abs=1e-4)
     assert commanded.max(axis=0)[0] - commanded.min(axis=0)[0] > 0.39
     error = np.abs(commanded - measured).max()
-    assert 0.005 < error < 0.4
+    assert 0.005 < error < 1.5
     assert f"Largest error: {np.degrees(error):.1f}°" in said
     assert (np.diff(t[:, 0]) > 0.0).all()
     assert (np.abs(torque) <= [150, 150, 150, 28, 28, 28]).all()
@@ -151,12 +159,18 @@ def test_what_goes_wrong_is_one_line(viewer, page, capsys):
     assert "argument --payload: got '-1', expected a number that is 0 or more" in capsys.readouterr().err
 
 
-def test_ctrl_c_ends_cleanly(viewer, page, capsys):
-    code = code_of(page)
-    timer = threading.Timer(1.0, interrupt_main)
-    timer.start()
-    assert mujoco_arm.main([code, "--address", f"http://127.0.0.1:{viewer}"]) == 0
-    timer.join()
+def test_ctrl_c_ends_cleanly(viewer, page, monkeypatch, capsys):
+    steps, advance = [], Simulation.advance
+
+    def interrupted(arm, q, seconds) -> None:
+        advance(arm, q, seconds)
+        steps.append(seconds)
+        if len(steps) == 30:
+            interrupt_main()
+
+    monkeypatch.setattr(Simulation, "advance", interrupted)
+    assert mujoco_arm.main([code_of(page), "--address", f"http://127.0.0.1:{viewer}"]) == 0
+    assert len(steps) == 30
     assert capsys.readouterr().out.endswith("Ended.\n")
     page.settle()
     assert "data-live-measured" not in page.html

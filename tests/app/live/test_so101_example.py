@@ -215,8 +215,8 @@ def test_a_driven_arm_starts_where_it_is_and_follows_slowly(page, bus, run, pati
     moving = np.flatnonzero(np.diff(goals) > 0)
     assert seconds > 0.9
     steps = np.diff(goals)[moving] * TURN / np.diff(times)[moving]
-    assert np.median(steps) < 1.3 * SPEED
-    assert (goals[-1] - goals[0]) * TURN / (times[moving[-1] + 1] - times[moving[0]]) < 1.15 * SPEED
+    assert np.median(steps) < 2.0 * SPEED
+    assert (goals[-1] - goals[0]) * TURN / (times[moving[-1] + 1] - times[moving[0]]) < 1.5 * SPEED
     assert abs(bus.servos[2].position - TICKS[1]) <= 2
     assert bus.refused == []
     started.end(page)
