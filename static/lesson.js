@@ -11,6 +11,7 @@
     const detail = { kind, value };
     if (feature === "exercises" && ANSWERS.includes(kind)
       && !dispatchEvent(new CustomEvent("kinboard-answer", { detail, cancelable: true }))) return;
+    expectWords(node, kind);
     viserPage.send("feature", [feature, [kind, ...rest, ++serial], value]);
   }
 
@@ -83,17 +84,50 @@
       ?? block?.querySelector(".kb-guide-turn button:last-child") ?? block?.querySelector("[data-first]");
     node?.focus({ preventScroll: true });
   }
-  // What has just been opened is seen from its head: a course's bar, an exercise, the list of a course.
-  let open = "";
+  // What is said to an answer is seen, with its reason, unless the visitor has gone on meanwhile.
+  let expected = null; // { words, before }: where it will be, and what is there now
+  const wordsAt = (selector) => [...document.querySelectorAll(selector)].find((node) => node.textContent && node.getClientRects().length);
+  function expectWords(node, kind) {
+    if (![...ANSWERS, "check", "reveal"].includes(kind)) return;
+    const key = node.closest("[data-question]")?.dataset.question;
+    const words = key === undefined ? "[data-exercises-verdict], [data-feedback=assign]" : `[data-feedback="${key}"]`;
+    const said = wordsAt(words); // the same answer is answered in the same words
+    said?.scrollIntoView({ block: "nearest" });
+    expected = { words, before: said?.textContent };
+  }
+  function showWords() {
+    const node = expected && wordsAt(expected.words);
+    if (!node || node.textContent === expected.before) return;
+    expected = null;
+    node.scrollIntoView({ block: "nearest" });
+    dispatchEvent(new CustomEvent("kinboard-say", { detail: node.textContent }));
+  }
+  for (const kind of ["pointerdown", "wheel"]) addEventListener(kind, () => { expected = null; }, { capture: true, passive: true });
+  // What has just been opened is seen from its head: a course's bar, an exercise, the list of a course, a step.
+  let open = "", step = "";
   function reveal() {
     const bar = document.querySelector("[data-course=bar]");
     const head = bar ?? document.querySelector("[data-exercises=task], [data-course=follow], [data-course=choose]");
     const now = [bar?.dataset.at, document.querySelector("[data-exercise]")?.dataset.exercise, head?.dataset.course].join(" ");
-    if (now === open) return;
-    const first = open === "";
-    open = now;
-    if (head && !first && head.getBoundingClientRect().height) requestAnimationFrame(() => head.scrollIntoView({ block: "start" }));
+    if (now !== open) {
+      const first = open === "";
+      open = now;
+      if (head && !first) fromItsHead(head);
+    }
+    const [goal, steps] = ["goal", "steps"].map((name) => document.querySelector(`[data-guide=${name}]`));
+    if (!steps || !goal) { if (document.querySelector("[data-hints]")) step ||= "none"; return; }
+    const [lesson, before] = [goal.dataset.lesson, step];
+    step = `${lesson} ${steps.dataset.step}`;
+    if (step === before || before === "" || head) return;
+    const from = before.startsWith(`${lesson} `) ? steps : goal;
+    const { top, bottom } = viserPage.panel().getBoundingClientRect();
+    const at = from.getBoundingClientRect().top;
+    if (document.documentElement.hasAttribute("data-kb-narrow") || at < top || at > (top + bottom) / 2) fromItsHead(from);
   }
+  function fromItsHead(node) {
+    requestAnimationFrame(() => { if (node.getClientRects().length) node.scrollIntoView({ block: "start" }); });
+  }
+  viserPage.watch(showWords);
   viserPage.watch(reveal);
   viserPage.watch(restore);
 })();

@@ -7,6 +7,7 @@
 const viserPage = (() => {
   // Selectors of viser's parts. Words of ours are in them only where viser gives a part no name.
   const PARTS = {
+    page: "#root", // all that viser draws
     tab: '[role="tab"]',
     openTab: '[role="tab"][aria-selected="true"]',
     scene: "canvas[data-engine]",
@@ -25,6 +26,7 @@ const viserPage = (() => {
     track: ".mantine-Slider-track",
     progress: '[role="progressbar"]',
     settings: "button .tabler-icon-adjustments", // viser's own settings
+    icon: "svg.tabler-icon",
     messages: "div:has(> [data-answers]) + div input", // the hidden field behind our hidden HTML
   };
   // What viser calls, and how often it has since this page was loaded.
@@ -310,6 +312,11 @@ const viserPage = (() => {
     const box = line?.querySelector("input[type=checkbox]");
     return box ? { box, line } : null;
   }
+  /** The text in the field with this label, or "". */
+  function valueOf(text) {
+    const label = all(PARTS.label).find((node) => node.textContent === text);
+    return lineAt(label)?.querySelector("input")?.value ?? "";
+  }
   /** The element that shows a control's hint while the mouse is on it, from the control's label. */
   const hintedAt = (node) => lineAt(closest(node, PARTS.label))?.lastElementChild?.firstElementChild;
   /** The label of a control's line: the nearest box around the control with exactly one label. */
@@ -340,6 +347,7 @@ const viserPage = (() => {
       const button = icon.closest("button");
       if (!button.ariaLabel) name(button, "Settings of the page");
     }
+    for (const icon of all(PARTS.icon)) if (!icon.ariaHidden) icon.ariaHidden = "true";
     for (const head of all(PARTS.folderHead)) {
       head.role = "button";
       head.tabIndex = 0;
@@ -417,6 +425,8 @@ const viserPage = (() => {
     stripAt: (node) => closest(node, PARTS.tab)?.parentElement,
     openTitleIn: (strip) => all(PARTS.openTab, strip).map(textOf)[0] ?? "",
 
+    /** The element around all that viser draws. */
+    page: () => document.querySelector(PARTS.page),
     /** The canvas of the scene. */
     scene: () => document.querySelector(PARTS.scene),
     /** The scrolling part of the panel, or null. */
@@ -432,6 +442,7 @@ const viserPage = (() => {
     /** The line of the panel around an element, or null. */
     lineAt,
     labelOf,
+    valueOf,
     /** The thumb of the slider with this id, and its number field. */
     thumbOf,
     fieldOf,

@@ -10,6 +10,7 @@ import io
 import math
 import re
 from base64 import b64encode
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from kin.transforms import Array
-from kin.units import fixed
+from kin.units import fixed, general
 
 # The colours of joints 1, 2, … in plots; all of them are legible on white.
 JOINT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#a8518a", "#b87a00", "#2f8fbf", "#8a5a00")
@@ -102,6 +103,25 @@ def chart(width: float, height: float, label: str, content: str) -> str:
         f'<svg class="kb-plot" viewBox="0 0 {width:.0f} {height:.0f}" width="100%" role="img" '
         f'aria-label="{escape(label)}">{content}</svg>'
     )
+
+
+def extremes(title: str, curves: Sequence[tuple[str, Array, Array]], axis: str) -> str:
+    """The lowest and the highest value of a plot in words, for those who do not see it.
+
+    Args:
+        title: what is plotted, with its unit.
+        curves: of each curve its name, the places ``(k,)`` on the horizontal axis, and the values ``(k,)`` there.
+        axis: unit of the horizontal axis.
+    """
+    _, _, lowest = low = min(curves, key=lambda curve: float(curve[2].min()))
+    _, _, highest = high = max(curves, key=lambda curve: float(curve[2].max()))
+    if lowest.min() == highest.max():
+        return f"{title}: {general(float(lowest.min()), 4)} everywhere"
+    words = []
+    for (name, places, values), at in ((low, int(lowest.argmin())), (high, int(highest.argmax()))):
+        where = f"{name}, " if len(curves) > 1 else ""
+        words.append(f"{general(float(values[at]), 4)} ({where}at {general(float(places[at]), 4)} {axis})")
+    return f"{title}: from {words[0]} to {words[1]}"
 
 
 def tick_labels(low: float, high: float, unit: float) -> list[tuple[float, str]]:

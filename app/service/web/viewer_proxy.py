@@ -71,6 +71,7 @@ _SCRIPTS = (
     b"drawer",
     b"hints",
     b"driven",
+    b"describe",
 )
 _STYLES = (b"viewer", b"robot", b"program", b"class_tab", b"layout", b"drawer", b"hints")
 _OURS = b"".join(

@@ -202,7 +202,7 @@ def basins_html(basins: Basins, name: str, units: Units) -> str:
     titles = (f"θ₁ of the start, {unit.name}", f"θ₂ of the start, {unit.name}")
     return render(
         "numeric/basins",
-        name=name,
+        label=_basins_label(basins, name),
         plot=plot,
         wide=plot.right - plot.left,
         high=plot.bottom - plot.top,
@@ -210,6 +210,12 @@ def basins_html(basins: Basins, name: str, units: Units) -> str:
         axes=Markup(axes(_scaled(plot, unit.scale), titles, 1.0, _STYLE)),
         marks=[(*plot.at(q).tolist(), str(k)) for k, q in enumerate(basins.solutions, 1)],
     )
+
+
+def _basins_label(basins: Basins, name: str) -> str:
+    shares = [f"solution {k} from {100.0 * basins.share(k):.0f} %" for k in range(1, len(basins.solutions) + 1)]
+    shares.append(f"none from {100.0 * basins.share(0):.0f} %")
+    return f"Basins of attraction of {name}: {', '.join(shares)} of the starts"
 
 
 def mark_html(basins: Basins, start: Array) -> str:

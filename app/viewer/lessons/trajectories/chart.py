@@ -48,6 +48,7 @@ def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: st
     """The curves with their legend.
 
     Args:
+        label: what is shown, for a screen reader; the extremes are added.
         axis: unit of the horizontal axis.
         whole: not 0: the axis has whole numbers, and at least as many.
     """
@@ -70,8 +71,15 @@ def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: st
             )
     name = Markup('<span class="kb-chart-name"><i style="background:{}"></i>{}</span> ')
     legend = Markup("").join(name.format(joint_colour(i), curve.name) for i, curve in enumerate(curves))
-    drawn = Markup(svg.chart(WIDTH, bottom + BOTTOM, label, "".join(parts)))
+    words = "; ".join(_extremes(row, k, curves, axis) for k, row in enumerate(rows))
+    drawn = Markup(svg.chart(WIDTH, bottom + BOTTOM, f"{label}. {words}.", "".join(parts)))
     return Markup('<span class="kb-chart">') + drawn + legend + Markup("</span>")
+
+
+def _extremes(row: Row, k: int, curves: tuple[Curve, ...], axis: str) -> str:
+    return svg.extremes(
+        row.title, [(each.name, each.times, shown) for each in curves if (shown := each.rows[k]) is not None], axis
+    )
 
 
 def _row(row: Row, k: int, curves: tuple[Curve, ...], ends: tuple[float, float]) -> list[str]:

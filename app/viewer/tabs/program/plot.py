@@ -8,12 +8,13 @@ script's (``static/program.js``).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from markupsafe import Markup
 
-from app.exports.svg import chart, few, joint_colour, tick_labels
+from app.exports.svg import chart, extremes, few, joint_colour, tick_labels
 from app.viewer.views.templates import render
 from kin import Robot
 from kin.motion import Dwell, Motion
@@ -70,7 +71,8 @@ def plot_html(motion: Motion, joint: int | None, units: Units, other: Motion | N
     parts = [_panel(panel, courses, i, span, TOP + i * (HIGH + GAP)) for i, panel in enumerate(panels)]
     parts.append(_time_axis(span, bottom))
     words = "all joints in percent of their limits" if joint is None else f"joint {joint + 1}"
-    label = f"Position, velocity and acceleration over time: {words}; speed of the tool"
+    label = f"Position, velocity and acceleration over time: {words}; speed of the tool. "
+    label += "; ".join(_extremes(panel.title, i, courses) for i, panel in enumerate(panels)) + "."
     svg = Markup(chart(WIDTH, bottom + BOTTOM, label, "".join(parts)))
     joints = [
         {"index": i, "name": each.name, "colour": joint_colour(i), "on": i == joint}
@@ -81,6 +83,15 @@ def plot_html(motion: Motion, joint: int | None, units: Units, other: Motion | N
         "program/plot", svg=svg, joints=joints, all=joint is None, left=left, right=right, span=f"{span:.6f}",
         dashed=other is not None,
     )  # fmt: skip
+
+
+def _extremes(title: str, panel: int, courses: Sequence[Course]) -> str:
+    curves = []
+    for course in courses:
+        for i, values in course.curves[panel].items():
+            name = "the tool" if i < 0 else f"joint {i + 1}"
+            curves.append((name + ", compared" * course.dashed, course.times, values))
+    return extremes(title, curves, "s")
 
 
 def _course(motion: Motion, joint: int | None, units: Units, dashed: bool) -> Course:

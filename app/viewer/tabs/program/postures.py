@@ -14,6 +14,7 @@ import numpy as np
 from markupsafe import Markup, escape
 
 import kin
+from app.exports.svg import chart
 from app.viewer.arm import Arm
 from app.viewer.panel.posture import short
 from app.viewer.tabs.program.items import Items
@@ -79,17 +80,17 @@ def compute(chart: Chart) -> None:
     chart.found = kin.path_postures(plan.motion.robot, poses, options=options, q_start=before, stop=chart.check)
 
 
-def html(chart: Chart, units: Units) -> str:
+def html(shown: Chart, units: Units) -> str:
     """The chart, or that it is being computed."""
-    found = chart.found
+    found = shown.found
     rows = [] if found is None else [_row(found, row, units) for row in range(len(found.postures))]
     used = set() if found is None else {STATES[state] for state in np.unique(found.states).tolist()}
     return render(
         "program/postures",
-        index=chart.index,
-        words=chart.words if found is None else _words(found),
-        computing=found is None and not chart.words,
-        svg="" if found is None else _svg(found, chart.index, units),
+        index=shown.index,
+        words=shown.words if found is None else _words(found),
+        computing=found is None and not shown.words,
+        svg="" if found is None else _svg(found, shown.index, units),
         rows=rows,
         legend=[(state.replace(" ", "-"), words) for state, words in LEGEND.items() if state in used],
     )
@@ -154,7 +155,5 @@ def _svg(found: PathPostures, index: int, units: Units) -> Markup:
         f'text-anchor="{anchor}">{100 * share:.0f} %</text>'
         for share, anchor in ((0.0, "start"), (0.5, "middle"), (1.0, "end"))
     ]
-    return Markup(
-        f'<svg class="kb-plot" viewBox="0 0 {WIDTH:.0f} {bottom + BOTTOM:.0f}" width="100%" role="img" '
-        f'aria-label="Postures along the way: one row each, in the order of the list below">{"".join(parts)}</svg>'
-    )
+    label = f"Postures along the way: one row each, in the order of the list below. {_words(found)}"
+    return Markup(chart(WIDTH, bottom + BOTTOM, label, "".join(parts)))

@@ -17,7 +17,7 @@ from app.exports.svg import AxisStyle, Plot, axes, chart, joint_colour, png_url
 from app.viewer.tabs.workspace.colours import radius_and_height
 from app.viewer.views.templates import render
 from kin import Robot, Section
-from kin.units import Unit, Units
+from kin.units import Unit, Units, general
 from kin.workspace import SectionArc
 
 CLOUD = (0, 114, 178)
@@ -78,7 +78,7 @@ def plot_html(section: Section, frame: Plot, image: str, units: Units) -> str:
     return render(
         "workspace/section",
         joints=[{"number": joint + 1, "colour": joint_colour(joint)} for joint in joints],
-        svg=_svg(frame, f"{image}{_axes(frame, unit)}{_curves(section, frame)}{arcs}"),
+        svg=_svg(frame, _label(section, unit), f"{image}{_axes(frame, unit)}{_curves(section, frame)}{arcs}"),
     )
 
 
@@ -86,7 +86,7 @@ def tool_html(frame: Plot, r: float, z: float) -> str:
     """The tool's dot as a separate SVG. Directly after `plot_html`, it takes no space and lies over the plot."""
     x, y = frame.at(np.array([r, z])).tolist()
     dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5" fill="#d55e00" stroke="#fff" stroke-width="1.5"/>'
-    return render("workspace/tool_dot", svg=_svg(frame, dot))
+    return render("workspace/tool_dot", svg=_svg(frame, "the tool", dot))
 
 
 def image(density: Density) -> str:
@@ -99,8 +99,18 @@ def image(density: Density) -> str:
     )
 
 
-def _svg(frame: Plot, content: str) -> Markup:
+def _label(section: Section, unit: Unit) -> str:
+    """What the section shows, and how far it extends."""
     label = "section of the workspace: distance from joint 1's axis and height"
+    if not section.curves:
+        return label
+    points = unit.scale * np.concatenate(section.curves)
+    (r_low, z_low), (r_high, z_high) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    r = f"r from {general(r_low, 4)} to {general(r_high, 4)}"
+    return f"{label}, {unit.name}: {r}, z from {general(z_low, 4)} to {general(z_high, 4)}"
+
+
+def _svg(frame: Plot, label: str, content: str) -> Markup:
     return Markup(chart(WIDTH, frame.bottom + BOTTOM, label, content))
 
 

@@ -1,0 +1,73 @@
+"""A phone: what matters is on its small screen, and nothing there covers it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from page import Tab
+from playwright.sync_api import expect
+
+import kin
+from app.viewer.lessons.equations.lesson import EquationsLesson
+from app.viewer.lessons.guide.outline import Choice, Number, Question
+from kin.units import Units
+
+pytestmark = pytest.mark.browser
+
+PIONEER = kin.get_robot("pioneer5")
+SIZES = [(390, 844), (360, 640)]
+
+# Sliders whose thumb the visitor can press where it is.
+PRESSABLE = """() => [...document.querySelectorAll("[role=slider]")].filter((thumb) => {
+  const { left, top, width, height } = thumb.getBoundingClientRect();
+  const at = document.elementFromPoint(left + width / 2, top + height / 2);
+  return at !== null && thumb.closest(".mantine-Slider-root").contains(at);
+}).length"""
+
+
+@pytest.fixture(params=SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def small(phone: Tab, no_spoilt_page: None, request: pytest.FixtureRequest) -> Iterator[Tab]:
+    """The phone with a window of this size."""
+    before = phone.page.viewport_size
+    assert before is not None
+    width, height = request.param
+    phone.page.set_viewport_size({"width": width, "height": height})
+    yield phone
+    phone.page.set_viewport_size(before)
+
+
+def test_three_joints_can_be_moved_without_scrolling(phone: Tab) -> None:
+    phone.show(PIONEER)
+    phone.top()
+    assert phone.page.evaluate(PRESSABLE) >= 3
+    expect(phone.page.get_by_role("button", name="Undo")).to_be_in_viewport(ratio=1)
+    expect(phone.page.get_by_role("button", name="Type a target")).to_be_in_viewport(ratio=1)
+
+
+def answer_wrong(tab: Tab, key: str, question: Question) -> None:
+    box = tab.page.locator(f'[data-question="{key}"]')
+    if isinstance(question, Number):
+        box.locator("input").fill("6000")
+        box.locator("input").press("Enter")
+    else:
+        assert isinstance(question, Choice)
+        wrong = next(i for i, option in enumerate(question.options) if not option.right)
+        box.locator(f'[data-guide-do=answer][data-argument="{wrong}"]').click()
+
+
+def test_the_reason_of_a_wrong_answer_is_in_the_window(small: Tab) -> None:
+    page = small.page
+    small.show(PIONEER)
+    small.choose_lesson(EquationsLesson.title)
+    questions = dict(EquationsLesson.outline(PIONEER, Units()).questions())
+    steps = page.locator("[data-guide=steps]")
+    for number in (2, 3):
+        page.locator(f'[data-guide=steps] [data-guide-do=go][data-argument="{number - 1}"]').first.click()
+        expect(steps).to_have_attribute("data-step", str(number))
+        expect(steps.get_by_role("heading").first).to_be_in_viewport(ratio=1)
+        answer_wrong(small, str(number), questions[str(number)])
+        said = page.locator(f'[data-feedback="{number}"]')
+        expect(said).not_to_be_empty()
+        expect(said).to_be_in_viewport(ratio=1)
+    small.choose("Lesson", "None")
