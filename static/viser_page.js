@@ -26,7 +26,7 @@ const viserPage = (() => {
     track: ".mantine-Slider-track",
     progress: '[role="progressbar"]',
     settings: "button .tabler-icon-adjustments", // viser's own settings
-    icon: "svg.tabler-icon",
+    icon: "svg.tabler-icon, svg[data-combobox-chevron]",
     messages: "div:has(> [data-answers]) + div input", // the hidden field behind our hidden HTML
   };
   // What viser calls, and how often it has since this page was loaded.

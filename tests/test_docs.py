@@ -410,3 +410,24 @@ def test_the_image_gets_every_file_its_build_copies():
         for source in sources.split():
             assert f"!{source}" in ignore
             assert (ROOT / source).exists()
+
+
+# WCAG 2.2, levels A and AA: the numbers of the criteria in each guideline.
+CRITERIA = {
+    "1.1": (1,), "1.2": range(1, 6), "1.3": range(1, 6), "1.4": (*range(1, 6), *range(10, 14)), "2.1": (1, 2, 4),
+    "2.2": (1, 2), "2.3": (1,), "2.4": (*range(1, 8), 11), "2.5": (1, 2, 3, 4, 7, 8), "3.1": (1, 2),
+    "3.2": (1, 2, 3, 4, 6), "3.3": (1, 2, 3, 4, 7, 8), "4.1": (2, 3),
+}  # fmt: skip
+
+
+def test_the_report_on_accessibility_has_each_criterion_and_names_tests_that_exist():
+    rows = table(PAGES["docs/accessibility.md"], "criterion")
+    expected = [f"{guideline}.{number}" for guideline, numbers in CRITERIA.items() for number in numbers]
+    assert [name.split()[0] for name, *_ in rows] == expected
+    files = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py")}
+    for name, level, result, checked in rows:
+        assert level in ("A", "AA"), name
+        assert result in ("conforms", "in part", "no", "nothing of the kind"), name
+        assert bool(checked) != (result == "nothing of the kind"), name
+        for file, test in re.findall(r"`(test_\w+\.py)(?:::(\w+))?`", checked):
+            assert f"def {test}" in files[file], f"{name}: {file}::{test}"

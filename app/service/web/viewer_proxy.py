@@ -56,6 +56,7 @@ _UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
 _SCRIPTS = (
     b"start",  # says so if one of the others fails
     b"viser_page",  # the others call it
+    b"keys",  # may keep keys from the others
     b"viewer",
     b"input",
     b"robot",
