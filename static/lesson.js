@@ -112,7 +112,7 @@
     if (now !== open) {
       const first = open === "";
       open = now;
-      if (head && !first) fromItsHead(head);
+      if (head && !first && head.getBoundingClientRect().height) requestAnimationFrame(() => head.scrollIntoView({ block: "start" }));
     }
     const [goal, steps] = ["goal", "steps"].map((name) => document.querySelector(`[data-guide=${name}]`));
     if (!steps || !goal) { if (document.querySelector("[data-hints]")) step ||= "none"; return; }
@@ -122,10 +122,9 @@
     const from = before.startsWith(`${lesson} `) ? steps : goal;
     const { top, bottom } = viserPage.panel().getBoundingClientRect();
     const at = from.getBoundingClientRect().top;
-    if (document.documentElement.hasAttribute("data-kb-narrow") || at < top || at > (top + bottom) / 2) fromItsHead(from);
-  }
-  function fromItsHead(node) {
-    requestAnimationFrame(() => { if (node.getClientRects().length) node.scrollIntoView({ block: "start" }); });
+    if (document.documentElement.hasAttribute("data-kb-narrow") || at < top || at > (top + bottom) / 2) {
+      if (from.getClientRects().length) from.scrollIntoView({ block: "start" });
+    }
   }
   viserPage.watch(showWords);
   viserPage.watch(reveal);
