@@ -1,8 +1,8 @@
 """Did they learn? What a course asks before and after, and the normalised gain between them.
 
 A course may pair exercises: one before, one after. Of both, a student's first answer counts; later ones have seen
-a verdict, and other numbers do not begin anew. Who asks for the answer first has scored 0. The normalised gain is
-the share of what was missing that was gained (Hake, 1998)::
+a verdict, and other numbers do not begin anew. An answer that was shown before any was given scores 0. The
+normalised gain is the share of what was missing that was gained (Hake, 1998)::
 
     g = (after - before) / (1 - before)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from markupsafe import Markup
 
@@ -72,7 +73,7 @@ def course_html(progress: Progress, known: Exercises, desk: Desk) -> str:
     """The list of an open course, or its editor."""
     course = progress.course
     assert course is not None
-    rows = [
+    rows: list[dict[str, Any]] = [
         {"index": i, "kind": item.kind, "title": _title(known, item), "own": item.title, "note": item.note,
          "mark": mark, "name": course.items[i].key}
         for i, (item, mark) in enumerate(zip(course.items, _marks(progress), strict=True))
@@ -87,7 +88,7 @@ def course_html(progress: Progress, known: Exercises, desk: Desk) -> str:
             if one["kind"] == "exercise" and (one["name"] not in taken or one["name"] == row["before"])
         ]
         row["free"] = row["kind"] == "exercise" and row["name"] not in course.before
-    done = sum(row["mark"]["color"] == "green" for row in rows)  # type: ignore[index]
+    done = sum(row["mark"]["color"] == "green" for row in rows)
     link = Markup(box_html(desk.link, "Copy link", wrap=True)) if desk.link else ""
     if desk.editing:
         exercises = [(topic, [(one.id, one.title) for one in members]) for topic, members in known.topics()]
@@ -98,7 +99,7 @@ def course_html(progress: Progress, known: Exercises, desk: Desk) -> str:
     code = Markup(box_html(desk.code, "Copy code", wrap=True)) if desk.code else ""
     return render(
         "course/follow", course=course, rows=rows, done=done, desk=desk, link=link, code=code,
-        alias=progress.alias, begun=any(row["mark"]["symbol"] for row in rows), outcome=progress.outcome(),  # type: ignore[index]
+        alias=progress.alias, begun=any(row["mark"]["symbol"] for row in rows), outcome=progress.outcome(),
         seated=progress.seated,
         back=[
             {"key": key, "title": _title(known, Item("exercise", key)), "mark": MARKS[mark]}
