@@ -9,7 +9,9 @@ same queue.
 
 Values: viser's setter of an input element's value starts a task of the event loop for each callback, for each
 slider that follows the arm. `show_value` starts none. `show_content` sets the HTML of an element without a look at
-the type of that property.
+the type of that property. The callbacks of a value that a visitor has set read it from the element, where another
+thread may have shown a newer one meanwhile, such as that of an arm that moves: what was typed was lost.
+`keep_sent_values` and `sent_value` have the value as it was sent.
 
 Drags: viser converts each field of an event by its type hints and passes it through six coroutines, of the shared
 scene and of the visitor's own. `drag_gizmo` does the same for a gizmo of the visitor alone, in one.
@@ -30,6 +32,7 @@ viser's own.
 from __future__ import annotations
 
 import asyncio
+import contextvars
 import functools
 import inspect
 import threading
@@ -72,8 +75,8 @@ def assign(
         state.api._queue_scene_message(messages.SetOrientationMessage(state.name, (w, x, y, z)))
 
 
-def show_value(handle: Any, value: object) -> None:
-    """Show another value in an input element; an unchanged value is not sent.
+def show_value(handle: Any, value: object, again: bool = False) -> None:
+    """Show another value in an input element; an unchanged value is sent only `again` if that is asked for.
 
     viser's own setter also calls the element's callbacks, each as a task of the event loop, which it wakes for it.
 
@@ -84,10 +87,42 @@ def show_value(handle: Any, value: object) -> None:
     if state.removed:
         raise RuntimeError(f"a {type(handle).__name__} was removed and cannot be set")
     value = type(state.value)(value)
-    if value != state.value:
+    if again or value != state.value:
         state.gui_api._websock_interface.queue_message(messages.GuiUpdateMessage(state.uuid, {"value": value}))
         state.value = value
         state.update_timestamp = time.time()
+
+
+_SENT = contextvars.ContextVar[dict[str, Any] | None]("sent", default=None)
+
+
+def keep_sent_values() -> None:
+    """Let callbacks ask for the value that a browser has sent, with `sent_value`. It may be called again."""
+    original = viser.GuiApi._handle_gui_updates
+    if getattr(original, "keeps_sent_values", False):
+        return
+
+    @functools.wraps(original)
+    async def handle(self: Any, client_id: ClientId, message: Any) -> None:
+        before = _SENT.set(message.updates)
+        try:
+            await original(self, client_id, message)
+        finally:
+            _SENT.reset(before)
+
+    handle.keeps_sent_values = True  # type: ignore[attr-defined]
+    viser.GuiApi._handle_gui_updates = handle  # type: ignore[method-assign]
+
+
+def sent_value(event: Any) -> Any:
+    """The value that a browser has sent, in a callback of an input element; of the type of its values."""
+    shown, sent = event.target.value, _SENT.get()
+    if sent is None or "value" not in sent:
+        return shown
+    value = sent["value"]
+    if isinstance(shown, tuple):
+        return tuple(map(type(shown[0]), value)) if shown else tuple(value)
+    return type(shown)(value)
 
 
 def show_content(element: viser.GuiHtmlHandle, content: str) -> None:

@@ -8,6 +8,7 @@ if its `of` is another one.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,9 +20,11 @@ import viser
 
 from app.viewer.declared.fields import Settings, Spec
 from app.viewer.declared.press import Press
-from app.viewer.viser_patches import show_content, show_value
+from app.viewer.viser_patches import sent_value, show_content, show_value
 from kin import InputError, Robot
 from kin.units import Units
+
+CROSSING = 1.0  # s that a message to the page and one from it may take
 
 Event = tuple[Hashable, ...]
 Post = Callable[[Hashable, object], None]
@@ -118,7 +121,14 @@ Node = Html | Folder | Control | Button | Buttons | Progress | Native
 
 @dataclass(slots=True, eq=False)
 class _Mounted:
-    """A control in the page. `serial` is in its events; `known`: the value of the setting that it shows."""
+    """A control in the page.
+
+    Attributes:
+        serial: in its events.
+        known: the value of the setting that it shows.
+        written: when it was last made to show a value (`time.monotonic`'s).
+        crossed: whether it may show that value in place of the one that it has sent.
+    """
 
     handle: Any
     identity: Hashable
@@ -126,6 +136,8 @@ class _Mounted:
     serial: int
     spec: Spec | None = None
     known: Any = None
+    written: float = -math.inf
+    crossed: bool = False
     props: dict[str, Any] = field(default_factory=dict)
     args: tuple[Any, ...] = ()
     events: Mapping[str, Event] = field(default_factory=dict)
@@ -155,7 +167,8 @@ class PanelView:
     def received(self, settings: S, path: str, serial: int, posted: object) -> S | None:
         """The settings with what a control has sent; None: it has been replaced since, by one in other units.
 
-        Its own value is not sent back to it, so that a slider follows its finger.
+        Its own value is not sent back to it, so that a slider follows its finger; unless the control was made to
+        show another one meanwhile, as by a motion: both messages may have crossed.
 
         Raises:
             InputError: for an invalid value. What was typed stays; a list, which cannot show what is not in it,
@@ -170,7 +183,7 @@ class PanelView:
             if one.spec.kind == "dropdown":
                 one.known = object()
             raise
-        one.known = found
+        one.known, one.crossed = found, time.monotonic() - one.written < CROSSING
         return settings.with_value(path, found)
 
     def is_live(self, serial: object) -> bool:
@@ -315,14 +328,16 @@ class PanelView:
         elif isinstance(node, Control):
             one.spec = spec = self._spec(node)
             value = self._value(node)
-            if self._write or value != one.known:
-                one.known = value
-                show_value(one.handle, spec.shown(value, self._robot, self._units))
+            if self._write or value != one.known or one.crossed:
+                if not one.crossed:
+                    one.written = time.monotonic()
+                show_value(one.handle, spec.shown(value, self._robot, self._units), again=one.crossed)
+                one.known, one.crossed = value, False
 
     def _listen(self, handle: Any, path: str, serial: int) -> None:
         async def changed(event: Any) -> None:
             if event.client is not None:
-                self._post(("at", path, serial), event.target.value)
+                self._post(("at", path, serial), sent_value(event))
 
         handle.on_update(changed)
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import viser
 
-from app.viewer.viser_patches import show_value
+from app.viewer.viser_patches import sent_value, show_value
 
 Post = Callable[[Hashable, object], None]
 
@@ -27,7 +27,7 @@ def listen(handle: Any, post: Post, key: Hashable) -> None:
     @handle.on_update  # type: ignore[untyped-decorator]
     async def _(event: Any) -> None:
         if event.client is not None:
-            post(key, event.target.value)
+            post(key, sent_value(event))
 
 
 def assign(handle: Any, value: object) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import viser
 from viser import _assignable_props_api as props
-from viser._messages import SetPositionMessage, TransformControlsUpdateMessage
+from viser._messages import GuiUpdateMessage, SetPositionMessage, TransformControlsUpdateMessage
 from viser.infra import _async_message_buffer as buffers
 
 from app.viewer.viser_patches import (
@@ -20,6 +20,8 @@ from app.viewer.viser_patches import (
     assign,
     cache_type_hints,
     keep_private,
+    keep_sent_values,
+    sent_value,
     set_events_in_their_loop,
     show_content,
     show_text,
@@ -274,3 +276,38 @@ def test_two_filters_end_in_any_order(wire, first):
     assert seen_at_the_top(messages) == {"/wall-1": True, "/worked-1": True, "/arm": True}
     scene.add_frame("/late")
     assert seen_at_the_top(messages)["/late"]
+
+
+@pytest.mark.parametrize(
+    ("add", "first", "shown", "sent", "expected"),
+    [
+        ("add_slider", 1.0, 2.0, 7, 7.0),
+        ("add_number", 1.0, 2.0, 7, 7.0),
+        ("add_text", "a", "b", "typed", "typed"),
+        ("add_checkbox", False, False, True, True),
+        ("add_rgb", (1, 2, 3), (4, 5, 6), [7, 8, 9], (7, 8, 9)),
+    ],
+)
+def test_a_value_that_was_sent_arrives_though_another_is_shown_meanwhile(wire, add, first, shown, sent, expected):
+    keep_sent_values()
+    keep_sent_values()
+    gui = wire[1]._owner.gui
+    more = {"min": 0.0, "max": 10.0, "step": 0.1} if add == "add_slider" else {}
+    handle = getattr(gui, add)("Value", initial_value=first, **more)
+    # Viser calls this between the value and the callbacks; in a page, another thread may come in between.
+    handle._impl.sync_cb = lambda *_: show_value(handle, shown)
+    got = []
+
+    async def changed(event):
+        got.append((event.target.value, sent_value(event)))
+
+    handle.on_update(changed)
+    gui._resolve_client = lambda _: object()
+    asyncio.run(gui._handle_gui_updates(0, GuiUpdateMessage(handle._impl.uuid, {"value": sent})))
+    assert got == [(shown, expected)]
+    assert type(got[0][1]) is type(expected)
+
+    async def no_message():
+        return sent_value(viser.GuiEvent(None, None, handle))
+
+    assert asyncio.run(no_message()) == shown, "without a message, what is shown"
