@@ -50,7 +50,7 @@ PROGRAM = {"programs": {"ur5": MOVES}, "ghosts": True, "compare": "lin"}
 ANSWERED = {"guide": {"revealed": ["1"]}}  # an open question withholds what these pictures show
 SHOTS = (
     Shot("dashboard", "Move", {"robot": "puma560", "q": PUMA}),
-    Shot("dh", "Learn", {"robot": "stanford", "lesson": "dh", "features": {"dh": {"at": 8.0}}}),
+    Shot("dh", "Learn", {"robot": "stanford", "lesson": "dh", "features": {"dh": {"at": 8.0}, **ANSWERED}}),
     Shot("equations", "Learn", {"robot": "pioneer5", "lesson": "equations", "features": ANSWERED}),
     Shot("postures", "Learn", {"robot": "puma560", "q": PUMA, "lesson": "postures", "features": ANSWERED}, 8.0),
     Shot("redundancy", "Learn", {"robot": "iiwa14", "lesson": "redundancy", "features": ANSWERED}, 8.0),
