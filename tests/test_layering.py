@@ -87,7 +87,13 @@ RULES: dict[str, set[str]] = {
         ),
     },
     "app/viewer/viser_patches.py": {"msgspec", "numpy", "viser", "kin.transforms"},
-    "app/viewer/viser_outbox.py": {"msgspec", "viser", "zstandard", "app.shared.connection", "app.shared.notes"},
+    "app/viewer/viser_outbox.py": {
+        "msgspec",
+        "viser",
+        "zstandard",
+        "app.shared.connection",
+        "app.shared.throttled_log",
+    },
     "app/viewer/meshes": {
         *("fast_simplification", "trimesh", "numpy", "kin", "app.shared", "app.viewer.meshes", "app.viewer.scene"),
         "app.viewer.own_arm",

@@ -21,7 +21,7 @@ from starlette.concurrency import run_in_threadpool
 from app.api.problems import ClientLeftError, ProblemError
 from app.shared.clients import client_of
 from app.shared.memory.answers import AnswerMemory
-from app.shared.places import Place, Places
+from app.shared.slots import Slot, Slots
 from app.shared.threads.compiling import queued
 from app.shared.threads.turns import MOST, Turn, Turns, offer
 
@@ -72,17 +72,17 @@ class ComputeSlots:
         self.closed = False
         self.waiting = 0  # requests that wait for a slot
         self.turns = Turns()
-        self._places = Places(most, share)
-        self._reading = Places(MOST)  # of threads that validate large bodies
+        self._slots = Slots(most, share)
+        self._reading = Slots(MOST)  # of threads that validate large bodies
 
     @asynccontextmanager
     async def slot(self, request: Request) -> AsyncIterator[Deadline]:
         """A slot for as long as the context lasts, and its deadline; raises 503 if none becomes free in time."""
         client = client_of(request.scope)
         with self.watched(request) as deadline:
-            await self._acquire(self._places, client, deadline, "computed")
-            with Place(self._places, client) as place:
-                deadline.start(place)
+            await self._acquire(self._slots, client, deadline, "computed")
+            with Slot(self._slots, client) as slot:
+                deadline.start(slot)
                 yield deadline
 
     async def read(self, request: Request, validated: Callable[[], T]) -> T:
@@ -95,7 +95,7 @@ class ComputeSlots:
 
         with self.watched(request) as deadline:
             await self._acquire(self._reading, client, deadline, "read")
-            with Place(self._reading, client):
+            with Slot(self._reading, client):
                 return await run_in_threadpool(in_turn)
 
     @contextmanager
@@ -117,7 +117,7 @@ class ComputeSlots:
     @property
     def used(self) -> int:
         """How many requests compute."""
-        return self._places.taken
+        return self._slots.taken
 
     def close(self) -> None:
         """End all computations that check their deadline, and all waiting."""
@@ -133,18 +133,18 @@ class ComputeSlots:
             await asyncio.wait((wrapped,), timeout=max(0.0, min(deadline.left, POLL)))
         return wrapped.result()
 
-    async def _acquire(self, places: Places, client: str, deadline: Deadline, act: str) -> None:
-        if places.take(client):
+    async def _acquire(self, slots: Slots, client: str, deadline: Deadline, act: str) -> None:
+        if slots.take(client):
             return
         self.waiting += 1
         try:
             async with asyncio.timeout(self.seconds) as waiting:
                 deadline.on_left = lambda: waiting.reschedule(0.0)
                 with queued():
-                    await places.wait(client)
+                    await slots.wait(client)
         except TimeoutError:
             deadline.check_client()
-            detail = f"{places.taken} requests are being {act}, which is the maximum or your share of it."
+            detail = f"{slots.taken} requests are being {act}, which is the maximum or your share of it."
             raise busy(detail) from None
         finally:
             self.waiting -= 1
@@ -155,16 +155,16 @@ class Deadline:
     """The time limit of one request, and its slot if it has one. Any thread may call `check`."""
 
     def __init__(self, work: ComputeSlots) -> None:
-        self.place: Place | None = None
+        self.slot: Slot | None = None
         self.on_left: Callable[[], None] | None = None  # called by the event loop when the client leaves
         self.turn = Turn(work.turns)  # which its thread takes to compute
         self._work = work
         self._left = False
         self.start()
 
-    def start(self, place: Place | None = None) -> None:
+    def start(self, slot: Slot | None = None) -> None:
         """The time of the request begins now."""
-        self.place = place
+        self.slot = slot
         self._ends = time.monotonic() + self._work.seconds
 
     @property

@@ -13,7 +13,7 @@ def update_gauges(state: Any, bridge: ViewerBridge) -> None:
     """Set the gauges to the present values; `state` is that of the application."""
     PLACES.labels("requests").set(state.compute.used)
     PLACES.labels("streams").set(state.streams.open)
-    PLACES.labels("viewer").set(bridge.places.taken)
+    PLACES.labels("viewer").set(bridge.slots.taken)
     PENDING.labels("requests").set(state.compute.waiting)
     PENDING.labels("summaries").set(state.summaries.pending)
     PENDING.labels("maps").set(state.maps.pending)

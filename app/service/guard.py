@@ -14,8 +14,8 @@ from typing import Protocol
 
 from app.shared.clients import Proxies, network_of, share_of
 from app.shared.metrics import CONNECTIONS, REFUSED
-from app.shared.notes import Notes
 from app.shared.settings import Settings
+from app.shared.throttled_log import ThrottledLog
 
 logger = logging.getLogger("kinboard.connections")
 
@@ -48,7 +48,7 @@ class Guard:
         self._clients: Counter[str] = Counter()
         self._watched: set[Watched] = set()
         self._timer: asyncio.TimerHandle | None = None
-        self._notes = Notes(logger)
+        self._throttled = ThrottledLog(logger)
         if files is not None and files - SPARE_FILES < settings.max_connections:
             logger.warning(
                 "this process may have only %d files open (ulimit -n), too few for %d connections "
@@ -100,7 +100,7 @@ class Guard:
     def note(self, why: str, line: str, error: Exception | None = None) -> None:
         """Count a refusal and log it: the first of its kind at once, those of the next seconds as a number."""
         REFUSED.labels(why).inc()
-        self._notes.note(why, line, error)
+        self._throttled.note(why, line, error)
 
     def _schedule(self) -> None:
         tick = min(TICK, 0.25 * self.receive_timeout, 0.25 * self.send_timeout)

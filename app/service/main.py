@@ -63,9 +63,9 @@ from app.shared.memory.answers import AnswerMemory
 from app.shared.memory.process import MemoryKeeper
 from app.shared.memory.shared import shared_bytes
 from app.shared.metrics import count_together, forget_process
-from app.shared.places import Places
 from app.shared.security import SecurityHeaders
 from app.shared.settings import Settings
+from app.shared.slots import Slots
 from app.shared.static_folder import static_folder
 from app.shared.store import Store
 from app.shared.summaries import Summaries
@@ -117,7 +117,7 @@ def create_app(
         RobotFileError: a file in the operator's folder of robots is invalid.
     """
     store = store or Store(settings.robots)
-    bridge = ViewerBridge(settings.allowed_origins, Places(settings.max_visitors, settings.client_share))
+    bridge = ViewerBridge(settings.allowed_origins, Slots(settings.max_visitors, settings.client_share))
     clouds, summaries = Clouds(settings.cloud_memory), Summaries()
     maps = Maps(settings.map_memory, seconds=settings.map_time)
     memory = AnswerMemory(settings.max_answer, settings.answer_memory)
@@ -129,7 +129,7 @@ def create_app(
     startup = Startup(settings, store, clouds, maps, summaries, classroom, known, bridge, lines, member, on_ready)
 
     def idle() -> bool:
-        return not (bridge.places.taken or work.used or state.streams.open or summaries.pending or maps.pending)
+        return not (bridge.slots.taken or work.used or state.streams.open or summaries.pending or maps.pending)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:

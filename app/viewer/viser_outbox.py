@@ -33,7 +33,7 @@ from viser.infra import Message, _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.shared.connection import Connection
-from app.shared.notes import Notes
+from app.shared.throttled_log import ThrottledLog
 
 logger = logging.getLogger("kinboard.viewer")
 _encode = msgspec.msgpack.Encoder().encode
@@ -184,7 +184,7 @@ class Packer:
     """Messages as bytes on the wire, as viser's producer makes them. Only the event loop's thread uses it."""
 
     def __init__(self) -> None:
-        self._notes = Notes(logger)
+        self._throttled = ThrottledLog(logger)
         self._compress = zstandard.ZstdCompressor(level=1).compress  # half a megabyte of memory
 
     def pack(self, window: Sequence[Message]) -> bytes:
@@ -198,7 +198,7 @@ class Packer:
         try:
             inner = _encode(whole)
         except (ValueError, OverflowError, TypeError) as error:
-            self._notes.note("unencodable", f"a message for a page cannot be sent as it is: {error}")
+            self._throttled.note("unencodable", f"a message for a page cannot be sent as it is: {error}")
             inner = _encode(whole | {"messages": _encodable(whole["messages"])})
         packed = self._compress(inner)
         parts: list[bytes | memoryview] = [

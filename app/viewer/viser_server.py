@@ -32,8 +32,8 @@ from viser.infra import _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.shared.connection import Connection, ConnectionEnded
-from app.shared.notes import Notes
 from app.shared.security import Rights
+from app.shared.throttled_log import ThrottledLog
 from app.viewer import viser_outbox
 from app.viewer.viser_outbox import LoopWaker, Outbox, Packer
 from app.viewer.viser_patches import drag_gizmo
@@ -65,7 +65,7 @@ class PortlessServer(infra.WebsockServer):
         self.silences: dict[int, Callable[[], float]] = {}  # `Connection.silence`, by client id
         self.visitors: dict[int, viser.ClientHandle] = {}  # viser's own, by client id
         self._open = 0  # connections
-        self._notes = Notes(log)
+        self._throttled = ThrottledLog(log)
         self._waker, self._packer = LoopWaker(loop), Packer()
         self._stopping: asyncio.Future[None]
         self._all_ended: asyncio.Event
@@ -176,7 +176,7 @@ class PortlessServer(infra.WebsockServer):
             self._note(error)
 
     def _note(self, error: Exception) -> None:
-        self._notes.note("unhandled", f"a message of a visitor could not be handled: {error!r:.200}")
+        self._throttled.note("unhandled", f"a message of a visitor could not be handled: {error!r:.200}")
 
 
 async def _call(callbacks: _Callbacks, client: infra.WebsockClientConnection) -> None:

@@ -25,7 +25,15 @@ from kin.ik.candidates import POSITION_ERROR, ROTATION_ERROR
 from kin.ik.details import LimitViolation
 from kin.ik.problem import IKProblem
 from kin.path.configurations import LARGE, branches_near, continued, descended, nearest_solution
-from kin.path.details import BranchEnds, JumpCause, JumpDetails, LimitInTheWay, NearSingularity, Place, TooFarApart
+from kin.path.details import (
+    BranchEnds,
+    JumpCause,
+    JumpDetails,
+    LimitInTheWay,
+    MotionEnd,
+    NearSingularity,
+    TooFarApart,
+)
 from kin.path.results import PathJump
 from kin.path.search import DeadEnd
 from kin.path.waypoints import LayerSequence, PathSettings, has_closed_form
@@ -64,10 +72,10 @@ class _Break:
     before: int
     after: int
 
-    def place(self, index: int) -> Place:
+    def place(self, index: int) -> MotionEnd:
         """Where it is, seen from the jump before waypoint `index`."""
         first, second = sorted((self.before, self.after))
-        return Place(first, second, (first, second) == (index - 1, index), self.before > self.after)
+        return MotionEnd(first, second, (first, second) == (index - 1, index), self.before > self.after)
 
     def distance(self, q: Array | None) -> float:
         """The motion to a configuration ``(n,)``, infinite if there is none."""

@@ -23,7 +23,7 @@ class JointMove(NamedTuple):
     motion: float
 
 
-class Place(NamedTuple):
+class MotionEnd(NamedTuple):
     """Between which neighbouring waypoints a continuous motion ends.
 
     Attributes:

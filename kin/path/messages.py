@@ -12,8 +12,8 @@ from kin.path.details import (
     JointMove,
     JumpDetails,
     LimitInTheWay,
+    MotionEnd,
     NearSingularity,
-    Place,
     TooFarApart,
 )
 from kin.solvers.singular import Singularity
@@ -28,7 +28,7 @@ def move(size: JointMove, units: Units) -> str:
 
 
 def jump(
-    index: int, joints: Sequence[int], widest: JointMove, place: Place, details: JumpDetails, units: Units
+    index: int, joints: Sequence[int], widest: JointMove, place: MotionEnd, details: JumpDetails, units: Units
 ) -> str:
     """A jump before waypoint `index`: which joint moves how far, and why there is no way around it."""
     others = f" (and {len(joints) - 1} more)" if len(joints) > 1 else ""
@@ -73,7 +73,7 @@ def contacts(found: Sequence[Touch], units: Units) -> str:
     return f"Collisions: {'; '.join(parts)}{more}."
 
 
-def _where(place: Place) -> str:
+def _where(place: MotionEnd) -> str:
     """The beginning of a clause that says where a motion ends."""
     if place.is_jump:
         return "there"
@@ -81,7 +81,7 @@ def _where(place: Place) -> str:
     return f"{motion} ends between waypoints {place.before} and {place.after}, where"
 
 
-def _why(place: Place, details: JumpDetails, units: Units) -> str:
+def _why(place: MotionEnd, details: JumpDetails, units: Units) -> str:
     """The end of that clause."""
     match details:
         case LimitInTheWay(violation):

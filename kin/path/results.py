@@ -9,7 +9,7 @@ from kin.ik.details import Details
 from kin.ik.messages import explain, rounded_target
 from kin.ik.results import Cause, Status
 from kin.path import messages
-from kin.path.details import JointMove, JumpCause, JumpDetails, Place
+from kin.path.details import JointMove, JumpCause, JumpDetails, MotionEnd
 from kin.solvers.singular import Singularity
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -37,7 +37,7 @@ class PathJump:
     step: float
     widest: JointMove
     cause: JumpCause
-    place: Place
+    place: MotionEnd
     details: JumpDetails
 
     def __repr__(self) -> str:

@@ -32,7 +32,7 @@ from kin.solvers import (
 )
 from kin.solvers.contract import APPROACH, ClosedForm
 from kin.solvers.reversed import ReversedJoints, readings
-from kin.solvers.rounded import Rounded, Rounded7, meant
+from kin.solvers.rounded import Rounded, Rounded7, intended_arm
 
 FAMILIES: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     wrist5.match,
@@ -82,7 +82,7 @@ def family_of(robot: Robot) -> str:
 
 def _closed_form(robot: Robot, solvers: tuple[Callable[[Robot], ClosedForm | None], ...]) -> ClosedForm | None:
     """`closed_form_of`, with these general solvers for an arm that fits no family."""
-    found, intended = _family(robot, robot), meant(robot)
+    found, intended = _family(robot, robot), intended_arm(robot)
     if intended is None:
         return found or _first_match(robot, solvers)
     if found is None:

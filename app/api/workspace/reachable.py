@@ -114,7 +114,7 @@ def reachable(
     pieces = _pieces(answers, count, at_once, deadline)
     # Invalid options show in the first piece, while the status of the response can still be set.
     pieces = _resumed(next(pieces), pieces)
-    return ComputedResponse(pieces, "reachable", "application/json", place=deadline.place)
+    return ComputedResponse(pieces, "reachable", "application/json", slot=deadline.slot)
 
 
 def _options(body: ReachableRequest, task: Task) -> IKOptions:

@@ -29,8 +29,8 @@ from app.exports.formats import slices, table_of
 from app.shared.clients import client_of
 from app.shared.clouds import Cloud
 from app.shared.metrics import STREAMED
-from app.shared.places import Place
 from app.shared.problems import FieldError, Problem
+from app.shared.slots import Slot
 from kin import Robot, UnknownRobotError
 
 logger = logging.getLogger("kinboard.workspace")
@@ -100,8 +100,8 @@ async def _serve(visitor: WebSocket, described: Callable[[], Awaitable[tuple[Clo
     try:
         query, robot = await described()
         cloud = query.cloud(robot, state.settings)
-        with state.streams.slot(client_of(visitor.scope)) as place:
-            ending = await _carry(visitor, place, cloud, query.q)
+        with state.streams.slot(client_of(visitor.scope)) as slot:
+            ending = await _carry(visitor, slot, cloud, query.q)
     except WebSocketDisconnect:  # before the first message
         return
     except UnknownRobotError as error:
@@ -115,9 +115,9 @@ async def _serve(visitor: WebSocket, described: Callable[[], Awaitable[tuple[Clo
         await close(visitor, *ending)
 
 
-async def _carry(visitor: WebSocket, place: Place, cloud: Cloud, with_q: bool) -> _Ending:
+async def _carry(visitor: WebSocket, slot: Slot, cloud: Cloud, with_q: bool) -> _Ending:
     """Send the cloud until it is complete or the client cancels."""
-    tasks = asyncio.create_task(_send(visitor, place, cloud, with_q)), asyncio.create_task(_listen(visitor))
+    tasks = asyncio.create_task(_send(visitor, slot, cloud, with_q)), asyncio.create_task(_listen(visitor))
     try:
         ended, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
@@ -127,11 +127,11 @@ async def _carry(visitor: WebSocket, place: Place, cloud: Cloud, with_q: bool) -
     return ended.pop().result()
 
 
-async def _send(visitor: WebSocket, place: Place, cloud: Cloud, with_q: bool) -> _Ending:
+async def _send(visitor: WebSocket, slot: Slot, cloud: Cloud, with_q: bool) -> _Ending:
     table = table_of(cloud, with_q)
     chunks = ThreadedGenerator(slices(visitor.app.state.clouds, cloud, with_q))
     begun = reported = time.perf_counter()
-    send_bytes = place.lent(visitor.send_bytes)
+    send_bytes = slot.lent(visitor.send_bytes)
     try:
         await _send_text(visitor, type="start", total=table.n, columns=table.columns)
         while (chunk := await run_in_threadpool(chunks.take)) is not None:

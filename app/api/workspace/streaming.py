@@ -16,7 +16,7 @@ from app.api.problems import ClientLeftError
 from app.api.work import busy
 from app.shared.clients import client_of
 from app.shared.metrics import STREAMED
-from app.shared.places import Place, Places
+from app.shared.slots import Slot, Slots
 
 logger = logging.getLogger("kinboard.workspace")
 T = TypeVar("T")
@@ -25,7 +25,7 @@ T = TypeVar("T")
 class StreamLimit:
     """Limits the number of concurrent streams. Used by the event loop only, so it needs no lock.
 
-    A stream whose client does not read gives its place to another, so more may be open than are being sent.
+    A stream whose client does not read gives its slot to another, so more may be open than are being sent.
 
     Args:
         most: how many are sent at a time.
@@ -35,8 +35,8 @@ class StreamLimit:
     OPEN = 4  # streams may be open for each that is sent
 
     def __init__(self, most: int, share: float = 1.0) -> None:
-        self._sent = Places(most, share)
-        self._open = Places(self.OPEN * most, share)
+        self._sent = Slots(most, share)
+        self._open = Slots(self.OPEN * most, share)
 
     @property
     def open(self) -> int:
@@ -44,7 +44,7 @@ class StreamLimit:
         return self._open.taken
 
     @contextmanager
-    def slot(self, client: str) -> Iterator[Place]:
+    def slot(self, client: str) -> Iterator[Slot]:
         """A slot for as long as the context lasts; raises 503 if there is none."""
         if not self._open.free(client) or not self._sent.take(client):
             detail = (
@@ -52,8 +52,8 @@ class StreamLimit:
             )
             raise busy(detail, "KINBOARD_MAX_STREAMS")
         self._open.take(client)
-        with Place(self._open, client), Place(self._sent, client) as place:
-            yield place
+        with Slot(self._open, client), Slot(self._sent, client) as slot:
+            yield slot
 
 
 class ThreadedGenerator(Generic[T]):
@@ -81,7 +81,7 @@ class _StoppedError(Exception):
 class ComputedResponse(StreamingResponse):
     """A response whose bytes are computed piece by piece in threads while it is sent.
 
-    A slow client slows the computation down, and gives its place to others while it reads nothing; a client that
+    A slow client slows the computation down, and gives its slot to others while it reads nothing; a client that
     leaves ends it: the generator is always closed before the request ends.
 
     Args:
@@ -89,7 +89,7 @@ class ComputedResponse(StreamingResponse):
         name: label of the bytes in the metrics.
         media_type, headers: of the response.
         limit: the limit of concurrent streams, if it applies.
-        place: the place of the request, if it has one.
+        slot: the place of the request, if it has one.
     """
 
     def __init__(
@@ -99,19 +99,19 @@ class ComputedResponse(StreamingResponse):
         media_type: str,
         headers: dict[str, str] | None = None,
         limit: StreamLimit | None = None,
-        place: Place | None = None,
+        slot: Slot | None = None,
     ) -> None:
         self._pieces = ThreadedGenerator(pieces)
         self._name = name
         self._limit = limit
-        self._place = place
+        self._slot = slot
         super().__init__(self._in_threads(), headers=headers, media_type=media_type)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self._slots = scope["app"].state.compute
         try:
-            with self._limit.slot(client_of(scope)) if self._limit else nullcontext(self._place) as place:
-                await super().__call__(scope, receive, send if place is None else place.lent(send))
+            with self._limit.slot(client_of(scope)) if self._limit else nullcontext(self._slot) as slot:
+                await super().__call__(scope, receive, send if slot is None else slot.lent(send))
         except _StoppedError:
             # The response is incomplete: the server closes the connection, which shows the client that it is.
             logger.warning("a response was cut off because the service is being stopped")

@@ -33,8 +33,8 @@ from app.service.web.short_page import short_page
 from app.shared.clients import client_of
 from app.shared.connection import SILENCE, ConnectionEnded, Viewer, never_silent
 from app.shared.metrics import DROPPED, STREAMED, VISITORS
-from app.shared.places import Place, Places
 from app.shared.security import VIEWER_POLICY, origin_allowed
+from app.shared.slots import Slot, Slots
 
 logger = logging.getLogger("kinboard.bridge")
 
@@ -84,9 +84,9 @@ _OURS = b"".join(
 class ViewerBridge:
     """Routes for ``/viewer``. `viewer` serves the visitors, None until it has started."""
 
-    def __init__(self, allowed_origins: Iterable[str] = (), places: Places | None = None) -> None:
+    def __init__(self, allowed_origins: Iterable[str] = (), slots: Slots | None = None) -> None:
         self.viewer: Viewer | None = None
-        self.places = places or Places(200)
+        self.slots = slots or Slots(200)
         self._allowed_origins = tuple(allowed_origins)
         self._pages: dict[str, _Page] = {}  # by what depends on the service's address
 
@@ -103,7 +103,7 @@ class ViewerBridge:
         """viser's page with our content policy; until the viewer has started, 503 and a page that tries again."""
         if self.viewer is None:
             return HTMLResponse(_WARMING_PAGE, status_code=503, headers={"retry-after": "1"})
-        if not self.places.free(client_of(request.scope)):
+        if not self.slots.free(client_of(request.scope)):
             return HTMLResponse(_FULL_PAGE, status_code=503, headers={"retry-after": "10"})
         link = discovery(request)
         if link not in self._pages and len(self._pages) >= ADDRESSES:
@@ -122,11 +122,11 @@ class ViewerBridge:
             await _turn_away(visitor, "The viewer is warming up.")
             return
         client = client_of(visitor.scope)
-        if not self.places.take(client):
+        if not self.slots.take(client):
             DROPPED.labels("full").inc()
             await _turn_away(visitor, "All places are taken.")
             return
-        with Place(self.places, client), VISITORS.track_inprogress():
+        with Slot(self.slots, client), VISITORS.track_inprogress():
             await _serve(visitor, self.viewer)
 
 

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, Protocol
 from app.classroom.courses import Course, Courses
 from app.classroom.work import Work
 from app.exercises import Exercise, Shelf, Verdict
-from app.viewer.activity.places import Place
+from app.viewer.activity.context import ExerciseContext
 from app.viewer.activity.practice import Practice
 from app.viewer.activity.progress import Progress
 from app.viewer.activity.review import Review, question_key
@@ -200,7 +200,7 @@ class Activity:
         self.practice.enter(place)
         self.changed()
 
-    def take_seat(self, place: Place, seat: Seat) -> None:
+    def take_seat(self, place: ExerciseContext, seat: Seat) -> None:
         """This is a student's page in a room from now on."""
         self._seat = seat
         self.practice.enter(place)

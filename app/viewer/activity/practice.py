@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, get_args
 
 from app.classroom.work import Settled, Work
 from app.exercises import Exercise, Exercises, Variant, Verdict
-from app.viewer.activity.places import LABEL, Place
+from app.viewer.activity.context import LABEL, ExerciseContext
 from kin import InputError
 
 Mark = Literal["open", "wrong", "right", "shown"]
@@ -72,13 +72,13 @@ class Practice:
         self.at: Exercise | None = None
         self.records: dict[str, Record] = {}
         self._wanted: object = None  # what a restored state has open, if it is not there yet
-        self._place: Place | None = None
+        self._place: ExerciseContext | None = None
         self._elsewhere: dict[str, dict[str, Record]] = {}  # records of this page in other places, by label
         self._claims: dict[str, Claim] = {}  # what was restored for other places
         self._work: Mapping[str, Work] = {}  # what is stored of the seat
         self._settled: dict[tuple[str, int], Record] = {}  # answers that this page has shown, by id and seed
 
-    def enter(self, place: Place | None) -> None:
+    def enter(self, place: ExerciseContext | None) -> None:
         """Work in this place from now on; None: alone. A seat is not left for a course."""
         if self.seated or place == self._place:
             return
@@ -93,7 +93,7 @@ class Practice:
         """Whether this is a student's page in a room."""
         return self._place is not None and self._place.seat
 
-    def is_in(self, place: Place) -> bool:
+    def is_in(self, place: ExerciseContext) -> bool:
         """Whether what is known was judged in this place."""
         return self.seated or self._place == place
 

@@ -9,7 +9,7 @@ from app.classroom.courses import Course, Courses, Item, Seal, course_of, to_dat
 from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.results import Outcome, write_code
 from app.exercises import Exercise
-from app.viewer.activity.places import Place
+from app.viewer.activity.context import ExerciseContext
 from app.viewer.activity.practice import MARKS, Mark, Practice
 from kin import InputError
 
@@ -169,7 +169,7 @@ class Progress:
             tries=sum(record.attempts for record in done), day=datetime.now(UTC).date(),
         )  # fmt: skip
 
-    def place(self, key: Callable[[], bytes]) -> Place | None:
+    def place(self, key: Callable[[], bytes]) -> ExerciseContext | None:
         """Where its exercises are done; None: no course is open. Raises what `key` raises."""
         course = self.course
         if course is None:
@@ -177,7 +177,7 @@ class Progress:
         answers = (
             "with" if course.answers else "without"
         )  # else a course with answers would show those of one without
-        return Place(f"course {course.fingerprint.hex()} {answers} answers", key())
+        return ExerciseContext(f"course {course.fingerprint.hex()} {answers} answers", key())
 
     def code(self, key: Callable[[], bytes]) -> str:
         """The result code; raises `InputError` if the answers were not judged by this service."""

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from app.viewer.activity.places import LABEL
+from app.viewer.activity.context import LABEL
 
 INTERVALS: Final = (1, 3, 7)  # days
 MOST_MISSED: Final = 60  # in a list

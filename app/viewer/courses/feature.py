@@ -16,7 +16,7 @@ from app.classroom.results import read_code
 from app.classroom.results.codes import clean_alias
 from app.viewer.activity.activity import EXERCISES, REVIEW
 from app.viewer.courses import views
-from app.viewer.courses.views import Desk
+from app.viewer.courses.views import CourseView
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons import LESSONS
 from app.viewer.panel import update_html
@@ -41,7 +41,7 @@ class CourseFeature(Feature):
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
         self._courses, self._progress = stage.activity.courses, stage.activity.progress
-        self._desk = Desk()
+        self._view = CourseView()
         self._bar = stage.client.gui.add_html("")
         self._page: viser.GuiHtmlHandle | None = None
 
@@ -90,28 +90,28 @@ class CourseFeature(Feature):
         if name in ("next", "back", "list"):
             self._walk(name)
         elif self.shown:
-            self._desk.error = ""
+            self._view.error = ""
             try:
                 self._act(name, rest, value)
             except KinematicsError as error:
                 text = str(error)
-                self._desk.error, self._desk.errs = f"{text[:1].upper()}{text[1:]}.", self._desk.errs or "file"
+                self._view.error, self._view.errs = f"{text[:1].upper()}{text[1:]}.", self._view.errs or "file"
         if (
-            name != "set" or self._desk.error or (rest and str(rest[0]).startswith(("add", "before-")))
+            name != "set" or self._view.error or (rest and str(rest[0]).startswith(("add", "before-")))
         ):  # what was typed is on the screen already
             self._update()
 
     def _act(self, name: object, rest: list[object], value: object) -> None:
-        desk, progress = self._desk, self._progress
-        desk.errs = ""
+        view, progress = self._view, self._progress
+        view.errs = ""
         match name, value:
             case "pick", int() if 0 <= value < len(self._courses.all):
                 self._open(self._courses.all[value])
             case "new", _:
                 self._open(Course("My course"))
-                self._desk.editing = True
+                self._view.editing = True
             case "close", _:
-                self._desk = Desk()
+                self._view = CourseView()
                 progress.course = progress.at = None
                 self.stage.activity.enter_course()
             case "upload", [str(file), str(text)]:
@@ -119,7 +119,7 @@ class CourseFeature(Feature):
                     raise InputError("file", file, f"a text file of 1 to {MOST_IN_FILE} bytes")
                 self._open(parse_course(text, self._courses.exercises, file[:80], self._courses.find))
             case "edit" | "done", _:
-                desk.editing, desk.link, desk.code = name == "edit", "", ""
+                view.editing, view.link, view.code = name == "edit", "", ""
             case "go", int():
                 self._go(progress.go(value))
             case "recall", _ if rest and rest[0] in progress.back:
@@ -127,17 +127,17 @@ class CourseFeature(Feature):
                 self.stage.post(("feature", REVIEW, ("open", str(rest[0]), 0)), None)
             case "fields", [[str(text)]]:
                 self._take(rest[0], text)
-            case (("set" | "up" | "down" | "delete" | "answers"), _) if desk.editing:
+            case (("set" | "up" | "down" | "delete" | "answers"), _) if view.editing:
                 self._change(str(name), rest, value)
             case "download", _:
                 self._download()
             case "link", _:
-                desk.link = "" if desk.link else self._link()
+                view.link = "" if view.link else self._link()
             case _:
                 raise InputError("course", name, "a control of the course")
 
     def _open(self, course: Course) -> None:
-        self._desk = Desk()
+        self._view = CourseView()
         self._progress.open(course)
         self.stage.activity.enter_course()
 
@@ -168,15 +168,15 @@ class CourseFeature(Feature):
 
     def _take(self, field: object, text: str) -> None:
         """A typed code is to be checked, or an alias gets a code."""
-        desk = self._desk
-        desk.errs = "alias" if field == "alias" else "check"
+        view = self._view
+        view.errs = "alias" if field == "alias" else "check"
         if field == "alias":
-            desk.code = ""
+            view.code = ""
             self._progress.alias = clean_alias(text)
-            desk.code = self._progress.code(self.stage.activity.secret)
+            view.code = self._progress.code(self.stage.activity.secret)
         else:
-            desk.checked, desk.typed = None, text[:500]
-            desk.checked = read_code(text, self.stage.activity.secret())
+            view.checked, view.typed = None, text[:500]
+            view.checked = read_code(text, self.stage.activity.secret())
 
     def _change(self, name: str, rest: list[object], value: object) -> None:
         course = self._progress.course
@@ -196,7 +196,7 @@ class CourseFeature(Feature):
                 raise InputError("course", name, "a control of the editor")
         self._progress.edit(changed)
         self.stage.activity.enter_course()
-        self._desk.link = ""
+        self._view.link = ""
 
     def _set(self, course: Course, what: str, text: str) -> Course:
         """A typed text, or one more item."""
@@ -265,10 +265,10 @@ class CourseFeature(Feature):
         if self._page is None:
             return
         if self._progress.course is None:
-            update_html(self._page, views.chooser_html(self._courses, self._desk, self._progress.seated))
+            update_html(self._page, views.chooser_html(self._courses, self._view, self._progress.seated))
         else:
             self._ask_back()
-            update_html(self._page, views.course_html(self._progress, self.stage.activity.exercises, self._desk))
+            update_html(self._page, views.course_html(self._progress, self.stage.activity.exercises, self._view))
 
     def _ask_back(self) -> None:
         activity = self.stage.activity

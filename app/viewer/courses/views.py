@@ -28,7 +28,7 @@ LESSON_MARKS: dict[Mark, tuple[str, str, str]] = {
 
 
 @dataclass
-class Desk:
+class CourseView:
     """What a page shows of its course besides the course.
 
     Attributes:
@@ -61,15 +61,15 @@ def bar_html(progress: Progress, known: Exercises) -> str:
     )  # fmt: skip
 
 
-def chooser_html(courses: Courses, desk: Desk, seated: bool) -> str:
+def chooser_html(courses: Courses, view: CourseView, seated: bool) -> str:
     """All courses, and, but for a student in a room (`seated`), what is for teachers: own courses, codes."""
     return render(
-        "course/choose", courses=courses.all, desk=desk, most=MOST_IN_FILE, said=said(desk.checked, courses),
+        "course/choose", courses=courses.all, view=view, most=MOST_IN_FILE, said=said(view.checked, courses),
         seated=seated,
     )  # fmt: skip
 
 
-def course_html(progress: Progress, known: Exercises, desk: Desk) -> str:
+def course_html(progress: Progress, known: Exercises, view: CourseView) -> str:
     """The list of an open course, or its editor."""
     course = progress.course
     assert course is not None
@@ -89,16 +89,16 @@ def course_html(progress: Progress, known: Exercises, desk: Desk) -> str:
         ]
         row["free"] = row["kind"] == "exercise" and row["name"] not in course.before
     done = sum(row["mark"]["color"] == "green" for row in rows)
-    link = Markup(box_html(desk.link, "Copy link", wrap=True)) if desk.link else ""
-    if desk.editing:
+    link = Markup(box_html(view.link, "Copy link", wrap=True)) if view.link else ""
+    if view.editing:
         exercises = [(topic, [(one.id, one.title) for one in members]) for topic, members in known.topics()]
         return render(
             "course/edit", course=course, rows=rows, longest=LONGEST, full=len(rows) >= MOST_ITEMS, link=link,
-            lessons=[(lesson.key, lesson.title) for lesson in LESSONS], exercises=exercises, desk=desk,
+            lessons=[(lesson.key, lesson.title) for lesson in LESSONS], exercises=exercises, view=view,
         )  # fmt: skip
-    code = Markup(box_html(desk.code, "Copy code", wrap=True)) if desk.code else ""
+    code = Markup(box_html(view.code, "Copy code", wrap=True)) if view.code else ""
     return render(
-        "course/follow", course=course, rows=rows, done=done, desk=desk, link=link, code=code,
+        "course/follow", course=course, rows=rows, done=done, view=view, link=link, code=code,
         alias=progress.alias, begun=any(row["mark"]["symbol"] for row in rows), outcome=progress.outcome(),
         seated=progress.seated,
         back=[

@@ -11,7 +11,7 @@ from app.classroom.clock import now
 from app.classroom.views import NewAttempt
 from app.exercises import Exercise, ExerciseFileError, parse_exercise
 from app.viewer.activity.activity import EXERCISES, REVIEW, GivenUp, Judged
-from app.viewer.activity.places import Place
+from app.viewer.activity.context import ExerciseContext
 from app.viewer.feature import Stage
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
@@ -27,7 +27,7 @@ JOIN_AGAIN = " Join a room to go on; the link of this page keeps what you have d
 FROZEN = "The teacher has frozen the class: look at the teacher’s screen."
 
 
-class Lead(NamedTuple):
+class SharedPage(NamedTuple):
     """Who leads, and the packed state of that page."""
 
     leader: str
@@ -60,7 +60,7 @@ class Student(Member):
         self._answered: tuple[str, int] | None = None  # exercise and seed of the last answer
         self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, STORED)))
         ticket = self.attendance.ticket
-        place = Place(f"seat {ticket.room} {ticket.seat}", self.attendance.secret(), seat=True)
+        place = ExerciseContext(f"seat {ticket.room} {ticket.seat}", self.attendance.secret(), seat=True)
         self.activity.take_seat(place, self)  # before what is stored of exercises in the browser is restored
 
     def handle(self, key: Hashable, value: object) -> None:
@@ -118,14 +118,14 @@ class Student(Member):
             self.page.status.show(Notice("advice", views.MODES["closed"][1], self.room.closed))
 
     @property
-    def _lead(self) -> Lead | None:
+    def _lead(self) -> SharedPage | None:
         room = self.room
         if room.seat is None:
             return None
         if room.shown is not None:
             mine = room.shown.seat == room.seat.id
-            return None if mine or not room.shown.page else Lead(room.shown.seat, room.shown.page)
-        return Lead(TEACHER, room.page) if room.follow and room.page else None
+            return None if mine or not room.shown.page else SharedPage(room.shown.seat, room.shown.page)
+        return SharedPage(TEACHER, room.page) if room.follow and room.page else None
 
     @property
     def frozen(self) -> bool:

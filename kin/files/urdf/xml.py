@@ -13,7 +13,7 @@ MAX_DEPTH = 64
 MAX_ELEMENTS = 100_000
 
 
-class Place(NamedTuple):
+class TagPosition(NamedTuple):
     """Where an element is in a text.
 
     Attributes:
@@ -26,7 +26,7 @@ class Place(NamedTuple):
     end: int
 
 
-def parse_xml(text: bytes | str, file: str, places: dict[Element, Place] | None = None) -> Element:
+def parse_xml(text: bytes | str, file: str, places: dict[Element, TagPosition] | None = None) -> Element:
     """The root element; raises `RobotFileError`. A `str` is decoded already, whatever encoding it declares.
 
     Args:
@@ -62,7 +62,7 @@ def parse_xml(text: bytes | str, file: str, places: dict[Element, Place] | None 
             last = parser.CurrentByteIndex  # of an end tag its beginning, else the end of the only tag
             if text[last : last + 2] == b"</":
                 last = text.index(b">", last) + 1
-            places[element] = Place(line, first, last)
+            places[element] = TagPosition(line, first, last)
 
     def doctype(name: str, *_: object) -> None:
         raise RobotFileError(file, "DOCTYPE", name, "a file without DOCTYPE and entities")

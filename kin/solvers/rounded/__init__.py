@@ -14,5 +14,5 @@ structure is in doubt (:mod:`kin.solvers.rounded.tracing`), and the posture of e
 
 from kin.solvers.rounded.closed_form import Rounded as Rounded
 from kin.solvers.rounded.seven import Rounded7 as Rounded7
-from kin.solvers.rounded.table import Meant as Meant
-from kin.solvers.rounded.table import meant as meant
+from kin.solvers.rounded.table import IntendedArm as IntendedArm
+from kin.solvers.rounded.table import intended_arm as intended_arm

@@ -21,7 +21,7 @@ _EXACT = 1e-10  # radians, shares of the arm's size: rounding that does not matt
 _SEEN = 2e-9  # the most that matching takes as exact
 
 
-class Meant(NamedTuple):
+class IntendedArm(NamedTuple):
     """The arm that a table stands for.
 
     Attributes:
@@ -35,7 +35,7 @@ class Meant(NamedTuple):
     hidden: bool
 
 
-def meant(robot: Robot) -> Meant | None:
+def intended_arm(robot: Robot) -> IntendedArm | None:
     """The arm that was meant by a rounded table; None if the table is exact, or the arm another one."""
     if robot.n < 2:
         return None
@@ -53,7 +53,7 @@ def meant(robot: Robot) -> Meant | None:
     apart = np.abs(fk(table, q) - fk(robot, q))
     if apart[:, :3, :3].max() > _CLOSE or apart[:, :3, 3].max() > _CLOSE * scale:
         return None
-    return Meant(table, float(changes.max()), bool((changes < _SEEN).any()))
+    return IntendedArm(table, float(changes.max()), bool((changes < _SEEN).any()))
 
 
 def _parallel(lines: Lines) -> tuple[Lines, Array]:

@@ -23,8 +23,8 @@ from app.service.web.inspection import BURST, RATE, MessageLimit
 from app.service.web.negotiation import accepts_gzip, is_current
 from app.service.web.viewer_proxy import ViewerBridge, VisitorConnection, _serve
 from app.shared.connection import Connection, ConnectionEnded
-from app.shared.places import Places
 from app.shared.settings import Settings
+from app.shared.slots import Slots
 
 PROTOCOL = "viser-v9.9.9"
 
@@ -274,12 +274,12 @@ def test_a_visitor_who_does_not_read_is_disconnected(bridge, viser):
     with serve(app, Settings(send_timeout=0.5)) as port, visit(port, max_queue=1, close_timeout=0.1) as visitor:
         visitor.send(said("flood"))
         wait_for(lambda: len(viser.endings) == 1, 10)
-        wait_for(lambda: bridge.places.taken == 0, 10)
+        wait_for(lambda: bridge.slots.taken == 0, 10)
         assert viser.sent < 100, "how much the sockets on the way hold differs by tens of megabytes"
 
 
 def test_a_visitor_beyond_the_limit_gets_a_page_that_says_so(viser):
-    bridge = ViewerBridge(places=Places(2))
+    bridge = ViewerBridge(slots=Slots(2))
     bridge.viewer = viser
     app = FastAPI()
     app.router.routes.extend(bridge.routes())
@@ -293,25 +293,25 @@ def test_a_visitor_beyond_the_limit_gets_a_page_that_says_so(viser):
             assert page.status_code == 503
             assert "All places in the viewer are taken" in page.text
             assert page.headers["retry-after"] == "10"
-        wait_for(lambda: bridge.places.taken == 0)
+        wait_for(lambda: bridge.slots.taken == 0)
         with visit(port) as three:
             three.send(HELLO)
             assert three.recv(timeout=10) == HELLO
 
 
 def test_one_client_leaves_places_to_others(viser):
-    bridge = ViewerBridge(places=Places(4, 0.5))
+    bridge = ViewerBridge(slots=Slots(4, 0.5))
     bridge.viewer = viser
     app = FastAPI()
     app.router.routes.extend(bridge.routes())
     with serve(app) as port:
         with visit(port), visit(port):
-            wait_for(lambda: bridge.places.taken == 2)
+            wait_for(lambda: bridge.slots.taken == 2)
             assert turned_away(port) == (1013, "All places are taken.")
             with visit(port, source_address=("127.0.0.2", 0)) as other:
                 other.send(HELLO)
                 assert other.recv(timeout=10) == HELLO
-        wait_for(lambda: bridge.places.taken == 0)
+        wait_for(lambda: bridge.slots.taken == 0)
 
 
 def test_the_close_reason_of_viser_reaches_the_visitor(port):

@@ -12,7 +12,7 @@ from few import arm, typed_arm
 import kin
 from kin import Status
 from kin.solvers import closed_form_of
-from kin.solvers.rounded import Rounded, meant
+from kin.solvers.rounded import Rounded, intended_arm
 from kin.solvers.rounded.table import _rotation
 
 PI = math.pi
@@ -78,7 +78,7 @@ def test_a_rounded_table_has_the_postures_of_the_exact_one(robot, quarter):
 
 @arms
 def test_an_exact_table_is_left_alone(robot):
-    assert meant(robot) is None
+    assert intended_arm(robot) is None
     assert not isinstance(closed_form_of(robot), Rounded)
 
 
@@ -127,19 +127,19 @@ def test_one_tilt_of_several_parallel_axes_counts_once(row):
     rows = list(UR5.rows)
     rows[row] = replace(rows[row], alpha=rows[row].alpha + 1e-5)
     table = replace(UR5, id=f"tilted{row}", rows=tuple(rows))
-    assert meant(table).off == pytest.approx(1e-5, rel=1e-3)
+    assert intended_arm(table).off == pytest.approx(1e-5, rel=1e-3)
     assert closed_form_of(table).name == "parallel6"
 
 
 def test_tilts_of_parallel_axes_in_a_row_and_of_the_tool():
     typed = 3.1416 - PI
     planar = arm("planar", (0, 0.1, 0.3, 3.1416), (0, 0, 0.25, 3.1416), (0, 0, 0.2, 3.1416))
-    assert meant(planar).off == pytest.approx(typed, rel=1e-3)
+    assert intended_arm(planar).off == pytest.approx(typed, rel=1e-3)
     assert closed_form_of(planar).name == "scara4"
     five = arm("five", *[(0, 0, 0.3, 3.1416)] * 5)
-    assert meant(five).off == pytest.approx(typed, rel=1e-3)
+    assert intended_arm(five).off == pytest.approx(typed, rel=1e-3)
     # The typed twists are all that is off: without them nothing is.
-    assert np.abs(kin.fk(meant(five).table, np.zeros(5)) - kin.fk(five, np.zeros(5))).max() < 10.0 * typed
+    assert np.abs(kin.fk(intended_arm(five).table, np.zeros(5)) - kin.fk(five, np.zeros(5))).max() < 10.0 * typed
 
 
 @pytest.mark.parametrize("name", ["puma560", "ur5", "scara", "pioneer5", "iiwa14", "stanford"])

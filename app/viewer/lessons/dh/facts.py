@@ -9,7 +9,7 @@ import numpy as np
 
 from app.viewer.declared.facts import Facts
 from app.viewer.lessons.dh.settings import DHSettings
-from app.viewer.lessons.dh.steps import Place, place, reread
+from app.viewer.lessons.dh.steps import WalkState, place, reread
 from kin import Robot, link_frames
 from kin.transforms import Array
 
@@ -24,7 +24,7 @@ class DHFacts(Facts[DHSettings]):
         return link_frames(self.robot, self.q)
 
     @cached_property
-    def place(self) -> Place:
+    def place(self) -> WalkState:
         """Where the walk is."""
         return place(self.robot, self.q, self.settings.at, self.frames)
 
@@ -39,7 +39,7 @@ class DHFacts(Facts[DHSettings]):
         return link_frames(self.other, self.q)
 
     @cached_property
-    def other_place(self) -> Place:
+    def other_place(self) -> WalkState:
         """Where the walk is on that arm."""
         return place(self.other, self.q, self.settings.at, self.other_frames)
 

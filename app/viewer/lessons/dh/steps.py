@@ -33,7 +33,7 @@ _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class WalkState:
     """A place on the walk.
 
     Attributes:
@@ -93,7 +93,7 @@ def value(robot: Robot, row: int, factor: Factor, q: Array) -> float:
     return constant + float(q[robot.joint_rows.index(row)])
 
 
-def place(robot: Robot, q: Array, at: float, frames: Array | None = None) -> Place:
+def place(robot: Robot, q: Array, at: float, frames: Array | None = None) -> WalkState:
     """The place after `at` motions, for a configuration ``(n,)``.
 
     `frames` is ``link_frames(robot, q)``, if computed already.
@@ -114,7 +114,7 @@ def place(robot: Robot, q: Array, at: float, frames: Array | None = None) -> Pla
     before = start @ A
     if share > 0.0:
         A = A @ elementary(factor, whole * share)
-    return Place(row, motion, share, factor, whole, before, start @ A, A, values)
+    return WalkState(row, motion, share, factor, whole, before, start @ A, A, values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +202,7 @@ def amount(factor: Factor, shown: float, units: Units) -> str:
     return units.of(turns(factor)).text(shown)
 
 
-def caption(robot: Robot, at: Place, units: Units, asked: bool = False) -> str:
+def caption(robot: Robot, at: WalkState, units: Units, asked: bool = False) -> str:
     """The present motion in words; `asked`: without what a joint makes of its row."""
     if at.motion < 0:
         return "Frame 0 is at the base. Each row of the table carries a copy of it to the next frame."

@@ -16,7 +16,7 @@ from app.viewer.lessons.dh.steps import (
     LETTERS,
     MOVED,
     ORDERS,
-    Place,
+    WalkState,
     amount,
     axis,
     caption,
@@ -49,7 +49,7 @@ def color(factor: Factor, strength: float = 1.0) -> str:
     return f"rgba({r},{g},{b},{strength:g})"
 
 
-def caption_html(robot: Robot, at: Place, units: Units, asked: bool = False) -> str:
+def caption_html(robot: Robot, at: WalkState, units: Units, asked: bool = False) -> str:
     """The present motion, in words and highlighted in the row's product of four. The height is constant.
 
     `asked`: without what a joint makes of its row, here and in all tables.
@@ -57,7 +57,7 @@ def caption_html(robot: Robot, at: Place, units: Units, asked: bool = False) -> 
     return render("dh/caption", words=caption(robot, at, units, asked), formula=_product(robot, at, units))
 
 
-def _product(robot: Robot, at: Place, units: Units) -> Markup:
+def _product(robot: Robot, at: WalkState, units: Units) -> Markup:
     parts = [m.sub(m.ident("A"), m.short(at.row + 1)), m.op("=")]
     for k, factor in enumerate(ORDERS[robot.convention]):
         parts.append(m.gap())
@@ -85,7 +85,7 @@ def _expression(robot: Robot, row: int, factor: Factor, units: Units) -> m.MathM
 def table_html(
     robot: Robot,
     q: Array,
-    at: Place | None,
+    at: WalkState | None,
     units: Units,
     title: str = "",
     senses: Sequence[float] = (),
@@ -130,7 +130,7 @@ def _entry(robot: Robot, row: int, factor: Factor, units: Units, sense: float) -
     return units.of(turns(factor)).number(float(getattr(robot.rows[row], factor)))
 
 
-def matrices_html(robot: Robot, at: Place, symbols: bool, units: Units) -> str:
+def matrices_html(robot: Robot, at: WalkState, symbols: bool, units: Units) -> str:
     """The row's matrix and the moving frame's pose, so far. `symbols`: the row's with its joint variable."""
     unit = units.lengths
     whole = at.placed > at.row
@@ -157,7 +157,7 @@ def _numbers(T: Array, unit: Unit) -> m.MathML:
     return m.matrix([*lines, [m.short(v) for v in T[3].tolist()]], width=WIDTHS[unit.name])
 
 
-def _symbols(robot: Robot, at: Place, unit: Unit) -> m.MathML:
+def _symbols(robot: Robot, at: WalkState, unit: Unit) -> m.MathML:
     """The row's matrix up to the present motion, with its joint variable as a symbol."""
     found = symbolic(robot, at.row, at.motion + 1)
     q = _symbol(robot, at.row, MOVED.get(robot.rows[at.row].kind, "theta"))
@@ -218,7 +218,13 @@ def same_arm_html(robot: Robot, units: Units) -> str:
 
 
 def compare_html(
-    robot: Robot, other: Robot, q: Array, place_other: Place, distance: float, units: Units, asked: bool = False
+    robot: Robot,
+    other: Robot,
+    q: Array,
+    place_other: WalkState,
+    distance: float,
+    units: Units,
+    asked: bool = False,
 ) -> str:
     """The same numbers in the other convention: table, differences and reasons; `distance` of the tools (m)."""
     return render(

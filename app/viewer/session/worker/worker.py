@@ -1,8 +1,8 @@
 """A visitor's worker and its inbox.
 
 Browser callbacks post events and return. The worker takes all new events and processes them in one step. Its steps
-are called by the threads of a :class:`~app.viewer.session.worker.crew.Crew`, one at a time: state that only the
-worker touches needs no lock.
+are called by :class:`~app.viewer.session.worker.threads.VisitorThreads`, one at a time: state that only the worker
+touches needs no lock.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from collections.abc import Callable, Hashable
 import kin
 from app.shared.threads.turns import urgent
 from app.viewer.panel.status import Notice
-from app.viewer.session.worker.crew import CREW, Place
 from app.viewer.session.worker.inbox import Inbox
+from app.viewer.session.worker.threads import THREADS, Turn
 
 log = logging.getLogger(__name__)
 
@@ -32,7 +32,7 @@ class Worker:
         self._visitor = visitor
         self._failed = failed
         self._inbox = Inbox()
-        self._place = Place(CREW, self._act_once)
+        self._turn = Turn(THREADS, self._act_once)
         self._built = False
         self._ended = threading.Event()
         self._ended.set()  # until it is started
@@ -49,13 +49,13 @@ class Worker:
         """Queue an event; a newer value replaces a queued one of the same key."""
         self._inbox.post(key, value)
         if self._built:
-            self._place.call()
+            self._turn.call()
 
     def end(self) -> None:
         """Tell the worker to finish."""
         self._inbox.close()
         if self._built:
-            self._place.call()
+            self._turn.call()
 
     def join(self, timeout: float | None = None) -> bool:
         """Wait for the worker to finish; returns whether it has."""
@@ -87,7 +87,7 @@ class Worker:
         """Runs last: the page no longer exists."""
         raise NotImplementedError
 
-    # What the crew calls
+    # What the threads call
 
     def _open(self) -> None:
         try:
@@ -95,7 +95,7 @@ class Worker:
         except BaseException:  # noqa: BLE001 - logged there
             self._fail()
         else:
-            self._place.call(build=True)
+            self._turn.call(build=True)
 
     def _act_once(self) -> float | None:
         """Build the page, process one batch, or finish; returns seconds until the next call."""

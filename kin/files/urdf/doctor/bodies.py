@@ -10,7 +10,7 @@ import numpy as np
 
 from kin.files.numbers import number_of
 from kin.files.urdf.doctor.joints import check_origin
-from kin.files.urdf.doctor.notes import Notes, cut, spelled
+from kin.files.urdf.doctor.notes import FindingLog, cut, spelled
 from kin.transforms import Array
 from kin.units import general
 
@@ -41,7 +41,7 @@ class MeshFiles(Protocol):
         """The path, as the URDF would name it, of a file of the same name somewhere else; None without one."""
 
 
-def check_link(notes: Notes, link: Element, place: str, reach: float, files: MeshFiles | None) -> None:
+def check_link(notes: FindingLog, link: Element, place: str, reach: float, files: MeshFiles | None) -> None:
     """Look at the bodies of one link of an arm with this reach, in metres."""
     inertial = link.find("inertial")
     if inertial is not None:
@@ -65,7 +65,7 @@ def check_link(notes: Notes, link: Element, place: str, reach: float, files: Mes
                     _check_shape(notes, shape, where, tag == "collision")
 
 
-def _check_shape(notes: Notes, shape: Element, place: str, collides: bool) -> None:
+def _check_shape(notes: FindingLog, shape: Element, place: str, collides: bool) -> None:
     if shape.tag not in SHAPES or (shape.tag == "capsule" and not collides):
         words = f"URDF has no shape <{cut(shape.tag)}>: it is not drawn."
         notes.add(shape, place, "body", "left out", words)
@@ -88,7 +88,7 @@ def _check_shape(notes: Notes, shape: Element, place: str, collides: bool) -> No
             notes.add(shape, place, "body", "wrong", words, "State a length above zero, in metres.")
 
 
-def _check_mesh(notes: Notes, mesh: Element, place: str, reach: float, files: MeshFiles | None) -> None:
+def _check_mesh(notes: FindingLog, mesh: Element, place: str, reach: float, files: MeshFiles | None) -> None:
     source, path = notes.source, mesh.get("filename", "").strip()
     scale = notes.numbers(mesh, place, "scale", 3) if "scale" in mesh.attrib else [1.0, 1.0, 1.0]
     if not path:
@@ -130,7 +130,7 @@ def _check_mesh(notes: Notes, mesh: Element, place: str, reach: float, files: Me
     notes.add(mesh, place, "millimetres", "suspicious", words, mend, edit)
 
 
-def _check_inertial(notes: Notes, inertial: Element, place: str, reach: float) -> None:
+def _check_inertial(notes: FindingLog, inertial: Element, place: str, reach: float) -> None:
     source, place = notes.source, f"{place}: inertial"
     gone = source.without(inertial)
     element = inertial.find("mass")
@@ -158,7 +158,7 @@ def _check_inertial(notes: Notes, inertial: Element, place: str, reach: float) -
     _check_tensor(notes, tensor, place, mass, reach)
 
 
-def _check_tensor(notes: Notes, tensor: Element, place: str, mass: float, reach: float) -> None:
+def _check_tensor(notes: FindingLog, tensor: Element, place: str, mass: float, reach: float) -> None:
     source = notes.source
     missing = [key for key in INERTIA if key not in tensor.attrib]
     if missing:

@@ -16,7 +16,7 @@ from kin.errors import InputError, RobotFileError
 from kin.files.urdf.doctor.bodies import MeshFiles, check_link
 from kin.files.urdf.doctor.findings import RANKS, Symptom, UrdfExamination, UrdfFinding
 from kin.files.urdf.doctor.joints import check_joint
-from kin.files.urdf.doctor.notes import Notes, cut
+from kin.files.urdf.doctor.notes import FindingLog, cut
 from kin.files.urdf.doctor.source import Edit, SourceText, decoded
 from kin.files.urdf.doctor.tree import LISTED, check_elements, check_tree
 from kin.files.urdf.read import UrdfRobot, read_urdf
@@ -148,7 +148,7 @@ def _examined(text: str, base: str | None, tip: str | None, file: str, files: Me
         tree = tree_of(source.root, file)
     except RobotFileError as error:
         return _Round(UrdfExamination(file, (), (_unreadable(error),), None, str(error)))
-    notes, refusal = Notes(source), ""
+    notes, refusal = FindingLog(source), ""
     arms: dict[str, UrdfRobot | str] = {}
     several = tip is None and len(tree.tips) > 1 and not tree.unread
     for each in [each.link for each in tree.tips[:LISTED]] if several else [tip]:
@@ -221,7 +221,7 @@ def _result(arm: UrdfRobot | str) -> str:
     return f"refused: {arm}" if isinstance(arm, str) else f"{arm.robot.n} joint{'s' * (arm.robot.n > 1)}"
 
 
-def _note_arm(notes: Notes, tree: UrdfTree, arm: UrdfRobot) -> None:
+def _note_arm(notes: FindingLog, tree: UrdfTree, arm: UrdfRobot) -> None:
     """What is beside the arm."""
     report = arm.report
     beside = [joint for joint in tree.joints if joint.name in set(report.ignored)]
@@ -233,7 +233,7 @@ def _note_arm(notes: Notes, tree: UrdfTree, arm: UrdfRobot) -> None:
         notes.add(beside[0].element, "robot", "beside the arm", "left out", words)
 
 
-def _note_refusal(notes: Notes, tree: UrdfTree, refusal: str) -> None:
+def _note_refusal(notes: FindingLog, tree: UrdfTree, refusal: str) -> None:
     """Why there is no arm, unless a finding has said so."""
     place = _PLACE.match(refusal)
     named = [e for e in tree.root if place and e.tag == place[1] and e.get("name", "").strip() == place[2]]
@@ -260,7 +260,7 @@ def _note_refusal(notes: Notes, tree: UrdfTree, refusal: str) -> None:
     notes.add(named[0] if named else tree.root, "robot", "tree", "wrong", words, mend)
 
 
-def _note_meshes(notes: Notes, tree: UrdfTree, files: MeshFiles | None) -> None:
+def _note_meshes(notes: FindingLog, tree: UrdfTree, files: MeshFiles | None) -> None:
     meshes = [mesh for link in tree.root.findall("link") for mesh in link.iter("mesh")]
     if meshes and files is None:
         many = "1 mesh file is" if len(meshes) == 1 else f"{len(meshes)} mesh files are"

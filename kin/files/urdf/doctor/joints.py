@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from xml.etree.ElementTree import Element
 
 from kin.files.numbers import LARGEST, number_of
-from kin.files.urdf.doctor.notes import Notes, cut, spelled
+from kin.files.urdf.doctor.notes import FindingLog, cut, spelled
 from kin.files.urdf.doctor.source import Edit
 from kin.files.urdf.tree import MOVING, TYPES
 from kin.units import general
@@ -25,7 +25,7 @@ _EXACT, _ROUNDED = 1e-7, 5e-3  # radians between which an angle is a right or ha
 _MOST_ROUNDS = 64  # joints that follow each other
 
 
-def check_joint(notes: Notes, joint: Element, place: str, known: Mapping[str, Element]) -> None:
+def check_joint(notes: FindingLog, joint: Element, place: str, known: Mapping[str, Element]) -> None:
     """Look at one joint; `known` are all joints by name."""
     kind = _check_type(notes, joint, place)
     turns = kind in ("revolute", "continuous")
@@ -41,7 +41,7 @@ def check_joint(notes: Notes, joint: Element, place: str, known: Mapping[str, El
         check_origin(notes, origin, f"{place}: origin")
 
 
-def _check_type(notes: Notes, joint: Element, place: str) -> str:
+def _check_type(notes: FindingLog, joint: Element, place: str) -> str:
     kind = joint.get("type", "")
     if kind in TYPES:
         return kind
@@ -55,7 +55,7 @@ def _check_type(notes: Notes, joint: Element, place: str) -> str:
     return kind
 
 
-def _check_limits(notes: Notes, joint: Element, place: str, kind: str) -> bool:
+def _check_limits(notes: FindingLog, joint: Element, place: str, kind: str) -> bool:
     """Look at lower and upper; returns whether they look like degrees."""
     limit, source = joint.find("limit"), notes.source
     free = source.with_attribute(joint, "type", "continuous")
@@ -97,7 +97,7 @@ def _check_limits(notes: Notes, joint: Element, place: str, kind: str) -> bool:
     return _check_turns(notes, limit, place, lower, upper, free)
 
 
-def _check_slide(notes: Notes, limit: Element, place: str, lower: float, upper: float) -> None:
+def _check_slide(notes: FindingLog, limit: Element, place: str, lower: float, upper: float) -> None:
     if max(abs(lower), abs(upper)) <= _LONGEST_SLIDE:
         return
     edits = [
@@ -109,7 +109,7 @@ def _check_slide(notes: Notes, limit: Element, place: str, lower: float, upper: 
     notes.add(limit, place, "millimetres", "suspicious", words, mend, *edits)
 
 
-def _check_turns(notes: Notes, limit: Element, place: str, lower: float, upper: float, free: Edit) -> bool:
+def _check_turns(notes: FindingLog, limit: Element, place: str, lower: float, upper: float, free: Edit) -> bool:
     """Look at limits of a turning joint; returns whether they look like degrees. `free` makes it continuous."""
     source, most, shown = notes.source, max(abs(lower), abs(upper)), f"{general(lower)} to {general(upper)}"
     if most > _MOST_DEGREES:
@@ -130,7 +130,7 @@ def _check_turns(notes: Notes, limit: Element, place: str, lower: float, upper: 
     return True
 
 
-def _check_speeds(notes: Notes, joint: Element, place: str, turns: bool, in_degrees: bool) -> None:
+def _check_speeds(notes: FindingLog, joint: Element, place: str, turns: bool, in_degrees: bool) -> None:
     limit, source = joint.find("limit"), notes.source
     if limit is None:
         return
@@ -158,7 +158,7 @@ def _check_speeds(notes: Notes, joint: Element, place: str, turns: bool, in_degr
             notes.add(limit, place, "degrees", "suspicious", words, mend, *edits)
 
 
-def _check_axis(notes: Notes, joint: Element, place: str) -> None:
+def _check_axis(notes: FindingLog, joint: Element, place: str) -> None:
     axis, source = joint.find("axis"), notes.source
     if axis is None or "xyz" not in axis.attrib:
         words = "It states no axis, so that x counts."
@@ -183,7 +183,7 @@ def _check_axis(notes: Notes, joint: Element, place: str) -> None:
         notes.add(axis, place, "axis", "suspicious", words, mend, edit)
 
 
-def check_origin(notes: Notes, origin: Element, place: str) -> None:
+def check_origin(notes: FindingLog, origin: Element, place: str) -> None:
     """Look at an origin: lengths in millimetres, angles in degrees, right angles with a few digits."""
     source = notes.source
     xyz, rpy = (notes.numbers(origin, place, key, 3) for key in ("xyz", "rpy"))
@@ -231,7 +231,7 @@ def _meant(text: str, value: float) -> float:
     return exact if exact and digits >= 2 and _EXACT < abs(value - exact) <= near else value
 
 
-def _check_mimic(notes: Notes, joint: Element, place: str, known: Mapping[str, Element]) -> None:
+def _check_mimic(notes: FindingLog, joint: Element, place: str, known: Mapping[str, Element]) -> None:
     mimic, source = joint.find("mimic"), notes.source
     if mimic is None:
         return

@@ -11,7 +11,7 @@ from kin.files.urdf.doctor.source import Edit, SourceText
 _LONGEST = 60  # characters of a name or a text in a sentence
 
 
-class Notes:
+class FindingLog:
     """The findings of one text so far."""
 
     def __init__(self, source: SourceText) -> None:

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
 from kin.errors import RobotFileError
-from kin.files.urdf.xml import Place, parse_xml
+from kin.files.urdf.xml import TagPosition, parse_xml
 
 _ATTRIBUTE = re.compile(rb"\s+([^\s=<>/]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 _TAG = re.compile(rb"<[^\s<>/]+")
@@ -39,7 +39,7 @@ class SourceText:
 
     def __init__(self, text: str, file: str) -> None:
         self._bytes = text.encode("utf-8", "replace")
-        self._places: dict[Element, Place] = {}
+        self._places: dict[Element, TagPosition] = {}
         self.root = parse_xml(text, file, self._places)
 
     def line(self, element: Element) -> int:

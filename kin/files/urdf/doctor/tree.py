@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
 from kin.files.names import unused
-from kin.files.urdf.doctor.notes import Notes, cut
+from kin.files.urdf.doctor.notes import FindingLog, cut
 from kin.files.urdf.tree import Unread, UrdfTree
 
 LISTED = 6  # names in a sentence
@@ -34,7 +34,7 @@ _READ = {
 }
 
 
-def check_tree(notes: Notes, tree: UrdfTree) -> None:
+def check_tree(notes: FindingLog, tree: UrdfTree) -> None:
     """Look at names, parents and children."""
     for each in tree.unread:
         _check_unread(notes, tree, each)
@@ -50,7 +50,7 @@ def check_tree(notes: Notes, tree: UrdfTree) -> None:
         notes.add(element, "robot", "tree", "suspicious", words, "Connect them with fixed joints.")
 
 
-def _check_unread(notes: Notes, tree: UrdfTree, each: Unread) -> None:
+def _check_unread(notes: FindingLog, tree: UrdfTree, each: Unread) -> None:
     element, source, error = each.element, notes.source, each.error
     name = element.get("name", "").strip()
     place = f"{element.tag} {name}" if name else element.tag
@@ -104,7 +104,7 @@ def _free(tree: UrdfTree, tag: str) -> list[str]:
     return [link for link in tree.links if tag == "parent" or link not in tree.parents]
 
 
-def check_elements(notes: Notes, root: Element) -> None:
+def check_elements(notes: FindingLog, root: Element) -> None:
     """List the elements of which nothing is made, each tag once."""
     found: dict[tuple[str, str], list[Element]] = {}
     for parent in [root, *root.findall("link"), *root.findall("joint")]:

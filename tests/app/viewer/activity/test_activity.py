@@ -9,7 +9,7 @@ import pytest
 from app.classroom.courses import Course, Courses, Item
 from app.exercises import Exercise, Exercises, Verdict
 from app.viewer.activity.activity import EXERCISES, Activity, GivenUp, Judged
-from app.viewer.activity.places import Place
+from app.viewer.activity.context import ExerciseContext
 from kin import KinematicsError
 
 ALL = Exercises()
@@ -75,7 +75,7 @@ def test_a_course_without_answers_does_not_reveal_its_own(activity: Activity, se
     assert not activity.reveals(TABLE)
     assert activity.reveals(OTHER)
     room = Room()
-    activity.take_seat(Place("seat r s", b"k", seat=True), room)
+    activity.take_seat(ExerciseContext("seat r s", b"k", seat=True), room)
     assert not activity.give_up(TABLE, 1.0)
     assert not room.got, "nothing is stored as given up that is not shown"
     assert not activity.practice.record(TABLE).closed
@@ -83,7 +83,7 @@ def test_a_course_without_answers_does_not_reveal_its_own(activity: Activity, se
 
 def test_an_answer_is_shown_only_when_the_seat_has_stored_that_it_was(activity: Activity) -> None:
     room = Room(allows=False)
-    activity.take_seat(Place("seat r s", b"k", seat=True), room)
+    activity.take_seat(ExerciseContext("seat r s", b"k", seat=True), room)
     seed = activity.practice.seed_of(OTHER)
     assert not activity.give_up(OTHER, 2.0)
     assert not activity.practice.record(OTHER).closed
@@ -96,7 +96,7 @@ def test_an_answer_is_shown_only_when_the_seat_has_stored_that_it_was(activity: 
 def test_answers_go_to_the_seat(activity: Activity) -> None:
     room = Room()
     activity.answer(OTHER, 1, RIGHT, 1.0)  # alone
-    activity.take_seat(Place("seat r s", b"k", seat=True), room)
+    activity.take_seat(ExerciseContext("seat r s", b"k", seat=True), room)
     activity.answer(OTHER, 2, RIGHT, 4.0)
     assert room.got == [Judged(OTHER, activity.practice.seed_of(OTHER), 2, RIGHT, 4.0)]
 

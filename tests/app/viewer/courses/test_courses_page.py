@@ -20,7 +20,7 @@ from app.exercises import Exercises, Verdict
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.activity.places import Place
+from app.viewer.activity.context import ExerciseContext
 from app.viewer.activity.practice import Practice
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.lesson import Lesson
@@ -184,7 +184,7 @@ def builtin_list() -> list[object]:
 def test_marks_that_were_written_into_a_link_do_not_count(server: int) -> None:
     """A student edits the page's storage: neither the marks nor the answers they would open are shown."""
     done = {"which-joint-goes-down": [2, 1, 0, 5, 100, 0], "row-distance": [3, 1, 0, 5, 100, 0]}
-    label = Place(f"course {COURSE.fingerprint.hex()} without answers", b"of nobody").label
+    label = ExerciseContext(f"course {COURSE.fingerprint.hex()} without answers", b"of nobody").label
     for place in ({}, {"in": label}):
         practice = {"seed": SEED, "at": "", "done": done, "proof": "0" * 20, **place}
         memory = opened({"course": {"course": to_data(COURSE)}, "exercises": practice})
@@ -196,7 +196,7 @@ def test_marks_that_were_written_into_a_link_do_not_count(server: int) -> None:
 
 
 def test_a_proof_belongs_to_place_seed_and_records() -> None:
-    here, there = Place("course a", b"k"), Place("course b", b"k")
+    here, there = ExerciseContext("course a", b"k"), ExerciseContext("course b", b"k")
     practice = Practice(ALL)
     practice.enter(here)
     one = ALL.all[0]
@@ -226,21 +226,21 @@ def test_each_place_has_its_own_numbers_and_marks() -> None:
     assert one is not None
     seeds = [practice.seed_of(one)]
     for name, key in (("course a", b"k"), ("course b", b"k"), ("course a", b"other")):
-        practice.enter(Place(name, key))
+        practice.enter(ExerciseContext(name, key))
         seeds.append(practice.seed_of(one))
         assert not practice.record(one).closed
         practice.take(one, Verdict(True, "Yes."), 1.0)
     assert len(set(seeds)) == 4
     practice.enter(None)
     assert not practice.record(one).closed
-    practice.enter(Place("course a", b"k"))
+    practice.enter(ExerciseContext("course a", b"k"))
     assert practice.record(one).closed, "a course that is opened again"
 
 
 def test_an_answer_that_was_shown_stays_shown_when_undo_leads_back() -> None:
     practice, one = Practice(ALL), ALL.get("two-elbows")
     assert one is not None
-    practice.enter(Place("course a", b"k"))
+    practice.enter(ExerciseContext("course a", b"k"))
     practice.open(one.id)
     before = practice.state()
     practice.give_up(one)
@@ -256,13 +256,13 @@ def test_an_answer_that_was_shown_stays_shown_when_undo_leads_back() -> None:
 def test_a_seat_is_not_left_for_a_course() -> None:
     practice, one = Practice(ALL), ALL.get("two-elbows")
     assert one is not None
-    seat = Place("seat r s", b"k", seat=True)
+    seat = ExerciseContext("seat r s", b"k", seat=True)
     practice.enter(seat)
     other = Practice(ALL)
     other.enter(seat)
     assert practice.seed != other.seed
     assert practice.seed_of(one) == other.seed_of(one), "two pages of one seat have the same numbers"
-    practice.enter(Place("course a", b"k"))
+    practice.enter(ExerciseContext("course a", b"k"))
     practice.enter(None)
     assert practice.seed_of(one) == other.seed_of(one)
     fixed = ALL.get("five-joints")

@@ -15,7 +15,7 @@ from app.exercises import Exercises, Verdict
 from app.exercises.lessons import LESSONS as KEYS
 from app.shared.store import Store
 from app.viewer.activity.activity import REVIEW, Activity, GivenUp
-from app.viewer.activity.places import Place
+from app.viewer.activity.context import ExerciseContext
 from app.viewer.activity.review import INTERVALS, MOST_MISSED, Missed, Review, question_key
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide import earlier
@@ -147,7 +147,7 @@ def test_a_reload_keeps_the_list_and_undo_changes_nothing(clock: Clock) -> None:
 def test_seats_have_lists_of_their_own(clock: Clock) -> None:
     review = Review(clock)
     review.take("swing", False)
-    first, second = (Place(f"seat room {i}", b"key", seat=True).label for i in range(2))
+    first, second = (ExerciseContext(f"seat room {i}", b"key", seat=True).label for i in range(2))
     review.enter(first)
     assert review.missed == {}
     review.take("two-elbows", False)
@@ -227,7 +227,7 @@ def test_the_list_of_a_seat_is_not_that_of_the_page() -> None:
 
     one = activity()
     one.answer(ALL.all[0], None, Verdict(False, "No."), 1.0)
-    one.take_seat(Place("seat room me", b"key", seat=True), Room())
+    one.take_seat(ExerciseContext("seat room me", b"key", seat=True), Room())
     assert one.review.missed == {}
     one.answer(ALL.all[1], None, Verdict(False, "No."), 1.0)
     assert set(one.review.missed) == {ALL.all[1].id}

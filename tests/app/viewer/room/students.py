@@ -9,7 +9,7 @@ from fake_browser import FakeBrowser
 from app.classroom import COOKIE, Hub, Ticket
 from app.classroom.results.store import attempts_of
 from app.exercises import Exercise, Exercises, Variant
-from app.viewer.activity.places import Place
+from app.viewer.activity.context import ExerciseContext
 from app.viewer.session.state import PageState, encode
 from kin.units import Units
 
@@ -41,7 +41,9 @@ class Room:
 
     def variant(self, ticket: Ticket, exercise: Exercise) -> Variant:
         """The numbers of a seat."""
-        place = Place(f"seat {ticket.room} {ticket.seat}", self.hub.rooms.tokens.secret(ticket), seat=True)
+        place = ExerciseContext(
+            f"seat {ticket.room} {ticket.seat}", self.hub.rooms.tokens.secret(ticket), seat=True
+        )
         return exercise.variant(place.seed(exercise.id, 0))
 
     def attempts(self, ticket: Ticket) -> list[tuple[str, float]]:

@@ -27,7 +27,7 @@ from app.viewer.room.teacher import Teacher
 from app.viewer.room.wall import PADS
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import decode
-from app.viewer.session.worker.crew import BUILDS
+from app.viewer.session.worker.threads import BUILDS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 

@@ -21,7 +21,7 @@ from students import ALL, UNITS, Room, begin, exercise, press, text_of
 
 from app.exercises import Asked, Exercise, Variant
 from app.exercises.kinds.number import NumberKind
-from app.viewer.activity.places import Place
+from app.viewer.activity.context import ExerciseContext
 from app.viewer.exercises import views
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -268,12 +268,12 @@ def fixed(monkeypatch: pytest.MonkeyPatch) -> None:
         others = (seed for seed in seeds[1:] if one.kind.answer(one.variant(seed)) != first)
         return seeds[0], next(others, seeds[0])
 
-    def seed(self: Place, *parts: object) -> int:
+    def seed(self: ExerciseContext, *parts: object) -> int:
         if self.name not in names:
             names.append(self.name)
         return two_seeds(*parts)[names.index(self.name) % 2]
 
-    monkeypatch.setattr(Place, "seed", seed)
+    monkeypatch.setattr(ExerciseContext, "seed", seed)
 
 
 @pytest.mark.usefixtures("fixed")

@@ -6,14 +6,14 @@ import asyncio
 import logging
 
 from app.shared import notes
-from app.shared.notes import Notes
+from app.shared.throttled_log import ThrottledLog
 
 
 def test_each_kind_is_logged_at_once_and_then_counted(monkeypatch, caplog):
     monkeypatch.setattr(notes, "LOG_EVERY", 0.1)
 
     async def noted() -> None:
-        some = Notes(logging.getLogger("some"))
+        some = ThrottledLog(logging.getLogger("some"))
         for k in range(5):
             some.note("a", f"a {k}")
         some.note("b", "b")

@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Iterator
 import pytest
 
 from app.viewer.panel.status import Notice
-from app.viewer.session.worker.crew import BUILDS, Crew, Place
+from app.viewer.session.worker.threads import BUILDS, Turn, VisitorThreads
 from app.viewer.session.worker.worker import Worker
 
 WAIT = 10.0  # s for what takes milliseconds
@@ -25,26 +25,26 @@ def wait_for(condition: Callable[[], object], timeout: float = WAIT) -> None:
         time.sleep(0.002)
 
 
-def threads() -> list[str]:
+def thread_names() -> list[str]:
     return [thread.name for thread in threading.enumerate() if thread.name.startswith("visitors-")]
 
 
 @pytest.fixture
-def crew() -> Iterator[Crew]:
-    wait_for(lambda: not threads())  # those of an earlier test
-    made = Crew(keep=0.2)
+def threads() -> Iterator[VisitorThreads]:
+    wait_for(lambda: not thread_names())  # those of an earlier test
+    made = VisitorThreads(keep=0.2)
     yield made
-    wait_for(lambda: not threads())
+    wait_for(lambda: not thread_names())
 
 
 class Visitor:
     """Counts its steps, and whether two of them ran at a time."""
 
-    def __init__(self, crew: Crew, seconds: float = 0.0, again: float | None = None) -> None:
+    def __init__(self, threads: VisitorThreads, seconds: float = 0.0, again: float | None = None) -> None:
         self.steps, self.seconds, self.again = 0, seconds, again
         self.within = threading.Lock()
         self.times: list[float] = []
-        self.place = Place(crew, self.act)
+        self.turn = Turn(threads, self.act)
 
     def act(self) -> float | None:
         assert self.within.acquire(blocking=False), "two steps of one visitor at a time"
@@ -56,142 +56,145 @@ class Visitor:
         return self.again
 
 
-def test_a_call_is_one_step_and_calls_before_it_are_one(crew):
-    visitor, blocks = Visitor(crew), Visitor(crew, 0.01)
-    blocks.place.call()
+def test_a_call_is_one_step_and_calls_before_it_are_one(threads):
+    visitor, blocks = Visitor(threads), Visitor(threads, 0.01)
+    blocks.turn.call()
     wait_for(lambda: blocks.steps)
     for _ in range(5):
-        visitor.place.call()
+        visitor.turn.call()
     wait_for(lambda: visitor.steps)
     time.sleep(0.05)
     assert visitor.steps == 1
 
 
-def test_a_call_during_a_step_is_another_step(crew):
-    visitor = Visitor(crew, 0.05)
-    visitor.place.call()
+def test_a_call_during_a_step_is_another_step(threads):
+    visitor = Visitor(threads, 0.05)
+    visitor.turn.call()
     wait_for(lambda: visitor.steps == 1)
-    visitor.place.call()
-    visitor.place.call()
+    visitor.turn.call()
+    visitor.turn.call()
     wait_for(lambda: visitor.steps == 2)
     time.sleep(0.1)
     assert visitor.steps == 2
 
 
-def test_visitors_take_turns(crew):
+def test_visitors_take_turns(threads):
     order: list[int] = []
 
     def acts(k: int) -> Callable[[], float | None]:
         return lambda: order.append(k)
 
-    places = [Place(crew, acts(k)) for k in range(3)]
+    turns = [Turn(threads, acts(k)) for k in range(3)]
     gate = threading.Event()
 
     def first() -> float | None:
         gate.wait(0.01)
         for _ in range(3):  # an eager visitor calls more often than others, and has no more turns
-            places[0].call()
-        places[1].call()
-        places[2].call()
+            turns[0].call()
+        turns[1].call()
+        turns[2].call()
         return None
 
-    Place(crew, first).call()
+    Turn(threads, first).call()
     wait_for(lambda: len(order) == 3)
     assert order == [0, 1, 2]
 
 
-def test_a_visitor_is_called_again_when_it_asked_for_it_and_earlier_if_something_happens(crew):
-    visitor = Visitor(crew, again=0.1)
-    visitor.place.call()
+def test_a_visitor_is_called_again_when_it_asked_for_it_and_earlier_if_something_happens(threads):
+    visitor = Visitor(threads, again=0.1)
+    visitor.turn.call()
     wait_for(lambda: visitor.steps == 3)
     first, second, third = visitor.times[:3]
     assert min(second - first, third - second) >= 0.1
     visitor.again = 1000.0
     wait_for(lambda: visitor.steps == 4)
     visitor.again = None
-    visitor.place.call()
+    visitor.turn.call()
     wait_for(lambda: visitor.steps == 5)
 
 
-def test_a_step_that_blocks_holds_up_nobody_else(crew):
-    blocks, others = Visitor(crew, LONG), [Visitor(crew) for _ in range(5)]
-    blocks.place.call()
+def test_a_step_that_blocks_holds_up_nobody_else(threads):
+    blocks, others = Visitor(threads, LONG), [Visitor(threads) for _ in range(5)]
+    blocks.turn.call()
     wait_for(lambda: blocks.steps)
     begin = time.monotonic()
     for other in others:
-        other.place.call()
+        other.turn.call()
     wait_for(lambda: all(other.steps == 1 for other in others))
     assert time.monotonic() - begin < LONG / 2
     began = time.monotonic()
     for k in range(2, 22):
         for other in others:
-            other.place.call()
+            other.turn.call()
         wait_for(lambda k=k: all(other.steps == k for other in others))
     assert time.monotonic() - began < LONG / 2
     assert blocks.within.locked(), "it still blocks"
     wait_for(lambda: not blocks.within.locked())
 
 
-def test_several_blocked_steps_hold_up_nobody_and_their_threads_end(crew):
-    blocked, other = [Visitor(crew, 1.0) for _ in range(6)], Visitor(crew)
+def test_several_blocked_steps_hold_up_nobody_and_their_threads_end(threads):
+    blocked, other = [Visitor(threads, 1.0) for _ in range(6)], Visitor(threads)
     for visitor in blocked:
-        visitor.place.call()
+        visitor.turn.call()
     wait_for(lambda: all(visitor.steps for visitor in blocked))
-    other.place.call()
+    other.turn.call()
     wait_for(lambda: other.steps)
     assert sum(visitor.within.locked() for visitor in blocked) == 6, "all of them block at a time"
-    assert len(threads()) <= 8
+    assert len(thread_names()) <= 8
     wait_for(lambda: not any(visitor.within.locked() for visitor in blocked))
-    wait_for(lambda: len(threads()) <= 2)
-    other.place.call()
+    wait_for(lambda: len(thread_names()) <= 2)
+    other.turn.call()
     wait_for(lambda: other.steps == 2)
 
 
-def test_a_call_during_a_blocked_step_is_answered_after_it(crew):
-    blocks, other = Visitor(crew, 0.3), Visitor(crew)
-    blocks.place.call()
+def test_a_call_during_a_blocked_step_is_answered_after_it(threads):
+    blocks, other = Visitor(threads, 0.3), Visitor(threads)
+    blocks.turn.call()
     wait_for(lambda: blocks.steps)
-    blocks.place.call()
-    other.place.call()
+    blocks.turn.call()
+    other.turn.call()
     wait_for(lambda: other.steps)
     assert blocks.steps == 1
     wait_for(lambda: blocks.steps == 2)
 
 
-def test_steps_go_before_pages_that_are_built(crew):
+def test_steps_go_before_pages_that_are_built(threads):
     order: list[str] = []
 
     def acts(name: str) -> Callable[[], float | None]:
         return lambda: order.append(name)
 
-    builds, steps = [Place(crew, acts("build")) for _ in range(3)], [Place(crew, acts("step")) for _ in range(25)]
+    builds, steps = (
+        [Turn(threads, acts("build")) for _ in range(3)],
+        [Turn(threads, acts("step")) for _ in range(25)],
+    )
 
     def first() -> float | None:
-        for place in builds:
-            place.call(build=True)
-        for place in steps:
-            place.call()
+        for turn in builds:
+            turn.call(build=True)
+        for turn in steps:
+            turn.call()
         return None
 
-    Place(crew, first).call()
+    Turn(threads, first).call()
     wait_for(lambda: len(order) == 28)
     assert order[-1] == "build"
     assert "build" in order[:12], "pages are built beside many steps too"
     assert order[:9] == 9 * ["step"]
 
 
-def test_pages_whose_building_blocks_take_no_more_threads_than_allowed(crew):
-    builds, other = [Visitor(crew, 0.3) for _ in range(BUILDS + 3)], Visitor(crew)
+def test_pages_whose_building_blocks_take_no_more_threads_than_allowed(threads):
+    builds, other = [Visitor(threads, 0.3) for _ in range(BUILDS + 3)], Visitor(threads)
     for visitor in builds:
-        visitor.place.call(build=True)
+        visitor.turn.call(build=True)
     wait_for(lambda: sum(visitor.within.locked() for visitor in builds) == BUILDS)
-    other.place.call()
+    other.turn.call()
     wait_for(lambda: other.steps)
     assert sum(visitor.within.locked() for visitor in builds) <= BUILDS
     wait_for(lambda: all(visitor.steps for visitor in builds))
 
 
-def test_threads_that_cannot_be_started_are_tried_again(crew, monkeypatch, caplog):
+def test_threads_that_cannot_be_started_are_tried_again(threads, monkeypatch, caplog):
     start = threading.Thread.start
     refused = [True, False, True, True]  # the one that leads, once; the one that watches, twice
 
@@ -201,53 +204,53 @@ def test_threads_that_cannot_be_started_are_tried_again(crew, monkeypatch, caplo
         start(thread)
 
     monkeypatch.setattr(threading.Thread, "start", starts)
-    visitor, other = Visitor(crew), Visitor(crew)
-    visitor.place.call()
-    assert not threads()
-    visitor.place.call()
+    visitor, other = Visitor(threads), Visitor(threads)
+    visitor.turn.call()
+    assert not thread_names()
+    visitor.turn.call()
     wait_for(lambda: visitor.steps == 1)
     for k in range(1, 5):
-        wait_for(lambda k=k: other.place.call() or other.steps >= k)
+        wait_for(lambda k=k: other.turn.call() or other.steps >= k)
     assert not refused
     assert "could not be started: can't start new thread" in caplog.text
 
 
-def test_a_step_that_raises_ends_no_thread(crew, caplog):
+def test_a_step_that_raises_ends_no_thread(threads, caplog):
     def fails() -> float | None:
         raise SystemExit
 
-    other = Visitor(crew)
+    other = Visitor(threads)
     with caplog.at_level(logging.ERROR):
-        Place(crew, fails).call()
-        other.place.call()
+        Turn(threads, fails).call()
+        other.turn.call()
         wait_for(lambda: other.steps)
     assert "a visitor's step failed" in caplog.text
 
 
-def test_short_steps_of_many_visitors_stay_in_one_thread(crew):
+def test_short_steps_of_many_visitors_stay_in_one_thread(threads):
     seen: Counter[str] = Counter()
 
     def act() -> float | None:
         seen[threading.current_thread().name] += 1
         return None
 
-    places = [Place(crew, act) for _ in range(20)]
+    turns = [Turn(threads, act) for _ in range(20)]
     for _ in range(50):
-        for place in places:
-            place.call()
+        for turn in turns:
+            turn.call()
         time.sleep(0.002)
-    wait_for(lambda: not crew._ready)
+    wait_for(lambda: not threads._ready)
     assert seen.most_common(1)[0][1] > 0.8 * seen.total()
 
 
-def test_calls_from_many_threads_are_all_answered(crew):
-    visitors = [Visitor(crew) for _ in range(10)]
+def test_calls_from_many_threads_are_all_answered(threads):
+    visitors = [Visitor(threads) for _ in range(10)]
     wanted = [0] * 10
 
     def call(k: int) -> None:
         for _ in range(100):
             wanted[k] += 1
-            visitors[k].place.call()
+            visitors[k].turn.call()
             time.sleep(0.0005)
 
     callers = [threading.Thread(target=call, args=(k,)) for k in range(10)]
@@ -257,7 +260,7 @@ def test_calls_from_many_threads_are_all_answered(crew):
         caller.join(WAIT)
     before = [visitor.steps for visitor in visitors]
     for visitor in visitors:
-        visitor.place.call()
+        visitor.turn.call()
     wait_for(lambda: all(v.steps > b for v, b in zip(visitors, before, strict=True)))
 
 
@@ -351,7 +354,7 @@ def test_a_visitor_who_leaves_in_the_middle_of_a_step_is_left_after_it():
     page, other = Page(), Page()
     page.start(), other.start()
     page.post("wait")
-    wait_for(lambda: page._place.acts)
+    wait_for(lambda: page._turn.acts)
     page.end()
     other.post("news")
     wait_for(lambda: "news" in other.did)

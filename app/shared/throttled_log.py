@@ -8,7 +8,7 @@ import logging
 LOG_EVERY = 60.0  # seconds between two lines of the same kind
 
 
-class Notes:
+class ThrottledLog:
     """Logs the first line of a kind at once, those of the next seconds as a number. For one event loop only."""
 
     def __init__(self, logger: logging.Logger) -> None:

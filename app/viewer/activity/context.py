@@ -11,7 +11,7 @@ _SEED = 6  # bytes: also exact as a number of JSON
 
 
 @dataclass(frozen=True)
-class Place:
+class ExerciseContext:
     """One place.
 
     Attributes:

@@ -28,15 +28,15 @@ BUILDS = 4  # pages built at a time: more than one where the first take long
 LOG_EVERY = 10.0  # s between two log lines about threads that could not be started
 
 
-class Place:
-    """What one visitor has in a `Crew`.
+class Turn:
+    """What one visitor has in a `VisitorThreads`.
 
     Args:
         act: does what there is to do; returns seconds until it is called again, None: only after `call`.
     """
 
-    def __init__(self, crew: Crew, act: Callable[[], float | None]) -> None:
-        self._crew = crew
+    def __init__(self, threads: VisitorThreads, act: Callable[[], float | None]) -> None:
+        self._threads = threads
         self.act = act
         self.waits = self.acts = self.again = self.builds = False
         self.due: float | None = None  # of `time.monotonic`
@@ -47,10 +47,10 @@ class Place:
         Args:
             build: whether it is a page that is built, which may wait longer.
         """
-        self._crew.call(self, build)
+        self._threads.call(self, build)
 
 
-class Crew:
+class VisitorThreads:
     """The threads of one process. They start with the first call and end after `KEEP` seconds without one."""
 
     def __init__(self, patience: float = PATIENCE, keep: float = KEEP) -> None:
@@ -58,11 +58,11 @@ class Crew:
         self._lock = threading.Lock()
         self._work = threading.Condition(self._lock)  # what the leader waits for
         self._watch = threading.Condition(self._lock)  # what the watcher waits for
-        self._ready: deque[Place] = deque()
-        self._builds: deque[Place] = deque()
+        self._ready: deque[Turn] = deque()
+        self._builds: deque[Turn] = deque()
         self._building = 0
         self._row = 0  # steps since a page was built
-        self._due: list[tuple[float, int, Place]] = []
+        self._due: list[tuple[float, int, Turn]] = []
         self._order = itertools.count()
         self._numbers = itertools.count(1)
         self._leader: threading.Thread | None = None
@@ -71,14 +71,14 @@ class Crew:
         self._log_at = 0.0  # when a thread that could not be started is logged again
         self._watches = False  # whether the watcher looks at the leader again and again
 
-    def call(self, place: Place, build: bool) -> None:
-        """See `Place.call`."""
+    def call(self, turn: Turn, build: bool) -> None:
+        """See `Turn.call`."""
         with self._lock:
-            if place.acts:
-                place.again = True
+            if turn.acts:
+                turn.again = True
                 return
-            if not place.waits:
-                self._queue(place, build)
+            if not turn.waits:
+                self._queue(turn, build)
             if self._leader is None:
                 self._leader = self._start(True)
             elif not self._step & 1:
@@ -104,48 +104,48 @@ class Crew:
             if not self._lead():
                 return
 
-    def _queue(self, place: Place, build: bool) -> None:
-        place.waits, place.due, place.builds = True, None, build
-        (self._builds if build else self._ready).append(place)
+    def _queue(self, turn: Turn, build: bool) -> None:
+        turn.waits, turn.due, turn.builds = True, None, build
+        (self._builds if build else self._ready).append(turn)
 
     # The leader
 
     def _lead(self) -> bool:
         """Take the visitors in turn. True: another thread leads now; False: there was nothing to do for long."""
         me = threading.current_thread()
-        place: Place | None = None
+        turn: Turn | None = None
         again: float | None = None
         while True:
             with self._lock:
-                if place is not None:
-                    self._end_step(place, again)
+                if turn is not None:
+                    self._end_step(turn, again)
                 if self._leader is not me:
                     return True
                 self._step += self._step & 1
-                place = self._next()
-                if place is None:
+                turn = self._next()
+                if turn is None:
                     self._leader = None
                     self._watch.notify()
                     return False
-                self._begin_step(place)
+                self._begin_step(turn)
             try:
-                again = place.act()
+                again = turn.act()
             except BaseException:
                 log.exception("a visitor's step failed")
                 again = None
 
-    def _next(self) -> Place | None:
+    def _next(self) -> Turn | None:
         """The next visitor, for whom the leader waits; None: there was none for long."""
         while True:
             now = time.monotonic()
             while self._due:
-                at, _, place = self._due[0]
-                called = place.due != at  # before it was due
+                at, _, turn = self._due[0]
+                called = turn.due != at  # before it was due
                 if not called and at > now:
                     break
                 heapq.heappop(self._due)
                 if not called:
-                    self._queue(place, False)
+                    self._queue(turn, False)
             builds = self._builds and self._building < BUILDS
             if self._ready and not (builds and self._row >= IN_A_ROW):
                 self._row += 1
@@ -157,9 +157,9 @@ class Crew:
             if not self._work.wait(wait) and not (self._ready or self._builds or self._due):
                 return None
 
-    def _begin_step(self, place: Place) -> None:
-        place.waits, place.acts, place.again = False, True, False
-        self._building += place.builds
+    def _begin_step(self, turn: Turn) -> None:
+        turn.waits, turn.acts, turn.again = False, True, False
+        self._building += turn.builds
         self._step += 1
         if self._watcher is None:
             self._watches = True
@@ -168,14 +168,14 @@ class Crew:
             self._watches = True
             self._watch.notify()
 
-    def _end_step(self, place: Place, again: float | None) -> None:
-        place.acts = False
-        self._building -= place.builds
-        if place.again:
-            self._queue(place, False)
+    def _end_step(self, turn: Turn, again: float | None) -> None:
+        turn.acts = False
+        self._building -= turn.builds
+        if turn.again:
+            self._queue(turn, False)
         elif again is not None:
-            place.due = time.monotonic() + again
-            heapq.heappush(self._due, (place.due, next(self._order), place))
+            turn.due = time.monotonic() + again
+            heapq.heappush(self._due, (turn.due, next(self._order), turn))
         if self._leader is None and (self._ready or self._due):
             self._leader = self._start(True)
         elif self._leader is not threading.current_thread() and not self._step & 1:
@@ -213,4 +213,4 @@ class Crew:
         return False
 
 
-CREW = Crew()
+THREADS = VisitorThreads()
