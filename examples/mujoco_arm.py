@@ -168,10 +168,13 @@ class Simulation:
         """Joints that cannot hold the arm at ``q``, each with a sentence."""
         needed = self.needed(q)
         return [
-            (i, f"{self.robot.joints[i].name} needs {forced(self.robot, i, needed[i])} to hold this, and has "
-            f"{forced(self.robot, i, self.effort[i])}")
+            (
+                i,
+                f"{self.robot.joints[i].name} needs {forced(self.robot, i, needed[i])} to hold this, and has "
+                f"{forced(self.robot, i, self.effort[i])}",
+            )
             for i in np.flatnonzero(np.abs(needed) > self.effort).tolist()
-        ]  # fmt: skip
+        ]
 
 
 def _weight(model: Any, data: Any, q: Array) -> Array:

@@ -195,9 +195,11 @@ def main(words: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--rosbridge", default=BRIDGE, help=f"its address (default: {BRIDGE})")
     parser.add_argument(
-        "--joints", type=lambda text: text.split(","), metavar="NAME,…",
+        "--joints",
+        type=lambda text: text.split(","),
+        metavar="NAME,…",
         help="names in ROS of the joints of the page's arm, in its order (default: its own names)",
-    )  # fmt: skip
+    )
     parser.add_argument("--joint-states", default=STATES, help=f"topic with JointState (default: {STATES})")
     parser.add_argument(
         "--trajectory", default=TRAJECTORY, help=f"topic for JointTrajectory (default: {TRAJECTORY})"

@@ -34,9 +34,15 @@ class Postgres:
         command = [str(self._programs / program), *map(str, arguments)]
         with (self._folder / "log").open("a") as log:
             subprocess.run(
-                command, check=True, cwd=self._folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                timeout=60, **self._user,
-            )  # fmt: skip
+                command,
+                check=True,
+                cwd=self._folder,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                timeout=60,
+                **self._user,
+            )
 
     def start(self) -> None:
         options = f"-p {self.port} -c listen_addresses=127.0.0.1 -c unix_socket_directories='' -c fsync=off"

@@ -226,9 +226,14 @@ def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def found(scratch: Path) -> dict[str, Any]:
     path = os.pathsep.join(map(str, (scratch, ROOT / "tests" / "app", ROOT / "tests")))
     done = subprocess.run(
-        [sys.executable, "-c", LOOK], cwd=scratch, env={**os.environ, "PYTHONPATH": path}, capture_output=True,
-        text=True, check=False, timeout=300,
-    )  # fmt: skip
+        [sys.executable, "-c", LOOK],
+        cwd=scratch,
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
 

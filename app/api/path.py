@@ -116,9 +116,14 @@ def _solve(robot: Robot, body: PathRequest, settings: Settings, deadline: Deadli
 def _postures(robot: Robot, body: PathRequest, settings: Settings, deadline: Deadline) -> Response:
     poses, options, q_start, roundings = _read(robot, body, settings)
     found = path_postures(
-        robot, poses, options=options, q_start=q_start, max_step=body.max_step, stop=deadline.check,
+        robot,
+        poses,
+        options=options,
+        q_start=q_start,
+        max_step=body.max_step,
+        stop=deadline.check,
         roundings=roundings,
-    )  # fmt: skip
+    )
     return reply(postures_answer(found))
 
 

@@ -146,11 +146,14 @@ def run(settings: Settings, say: Say = lambda words, share: None) -> Report:
     try:
         say("finding out how long a turn is", CHECKS)
         measure(
-            turns, settings.rounds, settings.turn, clock=settings.clock,
+            turns,
+            settings.rounds,
+            settings.turn,
+            clock=settings.clock,
             after_round=lambda done: say(
                 f"round {done} of {settings.rounds}", CHECKS + (1.0 - CHECKS) * done / settings.rounds
             ),
-        )  # fmt: skip
+        )
     except KeyboardInterrupt:
         interrupted = True
     rounds = min((len(entry.seconds) for entry in turns), default=0)

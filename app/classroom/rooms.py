@@ -131,10 +131,18 @@ class Rooms:
             marks.keep(connection, anew=count == 0)
             connection.execute(
                 insert(Room).values(
-                    id=room, code=code, title=title, created=begin, ends=begin + life,
-                    version=1, state={}, page="", beat=0, opener=opener,
+                    id=room,
+                    code=code,
+                    title=title,
+                    created=begin,
+                    ends=begin + life,
+                    version=1,
+                    state={},
+                    page="",
+                    beat=0,
+                    opener=opener,
                 )
-            )  # fmt: skip
+            )
         return OpenRoom(room, code, title, begin, begin + life, tokens.sign(Ticket(room)))
 
     def join(self, code: str, alias: str, known: Ticket | None = None) -> Ticket:
@@ -168,10 +176,23 @@ class Rooms:
             ticket = Ticket(room, secrets.token_hex(TOKEN_BYTES))
             connection.execute(
                 insert(Seat).values(
-                    id=ticket.seat, room_id=room, alias=alias, joined=now(), hand=0.0, task="", tries=0,
-                    solved=False, voted="", vote=0, page="", beat=0, version=version, removed=False, gone=False,
+                    id=ticket.seat,
+                    room_id=room,
+                    alias=alias,
+                    joined=now(),
+                    hand=0.0,
+                    task="",
+                    tries=0,
+                    solved=False,
+                    voted="",
+                    vote=0,
+                    page="",
+                    beat=0,
+                    version=version,
+                    removed=False,
+                    gone=False,
                 )
-            )  # fmt: skip
+            )
         return ticket
 
     def find(self, ticket: Ticket) -> OpenRoom | None:
@@ -186,9 +207,15 @@ class Rooms:
             return None
         token = self.tokens.sign(Ticket(room.id))
         return OpenRoom(
-            room.id, room.code, room.title, room.created, room.ends, "" if ticket.seat else token,
-            len(aliases), aliases.get(ticket.seat, ""),
-        )  # fmt: skip
+            room.id,
+            room.code,
+            room.title,
+            room.created,
+            room.ends,
+            "" if ticket.seat else token,
+            len(aliases),
+            aliases.get(ticket.seat, ""),
+        )
 
     def is_open(self, ticket: Ticket) -> bool:
         """Whether the room of a ticket goes on, and its seat was not removed."""
@@ -316,17 +343,26 @@ class Rooms:
 
 
 _ERASED: dict[str, object] = {
-    "removed": True, "alias": "", "page": "", "hand": 0.0, "task": "", "tries": 0, "voted": "",
-}  # fmt: skip
+    "removed": True,
+    "alias": "",
+    "page": "",
+    "hand": 0.0,
+    "task": "",
+    "tries": 0,
+    "voted": "",
+}
 
 
 def _remove_unseen(connection: Connection, room: str, version: int | None) -> int:
     """As `Rooms.remove_unseen`, in a writing transaction."""
     answered = select(Attempt.seat_id).where(Attempt.room_id == room)
     unseen = update(Seat).where(
-        Seat.room_id == room, Seat.removed.is_(False), Seat.beat == 0, Seat.joined < now() - UNSEEN,
+        Seat.room_id == room,
+        Seat.removed.is_(False),
+        Seat.beat == 0,
+        Seat.joined < now() - UNSEEN,
         Seat.id.not_in(answered),
-    )  # fmt: skip
+    )
     count = connection.execute(unseen.values(**_ERASED, version=version)).rowcount
     if count:
         erasure.note(connection)

@@ -32,12 +32,18 @@ _PRESENT = (
 _A = cast(Table, Stored.__table__).c
 _ATTEMPTS = (
     select(
-        _A.seat_id, _A.exercise, _A.seed, func.substr(cast_to(_A.answer, Text), 1, SHOWN_ANSWER), _A.verdict,
-        _A.score, _A.started, _A.at,
+        _A.seat_id,
+        _A.exercise,
+        _A.seed,
+        func.substr(cast_to(_A.answer, Text), 1, SHOWN_ANSWER),
+        _A.verdict,
+        _A.score,
+        _A.started,
+        _A.at,
     )
     .where(_A.seat_id.in_(bindparam("of_seats", expanding=True)))
     .order_by(_A.seat_id, _A.at, _A.id)
-)  # fmt: skip
+)
 Loaded = tuple[dict[str, Any], list[dict[str, Any]]]
 
 

@@ -111,9 +111,14 @@ class Work:
         last = (self.seed, self.answer, self.verdict) if one.gave_up else (one.seed, one.answer, one.verdict)
         found = one.at if right and self.found is None else self.found
         return Work(
-            self.tries + (not one.gave_up), max(self.score, one.score), began, found, one.gave_up, *last,
+            self.tries + (not one.gave_up),
+            max(self.score, one.score),
+            began,
+            found,
+            one.gave_up,
+            *last,
             MappingProxyType({**self.numbers, one.seed: numbers}),
-        )  # fmt: skip
+        )
 
 
 NOTHING = Work()

@@ -65,9 +65,13 @@ class Fields:
     declared: ClassVar[str] = "[vary] or [let]"
 
     def __init__(
-        self, file: str, table: object, prefix: str = "", names: frozenset[str] = frozenset(),
+        self,
+        file: str,
+        table: object,
+        prefix: str = "",
+        names: frozenset[str] = frozenset(),
         found: list[Expression] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.file, self.prefix, self.names = file, prefix, names
         self.found = [] if found is None else found
         self._read: list[str] = []
@@ -122,9 +126,12 @@ class Fields:
         found = []
         for i, item in enumerate(value):
             one = type(self)(
-                self.file, {"text": item} if i == len(value) - 1 else item, f"{self.prefix}{field}[{i}].",
-                self.names, self.found,
-            )  # fmt: skip
+                self.file,
+                {"text": item} if i == len(value) - 1 else item,
+                f"{self.prefix}{field}[{i}].",
+                self.names,
+                self.found,
+            )
             found.append((one.expression("when", "1" if i == len(value) - 1 else None), one.text("text")))
             one.done()
         return Words(tuple(found))

@@ -118,14 +118,17 @@ class Group:
 
 
 _MOTIONS = Table(
-    "motions", "Motions", "In their order; each turns or slides.", "motion",
+    "motions",
+    "Motions",
+    "In their order; each turns or slides.",
+    "motion",
     (
         Cell("turn", "Turn about", "", "choice", ("x", "y", "z")),
         Cell("slide", "Slide along", "", "choice", ("x", "y", "z")),
         Cell("by", "By", "An angle or a length.", "expression"),
     ),
     {"turn": "z", "by": "90*deg"},
-)  # fmt: skip
+)
 _FIXED_AXES = Cell("fixed_axes", "About the axes of the base", "Otherwise about the frame’s own.", "flag")
 _NEAR = Cell("position_tolerance", "Accepted distance, mm", "", "number")
 _TURNED = Cell("rotation_tolerance", "Accepted rotation, degrees", "", "number")
@@ -157,7 +160,10 @@ _HEAD: tuple[tuple[str, str, tuple[Field, ...]], ...] = (
         "Each student gets other ones. Expressions are in radians and metres: 30*deg, 250*mm, pi/2.",
         (
             Table(
-                "vary", "Drawn", "From, to and step; or a list to choose from.", "number",
+                "vary",
+                "Drawn",
+                "From, to and step; or a list to choose from.",
+                "number",
                 (
                     Cell("from", "From", "", "number"),
                     Cell("to", "To", "", "number"),
@@ -165,18 +171,27 @@ _HEAD: tuple[tuple[str, str, tuple[Field, ...]], ...] = (
                     Cell("choose", "Or one of", "One in each line.", "numbers"),
                     Cell("unit", "Unit", _UNIT, "choice", tuple(UNITS)),
                 ),
-                {"from": -60, "to": 60, "step": 10, "unit": "deg"}, named=True,
+                {"from": -60, "to": 60, "step": 10, "unit": "deg"},
+                named=True,
             ),
             Table(
-                "let", "Computed", "From those, and from the arm at its posture.", "number",
+                "let",
+                "Computed",
+                "From those, and from the arm at its posture.",
+                "number",
                 (
                     Cell("value", "Value", "", "expression"),
                     Cell("unit", "Shown in", _UNIT, "choice", tuple(UNITS)),
                 ),
-                {"value": "0"}, named=True,
+                {"value": "0"},
+                named=True,
             ),
-            Cell("require", "Required", "One in each line; numbers for which one is false are drawn again.",
-                 "expressions"),
+            Cell(
+                "require",
+                "Required",
+                "One in each line; numbers for which one is false are drawn again.",
+                "expressions",
+            ),
         ),
     ),
     (
@@ -188,7 +203,7 @@ _HEAD: tuple[tuple[str, str, tuple[Field, ...]], ...] = (
             Cell("target.position", "Target point", "x, y, z, with the orientation at the joints.", "expressions"),
         ),
     ),
-)  # fmt: skip
+)
 _REASON = Cell("reason", "Reason", "Said to whom answers this.", "text")
 ANSWERS: dict[str, tuple[Field, ...]] = {
     "number": (
@@ -200,14 +215,20 @@ ANSWERS: dict[str, tuple[Field, ...]] = {
         Cell("method", "Method", "How it is computed.", "text"),
         Cell("whole_turns", "Whole turns count", "360° more is another answer.", "flag"),
         Table(
-            "mistakes", "Known mistakes", "Values that students get by a mistake, and what is said.", "mistake",
+            "mistakes",
+            "Known mistakes",
+            "Values that students get by a mistake, and what is said.",
+            "mistake",
             (Cell("value", "Value", "", "expressions"), Cell("when", "When", _WHEN, "expression"), _REASON),
             {"value": "0", "reason": "Why this is wrong."},
         ),
     ),
     "choice": (
         Table(
-            "options", "Options", "At least two.", "option",
+            "options",
+            "Options",
+            "At least two.",
+            "option",
             (
                 Cell("text", "Text", "", "text"),
                 Cell("right", "Right", "", "flag"),
@@ -223,14 +244,15 @@ ANSWERS: dict[str, tuple[Field, ...]] = {
         Cell("rows", "Rows", "Consecutive numbers from 1, one in each line.", "numbers"),
         Cell("convention", "Convention", "None: that of the arm.", "choice", tuple(CONVENTIONS)),
     ),
-    "mistake": (
-        Cell("mistakes", "Mistakes", "One in each line: " + ", ".join(MISTAKES) + ".", "lines"),
-    ),
+    "mistake": (Cell("mistakes", "Mistakes", "One in each line: " + ", ".join(MISTAKES) + ".", "lines"),),
     "reach": (
         Cell("task", "What must match", "", "choice", tuple(TASKS)),
         Cell("branch", "Posture", "Such as: elbow up."),
         Table(
-            "locked", "Locked joints", "Joints that must be at a value.", "joint",
+            "locked",
+            "Locked joints",
+            "Joints that must be at a value.",
+            "joint",
             (Cell("joint", "Joint", "Its number.", "number"), Cell("value", "Value", "", "expression")),
             {"joint": 1, "value": "0"},
         ),
@@ -253,11 +275,18 @@ ANSWERS: dict[str, tuple[Field, ...]] = {
         Cell("name", "Name of the entry", "Such as: p_x."),
         Cell("entry", "Its value", "", "expression"),
         Table(
-            "terms", "Terms", "At least two; their sum is the entry.", "term",
-            (Cell("value", "Value", "", "expression"), Cell("shown", "As printed")), {"value": "0", "shown": "0"},
+            "terms",
+            "Terms",
+            "At least two; their sum is the entry.",
+            "term",
+            (Cell("value", "Value", "", "expression"), Cell("shown", "As printed")),
+            {"value": "0", "shown": "0"},
         ),
         Table(
-            "misprints", "Misprints", "One of them is drawn.", "misprint",
+            "misprints",
+            "Misprints",
+            "One of them is drawn.",
+            "misprint",
             (
                 Cell("term", "Term", "Its number.", "number"),
                 Cell("value", "Value", "", "expression"),
@@ -281,7 +310,7 @@ ANSWERS: dict[str, tuple[Field, ...]] = {
         Cell("time", "Longest time, s", "0: no limit.", "expression"),
         Cell("tool_speed", "Fastest tool, m/s", "0: no limit.", "expression"),
     ),
-}  # fmt: skip
+}
 
 
 def read(text: str) -> Draft:
@@ -408,17 +437,24 @@ def _placed(draft: Draft, field: Field, above: tuple[str, ...], robots: Sequence
             place = (*at, key)
             named = Entry(Cell("", "Name"), f"{name}[{i}]", f"{name}.{key}", place, key, names=True)
             label, full = f"{name}[{i}]", f"{name}.{key}"
-            rows.append((named, *(
-                _entry(c, f"{label}.{c.name}", f"{full}.{c.name}", (*place, c.name), row.get(c.name))
-                for c in field.columns
-            )))  # fmt: skip
+            rows.append(
+                (
+                    named,
+                    *(
+                        _entry(c, f"{label}.{c.name}", f"{full}.{c.name}", (*place, c.name), row.get(c.name))
+                        for c in field.columns
+                    ),
+                )
+            )
     else:
         for i, row in enumerate(value if _is_tables(value) else ()):
             label = f"{name}[{i}]"
-            rows.append(tuple(
-                _entry(c, f"{label}.{c.name}", f"{label}.{c.name}", (*at, i, c.name), row.get(c.name))
-                for c in field.columns
-            ))  # fmt: skip
+            rows.append(
+                tuple(
+                    _entry(c, f"{label}.{c.name}", f"{label}.{c.name}", (*at, i, c.name), row.get(c.name))
+                    for c in field.columns
+                )
+            )
     return Rows(field, name, name, tuple(rows))
 
 

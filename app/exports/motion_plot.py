@@ -46,9 +46,14 @@ def _cut(text: str) -> str:
 
 
 def _panel(
-    motion: Motion, times: Array, values: Array, top: float, height: float, title: str,
+    motion: Motion,
+    times: Array,
+    values: Array,
+    top: float,
+    height: float,
+    title: str,
     band: tuple[float, float] | None = None,
-) -> str:  # fmt: skip
+) -> str:
     """One line per joint over time, the ends of segments, and a band of what is allowed."""
     low, high = (float(values.min()), float(values.max())) if band is None else (1.1 * band[0], 1.1 * band[1])
     room = max(0.05 * (high - low), 1e-3)

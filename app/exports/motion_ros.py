@@ -67,9 +67,11 @@ def trajectory_json(motion: Motion, rate: float) -> Generator[bytes]:
 def _json_point(t: float, q: list[float], qd: list[float], qdd: list[float]) -> dict[str, Any]:
     sec, nanosec = divmod(round(t * _NANO), _NANO)
     return {
-        "positions": q, "velocities": qd, "accelerations": qdd,
+        "positions": q,
+        "velocities": qd,
+        "accelerations": qdd,
         "time_from_start": {"sec": sec, "nanosec": nanosec},
-    }  # fmt: skip
+    }
 
 
 def _points(sample: MotionSample) -> list[tuple[float, list[float], list[float], list[float]]]:
@@ -174,10 +176,12 @@ def _transform(stamp: dict[str, int], name: str, T: Array) -> dict[str, Any]:
     """The pose of a frame in the world frame."""
     w, i, j, k = wxyz_from_rotation(T[:3, :3]).tolist()
     return {
-        "timestamp": stamp, "parent_frame_id": "world", "child_frame_id": name,
+        "timestamp": stamp,
+        "parent_frame_id": "world",
+        "child_frame_id": name,
         "translation": dict(zip("xyz", T[:3, 3].tolist(), strict=True)),
         "rotation": {"x": i, "y": j, "z": k, "w": w},
-    }  # fmt: skip
+    }
 
 
 def mcap_writer() -> ModuleType:

@@ -17,18 +17,35 @@ def about(motion: Motion) -> list[tuple[str, str]]:
         ("acceleration", limits.acceleration, "/s^2"),
         ("jerk", limits.jerk, "/s^3"),
     ]
-    assumed = [f"{name} of {json.dumps(joint.name)}" for joint, names in zip(joints, limits.assumed, strict=True)
-               for name in names]  # fmt: skip
+    assumed = [
+        f"{name} of {json.dumps(joint.name)}"
+        for joint, names in zip(joints, limits.assumed, strict=True)
+        for name in names
+    ]
     return [
         ("arm", f"{motion.robot.id}, {' '.join(motion.robot.name.split())}"),
         ("joints", ", ".join(json.dumps(joint.name) for joint in joints)),
         ("units", "seconds; radians for joints that turn, metres for joints that slide; metres for the tool"),
-        ("range", ", ".join(f"{low!r} to {high!r} {_unit(joint)}" for low, high, joint in
-                            zip(motion.robot.lower.tolist(), motion.robot.upper.tolist(), joints, strict=True))),
-        *((f"largest {name}", ", ".join(f"{value!r} {_unit(joint)}{per}" for value, joint in
-                                        zip(values.tolist(), joints, strict=True))) for name, values, per in rows),
+        (
+            "range",
+            ", ".join(
+                f"{low!r} to {high!r} {_unit(joint)}"
+                for low, high, joint in zip(
+                    motion.robot.lower.tolist(), motion.robot.upper.tolist(), joints, strict=True
+                )
+            ),
+        ),
+        *(
+            (
+                f"largest {name}",
+                ", ".join(
+                    f"{value!r} {_unit(joint)}{per}" for value, joint in zip(values.tolist(), joints, strict=True)
+                ),
+            )
+            for name, values, per in rows
+        ),
         ("assumed", ", ".join(assumed) or "none of these"),
-    ]  # fmt: skip
+    ]
 
 
 def _unit(joint: Joint) -> str:

@@ -20,8 +20,10 @@ def python(motion: Motion, own: bool, service: Service) -> str:
 def curl(motion: Motion, own: bool, service: Service) -> str:
     """A command for a shell that asks this service; `own`: the arm is sent along."""
     body: dict[str, object] = {
-        "program": program_to_dict(motion.program), "q_start": motion.q_start.tolist(), "rate": RATE,
-    }  # fmt: skip
+        "program": program_to_dict(motion.program),
+        "q_start": motion.q_start.tolist(),
+        "rate": RATE,
+    }
     address = f"{service.address}api/v1/robots/{motion.robot.id}/motion"
     if own:
         address, body = f"{service.address}api/v1/motion", {"robot": robot_to_dict(named(motion.robot)), **body}
@@ -41,5 +43,7 @@ def _text(name: str, motion: Motion) -> str:
 
 
 SNIPPETS: dict[str, Callable[[Motion, bool, Service], str]] = {
-    "Python, kin": python, "curl": curl, "URScript": urscript,
-}  # fmt: skip
+    "Python, kin": python,
+    "curl": curl,
+    "URScript": urscript,
+}

@@ -28,10 +28,19 @@ AXES = AxisStyle(
 )
 # Cividis, sampled: dark is rare, bright is frequent. The order is the same for people with colour blindness.
 SCALE = np.array(
-    [(0, 34, 78), (24, 53, 110), (63, 75, 109), (94, 96, 110), (122, 119, 121), (153, 143, 116), (188, 170, 100),
-     (224, 199, 78), (254, 232, 56)],
+    [
+        (0, 34, 78),
+        (24, 53, 110),
+        (63, 75, 109),
+        (94, 96, 110),
+        (122, 119, 121),
+        (153, 143, 116),
+        (188, 170, 100),
+        (224, 199, 78),
+        (254, 232, 56),
+    ],
     dtype=np.float64,
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)

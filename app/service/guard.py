@@ -52,8 +52,10 @@ class Guard:
         if files is not None and files - SPARE_FILES < settings.max_connections:
             logger.warning(
                 "this process may have only %d files open (ulimit -n), too few for %d connections "
-                "(KINBOARD_MAX_CONNECTIONS)", files, settings.max_connections,
-            )  # fmt: skip
+                "(KINBOARD_MAX_CONNECTIONS)",
+                files,
+                settings.max_connections,
+            )
 
     def refusal(self, host: str, file: int) -> str | None:
         """Why a new connection is not accepted; None if it is.

@@ -102,9 +102,14 @@ def set_cookie(response: Response, name: str, value: str, seconds: int, scope: S
     """
     secure = scope["scheme"] in ("https", "wss")
     response.set_cookie(
-        name, value, seconds, path=scope.get("root_path", "") + "/", httponly=True,
-        samesite="none" if framed and secure else "lax", secure=secure,
-    )  # fmt: skip
+        name,
+        value,
+        seconds,
+        path=scope.get("root_path", "") + "/",
+        httponly=True,
+        samesite="none" if framed and secure else "lax",
+        secure=secure,
+    )
     if framed and secure:
         name_, header = response.raw_headers.pop()
         response.raw_headers.append((name_, header + b"; Partitioned"))  # Python < 3.14 cannot write it

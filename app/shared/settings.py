@@ -194,10 +194,15 @@ class Settings(BaseSettings):
         """These settings for one process on a free port that only this machine reaches, without a token."""
         return self.model_copy(
             update={
-                "host": "127.0.0.1", "port": 0, "workers": 1, "rest_workers": 0, "token": None, "read_only": False,
+                "host": "127.0.0.1",
+                "port": 0,
+                "workers": 1,
+                "rest_workers": 0,
+                "token": None,
+                "read_only": False,
                 "root_path": "",
             }
-        )  # fmt: skip
+        )
 
     @property
     def data_folder(self) -> Path:

@@ -209,8 +209,11 @@ def test_the_service_starts_beside_a_foreign_package_app(environment, project):
 def serving(environment: Path, project: Path) -> Iterator[str]:
     with subprocess.Popen(
         [environment / "bin" / "kinboard", "serve", "--port", "0"],
-        cwd=project, env=os.environ | {"PYTHONPATH": "."}, stdout=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
+        cwd=project,
+        env=os.environ | {"PYTHONPATH": "."},
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
         try:
             found = re.search(r"http://\S+:\d+", process.stdout.readline())
             assert found

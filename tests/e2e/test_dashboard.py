@@ -249,9 +249,10 @@ def test_an_arm_that_touches_a_table_says_so(tab: Tab) -> None:
     arm = kin.get_robot("pioneer5")
     (table,) = placed.added((), "table", arm, arm.q_home)
     top = next(
-        z for z in np.arange(table.xyz[2], 1.0, 0.01).tolist()
+        z
+        for z in np.arange(table.xyz[2], 1.0, 0.01).tolist()
         if kin.clearance(arm, arm.q_home, placed.changed((table,), 0, "z", z)) < -0.005
-    )  # fmt: skip
+    )
     tab.page.get_by_text("Obstacles", exact=True).click()
     tab.page.get_by_role("button", name="Add a table").click()
     expect(tab.status).to_contain_text("Added: table")

@@ -119,7 +119,7 @@ def test_missing_limits_and_home_get_defaults():
         ('"standard"', '"dh"', "convention", '"modified"'),
         ('length = "mm"', 'length = "inch"', "units.length", '"cm"'),
         ('angle = "deg"', "angle = 1", "units.angle", '"rad"'),
-        ('units = {', 'unit = {', "unit", "units"),
+        ("units = {", "unit = {", "unit", "units"),
         ("d = 100", 'd = "far"', "rows[0].d", "number"),
         ("d = 100", "d = nan", "rows[0].d", "finite"),
         ("d = 100", "d = inf", "rows[0].d", "finite"),
@@ -139,7 +139,7 @@ def test_missing_limits_and_home_get_defaults():
         ("[[rows]]", "[[row]]", "row", "rows"),
         ('id = "bench"', 'id = "bench', "file", "TOML"),
     ],
-)  # fmt: skip
+)
 def test_an_error_names_the_field_and_what_is_valid(old, new, field, valid, tmp_path):
     assert old in GOOD
     path = tmp_path / "arm.toml"
@@ -270,7 +270,7 @@ SLIDE, LINK = Joint("slide", kind="prismatic"), Joint("link", a=1.0, limits=(-1,
         ({"description": "\n"}, "description", "without spaces at its ends"),
         ({"base": matrix_of((1e5, 0, 0), (0, 0, 0))}, "rows", "base"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_read_is_not_written(change, field, valid, tmp_path):
     robot = Robot.from_dh([LINK])
     assert read_again(robot) == robot
@@ -385,7 +385,7 @@ def test_base_and_tool_as_matrices():
         ({"base": {"matrix": 1, "xyz": [0, 0, 0]}}, "base.xyz", "matrix"),
         ({"tool": {"matrix": np.diag([2, 1, 1, 1]).tolist()}}, "tool.matrix rotation", "orthonormal"),
     ],
-)  # fmt: skip
+)
 def test_an_error_in_plain_data_names_the_field(change, field, valid):
     data = {"id": "a", "name": "A", "source": "test", "convention": "standard"}
     data |= {"units": {"length": "m", "angle": "rad"}, "rows": [{}]}

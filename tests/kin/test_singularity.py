@@ -254,15 +254,17 @@ def test_manipulability_of_the_srs_arm():
     for q in np.random.default_rng(7).uniform(-math.pi, math.pi, (200, 7)):
         _, c2, c3, c4, c5, c6, _ = np.cos(q)
         _, s2, s3, s4, s5, s6, _ = np.sin(q)
-        m = np.array([
-            d5 * s4 * c3 * s6,
-            -d5 * s4 * s3 * s2 * s6,
-            -s6 * (d5 * s4 * c3 * c2 + s2 * (d3 + d5 * c4)),
-            0.0,
-            s2 * (d3 * s4 * c5 * c6 + s6 * (d5 + d3 * c4)),
-            d3 * s4 * s5 * s2 * s6,
-            -d3 * s4 * c5 * s2,
-        ])  # fmt: skip
+        m = np.array(
+            [
+                d5 * s4 * c3 * s6,
+                -d5 * s4 * s3 * s2 * s6,
+                -s6 * (d5 * s4 * c3 * c2 + s2 * (d3 + d5 * c4)),
+                0.0,
+                s2 * (d3 * s4 * c5 * c6 + s6 * (d5 + d3 * c4)),
+                d3 * s4 * s5 * s2 * s6,
+                -d3 * s4 * c5 * s2,
+            ]
+        )
         assert np.abs(kin.jacobian(robot, q) @ m).max() <= 1e-15
         wanted = d3 * d5 * abs(s4) * np.linalg.norm(m)
         assert kin.manipulability(robot, q) == pytest.approx(wanted, rel=1e-9, abs=1e-14)

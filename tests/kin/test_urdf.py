@@ -113,8 +113,8 @@ def test_base_and_tip_may_be_any_links_of_the_chain(tmp_path):
         ('type="continuous"', 'type="floating"', "joint wrist: type", "prismatic"),
         ('type="continuous"', 'type="planar"', "joint wrist: type", "prismatic"),
         ('<parent link="rail"/>', '<parent link="rail"/><mimic joint="slide"/>', "joint wrist: mimic", "move"),
-        ('<parent link="rail"/>', '', "joint wrist: parent", "parent"),
-        ('<parent link="rail"/>', '<parent/>', "joint wrist: parent link", "text"),
+        ('<parent link="rail"/>', "", "joint wrist: parent", "parent"),
+        ('<parent link="rail"/>', "<parent/>", "joint wrist: parent link", "text"),
         ('<parent link="rail"/>', '<parent link="nail"/>', "joint wrist: parent", "link of this file"),
         ('<child link="camera"/>', '<child link="rail"/>', "link rail", "one parent"),
         ('<link name="camera"/>', '<link name="rail"/>', "link", "no other link"),
@@ -135,7 +135,7 @@ def test_base_and_tip_may_be_any_links_of_the_chain(tmp_path):
         ('xyz="0 0 0.2"', 'xyz="1e5 0 0.2"', "joint", "with the base"),
         ('<robot name="Bench arm 2">', '<robot xmlns:xacro="x" name="x"><xacro:if value="1"/>', "file", "xacro"),
     ],
-)  # fmt: skip
+)
 def test_an_error_names_the_joint_and_what_is_valid(old, new, field, valid):
     assert old in GOOD
     with pytest.raises(RobotFileError) as caught:
@@ -193,14 +193,18 @@ GRIPPER = """
         ('<child link="right"/>', '<child link="rihgt"/>', "joint right: child"),
         ('<child link="right"/>', "", "joint right: child"),
         ('<child link="right"/>', '<child link="left"/>', "link left"),
-        ('<parent link="palm"/><child link="right"/>', '<parent link="plam"/><child link="right"/>', "joint right: parent"),  # noqa: E501
+        (
+            '<parent link="palm"/><child link="right"/>',
+            '<parent link="plam"/><child link="right"/>',
+            "joint right: parent",
+        ),
         ('<joint name="right"', '<joint name="left"', "joint"),
         ('<joint name="right"', "<joint", "joint name"),
         ('<link name="right"/>', '<link name="right"/><link name="right"/>', "link"),
         ('<link name="right"/>', '<link name="right"/><link/>', "link name"),
         ('<parent link="palm"/><child link="right"/>', '<parent link="right"/><child link="right"/>', "joint"),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_beside_the_chain_is_left_out(old, new, field):
     """Other readers take such a file; it concerns the arm only if it may be a part of it."""
     assert old in GRIPPER

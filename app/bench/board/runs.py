@@ -89,9 +89,13 @@ class Runs:
         write_status(self.folder, Status("running", "starting", 0.0, time.time()))
         with (self.folder / "log").open("wb") as log:
             self._process = subprocess.Popen(
-                [*self._command, str(self.folder)], env=_environment(), pass_fds=[lock],
-                stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log,
-            )  # fmt: skip
+                [*self._command, str(self.folder)],
+                env=_environment(),
+                pass_fds=[lock],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=log,
+            )
 
     def cancel(self) -> bool:
         """Ask the run to end, which takes a second; False if there is none."""

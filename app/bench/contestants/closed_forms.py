@@ -167,10 +167,13 @@ def toolbox_analytic(task: Task) -> list[Contestant]:
 
     return [
         Contestant(
-            "roboticstoolbox analytic", solve, [(T,) for T in task.T],
-            lambda found: [our_joints(task, found.q)], derivation=spent,
+            "roboticstoolbox analytic",
+            solve,
+            [(T,) for T in task.T],
+            lambda found: [our_joints(task, found.q)],
+            derivation=spent,
         )
-    ]  # fmt: skip
+    ]
 
 
 def opw(task: Task) -> list[Contestant]:
@@ -204,9 +207,12 @@ def opw(task: Task) -> list[Contestant]:
         poses = RigidTransform.from_matrix(task.T)
         return [
             Contestant(
-                name, lambda T: robot.reach(T, ee_transform=tool).joints, [(poses,)],
-                lambda found: list(map(ours, found)), len(task.T),
+                name,
+                lambda T: robot.reach(T, ee_transform=tool).joints,
+                [(poses,)],
+                lambda found: list(map(ours, found)),
+                len(task.T),
             )
-        ]  # fmt: skip
+        ]
     targets = [(RigidTransform.from_matrix(T),) for T in task.T]
     return [Contestant(name, lambda T: robot.inverse(T, ee_transform=tool), targets, lambda found: [ours(found)])]

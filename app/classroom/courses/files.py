@@ -187,8 +187,10 @@ def _own(fields: Fields, exercises: Exercises, find: Find, seal: Seal | None) ->
             exercise = _parsed(text, find)
         except ExerciseFileError as error:
             made = fields.refuse(f"{name}.{error.field}", None, error.expected)
-            made.value, made.args = error.value, (f"{fields.file}: {name}.{error.field}: got {error.value}, "
-                                                  f"expected {error.expected}",)  # fmt: skip
+            made.value, made.args = (
+                error.value,
+                (f"{fields.file}: {name}.{error.field}: got {error.value}, expected {error.expected}",),
+            )
             raise made from None
         if exercise.id in found or exercises.get(exercise.id) is not None:
             raise fields.refuse(f"{name}.id", exercise.id, "an id that no other exercise has")

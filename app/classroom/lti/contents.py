@@ -43,8 +43,11 @@ class Content:
     def item(self, launch_url: str) -> dict[str, Any]:
         """As an item of an answer to deep linking: a link, and one column of the gradebook."""
         item: dict[str, Any] = {
-            "type": "ltiResourceLink", "title": self.title, "url": launch_url, "custom": {self.kind: self.key},
-        }  # fmt: skip
+            "type": "ltiResourceLink",
+            "title": self.title,
+            "url": launch_url,
+            "custom": {self.kind: self.key},
+        }
         if self.most:
             resource = self.key if self.kind == "exercise" else self.name
             item["lineItem"] = {"label": self.title, "scoreMaximum": self.most, "resourceId": resource}

@@ -183,9 +183,14 @@ def _verified(token: str, key: jwt.PyJWK, platform: Platform) -> dict[str, Any]:
     try:
         required = ["iss", "aud", "exp", "iat", "nonce", "sub"]
         claims: dict[str, Any] = jwt.decode(
-            token, key, algorithms=["RS256"], audience=platform.client_id, issuer=platform.issuer,
-            leeway=CLOCKS, options={"require": required},
-        )  # fmt: skip
+            token,
+            key,
+            algorithms=["RS256"],
+            audience=platform.client_id,
+            issuer=platform.issuer,
+            leeway=CLOCKS,
+            options={"require": required},
+        )
     except jwt.ExpiredSignatureError:
         raise LaunchRefused("The launch has expired. Start it again on the platform.") from None
     except jwt.InvalidAudienceError:

@@ -84,9 +84,15 @@ def write_code(outcome: Outcome, key: bytes) -> str:
     """The code of an outcome, in groups."""
     title = outcome.title[:LONGEST_TITLE].encode()
     head = _HEAD.pack(
-        _VERSION << 4 | _KINDS.index(outcome.kind), (outcome.day - _EPOCH).days, outcome.score, outcome.solved,
-        outcome.count, min(outcome.tries, 255), outcome.fingerprint, len(title),
-    )  # fmt: skip
+        _VERSION << 4 | _KINDS.index(outcome.kind),
+        (outcome.day - _EPOCH).days,
+        outcome.score,
+        outcome.solved,
+        outcome.count,
+        min(outcome.tries, 255),
+        outcome.fingerprint,
+        len(title),
+    )
     body = head + title + clean_alias(outcome.alias).encode()
     signed = body + _signature(body, key)
     return _grouped(_letters(signed + crc_hqx(signed, 0xFFFF).to_bytes(_CHECK)))
@@ -106,10 +112,11 @@ def read_code(text: str, key: bytes) -> Outcome:
     body, signature = data[: -_SIGNATURE - _CHECK], data[-_SIGNATURE - _CHECK : -_CHECK]
     if not hmac.compare_digest(signature, _signature(body, key)):
         raise ForgedCodeError(
-            "code", text,
+            "code",
+            text,
             "a code that this service has signed; its checksum is right, so it is not mistyped: "
             "it was changed, or made by another service",
-        )  # fmt: skip
+        )
     return _outcome(body)
 
 
@@ -117,9 +124,16 @@ def _outcome(body: bytes) -> Outcome:
     first, day, score, solved, count, tries, fingerprint, length = _HEAD.unpack_from(body)
     title, alias = body[_HEAD.size : _HEAD.size + length], body[_HEAD.size + length :]
     return Outcome(
-        _KINDS[first & 15], fingerprint, title.decode(), alias.decode(), score, solved, count, tries,
+        _KINDS[first & 15],
+        fingerprint,
+        title.decode(),
+        alias.decode(),
+        score,
+        solved,
+        count,
+        tries,
         _EPOCH + timedelta(days=day),
-    )  # fmt: skip
+    )
 
 
 def _signature(body: bytes, key: bytes) -> bytes:

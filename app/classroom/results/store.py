@@ -63,14 +63,22 @@ def pages_of(database: Database, room: str, answers: bool = True, size: int = PA
     numbers = {one.seat: one.number for one in members_of(database, room)}
     query = (
         select(
-            Stored.seat_id, Seat.alias, Stored.exercise, Stored.seed, answer, Stored.verdict, Stored.score,
-            Stored.started, Stored.at, Stored.id,
+            Stored.seat_id,
+            Seat.alias,
+            Stored.exercise,
+            Stored.seed,
+            answer,
+            Stored.verdict,
+            Stored.score,
+            Stored.started,
+            Stored.at,
+            Stored.id,
         )
         .join(Seat, Seat.id == Stored.seat_id)
         .where(Stored.room_id == room, Seat.removed.is_(False))
         .order_by(Stored.at, Stored.id)
         .limit(size)
-    )  # fmt: skip
+    )
     place = tuple_(Stored.at, Stored.id)
     after = query
     while True:

@@ -13,9 +13,20 @@ from app.classroom.work import NOTHING, URGENCY, Attempt, Work, works
 from app.shared.spreadsheets import cell
 
 COLUMNS = (
-    "alias", "exercise", "title", "attempt", "variant", "answer", "verdict", "score", "started",
-    "answered", "seconds", "seat", "state",
-)  # fmt: skip
+    "alias",
+    "exercise",
+    "title",
+    "attempt",
+    "variant",
+    "answer",
+    "verdict",
+    "score",
+    "started",
+    "answered",
+    "seconds",
+    "seat",
+    "state",
+)
 
 
 @dataclass(frozen=True)
@@ -74,10 +85,13 @@ def rows(members: Iterable[Member], attempts: Iterable[Attempt], task: str, now:
     return sorted(
         found,
         key=lambda row: (
-            not row.member.came, URGENCY.index(row.work.progress), -row.work.tries, -row.seconds,
+            not row.member.came,
+            URGENCY.index(row.work.progress),
+            -row.work.tries,
+            -row.seconds,
             row.member.number,
         ),
-    )  # fmt: skip
+    )
 
 
 def csv_of(pages: Iterable[Iterable[Attempt]], titles: Mapping[str, str]) -> Iterator[str]:
@@ -99,10 +113,22 @@ def csv_of(pages: Iterable[Iterable[Attempt]], titles: Mapping[str, str]) -> Ite
             words = [one.alias, one.exercise, titles.get(one.exercise, ""), answer, one.verdict]
             alias, exercise, title, answer, verdict = map(cell, words)
             rows.append(
-                [alias, exercise, title, "" if one.gave_up else work.tries, one.seed, answer, verdict,
-                 f"{one.score:.2f}", _time(one.started), _time(one.at), f"{max(0.0, one.at - one.started):.0f}",
-                 one.number, work.progress]
-            )  # fmt: skip
+                [
+                    alias,
+                    exercise,
+                    title,
+                    "" if one.gave_up else work.tries,
+                    one.seed,
+                    answer,
+                    verdict,
+                    f"{one.score:.2f}",
+                    _time(one.started),
+                    _time(one.at),
+                    f"{max(0.0, one.at - one.started):.0f}",
+                    one.number,
+                    work.progress,
+                ]
+            )
         yield _lines(rows)
 
 

@@ -46,9 +46,11 @@ def add_serve(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     )
     parser.add_argument("--root-path", metavar="PREFIX", help="path prefix that a reverse proxy adds")
     parser.add_argument(
-        "--read-only", action="store_true", default=None,
+        "--read-only",
+        action="store_true",
+        default=None,
         help="visitors without the access token (KINBOARD_TOKEN) may look but not move anything",
-    )  # fmt: skip
+    )
     parser.add_argument("--open", action="store_true", help="open the dashboard in the browser")
     return parser
 
@@ -82,9 +84,11 @@ def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     )
     parser.add_argument("--frames", action="store_true", help="also print the frame after every DH row")
     parser.add_argument(
-        "--frame", default="world", metavar="NAME",
+        "--frame",
+        default="world",
+        metavar="NAME",
         help="print poses in this frame: world (default), base (of the first DH row), or a workpiece",
-    )  # fmt: skip
+    )
     return parser
 
 
@@ -103,9 +107,11 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     )
     _add_target(parser)
     parser.add_argument(
-        "--seed", nargs="+", metavar="Q",
+        "--seed",
+        nargs="+",
+        metavar="Q",
         help=f"prefer solutions near this configuration; {UNITS_NOTE}",
-    )  # fmt: skip
+    )
     shown = {
         "task",
         "mask",
@@ -124,10 +130,11 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 def _add_dask(parser: argparse.ArgumentParser) -> None:
     """The argument of the commands whose work a cluster can do."""
     parser.add_argument(
-        "--dask", metavar="ADDRESS",
+        "--dask",
+        metavar="ADDRESS",
         help="compute on the workers of this Dask scheduler, such as tcp://host:8786; "
         "`pip install 'kinboard[cluster]'` installs what that needs",
-    )  # fmt: skip
+    )
 
 
 def _add_target(parser: argparse.ArgumentParser) -> None:
@@ -149,10 +156,12 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
     turn.add_argument("--wxyz", nargs=4, metavar=("W", *XYZ), help="orientation as a quaternion")
     turn.add_argument("--approach", nargs=3, metavar=XYZ, help="direction of the tool's z axis")
     parser.add_argument(
-        "--frame", default="world", metavar="NAME",
+        "--frame",
+        default="world",
+        metavar="NAME",
         help="frame in which the target is: world (default), base (of the first DH row), tool (where the tool is "
         "at --seed), or a workpiece",
-    )  # fmt: skip
+    )
     add_options(parser, ["task", "mask", "mask_frame"], task=None)
 
 
@@ -163,9 +172,10 @@ def _add_rows(parser: argparse.ArgumentParser, flag: str, read: str, written: st
         "-o", "--output", metavar="FILE", help=f"with {flag}: write {written}; - is standard output (default)"
     )
     parser.add_argument(
-        "--format", choices=("csv", "npy", "ndjson"),
+        "--format",
+        choices=("csv", "npy", "ndjson"),
         help=f"with {flag}: what is written (default: by the name of the file; for -, what is read)",
-    )  # fmt: skip
+    )
 
 
 def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
@@ -188,23 +198,27 @@ def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         help="many programs: JSON lines; the answers of REST are written as JSON lines; - is standard input",
     )
     parser.add_argument(
-        "--start", nargs="+", metavar="Q",
+        "--start",
+        nargs="+",
+        metavar="Q",
         help=f"where the arm is (default: its home configuration); {UNITS_NOTE}",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "-o", "--output", metavar="FILE", help="write the motion in radians and metres; - is standard output"
     )
     parser.add_argument(
-        "--format", choices=(
+        "--format",
+        choices=(
             *("csv", "csv-commented", "json", "ndjson", "trajectory-yaml", "trajectory-json", "mcap"),
             *("urscript", "python"),
         ),
         help="format of the file (default: by the ending of its name)",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--partial", action="store_true",
+        "--partial",
+        action="store_true",
         help="if the program cannot be driven, write its beginning that can; the exit code stays 1",
-    )  # fmt: skip
+    )
     parser.add_argument("--rate", default="100", help="samples per second (default 100)")
     parser.add_argument("--no-samples", action="store_true", help="with --json, --programs: leave out the samples")
     parser.add_argument("--picture", metavar="FILE", help="draw joint values and speeds over time (SVG)")
@@ -215,14 +229,20 @@ def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 def add_way(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard way``."""
     parser = _command(
-        commands, "way", "a way around obstacles: waypoints between which nothing touches",
-        parents.robots, parents.output, parents.mounts,
-    )  # fmt: skip
+        commands,
+        "way",
+        "a way around obstacles: waypoints between which nothing touches",
+        parents.robots,
+        parents.output,
+        parents.mounts,
+    )
     parser.add_argument("--goal", nargs="+", metavar="Q", required=True, help=f"joint values; {UNITS_NOTE}")
     parser.add_argument(
-        "--start", nargs="+", metavar="Q",
+        "--start",
+        nargs="+",
+        metavar="Q",
         help=f"where the arm is (default: its home configuration); {UNITS_NOTE}",
-    )  # fmt: skip
+    )
     parser.add_argument("--seed", default="0", help="of the random search (default 0)")
     parser.add_argument("--time-limit", default="5", metavar="S", help="seconds for the search (default 5)")
     parser.add_argument("-o", "--output", metavar="FILE", help="write the program (TOML); - is standard output")
@@ -233,9 +253,13 @@ def add_way(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 def add_page(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard page``."""
     parser = _command(
-        commands, "page", "an arm as one web page that needs no server: sliders, postures, a program",
-        parents.robots, parents.output, parents.mounts,
-    )  # fmt: skip
+        commands,
+        "page",
+        "an arm as one web page that needs no server: sliders, postures, a program",
+        parents.robots,
+        parents.output,
+        parents.mounts,
+    )
     parser.add_argument(
         "-o", "--output", metavar="FILE", help="file to write (default: ROBOT.html); - is standard output"
     )
@@ -243,9 +267,11 @@ def add_page(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "--q", nargs="+", metavar="Q", help=f"joint values to open with (default: home); {UNITS_NOTE}"
     )
     parser.add_argument(
-        "--target", nargs=6, metavar=(*XYZ, "ROLL", "PITCH", "YAW"),
+        "--target",
+        nargs=6,
+        metavar=(*XYZ, "ROLL", "PITCH", "YAW"),
         help=f"pose of the tool whose postures can be stepped through; {UNITS_NOTE}",
-    )  # fmt: skip
+    )
     parser.add_argument("--program", metavar="FILE", help="program to play (TOML), with its own units")
     parser.add_argument("--link", metavar="URL", default="", help="address of the full page, which the file names")
     return parser
@@ -283,9 +309,11 @@ def add_compare(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "--free", action="store_true", help="base, tool and zeros of joints may differ: they are no mistakes"
     )
     parser.add_argument(
-        "--tolerance", nargs=2, metavar=("LENGTH", "ANGLE"),
+        "--tolerance",
+        nargs=2,
+        metavar=("LENGTH", "ANGLE"),
         help=f"largest difference of the poses of arms that count as close; {UNITS_NOTE}",
-    )  # fmt: skip
+    )
     return parser
 
 
@@ -309,26 +337,33 @@ def add_workspace(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "--hull", metavar="FILE", help="write the convex hull of the cloud as a solid: stl, ply, obj, off, glb"
     )
     parser.add_argument(
-        "--format", choices=("csv", "npz", "ply", "ndjson", "bin"),
+        "--format",
+        choices=("csv", "npz", "ply", "ndjson", "bin"),
         help="format of the point cloud (default: by the ending of its name)",
-    )  # fmt: skip
+    )
     parser.add_argument("-n", type=count, default=100_000, help="number of points, such as 1e6 (default 100000)")
     parser.add_argument("--seed", type=whole_number, default=0, help="equal seeds give equal clouds (default 0)")
     parser.add_argument(
-        "--strategy", choices=("uniform", "quasi", "volume", "boundary"), default="uniform",
+        "--strategy",
+        choices=("uniform", "quasi", "volume", "boundary"),
+        default="uniform",
         help="uniform: joints sampled uniformly (default); quasi: more evenly; volume: points even in space; "
         "boundary: points on the envelope",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--measure", choices=("manipulability", "limit_margin", "limits"), action="append", default=[],
+        "--measure",
+        choices=("manipulability", "limit_margin", "limits"),
+        action="append",
+        default=[],
         help="add a column: manipulability, or limit_margin (older name: limits), the relative distance to the "
         "nearest joint limit (0 to 1); may be repeated",
-    )  # fmt: skip
+    )
     parser.add_argument("--q", action="store_true", help="add the joint values, in radians (metres)")
     parser.add_argument(
-        "--progress", action=argparse.BooleanOptionalAction,
+        "--progress",
+        action=argparse.BooleanOptionalAction,
         help="show progress on standard error (default: if that is a terminal)",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--effort", type=whole_number, default=4, help="2 to 64: precision of volume and surface (default 4)"
     )
@@ -400,10 +435,12 @@ def add_export(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard export``."""
     parser = _command(commands, "export", "an arm as a robot file, URDF or MJCF", parents.robots)
     parser.add_argument(
-        "--format", choices=("toml", "urdf", "mjcf", "dh", "mdh"), default="toml",
+        "--format",
+        choices=("toml", "urdf", "mjcf", "dh", "mdh"),
+        default="toml",
         help="toml: robot file (default); dh, mdh: the same in the standard or the modified convention; "
         "urdf: URDF without bodies; mjcf: for MuJoCo, with capsules and assumed masses",
-    )  # fmt: skip
+    )
     parser.add_argument("-o", "--output", metavar="FILE", help="write to this file (default: standard output)")
     return parser
 
@@ -411,9 +448,13 @@ def add_export(commands: Any, parents: Parents) -> argparse.ArgumentParser:
 def add_capability(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard capability``."""
     parser = _command(
-        commands, "capability", "capability map: from which directions the tool reaches each place",
-        parents.robots, parents.output, parents.joints,
-    )  # fmt: skip
+        commands,
+        "capability",
+        "capability map: from which directions the tool reaches each place",
+        parents.robots,
+        parents.output,
+        parents.joints,
+    )
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--voxel", metavar="SIDE", help="side of a voxel, millimetres (--rad: metres)")
     size.add_argument(

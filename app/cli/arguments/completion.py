@@ -107,23 +107,25 @@ def _bash(pages: list[Page]) -> str:
         if words := [*page.below, *page.words]:
             arguments.append(f'        "{page.name}:"*) words="{" ".join(words)}" ;;')
     nested = "|".join(sorted({page.name.split()[0] for page in pages if " " in page.name})) or "''"
-    return "\n".join([
-        '# Completion for bash: eval "$(kinboard completion bash)"',
-        "_kinboard() {",
-        "    local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]} page= words=",
-        "    ((COMP_CWORD > 1)) && page=${COMP_WORDS[1]}",
-        f'    case "$page" in {nested}) ((COMP_CWORD > 2)) && page="$page ${{COMP_WORDS[2]}}" ;; esac',
-        '    case "$page:$prev" in',
-        *values,
-        '    *) case "$page:$cur" in',
-        *arguments,
-        "    esac ;;",
-        "    esac",
-        '    COMPREPLY=($(compgen -W "$words" -- "$cur"))',
-        "}",
-        "complete -o default -F _kinboard kinboard  # files, where nothing else fits",
-        "",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            '# Completion for bash: eval "$(kinboard completion bash)"',
+            "_kinboard() {",
+            "    local cur=${COMP_WORDS[COMP_CWORD]} prev=${COMP_WORDS[COMP_CWORD-1]} page= words=",
+            "    ((COMP_CWORD > 1)) && page=${COMP_WORDS[1]}",
+            f'    case "$page" in {nested}) ((COMP_CWORD > 2)) && page="$page ${{COMP_WORDS[2]}}" ;; esac',
+            '    case "$page:$prev" in',
+            *values,
+            '    *) case "$page:$cur" in',
+            *arguments,
+            "    esac ;;",
+            "    esac",
+            '    COMPREPLY=($(compgen -W "$words" -- "$cur"))',
+            "}",
+            "complete -o default -F _kinboard kinboard  # files, where nothing else fits",
+            "",
+        ]
+    )
 
 
 def _zsh(pages: list[Page]) -> str:
@@ -136,10 +138,12 @@ def _zsh(pages: list[Page]) -> str:
                 f"    local -a below=({named})",
                 "    if ((CURRENT == 2)) && [[ $words[2] != -* ]]; then _describe command below; return; fi",
                 "    case $words[2] in",
-                *(f"    {word}) shift words; ((CURRENT--)); {_function(f'{page.name} {word}')}; return ;;"
-                  for word in page.below),
+                *(
+                    f"    {word}) shift words; ((CURRENT--)); {_function(f'{page.name} {word}')}; return ;;"
+                    for word in page.below
+                ),
                 "    esac",
-            ]  # fmt: skip
+            ]
         specs = [_zsh_flag(flag) for flag in page.flags]
         words = f"compadd {' '.join(page.words)}; " if page.words else ""
         specs.append(_quoted("*:argument:{" + words + "_files}"))

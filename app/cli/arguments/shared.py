@@ -31,9 +31,12 @@ class Parents:
             "--deg", dest="rad", action="store_false", default=False, help="degrees and millimetres (default)"
         )
         unit.add_argument(
-            "--rad", dest="rad", action="store_true", default=False,
+            "--rad",
+            dest="rad",
+            action="store_true",
+            default=False,
             help="read and print radians and metres",
-        )  # fmt: skip
+        )
         self.joints = argparse.ArgumentParser(add_help=False)
         add_options(self.joints, ["limits", "locked", "wider_limits"])
         self.mounts = argparse.ArgumentParser(add_help=False)
@@ -49,7 +52,11 @@ class Parents:
             )
         self.frames = argparse.ArgumentParser(add_help=False, parents=[self.mounts])
         self.frames.add_argument(
-            "--workpiece", type=workpiece, action="append", metavar="NAME=X:Y:Z[:ROLL:PITCH:YAW]", default=[],
+            "--workpiece",
+            type=workpiece,
+            action="append",
+            metavar="NAME=X:Y:Z[:ROLL:PITCH:YAW]",
+            default=[],
             help="a frame of your own, such as a table, with its pose in the world frame; --frame may name it; "
             f"{UNITS_NOTE}; may be repeated",
-        )  # fmt: skip
+        )

@@ -52,6 +52,8 @@ def run(arguments: Namespace) -> int:
         return 2
     print(f"\nRegistered in {path}:\n")
     for platform in platforms.all:
-        print(f"  {platform.name}: {platform.issuer}, client id {platform.client_id}, "
-              f"deployments {', '.join(platform.deployments)}")  # fmt: skip
+        print(
+            f"  {platform.name}: {platform.issuer}, client id {platform.client_id}, "
+            f"deployments {', '.join(platform.deployments)}"
+        )
     return 0

@@ -90,8 +90,9 @@ class Source:
                 yield np.array([self._q(robot, row, first + i) for i, row in enumerate(rows)])
         else:
             for first, lines in self._lines():
-                yield np.array([self._q(robot, self._json(each, first + i), first + i)
-                                for i, each in enumerate(lines)])  # fmt: skip
+                yield np.array(
+                    [self._q(robot, self._json(each, first + i), first + i) for i, each in enumerate(lines)]
+                )
 
     def goals(self) -> Iterator[list[Goal]]:
         """Targets, piece by piece.
@@ -107,8 +108,10 @@ class Source:
                 yield [Goal("pose", pose_of(row, f"{self.field}[{first + i}]")) for i, row in enumerate(rows)]
         else:
             for first, lines in self._lines():
-                yield [self._goal(self._json(each, first + i), f"{self.field}[{first + i}]")
-                       for i, each in enumerate(lines)]  # fmt: skip
+                yield [
+                    self._goal(self._json(each, first + i), f"{self.field}[{first + i}]")
+                    for i, each in enumerate(lines)
+                ]
 
     def objects(self) -> Iterator[dict[str, Any]]:
         """The objects of JSON lines, one by one."""

@@ -112,9 +112,10 @@ class MistakeKind(Kind):
         rows = read_rows(given, len(arm.rows), 0, units)
         kept = [  # a number that was not touched is exact
             Row(*(exact if text == old else new for exact, text, old, new in zip(*each, strict=True)))
-            for each in zip(map(astuple, _rows(wrong)), cast("list[list[str]]", given), shown, map(astuple, rows),
-                            strict=True)
-        ]  # fmt: skip
+            for each in zip(
+                map(astuple, _rows(wrong)), cast("list[list[str]]", given), shown, map(astuple, rows), strict=True
+            )
+        ]
         table = _with_rows(arm, kept)
         if _is_right(arm, table):
             return Verdict(True, f"{_praise(arm, table, units)} {_diagnosis(arm, wrong, units)}")

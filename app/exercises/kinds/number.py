@@ -100,10 +100,15 @@ class NumberKind(Kind):
             value = variant.number(expression)
             tolerance = share(value, self.part) if self.part else self.tolerance
             question = Number(
-                label or "Your answer", value, unit, tolerance, method,
-                tuple(Mistake(float(values[i]), reason) for values, reason in wrong), self.whole_turns,
+                label or "Your answer",
+                value,
+                unit,
+                tolerance,
+                method,
+                tuple(Mistake(float(values[i]), reason) for values, reason in wrong),
+                self.whole_turns,
                 ordered=self.unit != "joint",
-            )  # fmt: skip
+            )
             if self.least is not None:
                 question = apart(question, variant.number(self.least) * SCALES.get(self.unit, 1.0))
             found.append(question)

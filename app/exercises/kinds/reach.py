@@ -167,9 +167,11 @@ class ReachKind(Kind):
                 for low, high, by in zip(robot.lower, robot.upper, inset, strict=True)
             ]
         options = IKOptions(
-            task=self.task, branch=self.branch or None, constraints=JointConstraints(limits=limits, locked=locked),
+            task=self.task,
+            branch=self.branch or None,
+            constraints=JointConstraints(limits=limits, locked=locked),
             prefer="manipulability" if variant.number(self.manipulability) > 0.0 else "nearest",
-        )  # fmt: skip
+        )
         if self.line:
             return self._first_through(variant, options)
         found = kin.ik.solve(robot, variant.pose, options, robot.q_home)

@@ -167,9 +167,11 @@ class SolutionsKind(Kind):
 
     def solution(self, variant: Variant, units: Units) -> str:
         rows = [
-            "(" + ", ".join(
+            "("
+            + ", ".join(
                 units.of(bool(turns)).text(float(v), 1) for v, turns in zip(q, variant.robot.revolute, strict=True)
-            ) + ")"
+            )
+            + ")"
             for q in self._solutions(variant)
-        ]  # fmt: skip
+        ]
         return f"{'; '.join(rows)}." if rows else "There is no solution."

@@ -18,9 +18,18 @@ def csv_text(sheet: Sheet) -> str:
     angle = "deg" if sheet.units.degrees else "rad"
     length = sheet.units.length
     heads = [
-        "row", "name", "kind", f"theta_{angle}", f"d_{length}", f"a_{length}", f"alpha_{angle}",
-        "lower", "upper", "value", *ENTRIES,
-    ]  # fmt: skip
+        "row",
+        "name",
+        "kind",
+        f"theta_{angle}",
+        f"d_{length}",
+        f"a_{length}",
+        f"alpha_{angle}",
+        "lower",
+        "upper",
+        "value",
+        *ENTRIES,
+    ]
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(heads)

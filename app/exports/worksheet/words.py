@@ -6,20 +6,60 @@ import re
 import unicodedata
 
 _SPECIAL = {
-    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#", "_": r"\_", "%": r"\%",
-    "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "<": r"\textless{}", ">": r"\textgreater{}",
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "$": r"\$",
+    "&": r"\&",
+    "#": r"\#",
+    "_": r"\_",
+    "%": r"\%",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
     "|": r"\textbar{}",
-}  # fmt: skip
+}
 _MATH = {
-    "−": "-", "×": r"\times", "·": r"\cdot", "⋅": r"\cdot", "°": r"^\circ", "±": r"\pm", "√": r"\surd",
-    "≤": r"\le", "≥": r"\ge", "≠": r"\ne", "≈": r"\approx", "→": r"\to", "∞": r"\infty", "′": "'", "∈": r"\in",
-    "⊥": r"\perp", "∥": r"\parallel", "∑": r"\sum", "∂": r"\partial",
-    "∠": r"\angle", "½": r"\frac12",
-}  # fmt: skip
+    "−": "-",
+    "×": r"\times",
+    "·": r"\cdot",
+    "⋅": r"\cdot",
+    "°": r"^\circ",
+    "±": r"\pm",
+    "√": r"\surd",
+    "≤": r"\le",
+    "≥": r"\ge",
+    "≠": r"\ne",
+    "≈": r"\approx",
+    "→": r"\to",
+    "∞": r"\infty",
+    "′": "'",
+    "∈": r"\in",
+    "⊥": r"\perp",
+    "∥": r"\parallel",
+    "∑": r"\sum",
+    "∂": r"\partial",
+    "∠": r"\angle",
+    "½": r"\frac12",
+}
 _TEXT = {
-    "…": r"\dots{}", "–": "--", "—": "---", "’": "'", "‘": "`", "“": "``", "”": "''", "\u00a0": "~",
-    "\u202f": r"\,", "\u2009": r"\,", "✓": "", "✕": "", "ü": r'\"u', "ö": r'\"o', "ä": r'\"a',
-}  # fmt: skip
+    "…": r"\dots{}",
+    "–": "--",
+    "—": "---",
+    "’": "'",
+    "‘": "`",
+    "“": "``",
+    "”": "''",
+    "\u00a0": "~",
+    "\u202f": r"\,",
+    "\u2009": r"\,",
+    "✓": "",
+    "✕": "",
+    "ü": r"\"u",
+    "ö": r"\"o",
+    "ä": r"\"a",
+}
 _GREEK = {  # letters that LaTeX has commands for; others look like Latin ones, or have accents
     "SMALL": {
         *("alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "iota", "kappa", "lambda", "mu"),

@@ -76,9 +76,11 @@ def _pixels(name: str, given: str | None, default: int) -> int:
 def _embedded(link: str, request: Request) -> str:
     """The address to embed for a link to the viewer of this service; raises 404 for any other."""
     refused = ProblemError(
-        404, "not-found", f"{shorten_text(link)} is not a link to this viewer.",
+        404,
+        "not-found",
+        f"{shorten_text(link)} is not a link to this viewer.",
         "Give the link that the viewer's tab View offers under Share as the query parameter url.",
-    )  # fmt: skip
+    )
     try:
         parts = urlsplit(link)
     except ValueError:

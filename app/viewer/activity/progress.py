@@ -163,11 +163,16 @@ class Progress:
         done = [records[key] for key in course.exercises if key in records]
         count = len(course.exercises)
         return Outcome(
-            "course", course.fingerprint, course.title, self.alias,
+            "course",
+            course.fingerprint,
+            course.title,
+            self.alias,
             score=round(sum(record.credit for record in done) / count) if count else 0,
-            solved=sum(record.mark == "right" for record in done), count=count,
-            tries=sum(record.attempts for record in done), day=datetime.now(UTC).date(),
-        )  # fmt: skip
+            solved=sum(record.mark == "right" for record in done),
+            count=count,
+            tries=sum(record.attempts for record in done),
+            day=datetime.now(UTC).date(),
+        )
 
     def place(self, key: Callable[[], bytes]) -> ExerciseContext | None:
         """Where its exercises are done; None: no course is open. Raises what `key` raises."""

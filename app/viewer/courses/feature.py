@@ -34,9 +34,28 @@ class CourseFeature(Feature):
     title = "Courses"
     about = "New here? Begin with the course First steps. Make your own courses, and check results."
     messages = frozenset(
-        {"pick", "new", "close", "upload", "edit", "done", "set", "up", "down", "delete", "answers", "go", "next",
-         "back", "list", "download", "link", "fields", "recall"}
-    )  # fmt: skip
+        {
+            "pick",
+            "new",
+            "close",
+            "upload",
+            "edit",
+            "done",
+            "set",
+            "up",
+            "down",
+            "delete",
+            "answers",
+            "go",
+            "next",
+            "back",
+            "list",
+            "download",
+            "link",
+            "fields",
+            "recall",
+        }
+    )
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)

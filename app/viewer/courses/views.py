@@ -56,17 +56,27 @@ def bar_html(progress: Progress, known: Exercises) -> str:
     if course is None or at is None or item is None:
         return ""
     return render(
-        "course/bar", course=course, number=at + 1, count=len(course.items), title=_title(known, item),
-        note=item.note, marks=_marks(progress), at=at,
-    )  # fmt: skip
+        "course/bar",
+        course=course,
+        number=at + 1,
+        count=len(course.items),
+        title=_title(known, item),
+        note=item.note,
+        marks=_marks(progress),
+        at=at,
+    )
 
 
 def chooser_html(courses: Courses, view: CourseView, seated: bool) -> str:
     """All courses, and, but for a student in a room (`seated`), what is for teachers: own courses, codes."""
     return render(
-        "course/choose", courses=courses.all, view=view, most=MOST_IN_FILE, said=said(view.checked, courses),
+        "course/choose",
+        courses=courses.all,
+        view=view,
+        most=MOST_IN_FILE,
+        said=said(view.checked, courses),
         seated=seated,
-    )  # fmt: skip
+    )
 
 
 def course_html(progress: Progress, known: Exercises, view: CourseView) -> str:
@@ -74,10 +84,17 @@ def course_html(progress: Progress, known: Exercises, view: CourseView) -> str:
     course = progress.course
     assert course is not None
     rows: list[dict[str, Any]] = [
-        {"index": i, "kind": item.kind, "title": _title(known, item), "own": item.title, "note": item.note,
-         "mark": mark, "name": course.items[i].key}
+        {
+            "index": i,
+            "kind": item.kind,
+            "title": _title(known, item),
+            "own": item.title,
+            "note": item.note,
+            "mark": mark,
+            "name": course.items[i].key,
+        }
         for i, (item, mark) in enumerate(zip(course.items, _marks(progress), strict=True))
-    ]  # fmt: skip
+    ]
     partner = dict(zip(course.after, course.before, strict=True))
     taken = {*course.before, *course.after}
     for i, row in enumerate(rows):
@@ -93,19 +110,34 @@ def course_html(progress: Progress, known: Exercises, view: CourseView) -> str:
     if view.editing:
         exercises = [(topic, [(one.id, one.title) for one in members]) for topic, members in known.topics()]
         return render(
-            "course/edit", course=course, rows=rows, longest=LONGEST, full=len(rows) >= MOST_ITEMS, link=link,
-            lessons=[(lesson.key, lesson.title) for lesson in LESSONS], exercises=exercises, view=view,
-        )  # fmt: skip
+            "course/edit",
+            course=course,
+            rows=rows,
+            longest=LONGEST,
+            full=len(rows) >= MOST_ITEMS,
+            link=link,
+            lessons=[(lesson.key, lesson.title) for lesson in LESSONS],
+            exercises=exercises,
+            view=view,
+        )
     code = Markup(box_html(view.code, "Copy code", wrap=True)) if view.code else ""
     return render(
-        "course/follow", course=course, rows=rows, done=done, view=view, link=link, code=code,
-        alias=progress.alias, begun=any(row["mark"]["symbol"] for row in rows), outcome=progress.outcome(),
+        "course/follow",
+        course=course,
+        rows=rows,
+        done=done,
+        view=view,
+        link=link,
+        code=code,
+        alias=progress.alias,
+        begun=any(row["mark"]["symbol"] for row in rows),
+        outcome=progress.outcome(),
         seated=progress.seated,
         back=[
             {"key": key, "title": _title(known, Item("exercise", key)), "mark": MARKS[mark]}
             for key, mark in progress.back.items()
         ],
-    )  # fmt: skip
+    )
 
 
 def said(outcome: Outcome | None, courses: Courses) -> str:

@@ -52,9 +52,13 @@ def head_html(trial: Trial, refusal: Refusal) -> str:
 def group_html(group: Group, number: int, values: Mapping[str, tuple[str, ...]], refusal: Refusal) -> str:
     """Some fields with their values for three students."""
     return render(
-        "exercises/author_group", group=group, number=number, refusal=refusal, values=values_of(group, values),
+        "exercises/author_group",
+        group=group,
+        number=number,
+        refusal=refusal,
+        values=values_of(group, values),
         is_rows=lambda member: isinstance(member, Rows),
-    )  # fmt: skip
+    )
 
 
 def values_of(group: Group, values: Mapping[str, tuple[str, ...]]) -> dict[str, list[tuple[str, ...]]]:

@@ -43,22 +43,34 @@ class Drawing:
         """A frame with a label."""
         name, size = f"/exercise-{next(_NUMBERS)}", SIZE * reach
         frame = self._scene.add_frame(
-            name, axes_length=size, axes_radius=0.05 * size, origin_radius=0.13 * size, origin_color=_COLOR,
-            wxyz=wxyz_from_rotation(T[:3, :3]), position=T[:3, 3],
-        )  # fmt: skip
+            name,
+            axes_length=size,
+            axes_radius=0.05 * size,
+            origin_radius=0.13 * size,
+            origin_color=_COLOR,
+            wxyz=wxyz_from_rotation(T[:3, :3]),
+            position=T[:3, 3],
+        )
         self._nodes += [frame, self._scene.add_label(f"{name}/label", label, position=(0.0, 0.0, 0.5 * size))]
 
     def ghost(self, T: Array, reach: float) -> None:
         """A frame that the visitor drags."""
         name, size = f"/exercise-{next(_NUMBERS)}", SIZE * reach
         handle = self._scene.add_transform_controls(
-            name, scale=1.7 * size, line_width=3.0, depth_test=False,
-            wxyz=wxyz_from_rotation(T[:3, :3]), position=T[:3, 3],
-        )  # fmt: skip
+            name,
+            scale=1.7 * size,
+            line_width=3.0,
+            depth_test=False,
+            wxyz=wxyz_from_rotation(T[:3, :3]),
+            position=T[:3, 3],
+        )
         frame = self._scene.add_frame(
-            f"{name}/frame", axes_length=1.2 * size, axes_radius=0.06 * size, origin_radius=0.15 * size,
+            f"{name}/frame",
+            axes_length=1.2 * size,
+            axes_radius=0.06 * size,
+            origin_radius=0.15 * size,
             origin_color=_COLOR,
-        )  # fmt: skip
+        )
         self._nodes += [handle, frame, self._scene.add_label(f"{name}/label", "your ghost")]
         self._ghost = handle
 

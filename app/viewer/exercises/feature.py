@@ -328,15 +328,26 @@ class Practising(Feature):
             variant, closed = self._variant, self._shown.closed
             contents = [
                 views.task_html(
-                    exercise, variant, units, self.stage.now.robot == exercise.robot, self._shown.variant,
-                    activity.exercises.is_own(exercise.id) and not practice.seated, self.door,
+                    exercise,
+                    variant,
+                    units,
+                    self.stage.now.robot == exercise.robot,
+                    self._shown.variant,
+                    activity.exercises.is_own(exercise.id) and not practice.seated,
+                    self.door,
                 ),
                 views.question_html(self._asked, self._sheet, closed, self.door),
                 views.foot_html(
-                    exercise, variant, units, self._sheet, activity, self._shown, self._following(exercise),
+                    exercise,
+                    variant,
+                    units,
+                    self._sheet,
+                    activity,
+                    self._shown,
+                    self._following(exercise),
                     self.door,
                 ),
-            ]  # fmt: skip
+            ]
         posture = exercise is not None and self._asked.form == "posture"
         self._show_joints(posture and exercise is not None and not practice.record(exercise).closed)
         for block, content in zip(self._blocks, contents, strict=True):

@@ -32,10 +32,15 @@ def list_html(exercises: Exercises, practice: Practice) -> str:
             symbol, words, color = MARKS[record.mark]
             rows.append(
                 {
-                    "id": exercise.id, "title": exercise.title, "level": exercise.level,
-                    "level_words": LEVELS[exercise.level], "symbol": symbol, "words": words, "color": color,
+                    "id": exercise.id,
+                    "title": exercise.title,
+                    "level": exercise.level,
+                    "level_words": LEVELS[exercise.level],
+                    "symbol": symbol,
+                    "words": words,
+                    "color": color,
                 }
-            )  # fmt: skip
+            )
         solved = sum(practice.records.get(one.id, Record()).mark == "right" for one in members)
         topics.append({"title": title, "rows": rows, "solved": solved, "count": len(rows)})
     total, solved = len(exercises.all), sum(topic["solved"] for topic in topics)  # type: ignore[misc]
@@ -71,9 +76,15 @@ def task_html(
         own: whether it was written in this page.
     """
     return render(
-        "exercises/task", exercise=exercise, level=LEVELS[exercise.level], text=variant.text(exercise.text, units),
-        at_home=at_home, count=count, own=own, door=door,
-    )  # fmt: skip
+        "exercises/task",
+        exercise=exercise,
+        level=LEVELS[exercise.level],
+        text=variant.text(exercise.text, units),
+        at_home=at_home,
+        count=count,
+        own=own,
+        door=door,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,13 +165,24 @@ def foot_html(
     if any(reason == detail for _, reason in parts):
         detail = ""
     return render(
-        "exercises/foot", title=title, color=color, detail=detail, parts=parts, hints=hints,
+        "exercises/foot",
+        title=title,
+        color=color,
+        detail=detail,
+        parts=parts,
+        hints=hints,
         credit=0 if verdict is None or verdict.right else round(100 * verdict.credit),
-        more_hints=len(exercise.hints) - record.hints, record=record, time=_time(record.seconds),
-        solution=exercise.solution(variant, units) if record.closed else "", following=following,
-        varies=bool(exercise.vary), may_reveal=activity.reveals(exercise),
-        note=activity.note if door.counts else "", seated=activity.practice.seated and door.counts, door=door,
-    )  # fmt: skip
+        more_hints=len(exercise.hints) - record.hints,
+        record=record,
+        time=_time(record.seconds),
+        solution=exercise.solution(variant, units) if record.closed else "",
+        following=following,
+        varies=bool(exercise.vary),
+        may_reveal=activity.reveals(exercise),
+        note=activity.note if door.counts else "",
+        seated=activity.practice.seated and door.counts,
+        door=door,
+    )
 
 
 def _time(seconds: int) -> str:

@@ -78,9 +78,16 @@ class FigureNodes:
         return self.line(key, at - way, at + way, text, color)
 
     def dimension(
-        self, key: str, start: ArrayLike, end: ArrayLike, text: str, units: Units, aside: ArrayLike,
-        color: Color = BLUE, words: str | None = None,
-    ) -> list[Node]:  # fmt: skip
+        self,
+        key: str,
+        start: ArrayLike,
+        end: ArrayLike,
+        text: str,
+        units: Units,
+        aside: ArrayLike,
+        color: Color = BLUE,
+        words: str | None = None,
+    ) -> list[Node]:
         """A distance with its name and value, as in an engineering drawing; equal points have the label only.
 
         Args:
@@ -98,9 +105,18 @@ class FigureNodes:
         ]
 
     def angle(
-        self, key: str, corner: ArrayLike, start: ArrayLike, about: ArrayLike, angle: float, text: str,
-        units: Units, color: Color = BLUE, radius: float | None = None, words: str | None = None,
-    ) -> list[Node]:  # fmt: skip
+        self,
+        key: str,
+        corner: ArrayLike,
+        start: ArrayLike,
+        about: ArrayLike,
+        angle: float,
+        text: str,
+        units: Units,
+        color: Color = BLUE,
+        radius: float | None = None,
+        words: str | None = None,
+    ) -> list[Node]:
         """A rotation with its name and value: two sides, and the arc between them with an arrow head.
 
         Args:
@@ -121,9 +137,14 @@ class FigureNodes:
         ]
 
     def point(
-        self, key: str, at: ArrayLike, text: str = "", color: Color = AMBER, beside: ArrayLike = (0.0, 0.0, 1.0),
+        self,
+        key: str,
+        at: ArrayLike,
+        text: str = "",
+        color: Color = AMBER,
+        beside: ArrayLike = (0.0, 0.0, 1.0),
         radius: float = POINT,
-    ) -> list[Node]:  # fmt: skip
+    ) -> list[Node]:
         """A small ball, of this radius in thicknesses, with a label in the direction `beside` from it."""
         place, radius = np.asarray(at, float), radius * self.size
         props = {"radius": radius, "color": color, "cast_shadow": False, "receive_shadow": False}

@@ -19,8 +19,13 @@ Segments = NDArray[np.float32]
 
 # Okabe and Ito's colours, of middle brightness: they show on a light and on a dark background.
 BLUE, VERMILION, GREEN, AMBER, PURPLE, SKY = (
-    (0, 114, 178), (213, 94, 0), (0, 158, 115), (230, 159, 0), (204, 121, 167), (86, 180, 233),
-)  # fmt: skip
+    (0, 114, 178),
+    (213, 94, 0),
+    (0, 158, 115),
+    (230, 159, 0),
+    (204, 121, 167),
+    (86, 180, 233),
+)
 GREY = (128, 134, 145)
 ARC = 32  # segments
 # In units of the arm's thickness.

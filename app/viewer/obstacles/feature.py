@@ -198,11 +198,17 @@ class ObstaclesFeature(Feature):
         update_html(
             self._html,
             render(
-                "obstacles/panel", shapes=_ORDER, rows=rows, chosen=chosen, groups=self._groups(),
-                name="" if chosen is None else items[chosen].label, full=len(items) >= MOST_OBSTACLES,
-                most=MOST_OBSTACLES, wrong="" if self._wrong is None else self._wrong[2],
+                "obstacles/panel",
+                shapes=_ORDER,
+                rows=rows,
+                chosen=chosen,
+                groups=self._groups(),
+                name="" if chosen is None else items[chosen].label,
+                full=len(items) >= MOST_OBSTACLES,
+                most=MOST_OBSTACLES,
+                wrong="" if self._wrong is None else self._wrong[2],
             ),
-        )  # fmt: skip
+        )
 
     def _groups(self) -> list[tuple[str, list[dict[str, object]]]]:
         """The fields of the one that is chosen, by groups."""

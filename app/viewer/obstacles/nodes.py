@@ -41,9 +41,15 @@ class _Node:
         self._red = False
         self._parts = [(node, node.color) for node in _meshes(scene, self.root, each, deep)]
         self._label = add_label(
-            scene, f"{self.root}/name", each.label, scale=0.9, position=(0.0, 0.0, _above(each)),
-            anchor="bottom-center", depth_test=True, visible=False,
-        )  # fmt: skip
+            scene,
+            f"{self.root}/name",
+            each.label,
+            scale=0.9,
+            position=(0.0, 0.0, _above(each)),
+            anchor="bottom-center",
+            depth_test=True,
+            visible=False,
+        )
         for node, _ in self._parts:
             _listen(node, clicked)
 

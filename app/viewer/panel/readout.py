@@ -19,9 +19,13 @@ from kin.units import Unit, Units, fixed
 
 
 def html(
-    T_frame_tool: Array, units: Units, T_frame_target: Array | None = None, frame: str = WORLD,
-    withheld: Collection[str] = (), rotations: Rotations = DEFAULT,
-) -> str:  # fmt: skip
+    T_frame_tool: Array,
+    units: Units,
+    T_frame_target: Array | None = None,
+    frame: str = WORLD,
+    withheld: Collection[str] = (),
+    rotations: Rotations = DEFAULT,
+) -> str:
     """Position, angles such as roll, pitch, yaw, and quaternion of a pose ``(4, 4)`` as a small table.
 
     Args:
@@ -100,8 +104,12 @@ class PoseReadout:
         update_html(self._choice, render("panel/frame", frames=offered, shown=frames.shown))
 
     def show(
-        self, T: Array, units: Units, target: Array | None = None, frame: str = WORLD,
+        self,
+        T: Array,
+        units: Units,
+        target: Array | None = None,
+        frame: str = WORLD,
         withheld: Collection[str] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Replace the numbers; see `html`."""
         show_content(self._html, html(T, units, target, frame, withheld, self._rotations))

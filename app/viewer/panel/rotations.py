@@ -100,22 +100,45 @@ def _quaternion(order: str) -> Notation:
 
 
 RPY: Final = Notation(
-    "roll pitch yaw", "roll pitch yaw", "R = Rz(yaw)·Ry(pitch)·Rx(roll)", (True,) * 3, roll_pitch_yaw,
-    lambda given: from_xyz_rpy(np.zeros(3), given)[:3, :3], "0 0 0",
-)  # fmt: skip
+    "roll pitch yaw",
+    "roll pitch yaw",
+    "R = Rz(yaw)·Ry(pitch)·Rx(roll)",
+    (True,) * 3,
+    roll_pitch_yaw,
+    lambda given: from_xyz_rpy(np.zeros(3), given)[:3, :3],
+    "0 0 0",
+)
 ZYZ: Final = Notation(
-    "Euler Z-Y-Z", "α β γ", "R = Rz(α)·Ry(β)·Rz(γ)", (True,) * 3, z_y_z,
-    lambda given: rotation_about(np.eye(3)[2], given[0]) @ rotation_about(np.eye(3)[1], given[1])
-    @ rotation_about(np.eye(3)[2], given[2]), "0 0 0",
-)  # fmt: skip
+    "Euler Z-Y-Z",
+    "α β γ",
+    "R = Rz(α)·Ry(β)·Rz(γ)",
+    (True,) * 3,
+    z_y_z,
+    lambda given: (
+        rotation_about(np.eye(3)[2], given[0])
+        @ rotation_about(np.eye(3)[1], given[1])
+        @ rotation_about(np.eye(3)[2], given[2])
+    ),
+    "0 0 0",
+)
 AXIS: Final = Notation(
-    "axis and angle", "kx ky kz θ", "The turn by θ about the axis k", (False, False, False, True), _axis_angle,
-    _about, "0 0 1 0",
-)  # fmt: skip
+    "axis and angle",
+    "kx ky kz θ",
+    "The turn by θ about the axis k",
+    (False, False, False, True),
+    _axis_angle,
+    _about,
+    "0 0 1 0",
+)
 VECTOR: Final = Notation(
-    "rotation vector", "rx ry rz", "The axis times the angle, as in UR's p[x, y, z, rx, ry, rz]", (True,) * 3,
-    lambda R: tuple(rotation_vector(R).tolist()), _vector, "0 0 0",
-)  # fmt: skip
+    "rotation vector",
+    "rx ry rz",
+    "The axis times the angle, as in UR's p[x, y, z, rx, ry, rz]",
+    (True,) * 3,
+    lambda R: tuple(rotation_vector(R).tolist()),
+    _vector,
+    "0 0 0",
+)
 ANGLES: Final = {"rpy": RPY, "zyz": ZYZ, "axis": AXIS, "vector": VECTOR}
 WXYZ, XYZW = _quaternion("w x y z"), _quaternion("x y z w")
 QUATERNIONS: Final = {"wxyz": WXYZ, "xyzw": XYZW}

@@ -215,9 +215,13 @@ class Student(Member):
         verdict = judged.verdict
         self._answered = judged.exercise.id, judged.seed
         attempt = NewAttempt(
-            exercise=judged.exercise.id, seed=judged.seed, answer=judged.answer, verdict=verdict.reason,
-            score=1.0 if verdict.right else min(max(verdict.credit, 0.0), 1.0), started=now() - judged.seconds,
-        )  # fmt: skip
+            exercise=judged.exercise.id,
+            seed=judged.seed,
+            answer=judged.answer,
+            verdict=verdict.reason,
+            score=1.0 if verdict.right else min(max(verdict.credit, 0.0), 1.0),
+            started=now() - judged.seconds,
+        )
         if judged.sending:  # sent again after a lost connection, it is the same attempt
             name = f"{self.attendance.ticket.seat} {judged.exercise.id} {judged.seed} {judged.sending}"
             attempt = replace(attempt, id=hashlib.sha256(name.encode()).hexdigest()[:16])

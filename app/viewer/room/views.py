@@ -32,14 +32,17 @@ MODES: dict[Mode, tuple[str, str, str, str]] = {
     "frozen": ("❄", "Frozen", "The teacher has stopped all arms for a moment.", "violet"),
     "paused": ("‖", "Paused", "The teacher’s connection is lost. You can go on by yourself.", "amber"),
     "closed": ("■", "You are no longer in the room", "", "crimson"),
-}  # fmt: skip
+}
 STAYS = "What you have done stays on this page and in its link."
 GO_ON = "You can go on by yourself, or join a room."  # where no access token is needed
 # Symbol and colour of what has become of the task, or of the exercise on show.
 PROGRESS: dict[Progress, tuple[str, str]] = {
-    "not begun": ("○", ""), "at it": ("✎", "blue"), "stuck": ("!", "vermilion"), "gave up": ("⚑", "mauve"),
+    "not begun": ("○", ""),
+    "at it": ("✎", "blue"),
+    "stuck": ("!", "vermilion"),
+    "gave up": ("⚑", "mauve"),
     "solved": ("✓", "green"),
-}  # fmt: skip
+}
 HAND, AWAY = "☝", "…"
 
 
@@ -75,9 +78,15 @@ def student_html(room: RoomView, mode: Mode, task: Exercise | None, sent: Submis
     seat = room.seat or SeatView("", "")
     mark = _own_mark(room)
     return render(
-        "room/student", room=room, seat=seat, mode=mode, lead=_mode(room, mode, guest), task=task, mark=mark,
+        "room/student",
+        room=room,
+        seat=seat,
+        mode=mode,
+        lead=_mode(room, mode, guest),
+        task=task,
+        mark=mark,
         sent=sent,
-    )  # fmt: skip
+    )
 
 
 def _own_mark(room: RoomView) -> tuple[str, str]:
@@ -86,8 +95,10 @@ def _own_mark(room: RoomView) -> tuple[str, str]:
         return "", ""
     found = standing(room.seat, room)
     words: dict[Progress, str] = {
-        "not begun": "not begun", "solved": "solved", "gave up": f"{tries(found.work.tries)}, answer shown",
-    }  # fmt: skip
+        "not begun": "not begun",
+        "solved": "solved",
+        "gave up": f"{tries(found.work.tries)}, answer shown",
+    }
     progress = found.progress or "not begun"
     return words.get(progress, tries(found.work.tries)), PROGRESS[progress][1]
 
@@ -112,11 +123,20 @@ def student_bar(
     poll = room.poll if room.poll is not None and room.poll.id != read else None
     quiet = mode == "free" and poll is None and not room.problem
     return render(
-        "room/student_bar", room=room, mode=mode, lead=_mode(room, mode, guest=True), poll=poll, quiet=quiet,
-        stays=STAYS, task=task, mark=_own_mark(room)[0],
-        open_tab=open_tab, away=away and mode == "free", hand=bool(room.seat and room.seat.hand),
+        "room/student_bar",
+        room=room,
+        mode=mode,
+        lead=_mode(room, mode, guest=True),
+        poll=poll,
+        quiet=quiet,
+        stays=STAYS,
+        task=task,
+        mark=_own_mark(room)[0],
+        open_tab=open_tab,
+        away=away and mode == "free",
+        hand=bool(room.seat and room.seat.hand),
         paused="Task paused" if task is not None else "Exercise paused" if paused else "",
-    )  # fmt: skip
+    )
 
 
 def poll_html(poll: Poll | None, teacher: bool) -> str:
@@ -160,9 +180,14 @@ def tools_html(room: RoomView, wall: bool, armed: bool) -> str:
     members = Class.of(room)
     unseen = sum(not one.came for one in members.all)
     return render(
-        "room/tools", room=room, wall=wall, count=students(members.came), facts=members.facts(room), armed=armed,
+        "room/tools",
+        room=room,
+        wall=wall,
+        count=students(members.came),
+        facts=members.facts(room),
+        armed=armed,
         unseen=unseen if unseen >= MANY else 0,
-    )  # fmt: skip
+    )
 
 
 def seat_html(room: RoomView, seat: SeatView | None, looked: str, armed: bool, exercises: Exercises) -> str:
@@ -171,9 +196,15 @@ def seat_html(room: RoomView, seat: SeatView | None, looked: str, armed: bool, e
         return ""
     shown = room.shown is not None and room.shown.seat == seat.id
     return render(
-        "room/seat", room=room, seat=seat, looked=looked == seat.id, shown=shown, armed=armed,
-        named=bool(shown and room.shown and room.shown.alias), row=_row(seat, room, exercises),
-    )  # fmt: skip
+        "room/seat",
+        room=room,
+        seat=seat,
+        looked=looked == seat.id,
+        shown=shown,
+        armed=armed,
+        named=bool(shown and room.shown and room.shown.alias),
+        row=_row(seat, room, exercises),
+    )
 
 
 def list_html(room: RoomView, picked: str, exercises: Exercises) -> tuple[str, str]:
@@ -193,10 +224,15 @@ def _row(seat: SeatView, room: RoomView, exercises: Exercises) -> dict[str, obje
         symbol, color = (symbol, color) if found.progress in ("solved", "gave up") else (AWAY, "")
     wrong = found.progress in ("stuck", "at it", "gave up") and found.work.tries
     return {
-        "seat": seat, "hand": found.hand, "symbol": symbol, "color": color, "away": not found.here,
+        "seat": seat,
+        "hand": found.hand,
+        "symbol": symbol,
+        "color": color,
+        "away": not found.here,
         "words": " · ".join(_words(seat, room, found, exercises)),
-        "answer": said(found, exercises) if wrong else "", "verdict": found.work.verdict if wrong else "",
-    }  # fmt: skip
+        "answer": said(found, exercises) if wrong else "",
+        "verdict": found.work.verdict if wrong else "",
+    }
 
 
 def said(found: Standing, exercises: Exercises) -> str:
@@ -287,9 +323,15 @@ def task_html(
     chosen = chosen or next((one for _, members in exercises.topics() for one in members), None)
     members = Class.of(room)
     return render(
-        "room/task", room=room, task=task, topics=exercises.topics(), solved=members.at("solved"),
-        count=members.came, chosen=chosen, preview="" if chosen is None else _preview(chosen, units),
-    )  # fmt: skip
+        "room/task",
+        room=room,
+        task=task,
+        topics=exercises.topics(),
+        solved=members.at("solved"),
+        count=members.came,
+        chosen=chosen,
+        preview="" if chosen is None else _preview(chosen, units),
+    )
 
 
 @lru_cache(maxsize=256)
@@ -337,10 +379,19 @@ def teacher_bar(room: RoomView, looked: SeatView | None, wall: bool, open_tab: i
     words = [f"{count} {what}" for count, what in apart if count] if led else []
     arms = sum(bool(seat.page) for seat in room.seats)
     return render(
-        "room/teacher_bar", room=room, looked=looked, wall=wall, arms=arms, most=MOST, hands=hands,
-        count=students(members.came), following=following, apart=words, stuck=members.at("stuck"),
+        "room/teacher_bar",
+        room=room,
+        looked=looked,
+        wall=wall,
+        arms=arms,
+        most=MOST,
+        hands=hands,
+        count=students(members.came),
+        following=following,
+        apart=words,
+        stuck=members.at("stuck"),
         open_tab=open_tab,
-    )  # fmt: skip
+    )
 
 
 def _left(room: RoomView, now: float) -> str:

@@ -39,13 +39,23 @@ def _lit(*color: int) -> tuple[int, int, int]:
 
 # Colour of the pad, and symbol before the words.
 PADS: dict[State, tuple[int, int, int]] = {
-    "none": _lit(118, 142, 166), "not begun": _lit(118, 142, 166), "at it": _lit(86, 140, 190),
-    "stuck": _lit(213, 94, 0), "gave up": _lit(204, 121, 167), "solved": _lit(0, 158, 115),
+    "none": _lit(118, 142, 166),
+    "not begun": _lit(118, 142, 166),
+    "at it": _lit(86, 140, 190),
+    "stuck": _lit(213, 94, 0),
+    "gave up": _lit(204, 121, 167),
+    "solved": _lit(0, 158, 115),
     "away": _lit(150, 150, 150),
-}  # fmt: skip
+}
 SYMBOLS: dict[State, str] = {
-    "none": "", "not begun": "○ ", "at it": "✎ ", "stuck": "! ", "gave up": "⚑ ", "solved": "✓ ", "away": "… ",
-}  # fmt: skip
+    "none": "",
+    "not begun": "○ ",
+    "at it": "✎ ",
+    "stuck": "! ",
+    "gave up": "⚑ ",
+    "solved": "✓ ",
+    "away": "… ",
+}
 HAND, RAISED = "☝ ", _lit(240, 190, 0)  # before the name, and colour of the pad's column
 LINK, JOINT, AWAY = (86, 140, 190), (44, 62, 80), (165, 170, 175)
 MOST = 40  # arms on the wall
@@ -224,11 +234,15 @@ class Wall:
         tops = center + np.column_stack([middles[:, 0], low]) @ plane
         self._labels = [
             self._scene.add_label(
-                f"{root}/name/{i}", arm.label(layout.letters), font_size_mode="scene",
-                font_scene_height=layout.line, position=top, anchor="top-center",
+                f"{root}/name/{i}",
+                arm.label(layout.letters),
+                font_size_mode="scene",
+                font_scene_height=layout.line,
+                position=top,
+                anchor="top-center",
             )
             for i, (arm, top) in enumerate(zip(arms, tops, strict=True))
-        ]  # fmt: skip
+        ]
 
     def _pads(self, arms: Sequence[SmallArm]) -> tuple[Array, Array]:
         """Scales and positions ``(2 * count, 3)`` of the pads, and of the columns below the arms' bases."""
@@ -249,11 +263,17 @@ class Wall:
     def _add(self, name: str, positions: Array, scales: Array, index: int) -> viser.BatchedMeshHandle:
         vertices, faces = cylinder()
         node = self._scene.add_batched_meshes_simple(
-            name, vertices, faces, batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(positions), 1)),
-            batched_positions=positions, batched_scales=scales,
-            batched_colors=np.zeros((len(positions), 3), np.uint8), lod="off", cast_shadow=False,
+            name,
+            vertices,
+            faces,
+            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(positions), 1)),
+            batched_positions=positions,
+            batched_scales=scales,
+            batched_colors=np.zeros((len(positions), 3), np.uint8),
+            lod="off",
+            cast_shadow=False,
             receive_shadow=False,
-        )  # fmt: skip
+        )
         owners, seats = self._owners[index], [seat for seat, _ in self._arms or ()]
 
         @node.on_click

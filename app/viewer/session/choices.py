@@ -59,9 +59,13 @@ class ViewState(Settings):
         "Joint axes", True, hint="The axis of each joint of a skeleton; its arrow shows the positive turn"
     )
     dark: bool | None = choice(
-        "Page colours", SCHEMES, None, hint="Light or dark, or as the system is set", undo="Page colours",
+        "Page colours",
+        SCHEMES,
+        None,
+        hint="Light or dark, or as the system is set",
+        undo="Page colours",
         names="page colours",
-    )  # fmt: skip
+    )
     base_axes: bool = choice(
         "Arrows along", AXES, False, hint=AXES_HINT, undo="Arrows along", names="arrows along"
     )
@@ -72,9 +76,12 @@ class ViewState(Settings):
         "Rotations", {one.title: key for key, one in ANGLES.items()}, "rpy", hint=NOTATION_HINT, undo=NOTATION_UNDO
     )
     quaternions: str = choice(
-        "Quaternions", {one.title: key for key, one in QUATERNIONS.items()}, "wxyz", hint=NOTATION_HINT,
+        "Quaternions",
+        {one.title: key for key, one in QUATERNIONS.items()},
+        "wxyz",
+        hint=NOTATION_HINT,
         undo=NOTATION_UNDO,
-    )  # fmt: skip
+    )
 
     @property
     def rotations(self) -> Rotations:
@@ -88,9 +95,13 @@ class PageChoices(Settings):
 
     radians: bool = flag("Radians", hint="Angles in radians instead of degrees", undo="Unit of angles", link=False)
     lengths: Length = choice(
-        "Lengths", {unit: unit for unit in LENGTHS}, DEFAULT_UNITS.length, hint="Unit of all lengths",
-        undo="Unit of lengths", link=False,
-    )  # fmt: skip
+        "Lengths",
+        {unit: unit for unit in LENGTHS},
+        DEFAULT_UNITS.length,
+        hint="Unit of all lengths",
+        undo="Unit of lengths",
+        link=False,
+    )
     task: Task = choice("Target must match", TASKS, DEFAULT_TASK, hint=TASK_HINT, link=False)
     view: ViewState = part(ViewState)
 

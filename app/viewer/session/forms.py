@@ -46,8 +46,10 @@ class Forms:
     ) -> None:
         self._page, self._post = page, post
         self._nodes: dict[str, Sequence[Node]] = {
-            "view": _view(detailed), "target": _target(), "obstacles": [Control("view.avoid")],
-        }  # fmt: skip
+            "view": _view(detailed),
+            "target": _target(),
+            "obstacles": [Control("view.avoid")],
+        }
         self._views: dict[str, PanelView] = {}
         containers = {"view": panel.view, "target": panel.target, "obstacles": panel.avoid}
         for place, container in containers.items():

@@ -402,9 +402,16 @@ class VisitorPage(ShownArm, Worker):
             self.numbers = Numbers(self, self._pace)
             gui.main_panel.dock_right()
             self.panel = Panel(
-                gui, self.store.robots, self.own, robot, self.units, self.system_dark, self._welcome,
-                [tab.title for tab in self.offered], self.post,
-            )  # fmt: skip
+                gui,
+                self.store.robots,
+                self.own,
+                robot,
+                self.units,
+                self.system_dark,
+                self._welcome,
+                [tab.title for tab in self.offered],
+                self.post,
+            )
             self.panel.readout.use_rotations(self.view.rotations)
             self.panel.fit(gui.main_panel, self._persistence.embedded)
             self.panel.obstacles.expand_by_default = bool(saved.obstacles)

@@ -133,9 +133,15 @@ def with_arm(robot: Robot, q: Array | None, known: Iterable[Robot]) -> PageState
 def without_arm(state: PageState) -> PageState:
     """A state as far as it does not depend on the robot on show."""
     return PageState(
-        units=state.units, view=state.view, own=state.own, frames=state.frames, missing=state.missing,
-        unreadable=state.unreadable, ignored=state.ignored, refused=state.refused,
-    )  # fmt: skip
+        units=state.units,
+        view=state.view,
+        own=state.own,
+        frames=state.frames,
+        missing=state.missing,
+        unreadable=state.unreadable,
+        ignored=state.ignored,
+        refused=state.refused,
+    )
 
 
 class Written(NamedTuple):

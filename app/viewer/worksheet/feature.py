@@ -85,9 +85,15 @@ class Worksheets(Feature):
             return Sheet("The arm at a configuration", stage.now.robot, stage.now.goal, stage.units)
         found = type(lesson).outline(stage.now.robot, stage.units)
         return Sheet(
-            type(lesson).title, stage.now.robot, stage.now.goal, stage.units, found.goal, parts_of(found),
-            lesson.formulas(), lesson.left,
-        )  # fmt: skip
+            type(lesson).title,
+            stage.now.robot,
+            stage.now.goal,
+            stage.units,
+            found.goal,
+            parts_of(found),
+            lesson.formulas(),
+            lesson.left,
+        )
 
     def remove(self) -> None:
         update_html(self._page, "")

@@ -150,8 +150,12 @@ def test_code_is_text_and_python_plans_the_same_motion(client, capsys):
     exec(compile(text, "motion.py", "exec"), found)
     assert found["motion"].duration == pytest.approx(EXPECTED.duration, abs=1e-9)
     assert EXPECTED.reason in capsys.readouterr().out
-    problem = post(client, {"format": "urscript", "program": {"segments": [{"kind": "dwell", "seconds": 1}]}}, 422,
-                   "robots/scara/motion").json()  # fmt: skip
+    problem = post(
+        client,
+        {"format": "urscript", "program": {"segments": [{"kind": "dwell", "seconds": 1}]}},
+        422,
+        "robots/scara/motion",
+    ).json()
     assert problem["errors"][0]["field"] == "format"
 
 
@@ -334,11 +338,15 @@ def test_poses_in_the_frame_of_a_workpiece_are_those_of_the_world(client):
         "program": {
             "units": {"length": "mm"},
             "segments": [
-                {"kind": "ptp", "frame": "table", "position": (1e3 * there[:3, 3]).tolist(),
-                 "wxyz": kin.wxyz_from_rotation(there[:3, :3]).tolist()},
+                {
+                    "kind": "ptp",
+                    "frame": "table",
+                    "position": (1e3 * there[:3, 3]).tolist(),
+                    "wxyz": kin.wxyz_from_rotation(there[:3, :3]).tolist(),
+                },
             ],
         },
-    }  # fmt: skip
+    }
     found = client.post("/api/v1/robots/pioneer5/motion", json=body).json()
     assert found["planned"], found["reason"]
     assert found["samples"]["position"][-1] == pytest.approx((table @ there)[:3, 3].tolist(), abs=1e-8)

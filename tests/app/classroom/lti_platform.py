@@ -98,13 +98,23 @@ class Platform:
     ) -> str:
         now = int(time.time())
         claims = {
-            "iss": self.issuer, "aud": CLIENT, "sub": "user-7", "iat": now, "exp": now + 60, "nonce": nonce,
-            "given_name": "Ada", "email": "ada@school.example", "name": "Ada Lovelace",
-            CLAIM + "version": "1.3.0", CLAIM + "message_type": LEARN, CLAIM + "deployment_id": "1",
-            CLAIM + "resource_link": {"id": "link-1", "title": "Week 3"}, CLAIM + "roles": [f"{MEMBER}#Learner"],
+            "iss": self.issuer,
+            "aud": CLIENT,
+            "sub": "user-7",
+            "iat": now,
+            "exp": now + 60,
+            "nonce": nonce,
+            "given_name": "Ada",
+            "email": "ada@school.example",
+            "name": "Ada Lovelace",
+            CLAIM + "version": "1.3.0",
+            CLAIM + "message_type": LEARN,
+            CLAIM + "deployment_id": "1",
+            CLAIM + "resource_link": {"id": "link-1", "title": "Week 3"},
+            CLAIM + "roles": [f"{MEMBER}#Learner"],
             CLAIM + "custom": {"exercise": "two-elbows"},
             GRADES: {"scope": [SCORE_SCOPE], "lineitem": f"{self.issuer}/columns/5?type=x"},
-        } | changes  # fmt: skip
+        } | changes
         given = {k: v for k, v in claims.items() if v is not None}
         payload = json.dumps(given).encode()  # `jwt.encode` refuses what is odd
         return jwt.PyJWS().encode(payload, key or self.key, "RS256", {"kid": key_id})

@@ -29,9 +29,12 @@ def cookies_of(tmp_path, platform: Platform, peer: str, framed: bool) -> tuple[l
     application = create_app(settings if framed else settings.model_copy(update={"frame_ancestors": []}), STORE)
     proxied = ProxyHeadersMiddleware(application, trusted_hosts=[PROXY])
     browser = TestClient(
-        proxied, base_url="http://kinboard.example", follow_redirects=False, client=(peer, 5),
+        proxied,
+        base_url="http://kinboard.example",
+        follow_redirects=False,
+        client=(peer, 5),
         headers={"x-forwarded-proto": "https", "x-forwarded-for": "192.0.2.7"},
-    )  # fmt: skip
+    )
     opened = browser.post("/room", data={"hours": "2"})
     begun = browser.get("/lti/login", params={"iss": platform.issuer, "client_id": CLIENT, "login_hint": "7"})
     application.state.classroom.close()

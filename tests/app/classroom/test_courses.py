@@ -73,7 +73,7 @@ def test_the_built_in_courses_are_valid() -> None:
         (('lesson = "dh"\n', ""), r"item\[0\]\.lesson: got None, expected either lesson"),
         (('robot = "scara"', 'robot = "scarab"'), r"item\[0\]\.robot: got 'scarab', expected the id of a robot"),
         (('title = "Both', 'titel = "Both'), r"item\[1\]\.titel: .* no such field; valid are"),
-        (('robot = "scara"', 'q = 1'), r"item\[0\]\.q: got 1, expected no such field"),
+        (('robot = "scara"', "q = 1"), r"item\[0\]\.q: got 1, expected no such field"),
         (("answers = false", 'answers = "no"'), "answers: got 'no', expected true or false"),
         (('title = "Week 1"', 'title = ""'), "title: got '', expected a text of 1 to"),
         (('title = "Week 1"', f'title = "{"x" * 81}"'), "title: .* a text of 1 to 80 characters"),
@@ -81,7 +81,7 @@ def test_the_built_in_courses_are_valid() -> None:
         (("[[item]]", "[[items]]"), "items: .* no such field; valid are title, about, answers, own, item"),
         (("[[item]]", "[[item]"), "file: .* expected valid TOML"),
     ],
-)  # fmt: skip
+)
 def test_a_wrong_file_is_refused_by_field_value_and_what_is_valid(change: tuple[str, str], message: str) -> None:
     with pytest.raises(ExerciseFileError, match=message):
         parse_course(FILE.replace(*change), ALL, "week1.toml")

@@ -28,9 +28,15 @@ from app.shared.store import Store
 STORE = Store()
 NEWER = "written by a newer version of Kinboard"
 PAGES = [
-    ("GET", "/room"), ("GET", "/room/results"), ("GET", "/room/results.csv"), ("GET", "/room/qr.svg"),
-    ("GET", "/room/teach/{}"), ("POST", "/room"), ("POST", "/room/join"), ("POST", "/room/end"),
-]  # fmt: skip
+    ("GET", "/room"),
+    ("GET", "/room/results"),
+    ("GET", "/room/results.csv"),
+    ("GET", "/room/qr.svg"),
+    ("GET", "/room/teach/{}"),
+    ("POST", "/room"),
+    ("POST", "/room/join"),
+    ("POST", "/room/end"),
+]
 FORM = {"hours": "2", "code": "ACDEFGHJ", "alias": "Ada"}
 
 

@@ -35,12 +35,19 @@ def attempt(seat: int, exercise: str, score: float, at: float, verdict: str = ""
 
 def test_first_answers_give_the_gains_of_items_students_and_class() -> None:
     attempts = [
-        attempt(1, "two-elbows", 0.2, 1), attempt(1, "two-elbows", 1.0, 2), attempt(1, "swing", 0.0, 3),
-        attempt(2, "two-elbows", 1.0, 4), attempt(2, "swing", 0.5, 5), attempt(3, "swing", 0.25, 6),
-        attempt(1, "other-wrist", 0.6, 7), attempt(1, "other-wrist", 1.0, 8), attempt(1, "row-distance", 1.0, 9),
-        attempt(2, "other-wrist", 0.5, 10), attempt(2, "row-distance", 0.0, 11, ANSWER_SHOWN),
+        attempt(1, "two-elbows", 0.2, 1),
+        attempt(1, "two-elbows", 1.0, 2),
+        attempt(1, "swing", 0.0, 3),
+        attempt(2, "two-elbows", 1.0, 4),
+        attempt(2, "swing", 0.5, 5),
+        attempt(3, "swing", 0.25, 6),
+        attempt(1, "other-wrist", 0.6, 7),
+        attempt(1, "other-wrist", 1.0, 8),
+        attempt(1, "row-distance", 1.0, 9),
+        attempt(2, "other-wrist", 0.5, 10),
+        attempt(2, "row-distance", 0.0, 11, ANSWER_SHOWN),
         attempt(2, "row-distance", 1.0, 12),
-    ]  # fmt: skip
+    ]
     group, one, two, three = gains(MEMBERS, attempts, PAIRS)
     assert [row.member for row in (group, one, two, three)] == [None, *MEMBERS[:3]], "nobody without an answer"
 

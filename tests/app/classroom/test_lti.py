@@ -259,8 +259,10 @@ def test_a_course_opens_in_the_room_and_its_score_is_the_share_that_is_solved(
         assert path == "/columns/5/scores?type=x"
         expected.append(solved)
         assert (sent["userId"], sent["scoreGiven"], sent["scoreMaximum"]) == (
-            "user-11", solved, len(course.exercises),
-        )  # fmt: skip
+            "user-11",
+            solved,
+            len(course.exercises),
+        )
         done = solved == len(course.exercises)
         assert sent["activityProgress"] == ("Completed" if done else "InProgress")
         assert sent["gradingProgress"] == "FullyGraded"
@@ -333,8 +335,10 @@ def test_deep_linking(browser: TestClient, platform: Platform) -> None:
     assert claims[base + "data"] == "opaque"
     items = claims[base + "content_items"]
     assert [item["custom"] for item in items] == [
-        {"exercise": "two-elbows"}, {"course": "first-steps"}, {"exercise": "swing"},
-    ]  # fmt: skip
+        {"exercise": "two-elbows"},
+        {"course": "first-steps"},
+        {"exercise": "swing"},
+    ]
     columns = [(item["lineItem"]["scoreMaximum"], item["lineItem"]["resourceId"]) for item in items]
     assert columns == [(1, "two-elbows"), (len(course.exercises), "course:first-steps"), (1, "swing")]
     assert items[0]["url"] == f"{TOOL}/lti/launch"
@@ -356,9 +360,11 @@ def test_deep_linking(browser: TestClient, platform: Platform) -> None:
 )
 def test_a_wrong_file_is_refused_in_words(tmp_path, line: str, words: str) -> None:
     rows = {
-        "issuer": '"https://a.example"', "client_id": '"c"', "deployments": '["1"]',
+        "issuer": '"https://a.example"',
+        "client_id": '"c"',
+        "deployments": '["1"]',
         **dict.fromkeys(("login_url", "token_url", "keys_url"), '"https://a.example/x"'),
-    }  # fmt: skip
+    }
     name, _, value = line.partition(" = ")
     file = tmp_path / "platforms.toml"
     file.write_text("[[platform]]\n" + "\n".join(f"{k} = {v}" for k, v in {**rows, name: value}.items()))

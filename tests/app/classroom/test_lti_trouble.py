@@ -344,10 +344,29 @@ def test_a_score_waits_for_the_database(tmp_path, monkeypatch) -> None:
 # -- addresses that a platform names ---------------------------------------------------------------------------
 
 PRIVATE = [
-    "127.0.0.1", "127.9.9.9", "10.0.0.5", "172.16.3.4", "192.168.1.1", "169.254.169.254", "0.0.0.0", "100.64.0.1",
-    "224.0.0.1", "255.255.255.255", "::1", "::", "fe80::1", "fe80::1%eth0", "fd00::7", "ff02::1",
-    "::ffff:10.0.0.5", "::ffff:127.0.0.1", "64:ff9b::7f00:1", "64:ff9b::a9fe:1", "2002:7f00:1::", "2002:a00:5::1",
-]  # fmt: skip
+    "127.0.0.1",
+    "127.9.9.9",
+    "10.0.0.5",
+    "172.16.3.4",
+    "192.168.1.1",
+    "169.254.169.254",
+    "0.0.0.0",
+    "100.64.0.1",
+    "224.0.0.1",
+    "255.255.255.255",
+    "::1",
+    "::",
+    "fe80::1",
+    "fe80::1%eth0",
+    "fd00::7",
+    "ff02::1",
+    "::ffff:10.0.0.5",
+    "::ffff:127.0.0.1",
+    "64:ff9b::7f00:1",
+    "64:ff9b::a9fe:1",
+    "2002:7f00:1::",
+    "2002:a00:5::1",
+]
 
 
 @pytest.mark.parametrize("address", PRIVATE)
@@ -452,14 +471,33 @@ def test_tls_checks_the_name_although_the_connection_goes_to_an_address() -> Non
 @pytest.mark.parametrize(
     "address",
     [
-        "https://lms.example; script-src *", "https://lms.example;script-src=*/", "https://lms.example,https://evil",
-        "https://lms.example\r\nset-cookie: a=b", "https://lms.example\t/", "https://user@lms.example/",
-        "https://lms.example\\@evil.example/", "https://schüler.example/", "https://lms.example:99999/",
-        "https://lms.example:x/", "https:///x", "https://*/", "https://*.example/", "https://'self'/",
-        "https://a b/", "https://\ud800/", "javascript:alert(1)", "http://lms.example/", "//lms.example/", "", "https://[::1/x",
-        "https://lms.example/'\"><script>", "data:text/html,x", "ftp://lms.example/", "https://lms.example/\x7f",
+        "https://lms.example; script-src *",
+        "https://lms.example;script-src=*/",
+        "https://lms.example,https://evil",
+        "https://lms.example\r\nset-cookie: a=b",
+        "https://lms.example\t/",
+        "https://user@lms.example/",
+        "https://lms.example\\@evil.example/",
+        "https://schüler.example/",
+        "https://lms.example:99999/",
+        "https://lms.example:x/",
+        "https:///x",
+        "https://*/",
+        "https://*.example/",
+        "https://'self'/",
+        "https://a b/",
+        "https://\ud800/",
+        "javascript:alert(1)",
+        "http://lms.example/",
+        "//lms.example/",
+        "",
+        "https://[::1/x",
+        "https://lms.example/'\"><script>",
+        "data:text/html,x",
+        "ftp://lms.example/",
+        "https://lms.example/\x7f",
     ],
-)  # fmt: skip
+)
 def test_no_odd_address_is_safe_or_reaches_a_policy(browser, platform, address) -> None:
     assert not is_safe(address)
     claims = {CLAIM + "message_type": LINK, LINKING: {"deep_link_return_url": address}}
@@ -488,9 +526,11 @@ def test_the_origin_of_an_address(address, origin) -> None:
 # -- signed, but odd -------------------------------------------------------------------------------------------
 
 TABLES = {
-    CLAIM + "resource_link": ("id", "title"), CLAIM + "custom": ("exercise", "course"),
-    GRADES: ("scope", "lineitem"), LINKING: ("deep_link_return_url", "accept_multiple", "data"),
-}  # fmt: skip
+    CLAIM + "resource_link": ("id", "title"),
+    CLAIM + "custom": ("exercise", "course"),
+    GRADES: ("scope", "lineitem"),
+    LINKING: ("deep_link_return_url", "accept_multiple", "data"),
+}
 PATHS = [
     *(
         (name,)
@@ -530,9 +570,10 @@ def test_no_signed_message_is_an_error_of_ours(browser, platform, changes, link)
     claims = {CLAIM + "message_type": LINK, LINKING: {"deep_link_return_url": "https://lms.example/back"}}
     claims = claims if link else {LINKING: {}}
     claims |= {
-        CLAIM + "resource_link": {"id": "link-1"}, CLAIM + "custom": {},
+        CLAIM + "resource_link": {"id": "link-1"},
+        CLAIM + "custom": {},
         GRADES: {"scope": [SCORE_SCOPE], "lineitem": "https://lms.example/columns/5"},
-    }  # fmt: skip
+    }
     for path, value in changes.items():
         table = claims if len(path) == 1 else claims[path[0]]
         if isinstance(table, dict):
@@ -579,11 +620,23 @@ def test_a_name_that_shows_nothing_or_is_too_long_keeps_nobody_out(browser, plat
 
 
 HEADERS = [
-    b"[" * 30_000, b'{"alg":"RS256","kid":' + b"[" * 20_000, b'{"alg":"RS256","kid":5}', b'{"alg":"RS256"}',
-    b'{"alg":"RS256","kid":"\\ud800"}', b'{"alg":"RS256","kid":' + b"9" * 10_000 + b"}", b"[]", b"5", b'"x"', b"",
-    b'{"alg":null,"kid":"p1"}', b'{"alg":["RS256"],"kid":"p1"}', b'{"alg":"RS256","kid":"p1","crit":["x"]}',
-    b'{"alg":"RS256","kid":"p1","crit":5}', b'{"alg":"RS256","kid":"p1","b64":false}', b"\xff\xfe",
-]  # fmt: skip
+    b"[" * 30_000,
+    b'{"alg":"RS256","kid":' + b"[" * 20_000,
+    b'{"alg":"RS256","kid":5}',
+    b'{"alg":"RS256"}',
+    b'{"alg":"RS256","kid":"\\ud800"}',
+    b'{"alg":"RS256","kid":' + b"9" * 10_000 + b"}",
+    b"[]",
+    b"5",
+    b'"x"',
+    b"",
+    b'{"alg":null,"kid":"p1"}',
+    b'{"alg":["RS256"],"kid":"p1"}',
+    b'{"alg":"RS256","kid":"p1","crit":["x"]}',
+    b'{"alg":"RS256","kid":"p1","crit":5}',
+    b'{"alg":"RS256","kid":"p1","b64":false}',
+    b"\xff\xfe",
+]
 
 
 @pytest.mark.parametrize("header", HEADERS, ids=range(len(HEADERS)))

@@ -66,19 +66,44 @@ def fill(connection: Connection, now: float) -> None:
     tables = MetaData()
     tables.reflect(connection)
     room = {
-        "id": "room1", "code": "KVNWZTRB", "title": "Kinematics – übung", "created": now - 600, "ends": now + 3000,
-        "version": 7, "state": {"follow": True, "task": {"exercise": "two-elbows", "at": now - 60}}, "page": "arm",
+        "id": "room1",
+        "code": "KVNWZTRB",
+        "title": "Kinematics – übung",
+        "created": now - 600,
+        "ends": now + 3000,
+        "version": 7,
+        "state": {"follow": True, "task": {"exercise": "two-elbows", "at": now - 60}},
+        "page": "arm",
         "beat": 5,
-    }  # fmt: skip
+    }
     seat = {
-        "id": "seat1", "room_id": "room1", "alias": "Ada", "joined": now - 500, "hand": now - 5,
-        "task": "two-elbows", "tries": 2, "solved": False, "voted": "", "vote": 0, "page": "mine", "beat": 4,
-        "version": 6, "removed": False,
-    }  # fmt: skip
+        "id": "seat1",
+        "room_id": "room1",
+        "alias": "Ada",
+        "joined": now - 500,
+        "hand": now - 5,
+        "task": "two-elbows",
+        "tries": 2,
+        "solved": False,
+        "voted": "",
+        "vote": 0,
+        "page": "mine",
+        "beat": 4,
+        "version": 6,
+        "removed": False,
+    }
     answer = {
-        "id": "attempt1", "room_id": "room1", "seat_id": "seat1", "exercise": "two-elbows", "seed": 2**48 + 1,
-        "answer": ["30", {"θ": 0.5}], "verdict": "Half of it.", "score": 0.5, "started": now - 60, "at": now - 30,
-    }  # fmt: skip
+        "id": "attempt1",
+        "room_id": "room1",
+        "seat_id": "seat1",
+        "exercise": "two-elbows",
+        "seed": 2**48 + 1,
+        "answer": ["30", {"θ": 0.5}],
+        "verdict": "Half of it.",
+        "score": 0.5,
+        "started": now - 60,
+        "at": now - 30,
+    }
     connection.execute(insert(tables.tables["setting"]), {"name": "key", "value": "ab" * 32})
     connection.execute(insert(tables.tables["room"]), room)
     connection.execute(insert(tables.tables["seat"]), [seat, seat | {"id": "seat2", "alias": "", "removed": True}])

@@ -96,9 +96,12 @@ def test_a_drag_reaches_thirty_students_of_other_processes_in_time(tmp_path, pro
 def status(port: int, path: str, cookies: dict[str, str]) -> tuple[int, str]:
     """Over a new connection, so that either process may answer."""
     answer = httpx2.get(
-        f"http://127.0.0.1:{port}{path}", headers={"cookie": "; ".join(f"{k}={v}" for k, v in cookies.items())},
-        trust_env=False, verify=False, timeout=20,
-    )  # fmt: skip
+        f"http://127.0.0.1:{port}{path}",
+        headers={"cookie": "; ".join(f"{k}={v}" for k, v in cookies.items())},
+        trust_env=False,
+        verify=False,
+        timeout=20,
+    )
     return answer.status_code, answer.text
 
 
@@ -120,9 +123,12 @@ def test_sixty_join_in_five_seconds_and_stay_when_processes_are_killed(tmp_path)
                     time.sleep(5.0 * k / 60)
                     begin = time.monotonic()
                     answer = httpx2.post(
-                        f"{url}/room/join", data={"code": code, "alias": f"Student {k}"},
-                        trust_env=False, verify=False, timeout=20,
-                    )  # fmt: skip
+                        f"{url}/room/join",
+                        data={"code": code, "alias": f"Student {k}"},
+                        trust_env=False,
+                        verify=False,
+                        timeout=20,
+                    )
                     assert answer.status_code == 303
                     return time.monotonic() - begin, dict(answer.cookies)
 

@@ -136,9 +136,15 @@ def test_who_needs_the_teacher_comes_first_and_everybody_has_a_row() -> None:
     members = [Member(name, name.title(), i) for i, name in enumerate(names)]
     table = rows([*members, Member("ghost", "Ghost", 9, came=False)], attempts, task="a", now=300.0)
     assert [(row.member.seat, row.exercise, row.state) for row in table] == [
-        ("lost", "a", "stuck"), ("shown", "a", "gave up"), ("idle", "a", "not begun"), ("late", "b", "at it"),
-        ("busy", "a", "at it"), ("late", "a", "solved"), ("fast", "a", "solved"), ("ghost", "a", "has not come"),
-    ]  # fmt: skip
+        ("lost", "a", "stuck"),
+        ("shown", "a", "gave up"),
+        ("idle", "a", "not begun"),
+        ("late", "b", "at it"),
+        ("busy", "a", "at it"),
+        ("late", "a", "solved"),
+        ("fast", "a", "solved"),
+        ("ghost", "a", "has not come"),
+    ]
     assert [row.work.tries for row in table] == [3, 0, 0, 1, 1, 2, 1, 0]
     assert (table[0].seconds, table[-2].seconds, table[2].seconds) == (300.0, 10.0, 0.0)
     assert [(row.work.score, row.work.answer) for row in table[3:5]] == [(0.0, 3), (0.5, 1)]
@@ -167,8 +173,11 @@ def test_the_file_tells_students_apart_and_has_the_state_of_the_list() -> None:
     numbered = [replace(one, alias="Bob", number=1 + (one.seat == "b")) for one in given]
     found = list(csv.DictReader(io.StringIO("".join(csv_of([numbered[:2], numbered[2:]], {})))))
     assert [(row["seat"], row["attempt"], row["state"]) for row in found] == [
-        ("1", "1", "at it"), ("2", "1", "at it"), ("2", "", "gave up"), ("1", "2", "solved"),
-    ]  # fmt: skip
+        ("1", "1", "at it"),
+        ("2", "1", "at it"),
+        ("2", "", "gave up"),
+        ("1", "2", "solved"),
+    ]
 
 
 def test_each_attempt_is_a_row_and_each_page_a_text() -> None:
@@ -180,10 +189,14 @@ def test_each_attempt_is_a_row_and_each_page_a_text() -> None:
     assert [text.count("\r\n") for text in texts] == [1, 2, 1]
     found = list(csv.DictReader(io.StringIO("".join(texts))))
     assert [(row["alias"], row["attempt"], row["score"]) for row in found] == [
-        ("alias of a", "1", "0.00"), ("alias of b", "1", "0.25"), ("alias of b", "2", "1.00"),
-    ]  # fmt: skip
+        ("alias of a", "1", "0.00"),
+        ("alias of b", "1", "0.25"),
+        ("alias of b", "2", "1.00"),
+    ]
     assert found[1]["answer"] == '["1 mm","2"]'
     assert (found[1]["started"], found[1]["answered"], found[1]["seconds"]) == (
-        "1970-01-01T00:00:05Z", "1970-01-01T00:00:20Z", "15",
-    )  # fmt: skip
+        "1970-01-01T00:00:05Z",
+        "1970-01-01T00:00:20Z",
+        "15",
+    )
     assert found[0]["title"] == "An exercise"

@@ -127,11 +127,18 @@ def download(school: Class, body: Callable[[bytes], None]) -> bool:
 
     token = school.rooms.tokens.sign(Ticket(school.room.id))
     scope = {
-        "type": "http", "http_version": "1.1", "method": "GET", "scheme": "http", "path": "/room/results.csv",
-        "raw_path": b"/room/results.csv", "query_string": b"", "root_path": "", "client": ("127.0.0.1", 1),
+        "type": "http",
+        "http_version": "1.1",
+        "method": "GET",
+        "scheme": "http",
+        "path": "/room/results.csv",
+        "raw_path": b"/room/results.csv",
+        "query_string": b"",
+        "root_path": "",
+        "client": ("127.0.0.1", 1),
         "server": ("school.example", 80),
         "headers": [(b"host", b"school.example"), (b"cookie", f"{COOKIE}={token}".encode())],
-    }  # fmt: skip
+    }
     asyncio.run(school.app(scope, receive, send))
     return ended
 
@@ -141,11 +148,19 @@ def answer_much(school: Class, each: int) -> None:
     seats = [school.rooms.join(school.room.code, f"Student {i}").seat for i in range(30)]
     attempts = [
         {
-            "id": f"{i}", "room_id": school.room.id, "seat_id": seats[i % 30], "exercise": "two-elbows", "seed": i,
-            "answer": ["9" * 2000], "verdict": "Too large.", "score": 0.5, "started": 0.0, "at": float(i // 7),
+            "id": f"{i}",
+            "room_id": school.room.id,
+            "seat_id": seats[i % 30],
+            "exercise": "two-elbows",
+            "seed": i,
+            "answer": ["9" * 2000],
+            "verdict": "Too large.",
+            "score": 0.5,
+            "started": 0.0,
+            "at": float(i // 7),
         }
         for i in range(30 * each)
-    ]  # fmt: skip
+    ]
     with school.app.state.classroom.database.write(durable=False) as connection:
         connection.execute(insert(tables.Attempt), attempts)
 

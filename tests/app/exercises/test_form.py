@@ -128,7 +128,7 @@ method = "Add them up."
         ("answer.value", "__import__('os')", "answer.value[0]", "an expression"),
         ("answer.tolerance", "-1", "answer.tolerance", "above 0"),
     ],
-)  # fmt: skip
+)
 def test_a_refusal_names_field_value_and_what_is_valid(path: str, text: str, field: str, words: str) -> None:
     found = trial(with_cell(REACH, path, text))
     assert found.exercise is None

@@ -40,9 +40,10 @@ def judged(one: tuple[Exercise, Variant], given: Any, units: Units = UNITS) -> V
 
 ANGLE = made("planar2r", "number", '[answer]\nvalue = "30*deg"\nunit = "deg"\ntolerance = 1\nmethod = "Add."')
 POINT = made(
-    "planar2r", "number",
+    "planar2r",
+    "number",
     '[answer]\nvalue = [0.2, -0.1, 0.3]\nlabels = ["x", "y", "z"]\nunit = "mm"\ntolerance = 1\nmethod = "Add."',
-)  # fmt: skip
+)
 
 
 def test_numbers_are_read_in_the_readers_units() -> None:
@@ -195,10 +196,11 @@ def test_units_of_a_table_are_recognised() -> None:
 # Reach
 
 REACH = made(
-    "puma560", "reach",
+    "puma560",
+    "reach",
     '[target]\nq = ["0.3", "0.9", "-2.0", "0", "0.8", "0"]\n'
     '[answer]\ntask = "pose"\nbranch = "elbow up, wrist no-flip"\nmargin = 2',
-)  # fmt: skip
+)
 
 
 def test_a_posture_is_judged_by_all_conditions() -> None:
@@ -327,10 +329,11 @@ def test_a_wrong_singularity_is_given_its_distance() -> None:
 # Frames and orders
 
 FRAME = made(
-    "planar2r", "frame",
+    "planar2r",
+    "frame",
     '[answer]\nmotions = [{ slide = "x", by = "0.5" }, { turn = "z", by = "60*deg" }, '
     '{ turn = "x", by = "90*deg" }]',
-)  # fmt: skip
+)
 
 
 def pose_numbers(T: np.ndarray) -> list[float]:
@@ -374,10 +377,11 @@ def test_the_frame_of_a_row_knows_negated_joints() -> None:
 
 
 ORDER = made(
-    "planar2r", "order",
+    "planar2r",
+    "order",
     '[answer]\nmotions = [{ turn = "z", by = "0.4" }, { slide = "z", by = "0.2" }, '
     '{ slide = "x", by = "0.3" }, { turn = "x", by = "1.0" }]',
-)  # fmt: skip
+)
 
 
 def test_orders_with_the_same_product_are_right() -> None:

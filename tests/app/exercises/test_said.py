@@ -27,11 +27,19 @@ def test_right_answers_of_all_exercises_have_words(exercise) -> None:
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
-        ("2", None), ("99", "99"), ("true", "True"), ('"\\ud800"', "?"), ('["3', '["3'), ("", ""),
-        ('{"a": 1}', "{'a': 1}"), ("[[1.23456, 2], 3]", "1.235, 2"), ("9" * 400, None), ("-1", "-1"),
+        ("2", None),
+        ("99", "99"),
+        ("true", "True"),
+        ('"\\ud800"', "?"),
+        ('["3', '["3'),
+        ("", ""),
+        ('{"a": 1}', "{'a': 1}"),
+        ("[[1.23456, 2], 3]", "1.235, 2"),
+        ("9" * 400, None),
+        ("-1", "-1"),
         ("null", "None"),
     ],
-)  # fmt: skip
+)
 def test_anything_that_is_stored_has_words(answer: str, words: str | None) -> None:
     for exercise in ALL.all:
         found = answer_in_words(exercise, 3, answer)

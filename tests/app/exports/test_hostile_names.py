@@ -45,7 +45,7 @@ HOSTILE = (
     "'; import os; os.system('id') #",
     '"); DROP TABLE rooms; --',
     "\n!rm -rf ~\nx = 1",
-    "=HYPERLINK(\"http://x\",A1)",
+    '=HYPERLINK("http://x",A1)',
     "@SUM(1+1)*cmd|' /C calc'!A0",
     "a;=1+1",
     "+1\t-2",
@@ -53,7 +53,7 @@ HOSTILE = (
     "line\u2028paragraph\u2029order\u202eback",
     "omicron ο, alpha with tonos ά, 中文, 😀, ẋ, ⁿ",
     "{{ 7*7 }} {% raw %} ${7*7} {x}",
-)  # fmt: skip
+)
 SHEET_COMMANDS = re.compile(r"\\(input|include|write|openout|read|catcode|csname|def|let|end\{document\})|\^\^")
 
 
@@ -65,11 +65,16 @@ def arm(name: str, row: str = "") -> Robot:
     ]
     return kin.robot_from_dict(
         {
-            "id": "hostile", "name": name, "source": name, "description": name, "convention": "standard",
-            "units": {"length": "m", "angle": "deg"}, "rows": rows,
+            "id": "hostile",
+            "name": name,
+            "source": name,
+            "description": name,
+            "convention": "standard",
+            "units": {"length": "m", "angle": "deg"},
+            "rows": rows,
         },
         "the request",
-    )  # fmt: skip
+    )
 
 
 def sheet(robot: Robot) -> Sheet:

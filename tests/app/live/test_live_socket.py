@@ -157,8 +157,10 @@ def test_the_newest_value_wins_and_drawings_are_merged(page, port):
         page.take()
         assert page.taken["q"].tolist() == pytest.approx([0.19] * 6)
         assert {name: each["position"][2] for name, each in page.taken["draw"].items()} == {
-            "point 0": 18, "point 1": 19, "point 2": 17
-        }  # fmt: skip
+            "point 0": 18,
+            "point 1": 19,
+            "point 2": 17,
+        }
 
 
 @pytest.mark.parametrize(

@@ -89,8 +89,12 @@ def victim(
     code = f"{limit}import sys; from app.cli.parser import main; sys.exit(main(['serve']))"
     with subprocess.Popen(
         [*before, sys.executable, "-c", code],
-        cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
+        cwd=ROOT,
+        env=env,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
         errors: list[str] = []
         reading = threading.Thread(target=lambda: errors.extend(process.stderr or ()), daemon=True)
         reading.start()

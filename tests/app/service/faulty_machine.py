@@ -324,11 +324,16 @@ def running_machine(base: Path, kernels: bool = False) -> Iterator[Machine]:
     if not mounted:
         shutil.copytree(seeds, folders, dirs_exist_ok=True)
     environment = {
-        "PYTHONPATH": os.pathsep.join((str(base / "code"), str(ROOT))), "FAULTY_CLOCK": str(clock),
-        "FAULTY_FOLDERS": str(folders), "FAULTY_SEEDS": str(seeds), "FAULTY_SIZE": str(size),
-        "TMPDIR": str(folders / "temp" / "in"), "KINBOARD_DATA": str(folders / "data" / "in"),
-        "KINBOARD_BENCH": "1", "KINBOARD_WORKER_TIMEOUT": str(SILENCE),
-    } | {f"KINBOARD_{name.upper()}": str(folders / name / "in") for name in SEEDS}  # fmt: skip
+        "PYTHONPATH": os.pathsep.join((str(base / "code"), str(ROOT))),
+        "FAULTY_CLOCK": str(clock),
+        "FAULTY_FOLDERS": str(folders),
+        "FAULTY_SEEDS": str(seeds),
+        "FAULTY_SIZE": str(size),
+        "TMPDIR": str(folders / "temp" / "in"),
+        "KINBOARD_DATA": str(folders / "data" / "in"),
+        "KINBOARD_BENCH": "1",
+        "KINBOARD_WORKER_TIMEOUT": str(SILENCE),
+    } | {f"KINBOARD_{name.upper()}": str(folders / name / "in") for name in SEEDS}
     if kernels:
         environment["NUMBA_CACHE_DIR"] = str(folders / "cache" / "in")
     before = (*APART, "sh", "-c", MOUNT, "sh") if mounted else ()

@@ -36,9 +36,12 @@ from app.shared.settings import Settings
 @pytest.fixture(scope="module")
 def service() -> Iterator[Victim]:
     with victim(
-        ready=True, KINBOARD_RECEIVE_TIMEOUT="1", KINBOARD_SEND_TIMEOUT="2",
-        KINBOARD_MAX_CONNECTIONS="20", KINBOARD_MAX_VISITORS="4",
-    ) as service:  # fmt: skip
+        ready=True,
+        KINBOARD_RECEIVE_TIMEOUT="1",
+        KINBOARD_SEND_TIMEOUT="2",
+        KINBOARD_MAX_CONNECTIONS="20",
+        KINBOARD_MAX_VISITORS="4",
+    ) as service:
         yield service
         assert "Traceback" not in service.log
 
@@ -175,7 +178,7 @@ def test_requests_sent_ahead_take_no_memory(service):
         (b"GET / HTTP/1.1\r\nHost: \x00\r\n\r\n", 400, "bad-request"),
     ],
     ids=["head", "body", "many fields", "long field", "long address", "no method", "bad field"],
-)  # fmt: skip
+)
 def test_what_is_no_request_is_refused_in_time(service, sent, status, kind):
     with service.connection() as connection:
         try:

@@ -34,7 +34,7 @@ from faulty_machine import (
     misbehave,
     running_machine,
     strain,
-)  # fmt: skip
+)
 from live_server import wait_for
 
 from app.service.handover import SUPPORTED, Role
@@ -121,16 +121,24 @@ SIGNALS = ("SIGTERM", "SIGKILL", "SIGINT", "SIGHUP", "SIGSEGV", "SIGSTOP")
 SAMPLED = {("rest", "SIGTERM"), ("viewer", "SIGKILL"), ("temp", "full"), ("temp", "gone"), ("exercises", "gone")}
 PROCESSES = [
     Fault(
-        role, name, send(role, signal.Signals[name]), (role, name) in SAMPLED,
-        late=SILENCE if name == "SIGSTOP" else 0.0, lost=1,
+        role,
+        name,
+        send(role, signal.Signals[name]),
+        (role, name) in SAMPLED,
+        late=SILENCE if name == "SIGSTOP" else 0.0,
+        lost=1,
     )
     for role in ("viewer", "rest")
     for name in SIGNALS
-]  # fmt: skip
+]
 
 FOLDERS = [
     Fault(
-        name, how, and_replace_all(act), (name, how) in SAMPLED, lost=2,
+        name,
+        how,
+        and_replace_all(act),
+        (name, how) in SAMPLED,
+        lost=2,
         work=COMPILING if name == "cache" and how in ("damaged", "gone") else 0.0,
     )
     for name in ("temp", "shm", "data", "cache", *SEEDS)
@@ -141,7 +149,7 @@ FOLDERS = [
         ("gone", lambda on, name=name: on.remove(name)),
     )
     if how != "damaged" or name == "cache"  # damaged databases and robot files have tests of their own
-]  # fmt: skip
+]
 
 CLOCKS = [
     Fault("clock", how, lambda on, _, seconds=seconds: on.set_clock(seconds))

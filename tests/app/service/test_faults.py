@@ -48,8 +48,12 @@ def service(ready: bool = True, **environment: str) -> Iterator[tuple[subprocess
     env = os.environ | {"PYTHONPATH": str(ROOT), "KINBOARD_PORT": "0"} | environment
     with subprocess.Popen(
         [sys.executable, "-m", "app.cli", "serve"],
-        cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
+        cwd=ROOT,
+        env=env,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
         try:
             assert process.stdout is not None
             found = re.search(r":(\d+)/", process.stdout.readline())
@@ -358,9 +362,13 @@ def twice(folder: Path, before: str = "", kernel: str = KERNEL) -> dict[str, obj
     (folder / "kernel.py").write_text(kernel)
     env = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
     done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True, timeout=120,
+        [sys.executable, "-c", textwrap.dedent(code)],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
         env=env | {"PYTHONPATH": f"{ROOT}{os.pathsep}{folder}"},
-    )  # fmt: skip
+    )
     answer: dict[str, object] = json.loads(done.stdout)
     return answer
 

@@ -82,12 +82,21 @@ def one_answer(connection: socket.socket) -> tuple[int, bytes]:
 @pytest.mark.parametrize(
     ("path", "viewer", "rest"),
     [
-        ("/viewer", True, False), ("/viewer/", True, False), ("/viewer/x", True, False), ("/viewers", False, True),
-        ("/", True, True), ("/static/viewer.js", True, True), ("/favicon.ico", True, True),
-        ("/api/v1/robots", False, True), ("/livez", False, True), ("/docs", False, True),
-        ("/login", False, True), ("", False, True), ("/api/v1/viewer", False, True),
+        ("/viewer", True, False),
+        ("/viewer/", True, False),
+        ("/viewer/x", True, False),
+        ("/viewers", False, True),
+        ("/", True, True),
+        ("/static/viewer.js", True, True),
+        ("/favicon.ico", True, True),
+        ("/api/v1/robots", False, True),
+        ("/livez", False, True),
+        ("/docs", False, True),
+        ("/login", False, True),
+        ("", False, True),
+        ("/api/v1/viewer", False, True),
     ],
-)  # fmt: skip
+)
 def test_who_serves_what(path, viewer, rest):
     assert Role.VIEWER.serves(path) is viewer
     assert Role.REST.serves(path) is rest

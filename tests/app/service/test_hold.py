@@ -67,8 +67,10 @@ def test_abandoned_batches_do_not_delay_a_target(base):
     began = time.monotonic()
     answer = httpx2.post(
         f"http://{base}{API}/pioneer5/ik",
-        json={"target": {"position": [0.045, 0.191, -0.211]}}, trust_env=False, timeout=60,
-    )  # fmt: skip
+        json={"target": {"position": [0.045, 0.191, -0.211]}},
+        trust_env=False,
+        timeout=60,
+    )
     print(f"the next target took {time.monotonic() - began:.1f} s")
     assert answer.status_code == 200
     assert time.monotonic() - began < 15

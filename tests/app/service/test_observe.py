@@ -159,8 +159,11 @@ count(1, "[REQUESTS.labels('', k, 0).inc() for k in range(20_000)]; print('more'
 def test_several_processes_count_as_one_and_a_process_goes_on_where_its_predecessor_ended():
     out = subprocess.run(
         [sys.executable, "-c", COUNTING],
-        env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=True,
-    ).stdout  # fmt: skip
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
     for line in (
         'kinboard_requests_total{method="GET",route="/x",status="200"} 3.0',
         'kinboard_request_seconds_count{route="/x"} 2.0',

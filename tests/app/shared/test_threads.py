@@ -78,9 +78,12 @@ print(os.path.isdir(folder.name))
 def test_a_forked_process_runs_its_own_exit_handlers_and_not_those_of_its_parent():
     root = Path(__file__).parents[3]
     said = subprocess.run(
-        [sys.executable, "-c", FORKED], env=os.environ | {"PYTHONPATH": str(root)},
-        capture_output=True, text=True, check=True,
-    ).stdout.splitlines()  # fmt: skip
+        [sys.executable, "-c", FORKED],
+        env=os.environ | {"PYTHONPATH": str(root)},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.splitlines()
     own, *rest = said
     assert not Path(own).exists()
     assert rest == [

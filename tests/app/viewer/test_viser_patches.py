@@ -252,8 +252,10 @@ def test_behind_a_curtain_nothing_is_seen_and_all_is_as_its_owner_left_it(wire):
     scene.add_frame("/wall-1")
     hidden.visible, shown.visible, child.visible = True, False, False
     assert seen() == {
-        **dict.fromkeys(("/shown", "/hidden", "/x", "/late"), False), "/lamp": True, "/wall-1": True,
-    }  # fmt: skip
+        **dict.fromkeys(("/shown", "/hidden", "/x", "/late"), False),
+        "/lamp": True,
+        "/wall-1": True,
+    }
     late.visible = False
     messages.clear()
     scene_filter.open()

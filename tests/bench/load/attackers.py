@@ -275,9 +275,15 @@ def _frames(path: str, with_token: bool) -> Round:
 
 
 _KINDS = (
-    "GuiUpdateMessage", "GuiButtonHoldMessage", "TransformControlsUpdateMessage", "ViewerCameraMessage",
-    "SceneNodeClickMessage", "ScenePointerMessage", "CommandTriggerMessage", "ShareUrlRequest",
-)  # fmt: skip
+    "GuiUpdateMessage",
+    "GuiButtonHoldMessage",
+    "TransformControlsUpdateMessage",
+    "ViewerCameraMessage",
+    "SceneNodeClickMessage",
+    "ScenePointerMessage",
+    "CommandTriggerMessage",
+    "ShareUrlRequest",
+)
 
 
 async def _malformed(attacker: Attacker) -> None:
@@ -370,12 +376,14 @@ async def besiege(
     await asyncio.gather(*tasks, return_exceptions=True)
     return [
         {
-            "attack": name, "rounds": attacker.rounds, "ended by the service": attacker.failed,
+            "attack": name,
+            "rounds": attacker.rounds,
+            "ended by the service": attacker.failed,
             "MB sent": attacker.sent / 1e6,
             "statuses read": attacker.statuses,
         }
         for name, attacker in attackers.items()
-    ]  # fmt: skip
+    ]
 
 
 async def _keep_on(attacker: Attacker, attack: Attack) -> None:

@@ -134,10 +134,16 @@ async def _of_size(service: Service, n: int, runs: int) -> list[dict[str, Any]]:
     def row(name: str, seconds: float, spent: float, grown: int) -> None:
         rows.append(
             {
-                "way": name, "points": n, "s": seconds, "ns a point": 1e9 * seconds / n, "M/s": n / seconds / 1e6,
-                "× generator": seconds / min(alone), "service CPU s": spent, "memory grows MB": grown / 1e6,
+                "way": name,
+                "points": n,
+                "s": seconds,
+                "ns a point": 1e9 * seconds / n,
+                "M/s": n / seconds / 1e6,
+                "× generator": seconds / min(alone),
+                "service CPU s": spent,
+                "memory grows MB": grown / 1e6,
             }
-        )  # fmt: skip
+        )
 
     row("generator, one thread, here", min(alone), 0.0, 0)
 

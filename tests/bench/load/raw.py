@@ -135,9 +135,15 @@ class Socket(asyncio.Protocol):
 
     @classmethod
     async def open(
-        cls, port: int, path: str, subprotocol: str, heard: Callable[[bytes], None], token: str = "",
-        source: str = "127.0.0.1", cookie: str = "",
-    ) -> Socket:  # fmt: skip
+        cls,
+        port: int,
+        path: str,
+        subprotocol: str,
+        heard: Callable[[bytes], None],
+        token: str = "",
+        source: str = "127.0.0.1",
+        cookie: str = "",
+    ) -> Socket:
         """A websocket that has shaken hands; raises `ConnectionError` if it was refused."""
         _, protocol = await asyncio.get_running_loop().create_connection(
             lambda: cls(handshake(path, subprotocol, token, cookie), heard),

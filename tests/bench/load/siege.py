@@ -274,7 +274,9 @@ def report(siege: Siege, statuses: dict[str, int], before: int, after: int, work
     print(f"not as it should be: {', '.join(wrong) or 'nothing'}")
     return {
         "phases": [phase.row(k + 1) for k, phase in enumerate(siege.phases)],
-        "all": rows, "attacks": siege.attacks,
-        "answers": statuses, "memory": {"before": before, "most": most, "after": after, "limits": bound},
+        "all": rows,
+        "attacks": siege.attacks,
+        "answers": statuses,
+        "memory": {"before": before, "most": most, "after": after, "limits": bound},
         "left behind": wrong,
-    }  # fmt: skip
+    }

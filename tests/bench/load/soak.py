@@ -120,12 +120,18 @@ async def steady(
         waited = [x for visitor in visitors for x in visitor.latencies]
         rows.append(
             {
-                "minute": k, "requests": len(answered), "drags": len(waited), **latencies(waited),
-                "unanswered": sum(v.unanswered for v in visitors), "lost": sum(v.lost for v in visitors),
-                "threads": now.threads, "files": now.files, "memory MB": now.memory / 1e6,
+                "minute": k,
+                "requests": len(answered),
+                "drags": len(waited),
+                **latencies(waited),
+                "unanswered": sum(v.unanswered for v in visitors),
+                "lost": sum(v.lost for v in visitors),
+                "threads": now.threads,
+                "files": now.files,
+                "memory MB": now.memory / 1e6,
                 "CPU s": now.seconds - usages[-1].seconds,
             }
-        )  # fmt: skip
+        )
         print(table("", rows[-1:]), flush=True)
         usages.append(now)
         answered.clear()

@@ -66,9 +66,17 @@ class Visitor:
             )
             try:
                 self.send(
-                    "ViewerCameraMessage", wxyz=(1, 0, 0, 0), position=(3, 3, 3), fov=1.3, near=0.01, far=1000,
-                    image_height=720, image_width=1280, look_at=(0, 0, 0), up_direction=(0, 0, 1),
-                )  # fmt: skip
+                    "ViewerCameraMessage",
+                    wxyz=(1, 0, 0, 0),
+                    position=(3, 3, 3),
+                    fov=1.3,
+                    near=0.01,
+                    far=1000,
+                    image_height=720,
+                    image_width=1280,
+                    look_at=(0, 0, 0),
+                    up_direction=(0, 0, 1),
+                )
                 await self._there.wait()
             except BaseException:
                 self.close()
@@ -129,9 +137,12 @@ class Visitor:
         x, y, z = self._position
         turn = (math.cos(half), 0.0, 0.0, math.sin(half))
         self.send(
-            "TransformControlsUpdateMessage", name=self.gizmo["name"], owner=self.gizmo["owner"],
-            position=(c * x - s * y, s * x + c * y, z), wxyz=_product(turn, self._wxyz),
-        )  # fmt: skip
+            "TransformControlsUpdateMessage",
+            name=self.gizmo["name"],
+            owner=self.gizmo["owner"],
+            position=(c * x - s * y, s * x + c * y, z),
+            wxyz=_product(turn, self._wxyz),
+        )
 
     def watch(self, leader: Visitor) -> None:
         """Expect a picture for the event that another visitor has just sent, whose arm this page shows."""
@@ -190,9 +201,11 @@ class Visitor:
                 self.points += said["binaryBufferLengths"][points["__binary_index"]] // width
             elif kind == "LocalStorageGetItemRequestMessage":
                 self.send(
-                    "LocalStorageGetItemResponseMessage", request_uuid=message["request_uuid"], value=None,
+                    "LocalStorageGetItemResponseMessage",
+                    request_uuid=message["request_uuid"],
+                    value=None,
                     error=None,
-                )  # fmt: skip
+                )
             elif kind == "TransformControlsMessage":
                 self.gizmo = self.gizmo or message
                 self.complete = now

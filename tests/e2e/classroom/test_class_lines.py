@@ -224,8 +224,11 @@ class Class:
         assert joined.ok
         stranger.close()
         self.truth = {
-            "Ann": Truth(1), "Bob": Truth(2), "Eve": Truth(3), "Dan": Truth(4, presence="has not come"),
-        }  # fmt: skip
+            "Ann": Truth(1),
+            "Bob": Truth(2),
+            "Eve": Truth(3),
+            "Dan": Truth(4, presence="has not come"),
+        }
         self.task, self.led = EXERCISE, False
 
     @property
@@ -246,10 +249,16 @@ class Class:
             time.sleep(0.1)
             shown = self.teacher.page.evaluate(SHOWN)
             wrong = (
-                self._list(shown["list"]) or self._chips(shown["chips"]) or self._solved(shown["solved"])
-                or self._bar(shown["bar"]) or self._table(shown["results"]) or self._counts(shown["counts"])
-                or self._file(shown["file"]) or self._wall() or self._own_bars()
-            )  # fmt: skip
+                self._list(shown["list"])
+                or self._chips(shown["chips"])
+                or self._solved(shown["solved"])
+                or self._bar(shown["bar"])
+                or self._table(shown["results"])
+                or self._counts(shown["counts"])
+                or self._file(shown["file"])
+                or self._wall()
+                or self._own_bars()
+            )
 
     def _list(self, rows: list[dict[str, str]]) -> str:
         shown = [(row["alias"], row["words"], row["said"]) for row in rows]

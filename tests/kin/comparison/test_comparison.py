@@ -197,13 +197,17 @@ def test_a_single_mistake_is_explained_by_a_single_change(arm, frames):
     ("change", "mistake", "words"),
     [
         (lambda arm: replace(arm, convention="modified"), "convention", "in the standard convention"),
-        (lambda arm: changed(arm, 3, alpha=-arm.rows[3].alpha), "sign", "α of row 4 has the wrong sign (90°, not −90°)"),  # noqa: E501
+        (
+            lambda arm: changed(arm, 3, alpha=-arm.rows[3].alpha),
+            "sign",
+            "α of row 4 has the wrong sign (90°, not −90°)",
+        ),
         (lambda arm: changed(arm, 1, a=-0.4), "value", "a of row 2 is wrong (−425 mm, not −400 mm)"),
         (lambda arm: changed(arm, 2, alpha=0.7), "twist", "α of row 3 is wrong (0°, not 40.11°)"),
         (lambda arm: changed(arm, 2, a=-39.225), "decimal point", ""),
         (lambda arm: replace(arm, rows=arm.rows[:2] + arm.rows[3:], home=arm.home[1:]), "missing row", "missing"),
     ],
-)  # fmt: skip
+)
 def test_a_mistake_in_the_table_of_the_ur5_is_named(change: Callable[[Robot], Robot], mistake, words):
     a = kin.get_robot("ur5")
     b = change(a)

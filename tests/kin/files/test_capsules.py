@@ -28,10 +28,14 @@ def test_a_converted_arm_has_the_same_bodies(robot):
 def arm(**capsule):
     row = {"name": "one", "a": 0.3}
     return {
-        "id": "arm", "name": "Arm", "source": "test", "convention": "standard",
-        "units": {"length": "m", "angle": "rad"}, "rows": [row, {**row, "name": "two"}],
+        "id": "arm",
+        "name": "Arm",
+        "source": "test",
+        "convention": "standard",
+        "units": {"length": "m", "angle": "rad"},
+        "rows": [row, {**row, "name": "two"}],
         "capsules": [{"row": "one", "start": [0, 0, 0], "radius": 0.1, **capsule}],
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.parametrize(

@@ -190,9 +190,13 @@ def test_capsules_of_mjcf_are_those_of_the_arm():
         ('range="0 0.3"', 'range="0.3 0"', "joint boom: limit"),
         ('<compiler angle="degree"/>', '<compiler eulerseq="abc"/>', "compiler eulerseq"),
         ('<compiler angle="degree"/>', '<compiler coordinate="global"/>', "compiler coordinate"),
-        ("</worldbody>", '</worldbody><equality><joint joint1="roll" joint2="pan"/></equality>', "joint roll: mimic"),  # noqa: E501
+        (
+            "</worldbody>",
+            '</worldbody><equality><joint joint1="roll" joint2="pan"/></equality>',
+            "joint roll: mimic",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_serial_arm_is_refused_with_its_place(old, new, field):
     text = RICH.format(compiler='angle="degree"')
     assert old in text

@@ -79,23 +79,59 @@ def test_a_healthy_file_has_no_findings_but_what_is_left_out():
 
 # What is written instead of what, on which line it is found, as what, and what the mended text has there.
 CASES = [
-    ('lower="-2" upper="2"', 'lower="-120" upper="120"', "degrees", "suspicious", 'lower="-2.0943951023931953" upper="2.0943951023931953"'),  # noqa: E501
-    ('lower="-2" upper="2"', 'lower="-10" upper="10"', "degrees", "suspicious", f'lower="{-10 * DEGREE!r}" upper="{10 * DEGREE!r}"'),  # noqa: E501
+    (
+        'lower="-2" upper="2"',
+        'lower="-120" upper="120"',
+        "degrees",
+        "suspicious",
+        'lower="-2.0943951023931953" upper="2.0943951023931953"',
+    ),
+    (
+        'lower="-2" upper="2"',
+        'lower="-10" upper="10"',
+        "degrees",
+        "suspicious",
+        f'lower="{-10 * DEGREE!r}" upper="{10 * DEGREE!r}"',
+    ),
     ('lower="-2" upper="2"', 'lower="-1e5" upper="1e5"', "limit", "suspicious", 'type="continuous"'),
     ('lower="-2" upper="2"', 'lower="-1e9" upper="1e9"', "limit", "suspicious", 'type="continuous"'),
     ('lower="-2" upper="2"', 'lower="2" upper="-2"', "limit", "wrong", 'lower="-2.0" upper="2.0"'),
     ('lower="-2" upper="2"', 'lower="0" upper="0"', "limit", "suspicious", '<joint name="shoulder" type="fixed">'),
     ('lower="-2" upper="2"', 'lower="-1,5" upper="2"', "number", "wrong", 'lower="-1.5" upper="2"'),
-    ('lower="-2" upper="2" velocity="3"', 'lower="-2" upper="2" velocity="-3"', "limit", "wrong", 'velocity="3.0"'),  # noqa: E501
+    (
+        'lower="-2" upper="2" velocity="3"',
+        'lower="-2" upper="2" velocity="-3"',
+        "limit",
+        "wrong",
+        'velocity="3.0"',
+    ),
     ('lower="-2" upper="2" velocity="3"', 'lower="-2" upper="2"', "limit", "suspicious", 'velocity="0"'),
     ('lower="0" upper="0.1"', 'lower="0" upper="100"', "millimetres", "suspicious", 'lower="0.0" upper="0.1"'),
-    ('<axis xyz="0 0 1"/>\n    <limit lower="-2"', '<axis xyz="0 0 2"/>\n    <limit lower="-2"', "axis", "suspicious", '<axis xyz="0.0 0.0 1.0"/>'),  # noqa: E501
-    ('<axis xyz="0 0 1"/>\n    <limit lower="-2"', '<limit lower="-2"', "axis", "suspicious", '<axis xyz="1 0 0"/>'),  # noqa: E501
+    (
+        '<axis xyz="0 0 1"/>\n    <limit lower="-2"',
+        '<axis xyz="0 0 2"/>\n    <limit lower="-2"',
+        "axis",
+        "suspicious",
+        '<axis xyz="0.0 0.0 1.0"/>',
+    ),
+    (
+        '<axis xyz="0 0 1"/>\n    <limit lower="-2"',
+        '<limit lower="-2"',
+        "axis",
+        "suspicious",
+        '<axis xyz="1 0 0"/>',
+    ),
     ('xyz="0 0 0.2"', 'xyz="0 0 200"', "millimetres", "suspicious", 'xyz="0.0 0.0 0.2"'),
     ('xyz="0 0 0.2"', 'xyz="0, 0, 0.2"', "number", "wrong", 'xyz="0 0 0.2"'),
     ('rpy="1.5707963267948966 0 0"', 'rpy="90 0 0"', "degrees", "suspicious", 'rpy="1.5707963267948966 0.0 0.0"'),
     ('rpy="1.5707963267948966 0 0"', 'rpy="1.57 0 0"', "rounded", "suspicious", 'rpy="1.5707963267948966 0 0"'),
-    ('type="prismatic">\n    <parent link="fore"', 'type="Prismatc">\n    <parent link="fore"', "type", "wrong", '<joint name="slide" type="prismatic">'),  # noqa: E501
+    (
+        'type="prismatic">\n    <parent link="fore"',
+        'type="Prismatc">\n    <parent link="fore"',
+        "type",
+        "wrong",
+        '<joint name="slide" type="prismatic">',
+    ),
     ('<child link="hand"/>', '<child link="hnad"/>', "tree", "wrong", '<child link="hand"/>'),
     ('  <link name="claw"/>\n', "", "tree", "wrong", '<link name="claw"/>'),
     ('<joint name="grip"', '<joint name="elbow"', "name", "wrong", '<joint name="elbow_2" type="prismatic">'),
@@ -109,7 +145,7 @@ CASES = [
     ('<mass value="2"/>', '<mass value="2500"/>', "inertia", "suspicious", '<mass value="2.5"/>'),
     ('<box size="0.1 0.1 0.3"/>', '<box size="0.1 -0.1 0.3"/>', "body", "wrong", 'size="0.1 0.1 0.3"'),
     ('<geometry><box size="0.1 0.1 0.3"/></geometry>', "", "body", "wrong", None),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("old", "new", "symptom", "rank", "mended"), CASES, ids=lambda value: str(value)[:32])
@@ -148,14 +184,24 @@ def test_what_is_wrong_is_found_on_its_line_and_mended(old, new, symptom, rank, 
         ('lower="-2" upper="2"', 'lower="${min}" upper="2"', "number", "“${min}”"),
         ('<mass value="2"/>', "<mass/>", "inertia", "no mass"),
         ('ixx="0.02"', 'ixx="200"', "inertia", "No body has"),
-        ('ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"', 'ixx="20" ixy="0" ixz="0" iyy="20" iyz="0" izz="20"', "inertia", "more than the arm reaches"),  # noqa: E501
-        ('lower="-2" upper="2" velocity="3"', 'lower="-2" upper="2" velocity="180"', "degrees", "29 turns in a second"),  # noqa: E501
+        (
+            'ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"',
+            'ixx="20" ixy="0" ixz="0" iyy="20" iyz="0" izz="20"',
+            "inertia",
+            "more than the arm reaches",
+        ),
+        (
+            'lower="-2" upper="2" velocity="3"',
+            'lower="-2" upper="2" velocity="180"',
+            "degrees",
+            "29 turns in a second",
+        ),
         ('lower="-2" upper="2"', 'lower="0.5" upper="0.5"', "limit", "cannot move"),
         ("<robot", "<robots", "file", "mismatched tag"),
         ("</robot>", "<joint", "file", "well-formed"),
         ('<robot name="small">', "<!DOCTYPE robot><robot>", "file", "DOCTYPE"),
     ],
-)  # fmt: skip
+)
 def test_what_needs_a_decision_is_named_with_advice(old, new, symptom, words):
     text = WELL.replace(old, new, 1)
     found = kin.examine_urdf(text, **HAND)
@@ -219,8 +265,13 @@ def test_makers_files_are_read_and_only_rounded_angles_are_suspicious(name):
 
 
 def test_every_end_is_tried():
-    found = kin.examine_urdf(WELL.replace("</robot>", '<link name="eye"/><joint name="e" type="fixed">'
-                             '<parent link="hand"/><child link="eye"/></joint></robot>'))  # fmt: skip
+    found = kin.examine_urdf(
+        WELL.replace(
+            "</robot>",
+            '<link name="eye"/><joint name="e" type="fixed">'
+            '<parent link="hand"/><child link="eye"/></joint></robot>',
+        )
+    )
     assert found.arm is None
     assert "claw (refused: joint grip: mimic" in found.read[1]
     assert "eye (3 joints)" in found.read[1]

@@ -22,9 +22,23 @@ arms = pytest.mark.parametrize(("robot", "task"), ARMS, ids=lambda part: getattr
 def apart_from_solutions(result):
     """All of an answer but its solutions."""
     names = (
-        "status", "cause", "details", "completeness", "closest", "blocked", "distance", "nearest_orientation",
-        "redundancy", "singularities", "tolerances", "target_error", "solver", "solver_reason", "task", "reason",
-    )  # fmt: skip
+        "status",
+        "cause",
+        "details",
+        "completeness",
+        "closest",
+        "blocked",
+        "distance",
+        "nearest_orientation",
+        "redundancy",
+        "singularities",
+        "tolerances",
+        "target_error",
+        "solver",
+        "solver_reason",
+        "task",
+        "reason",
+    )
     return [getattr(result, name) for name in names]
 
 
@@ -92,8 +106,14 @@ def test_rounded_targets_and_choices_among_postures_are_left_to_results():
     rounded = T.copy()
     rounded[3] = T[3].round(4)
     assert (Table.of(robot, rounded, IKOptions()).kinds < 0).tolist() == [k == 3 for k in range(8)]
-    for choice in ({"branch": "elbow positive"}, {"images": "all"}, {"prefer": "limits"}, {"solver": "numeric"},
-                   {"avoid_self_collision": True}, {"task": "position"}):  # fmt: skip
+    for choice in (
+        {"branch": "elbow positive"},
+        {"images": "all"},
+        {"prefer": "limits"},
+        {"solver": "numeric"},
+        {"avoid_self_collision": True},
+        {"task": "position"},
+    ):
         assert (Table.of(robot, T, IKOptions(**choice)).kinds == -1).all(), choice
     assert (Table.of(kin.get_robot("iiwa14"), T, IKOptions()).kinds == -1).all()
 

@@ -23,16 +23,25 @@ def arm(name, *rows):
 def upright(name, offset=0.0):
     """Like Doosan's M1013: an offset shoulder, and a spherical wrist unless it has an offset too."""
     return arm(
-        name, (0, 0.1525, 0, -PI / 2), (-PI / 2, 0.0345, 0.62, 0), (PI / 2, 0, 0, PI / 2),
-        (0, 0.559, 0, -PI / 2), (0, 0, offset, PI / 2), (0, 0.121, 0, 0),
-    )  # fmt: skip
+        name,
+        (0, 0.1525, 0, -PI / 2),
+        (-PI / 2, 0.0345, 0.62, 0),
+        (PI / 2, 0, 0, PI / 2),
+        (0, 0.559, 0, -PI / 2),
+        (0, 0, offset, PI / 2),
+        (0, 0.121, 0, 0),
+    )
 
 
 M1013, OFFSET = upright("m1013-like"), upright("offset-wrist", 0.05)
 ELBOW5 = arm(
-    "offset-elbow5", (0, 0.3, 0.05, -PI / 2), (0, 0.1, 0.4, 0), (0, 0, 0.02, -PI / 2), (0, 0.4, 0, PI / 2),
+    "offset-elbow5",
+    (0, 0.3, 0.05, -PI / 2),
+    (0, 0.1, 0.4, 0),
+    (0, 0, 0.02, -PI / 2),
+    (0, 0.4, 0, PI / 2),
     (0, 0, 0, -PI / 2),
-)  # fmt: skip
+)
 
 
 def smallest(robot, q):

@@ -15,11 +15,19 @@ RIGHT = 0.5 * math.pi
 
 def arm(kinds: str, numbers) -> Robot:
     """A standard table from rows (θ, d, a, α); P slides and R turns."""
-    return Robot.from_dh([
-        {"kind": "prismatic" if kind == "P" else "revolute", "theta": theta, "d": d, "a": a, "alpha": alpha,
-         **({"limits": (-1.0, 1.0)} if kind == "P" else {})}
-        for kind, (theta, d, a, alpha) in zip(kinds, numbers, strict=True)
-    ])  # fmt: skip
+    return Robot.from_dh(
+        [
+            {
+                "kind": "prismatic" if kind == "P" else "revolute",
+                "theta": theta,
+                "d": d,
+                "a": a,
+                "alpha": alpha,
+                **({"limits": (-1.0, 1.0)} if kind == "P" else {}),
+            }
+            for kind, (theta, d, a, alpha) in zip(kinds, numbers, strict=True)
+        ]
+    )
 
 
 def random_arm(kinds: str, rng: np.random.Generator, right: bool = False) -> Robot:

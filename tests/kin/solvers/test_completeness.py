@@ -42,39 +42,73 @@ CRX = arm(
 )
 HC10 = arm(
     "hc10",
-    (0, 0.275, 0, -H), (-H, 0, 0.7, PI), (0, 0, 0, -H), (0, -0.5, 0, H), (0, 0.162, 0, -H), (0, -0.17, 0, PI),
-)  # fmt: skip
+    (0, 0.275, 0, -H),
+    (-H, 0, 0.7, PI),
+    (0, 0, 0, -H),
+    (0, -0.5, 0, H),
+    (0, 0.162, 0, -H),
+    (0, -0.17, 0, PI),
+)
 DOOSAN = arm(
     "doosan",
-    (0, 0.1525, 0, -H), (-H, 0.0345, 0.62, 0), (H, 0, 0, H), (0, 0.559, 0, -H), (0, 0, 0, H), (0, 0.121, 0, 0),
-)  # fmt: skip
+    (0, 0.1525, 0, -H),
+    (-H, 0.0345, 0.62, 0),
+    (H, 0, 0, H),
+    (0, 0.559, 0, -H),
+    (0, 0, 0, H),
+    (0, 0.121, 0, 0),
+)
 XARM = arm(
     "xarm6",
-    (0, 0.267, 0, -H), (-1.3849179, 0, 0.28949, 0), (1.3849179, 0, 0.0775, -H), (0, 0.3425, 0, H),
-    (0, 0, 0.076, -H), (0, 0.097, 0, 0),
-)  # fmt: skip
+    (0, 0.267, 0, -H),
+    (-1.3849179, 0, 0.28949, 0),
+    (1.3849179, 0, 0.0775, -H),
+    (0, 0.3425, 0, H),
+    (0, 0, 0.076, -H),
+    (0, 0.097, 0, 0),
+)
 GOFA = arm(
     "gofa",
-    (0, 0.265, 0, -H), (-H, 0, 0.444, 0), (0, 0, 0.11, -H), (0, 0.47, 0, H), (0, 0, 0.08, -H), (PI, 0.101, 0, 0),
-)  # fmt: skip
+    (0, 0.265, 0, -H),
+    (-H, 0, 0.444, 0),
+    (0, 0, 0.11, -H),
+    (0, 0.47, 0, H),
+    (0, 0, 0.08, -H),
+    (PI, 0.101, 0, 0),
+)
 TX2 = arm(
     "tx2",
-    (0, 0.4, 0.05, -H), (-H, 0, 0.425, 0), (H, 0.05, 0, H), (0, 0.425, 0.03, -H), (0, 0, 0.05, H), (0, 0.1, 0, 0),
-)  # fmt: skip
+    (0, 0.4, 0.05, -H),
+    (-H, 0, 0.425, 0),
+    (H, 0.05, 0, H),
+    (0, 0.425, 0.03, -H),
+    (0, 0, 0.05, H),
+    (0, 0.1, 0, 0),
+)
 JACO = arm(
     "jaco",
-    (0, 0.2755, 0, H), (0, 0, 0.41, PI), (0, -0.0098, 0, H), (0, -0.25008, 0, PI / 3), (0, -0.08556, 0, PI / 3),
+    (0, 0.2755, 0, H),
+    (0, 0, 0.41, PI),
+    (0, -0.0098, 0, H),
+    (0, -0.25008, 0, PI / 3),
+    (0, -0.08556, 0, PI / 3),
     (0, -0.20278, 0, PI),
-)  # fmt: skip
+)
 # Angles with 3 decimals keep the arm away from its family; with more, tables of a family are `Rounded`.
 GENERAL = [typed(robot, decimals) for robot in (CRX, HC10) for decimals in (3, 4, 5, 6)] + [
     typed(robot, decimals) for robot in (DOOSAN, XARM, GOFA, TX2, JACO) for decimals in (3, 4)
 ]
 # A cut of the HC10 with three decimals that is valid by the rounding alone; see the note on noise in `roots`.
-LOST = np.array([
-    -0.7421054974565835, -2.5565560329908603, -2.3832930059431905, -0.03904845663065393, -1.5011028750531175,
-    -2.238855104076985,
-])  # fmt: skip
+LOST = np.array(
+    [
+        -0.7421054974565835,
+        -2.5565560329908603,
+        -2.3832930059431905,
+        -0.03904845663065393,
+        -1.5011028750531175,
+        -2.238855104076985,
+    ]
+)
 QUARTERS = (1.5708, 1.570796, 1.5707963)
 
 
@@ -228,10 +262,16 @@ def test_postures_that_nothing_certifies_are_listed_all_the_same():
 def test_no_posture_at_the_corner_of_the_reach_is_not_called_complete():
     """Elbow stretched and wrist nearest to axis 1: the exact arm reaches the pose by no motion along one axis."""
     robot = next(each for each in FAMILIES if each.id == "puma560-1.5708")
-    q = np.array([
-        -1.1325942185166853, -1.5698179555207745, -1.5257294354010233, -2.1148235916255356, 0.7544880020439604,
-        -1.445842761747103,
-    ])  # fmt: skip
+    q = np.array(
+        [
+            -1.1325942185166853,
+            -1.5698179555207745,
+            -1.5257294354010233,
+            -2.1148235916255356,
+            0.7544880020439604,
+            -1.445842761747103,
+        ]
+    )
     found, known = candidates(robot, kin.fk(robot, q), q)
     assert known == "unknown"
     assert apart(found, q).min() < 1e-3

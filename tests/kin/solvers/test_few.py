@@ -244,9 +244,12 @@ def test_reversed_joints_and_the_other_convention_change_nothing():
 
 def test_no_posture_is_lost_where_the_last_axis_is_almost_the_approach_axis():
     rows = (
-        (0, 0, 0, 1.6502), (-PI / 2, 0, 0, -PI / 2), (-PI / 2, 0.461753, 0, PI / 2), (0.3, 0, -0.319846, 0),
+        (0, 0, 0, 1.6502),
+        (-PI / 2, 0, 0, -PI / 2),
+        (-PI / 2, 0.461753, 0, PI / 2),
+        (0.3, 0, -0.319846, 0),
         (0, -0.281150, -0.470773, 3.1416),
-    )  # fmt: skip
+    )
     assert missed(arm("nearly-rolled", *rows), 300) == 0
 
 

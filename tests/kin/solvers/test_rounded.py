@@ -160,8 +160,12 @@ def test_an_approach_direction_is_met_with_a_tool_that_is_tilted_a_little(name):
 PLANAR = arm("planar-typed", (0, 0.1, 0.3, 0), (0, 0, 0.25, 3.1416), (0, 0, 0.2, -1.5708))
 FIVE = arm(
     "five-typed",
-    (0, 0.15, 0, 1.5708), (0, 0, 0.26, 0), (0, 0, 0.42, 3.1416), (0.3, 0, -0.1, 1.5708), (0, 0, 0, 3.141593),
-)  # fmt: skip
+    (0, 0.15, 0, 1.5708),
+    (0, 0, 0.26, 0),
+    (0, 0, 0.42, 3.1416),
+    (0.3, 0, -0.1, 1.5708),
+    (0, 0, 0, 3.141593),
+)
 
 
 @pytest.mark.parametrize(("robot", "task"), [(PLANAR, "position"), (FIVE, "approach")])

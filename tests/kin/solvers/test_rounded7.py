@@ -49,23 +49,58 @@ def urdf(name, quarter, origins, limits):
 
 
 _XARM = (
-    [("0 0 0.267", 0), ("0 0 0", -1), ("0 -0.293 0", 1), ("0.0525 0 0", 1), ("0.0775 -0.3425 0", 1), ("0 0 0", 1),
-     ("0.076 0.097 0", -1)],
-    [(-6.2832, 6.2832), (-2.059, 2.0944), (-6.2832, 6.2832), (-0.19198, 3.927), (-6.2832, 6.2832),
-     (-1.69297, 3.1416), (-6.2832, 6.2832)],
-)  # fmt: skip
+    [
+        ("0 0 0.267", 0),
+        ("0 0 0", -1),
+        ("0 -0.293 0", 1),
+        ("0.0525 0 0", 1),
+        ("0.0775 -0.3425 0", 1),
+        ("0 0 0", 1),
+        ("0.076 0.097 0", -1),
+    ],
+    [
+        (-6.2832, 6.2832),
+        (-2.059, 2.0944),
+        (-6.2832, 6.2832),
+        (-0.19198, 3.927),
+        (-6.2832, 6.2832),
+        (-1.69297, 3.1416),
+        (-6.2832, 6.2832),
+    ],
+)
 _RM75 = (
-    [("0 0 0.2405", 0), ("0 0 0", -1), ("0 -0.256 0", 1), ("0 0 0", -1), ("0 -0.21 0", 1), ("0 0 0", -1),
-     ("0 -0.144 0", 1)],
-    [(-3.106, 3.106), (-2.269, 2.269), (-3.106, 3.106), (-2.356, 2.356), (-3.106, 3.106), (-2.234, 2.234),
-     (-6.283, 6.283)],
-)  # fmt: skip
+    [
+        ("0 0 0.2405", 0),
+        ("0 0 0", -1),
+        ("0 -0.256 0", 1),
+        ("0 0 0", -1),
+        ("0 -0.21 0", 1),
+        ("0 0 0", -1),
+        ("0 -0.144 0", 1),
+    ],
+    [
+        (-3.106, 3.106),
+        (-2.269, 2.269),
+        (-3.106, 3.106),
+        (-2.356, 2.356),
+        (-3.106, 3.106),
+        (-2.234, 2.234),
+        (-6.283, 6.283),
+    ],
+)
 # A spherical shoulder, and offsets at elbow and wrist.
 _GEN72 = (
-    [("0 0 0.218", 0), ("0 0 0", -1), ("0 -0.28 0", 1), ("0.04 0 0", -1), ("-0.019 -0.2525 0", 1), ("0 0 0", -1),
-     ("0.0678 -0.1 0", 1)],
+    [
+        ("0 0 0.218", 0),
+        ("0 0 0", -1),
+        ("0 -0.28 0", 1),
+        ("0.04 0 0", -1),
+        ("-0.019 -0.2525 0", 1),
+        ("0 0 0", -1),
+        ("0.0678 -0.1 0", 1),
+    ],
     [(-3.0, 3.0), (-1.832, 1.832), (-3.0, 3.0), (-2.879, 0.959), (-3.0, 3.0), (-1.658, 1.779), (-6.283, 6.283)],
-)  # fmt: skip
+)
 
 
 def arm_named(name):
@@ -79,10 +114,22 @@ def arm_named(name):
 
 
 CAMPAIGN = (
-    "panda 1.57", "panda 1.571", "panda 1.5708", "panda 1.570796", "xarm7 1.571", "xarm7-urdf 1.5708", "gen3 1.57",
-    "gen3 1.5708", "gen72-urdf 1.5708", "gen72-urdf 1.571", "rm75-urdf 1.5708", "iiwa14 1.57", "iiwa14 1.5708",
-    "redundant7-craig 1.5708", "redundant7 1.5708",
-)  # fmt: skip
+    "panda 1.57",
+    "panda 1.571",
+    "panda 1.5708",
+    "panda 1.570796",
+    "xarm7 1.571",
+    "xarm7-urdf 1.5708",
+    "gen3 1.57",
+    "gen3 1.5708",
+    "gen72-urdf 1.5708",
+    "gen72-urdf 1.571",
+    "rm75-urdf 1.5708",
+    "iiwa14 1.57",
+    "iiwa14 1.5708",
+    "redundant7-craig 1.5708",
+    "redundant7 1.5708",
+)
 arms = pytest.mark.parametrize("name", CAMPAIGN)
 
 
@@ -163,9 +210,10 @@ class Judge:
             found["incomplete"] += not result.complete
             names = {s.branch for s in result.solutions}
             missing = [
-                p for p in self.postures(T, q, rng, values, random)
+                p
+                for p in self.postures(T, q, rng, values, random)
                 if not self.lists(T, result, p) and width(self.chain, T, p, self.joint) >= 1e-3
-            ]  # fmt: skip
+            ]
             found["posture"] += bool(missing)
             lost = {kin.branch_names(self.robot)[self.form.branch_of(p)] for p in missing} - names
             found["branch"] += bool(lost)
@@ -298,9 +346,9 @@ def test_followed_intervals_leave_out_what_a_step_passes(name, target):
 def test_a_branch_is_listed_of_which_only_narrow_intervals_are_far_from_folds():
     """Two branches of a Gen3 meet at folds 3e-3 rad inside their limits; following the curves had lost one."""
     robot, exact = arm_named("gen3 1.57")
-    q = np.array((
-        -0.9107511846, -1.4923641253, -0.1655527070, -1.6937266603, 1.8787194783, 0.5121045217, -1.3626296674
-    ))  # fmt: skip
+    q = np.array(
+        (-0.9107511846, -1.4923641253, -0.1655527070, -1.6937266603, 1.8787194783, 0.5121045217, -1.3626296674)
+    )
     found, meant = (kin.solve_ik(each, kin.fk(each, q)) for each in (robot, exact))
     assert {s.branch for s in found.solutions} == {s.branch for s in meant.solutions}
     assert len(found.solutions) == 8

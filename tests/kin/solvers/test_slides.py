@@ -27,7 +27,10 @@ TEXTBOOK = {
     "SCARA, slide first": ("PRRR", [LIFT, (0, 0, 0.4, 0), (0, 0, 0.3, 0), (0, 0, 0, 0)], "pose", "scara4"),
     "SCARA with a wrist": ("PRRRRR", [LIFT, (0, 0, 0.4, 0), (0, 0, 0.3, 0), *WRIST], "pose", "general6"),
     "slide between parallel axes": (
-        "RPRRRR", [LIFT, (0, 0, 0.3, 0), (0, 0, 0.25, 0), *WRIST], "pose", "general6",
+        "RPRRRR",
+        [LIFT, (0, 0, 0.3, 0), (0, 0, 0.25, 0), *WRIST],
+        "pose",
+        "general6",
     ),
     "Stanford with an offset wrist": (
         "RRPRRR",
@@ -39,7 +42,7 @@ TEXTBOOK = {
     "planar PRR": ("PRR", [(0, 0.1, 0, RIGHT), (0, 0, 0.3, 0), (0, 0, 0.2, 0)], "pose", "general5"),
     "planar PPR": ("PPR", [(RIGHT, 0, 0, RIGHT), (RIGHT, 0, 0, RIGHT), (0, 0, 0.2, 0)], "pose", "general5"),
     "planar RPP": ("RPP", [(RIGHT, 0, 0, RIGHT), (RIGHT, 0.2, 0, RIGHT), (0, 0.1, 0, 0)], "pose", "general5"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kinds", ORDERS)
@@ -85,8 +88,9 @@ def test_a_slide_that_reaches_out_from_a_lift_has_two_postures_at_a_point():
     robot = arm(*TEXTBOOK["cylinder"][:2])
     T = kin.fk(robot, [0.4, 0.1, 0.3])
     out = float(np.hypot(*T[:2, 3]))
-    front, back = sorted(kin.solve_ik(robot, T[:3, 3], task="position", respect_limits=False).solutions,
-                         key=lambda s: -s.q[2])  # fmt: skip
+    front, back = sorted(
+        kin.solve_ik(robot, T[:3, 3], task="position", respect_limits=False).solutions, key=lambda s: -s.q[2]
+    )
     assert front.q == pytest.approx([0.4, 0.1, out - 0.2])
     assert back.q == pytest.approx([0.4 - np.pi, 0.1, -out - 0.2])
 

@@ -51,10 +51,15 @@ class Results:
         pairs, found = compared
         titles = await run_in_threadpool(lambda: self._titles) if pairs else {}
         return results_page(
-            request, room=room, rows=shown, counts=counts, more=len(table) - len(shown), attempts=attempts,
+            request,
+            room=room,
+            rows=shown,
+            counts=counts,
+            more=len(table) - len(shown),
+            attempts=attempts,
             pairs=[[titles.get(key, key) for key in pair] for pair in pairs],
             gains=[_compared(row) for row in found[: MOST + 1]],
-        )  # fmt: skip
+        )
 
     def _shown(self, row: Row) -> dict[str, object]:
         """A row as the page has it."""
@@ -65,11 +70,17 @@ class Results:
 
             said = answer_in_words(exercise, work.seed, said)
         return {
-            "alias": row.member.alias, "number": row.member.number, "state": row.state,
-            "title": row.exercise if exercise is None else exercise.title, "tries": work.tries,
-            "score": round(100 * work.score), "time": f"{int(row.seconds) // 60}:{int(row.seconds) % 60:02}",
-            "answer": said, "verdict": work.verdict, "begun": bool(work.numbers),
-        }  # fmt: skip
+            "alias": row.member.alias,
+            "number": row.member.number,
+            "state": row.state,
+            "title": row.exercise if exercise is None else exercise.title,
+            "tries": work.tries,
+            "score": round(100 * work.score),
+            "time": f"{int(row.seconds) // 60}:{int(row.seconds) % 60:02}",
+            "answer": said,
+            "verdict": work.verdict,
+            "begun": bool(work.numbers),
+        }
 
     async def download(self, request: Request) -> Response:
         """One row per attempt; what has been read is sent before more is."""

@@ -61,9 +61,9 @@ def assign_html(attempt: Attempt, units: Units) -> str:
         words=_finished(work, units) if done else choices.relation_words(work, number),
         settled=settled,
         part=part or "",
-        prompt="" if part is None else PROMPTS[part].format(
-            i=low(number) if part in ("axis", "direction", "x") else number
-        ),
+        prompt=""
+        if part is None
+        else PROMPTS[part].format(i=low(number) if part in ("axis", "direction", "x") else number),
         options=options,
         fields=fields,
         row_prompt=f"Fill in row {number}, measured at the pose on show.",
@@ -72,7 +72,7 @@ def assign_html(attempt: Attempt, units: Units) -> str:
         color="green" if right else "vermilion",
         begun=bool(work.rows or len(settled)),
         done=done,
-    )  # fmt: skip
+    )
 
 
 def rows_html(work: Assignment, q: Array, units: Units, asked: bool = False) -> str:

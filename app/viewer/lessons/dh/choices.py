@@ -98,9 +98,11 @@ def relation_words(work: Assignment, number: int) -> str:
     lines = _lines(work, number, work.axes[carrier].z)
     assert lines is not None
     first, second = (_name(work, joint) for joint in sorted((carrier, partner)))
-    free = " A prismatic joint has a direction only; its line is laid through the joint." if any(
-        work.slides(joint) for joint in (carrier, partner)
-    ) else ""  # fmt: skip
+    free = (
+        " A prismatic joint has a direction only; its line is laid through the joint."
+        if any(work.slides(joint) for joint in (carrier, partner))
+        else ""
+    )
     return {
         "skew": f"{first} and {second} are skew: they have one common normal.",
         "meet": f"{first} and {second} intersect: a = 0. x is perpendicular to both; both directions are right.",
@@ -261,10 +263,12 @@ def _xs(work: Assignment, number: int, lines: Lines) -> tuple[Choice, ...]:
             Choice(f"{one} × {two}", True, "Perpendicular to both axes.", x),
             Choice(f"{two} × {one}", True, "The opposite direction is as right: α changes its sign.", -x),
             Choice(
-                f"along z{low(number - 1 if standard else number + 1)}", False,
-                "x is perpendicular to both axes.", along,
+                f"along z{low(number - 1 if standard else number + 1)}",
+                False,
+                "x is perpendicular to both axes.",
+                along,
             ),
-        )  # fmt: skip
+        )
     across = cross(z, x)
     return (
         Choice(f"from {one} to {two}", True, "Along the normal; a is positive.", x),

@@ -43,9 +43,17 @@ class DHSettings(Settings):
     """See the module; `at` is the place on the walk, in motions, of which its slider shows rows."""
 
     at: float = slider(
-        "Row", 0.0, (0.0, 0.0), hint=ROW_HINT, scale=1 / MOTIONS, digits=4, step=0.01, names="row", renew=True,
+        "Row",
+        0.0,
+        (0.0, 0.0),
+        hint=ROW_HINT,
+        scale=1 / MOTIONS,
+        digits=4,
+        step=0.01,
+        names="row",
+        renew=True,
         within=lambda robot: (0.0, float(length(robot))),
-    )  # fmt: skip
+    )
     symbols: bool = flag("Symbols", hint=SYMBOLS_HINT)
     compare: bool = flag("Compare conventions", hint=COMPARE_HINT)
     speed: str = choice("Speed", {name: name for name in SPEEDS}, "Normal")

@@ -241,9 +241,12 @@ def _finding(book: Book, columns: list[str], rows: list[str]) -> tuple[str, Mark
     found = [by_entry[f"{column}_{row}"] for column in columns for row in rows]
     names = [Markup("{} in ({})").format(Markup(typeset.mathml_name(e.entry)), e.number) for e in found]
     text = Markup("{} {} and {} {} cannot be right: look at {}.").format(
-        "Columns" if len(columns) > 1 else "Column", _listed(columns),
-        "rows" if len(rows) > 1 else "row", _listed(rows), _listed(names),
-    )  # fmt: skip
+        "Columns" if len(columns) > 1 else "Column",
+        _listed(columns),
+        "rows" if len(rows) > 1 else "row",
+        _listed(rows),
+        _listed(names),
+    )
     return wrong[0], text, wrong[2]
 
 

@@ -44,10 +44,16 @@ def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "") -> s
             for letter in "cr"
         )
         return render(
-            "guide/check", marks=marks, at=at, questions=asked, right=right, count=count, earlier=earlier,
+            "guide/check",
+            marks=marks,
+            at=at,
+            questions=asked,
+            right=right,
+            count=count,
+            earlier=earlier,
             recalled=sum(progress.mark(str(one["key"])) == "right" for one in earlier),
             done=all(question["closed"] for question in asked),
-        )  # fmt: skip
+        )
     step, key, before = steps[at], str(at + 1), f"e{at + 1}"
     closed = step.question is None or progress.is_closed(key)
     estimate = step.estimate if not closed or progress.mark(before) != "open" else None
@@ -78,6 +84,12 @@ def _question(progress: Progress, key: str, question: Question, sheets: dict[str
     if closed and isinstance(question, Choice):
         rights = frozenset(i for i, option in enumerate(question.options) if option.right)
     return {
-        "key": key, "prompt": question.prompt, "closed": closed, "feedback": feedback, "symbol": symbol,
-        "title": title, "color": f"kb-{color}", "entry": entry_of(question.asked(), sheet, closed, key, rights),
-    }  # fmt: skip
+        "key": key,
+        "prompt": question.prompt,
+        "closed": closed,
+        "feedback": feedback,
+        "symbol": symbol,
+        "title": title,
+        "color": f"kb-{color}",
+        "entry": entry_of(question.asked(), sheet, closed, key, rights),
+    }

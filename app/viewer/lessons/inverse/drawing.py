@@ -19,10 +19,24 @@ from kin.transforms import Array
 from kin.units import Units
 
 LABELS = {
-    "w": "wrist centre w", "p": "tool point p", "S": "shoulder S", "E": "elbow E", "2": "axis 2", "t": "tool",
-    "z0": "axis 1", "x0": "x₀", "x3": "x₃", "y3": "y₃", "z3": "z₃", "down": "", "SW": "", "tilt": "", "tilt2": "",
-    "circle": "", "k": "",
-}  # fmt: skip
+    "w": "wrist centre w",
+    "p": "tool point p",
+    "S": "shoulder S",
+    "E": "elbow E",
+    "2": "axis 2",
+    "t": "tool",
+    "z0": "axis 1",
+    "x0": "x₀",
+    "x3": "x₃",
+    "y3": "y₃",
+    "z3": "z₃",
+    "down": "",
+    "SW": "",
+    "tilt": "",
+    "tilt2": "",
+    "circle": "",
+    "k": "",
+}
 COLORS = {"a": VERMILION, "x3": GREY, "y3": GREY, "z3": BLUE, "z0": GREY, "X": GREEN, "β": PURPLE, "D": VERMILION}
 QUIET = ("tilt", "tilt2", "circle")  # arcs without a value
 FOUND = ("r", "D", "ρ")  # lengths that a step finds; the others are given

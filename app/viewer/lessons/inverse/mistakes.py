@@ -19,8 +19,11 @@ SWAPPED = "The arguments are swapped: atan2 takes y first."
 
 # The names of the two links of the triangle.
 SIDES: dict[Family, tuple[str, str]] = {
-    "planar": ("l1", "l2"), "wrist5": ("a2", "d4"), "wrist6": ("a2", "f"), "srs7": ("d3", "d5"),
-}  # fmt: skip
+    "planar": ("l1", "l2"),
+    "wrist5": ("a2", "d4"),
+    "wrist6": ("a2", "f"),
+    "srs7": ("d3", "d5"),
+}
 
 
 def split_name(key: StepKey, derivation: Derivation) -> str:

@@ -58,7 +58,15 @@ class InverseSettings(Settings):
     all: bool = flag("All numbers", hint=ALL_HINT)
     taken: Mapping[str, float] = kept(lambda robot: {}, to_json=dict, from_json=_read_taken)
     psi: float = slider(
-        "ψ of the derivation", 0.0, TURN, "angle", hint=PSI_HINT, names="arm angle", undo="Arm angle",
-        named=False, clip=True, link=False,
-    )  # fmt: skip
+        "ψ of the derivation",
+        0.0,
+        TURN,
+        "angle",
+        hint=PSI_HINT,
+        names="arm angle",
+        undo="Arm angle",
+        named=False,
+        clip=True,
+        link=False,
+    )
     turned: bool = kept(False, link=False, renew=True)

@@ -71,10 +71,18 @@ def _step(
         _line(line, is_open or step.failure is not None, units) for line in step.lines if line.text or is_open
     ]
     return {
-        "key": step.key, "number": index + 1, "title": words.title(arm, step.key), "way": way, "open": is_open,
-        "here": here, "lines": lines, "note": note, "symbol": symbol, "color": color,
+        "key": step.key,
+        "number": index + 1,
+        "title": words.title(arm, step.key),
+        "way": way,
+        "open": is_open,
+        "here": here,
+        "lines": lines,
+        "note": note,
+        "symbol": symbol,
+        "color": color,
         "code": step.failure or step.special or "",
-    }  # fmt: skip
+    }
 
 
 def _line(line: Line, is_open: bool, units: Units) -> dict[str, object]:

@@ -20,8 +20,13 @@ RING = 1.32  # radius of the ring, relative to the elbow's circle
 SMALLEST_CIRCLE = 0.25  # of the arm's size unit; a smaller circle has no room for a ring
 TRADE_RADIUS = 4.6  # in the arm's size unit
 FEASIBLE, BLOCKED, LIMIT, NOW, ELBOW, LINE = (
-    (0, 158, 115), (165, 165, 165), (213, 94, 0), (0, 114, 178), (86, 180, 233), (120, 120, 120),
-)  # fmt: skip
+    (0, 158, 115),
+    (165, 165, 165),
+    (213, 94, 0),
+    (0, 114, 178),
+    (86, 180, 233),
+    (120, 120, 120),
+)
 
 
 @dataclass(frozen=True, eq=False)

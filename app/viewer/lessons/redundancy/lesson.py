@@ -137,9 +137,11 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
         """
         f, item = self.read, self.read.item
         key: tuple[object, ...] = (
-            f.T_held.tobytes(), f.arm.task, f.arm.options.constraints,
+            f.T_held.tobytes(),
+            f.arm.task,
+            f.arm.options.constraints,
             None if item is None else (item.name, np.round(item.intervals, 6).tobytes()),
-        )  # fmt: skip
+        )
         if key == self._ends_key:
             return None
         if not moving and (wait := QUIET - (now - self._changed)) > 0.0:

@@ -73,28 +73,36 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
         turns = MOTIONS[s.motion][0]
         return [
             Control("chained"),
-            Folder("One rotation", self.unless_asked(
-                "forms",
-                Control("convention"),
-                Html(views.convention_html, (f.convention,)),
-                *(self._angle(k) for k in range(3)),
-                Buttons("Turn", turned, TURN_HINT),
-                Html(views.turning_html, (f.convention, at)),
-                Html(views.lock_html, (f.convention, s.angles, units)),
-                Html(views.rotation_html, (f.convention, s.angles, units)),
-                Control("typed"),
-                Buttons("Use", {name: self.event(method) for name, method in uses.items()}, ACT_HINT),
-                Html(views.error_html, (self._error,)),
-            ), visible=not s.chained),
-            Folder("Chain of frames", [
-                Control("motion"),
-                Control("turn", visible=turns),
-                Control("shift", visible=not turns),
-                Control("own"),
-                Buttons("Chain", {name: self.event(method) for name, method in changes.items()}, CHAIN_HINT),
-                Html(views.chain_html, (s.chain, units)),
-            ], visible=s.chained),
-        ]  # fmt: skip
+            Folder(
+                "One rotation",
+                self.unless_asked(
+                    "forms",
+                    Control("convention"),
+                    Html(views.convention_html, (f.convention,)),
+                    *(self._angle(k) for k in range(3)),
+                    Buttons("Turn", turned, TURN_HINT),
+                    Html(views.turning_html, (f.convention, at)),
+                    Html(views.lock_html, (f.convention, s.angles, units)),
+                    Html(views.rotation_html, (f.convention, s.angles, units)),
+                    Control("typed"),
+                    Buttons("Use", {name: self.event(method) for name, method in uses.items()}, ACT_HINT),
+                    Html(views.error_html, (self._error,)),
+                ),
+                visible=not s.chained,
+            ),
+            Folder(
+                "Chain of frames",
+                [
+                    Control("motion"),
+                    Control("turn", visible=turns),
+                    Control("shift", visible=not turns),
+                    Control("own"),
+                    Buttons("Chain", {name: self.event(method) for name, method in changes.items()}, CHAIN_HINT),
+                    Html(views.chain_html, (s.chain, units)),
+                ],
+                visible=s.chained,
+            ),
+        ]
 
     def _angle(self, k: int) -> Control:
         convention = self.read.convention

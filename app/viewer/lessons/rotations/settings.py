@@ -26,9 +26,14 @@ WHOSE_HINT = "Axes of the frame itself, or of the fixed frame {0}"
 TURN_HINT, SHIFT_HINT = "Angle of the next turn", "Length of the next shift"
 FIRST: Angles = (math.radians(20.0), math.radians(35.0), math.radians(50.0))
 ANGLE = Number(
-    limits=(-7.0, 7.0), measure="angle", slider=(-math.pi, math.pi), marks=True, named=False, names="angle",
+    limits=(-7.0, 7.0),
+    measure="angle",
+    slider=(-math.pi, math.pi),
+    marks=True,
+    named=False,
+    names="angle",
     hint=ANGLE_HINT,
-)  # fmt: skip
+)
 
 
 def _chain(entry: object, robot: Robot) -> tuple[Motion, ...]:

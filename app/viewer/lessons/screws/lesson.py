@@ -52,15 +52,21 @@ class ScrewsLesson(DeclaredFeature[ScrewsSettings, ScrewsFacts], Lesson):
             Control("form"),
             Control("axes"),
             *self.unless_asked("screws", Html(views.table_html, (robot, f.columns, s.form, f.now, f.chosen))),
-            Folder("One screw", [
-                Control("joint", of=robot.id),
-                *self.unless_asked("screws", Html(views.one_html, one)),
-            ]),
-            Folder("Product of exponentials", [
-                Control("factors", of=robot.id),
-                Html(views.product_html, (robot, f.zero, f.acting, s.factors, s.form)),
-            ]),
-        ]  # fmt: skip
+            Folder(
+                "One screw",
+                [
+                    Control("joint", of=robot.id),
+                    *self.unless_asked("screws", Html(views.one_html, one)),
+                ],
+            ),
+            Folder(
+                "Product of exponentials",
+                [
+                    Control("factors", of=robot.id),
+                    Html(views.product_html, (robot, f.zero, f.acting, s.factors, s.form)),
+                ],
+            ),
+        ]
 
     def scene(self) -> Sequence[Lazy]:
         # Axes at zero do not move with the arm.

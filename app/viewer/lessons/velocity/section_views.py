@@ -22,10 +22,14 @@ CONDITION = "Condition number κ"
 def statics_html(robot: Robot, force: Array, tau: Array, least: Array, cost: float, R: Array) -> str:
     """τ = JᵀF for each joint, and the direction ``(3,)`` whose force takes the least torque, `cost` per newton."""
     rows = [
-        {"name": label(robot, i), "value": fixed(value, 2), "unit": "N·m" if robot.revolute[i] else "N",
-         "most": abs(value) > 0.999 * float(np.abs(tau).max()) and abs(value) > 5e-3}
+        {
+            "name": label(robot, i),
+            "value": fixed(value, 2),
+            "unit": "N·m" if robot.revolute[i] else "N",
+            "most": abs(value) > 0.999 * float(np.abs(tau).max()) and abs(value) > 5e-3,
+        }
         for i, value in enumerate(tau.tolist())
-    ]  # fmt: skip
+    ]
     where = axis_name(least, R)
     if cost < FREE:
         cheap = f"A force along {where} costs nothing: the structure carries it; no joint moves the tool there."

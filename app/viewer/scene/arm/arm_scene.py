@@ -88,9 +88,13 @@ class ArmScene:
         tool, color = self.body.chain.T_last_tool, self.body.gripper[0].color
         self._drawn = DrawnBody(self._add, self._nodes, f"{root}-target", tool, color)
         self._gap = scene.add_line_segments(
-            f"{root}-gap", np.zeros((1, 2, 3), np.float32), GAP_COLOR, thickness=3.0, thickness_units="screen",
+            f"{root}-gap",
+            np.zeros((1, 2, 3), np.float32),
+            GAP_COLOR,
+            thickness=3.0,
+            thickness_units="screen",
             visible=False,
-        )  # fmt: skip
+        )
         self._contact = ContactMark(scene, f"{root}-contact", self.body)
         self._top += [self.gizmo, self._gap, self._contact.node]
         self._rings: list[viser.TransformControlsHandle] = []

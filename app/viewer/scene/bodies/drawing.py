@@ -99,8 +99,13 @@ def _loft(part: dict[str, Any]) -> _Covered:
     bevel = min(MM * part.get("bevel", 3.0), 0.4 * length)
     heights = (0.0, 0.0, bevel, length - bevel, length, length)
     outlines = (
-        _middle(first), outline(first, bevel), outline(first), outline(last), outline(last, bevel), _middle(last),
-    )  # fmt: skip
+        _middle(first),
+        outline(first, bevel),
+        outline(first),
+        outline(last),
+        outline(last, bevel),
+        _middle(last),
+    )
     rings = [start + z * axis + points @ across for z, points in zip(heights, outlines, strict=True)]
     spheres = [np.column_stack([np.vstack(rings[2:4])[:: DIRECTIONS // RIM], np.zeros(2 * RIM)])]
     half = 0.5 * length

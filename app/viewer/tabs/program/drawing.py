@@ -84,15 +84,23 @@ class Drawing:
 
     def _dot(self, name: str, radius: float, colour: tuple[int, int, int], opacity: float, at: Array) -> None:
         self._scene.add_icosphere(
-            f"{self._root}/{name}", radius * self._size, colour, opacity=opacity, position=at,
-            cast_shadow=False, receive_shadow=False,
-        )  # fmt: skip
+            f"{self._root}/{name}",
+            radius * self._size,
+            colour,
+            opacity=opacity,
+            position=at,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
 
     def _axes(self, name: str, poses: Array, length: float, radius: float) -> None:
         self._scene.add_batched_axes(
-            f"{self._root}/{name}", wxyz_from_rotation(poses[:, :3, :3]), poses[:, :3, 3],
-            axes_length=length * self._size, axes_radius=radius * self._size,
-        )  # fmt: skip
+            f"{self._root}/{name}",
+            wxyz_from_rotation(poses[:, :3, :3]),
+            poses[:, :3, 3],
+            axes_length=length * self._size,
+            axes_radius=radius * self._size,
+        )
 
     def show_path(self, motion: Motion) -> None:
         """Draw the path of the tool. One node for each colour: the browser shows colours of points brighter."""
@@ -134,11 +142,18 @@ class Drawing:
         rows = np.unique(np.linspace(0, len(self._q) - 1, min(len(self._q), GHOSTS)).astype(int))
         positions, wxyz, _ = places(self._robot, self._q[rows])
         self._scene.add_batched_meshes_simple(
-            f"{self._root}/ghosts", vertices, faces, batched_wxyzs=wxyz.reshape(-1, 4).astype(np.float32),
+            f"{self._root}/ghosts",
+            vertices,
+            faces,
+            batched_wxyzs=wxyz.reshape(-1, 4).astype(np.float32),
             batched_positions=positions.reshape(-1, 3).astype(np.float32),
-            batched_scales=np.tile(bones.scales, (len(rows), 1)), batched_colors=GHOST, opacity=0.3, lod="off",
-            cast_shadow=False, receive_shadow=False,
-        )  # fmt: skip
+            batched_scales=np.tile(bones.scales, (len(rows), 1)),
+            batched_colors=GHOST,
+            opacity=0.3,
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
 
     def remove(self) -> None:
         """Remove everything from the scene."""

@@ -8,9 +8,12 @@ from kin import InputError, Robot
 from kin.motion import Motion, Program, parse_program
 
 MOTIONS: dict[str, str] = {
-    "csv-commented": "CSV", "trajectory-yaml": "ROS YAML", "trajectory-json": "ROS JSON", "mcap": "MCAP",
+    "csv-commented": "CSV",
+    "trajectory-yaml": "ROS YAML",
+    "trajectory-json": "ROS JSON",
+    "mcap": "MCAP",
     "urscript": "URScript",
-}  # fmt: skip
+}
 RATE, MOST_SAMPLES = 100.0, 30_000  # samples per second, and in all: a longer motion has fewer per second
 LARGEST = 30_000  # bytes of a file: it comes in one message of the page
 

@@ -310,10 +310,15 @@ def _waypoints(segment: Segment, robot: Robot, motion: Motion, index: int, befor
         found.append(replace(waypoint(robot.clip(before)), kind=kind))
     via = segment.via if isinstance(segment, Circ) else None
     found[-1] = replace(
-        found[-1], via=via, speed=max(segment.speed, SLOWEST), acceleration=max(segment.acceleration, SLOWEST),
-        blend=segment.blend, tool_speed=segment.tool_speed, tool_turn=segment.tool_turn,
+        found[-1],
+        via=via,
+        speed=max(segment.speed, SLOWEST),
+        acceleration=max(segment.acceleration, SLOWEST),
+        blend=segment.blend,
+        tool_speed=segment.tool_speed,
+        tool_turn=segment.tool_turn,
         name=clean(segment.name, NAME),
-    )  # fmt: skip
+    )
     return found
 
 

@@ -80,9 +80,15 @@ def plot_html(motion: Motion, joint: int | None, units: Units, other: Motion | N
     ]
     left, right = 100 * LEFT / WIDTH, 100 * (WIDTH - RIGHT) / WIDTH
     return render(
-        "program/plot", svg=svg, joints=joints, all=joint is None, left=left, right=right, span=f"{span:.6f}",
+        "program/plot",
+        svg=svg,
+        joints=joints,
+        all=joint is None,
+        left=left,
+        right=right,
+        span=f"{span:.6f}",
         dashed=other is not None,
-    )  # fmt: skip
+    )
 
 
 def _extremes(title: str, panel: int, courses: Sequence[Course]) -> str:

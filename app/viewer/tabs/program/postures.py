@@ -28,9 +28,13 @@ from kin.units import Units, typeset
 PLACES = 80  # along the way
 WIDTH, LEFT, RIGHT, ROW, GAP, TOP, BOTTOM = 320.0, 18.0, 4.0, 15.0, 4.0, 4.0, 18.0
 LEGEND: dict[State, str] = {
-    "free": "free", "near limit": "near a limit", "near singularity": "near a singularity",
-    "outside": "outside the limits", "touches": "touches something", "none": "no such posture",
-}  # fmt: skip
+    "free": "free",
+    "near limit": "near a limit",
+    "near singularity": "near a singularity",
+    "outside": "outside the limits",
+    "touches": "touches something",
+    "none": "no such posture",
+}
 
 
 @dataclass
@@ -74,9 +78,10 @@ def compute(chart: Chart) -> None:
         chart.words = "There is no way to show: the program ends before this waypoint, or it has no length."
         return
     options = IKOptions(
-        task=kin.motion.task_of(plan.motion.program, plan.motion.robot), avoid_self_collision=avoid,
+        task=kin.motion.task_of(plan.motion.program, plan.motion.robot),
+        avoid_self_collision=avoid,
         obstacles=chart.arm.obstacles if avoid else (),
-    )  # fmt: skip
+    )
     chart.found = kin.path_postures(plan.motion.robot, poses, options=options, q_start=before, stop=chart.check)
 
 
@@ -115,9 +120,12 @@ def _row(found: PathPostures, row: int, units: Units) -> dict[str, object]:
         reason = typeset(found.reasons.get((reach + 1, row), Reason()).explain(units))
         text = f"to {100.0 * reach / max(last, 1):.0f} %" + (f": {reason}" if reason else "")
     return {
-        "name": short(found.postures[row]), "text": text, "can": reach >= 0, "row": row,
+        "name": short(found.postures[row]),
+        "text": text,
+        "can": reach >= 0,
+        "row": row,
         "best": int(found.rows[0]) == row,
-    }  # fmt: skip
+    }
 
 
 def _svg(found: PathPostures, index: int, units: Units) -> Markup:

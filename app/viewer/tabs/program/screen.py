@@ -120,10 +120,16 @@ class Screen:
         self._show(
             "files",
             render(
-                "program/files", any=any_items, most=f"{LARGEST // 1000} kB", bytes=LARGEST, code=code,
-                languages=list(SNIPPETS), language=self.language, motions=MOTIONS if motion is not None else {},
+                "program/files",
+                any=any_items,
+                most=f"{LARGEST // 1000} kB",
+                bytes=LARGEST,
+                code=code,
+                languages=list(SNIPPETS),
+                language=self.language,
+                motions=MOTIONS if motion is not None else {},
             ),
-        )  # fmt: skip
+        )
 
     def draw(self, items: Items, plan: Plan | None, fault: Fault | None, loop: bool, other: Motion | None) -> None:
         """Draw the program in the scene, if it is another one than before."""

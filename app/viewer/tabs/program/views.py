@@ -69,9 +69,15 @@ def clock(player: Player, duration: float, here: int | None) -> str:
 
 
 def items_html(
-    items: Items, chosen: int | None, plan: Plan | None, fault: Fault | None, loop: bool, fields: Fields,
-    by_pose: bool, revision: int,
-) -> str:  # fmt: skip
+    items: Items,
+    chosen: int | None,
+    plan: Plan | None,
+    fault: Fault | None,
+    loop: bool,
+    fields: Fields,
+    by_pose: bool,
+    revision: int,
+) -> str:
     """The list; the chosen item is open. `by_pose`: its values are those of the tool, not of the joints."""
     first = start_of(items)
     ends = plan.ends if plan is not None else ()

@@ -121,9 +121,16 @@ def compute(search: Search, settings: Settings, report: Callable[[], None]) -> N
 
         itself = bool(arm.robot.capsules)
         way = find_way(
-            arm.robot, start, item.q, obstacles=arm.obstacles, avoid_self_collision=itself, seed=settings.seed,
-            time_limit=settings.seconds, progress=progress, stop=stop,
-        )  # fmt: skip
+            arm.robot,
+            start,
+            item.q,
+            obstacles=arm.obstacles,
+            avoid_self_collision=itself,
+            seed=settings.seed,
+            time_limit=settings.seconds,
+            progress=progress,
+            stop=stop,
+        )
         if way.q is None:
             search.explain = way.explain
             return
@@ -133,11 +140,15 @@ def compute(search: Search, settings: Settings, report: Callable[[], None]) -> N
         search.title, search.explain = "The way that was found cannot be driven", motion.explain
         return
     between = [
-        Item("ptp", configuration(np.array(segment.target.q)), blend=segment.blend,
-             **{name: getattr(item, name) for name in _KEPT})
+        Item(
+            "ptp",
+            configuration(np.array(segment.target.q)),
+            blend=segment.blend,
+            **{name: getattr(item, name) for name in _KEPT},
+        )
         for segment in motion.program.segments[:-1]
         if isinstance(segment, Ptp) and isinstance(segment.target, JointTarget)
-    ]  # fmt: skip
+    ]
     search.found, search.count = with_way(items, before, search.index, between), len(between)
 
 

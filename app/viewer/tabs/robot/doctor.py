@@ -159,7 +159,14 @@ class Doctor:
         if found.refusal:
             colour, symbol = "kb-vermilion", "✕"
         return render(
-            "robot/doctor", file=found.file, words=outcome(found), colour=colour, symbol=symbol, read=found.read,
-            refusal=found.refusal, groups=groups, mends=found.mends if found.mended is not None else 0,
+            "robot/doctor",
+            file=found.file,
+            words=outcome(found),
+            colour=colour,
+            symbol=symbol,
+            read=found.read,
+            refusal=found.refusal,
+            groups=groups,
+            mends=found.mends if found.mended is not None else 0,
             mendable=found.mendable,
-        )  # fmt: skip
+        )

@@ -132,9 +132,12 @@ class CloudView:
     def _requested(self) -> Cloud:
         """The cloud that settings and locks describe."""
         return Cloud(
-            self._stage.now.robot, self.settings.n, self.settings.seed, self.settings.strategy,
+            self._stage.now.robot,
+            self.settings.n,
+            self.settings.seed,
+            self.settings.strategy,
             constraints=self._stage.now.options.constraints,
-        )  # fmt: skip
+        )
 
     def _is_shown(self, cloud: Cloud) -> bool:
         """Whether this cloud is in the scene, regardless of its measures."""

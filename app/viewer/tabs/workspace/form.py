@@ -47,16 +47,19 @@ def form(
         Html(str, (said.legend,), key="legend"),
         Control("size", spec=sizes, label=f"Point size ({unit.name})"),
         Folder("Cut open", closed),
-        Folder("Look closer", [
-            Control("clicks"),
-            Html(str, (said.picked,), key="picked"),
-            Control("compare", spec=spec("compare").narrowed(names)),
-            Control("section"),
-            Control("axes"),
-            Control("sizes"),
-            Html(str, (said.sizes,), key="sizes"),
-        ]),
-    ]  # fmt: skip
+        Folder(
+            "Look closer",
+            [
+                Control("clicks"),
+                Html(str, (said.picked,), key="picked"),
+                Control("compare", spec=spec("compare").narrowed(names)),
+                Control("section"),
+                Control("axes"),
+                Control("sizes"),
+                Html(str, (said.sizes,), key="sizes"),
+            ],
+        ),
+    ]
 
 
 def cloud(settings: WorkspaceSettings, said: Said, actions: Mapping[str, Event]) -> list[Node]:

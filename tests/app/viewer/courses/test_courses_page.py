@@ -322,8 +322,9 @@ def test_a_teacher_makes_a_course(server: int) -> None:
         tab.wait(lambda: "mine.toml is saved" in shown(tab))
     made = parse_course(
         'title = "Mine"\nanswers = false\n[[item]]\nlesson = "dh"\nnote = "Read this"\n'
-        '[[item]]\nexercise = "two-elbows"\ntitle = "Both of them"', ALL
-    )  # fmt: skip
+        '[[item]]\nexercise = "two-elbows"\ntitle = "Both of them"',
+        ALL,
+    )
     assert decode(link[1], builtin_list()).features == {"course": {"course": to_data(made)}}
     with FakeBrowser(server, memory=opened({"course": {}})) as tab:
         tab.wait(lambda: bool(block(tab, "choose")))

@@ -55,13 +55,41 @@ STATES: dict[str, list[dict[str, object]]] = {
     ],
     # All entries, as in every link: those that are missing or invalid stay as they are now.
     "numeric": [
-        {"method": "transpose", "damping": 0.2, "gain": 0.5, "longest": 0.3, "limits": True, "match": "point",
-         "start": None, "at": None, "compare": False, "picture": False},
+        {
+            "method": "transpose",
+            "damping": 0.2,
+            "gain": 0.5,
+            "longest": 0.3,
+            "limits": True,
+            "match": "point",
+            "start": None,
+            "at": None,
+            "compare": False,
+            "picture": False,
+        },
         {"method": "damped", "compare": True, "at": 2, "picture": True, "start": None},
-        {"method": "guess", "damping": 99, "gain": "1", "longest": -1, "match": 3, "target": [1], "start": None,
-         "at": None, "compare": False, "picture": False},
-        {"method": "newton", "limits": False, "longest": math.pi, "match": "pose", "start": None, "at": None,
-         "compare": True, "picture": False},
+        {
+            "method": "guess",
+            "damping": 99,
+            "gain": "1",
+            "longest": -1,
+            "match": 3,
+            "target": [1],
+            "start": None,
+            "at": None,
+            "compare": False,
+            "picture": False,
+        },
+        {
+            "method": "newton",
+            "limits": False,
+            "longest": math.pi,
+            "match": "pose",
+            "start": None,
+            "at": None,
+            "compare": True,
+            "picture": False,
+        },
     ],
     "postures": [
         {"ghosts": False, "cone": True, "hidden": []},
@@ -80,8 +108,13 @@ STATES: dict[str, list[dict[str, object]]] = {
         {"at": 9, "symbols": False, "compare": True, "speed": "Half", "lines": True, "assign": None},
         {"at": True, "symbols": 1, "compare": False, "speed": ["x"], "lines": "yes"},
         {"at": 1e9, "compare": False, "assign": {"base": [], "rows": [], "made": {}}},
-        {"assign": {"base": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
-                    "rows": [[0.1, 0.2, 0.3, 0.4], [0, 1e9, 0, 0]], "made": {"axis": 1, "x": True}}},
+        {
+            "assign": {
+                "base": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
+                "rows": [[0.1, 0.2, 0.3, 0.4], [0, 1e9, 0, 0]],
+                "made": {"axis": 1, "x": True},
+            }
+        },
         {"assign": {"base": [1, 2], "rows": 3, "made": {"axis": 99}}},
         {"at": 4, "assign": None, "lines": True},
     ],
@@ -94,7 +127,7 @@ STATES: dict[str, list[dict[str, object]]] = {
         {"q": [0.3, 0.8], "signs": [-1], "all": True},
         {"q": [0.2] * 5, "signs": [-1, 1, 1], "all": True},
     ],
-}  # fmt: skip
+}
 
 
 def record(key: str) -> dict[str, Any]:

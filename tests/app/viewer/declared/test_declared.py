@@ -205,8 +205,13 @@ def test_the_panel_shows_what_is_declared_and_controls_survive(page: BarePage) -
     toy = page.open(Toy)
     first = handles(page)
     assert [item.get("label", item["kind"]) for item in page.panel()] == [
-        "Frame", "Amounts", "GuiHtmlHandle", "Add", "Go", "GuiProgressBarHandle",
-    ]  # fmt: skip
+        "Frame",
+        "Amounts",
+        "GuiHtmlHandle",
+        "Add",
+        "Go",
+        "GuiProgressBarHandle",
+    ]
     assert page.panel()[4]["options"] == ["a"]
     page.set("Step, mm", 12.5)
     page.rest()
@@ -294,8 +299,12 @@ def test_undo_names_and_links(page: BarePage) -> None:
     assert toy.step_name(("at", "force.on", 3)) == "Force"
     assert toy.step_name(("at", "step", 3)) == "Toy"
     assert toy.state() == {
-        "frame": "base", "step": 0.005, "count": 6, "joint": 0, "force": {"on": False, "parts": [1.0, 2.0]},
-    }  # fmt: skip
+        "frame": "base",
+        "step": 0.005,
+        "count": 6,
+        "joint": 0,
+        "force": {"on": False, "parts": [1.0, 2.0]},
+    }
     toy.restore({"frame": "world", "joint": 3, "force": {"on": True, "parts": [9.0, 1.0]}, "step": "far"})
     assert toy.state() == {**toy.state(), "frame": "base", "joint": 3, "force": {"on": True, "parts": [1.0, 2.0]}}
     page.change(STORE.get("scara"))

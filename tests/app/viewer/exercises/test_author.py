@@ -124,7 +124,7 @@ def test_hostile_messages_and_files_change_nothing(server: int) -> None:
             (["upload", 8], ["a.toml", "x" * (MOST_BYTES + 1)]),
             (["upload", 9], ["a.toml", "id = 1"]),
             (["upload", 10], ["a.toml", "[" * 5000]),
-        ):  # fmt: skip
+        ):
             press(tab, key, value)
         press(tab, ["set", "title", 11], "Still here")
         tab.wait(lambda: 'value="Still here"' in tab.html)

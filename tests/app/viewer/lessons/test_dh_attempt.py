@@ -196,10 +196,16 @@ def test_back_undoes_one_step_at_a_time(robot: kin.Robot) -> None:
 @pytest.mark.parametrize(
     "state",
     [
-        {}, {"base": [1]}, {"base": ["x"] * 16}, {"base": [math.inf] * 16}, {"base": [0.0] * 16},
-        {"rows": [[1, 2, 3, 4]]}, {"made": {"axis": 99, "x": True}}, {"made": {"axis": -1}},
+        {},
+        {"base": [1]},
+        {"base": ["x"] * 16},
+        {"base": [math.inf] * 16},
+        {"base": [0.0] * 16},
+        {"rows": [[1, 2, 3, 4]]},
+        {"made": {"axis": 99, "x": True}},
+        {"made": {"axis": -1}},
     ],
-)  # fmt: skip
+)
 def test_a_hostile_link_starts_at_the_beginning(state: object) -> None:
     assert Attempt.restored(PIONEER, state).state() == begin(PIONEER).state()
 

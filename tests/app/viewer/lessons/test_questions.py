@@ -62,8 +62,10 @@ def number(asked: Choice | Number | None) -> Number:
 def test_only_exact_solutions_are_counted(robot: Robot) -> None:
     T = kin.fk(robot, robot.q_home)
     turned = T.copy()
-    turned[:3, :2] = T[:3, :2] @ [[math.cos(postures.ROLL), -math.sin(postures.ROLL)],
-                                  [math.sin(postures.ROLL), math.cos(postures.ROLL)]]  # fmt: skip
+    turned[:3, :2] = T[:3, :2] @ [
+        [math.cos(postures.ROLL), -math.sin(postures.ROLL)],
+        [math.sin(postures.ROLL), math.cos(postures.ROLL)],
+    ]
     results = [kin.solve_ik(robot, target, q_seed=robot.q_home) for target in (T, turned)]
     known = postures.solved(robot)
     exact = [len(result.solutions) if result.status == "solved" else 0 for result in results]

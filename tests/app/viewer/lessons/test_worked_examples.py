@@ -118,7 +118,9 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
         (
             rf"trace is {N}, the cosine \(trace − 1\)/2 = {N}, and the angle {N}°",
             lambda h, m: [
-                trace := float(np.trace(h.T[:3, :3])), (trace - 1) / 2, math.degrees(math.acos((trace - 1) / 2)),
+                trace := float(np.trace(h.T[:3, :3])),
+                (trace - 1) / 2,
+                math.degrees(math.acos((trace - 1) / 2)),
             ],
         ),
         (rf"about z by their sum, {N}°", lambda h, m: [h.heading]),
@@ -148,8 +150,10 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
         (rf"With θ₂ = {N}°, link 2 is turned by {N}°", lambda h, m: [*h.deg(2), h.heading]),
         (rf"x = a₁ cos θ₁ = {N} mm and y = a₁ sin θ₁ = {N} mm", lambda h, m: h.elbow[:2]),
         (rf"= {N} mm along x, and .* = {N} mm along y", lambda h, m: (h.p - h.elbow)[:2]),
-        (rf"the tool is at x = {N} mm and y = {N} mm|The tool is at x = {N} mm and y = {N} mm",
-         lambda h, m: [*h.p[:2], *h.p[:2]]),
+        (
+            rf"the tool is at x = {N} mm and y = {N} mm|The tool is at x = {N} mm and y = {N} mm",
+            lambda h, m: [*h.p[:2], *h.p[:2]],
+        ),
         (rf"x = a₁ \+ a₂ = {N} mm, and y = {N} mm", lambda h, m: h.p[:2]),
         (rf"x = {N} mm, and y = a₁ \+ a₂ = {N} mm", lambda h, m: h.p[:2]),
     ),
@@ -207,12 +211,23 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
         ),
         (rf"{N}° and {N}°", lambda h, m: h.deg(1, 2)),
     ),
-}  # fmt: skip
+}
 # The numbers that belong to names and formulas.
 ALWAYS = (
-    r"[Jj]oints? \d", r"[Ll]ink \d", r"[Aa]xis \d", r"[Rr]ow \d", r"[Ff]rame \d", r"[Cc]olumn \d", r"1 rad/s",
-    r"3 s² − 2 s³", r"[ωv] = 0\b", r"2 × 2", r"sine is 0", r"cosine 1", r"1\.5 times",
-)  # fmt: skip
+    r"[Jj]oints? \d",
+    r"[Ll]ink \d",
+    r"[Aa]xis \d",
+    r"[Rr]ow \d",
+    r"[Ff]rame \d",
+    r"[Cc]olumn \d",
+    r"1 rad/s",
+    r"3 s² − 2 s³",
+    r"[ωv] = 0\b",
+    r"2 × 2",
+    r"sine is 0",
+    r"cosine 1",
+    r"1\.5 times",
+)
 
 
 @pytest.mark.parametrize("key", KEYS)

@@ -55,9 +55,18 @@ def test_fields_are_changed_one_by_one():
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("x", 1001.0), ("x", math.nan), ("z", math.inf), ("radius", 0.0), ("radius", 101.0), ("yaw", math.nan),
-     ("length", 1.0), ("colour", 1.0), ("roll", 1e9)],
-)  # fmt: skip
+    [
+        ("x", 1001.0),
+        ("x", math.nan),
+        ("z", math.inf),
+        ("radius", 0.0),
+        ("radius", 101.0),
+        ("yaw", math.nan),
+        ("length", 1.0),
+        ("colour", 1.0),
+        ("roll", 1e9),
+    ],
+)
 def test_a_value_that_is_not_valid_is_named(field, value):
     (ball,) = placed.added((), "sphere", UR5, UR5.q_home)
     with pytest.raises(kin.InputError) as caught:
@@ -98,13 +107,32 @@ GOOD = ["b", "box", 0.5, 0, 0.2, 0, 0, 0, 0.1, 0.1, 0.1]
 
 @pytest.mark.parametrize(
     "row",
-    [None, 7, "b", [], ["b"], ["x", *GOOD[1:]], GOOD[:-1], [*GOOD, 1], ["b", "", *GOOD[2:]], ["b", 5, *GOOD[2:]],
-     ["b", "box", math.nan, *GOOD[3:]], ["b", "box", math.inf, *GOOD[3:]], ["b", "box", True, *GOOD[3:]],
-     ["b", "box", "0", *GOOD[3:]], [*GOOD[:-1], 0], [*GOOD[:-1], -1], [*GOOD[:-1], 1e9], [*GOOD[:-1], 10**400],
-     ["b", "box", 2000, *GOOD[3:]], [*GOOD[:5], 1e300, *GOOD[6:]], ["b", "\u202e\u200b", *GOOD[2:]],
-     {"shape": "box"}],
+    [
+        None,
+        7,
+        "b",
+        [],
+        ["b"],
+        ["x", *GOOD[1:]],
+        GOOD[:-1],
+        [*GOOD, 1],
+        ["b", "", *GOOD[2:]],
+        ["b", 5, *GOOD[2:]],
+        ["b", "box", math.nan, *GOOD[3:]],
+        ["b", "box", math.inf, *GOOD[3:]],
+        ["b", "box", True, *GOOD[3:]],
+        ["b", "box", "0", *GOOD[3:]],
+        [*GOOD[:-1], 0],
+        [*GOOD[:-1], -1],
+        [*GOOD[:-1], 1e9],
+        [*GOOD[:-1], 10**400],
+        ["b", "box", 2000, *GOOD[3:]],
+        [*GOOD[:5], 1e300, *GOOD[6:]],
+        ["b", "\u202e\u200b", *GOOD[2:]],
+        {"shape": "box"},
+    ],
     ids=str,
-)  # fmt: skip
+)
 def test_what_is_not_valid_in_a_link_is_left_out(row):
     found = placed.unpack([row, GOOD])
     assert [each.name for each in found] == ["box"]

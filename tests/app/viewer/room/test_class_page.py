@@ -519,9 +519,15 @@ def test_the_wall_sends_one_list_of_poses_for_all(room: Class) -> None:
     assert 1 <= sum("batched_positions" in keys for keys in updates) <= 2
     count = len(teacher.nodes[arm]["props"]["batched_positions"])
     teacher.send(
-        "SceneNodeClickMessage", name=arm, instance_index=count // 3 - 1, ray_origin=(0, 0, 0),
-        ray_direction=(0, 0, 1), screen_pos=(0.5, 0.5), modifier=None, owner=teacher.nodes[arm]["owner"],
-    )  # fmt: skip
+        "SceneNodeClickMessage",
+        name=arm,
+        instance_index=count // 3 - 1,
+        ray_origin=(0, 0, 0),
+        ray_direction=(0, 0, 1),
+        screen_pos=(0.5, 0.5),
+        modifier=None,
+        owner=teacher.nodes[arm]["owner"],
+    )
     teacher.wait(lambda: 'The arm of <span dir="auto">Student 2</span>' in teacher.html)
     teacher.wait(lambda: not any("/wall-" in name for name in teacher.nodes))
     assert teacher.visible[teacher.gizmo] is True

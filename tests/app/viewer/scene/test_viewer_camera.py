@@ -229,9 +229,13 @@ def test_an_address_without_a_camera_has_the_default_view(port: int) -> None:
 def a_camera() -> tuple[SimpleNamespace, camera.VisitorCamera]:
     """The camera of a visitor, and what the browser's is in viser."""
     lens = SimpleNamespace(
-        image_width=956, image_height=720, position=np.ones(3), look_at=np.zeros(3), up_direction=camera.UP,
+        image_width=956,
+        image_height=720,
+        position=np.ones(3),
+        look_at=np.zeros(3),
+        up_direction=camera.UP,
         on_update=lambda act: act,
-    )  # fmt: skip
+    )
     return lens, camera.VisitorCamera(SimpleNamespace(camera=lens), lambda key, value: None)  # type: ignore[arg-type]
 
 

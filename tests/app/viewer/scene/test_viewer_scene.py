@@ -152,9 +152,11 @@ def test_bodies_are_valid_and_above_the_floor(robot: kin.Robot) -> None:
 
 def test_a_hanging_arm_hangs_from_a_ceiling() -> None:
     down = robot_of(
-        "standard", ("1", "revolute", 0, 0.2, 0, 90), ("2", "revolute", 0, 0, 0.3, 0),
+        "standard",
+        ("1", "revolute", 0, 0.2, 0, 90),
+        ("2", "revolute", 0, 0, 0.3, 0),
         extra="[base]\nxyz = [0, 0, 1.5]\nrpy = [180, 0, 0]\n",
-    )  # fmt: skip
+    )
     made = body(down)
     assert made.mount.kind == "ceiling"
     assert not made.mount.stands

@@ -46,7 +46,11 @@ CASES: dict[str, PageState] = {
         lesson="velocity",
         features={
             "velocity": {
-                "frame": "tool", "ellipsoid": "moment", "joint": 3, "step": 0.02, "turn": 0.1,
+                "frame": "tool",
+                "ellipsoid": "moment",
+                "joint": 3,
+                "step": 0.02,
+                "turn": 0.1,
                 "statics": {"on": True, "force": [1.0, -2.0, 3.5]},
             },
             "guide": {"joints": True},
@@ -61,13 +65,20 @@ CASES: dict[str, PageState] = {
         lesson="rotations",
         features={
             "rotations": {
-                "convention": "zyz-moving", "angles": [0.1, 0.2, -0.3], "chained": False, "chain": [],
-                "motion": "Shift along x", "own": False, "turn": 1.0, "shift": -0.3,
+                "convention": "zyz-moving",
+                "angles": [0.1, 0.2, -0.3],
+                "chained": False,
+                "chain": [],
+                "motion": "Shift along x",
+                "own": False,
+                "turn": 1.0,
+                "shift": -0.3,
             }
         },
     ),
     "rotations, a chain": PageState(
-        robot="irb120", lesson="rotations",
+        robot="irb120",
+        lesson="rotations",
         features={"rotations": {"chained": True, "chain": [[True, 2, 0.5, True], [False, 0, 0.25, False]]}},
     ),
     "numeric": PageState(
@@ -75,20 +86,30 @@ CASES: dict[str, PageState] = {
         lesson="numeric",
         features={
             "numeric": {
-                "method": "transpose", "damping": 0.2, "gain": 0.5, "longest": 0.3, "limits": True,
-                "match": "point", "start": [0.5, 0.8], "at": 3, "compare": True, "picture": False,
+                "method": "transpose",
+                "damping": 0.2,
+                "gain": 0.5,
+                "longest": 0.3,
+                "limits": True,
+                "match": "point",
+                "start": [0.5, 0.8],
+                "at": 3,
+                "compare": True,
+                "picture": False,
             }
         },
     ),
     "postures": PageState(
-        robot="ur5", lesson="postures",
+        robot="ur5",
+        lesson="postures",
         features={"postures": {"ghosts": True, "cone": False, "hidden": ["shoulder_left/elbow_up/wrist_flip"]}},
     ),
     "postures of five joints": PageState(
         robot="pioneer5", lesson="postures", features={"postures": {"ghosts": False, "cone": False}}
     ),
     "screws": PageState(
-        robot="scara", lesson="screws",
+        robot="scara",
+        lesson="screws",
         features={"screws": {"form": "body", "axes": "now", "joint": 3, "factors": 2}},
     ),
     "equations": PageState(robot="pioneer5", lesson="equations", features={"equations": {"equation": "3.9"}}),
@@ -104,7 +125,9 @@ CASES: dict[str, PageState] = {
         lesson="inverse",
         features={
             "inverse": {
-                "q": [0.3, 0.2, 0.4, -0.5, 0.6, 0.7], "signs": [-1, -1, 1], "all": False,
+                "q": [0.3, 0.2, 0.4, -0.5, 0.6, 0.7],
+                "signs": [-1, -1, 1],
+                "all": False,
                 "taken": {"2": -2.5},
             },
             "guide": {"step": 2, "given": {"2": -2.5}, "revealed": ["1"]},
@@ -114,11 +137,27 @@ CASES: dict[str, PageState] = {
         robot="irb120",
         features={
             "workspace": {
-                "n": 30000, "strategy": "halton", "seed": 5, "by": "manipulability", "map": "viridis",
-                "size": 0.005, "axis": "x", "at": 0.1, "keep": "above", "compare": "ur5", "sizes": True,
-                "section": True, "axes": True, "clicks": False, "drawn": False,
+                "n": 30000,
+                "strategy": "halton",
+                "seed": 5,
+                "by": "manipulability",
+                "map": "viridis",
+                "size": 0.005,
+                "axis": "x",
+                "at": 0.1,
+                "keep": "above",
+                "compare": "ur5",
+                "sizes": True,
+                "section": True,
+                "axes": True,
+                "clicks": False,
+                "drawn": False,
                 "capability": {
-                    "resolution": 15, "directions": 48, "by": "manipulability", "least": 0.3, "drawn": False,
+                    "resolution": 15,
+                    "directions": 48,
+                    "by": "manipulability",
+                    "least": 0.3,
+                    "drawn": False,
                 },
             }
         },
@@ -132,7 +171,7 @@ CASES: dict[str, PageState] = {
         units=Units(False, "cm"),
         view=ViewState(frames=True, labels=False, axes=False, dark=True, base_axes=True, look="both", avoid=True),
     ),
-}  # fmt: skip
+}
 
 
 def restored(port: int, link: str) -> PageState:
@@ -158,13 +197,17 @@ def described(state: PageState) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(
         json.dumps(
             {
-                "robot": state.robot, "lesson": state.lesson, "task": state.task, "locks": state.locks,
-                "units": [state.units.degrees, state.units.length], "view": vars(state.view),
+                "robot": state.robot,
+                "lesson": state.lesson,
+                "task": state.task,
+                "locks": state.locks,
+                "units": [state.units.degrees, state.units.length],
+                "view": vars(state.view),
                 "q": None if state.q is None else [round(x, 6) for x in state.q.tolist()],
                 "features": state.features,
             }
         )
-    )  # fmt: skip
+    )
     return found
 
 

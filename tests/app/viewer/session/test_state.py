@@ -318,12 +318,20 @@ OWN = {"n": "my <b>", "r": [[0, 100, 50, 90, [-90, 90], "", "one"], [0, 0, 80, 0
 def hostile_states(draw: st.DrawFn) -> str:
     """A link with valid entries, one of which, or a part of one, is replaced by anything."""
     said: dict[str, Any] = {
-        "v": 1, "robot": draw(st.sampled_from(["own", "puma560", "pioneer5"])), "own": copy.deepcopy(OWN),
-        "q": [0.0, 0.0], "features": {"counter": {"count": 3}}, "lesson": "dh", "task": "pose", "length": "cm",
+        "v": 1,
+        "robot": draw(st.sampled_from(["own", "puma560", "pioneer5"])),
+        "own": copy.deepcopy(OWN),
+        "q": [0.0, 0.0],
+        "features": {"counter": {"count": 3}},
+        "lesson": "dh",
+        "task": "pose",
+        "length": "cm",
         "obstacles": [["b", "crate", 0.3, 0, 0.2, 0, 0, 0, 0.1, 0.1, 0.1]],
-        "frames": ["world", ["w", 0, 0, 0, 0, 0, 0]], "view": {},
-        "camera": [1, 1, 1, 0, 0, 0], "locks": [1],
-    }  # fmt: skip
+        "frames": ["world", ["w", 0, 0, 0, 0, 0, 0]],
+        "view": {},
+        "camera": [1, 1, 1, 0, 0, 0],
+        "locks": [1],
+    }
     place, key = said, draw(st.sampled_from(sorted(said)))
     while isinstance(place[key], dict | list) and place[key] and draw(st.booleans()):
         place = place[key]

@@ -51,7 +51,11 @@ def answer(
     searched = not busy and not stopped and found.verdict == "different" and not explanations
     listed = found.differences[1 : 1 + MOST_DIFFERENCES]
     return render(
-        "robot/compared", **facts, found=found, colour=_COLOURS[found.verdict], symbol=_SYMBOLS[found.verdict],
+        "robot/compared",
+        **facts,
+        found=found,
+        colour=_COLOURS[found.verdict],
+        symbol=_SYMBOLS[found.verdict],
         words=messages.verdict(found, a, shown, units, _NAMES),
         within=_proof(found.position, found.rotation, units) if found.is_same else "",
         differences=[messages.difference(each, a, shown, units, _NAMES) for each in listed],
@@ -59,9 +63,11 @@ def answer(
         rows=_rows(found.mapping, a, units) if mapped and found.mapping is not None else (),
         frames=_frames(found.mapping, units) if mapped and found.mapping is not None else (),
         code=Markup(box_html(code(found.mapping, a), "Copy code")) if mapped and found.mapping is not None else "",
-        free=_free(found), explanations=explanations, nothing=_nothing(found) if searched else "",
+        free=_free(found),
+        explanations=explanations,
+        nothing=_nothing(found) if searched else "",
         incomplete=bool(explanations) and not found.complete and not busy,
-    )  # fmt: skip
+    )
 
 
 def joint(found: Comparison, index: int, other: Robot, shown: Robot, units: Units) -> str:
@@ -74,9 +80,13 @@ def joint(found: Comparison, index: int, other: Robot, shown: Robot, units: Unit
     first = found.first is not None and index == max(found.first.joints, default=min(other.n, shown.n))
     names = [robot.joints[index].name for robot in (shown, other) if index < robot.n]
     return render(
-        "robot/compared_joint", number=index + 1, names=" / ".join(dict.fromkeys(names)), differing=differing,
-        first=first, lonely=index >= min(other.n, shown.n),
-    )  # fmt: skip
+        "robot/compared_joint",
+        number=index + 1,
+        names=" / ".join(dict.fromkeys(names)),
+        differing=differing,
+        first=first,
+        lonely=index >= min(other.n, shown.n),
+    )
 
 
 def code(mapping: Mapping, other: Robot) -> str:

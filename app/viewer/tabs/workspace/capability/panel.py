@@ -99,20 +99,24 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
         }
         names = views.buttons(self._state, self._request != self._requested)
         return [
-            Folder("Capability", [
-                Html(_note, (ABOUT,)),
-                Control("resolution"),
-                Control("directions"),
-                Buttons("Map", events, MAP_HINT, names),
-                Progress(round(PERCENT * done / total, 1) if total else 0.0),
-                Html(views.progress, (self._state, done, total)),
-                Control("by"),
-                legend,
-                Control("least"),
-                facts,
-                pick,
-            ], open=False)
-        ]  # fmt: skip
+            Folder(
+                "Capability",
+                [
+                    Html(_note, (ABOUT,)),
+                    Control("resolution"),
+                    Control("directions"),
+                    Buttons("Map", events, MAP_HINT, names),
+                    Progress(round(PERCENT * done / total, 1) if total else 0.0),
+                    Html(views.progress, (self._state, done, total)),
+                    Control("by"),
+                    legend,
+                    Control("least"),
+                    facts,
+                    pick,
+                ],
+                open=False,
+            )
+        ]
 
     @property
     def extent(self) -> Sphere | None:
@@ -256,9 +260,13 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
         # The root identifies the clicked map: a click may come from nodes that are being replaced.
         root = self._new_root()
         self._voxels = Voxels(
-            scene, root, found, self._drawn_as, self.settings.least,
+            scene,
+            root,
+            found,
+            self._drawn_as,
+            self.settings.least,
             lambda level, instance: self.post(("do", self.event(self.on_voxel, root, level, instance), 0, 0)),
-        )  # fmt: skip
+        )
         self._drawn_root = root
         if old is not None:
             old.remove()

@@ -50,6 +50,13 @@ class MapSettings(Settings):
     directions: int = choice("Directions", DIRECTIONS, default_directions, hint=DIRECTIONS_HINT)
     by: By = choice("Voxels show", BY, "share", hint=BY_HINT)
     least: float = number(
-        "Hide voxels below (% of the best)", 0.0, (0.0, 1.0), hint=LEAST_HINT,
-        slider=(0.0, (LEVELS - 1) / LEVELS), scale=100.0, step=100.0 / LEVELS, digits=6, clip=True,
-    )  # fmt: skip
+        "Hide voxels below (% of the best)",
+        0.0,
+        (0.0, 1.0),
+        hint=LEAST_HINT,
+        slider=(0.0, (LEVELS - 1) / LEVELS),
+        scale=100.0,
+        step=100.0 / LEVELS,
+        digits=6,
+        clip=True,
+    )

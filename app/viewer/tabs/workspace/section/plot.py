@@ -25,9 +25,13 @@ WIDTH, TALLEST = 320.0, 500.0
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 12.0, 10.0, 36.0
 CELLS = 112  # along the longer side
 AXES = AxisStyle(
-    tick='stroke="currentColor" stroke-opacity=".18"', label='class="kb-axis"', title='class="kb-axis"',
-    length=4.0, grid=True, across=37.0,
-)  # fmt: skip
+    tick='stroke="currentColor" stroke-opacity=".18"',
+    label='class="kb-axis"',
+    title='class="kb-axis"',
+    length=4.0,
+    grid=True,
+    across=37.0,
+)
 
 
 def frame_of(section: Section) -> Plot:

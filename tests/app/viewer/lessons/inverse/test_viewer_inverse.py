@@ -50,11 +50,17 @@ def pose(seed: int) -> Array:
 
 
 ARMS = [
-    PIONEER, PUMA, ABB, SRS, IIWA, TWO, THREE,
+    PIONEER,
+    PUMA,
+    ABB,
+    SRS,
+    IIWA,
+    TWO,
+    THREE,
     replace(PIONEER.with_base(pose(1)), id="pioneer-base"),
     replace(PUMA.with_base(pose(2)).with_tool(pose(3)), id="puma-tool"),
     replace(SRS.with_tool(pose(4)), id="srs-tool"),
-]  # fmt: skip
+]
 
 
 def of(robot: Robot) -> Arm:
@@ -360,8 +366,10 @@ def test_either_way_is_right_and_named(robot: Robot) -> None:
             assert asked.way_of(way.value) == 1
             assert any(
                 abs(math.remainder(way.value - float(value), 2.0 * math.pi)) < 1e-9
-                for found in derivations.values() for name, value in found.values.items() if name.startswith("θ")
-            )  # fmt: skip
+                for found in derivations.values()
+                for name, value in found.values.items()
+                if name.startswith("θ")
+            )
             split += 1
         for mistake in asked.mistakes:
             assert not asked.judge(mistake.value).right

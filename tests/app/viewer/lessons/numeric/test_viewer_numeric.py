@@ -94,12 +94,17 @@ def test_rows_and_shapes() -> None:
         for problem in [Problem(r, kin.fk(r, r.q_home), match)]  # type: ignore[arg-type]
     }
     assert shapes == {
-        ("planar2r", "point"): (2, True), ("planar2r", "pose"): (3, True),
-        ("pioneer5", "point"): (3, False), ("pioneer5", "pose"): (6, True),
-        ("scara", "point"): (3, False), ("scara", "pose"): (4, True),
-        ("ur5", "point"): (3, False), ("ur5", "pose"): (6, True),
-        ("panda", "point"): (3, False), ("panda", "pose"): (6, False),
-    }  # fmt: skip
+        ("planar2r", "point"): (2, True),
+        ("planar2r", "pose"): (3, True),
+        ("pioneer5", "point"): (3, False),
+        ("pioneer5", "pose"): (6, True),
+        ("scara", "point"): (3, False),
+        ("scara", "pose"): (4, True),
+        ("ur5", "point"): (3, False),
+        ("ur5", "pose"): (6, True),
+        ("panda", "point"): (3, False),
+        ("panda", "pose"): (6, False),
+    }
     lifted = point(1.0, 0.5).T.copy()
     lifted[2, 3] = 0.1
     assert Problem(PLANAR, lifted, "point").rows.tolist() == [0, 1, 2], (

@@ -79,16 +79,19 @@ names = st.text(max_size=60)
         st.one_of(
             st.builds(
                 lambda name, speed: Item("ptp", ITEMS[1].q, round(speed, 3), name=clean(name, lists.NAME)),
-                names, st.floats(0.01, 1.0),
+                names,
+                st.floats(0.01, 1.0),
             ),
             st.builds(
                 lambda name, seconds: Item("pause", seconds=seconds, name=clean(name, lists.NAME)),
-                names, st.floats(0.0, 3600.0),
+                names,
+                st.floats(0.0, 3600.0),
             ),
         ),
-        min_size=1, max_size=8,
+        min_size=1,
+        max_size=8,
     )
-)  # fmt: skip
+)
 def test_a_link_keeps_the_list(found: list[Item]) -> None:
     packed = json.loads(json.dumps(pack(tuple(found))))
     assert unpack(packed, PIONEER) == tuple(found)
@@ -100,15 +103,35 @@ ROW = ["p", [0, 0, 0, 0, 0]]
 @pytest.mark.parametrize(
     "value",
     [
-        None, {}, [], [1], [["p"]], [["p", [0, 0]]], [["p", [0, 0, 0, 0, True]]], [["p", [0, 0, 0, 0, "1"]]],
-        [["p", [0, 0, 0, 0, float("nan")]]], [["p", [0, 0, 0, 0, 1e9]]], [[*ROW, 5]], [[*ROW, "", 0]],
-        [[*ROW, "", 2]], [[*ROW, "", 1, 1]], [[*ROW, "", 1, {"x": 1}]], [[*ROW, "", 1, {"a": 0}]],
+        None,
+        {},
+        [],
+        [1],
+        [["p"]],
+        [["p", [0, 0]]],
+        [["p", [0, 0, 0, 0, True]]],
+        [["p", [0, 0, 0, 0, "1"]]],
+        [["p", [0, 0, 0, 0, float("nan")]]],
+        [["p", [0, 0, 0, 0, 1e9]]],
+        [[*ROW, 5]],
+        [[*ROW, "", 0]],
+        [[*ROW, "", 2]],
+        [[*ROW, "", 1, 1]],
+        [[*ROW, "", 1, {"x": 1}]],
+        [[*ROW, "", 1, {"a": 0}]],
         [[*ROW, "", 1, {"o": [1, 2]}]],
-        [["c", *ROW[1:]]], [[*ROW, "", 1, {}, 1]], [[*ROW, "", 1, {"b": "1"}]],
-        [["w", -1]], [["w", 1e9]], [["w", True]], [["w", 1, 2]], [["x", 1]],
-        [ROW] * (lists.MOST + 1), [ROW, ["w"]],
+        [["c", *ROW[1:]]],
+        [[*ROW, "", 1, {}, 1]],
+        [[*ROW, "", 1, {"b": "1"}]],
+        [["w", -1]],
+        [["w", 1e9]],
+        [["w", True]],
+        [["w", 1, 2]],
+        [["x", 1]],
+        [ROW] * (lists.MOST + 1),
+        [ROW, ["w"]],
     ],
-)  # fmt: skip
+)
 def test_what_is_no_list_is_ignored(value: object) -> None:
     assert unpack(value, PIONEER) is None
     assert unpack([ROW], PIONEER) is not None
@@ -129,13 +152,18 @@ FIELDS = Fields(PIONEER, DEFAULT_UNITS, np.eye(4), "approach")
 @pytest.mark.parametrize(
     ("field", "text", "expected"),
     [
-        ("speed", " 50 % ", {"speed": 0.5}), ("acceleration", "25", {"acceleration": 0.25}),
-        ("blend", "20", {"blend": 0.02}), ("blend", "2 cm", {"blend": 0.02}), ("blend", "", {"blend": 0.0}),
-        ("tool_speed", "250 mm/s", {"tool_speed": 0.25}), ("tool_speed", " ", {"tool_speed": None}),
-        ("tool_turn", "180", {"tool_turn": np.pi}), ("name", "a\nb" + "x" * 100, {"name": "a b" + "x" * 36 + "…"}),
+        ("speed", " 50 % ", {"speed": 0.5}),
+        ("acceleration", "25", {"acceleration": 0.25}),
+        ("blend", "20", {"blend": 0.02}),
+        ("blend", "2 cm", {"blend": 0.02}),
+        ("blend", "", {"blend": 0.0}),
+        ("tool_speed", "250 mm/s", {"tool_speed": 0.25}),
+        ("tool_speed", " ", {"tool_speed": None}),
+        ("tool_turn", "180", {"tool_turn": np.pi}),
+        ("name", "a\nb" + "x" * 100, {"name": "a b" + "x" * 36 + "…"}),
         ("via", "100, 0, 250.5", {"via": (0.1, 0.0, 0.2505)}),
     ],
-)  # fmt: skip
+)
 def test_typed_values(field: str, text: str, expected: dict[str, object]) -> None:
     ((name, value),) = expected.items()
     assert FIELDS.read(field, text, ITEMS[0])[name] == (value if isinstance(value, str) else pytest.approx(value))
@@ -155,11 +183,24 @@ def test_typed_joint_values_and_poses_are_exact() -> None:
 @pytest.mark.parametrize(
     ("field", "text"),
     [
-        ("speed", "0"), ("speed", "101"), ("speed", "nan"), ("seconds", "-1"), ("seconds", "x"), ("blend", "-1"),
-        ("q0", "1000"), ("q0", ""), ("position", "1 2"), ("position", "9000 0 0"), ("via", "a b c"),
-        ("tool_speed", "x"), ("tool_speed", "0"), ("tool_turn", "0"), ("tool_speed", "inf"), ("acceleration", "0"),
+        ("speed", "0"),
+        ("speed", "101"),
+        ("speed", "nan"),
+        ("seconds", "-1"),
+        ("seconds", "x"),
+        ("blend", "-1"),
+        ("q0", "1000"),
+        ("q0", ""),
+        ("position", "1 2"),
+        ("position", "9000 0 0"),
+        ("via", "a b c"),
+        ("tool_speed", "x"),
+        ("tool_speed", "0"),
+        ("tool_turn", "0"),
+        ("tool_speed", "inf"),
+        ("acceleration", "0"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_read_is_refused(field: str, text: str) -> None:
     with pytest.raises(EntryError):
         FIELDS.read(field, text, ITEMS[0])

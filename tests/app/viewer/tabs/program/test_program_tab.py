@@ -473,8 +473,11 @@ def test_an_arc_has_a_via_point_and_a_spline_its_points(tab: FakeBrowser) -> Non
     for field, text in (("acceleration", "50"), ("blend", "15"), ("tool_speed", "120"), ("tool_turn", "90")):
         press(tab, "field", 2, value=[field, text])
     assert [inputs(tab)[name] for name in ("acceleration", "blend", "tool_speed", "tool_turn")] == [
-        "50", "15", "120", "90",
-    ]  # fmt: skip
+        "50",
+        "15",
+        "120",
+        "90",
+    ]
     press(tab, "via", 2)  # where the tool is: at the waypoint itself
     assert "Segment 3 (CIRC) cannot be driven" in part(tab, "list")
     for index in (1, 2):
