@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 
-from app.shared import notes
+from app.shared import throttled_log
 from app.shared.throttled_log import ThrottledLog
 
 
 def test_each_kind_is_logged_at_once_and_then_counted(monkeypatch, caplog):
-    monkeypatch.setattr(notes, "LOG_EVERY", 0.1)
+    monkeypatch.setattr(throttled_log, "LOG_EVERY", 0.1)
 
     async def noted() -> None:
         some = ThrottledLog(logging.getLogger("some"))
