@@ -88,9 +88,7 @@ class SixJoints:
         exact = np.full_like(q, math.nan)
         for place, apart in zip(np.flatnonzero(there).tolist(), nearest, strict=True):
             exact[place] = rows[int(apart.argmin())]
-        for i in np.flatnonzero(there)[1:].tolist():
-            if (_apart(exact[:i][there[:i]], exact[i]) < _SAME).any():
-                exact[i], there[i] = math.nan, False
+        exact, there = _each_once(exact, there)
         return self._in_rows(exact, there, rows), "agreed"
 
     def _by_continuation(self, T: Array, exact: Array, starts: Array, q: Array) -> tuple[Array, Completeness]:
@@ -113,6 +111,7 @@ class SixJoints:
         self, T: Array, starts: Array, q: Array, there: Flags, doubtful: Flags
     ) -> tuple[Array, Completeness]:
         """`completed` by a search around the postures that are not regular: the flags are ``(k,)``."""
+        q, there = self._polished(T, q, there)
         known = np.ascontiguousarray(q[there])
         rows = starts[doubtful]
         sigma, vectors = self._weak(rows)
@@ -127,8 +126,8 @@ class SixJoints:
             sets.append(self._without_curves(T, np.concatenate([known, ends]))[0])
         found, curves = self._without_curves(T, np.concatenate([known, *sets]))
         agreed = len(found) == len(sets[0]) == len(sets[1]) <= len(q) and not flat.any()
-        # As many as the family has at most: what stalled is none.
-        agreed &= not stalled or len(found) + curves == len(q)
+        # As many as the family has at most: what stalled is none. With fewer, both sets may have missed a pair.
+        agreed &= len(found) + curves == len(q)
         apart = bool((self._weak(found)[0][:, 0] > _DOUBLE).all())
         even = curves > 0 or (len(found) % 2 == 0 and apart)
         return self._in_rows(q, there, found), "agreed" if agreed and even and len(found) else "unknown"
@@ -153,6 +152,15 @@ class SixJoints:
         # Near a fold the error of a posture is far larger than that of its pose: only exact ones can be compared.
         exact, _ = self._newton(T, _unique(rows[errors < _MET]))
         return np.concatenate([exact, ends[met], others[reached]]), doubt
+
+    def _polished(self, T: Array, q: Array, there: Flags) -> tuple[Array, Flags]:
+        """The rows q ``(k, 6)`` on the target to the last digit, each posture once, and which are there.
+
+        Beside a fold a pose met to 1e-10 leaves its posture uncertain by far more, so one could be counted twice.
+        """
+        out = q.copy()
+        out[there] = self._newton(T, q[there])[0]
+        return _each_once(out, there)
 
     def _errors(self, T: Array, q: Array) -> Array:
         """Twists ``(k, 6)`` that would bring the tool from where it is onto the target, lengths in arm sizes."""
@@ -216,6 +224,15 @@ class SixJoints:
 def _apart(a: Array, b: Array) -> Array:
     """The largest joint difference ``(k,)``, whole turns aside."""
     return np.asarray(np.abs((a - b + math.pi) % TURN - math.pi).max(axis=1, initial=0.0))
+
+
+def _each_once(q: Array, there: Flags) -> tuple[Array, Flags]:
+    """The rows ``(k, 6)`` that are there, of equal ones the first; the others are NaN."""
+    out, kept = q.copy(), there.copy()
+    for i in np.flatnonzero(there)[1:].tolist():
+        if (_apart(out[:i][kept[:i]], out[i]) < _SAME).any():
+            out[i], kept[i] = math.nan, False
+    return out, kept
 
 
 def _unique(rows: Array) -> Array:

@@ -136,6 +136,16 @@ def apart(a, b):
     return np.abs((a - b + PI) % (2 * PI) - PI).max(axis=-1)
 
 
+MET_TWICE = (
+    1.719082170075926,
+    -0.1362125421475775,
+    1.6311147063700666,
+    0.6461103606158805,
+    -0.017528527194711874,
+    -2.118604786682431,
+)
+
+
 def candidates(robot, T, seed):
     """The configurations that the solver finds, and what it says of them."""
     form, wide = closed_form_of(robot), np.full(6, 1e6)
@@ -250,6 +260,17 @@ def test_doubt_about_targets_of_a_rounded_puma_is_settled(place):
     found, known = candidates(PUMA, kin.fk(PUMA, q), np.zeros(6))
     assert (len(found), known) == (8, "agreed")
     assert apart(found, q).min() < 1e-6
+
+
+def test_a_posture_that_is_met_twice_beside_a_fold_is_counted_once():
+    """Two such pairs filled the rows of the family, and the posture itself had none."""
+    robot = next(each for each in FAMILIES if each.id == "puma560-1.5708")
+    q = np.array(MET_TWICE)
+    found, known = candidates(robot, kin.fk(robot, q), q)
+    assert known == "agreed"
+    assert len(found) == 8
+    assert apart(found, q).min() < 1e-9
+    assert min(apart(np.delete(found, i, axis=0), row).min() for i, row in enumerate(found)) > 1e-3
 
 
 def test_postures_that_nothing_certifies_are_listed_all_the_same():
