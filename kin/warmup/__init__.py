@@ -5,7 +5,7 @@ ready once the arm that a page shows first can be moved (`warm_up_first`). The r
 compiled while the first visitors are served, those of that arm first (`warm_up_rest`). They come in named `parts`,
 which can be taken in any order, each in small steps.
 
-The array-level call (:mod:`kin.ik.batch`) is not part of a service: its kernels are compiled on first use. Kernels
+The array-level call `kin.ik_branches` is not part of a service: its kernels are compiled on first use. Kernels
 belong to solver families, not to arms, so one arm of each family is enough.
 """
 
@@ -26,8 +26,10 @@ from kin.collision.sweep import touches_along
 from kin.differential.task import Task
 from kin.files import classic_robots
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
-from kin.ik import solve_ik
+from kin.ik import IKOptions, solve_ik
+from kin.ik.batch import solve_ik_many
 from kin.ik.candidates import unchecked
+from kin.ik.table import Table
 from kin.kernels.cache import is_cached
 from kin.kernels.fk import fk_one
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion
@@ -194,7 +196,13 @@ def _calls(robot: Robot) -> list[Step]:
         fk_positions(robot, q)
         _ = solve_ik(robot, target(), task="position").redundancy
 
+    def lists() -> None:
+        for task in TASKS:
+            solve_ik_many(robot, fk(robot, pair), task=task)
+            Table.of(robot, fk(robot, pair), IKOptions(task=task))
+
     return [
+        lists,
         lambda: solve_ik(robot, target(10.0), task="pose"),  # the first visitor may well drag it out of reach
         positions,
         lambda: solve_ik(robot, target(), task="position", prefer="limits"),

@@ -14,7 +14,9 @@ PROGRAM = """
 import sys
 sys.path.insert(0, "tests")
 import kin
+import numpy as np
 from arms import random_arms
+from kin.ik.table import Table
 from numba.core.dispatcher import Dispatcher
 
 def compilations():
@@ -30,6 +32,8 @@ for robot in kin.classic_robots().values():
     T = kin.fk(robot, robot.home)
     kin.jacobian(robot, robot.home)
     for task in ("pose", "approach", "position"):
+        kin.solve_ik_many(robot, [T, T], task=task)
+        Table.of(robot, np.array([T, T]), kin.IKOptions(task=task))
         for prefer in ("nearest", "limits", "manipulability"):
             kin.solve_ik(robot, T, task=task, prefer=prefer)
             if robot.n > 6:
