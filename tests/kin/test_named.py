@@ -12,6 +12,9 @@ from kin import InputError, UnknownRobotError
 
 UR5 = kin.get_robot("ur5")
 T = kin.fk(UR5, UR5.q_home)
+SO101 = kin.get_robot("so101")
+POSES = np.array([SO101.q_home, SO101.q_home + 0.5])
+PAN = {"id": 1, "drive_mode": 0, "homing_offset": -12, "range_min": 740, "range_max": 3331}
 # The arguments after the robot of every public function that takes one.
 CALLS = {
     "branch_meanings": (),
@@ -50,6 +53,14 @@ CALLS = {
     "workspace_facts": (),
     "workspace_slice": (8, 0, 8),
 }
+# The same of those that take an arm with motors.
+OF_MOTORS = {
+    "match_motors": (POSES, kin.readings_of_q(SO101, POSES)),
+    "match_poses": (2,),
+    "motors_from_lerobot": ({"shoulder_pan": PAN},),
+    "q_of_readings": (kin.readings_of_q(SO101, POSES),),
+    "readings_of_q": (POSES,),
+}
 MORE = {
     "capability_grid": {"resolution": 4, "directions": 12},
     "capability_map": {"resolution": 2, "directions": 12},
@@ -62,12 +73,12 @@ def test_the_table_names_every_function_that_takes_a_robot():
     functions = {name: value for name, value in vars(kin).items() if inspect.isfunction(value)}
     first = {name: next(iter(inspect.signature(value).parameters), "") for name, value in functions.items()}
     taking = {name for name, parameter in first.items() if parameter == "robot"}
-    # `show` starts a service, which finds the robot.
-    assert taking & set(kin.__all__) == {*CALLS, "show"}
+    # `show` and `save_page` ask the service, which finds the robot; no built-in arm has a calibration to write.
+    assert taking & set(kin.__all__) == {*CALLS, *OF_MOTORS, "show", "save_page", "motors_to_lerobot"}
 
 
 def found(name, robot, tmp_path):
-    arguments = CALLS[name]
+    arguments = CALLS.get(name) or OF_MOTORS.get(name, ())
     if name == "save_robot":
         arguments = (tmp_path / "robot.toml",)
     result = getattr(kin, name)(robot, *arguments, **MORE.get(name, {}))
@@ -83,9 +94,17 @@ def test_show_refuses_what_is_no_robot_before_it_starts_a_service():
         kin.show(5)
 
 
-@pytest.mark.parametrize("name", CALLS)
+def test_a_saved_page_is_of_a_robot(tmp_path):
+    page, same = (kin.save_page(robot, tmp_path / "page.html").read_text("utf-8") for robot in ("ur5", UR5))
+    assert page == same
+    with pytest.raises(UnknownRobotError, match="ur6"):
+        kin.save_page("ur6", tmp_path / "page.html")
+
+
+@pytest.mark.parametrize("name", [*CALLS, *OF_MOTORS])
 def test_the_id_of_a_robot_is_as_good_as_the_robot(name, tmp_path):
-    assert found(name, "ur5", tmp_path) == found(name, UR5, tmp_path)
+    robot = SO101 if name in OF_MOTORS else UR5
+    assert found(name, robot.id, tmp_path) == found(name, robot, tmp_path)
     with pytest.raises(UnknownRobotError, match="ur6"):
         found(name, "ur6", tmp_path)
     with pytest.raises(InputError, match=r"^robot: got 5, expected a Robot"):

@@ -14,6 +14,7 @@ from app.exercises.expressions import Expression, Function
 from app.exercises.fields import ExerciseFileError
 from app.exercises.lesson_text import BarText, LessonText, QuestionText, StepText, lesson_files, load_lesson
 from app.exercises.variant import Quantity, Variant
+from app.exercises.worked import WorkedText
 from app.viewer.lessons.guide.outline import Bar, Drawn, Outline, Pose, Question, Step
 from kin import Robot, fk
 from kin.units import Units
@@ -44,6 +45,11 @@ class LessonFacts:
 def texts_of(lesson: str) -> LessonText:
     """The texts of a lesson."""
     return load_lesson(lesson_files()[lesson])
+
+
+def written_example(lesson: str) -> WorkedText | None:
+    """The worked example of a lesson; None of one that has no file."""
+    return texts_of(lesson).example if lesson in lesson_files() else None
 
 
 def outline_of(lesson: str, robot: Robot, units: Units, facts: LessonFacts) -> Outline:

@@ -28,9 +28,13 @@ PLAY, NEXT, BACK = 0, 1, -1  # what the buttons send
 
 
 class ExampleView:
-    """The example of one lesson. Its control is made in the container that is open."""
+    """The example of one lesson. Its control is made in the container that is open.
 
-    def __init__(self, stage: Stage, text: WorkedText) -> None:
+    Args:
+        text: None: the lesson has none, and there is nothing to see.
+    """
+
+    def __init__(self, stage: Stage, text: WorkedText | None) -> None:
         self._stage, self._text = stage, text
         self._scene = SceneView(stage.client.scene, KEY, stage.post)
         self._html: viser.GuiHtmlHandle = stage.client.gui.add_html("")
@@ -47,7 +51,7 @@ class ExampleView:
 
     def press(self, button: object) -> None:
         """A button was pressed; raises `kin.InputError` for one that does not exist."""
-        if type(button) is not int or button not in (PLAY, NEXT, BACK):
+        if self._text is None or type(button) is not int or button not in (PLAY, NEXT, BACK):
             raise InputError("example", button, f"{PLAY}, {NEXT} or {BACK}")
         now = time.perf_counter()
         if self._player is None:
@@ -87,6 +91,7 @@ class ExampleView:
         return None if wait is None else max(wait, FRAME)
 
     def _example(self) -> Example:
+        assert self._text is not None
         return example_of(self._text, self._stage.units)
 
     def _begin(self, now: float) -> None:
@@ -113,6 +118,8 @@ class ExampleView:
 
     def _show_words(self) -> None:
         player = self._player
+        if self._text is None:
+            return
         said: tuple[object, ...] = (self._text.title,)
         if player is not None:
             said = (player.step, player.at, player.arrived, player.playing, player.is_last)

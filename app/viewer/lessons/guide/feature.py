@@ -18,7 +18,7 @@ from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import earlier, views
 from app.viewer.lessons.guide.answer_drawing import answer_nodes
-from app.viewer.lessons.guide.content import texts_of
+from app.viewer.lessons.guide.content import written_example
 from app.viewer.lessons.guide.example_view import ExampleView
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Outline, Pose
@@ -70,7 +70,7 @@ class Guide(Feature):
         self._copies = SceneView(stage.client.scene, "answer", self.post)
         gui = stage.client.gui
         self._goal = gui.add_html("")
-        self._example = ExampleView(stage, texts_of(lesson.key).example)
+        self._example = ExampleView(stage, written_example(lesson.key))
         with gui.add_folder("Steps"):
             self._steps = gui.add_html("")
         self._joints_box = gui.add_checkbox("Joint sliders", False, hint=JOINTS_HINT)

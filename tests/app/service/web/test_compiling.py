@@ -112,8 +112,8 @@ def test_those_that_wait_for_the_compiler_take_no_turn_from_others(
     """More of them than there are turns, also beyond the usual number."""
     app, client = served
     monkeypatch.setattr(compiling, "PATIENCE", PATIENCE)
-    monkeypatch.setattr(app.state.compute._places, "most", 100)
-    monkeypatch.setattr(app.state.compute._places, "most_of_one", 100)
+    monkeypatch.setattr(app.state.compute._slots, "most", 100)
+    monkeypatch.setattr(app.state.compute._slots, "most_of_one", 100)
     solve, waiting = ik.solve, 2 * MOST + 1
     with Compiler(), ThreadPoolExecutor(waiting) as callers:
         monkeypatch.setattr(ik, "solve", after_compiling(solve))

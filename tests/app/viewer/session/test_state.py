@@ -413,7 +413,8 @@ def test_a_link_opens_for_visitors_who_may_only_look_what_computes_nothing(lesso
     text = remembering(encode(PageState("pioneer5", lesson=lesson.key)))
     client = SimpleNamespace(local_storage=SimpleNamespace(get_item=lambda key, timeout: text))
     for rights, shown in ((Rights.FULL, True), (Rights.LOOK, not lesson.computes)):
-        page_ = SimpleNamespace(client=client, store=STORE)
+        activity = SimpleNamespace(review=SimpleNamespace(zone=""))
+        page_ = SimpleNamespace(client=client, store=STORE, activity=activity)
         persistence = Persistence(page_, False, lambda action: action(), rights)  # type: ignore[arg-type]
         persistence.load()
         assert persistence.stored.lesson == (lesson.key if shown else None)
