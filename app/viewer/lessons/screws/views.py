@@ -32,7 +32,7 @@ def table_html(robot: Robot, columns: Array, form: Form, now: bool, chosen: int)
         }
         for i in range(robot.n)
     ]
-    heads = [m.math(m.sub(m.ident(name), m.text(axis))) for name in "ωv" for axis in "xyz"]
+    heads = [(f"{name} {axis}", m.math(m.sub(m.ident(name), m.text(axis)))) for name in "ωv" for axis in "xyz"]
     where = "where the axes are now: the columns of the Jacobian" if now else "with all joints at zero"
     note = f"Screws in the {FRAME[form]} frame, {where}. ω without unit, v in m; h is the pitch."
     return render("screws/table", rows=rows, heads=heads, chosen=chosen, form=form, note=note)

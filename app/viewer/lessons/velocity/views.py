@@ -82,10 +82,14 @@ def matrix_html(robot: Robot, J: Array, frame: str, chosen: int | None) -> str:
         wide=wide,
         chosen=chosen,
         chosen_class=CHOSEN,
-        heads=[formula(sub(ident(variable), text(str(i + 1)))) for i, variable in enumerate(variables)],
+        heads=[
+            (f"{variable} {i}", formula(sub(ident(variable), text(str(i)))))
+            for i, variable in enumerate(variables, 1)
+        ],
         rows=[
             {
                 "name": formula(sub(names[r], text("xyz"[r % 3]))),
+                "said": f"{'vω'[r // 3]} {'xyz'[r % 3]}",
                 "values": [fixed(value, 2 if wide else 3) for value in line],
             }
             for r, line in enumerate(J.tolist())
