@@ -2,8 +2,8 @@
 
 The file holds the arm as data and a script that moves it. The script computes forward kinematics itself, from the
 same constants as the scene of the viewer (:mod:`app.viewer.scene.chain`), so each slider answers at once; inverse
-kinematics and programs are solved here, and the file holds their answers. Its parts are in ``static/takehome``:
-``page.html``, ``page.css`` and ``page.js``; three.js is in ``static/vendor/three``.
+kinematics and programs are solved here, and the file holds their answers. Its parts are the template
+``takehome/page.html``, ``static/takehome`` (style and script) and three.js in ``static/vendor/three``.
 
 Nothing is loaded from elsewhere, which a content security policy in the file makes certain.
 """
@@ -21,17 +21,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup, escape
+from markupsafe import Markup
 from numpy.typing import ArrayLike, NDArray
 
 from app.shared.static_folder import static_folder
 from app.viewer.panel.posture import short
 from app.viewer.scene.bodies.drawing import Drawing, drawing
 from app.viewer.scene.bodies.parts import Part, joint_color
-from app.viewer.scene.chain import chain
+from app.viewer.scene.chain import Link, chain
 from app.viewer.scene.meshes import Body, body
+from app.viewer.views.templates import render
 from kin import IKOptions, InputError, Motion, Robot, __version__, solve_ik
 from kin.named import robot_of
+from kin.robot import Joint
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
 
@@ -106,37 +108,29 @@ def web_page(saved: SavedArm) -> str:
 
 
 def _page(saved: SavedArm, drawn: Drawing | None) -> str:
-    robot = saved.robot
-    link = Markup(' <a href="{}">Open in Kinboard</a>').format(saved.link) if saved.link else ""
-    source = Markup('<p class="quiet">Source of the numbers: {}</p>').format(robot.source) if robot.source else ""
-    parts = {
-        "title": escape(robot.name),
-        "about": f"{robot.n} joint{'s' * (robot.n != 1)}",
-        "source": source,
-        "version": escape(__version__),
-        "link": link,
-        "data": _as_script(_data(saved, drawn)),
-        "style": _text("takehome/page.css"),
-        "three": _text("vendor/three/three.min.js"),
-        "script": _text("takehome/page.js"),
-    }
-    pieces = _text("takehome/page.html").split("{{ ")
-    filled = [pieces[0]]
-    for piece in pieces[1:]:
-        name, _, rest = piece.partition(" }}")
-        filled += [str(parts[name]), rest]
-    return "".join(filled)
+    return render(
+        "takehome/page",
+        title=saved.robot.name,
+        joints=saved.robot.n,
+        source=saved.robot.source,
+        version=__version__,
+        link=saved.link,
+        data=_as_script(_data(saved, drawn)),
+        style=_text("takehome/page.css"),
+        three=_text("vendor/three/three.min.js"),
+        script=_text("takehome/page.js"),
+    )
 
 
 @cache
-def _text(name: str) -> str:
-    return (static_folder() / name).read_text(encoding="utf-8")
+def _text(name: str) -> Markup:
+    return Markup((static_folder() / name).read_text(encoding="utf-8"))
 
 
-def _as_script(data: dict[str, Any]) -> str:
+def _as_script(data: dict[str, Any]) -> Markup:
     """JSON that nothing in it can end: a name may contain ``</script>``."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
-    return text.replace("<", "\\u003c")
+    return Markup(text.replace("<", "\\u003c"))
 
 
 def _data(saved: SavedArm, drawn: Drawing | None) -> dict[str, Any]:
@@ -166,18 +160,8 @@ def arm_data(robot: Robot) -> dict[str, Any]:
     found = chain(robot)
     return {
         "joints": [
-            {
-                "name": joint.name,
-                "turns": joint.kind == "revolute",
-                "lower": low,
-                "upper": high,
-                "home": home,
-                "color": joint_color(i),
-                "axis": link.T_parent_axis.ravel().tolist(),
-            }
-            for i, (joint, link, low, high, home) in enumerate(
-                zip(robot.joints, found.links[1:], *_ranges(robot), robot.home, strict=True)
-            )
+            _joint(i, joint, link, home)
+            for i, (joint, link, home) in enumerate(zip(robot.joints, found.links[1:], robot.home, strict=True))
         ],
         "tool": found.T_last_tool.ravel().tolist(),
         "rows": _rows(robot),
@@ -185,11 +169,18 @@ def arm_data(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _ranges(robot: Robot) -> tuple[list[float], list[float]]:
-    """What the sliders reach: the limits, or one turn to either side of an arm that has none."""
-    lower = np.where(np.isfinite(robot.lower), robot.lower, -math.pi)
-    upper = np.where(np.isfinite(robot.upper), robot.upper, math.pi)
-    return lower.tolist(), upper.tolist()
+def _joint(index: int, joint: Joint, link: Link, home: float) -> dict[str, Any]:
+    """A joint; the slider of one without limits reaches half a turn to either side, as in the viewer."""
+    lower, upper = joint.limits or (-math.pi, math.pi)
+    return {
+        "name": joint.name,
+        "turns": joint.kind == "revolute",
+        "lower": lower,
+        "upper": upper,
+        "home": home,
+        "color": joint_color(index),
+        "axis": link.T_parent_axis.ravel().tolist(),
+    }
 
 
 def _rows(robot: Robot) -> list[dict[str, Any]]:
