@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import driving
 import pytest
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
@@ -39,3 +40,10 @@ def page(viewer) -> Iterator[FakeBrowser]:
     with FakeBrowser(viewer) as page:
         page.choose("UR5")
         yield page
+
+
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs that drive an arm wait long for page and arm: a busy machine is no reason to stop."""
+    monkeypatch.setattr(driving, "PAGE_LOST", 20.0)
+    monkeypatch.setattr(driving, "ARM_LOST", 20.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Iterator
 
@@ -10,6 +9,7 @@ import driving
 import numpy as np
 import pytest
 import ros2_arm
+from example_run import ExampleRun
 from live_code import code_of
 from rosbridge import Rosbridge
 
@@ -28,51 +28,22 @@ def bridge() -> Iterator[Rosbridge]:
         yield bridge
 
 
-class Run:
-    """The example in a thread of its own."""
-
-    def __init__(self, viewer, page, bridge, *words) -> None:
-        self.codes = []
-        code = code_of(page)
-        given = [code, "--address", f"http://127.0.0.1:{viewer}", "--rosbridge", bridge.address, *words]
-        self._thread = threading.Thread(target=lambda: self.codes.append(ros2_arm.main(given)))
-        self._thread.start()
-
-    @property
-    def alive(self) -> bool:
-        return self._thread.is_alive()
-
-    def wait(self) -> None:
-        """Wait for the end."""
-        self._thread.join(30.0)
-        assert not self.alive
-
-    def end(self, page) -> None:
-        """Withdraw the code, and wait for the end."""
-        if self.alive:
-            page.send("GuiUpdateMessage", uuid=page.element("Withdraw the code"), updates={"value": True})
-        self.wait()
+def started_with(viewer, page, bridge, *words) -> ExampleRun:
+    return ExampleRun(ros2_arm.main, viewer, page, ["--rosbridge", bridge.address, *words])
 
 
 @pytest.fixture
 def run(viewer, page, bridge):
     runs = []
 
-    def started(*words) -> Run:
-        runs.append(Run(viewer, page, bridge, "--joints", ",".join(NAMES), *words))
+    def started(*words) -> ExampleRun:
+        runs.append(started_with(viewer, page, bridge, "--joints", ",".join(NAMES), *words))
         return runs[-1]
 
     yield started
     for each in runs:
         each.end(page)
     page.settle()
-
-
-@pytest.fixture
-def patient(monkeypatch):
-    """A busy machine is no reason to stop."""
-    monkeypatch.setattr(driving, "PAGE_LOST", 20.0)
-    monkeypatch.setattr(driving, "ARM_LOST", 20.0)
 
 
 def ghost(page) -> list[str]:
@@ -177,7 +148,7 @@ def test_another_arm_in_the_page_stops(page, bridge, run, patient, capsys):
 
 def test_a_lost_rosbridge_stops(viewer, page, patient, monkeypatch, capsys):
     with Rosbridge(dict(zip(NAMES, HERE, strict=True)), ros2_arm.TRAJECTORY) as bridge:
-        started = Run(viewer, page, bridge, "--joints", ",".join(NAMES), "--drive", "--yes")
+        started = started_with(viewer, page, bridge, "--joints", ",".join(NAMES), "--drive", "--yes")
         page.wait(lambda: "The arm follows the page." in capsys.readouterr().out)
         monkeypatch.setattr(driving, "ARM_LOST", 0.5)
     started.wait()
@@ -187,7 +158,7 @@ def test_a_lost_rosbridge_stops(viewer, page, patient, monkeypatch, capsys):
 
 def test_joints_of_other_names_are_listed(viewer, page, bridge, monkeypatch, capsys):
     monkeypatch.setattr(ros2_arm, "WAITING", 0.2)
-    started = Run(viewer, page, bridge)
+    started = started_with(viewer, page, bridge)
     started.wait()
     said = capsys.readouterr().err
     assert started.codes == [1]

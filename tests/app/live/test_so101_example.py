@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,8 +12,8 @@ import driving
 import numpy as np
 import pytest
 import so101_arm
+from example_run import ExampleRun
 from feetech_bus import GOAL, TORQUE, FeetechBus, packet
-from live_code import code_of
 
 import kin
 from app.live.client.connection import Connection
@@ -49,51 +48,21 @@ def calibration(tmp_path) -> Path:
     return file
 
 
-class Run:
-    """The example in a thread of its own."""
-
-    def __init__(self, viewer, page, words) -> None:
-        self.codes: list[int] = []
-        given = [code_of(page), "--address", f"http://127.0.0.1:{viewer}", *map(str, words)]
-        self._thread = threading.Thread(target=lambda: self.codes.append(so101_arm.main(given)))
-        self._thread.start()
-
-    @property
-    def alive(self) -> bool:
-        return self._thread.is_alive()
-
-    def wait(self) -> None:
-        """Wait for the end."""
-        self._thread.join(30.0)
-        assert not self.alive
-
-    def end(self, page) -> None:
-        """Withdraw the code, and wait for the end."""
-        if self.alive:
-            page.send("GuiUpdateMessage", uuid=page.element("Withdraw the code"), updates={"value": True})
-        self.wait()
-
-
 @pytest.fixture
 def run(viewer, page, bus, calibration):
     runs = []
     page.choose(ARM.name)
 
-    def started(*words) -> Run:
-        runs.append(Run(viewer, page, ["--port", bus.port, "--calibration", calibration, *words]))
+    def started(*words) -> ExampleRun:
+        runs.append(
+            ExampleRun(so101_arm.main, viewer, page, ["--port", bus.port, "--calibration", calibration, *words])
+        )
         return runs[-1]
 
     yield started
     for each in runs:
         each.end(page)
     page.settle()
-
-
-@pytest.fixture
-def patient(monkeypatch):
-    """A busy machine is no reason to stop."""
-    monkeypatch.setattr(driving, "PAGE_LOST", 20.0)
-    monkeypatch.setattr(driving, "ARM_LOST", 20.0)
 
 
 def measured(page) -> list[float]:
@@ -318,7 +287,7 @@ def test_what_is_lacking_is_said(viewer, page, bus, tmp_path, capsys):
         (["--port", bus.port, "--calibration", wrong], "expected LeRobot's calibration"),
         (["--port", bus.port, "--calibration", tmp_path / "none.json"], "No such file or directory"),
     ):
-        started = Run(viewer, page, words)
+        started = ExampleRun(so101_arm.main, viewer, page, words)
         started.wait()
         assert started.codes == [1]
         assert said in capsys.readouterr().err
