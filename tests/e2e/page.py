@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +107,13 @@ class Tab:
         self._browser, self._address, self._size = browser, address, ViewportSize(width=width, height=height)
         self.page: Page
         self._open()
+
+    @contextmanager
+    def sized(self, width: int, height: int) -> Iterator[Tab]:
+        """The tab with a window of this size, meanwhile."""
+        self.page.set_viewport_size({"width": width, "height": height})
+        yield self
+        self.page.set_viewport_size(self._size)
 
     def _open(self) -> None:
         self.page = self._browser.new_page(viewport=self._size, has_touch=self.touch, is_mobile=self.touch)

@@ -217,12 +217,8 @@ def test_the_tree_of_each_step_of_every_lesson(tab: Tab, lesson: type[Lesson]) -
 @pytest.fixture(params=[(320, 568), (390, 844)], ids=["320x568", "390x844"])
 def small(phone: Tab, no_spoilt_page: None, request: pytest.FixtureRequest) -> Iterator[Tab]:
     """The phone with a window of this size; 320 px are a page of 1280 px at 400 %."""
-    before = phone.page.viewport_size
-    assert before is not None
-    width, height = request.param
-    phone.page.set_viewport_size({"width": width, "height": height})
-    yield phone
-    phone.page.set_viewport_size(before)
+    with phone.sized(*request.param):
+        yield phone
 
 
 def screens(tab: Tab) -> Iterator[str]:

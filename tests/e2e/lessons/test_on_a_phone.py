@@ -29,12 +29,8 @@ PRESSABLE = """() => [...document.querySelectorAll("[role=slider]")].filter((thu
 @pytest.fixture(params=SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
 def small(phone: Tab, no_spoilt_page: None, request: pytest.FixtureRequest) -> Iterator[Tab]:
     """The phone with a window of this size."""
-    before = phone.page.viewport_size
-    assert before is not None
-    width, height = request.param
-    phone.page.set_viewport_size({"width": width, "height": height})
-    yield phone
-    phone.page.set_viewport_size(before)
+    with phone.sized(*request.param):
+        yield phone
 
 
 def test_three_joints_can_be_moved_without_scrolling(phone: Tab) -> None:
