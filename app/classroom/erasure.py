@@ -1,9 +1,9 @@
 """Erased means: no byte of it is left in any file of the database.
 
-SQLite overwrites what is deleted (`secure_delete`), first in its log. The file itself, and what the log had
-before, are only overwritten by a checkpoint that empties the log, and as long as another program reads the
-database, there is none. So what deletes something leaves a note in the same transaction, which stays until a
-checkpoint has succeeded. Every process tries again while there is a note, also after a restart.
+SQLite overwrites what is deleted (`secure_delete`), first in its log. Only a checkpoint that empties the log
+overwrites the file itself and the log's earlier contents. There is none while another program reads the database.
+So every deletion leaves a note in the same transaction. The note stays until a checkpoint has succeeded. Every
+process tries again while there is a note, also after a restart.
 
 PostgreSQL overwrites what is deleted when it needs the space, and keeps copies in its log and in backups. There,
 nothing is noted, and nothing is called erased.

@@ -14,8 +14,8 @@ no thread, no file, no import of SQLAlchemy. A page does::
 
 Two tabs of one seat are two attendances of one ticket; both see and tell the same seat. What one page tells,
 others in the same process see at once. Those in other processes, on this or another machine, see it through the
-database: a thread writes what was reported in one transaction, at once when a page has set something, and every
-`TICK` reads the rooms whose version has changed. Pages are notified only of what they can see. `changed` must
+database: a thread writes all reports in one transaction, at once if a page has set something. Every `TICK` it
+reads the rooms whose version has changed. Pages are notified only of what they can see. `changed` must
 return at once: post to the inbox of the page. All methods are thread-safe. Only `ticket` (once per process),
 `attend`, `submit`, `remove_seat`, `rename_seat` and `end_room` wait for the database; they belong
 in the worker of a page, never in the event loop.

@@ -1,4 +1,4 @@
-"""The mark in the database from which processes that start later count the time of rooms on.
+"""A mark in the database. Processes that start later go on counting the time of rooms from it.
 
 It counts while there are rooms. Without any, a process goes by the machine's clock: one that was wrong once does
 no harm any more.

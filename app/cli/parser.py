@@ -4,8 +4,8 @@ Input and output are in degrees and millimetres, with ``--rad`` in radians and m
 answers, problem documents included, and files of rows are in radians and metres. Exit codes: 0 success, 1 no exact
 solution (``ik``) or the service could not start, 2 invalid input, 130 interrupted.
 
-A command is a row of `COMMANDS`: its arguments (:mod:`app.cli.arguments`) and the module that runs it, which is
-imported when the arguments have been parsed.
+A command is a row of `COMMANDS`: its arguments (:mod:`app.cli.arguments`) and the module that runs it. That is
+imported after parsing.
 """
 
 from __future__ import annotations

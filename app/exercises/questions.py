@@ -91,7 +91,7 @@ class Asked:
 class Question(ABC):
     """One question, of one arm and in the reader's units.
 
-    An answer is plain data that means the same in all units, so that links may keep it.
+    An answer is plain data and means the same in all units, so links may keep it.
     """
 
     prompt: str
@@ -202,7 +202,7 @@ class Number(Question):
         answer: the right value, in radians, metres or SI units.
         unit: of typed numbers, unless another unit follows them.
         tolerance: the largest accepted error, as `answer`.
-        method: how to find the answer, for who has given a wrong one that is no known mistake.
+        method: how to find the answer, shown after a wrong one that is no known mistake.
         mistakes: known wrong values.
         whole_turns: whether values that differ by whole turns are equal.
         ways: further right values.

@@ -1,9 +1,9 @@
 """The line between a page and the program that is connected to it.
 
 What the program sends waits in the line until the page's worker takes it: of each kind only the newest value, so
-that a fast program makes nobody wait. What the page shows is kept there too, numbered by its changes, and the
-program's connection sends what has changed, as often as the program asks. Both sides are woken by calls that
-return at once; all methods are thread-safe.
+that a fast program makes nobody wait. It also keeps what the page shows, with a number for each change. The
+program's connection sends changes as often as the program asks. Both sides are woken by calls that return at once;
+all methods are thread-safe.
 """
 
 from __future__ import annotations

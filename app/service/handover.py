@@ -6,9 +6,9 @@ accepts all connections. When the head of a request has arrived that is not for 
 sends the open connection, with the bytes read so far, to a process for REST, and so back for a later request.
 A connection belongs to one process at a time, which counts it, bounds it and logs it.
 
-The sockets between processes outlive them: what was sent to a process that dies is served by the one that replaces
-it. A process whose partner is away does everything itself, as far as it can: the viewer's process answers REST; a
-process for REST accepts connections, and tells visitors that the viewer is warming up.
+The sockets between processes outlive them: if a process dies, its successor serves what was sent to it. A process
+whose partner is away does everything itself, as far as it can: the viewer's process answers REST; a process for
+REST accepts connections, and tells visitors that the viewer is warming up.
 
 A program that is to be connected to a page may reach any process of any worker. The code in its address says which
 one has the page (:mod:`app.live.codes`): the processes with viewers are linked too, for these connections alone.

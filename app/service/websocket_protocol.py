@@ -220,7 +220,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         super().send_keepalive_ping()
 
     def keepalive_timeout(self) -> None:
-        """Disconnect a client that has not answered a ping, unless the ping waits behind data that flows."""
+        """Disconnect a client that has not answered a ping, unless the ping still waits behind data on its way."""
         unsent = self._unsent()
         if unsent and (self._resumed or unsent < self._queued):
             self._queued, self._resumed = unsent, False

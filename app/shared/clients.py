@@ -1,7 +1,7 @@
 """Who a client is, for limits per client: an IPv4 address, or an IPv6 network, within which a host may use any.
 
 Behind a proxy, all connections come from the proxy's address, and the header ``X-Forwarded-For`` names the client.
-Anybody can send that header, so it counts only if the connection comes from a proxy that the operator trusts.
+Anybody can send that header. It counts only if the connection comes from a proxy the operator trusts.
 """
 
 from __future__ import annotations

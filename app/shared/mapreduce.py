@@ -47,8 +47,8 @@ def run_local(
 def run_dask(grid: CapabilityGrid, address: str) -> Iterator[CapabilityBlock]:
     """The blocks of a grid as they are finished by the workers of the Dask scheduler at `address`.
 
-    The unfinished blocks of a worker that dies are computed by the others, or by workers that join during the run.
-    (Dask gives up on a block after four workers have died computing it.)
+    If a worker dies, the others compute its unfinished blocks. So do workers that join during the run. (Dask gives
+    up on a block after four workers have died computing it.)
 
     Raises:
         InputError: the extra ``cluster`` is not installed, there is no scheduler, no worker, none that has

@@ -166,7 +166,7 @@ class Stage(Protocol):
         """
 
     def toward_camera(self) -> Array:
-        """A vector ``(3,)`` of the world frame that leads from what the visitor looks at to the camera."""
+        """A vector ``(3,)`` in the world frame, from the point the visitor looks at to the camera."""
 
 
 class Feature:
@@ -247,7 +247,7 @@ class Feature:
         return ""
 
     def extents(self) -> Sequence[Sphere]:
-        """Spheres around what it shows in the scene, which the picture shows with the arm when it is fitted."""
+        """Spheres around what it shows in the scene. *Fit* includes them in the picture with the arm."""
         return ()
 
     def tick(self, now: float) -> None:

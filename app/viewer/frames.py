@@ -57,7 +57,7 @@ class Frames:
         return (WORLD, BASE, *(each.name for each in self.workpieces))
 
     def pose(self, robot: Robot, q: Array, relative: bool = False) -> Array:
-        """The frame that is shown, or that of the tool at `q` if `relative`, in the world frame ``(4, 4)``."""
+        """The frame on show in the world frame ``(4, 4)``; if `relative`, the frame of the tool at `q` instead."""
         return frame_pose(robot, TOOL if relative else self.shown, self.poses, q)
 
     def choose(self, name: object) -> Frames:

@@ -107,7 +107,7 @@ def ends(robot: Robot, T: Array, options: IKOptions, q: Array, item: Redundancy)
 
 
 def leaders(robot: Robot, q: Array, task: Task, locked: tuple[int, ...] = ()) -> tuple[Redundancy, ...]:
-    """The revolute joints that take part in the null space at q ``(n,)``, as parameters that can be given a value.
+    """The revolute joints of the null space at q ``(n,)``, each as a parameter that can be set.
 
     Without a closed form nobody knows the feasible range: it is that of the joint's own limits.
     """

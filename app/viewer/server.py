@@ -45,7 +45,7 @@ RESTARTED = Notice(
 
 
 class ViewerServer:
-    """Serves the 3-D page to connections that the service has accepted, and whose access it has checked.
+    """Serves the 3-D page to connections. The service has accepted them and checked their access.
 
     Args:
         maps, summaries, classroom: shared with REST; None: the viewer creates and closes its own.

@@ -2,9 +2,9 @@
 
 viser wakes the event loop once for each message outside of an atomic block, at the end of each block and for each
 flush. A generator, a timer and two tasks then wait for the next message. That cost more than posing the arm. An
-`Outbox` keeps viser's buffer, its culling of superseded messages and its format, and replaces how it is read: what
-is pushed within `in_one_frame` leaves in one frame, for which the loop is woken once; a `LoopWaker` wakes it once
-for all visitors who are waiting.
+`Outbox` keeps viser's buffer, its culling of superseded messages and its format, and replaces how it is read: all
+that is pushed within `in_one_frame` leaves in one frame and wakes the loop once. A `LoopWaker` wakes it once for
+all visitors who are waiting.
 
 It relies on private names of viser, which `missing_names` lists; `app.viewer.viser_server.start_viser` refuses a
 version that lacks one. Tests compare the bytes with those of viser's own `_message_producer`. Upstream offers no
@@ -41,7 +41,7 @@ _PLAIN = frozenset({str, bool, int, float})
 
 
 class LoopWaker:
-    """Calls functions in the thread of an event loop, which is woken once for all calls that wait.
+    """Calls functions in the thread of an event loop. One wake-up serves all calls that wait.
 
     Args:
         loop: the event loop.

@@ -9,9 +9,9 @@ same queue.
 
 Values: viser's setter of an input element's value starts a task of the event loop for each callback, for each
 slider that follows the arm. `show_value` starts none. `show_content` sets the HTML of an element without a look at
-the type of that property. The callbacks of a value that a visitor has set read it from the element, where another
-thread may have shown a newer one meanwhile, such as that of an arm that moves: what was typed was lost.
-`keep_sent_values` and `sent_value` have the value as it was sent.
+the type of that property. When a visitor sets a value, viser's callbacks read it from the element. Another thread
+may have shown a newer value there meanwhile, as a moving arm does, and what was typed was lost. `keep_sent_values`
+and `sent_value` have the value as it was sent.
 
 Drags: viser converts each field of an event by its type hints and passes it through six coroutines, of the shared
 scene and of the visitor's own. `drag_gizmo` does the same for a gizmo of the visitor alone, in one.
@@ -19,8 +19,8 @@ scene and of the visitor's own. `drag_gizmo` does the same for a gizmo of the vi
 Pages: viser evaluates the type hints of a class for each of its objects, a quarter of the cost of a page.
 `cache_type_hints` caches them.
 
-Parts of a scene: viser can hide one node or all of them. A `SceneFilter` hides all but some, also what is added
-meanwhile, and knows what to show again.
+Parts of a scene: viser can hide one node or all of them. A `SceneFilter` hides all but some, including nodes that
+are added later. It knows which to show again.
 
 Wake-ups: messages from other threads than the event loop's wake their reader in an unsafe way; now and then a
 visitor's connection was lost. `set_events_in_their_loop` fixes that.
@@ -188,7 +188,7 @@ class SceneFilter:
             self._scene._queue_scene_message(messages.SetSceneNodeVisibilityMessage(node.name, node.visible))
 
     def _hides(self, name: str) -> bool:
-        """Whether this is the name of a node at the top, below which all others are, that must not be seen."""
+        """Whether this names a top-level node that must not be seen."""
         node = self._scene._handle_from_node_name.get(name)
         return name.count("/") == 1 and not name.startswith(self._kept) and not isinstance(node, _LIGHTS)
 

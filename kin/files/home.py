@@ -1,8 +1,8 @@
 """The home configuration of an arm whose file has none.
 
 The middle of the limits is the natural choice, but for many arms it is singular: the arm is fully stretched, and
-the tool cannot be pulled in along it. Therefore bent configurations are considered too, in which up to three
-joints are moved by 45° (or half-way to the limit, if that is less) to one side or the other of their middle.
+the tool cannot be pulled in along it. Therefore bent configurations are considered too. In these, up to three
+joints are 45° to one side of their middle, or half-way to the limit if that is less.
 
 A configuration is judged by its *margin*: the smallest singular value of the Jacobian that is not zero in all of
 them, with lengths in units of the reach. Among the candidates with at least half the largest margin, the one with

@@ -1,8 +1,8 @@
 """Readings of motors as joint values, joint values as readings, and ticks as LeRobot normalises them.
 
 Ticks, degrees and radians begin again after a turn: an encoder on the shaft cannot tell how often the joint has
-turned. Of the joint values that a reading may mean, the one inside the limits counts, and where none or several
-are, the one next to the middle of the limits or, without limits, next to zero.
+turned. A reading may mean several joint values. The one inside the limits counts. If none or several are inside,
+it is the one nearest to the middle of the limits, or to zero without limits.
 """
 
 from __future__ import annotations

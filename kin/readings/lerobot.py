@@ -28,9 +28,9 @@ def motors_from_lerobot(
 ) -> tuple[Motor, ...]:
     """The motors that a calibration of LeRobot describes.
 
-    A motor belongs to the joint of its name, where capitals, spaces and ``_`` do not count, or else to the joint
-    that is named like its id. One without a joint, such as that of a gripper, moves nothing. Where the arm has a
-    motor of the same name already, that motor keeps its joint, sign, zero and unit.
+    A motor belongs to the joint of its name; capitals, spaces and ``_`` do not count. Otherwise it belongs to the
+    joint named like its id. One without a joint, such as that of a gripper, moves nothing. If the arm already has
+    a motor of that name, it keeps its joint, sign, zero and unit.
 
     Args:
         robot: the arm, or the id of a built-in one.

@@ -4,8 +4,8 @@ In pose i, where the joint value is qᵢ, a motor reads ``rᵢ = offset + sign �
 differences ``rᵢ / scale − sign · qᵢ`` would all be the zero. It is their mean (least squares), on the circle where
 readings begin again after a turn. With the right sign they agree, but for the care with which the arm was put into
 the poses; with the wrong one they are as far apart as twice the way that the joint has moved. Where they agree for
-both signs, the joint has moved too little, or half a turn. Where they agree for none, something else is wrong, and
-what is wrong most often is tried: another unit, the motor of another joint, one pose or reading, a gear.
+both signs, the joint has moved too little, or half a turn. If they agree for none, something else is wrong. The
+most frequent faults are tried: another unit, the motor of another joint, one pose or reading, a gear.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ _UNITS = {
 
 
 def sentence(found: MotorFinding) -> str:
-    """What the readings of one motor say, and what to do where it is not matched."""
+    """The finding on one motor in words, and what to do if it is not matched."""
     motor = found.motor
     who = f"Motor {motor.id}, {motor.joint},"
     joint, slides = f"the joint {motor.joint}", motor.lead is not None

@@ -57,7 +57,7 @@ class StreamLimit:
 
 
 class ThreadedGenerator(Generic[T]):
-    """A generator whose pieces are computed by any thread, one at a time, and that any thread may close."""
+    """A generator that any thread may advance, one at a time, and any thread may close."""
 
     def __init__(self, pieces: Generator[T]) -> None:
         self._pieces = pieces

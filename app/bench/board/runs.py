@@ -8,7 +8,7 @@ process of the run, share a folder:
 - ``cancel``: exists when the run shall end;
 - ``result.json``: the last run that was finished.
 
-The process of the run ends with the process that started it, whose end of a pipe it reads.
+The process of the run reads a pipe of the process that started it, and ends with it.
 """
 
 from __future__ import annotations

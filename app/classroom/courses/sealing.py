@@ -1,8 +1,8 @@
 """Seals the exercises that a course brings along: what a browser keeps of them can be read by the service alone.
 
 A text is packed and joined with a stream of SHAKE-256, which begins at a digest of the text itself (Rogaway and
-Shrimpton, *Deterministic authenticated encryption*, 2006): the same text is always sealed in the same way, so that
-a page's state does not change by being saved, and a seal that was not made here, or was changed, does not open.
+Shrimpton, *Deterministic authenticated encryption*, 2006): the same text always gets the same seal, so saving a
+page does not change its state. A seal that was changed, or made elsewhere, does not open.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Sends scores to platforms, behind the student's back and without making anybody wait.
 
-One thread looks up what is due in the database and hands it to the platform's sender, which has a thread of its
-own while it has something to send: a platform that does not answer delays no score for another one. A score is
-looked up when it is due, so the score of a student who was removed meanwhile is not sent.
+One thread looks up in the database what is due and hands it to the platform's sender. A sender has a thread of its
+own while it has work: a platform that does not answer delays no score for another one. A score is looked up when
+it is due, so the score of a student who was removed meanwhile is not sent.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Result codes: what a student has reached, signed by the service, as letters and digits.
 
 A code is in Crockford's base 32, in groups of five: upper and lower case are equal, O is 0, I and L are 1. It has
-what it says, eight bytes of a signature (HMAC-SHA256), and a checksum of two bytes (CRC-16). The checksum tells a
-code that was mistyped from one that was changed or that another service made.
+what it says, eight bytes of a signature (HMAC-SHA256), and a checksum of two bytes (CRC-16). The checksum finds a
+mistyped code. One that was changed, or made by another service, has a wrong signature.
 """
 
 from __future__ import annotations

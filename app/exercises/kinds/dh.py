@@ -28,8 +28,8 @@ _WORDS: dict[Convention, str] = {"standard": "the standard convention", "modifie
 class DHKind(Kind):
     """See the module.
 
-    The values are those of the exercise’s posture, so that no zero of a joint has to be agreed. What counts is
-    where the joint axes are as lines, and where the tool is: two tables that agree in these move in the same way.
+    The values are those of the exercise’s posture, so that no zero of a joint has to be agreed. What counts are
+    the joint axes, as lines, and the pose of the tool: two tables that agree in these move in the same way.
     """
 
     name: ClassVar[str] = "dh"

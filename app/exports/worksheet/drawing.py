@@ -1,7 +1,7 @@
 """The arm as a line drawing for paper: its DH path, joint axes and frames, as SVG and as TikZ.
 
-Parallel projection from a corner above. What is drawn is a list of lines, dots and words, from which both formats
-are made.
+Parallel projection from a corner above. A drawing is a list of lines, dots and words. Both formats are made from
+it.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Which host a request is for, and hints about proxies.
 
 A page of another site can have its name resolve to our address (DNS rebinding). The browser then takes us for a
-part of that site and lets its scripts read our answers, but it still names that host in the request. So a service
-that anybody may use, on an address that only this machine can reach, answers only under its own names.
+part of that site and lets its scripts read our answers. But the request still names that host. So a service
+without a token, on an address only this machine can reach, answers under its own names only.
 """
 
 from __future__ import annotations

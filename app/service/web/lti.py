@@ -1,7 +1,7 @@
 """The routes below ``/lti``: login, launch, our public keys, and the choice of exercises and courses.
 
-A platform's page may show them in a frame. Their forms carry what a platform or we have signed, so they need no
-cookie of ours except the one that ties a launch to the browser of its login.
+A platform's page may show them in a frame. Their forms carry what a platform or we have signed. So they need one
+cookie of ours only: it ties a launch to the browser of its login.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ def short_page(title: str, body: str, *, root: str = "../", again: int | None = 
         title: text; also the heading.
         body: HTML.
         root: the service's root, relative to the page.
-        again: seconds after which the page is loaded again. A refresh would not do that where the address has a
-            fragment, as links of the viewer have.
+        again: seconds after which the page is loaded again. A refresh would not if the address has a fragment, as
+            links of the viewer have.
     """
     script = "" if again is None else f'<script src="{root}static/again.js" data-after="{again}"></script>'
     title = html.escape(title)

@@ -1,7 +1,7 @@
 """How long a request has been held up by the compiler of kernels.
 
 A kernel that is in no cache is compiled by the thread that calls it first. This takes seconds, and nothing can
-interrupt it. A request is found by its context variable, which the threads that work for it inherit.
+interrupt it. A request is found by its context variable. The threads that work for it inherit that.
 """
 
 from __future__ import annotations

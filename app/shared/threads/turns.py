@@ -4,8 +4,8 @@ Only one thread at a time runs Python. With sixteen requests that compute, the e
 visitors would get a seventeenth of the interpreter: a drag would take half a second instead of some milliseconds.
 So a thread has a turn while it computes, and offers it to others between two steps. A short request is next soon,
 however many long ones there are. Computations wait while a visitor's event is answered and while the event loop is
-busy, as each of its calls to the system would have to wait for the interpreter again. A thread that asks for the
-compiler of kernels has no turn until it leaves it, which may take a minute.
+busy, as each of its calls to the system would have to wait for the interpreter again. A thread inside the compiler
+of kernels has no turn, perhaps for a minute.
 """
 
 from __future__ import annotations

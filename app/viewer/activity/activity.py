@@ -179,7 +179,7 @@ class Activity:
         self.changed()
 
     def stock(self) -> None:
-        """Have the exercises that courses and room bring along, and the one that is written here."""
+        """Take in the exercises of courses and of the room, and the one written here."""
         courses = filter(None, (self.sent, self.progress.course))
         brought = [one.exercise for course in courses for one in course.own]
         self.exercises.put([*brought, *filter(None, (self.lent, self.draft))])

@@ -342,7 +342,7 @@ def numbers_by_name(name: str, entry: object) -> dict[str, float]:
 
 
 def subset(name: str, entry: object, known: Iterable[str]) -> frozenset[str]:
-    """An entry of a link that is a list of names, without those that are not known; raises `InputError`."""
+    """A list of names in a link, without unknown ones; raises `InputError`."""
     if not isinstance(entry, list):
         raise InputError(name, entry, "a list of names")
     return frozenset(one for one in known if one in entry)

@@ -2,8 +2,8 @@
 
 Nodes are made anew for each update. A node is the successor of the one with the same key in the same folder;
 without a key, of the one of the same type and number. A successor changes properties of the control that is there.
-A control is only replaced if it shows another unit, so that what was typed before is not read in the new unit, or
-if its `of` is another one.
+A control is replaced only if its unit or its `of` changes. With a new unit, what was typed before must not be read
+in that unit.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Control:
     Attributes:
         label, hint: in place of those of the field.
         spec: what is valid here, in place of the field's own, where it depends on facts: options, limits.
-        value: what it shows in place of the setting, where this is only what the visitor has asked for.
+        value: what it shows instead of the setting, if the setting is only what the visitor has asked for.
         of: another one makes a new control, so that late events of the old one are void.
     """
 

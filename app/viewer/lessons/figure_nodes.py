@@ -1,7 +1,7 @@
 """Parts of figures in the scene: lines, dimensions, angles, points and faces, each with its label, as nodes.
 
-A figure remembers only where its labels are. A label that would cover another one of its figure, as seen in the
-default view, takes the next of a few places, and stays there while that is free::
+A figure remembers only where its labels are. A label must not cover another one of its figure in the default view.
+It takes the first of a few places that is free, and stays there while it is::
 
     self.figure = FigureNodes(body(robot).size)            # for each arm
 

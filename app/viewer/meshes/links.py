@@ -25,7 +25,7 @@ SAME = 1e-7  # of the reach, or rad: differences of two tables that describe one
 
 
 def shapes_of(robot: Robot, visuals: Sequence[Visual], links: Sequence[LinkPieces] = ()) -> Shapes:
-    """The visible bodies of a robot that was read from a URDF, where they are in its links.
+    """The visible bodies of a robot from a URDF, in the frames of its links.
 
     Args:
         links: its collision bodies.

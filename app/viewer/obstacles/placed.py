@@ -65,7 +65,7 @@ def pose(obstacle: Obstacle) -> Array:
 
 
 def added(items: Obstacles, shape: object, robot: Robot, q: Array) -> Obstacles:
-    """One more obstacle, of a size that fits the arm, where the arm at `q` ``(n,)`` and at home touches it not.
+    """One more obstacle, sized to the arm. The arm touches it neither at `q` ``(n,)`` nor at home.
 
     Raises:
         InputError: no such shape, or there are as many as there may be.

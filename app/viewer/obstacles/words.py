@@ -13,7 +13,7 @@ NAMED = 2  # obstacles, and the arm itself, that the sentence names
 def sentence(contacts: Sequence[Contact], units: Units) -> str:
     """``"Link 4 touches the table, 12 mm deep."``; "" for none.
 
-    Of the links that touch each other, and of those that touch one obstacle, only the deepest are named.
+    Several links may touch each other or one obstacle. Only the deepest contact of each is named.
     """
     if not contacts:
         return ""

@@ -147,7 +147,7 @@ class JointSliders:
         return float(np.clip(raw, self.robot.lower[index], self.robot.upper[index]))
 
     def show(self, q: Array, dragged: int | None = None) -> None:
-        """Set every slider but the one that the visitor drags, which would jump under the pointer.
+        """Set every slider except the one the visitor drags: it would jump under the pointer.
 
         That one is set too if the value typed into it is outside the limits.
         """

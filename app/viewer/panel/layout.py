@@ -36,7 +36,8 @@ class Panel:
         script: the connection to the page's own script.
         jog: buttons that move the arm in steps.
         joints, posture: folders that are filled for each robot.
-        obstacles: the folder of the obstacles, closed like that of `jog`, so that the rest fits a small window.
+        obstacles: the folder of the obstacles. Like that of `jog` it is closed at first, so that the rest fits a
+        small window.
         view, target, avoid: where the choices for the whole page are: in the tab *View*, between the joints and
             the posture, and at the top of the obstacles.
         learn: the tab for lessons.

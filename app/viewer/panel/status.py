@@ -133,7 +133,7 @@ def _kind(result: IKResult) -> Kind:
 
 
 def html(shown: Notice, warning: str = "", waiting: str = "", failure: str = "") -> str:
-    """The notice as a card, which ``static/layout.css`` places over the scene, with what is added to it.
+    """The notice as a card, with what is added to it. ``static/layout.css`` places it over the scene.
 
     A notice that all is well is no longer blue or green beside a warning or a failure, and the card says both.
     """

@@ -1,4 +1,4 @@
-"""What the page of a member of a room can do besides, for its tab *Class* and for who leads it."""
+"""What else the page of a member of a room can do: for its tab *Class*, and for whoever leads it."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ def student_html(room: RoomView, mode: Mode, task: Exercise | None, sent: Submis
 
 
 def _own_mark(room: RoomView) -> tuple[str, str]:
-    """What has become of the task of a student who looks, in words, and its colour."""
+    """How far the student on show is with the task, in words, and the colour of that."""
     if room.seat is None or room.task is None:
         return "", ""
     found = standing(room.seat, room)
@@ -257,7 +257,7 @@ def _words(seat: SeatView, room: RoomView, found: Standing, exercises: Exercises
 
 
 def _place(seat: SeatView, room: RoomView, found: Standing, exercises: Exercises) -> list[str]:
-    """What a student who is here looks at, as far as it is not the task."""
+    """What a student who is here has open beside the task."""
     if found.presence == "following":
         return ["follows"]
     place = ["stopped following"] if room.follow or room.shown is not None else []
@@ -349,7 +349,7 @@ def course_title(room: RoomView) -> str:
 
 
 def course_html(room: RoomView, courses: Sequence[Course], task: Exercise | None) -> str:
-    """The form to send a course, which one was sent, and which task the next one ends."""
+    """The form to send a course, the course that was sent, and the task that sending would end."""
     return render("room/course", room=room, title=course_title(room), courses=courses, task=task)
 
 

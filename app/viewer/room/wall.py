@@ -1,9 +1,9 @@
 """The wall: the arms of all students of a class as small copies in the teacher's scene.
 
 All pieces of all arms are instances of one cylinder in one node, and the pads below them are another: a tick sends
-two lists of poses, however many students there are. The arms float in a plane that faces the default view, so that
-each is seen as in the view of one arm. They and their names share the picture as evenly as its shape allows; names
-have a size in the scene, so that they keep to their cells in every window.
+two lists of poses, however many students there are. The arms float in a plane that faces the default view. So each
+looks as it does when it is the only arm. They and their names share the picture as evenly as its shape allows;
+names have a size in the scene, so that they keep to their cells in every window.
 """
 
 from __future__ import annotations

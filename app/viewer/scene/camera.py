@@ -81,7 +81,7 @@ def view(body: Body, aspect: float, room: Sequence[Sphere] = ()) -> tuple[Array,
 
 
 def narrowed(viewpoint: Array, aspect: float) -> Array:
-    """The viewpoint that shows in a picture of this aspect ratio what `viewpoint` ``(3, 3)`` shows in a wide one.
+    """The viewpoint for a picture of this aspect ratio. It shows what `viewpoint` ``(3, 3)`` shows in a wide one.
 
     Rows of a viewpoint: camera position, look-at point, and up direction.
     """

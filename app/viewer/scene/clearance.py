@@ -135,7 +135,7 @@ def clearance_of(robot: Robot, drawn: Drawing | None) -> Clearance:
 def _spheres(
     robot: Robot, made: Body, drawn: Drawing | None
 ) -> tuple[NDArray[np.int64], Array, Array, NDArray[np.int64]]:
-    """DH row, centre in the frame of that row, radius, and link of the spheres that cover the moving parts."""
+    """The spheres that cover the moving parts: DH row, centre in the frame of that row, radius, and link."""
     rows: list[int] = []
     points: list[Array] = []
     radii: list[float] = []

@@ -18,7 +18,7 @@ _ABOVE, _BELOW = 0.16, 0.3
 
 
 def place_beside(point: Array, size: float, target: Array | None, radius: float) -> tuple[float, Anchor]:
-    """Where a label of a mark is, so that it does not cover the key number of a missed target.
+    """The place of a mark's label: it must not cover the key number of a missed target.
 
     Args:
         point: where the mark is ``(3,)``.

@@ -1,7 +1,7 @@
 """What an arm is mounted on, and the floor: the one place that says what holds the base and how deep the floor is.
 
-A robot file may state both (`Robot.mounting`, `Robot.floor`). Where it does not, an arm whose base points up
-stands on a short pedestal, so that it can work beside it; one whose base points down hangs from a ceiling. The
+A robot file may state both (`Robot.mounting`, `Robot.floor`). By default, an arm whose base points up stands on a
+short pedestal, which leaves room to work beside it. One whose base points down hangs from a ceiling. The
 solids of the mounting are blocks in the frame of the mount: its origin is that of the base, its z axis leads out
 of the surface.
 """
@@ -95,7 +95,7 @@ class Mount:
 
 
 def turn_of(kind: Mounting) -> Array:
-    """The rotation ``(3, 3)`` that turns what stands on a floor so that it is mounted in this way."""
+    """The rotation ``(3, 3)`` from something standing on a floor to something mounted in this way."""
     if kind == "wall":
         return np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     return np.diag([1.0, -1.0, -1.0]) if kind == "ceiling" else np.eye(3)
@@ -121,7 +121,7 @@ def mount_of(robot: Robot, size: float) -> Mount:
 
 
 def _blocks(kind: Mounting, size: float, reach: float, height: float) -> tuple[Holder, tuple[Block, ...]]:
-    """What holds the base, in the frame of the mount, and what that is called."""
+    """The solids that hold the base, in the frame of the mount, and the name of their kind."""
 
     def disc(radius: float, low: float, high: float) -> Block:
         return Block(low, high, (radius * size, radius * size), round=True)
@@ -171,7 +171,7 @@ def _floor(robot: Robot, kind: Mounting, size: float) -> float:
     """Height of a floor that is not stated.
 
     Below a pedestal it is so deep that the arm at home is above it; an arm that can go deeper may pass through it.
-    Below an arm that hangs, or whose base is tilted, it is below all that the arm reaches.
+    If the arm hangs or its base is tilted, the floor is below everything the arm reaches.
     """
     base = float(robot.T_world_base[2, 3])
     if kind == "floor":

@@ -163,7 +163,7 @@ def placed(mesh: Solid, T: Array) -> Solid:
 
 
 def spaced(path: Array, step: float) -> Array:
-    """Points on a polyline ``(k, 3)``, at most `step` apart where that takes at most `MOST_POINTS` for a line."""
+    """Points on a polyline ``(k, 3)``, at most `step` apart, farther where that takes over `MOST_POINTS`."""
     pieces = [path[:1]]
     for start, end in pairwise(path):
         count = math.ceil(min(MOST_POINTS, max(1.0, float(np.linalg.norm(end - start)) / step)))

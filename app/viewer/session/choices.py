@@ -48,7 +48,7 @@ class ViewState(Settings):
         dark: whether the page is dark; None: as the visitor's system is.
         base_axes: whether the gizmo is aligned with the base instead of the tool.
         look: how an arm is drawn of which there is a body.
-        detailed: whether the body is that of an installed package, for arms of which there is one.
+        detailed: whether the body is that of an installed package, if there is one for the arm.
         avoid: whether the arm is moved to targets without touching itself or an obstacle.
         angles, quaternions: how rotations are written and typed: keys of `ANGLES` and `QUATERNIONS`.
     """

@@ -165,7 +165,7 @@ class ArmController:
         """The visitor changed what is to be avoided: solve at the tool's pose if the arm touches something there.
 
         `renew`: solve in any case, because the page shows an answer of before. A target that is still open has
-        been solved already, and an arm that a feature moves is left alone.
+        been solved already. An arm that a feature moves is left alone.
         """
         if self.target is not None or self.dragging or self.playing:
             return

@@ -118,6 +118,6 @@ def pause_within(gesture: tuple[object, ...], value: object) -> float:
 
 
 def belongs_before(gesture: tuple[object, ...]) -> bool:
-    """Whether an event of a feature only completes what an earlier one began, as meshes that were read do."""
+    """Whether an event of a feature only completes an earlier one. Meshes that have been read are an example."""
     key = gesture[2] if gesture[0] == "feature" else None
     return isinstance(key, tuple) and key[:1] == ("meshes",)

@@ -47,9 +47,9 @@ class History:
         self._news.add(KEY_RETURN)
 
     def take_key(self) -> str:
-        """The key under which the page is stored after what has happened since the last call.
+        """The key under which the page is stored now, given the events since the last call.
 
-        A step that only went on replaces its entry in the browser's history, which has the same steps as undo.
+        The browser's history has the same steps as undo. A step that only went on replaces its entry there.
         """
         news, self._news = self._news, set()
         return next((key for key in (KEY_RETURN, KEY, KEY_REPLACE) if key in news), KEY)

@@ -2,8 +2,8 @@
 
 The state is stored in the browser: in the page's URL and in the storage of its tab. The service keeps nothing of a
 visitor who leaves. When a page connects, for the first time or after a lost connection, the service reads the
-stored state; from then on it stores every state in which the visitor pauses, and what is opened at once. What is
-stored is a `PageState`.
+stored state; from then on it stores the state at each pause of the visitor. Whatever is opened is stored at once.
+What is stored is a `PageState`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Events that wait until the kernels they need are compiled, which happens on a new machine only.
+"""Events that wait until their kernels are compiled. That happens on a new machine only.
 
 Compiling takes seconds. If an event were handled before that, the page would stand still without a reason. So it
 is held, the status card says what is being prepared, and the page can be used meanwhile.
@@ -89,7 +89,7 @@ class Preparing:
         self._show()
 
     def _give_up(self, key: Hashable) -> None:
-        """Drop what an event replaces, and what is meant for a stored state that will not be shown."""
+        """Drop held events that this one replaces. Drop those for a stored state too, if it will not be shown."""
         linked = LINK in self._held and key != LINK
         for name in list(self._held):
             rule = RULES[name_of(name)]

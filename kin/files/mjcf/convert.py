@@ -155,7 +155,7 @@ class _Converter:
         return joint
 
     def _body(self, element: Element, link: str, T: Array, inherited: str) -> None:
-        """Add what is in a body, or in a frame of it, whose own frame is `T` in that of the link."""
+        """Add the contents of a body, or of a frame in it. `T` is its frame in that of the link."""
         inherited = element.get("childclass", inherited)
         for child in element:
             if child.tag == "body":

@@ -1,8 +1,8 @@
 """The collision bodies of a URDF as capsules of the robot that was read from it.
 
 Each URDF link gets capsules of its own, in the frame of the DH row that moves it; links behind fixed joints, and
-those beside the chain, move with the link that carries them. What a file states wrongly, or in a mesh that is not
-there, is left out, and a tube is assumed for that link of the arm.
+those beside the chain, move with the link that carries them. A collision body that is stated wrongly, or whose
+mesh is missing, is left out. A tube is assumed for that link of the arm.
 """
 
 from __future__ import annotations

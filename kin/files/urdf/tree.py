@@ -152,7 +152,7 @@ class UrdfTree:
     """A URDF file: links that joints connect.
 
     What is wrong beside an arm does not concern it: joints without their links are left out, and `chain` refuses
-    only what belongs to the arm that is asked for.
+    faults of the requested arm only.
 
     Attributes:
         joints: those with a parent and a child.

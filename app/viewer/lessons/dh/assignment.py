@@ -94,8 +94,8 @@ class Assignment:
     def frames_at(self, q: Array, more: Row | None = None, then: Array | None = None) -> list[Array]:
         """The frames at a configuration ``(n,)``; `more`: one more row.
 
-        `then`: frame to which that row should lead, whose z says in which direction its joint counts; by default
-        the one to which it leads.
+        `then`: the frame to which that row should lead; by default the one to which it does. Its z axis says in
+        which direction the joint counts.
         """
         if not self.frames:
             return []
@@ -130,7 +130,7 @@ class Assignment:
 
 
 def read_row(convention: Convention, old: Array, new: Array) -> Row:
-    """The row that leads from a frame to another one that has been chosen by the rules."""
+    """The row from a frame to the next one, which was chosen by the rules."""
     z, x = (old[:3, 2], new[:3, 0]) if convention == "standard" else (new[:3, 2], old[:3, 0])
     between = new[:3, 3] - old[:3, 3]
     return Row(

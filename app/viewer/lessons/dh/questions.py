@@ -123,7 +123,7 @@ def _tool_moves(robot: Robot) -> bool:
 
 @lru_cache(maxsize=64)
 def mistyped(robot: Robot) -> tuple[int, Factor, Robot, Comparison] | None:
-    """A row, the number of it that gets the wrong sign, the arm of that table, and what a comparison finds.
+    """A row, which of its numbers gets the wrong sign, the arm of that table, and the findings of a comparison.
 
     The sign of α that turns an axis, or else of the first length; None if the table has neither.
     """

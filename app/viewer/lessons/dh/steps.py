@@ -254,7 +254,7 @@ def degrees_of_freedom(robot: Robot) -> int:
 
 @lru_cache(maxsize=64)
 def verdict(robot: Robot, units: Units) -> tuple[str, ...]:
-    """The arm that each convention makes of the table, and the numbers that decide it, in words."""
+    """In words: the arm that each convention makes of the table, and the numbers that decide which is meant."""
     readings = sorted((robot, reread(robot)), key=lambda r: r.convention, reverse=True)
     if any(coaxial_joints(reading) for reading in readings):
         return tuple(_lines(reading, units) for reading in readings)
@@ -281,7 +281,7 @@ def _lines(robot: Robot, units: Units) -> str:
 
 
 def _leads(robot: Robot, k: int, units: Units) -> str:
-    """From which axis to which the parameters between joints k and k + 1 lead, and what one row of them does."""
+    """The axes between which the parameters of joints k and k + 1 lead, and the effect of one row of them."""
     before, after = robot.joint_rows[k], robot.joint_rows[k + 1]
     leads = f"leads from axis {k + 1} to axis {k + 2}"
     if after - before > 1:

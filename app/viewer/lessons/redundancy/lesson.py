@@ -2,9 +2,9 @@
 
 A slider, or a continuous sweep, takes the redundancy parameter through its range. Each frame shows a configuration
 that was solved for, never an interpolated one, so the tool is held exactly; the residual shows it. For an arm with
-spherical shoulder and wrist, the feasible arm angles form a ring about the line from shoulder to wrist. For an arm
-whose joints 1 and 2 are coaxial, the drawing shows that only these two joints turn against each other. Where the
-core has no redundancy parameter, a joint of the null space leads and the others follow numerically.
+spherical shoulder and wrist, the feasible arm angles form a ring about the line from shoulder to wrist. If joints
+1 and 2 of the arm are coaxial, the drawing shows that only these two turn, against each other. Where the core has
+no redundancy parameter, a joint of the null space leads and the others follow numerically.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ def _axes(facts: ScrewsFacts, figure: FigureNodes, ends: Array) -> list[Node]:
 
 
 def _chosen(facts: ScrewsFacts, figure: FigureNodes, ends: Array, units: Units) -> list[Node]:
-    """Where the numbers of one screw come from, seen from the frame in which they are given.
+    """Where the numbers of one screw come from, seen from their own frame.
 
     The perpendicular from its origin to the axis, and there the velocity v of a point that moves along.
     """

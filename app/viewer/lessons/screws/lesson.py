@@ -1,7 +1,7 @@
 """The lesson "Screws": the joint axes as six numbers each, and the tool pose as a product of their exponentials.
 
-The axes are drawn where they are with all joints at zero, which is where the formula takes them, or where they are
-now: then they are the columns of the Jacobian. A ghost shows the arm after the first factors of the product.
+The axes are drawn either with all joints at zero, as in the formula, or at the current configuration. There they
+are the columns of the Jacobian. A ghost shows the arm after the first factors of the product.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
 
 
 def singular(robot: Robot) -> tuple[Array, Singularity] | None:
-    """A singular configuration within the limits that is one joint away from home, and what aligns there."""
+    """A singular configuration within the limits, one joint away from home, and what aligns there."""
     for near in singularities(robot, robot.q_home):
         if len(near.met_at) != 1 or near.kind in ("algorithmic", "jacobian"):
             continue

@@ -5,8 +5,8 @@ for each visitor, thirty who drag cost a dozen switches of threads per event and
 it takes the visitors in turn, each for one step. A second one watches. If a step lasts longer than `PATIENCE`, the
 watcher leads, and the thread of that step only ends it: a visitor whose step blocks holds up the others that long.
 
-Pages that are built come behind the steps of visitors who are there: of two hundred who come at once, each needs
-some ten milliseconds, which nobody who drags waits for more than once.
+Visitors who are there come first, and pages are built after their steps. If two hundred arrive at once, each page
+takes some ten milliseconds, and a visitor who drags waits for one of them at most.
 """
 
 from __future__ import annotations

@@ -259,7 +259,7 @@ def halfway(items: Items, index: int, robot: Robot) -> tuple[float, float, float
 
 
 def items_of(program: Program, robot: Robot, q: Array) -> Items:
-    """The list for a program that was read from a file, which starts at q ``(n,)``.
+    """The list for a program from a file. It starts at q ``(n,)``.
 
     Raises:
         InputError: a pose that the arm cannot reach, or something that the list cannot hold.

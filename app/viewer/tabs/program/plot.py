@@ -59,7 +59,7 @@ class Course(NamedTuple):
 
 
 def plot_html(motion: Motion, joint: int | None, units: Units, other: Motion | None = None) -> str:
-    """The plots of a motion that lasts, of one joint or of all (None), with the buttons that choose the joint.
+    """The plots of a motion that takes time, of one joint or all (None), and the buttons that choose the joint.
 
     `other`: a motion of the same arm to compare it with.
     """

@@ -62,7 +62,7 @@ class Chart:
             raise CancelledError
 
     def fits(self, items: Items, arm: Arm) -> bool:
-        """Whether a list, and what an arm avoids, are still those for which it is computed."""
+        """Whether the list and what the arm avoids are unchanged since this computation began."""
         mine = self.arm
         avoided = (arm.avoid, arm.obstacles) == (mine.avoid, mine.obstacles)
         return items == self.plan.items and arm.robot == mine.robot and avoided

@@ -81,7 +81,7 @@ class Search:
         return max((i for i, item in enumerate(self.plan.items[: self.index]) if item.q), default=None)
 
     def fits(self, items: Items, arm: Arm) -> bool:
-        """Whether a list, and what an arm can touch, are still those for which it is searched."""
+        """Whether the list and what the arm can touch are unchanged since this search began."""
         mine = self.arm
         return items == self.plan.items and arm.robot == mine.robot and arm.obstacles == mine.obstacles
 

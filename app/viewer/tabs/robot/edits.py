@@ -60,7 +60,7 @@ def name_of(cell: Cell) -> str:
 
 
 def fields_of(robot: Robot, own: OwnArm | None) -> tuple[Fields, str]:
-    """The fields of the arm that a change starts from, and what it was made from."""
+    """The fields of the arm before a change, and what that arm was made from."""
     data: Fields = kin.robot_to_dict(robot)
     if own is not None and own.robot == robot:
         return data, own.start

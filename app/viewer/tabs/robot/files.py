@@ -37,7 +37,7 @@ class Busy(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """A file that a visitor sent, as far as it is known what is wanted of it.
+    """A file from a visitor, and what is known so far of how to use it.
 
     Attributes:
         name: of the file, for messages; with the name of the URDF if it is a zip.

@@ -261,7 +261,7 @@ class RobotTab(Feature):
             self.stage.notify(Notice("advice", "A field that was not valid is as before", lost))
 
     def _lost(self, before: Mapping[Cell, tuple[str, str]]) -> str:
-        """Which of the cells that were wrong `before` are written again as they were, for the status."""
+        """For the status: cells that were wrong `before` and are now as they were written first."""
         gone = [
             f"{edits.name_of(cell)} (“{cut(text)}”)"
             for cell, (text, _) in before.items()

@@ -1,4 +1,4 @@
-"""A pad on which the checks write their findings, with the changes of the text that mend them."""
+"""A pad for the findings of the checks, each with the change of the text that mends it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be wrong with how links and joints hang together, and which parts of a file nobody reads."""
+"""Faults in how links and joints hang together, and parts of a file that nobody reads."""
 
 from __future__ import annotations
 

@@ -7,7 +7,8 @@ A text is a robot file (TOML), a URDF, or a bare DH table: one row in a line, as
               -90    0      0      q2 + 90
 
 The first line may name the columns and the convention. Without it they are theta, d, a, alpha, standard. A name
-such as ``q1`` is the value of a joint, in the column theta of one that turns and in d of one that slides.
+such as ``q1`` is the value of a joint. It stands in the column theta of a joint that turns, or d of one that
+slides.
 """
 
 from __future__ import annotations

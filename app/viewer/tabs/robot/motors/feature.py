@@ -87,7 +87,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
         return LOOK_AGAIN if self._run is not None else None
 
     def _streamed(self) -> tuple[float, ...] | None:
-        """What a connected program says that the motors read, if it has as many as the run."""
+        """The readings of the motors that a connected program sends, if there are as many as the run has."""
         line = self.stage.door.line
         if self._run is None or line is None or line.readings is None:
             return None

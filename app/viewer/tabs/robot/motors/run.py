@@ -1,4 +1,4 @@
-"""One run of *Match motors*: poses that are shown one after the other, what is read in each, and what follows."""
+"""One run of *Match motors*: poses shown one after another, the readings in each, and the conclusion."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def table(motors: tuple[Motor, ...], chosen: int) -> str:
 
 
 def pose(run: Run, units: Units) -> str:
-    """Which pose is on show, where its joints are, and what was read before."""
+    """The pose on show: its number, its joint values, and earlier readings in it."""
     names = [joint.name for joint in run.robot.joints]
     rows = []
     for k, motor in enumerate(moving_motors(run.robot)):
