@@ -1,4 +1,4 @@
-"""What else the page of a member of a room can do: for its tab *Class*, and for whoever leads it."""
+"""What else the page of a member of a room can do: for its tab *Class*, and for leading it."""
 
 from __future__ import annotations
 
