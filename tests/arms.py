@@ -162,3 +162,30 @@ def random_robot(seed):
         limits = None if kind == "fixed" else (-1.5, 2.0)
         rows.append(Joint(f"part {i}", draw.angle(), draw.length(), draw.length(), draw.angle(), kind, limits))
     return Robot.from_dh(rows, str(rng.choice(["standard", "modified"])), base=draw.pose(), tool=draw.pose())
+
+
+def random_table(joints, seed):
+    """Numbers without any pattern (even seeds), or as tables are typed: right angles and zeros (odd seeds)."""
+    rng = np.random.default_rng([joints, seed])
+    rows = []
+    for i in range(joints):
+        theta, alpha = rng.uniform(-3.0, 3.0, 2).tolist()
+        d, a = rng.uniform(-0.5, 0.5, 2).tolist()
+        if seed % 2:
+            alpha = float(rng.choice((0.0, math.pi / 2, -math.pi / 2, math.pi)))
+            theta, d, a = (value if rng.random() < 0.4 else 0.0 for value in (theta, d, a))
+        rows.append(Joint(f"joint {i + 1}", theta, d, a, alpha, limits=(-math.pi, math.pi)))
+    home = rng.uniform(-0.5, 0.5, joints)
+    return Robot.from_dh(rows, ("standard", "modified")[seed // 2 % 2], robot_id=f"{joints}-{seed}", home=home)
+
+
+def with_slides(robot, seed):
+    """The same table with about a third of the joints sliding, at least one."""
+    rng = np.random.default_rng([robot.n, seed, 7])
+    slides = rng.random(robot.n) < 0.35
+    slides[rng.integers(robot.n)] = True
+    rows = [
+        replace(row, kind="prismatic", limits=(-0.6, 0.6)) if sliding else row
+        for row, sliding in zip(robot.rows, slides, strict=True)
+    ]
+    return replace(robot, id=f"{robot.id}-slides", rows=tuple(rows))

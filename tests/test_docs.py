@@ -395,6 +395,9 @@ def test_the_changelog_knows_this_version():
     text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     headings = re.findall(r"^## \[(.+?)\]", text, re.MULTILINE)
     assert headings[:2] == ["Unreleased", kin.__version__]
+    released = re.search(rf"^## \[{re.escape(kin.__version__)}\] – (\S+)$", text, re.MULTILINE)[1]
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
+    assert {f"version: {kin.__version__}", f"date-released: {released}"} <= set(citation)
 
 
 def test_the_image_starts_the_way_the_app_does():

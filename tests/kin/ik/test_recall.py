@@ -13,46 +13,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from arms import Draw, reversed_at
+from arms import Draw, random_table, reversed_at, with_slides
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kin
 from app.bench.robots import robots
-from kin import Joint, Robot, Status, solve_ik
+from kin import Robot, Status, solve_ik
 
 PI = math.pi
 COUNTS = range(1, 8)
 NAMED = ("pioneer5", "puma560", "ur5", "irb120", "stanford", "scara", "panda")
 SAME = 1e-6  # radians or metres
 WELL = 1e-3  # smallest singular value of a configuration that is counted: near a singularity postures merge
-
-
-def random_table(joints: int, seed: int) -> Robot:
-    """Numbers without any pattern (even seeds), or as tables are typed: right angles and zeros (odd seeds)."""
-    rng = np.random.default_rng([joints, seed])
-    rows = []
-    for i in range(joints):
-        theta, alpha = rng.uniform(-3.0, 3.0, 2).tolist()
-        d, a = rng.uniform(-0.5, 0.5, 2).tolist()
-        if seed % 2:
-            alpha = float(rng.choice((0.0, PI / 2, -PI / 2, PI)))
-            theta, d, a = (value if rng.random() < 0.4 else 0.0 for value in (theta, d, a))
-        rows.append(Joint(f"joint {i + 1}", theta, d, a, alpha, limits=(-PI, PI)))
-    home = rng.uniform(-0.5, 0.5, joints)
-    return Robot.from_dh(rows, ("standard", "modified")[seed // 2 % 2], robot_id=f"{joints}-{seed}", home=home)
-
-
-def with_slides(robot: Robot, seed: int) -> Robot:
-    """The same table with about a third of the joints sliding, at least one."""
-    rng = np.random.default_rng([robot.n, seed, 7])
-    slides = rng.random(robot.n) < 0.35
-    slides[rng.integers(robot.n)] = True
-    rows = [
-        replace(row, kind="prismatic", limits=(-0.6, 0.6)) if sliding else row
-        for row, sliding in zip(robot.rows, slides, strict=True)
-    ]
-    return replace(robot, id=f"{robot.id}-slides", rows=tuple(rows))
 
 
 def turns_between(a, b):
