@@ -43,7 +43,7 @@ def environment(folder: Path) -> dict[str, str]:
 
 
 def network() -> dict[str, str]:
-    """The index and the certificate that pip is told to use here, for uv, which reads no settings of pip."""
+    """The index and the certificate in the settings of pip, for uv, which does not read them."""
     words = [sys.executable, "-m", "pip", "config", "list"]
     listed = subprocess.run(words, check=True, capture_output=True, text=True, timeout=UNTIL).stdout
     of_pip = dict(re.findall(r"^\S*\.([\w-]+)='(.*)'$", listed, re.MULTILINE))
