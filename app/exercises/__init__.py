@@ -8,8 +8,9 @@ the verdict is, and leaves only in `Exercise.solution`.
 from app.exercises.contract import Kind
 from app.exercises.exercise import TOPICS, Exercise, VariantError
 from app.exercises.fields import ExerciseFileError
-from app.exercises.files import Exercises, Shelf, builtin_exercises, load_exercise, load_folder, parse_exercise
+from app.exercises.files import builtin_exercises, load_exercise, load_folder, parse_exercise
 from app.exercises.questions import Asked, Verdict
+from app.exercises.shelf import Exercises, Shelf
 from app.exercises.trial import Student, Trial, tried
 from app.exercises.variant import Variant
 

@@ -1,10 +1,10 @@
-"""Exercise files: TOML → `Exercise`; the built-in exercises and those of a folder."""
+"""Exercise files: TOML → `Exercise`; the built-in exercises, and those of a folder."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -116,51 +116,6 @@ def load_folder(folder: Path, find: Find = get_robot, builtin: bool = False) -> 
 def builtin_exercises() -> tuple[Exercise, ...]:
     """The exercises of the package."""
     return load_folder(BUILTIN, builtin=True)
-
-
-class Exercises:
-    """The built-in exercises, and those of the operator's folder. Read-only, so any thread may use it.
-
-    Raises:
-        ExerciseFileError: a file of the folder is invalid, or its id is taken.
-    """
-
-    def __init__(self, folder: Path | None = None, find: Find = get_robot) -> None:
-        own = () if folder is None else load_folder(folder, find)
-        taken = {exercise.id for exercise in builtin_exercises()}
-        for exercise in own:
-            if exercise.id in taken:
-                raise ExerciseFileError(exercise.file, "id", exercise.id, "an id that no built-in exercise has")
-        both = (*builtin_exercises(), *own)
-        self.all = tuple(sorted(both, key=lambda one: one.rank))
-        self._by_id = {exercise.id: exercise for exercise in self.all}
-
-    def get(self, exercise_id: object) -> Exercise | None:
-        """One exercise; None if there is none with this id."""
-        return self._by_id.get(exercise_id) if isinstance(exercise_id, str) else None
-
-    def topics(self) -> tuple[tuple[str, tuple[Exercise, ...]], ...]:
-        """The topics that have exercises, with these."""
-        found = ((topic, tuple(one for one in self.all if one.topic == topic)) for topic in TOPICS)
-        return tuple((topic, exercises) for topic, exercises in found if exercises)
-
-
-class Shelf(Exercises):
-    """Those of a service, and those that one page has besides. Not thread-safe: the page's worker changes it."""
-
-    def __init__(self, known: Exercises) -> None:
-        self._known = known
-        self.put(())
-
-    def put(self, own: Iterable[Exercise]) -> None:
-        """Have these besides, instead of those before; one with an id of the service's is left out."""
-        self.own = {one.id: one for one in own if self._known.get(one.id) is None}
-        self.all = tuple(sorted((*self._known.all, *self.own.values()), key=lambda one: one.rank))
-        self._by_id = {exercise.id: exercise for exercise in self.all}
-
-    def is_own(self, exercise_id: str) -> bool:
-        """Whether the page has an exercise that the service does not have."""
-        return exercise_id in self.own
 
 
 def _robot(fields: Fields, find: Find) -> Robot:

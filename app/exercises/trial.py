@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from app.exercises.exercise import Exercise, VariantError
 from app.exercises.fields import ExerciseFileError
@@ -58,6 +58,11 @@ class Trial:
         except (KinematicsError, ValueError) as error:
             return Student(numbers, variant.text(one.text, units), failure=str(error))
 
+    def with_taken_id(self) -> Trial:
+        """The same of a draft whose id another exercise has."""
+        got = "" if self.exercise is None else self.exercise.id
+        return replace(self, field="id", error=f"got “{got}”, expected an id that no other exercise has")
+
     def values(self, units: Units) -> dict[str, tuple[str, ...]]:
         """The values of each expression for the seeds, by its field in the file."""
         if self.exercise is None:
@@ -72,21 +77,18 @@ class Trial:
         return found
 
 
-def tried(text: str, file: str, find: Find, taken: Callable[[str], bool]) -> Trial:
+def tried(text: str, file: str, find: Find) -> Trial:
     """Try a draft: parsed, drawn and solved as ``kinboard check`` does it.
 
     Args:
         text: TOML.
         file: the name in messages.
         find: gives the arm of an id.
-        taken: whether an id is that of another exercise.
     """
     try:
         exercise = parse_exercise(text, file, find)
     except ExerciseFileError as error:
         return Trial(None, error.field, f"got {error.value}, expected {error.expected}")
-    if taken(exercise.id):
-        return Trial(None, "id", f"got “{exercise.id}”, expected an id that no other exercise has")
     variants: list[Variant | None] = []
     for seed in SEEDS:
         try:

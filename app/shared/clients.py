@@ -31,6 +31,27 @@ def client_of(scope: Scope) -> str:
     return network_of(str((scope.get("client") or ("unknown", 0))[0])[:64])
 
 
+def host_name(host: bytes) -> str:
+    """The name in a header ``Host``, without the port."""
+    name = host.decode("latin-1").lower()
+    return name[1:].partition("]")[0] if name.startswith("[") else name.partition(":")[0].rstrip(".")
+
+
+def is_local_name(name: str) -> bool:
+    """Whether each machine means itself by the name of a host."""
+    try:
+        return ipaddress.ip_address(name).is_loopback
+    except ValueError:
+        return name == "localhost" or name.endswith(".localhost")
+
+
+def is_here(scope: Scope) -> bool:
+    """Whether a request comes from this machine, under a name that no other machine can use, and by no proxy."""
+    headers = dict(scope["headers"])
+    names = (scope.get("client") or ("",))[0], host_name(headers.get(b"host", b""))
+    return all(map(is_local_name, names)) and not headers.keys() & {b"x-forwarded-for", b"forwarded"}
+
+
 def share_of(most: int, share: float) -> int:
     """How many of `most` places one client may take."""
     return max(1, math.ceil(most * share))

@@ -1,9 +1,10 @@
 """What a client may cause, content security policies, cookies, and the check of a websocket's origin.
 
 `Rights` decides for every door, REST, the viewer's messages and what a link restores. Who has the access token, or
-everybody if there is none and the service is not read-only, may do everything. A read-only visitor may look: read
-pages and robots, and see the arm of a link from all sides. Nothing is moved, solved, sampled or mapped for a
-visitor who may only look.
+everybody if there is none and the service is not read-only, may do everything, but for one thing: exercises are
+saved on the service only by who has the token or, without one, by browsers on the same machine. A read-only
+visitor may look: read pages and robots, and see the arm of a link from all sides. Nothing is moved, solved,
+sampled or mapped for a visitor who may only look.
 
 The query of the viewer's address can name another server (``?websocket=ws://elsewhere``), which could then run
 scripts in our origin: ``connect-src 'self'`` prevents that. Browsers do not apply the same-origin rule to
@@ -38,27 +39,33 @@ _COMPUTING = re.compile(r"/(workspace|capability)\b")
 class Rights(Enum):
     """The rights of one client."""
 
+    SAVE = "save"
     FULL = "full"
     LOOK = "look"
 
     def allow_request(self, method: str, path: str) -> bool:
         """Whether a request without a websocket is answered; `path` below the prefix of the service."""
-        if self is Rights.FULL:
+        if self.compute:
             return True
         return method in SAFE_METHODS and path != "/metrics" and _COMPUTING.search(path) is None
 
     def allow_websocket(self, path: str) -> bool:
         """Whether a websocket is accepted: that of the viewer, or a cloud."""
-        return self is Rights.FULL or path.rstrip("/") == "/viewer"
+        return self.compute or path.rstrip("/") == "/viewer"
 
     def allow_message(self, kind: object) -> bool:
         """Whether a message of the viewer's page, which is known and well-formed, is passed on."""
-        return self is Rights.FULL or kind in (CAMERA, MEMORY)
+        return self.compute or kind in (CAMERA, MEMORY)
 
     @property
     def compute(self) -> bool:
         """Whether a link may start work: inverse kinematics, clouds, sections, sizes, maps."""
-        return self is Rights.FULL
+        return self is not Rights.LOOK
+
+    @property
+    def save(self) -> bool:
+        """Whether a page may save exercises in the folder of the service."""
+        return self is Rights.SAVE
 
 
 # Swagger UI sets inline styles and data: images; scripts come from our own files only.

@@ -44,6 +44,7 @@ class Stage(Protocol):
     frames: Frames  # the workpieces, and the frame in which poses are shown
     activity: Activity  # what is open, and what is withheld
     door: Door  # the line to a program, if there is one
+    may_save: bool  # whether the visitor may save in a folder of the service
 
     @property
     def client(self) -> viser.ClientHandle:

@@ -6,7 +6,7 @@ import asyncio
 import socket
 import threading
 import time
-from collections.abc import AsyncIterator, Iterable, Iterator
+from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 
 import uvicorn
@@ -15,6 +15,7 @@ from starlette.routing import BaseRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.service.server import server_config
+from app.service.web.access import Access
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.settings import Settings
 from app.viewer.server import ViewerServer
@@ -52,8 +53,15 @@ def without_viewer(app: FastAPI) -> ASGIApp:
 
 
 @contextmanager
-def serve_viewer(viewer: ViewerServer, routes: Iterable[BaseRoute] = (), **state: object) -> Iterator[int]:
+def serve_viewer(
+    viewer: ViewerServer,
+    routes: Iterable[BaseRoute] = (),
+    access: Mapping[str, object] | None = None,
+    **state: object,
+) -> Iterator[int]:
     """Start a viewer and serve it under ``/viewer``, beside further routes that need such a `state` of the app.
+
+    With arguments of `Access`, visitors have the rights that it gives them; otherwise those of a room's students.
 
     Yields the port, and stops the viewer at the end.
     """
@@ -69,6 +77,8 @@ def serve_viewer(viewer: ViewerServer, routes: Iterable[BaseRoute] = (), **state
     for name, value in state.items():
         setattr(app.state, name, value)
     app.router.routes.extend([*routes, *bridge.routes()])
+    if access is not None:
+        app.add_middleware(Access, **access)
     with serve(app) as port:
         viewer.start(loops[0])
         bridge.viewer = viewer

@@ -33,7 +33,7 @@ from starlette.websockets import WebSocket
 
 from app.api.problems import ProblemError, respond
 from app.service.web.rate_limit import TokenBucket
-from app.shared.clients import client_of
+from app.shared.clients import client_of, is_here
 from app.shared.security import SAFE_METHODS, Rights, origin_allowed, set_cookie
 
 COOKIE = "kinboard"
@@ -41,7 +41,7 @@ COOKIE_AGE = 30 * 24 * 3600  # seconds until a login ends
 GUEST_COOKIE = "kinboard_guest"  # of who has joined a classroom: opens the viewer while the seat is there
 _GUESTS = "kinboard.guests"  # in the scope: what signs that cookie, or None
 _MAY_OPEN = "kinboard.may-open"  # in the scope of a page of classrooms: whether the client may open one
-_RIGHTS = "kinboard.rights"  # in the scope of a client that has not all of them
+_RIGHTS = "kinboard.rights"  # in the scope: what the client may cause
 OPEN = ("/livez", "/readyz", "/login", "/favicon.ico", "/lti/login", "/lti/launch", "/lti/keys", "/lti/choose")
 HEALTH = OPEN[:2]
 TRIES, TRY_EVERY = 5, 10.0  # wrong tokens allowed at once per client, then one in this many seconds
@@ -113,7 +113,9 @@ class Access:
                 answer = await self._login(request)
             elif not (path in OPEN or path.startswith("/static/")):
                 scope[_MAY_OPEN] = await self._authenticated(scope)
-                if not scope[_MAY_OPEN] and not await self._is_guest(scope, path):
+                if scope[_MAY_OPEN] and (self._token is not None or is_here(scope)):
+                    scope[_RIGHTS] = Rights.SAVE
+                elif not scope[_MAY_OPEN] and not await self._is_guest(scope, path):
                     self._admit_anonymous(scope, path)
         except ProblemError as error:
             answer = respond(error)

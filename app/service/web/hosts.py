@@ -16,7 +16,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from app.api.problems import ProblemError, respond
-from app.shared.clients import client_of
+from app.shared.clients import client_of, host_name
 from app.shared.problems import shorten_text
 
 logger = logging.getLogger("kinboard.connections")
@@ -58,8 +58,7 @@ class Hosts:
             await respond(wrong_host(refused))(scope, receive, send)
 
     def _is_ours_uncached(self, host: bytes) -> bool:
-        name = host.decode("latin-1").lower()
-        name = name[1:].partition("]")[0] if name.startswith("[") else name.partition(":")[0].rstrip(".")
+        name = host_name(host)
         if name in self._allowed or name.endswith(".localhost"):
             return True
         try:

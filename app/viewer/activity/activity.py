@@ -180,9 +180,9 @@ class Activity:
 
     def stock(self) -> None:
         """Take in the exercises of courses and of the room, and the one written here."""
-        courses = filter(None, (self.sent, self.progress.course))
-        brought = [one.exercise for course in courses for one in course.own]
-        self.exercises.put([*brought, *filter(None, (self.lent, self.draft))])
+        sent, opened = ([one.exercise for one in c.own] if c else [] for c in (self.sent, self.progress.course))
+        mine = [] if self.practice.seated else opened  # of a student in a room, none takes the place of the task
+        self.exercises.put([*sent, *mine, *filter(None, (self.lent, self.draft))], weak=opened)
         self.practice.look_again()
 
     # Where exercises are done

@@ -118,9 +118,9 @@ class Practice:
 
     def after(self, exercise: Exercise) -> Exercise | None:
         """The next one in the list; None after the last one."""
-        ids = [one.id for one in self._exercises.all]
-        place = ids.index(exercise.id) + 1
-        return self._exercises.all[place] if place < len(ids) else None
+        known = self._exercises.all
+        place = [one.id for one in known].index(exercise.id) + 1
+        return known[place] if place < len(known) else None
 
     def variant(self, exercise: Exercise) -> Variant:
         """The student's numbers."""

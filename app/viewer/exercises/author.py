@@ -16,6 +16,7 @@ from app.exercises import Exercise, ExerciseFileError, Exercises, Trial, Variant
 from app.exercises import form as forms
 from app.exercises.files import MOST_BYTES, Find, parse_exercise
 from app.exercises.kinds import KINDS
+from app.exercises.shelf import digest, written_in_a_page
 from app.viewer.activity.activity import AUTHOR, EXERCISES
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
@@ -44,9 +45,15 @@ class AuthorSettings(Settings):
 
 @dataclass(frozen=True, eq=False)
 class Drafted(Facts[AuthorSettings]):
-    """What is known of the draft; `exercises` are those of the service, `find` gives the arm of an id."""
+    """What is known of the draft; `find` gives the arm of an id.
 
-    exercises: Exercises
+    Attributes:
+        known: the exercise of the service with the draft's id.
+        is_mine: whether the draft is another version of that one.
+    """
+
+    known: Exercise | None
+    is_mine: bool
     find: Find
 
     @cached_property
@@ -57,7 +64,13 @@ class Drafted(Facts[AuthorSettings]):
     @cached_property
     def trial(self) -> Trial:
         """The draft, tried."""
-        return _trial(self.settings.draft, self.exercises, self.find)
+        found = _trial(self.settings.draft, self.find)
+        return found if self.known is None or self.is_mine or found.exercise is None else found.with_taken_id()
+
+    @property
+    def is_saved(self) -> bool:
+        """Whether the service has the draft as it is."""
+        return self.known is not None and self.is_mine and self.known.source == forms.to_toml(self.data)
 
     @property
     def exercise(self) -> Exercise | None:
@@ -71,8 +84,8 @@ class Drafted(Facts[AuthorSettings]):
 
 
 @lru_cache(maxsize=16)  # facts are made anew with each frame of a moving arm
-def _trial(draft: str, exercises: Exercises, find: Find) -> Trial:
-    return tried(draft, FILE, find, lambda name: exercises.get(name) is not None)
+def _trial(draft: str, find: Find) -> Trial:
+    return tried(draft, FILE, find)
 
 
 class Author(DeclaredFeature[AuthorSettings, Drafted]):
@@ -82,11 +95,15 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
     title = "Write an exercise"
     about = "For teachers: your own question, from a kind or from any exercise."
     settings_of, facts_of = AuthorSettings, Drafted
-    messages = frozenset({"set", "add", "drop", "look", "pose", "try", "save", "bring", "close", "upload"})
+    messages = frozenset(
+        {"set", "add", "drop", "look", "pose", "try", "save", "serve", "bring", "close", "upload"}
+    )
 
     def __init__(self, stage: Stage) -> None:
         self.shown = False
         self._error = views.Refusal()
+        # What the folder of the service has of this page, by id: `digest`. Undo does not change it.
+        self._served: dict[str, str] = {}
         super().__init__(stage)
 
     def show(self) -> None:
@@ -102,7 +119,22 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
     # Declared
 
     def look(self) -> Drafted:
-        return Drafted(self.settings, self.stage.now, self.stage.activity.courses.exercises, self.stage.store.get)
+        known = self._exercises.get(self._id)
+        mine = known is not None and self._served.get(known.id) == digest(known.source)
+        return Drafted(self.settings, self.stage.now, known, mine, self.stage.store.get)
+
+    def besides(self) -> tuple[object, ...]:
+        return (self._exercises.get(self._id), *self._served.items())
+
+    @property
+    def _exercises(self) -> Exercises:
+        """Those of the service."""
+        return self.stage.activity.courses.exercises
+
+    @property
+    def _id(self) -> object:
+        """The id in the draft, whatever it is."""
+        return _id_of(self.settings.draft)
 
     def panel(self) -> Sequence[PanelNode]:
         if not self.shown:
@@ -114,11 +146,19 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
             return [Html(views.start_html, (activity.exercises.all, self._error))]
         trial, robots = f.trial, tuple(robot.id for robot in self.stage.store.robots)
         values, refusal = trial.values(units), self._error or views.Refusal(trial.field, trial.error)
-        nodes: list[PanelNode] = [Html(views.head_html, (trial, refusal))]
+        nodes: list[PanelNode] = [Html(views.head_html, (trial, refusal, self._place))]
         for i, group in enumerate(forms.groups(f.data, robots)):
             nodes.append(Html(views.group_html, (group, i, values, refusal)))
         nodes.append(Html(views.students_html, (trial.students(units), trial.error)))
         return nodes
+
+    @property
+    def _place(self) -> views.Place:
+        """What can be done with the draft in the folder of the service."""
+        if not self.stage.may_save:
+            return views.Place(saved=self.read.is_saved)
+        obstacle = self._exercises.obstacle
+        return views.Place(not obstacle, obstacle, self.read.is_saved, self.read.known is not None)
 
     def scene(self) -> Sequence[Node]:
         variant = self.read.first if self.shown else None
@@ -145,6 +185,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
                     self._act(name, rest, value)
                 except (ExerciseFileError, InputError) as error:
                     self._error = views.Refusal(error.field, f"got {error.value}, expected {error.expected}")
+                self.look_again()
             case _:
                 super().handle(key, value)
 
@@ -173,7 +214,9 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
                 self._save(one)
             case "bring", [int()], _ if (one := self.facts.exercise) is not None:
                 self._bring(one)
-            case (("try" | "save" | "bring"), [int()], _):
+            case "serve", [int()], _ if self.stage.may_save and (one := self.facts.exercise) is not None:
+                self._serve(one)
+            case (("try" | "save" | "bring" | "serve"), [int()], _):
                 pass  # the form says what is wrong
             case _:
                 raise InputError("exercise", name, "a control of the form")
@@ -187,7 +230,9 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         if one is None:
             raise InputError("exercise", origin, "the id of an exercise, or one of the kinds " + ", ".join(KINDS))
         data = forms.read(one.source)
-        if not known.is_own(one.id):
+        if self.stage.may_save and not one.builtin and not known.is_own(one.id) and written_in_a_page(one):
+            self._served[one.id] = digest(one.source)  # it is changed where it is; with another id, a new one
+        elif not known.is_own(one.id):
             data["id"] = _free(one.id, known)
             data["title"] = f"{one.title} (mine)"[:80]
             data.pop("place", None)
@@ -258,6 +303,16 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         self.stage.client.send_file_download(name, self.settings.draft.encode(), save_immediately=True)
         self.stage.notify(Notice("hand", f"{name} is saved", "Your browser has put it where it puts downloads."))
 
+    def _serve(self, exercise: Exercise) -> None:
+        """Into the folder of the service, for all pages."""
+        self.look_again()
+        again = self.facts.known is not None
+        saved = self._exercises.save(forms.to_toml(self.facts.data), self._served.get(exercise.id, ""))
+        self._served[exercise.id] = digest(saved.source)
+        self._offer()
+        title = f"{saved.title} is {'replaced' if again else 'saved'} on the server"
+        self.stage.notify(Notice("hand", title, "Other pages have it when they next open the list of exercises."))
+
     def _offer(self) -> None:
         """The page's exercises have the draft, as long as it is one."""
         self.stage.activity.draft = self.facts.exercise
@@ -277,14 +332,26 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
             super().on_robot()
 
     def state(self) -> dict[str, object]:
-        return super().state() if self.settings.draft else {}
+        if not self.settings.draft:
+            return {}
+        served = self._served.get(str(self._id), "")
+        return {**super().state(), **({"served": served} if served else {})}
 
     def restore(self, state: dict[str, object]) -> None:
         if self.stage.activity.practice.seated:
             return  # the draft of a teacher who leads the class has the answer
+        served, draft = state.get("served"), state.get("draft")
+        if isinstance(served, str) and isinstance(draft, str):
+            self._served.setdefault(str(_id_of(draft)), served)
         super().restore({"draft": "", **state})
         self.look_again()
         self._offer()
+
+
+@lru_cache(maxsize=16)
+def _id_of(draft: str) -> object:
+    """The id in a draft, whatever it is; None without one."""
+    return forms.read(draft).get("id")
 
 
 def _rounded(value: float, turns: bool) -> str | int:

@@ -32,6 +32,23 @@ class Refusal:
         return bool(self.why) and self.field == rows.field
 
 
+@dataclass(frozen=True)
+class Place:
+    """The folder of the service, for a draft.
+
+    Attributes:
+        open: whether the visitor may save there.
+        obstacle: why not, for whom it concerns.
+        saved: whether the draft is there as it is.
+        taken: whether an exercise with its id is there.
+    """
+
+    open: bool = False
+    obstacle: str = ""
+    saved: bool = False
+    taken: bool = False
+
+
 def student_html() -> str:
     """For a student in a room, who writes no exercises."""
     return render("exercises/author_seated")
@@ -44,9 +61,9 @@ def start_html(exercises: Sequence[Exercise], refusal: Refusal) -> str:
     return render("exercises/author_start", topics=topics, kinds=kinds, most=MOST_BYTES, refusal=refusal)
 
 
-def head_html(trial: Trial, refusal: Refusal) -> str:
+def head_html(trial: Trial, refusal: Refusal, place: Place) -> str:
     """Whether the draft is an exercise, and what can be done with it."""
-    return render("exercises/author_head", trial=trial, refusal=refusal, ready=not trial.error)
+    return render("exercises/author_head", trial=trial, refusal=refusal, ready=not trial.error, place=place)
 
 
 def group_html(group: Group, number: int, values: Mapping[str, tuple[str, ...]], refusal: Refusal) -> str:

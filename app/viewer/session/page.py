@@ -101,7 +101,7 @@ class VisitorPage(ShownArm, Worker):
         self.arm = ArmController(client, services.pace, self.post, self)
         self.view, self.units, self.system_dark = ViewState(), DEFAULT_UNITS, False
         self.client, self._pace = client, services.pace
-        self._welcome, self._looking = welcome, rights is Rights.LOOK
+        self._welcome, self._looking, self.may_save = welcome, rights is Rights.LOOK, rights.save
         self.door = Door(services.lines, self.post, self._looking)
         self._persistence = Persistence(self, token, self._guard, rights)
         self.offered: tuple[type[Feature], ...] = TABS

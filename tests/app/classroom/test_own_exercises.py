@@ -126,3 +126,9 @@ def test_an_exercise_is_replaced_and_goes_with_its_item() -> None:
     assert COURSE.removed(1).own == ()
     assert COURSE.removed(0).own == COURSE.own
     assert Course("Week 1", "", COURSE.items[:1]).fingerprint == COURSE.removed(1).fingerprint
+
+
+def test_a_course_opens_after_another_exercise_was_saved_under_the_same_id(tmp_path: Path) -> None:
+    known = Exercises(tmp_path)
+    known.save(form.to_toml({**DATA, "title": "By somebody else"}))
+    assert parse_course(to_toml(COURSE), known) == COURSE

@@ -42,7 +42,7 @@ def cell(draft: Draft, path: str) -> Entry:
 
 
 def trial(draft: Draft):  # type: ignore[no-untyped-def]
-    return tried(to_toml(draft), "exercise", kin.get_robot, lambda name: False)
+    return tried(to_toml(draft), "exercise", kin.get_robot)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -102,7 +102,7 @@ method = "Add them up."
 """
     arm = kin.get_robot("planar2r")
     x, y = kin.fk(arm, [math.radians(30), math.pi / 2])[:2, 3]
-    found = tried(text, "exercise", kin.get_robot, lambda name: False)
+    found = tried(text, "exercise", kin.get_robot)
     assert found.error == ""
     values = found.values(UNITS)
     assert values["q[0]"] == ("30°",) * 3
@@ -137,8 +137,10 @@ def test_a_refusal_names_field_value_and_what_is_valid(path: str, text: str, fie
 
 
 def test_an_id_that_is_taken_is_refused_and_what_cannot_be_solved_is_said() -> None:
-    taken = tried(to_toml(REACH), "exercise", kin.get_robot, lambda name: True)
-    assert (taken.exercise, taken.field) == (None, "id")
+    taken = trial(REACH).with_taken_id()
+    assert taken.field == "id"
+    assert REACH["id"] in taken.error
+    assert [one.failure for one in taken.students(UNITS)] == ["", "", ""], "what students get is said all the same"
     never = trial(with_cell(REACH, "require", "0 > 1"))
     assert never.exercise is not None
     assert "no numbers that meet the conditions" in never.error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import time
 from functools import cache
 from pathlib import Path
@@ -12,6 +11,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
 from app.service.web.rooms.network import ANY, url_for_others
+from app.shared.clients import is_local_name
 from app.shared.security import guard_teacher
 
 if TYPE_CHECKING:
@@ -98,11 +98,7 @@ def _for_others(request: Request) -> dict[str, object]:
 
 def only_here(request: Request) -> bool:
     """Whether the address of the request is one that other machines cannot use."""
-    host = request.url.hostname or ""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost" or host.endswith(".localhost")
+    return is_local_name(request.url.hostname or "")
 
 
 def qr_svg(address: str) -> bytes:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import pytest
 
 from app.classroom.courses import Course, Courses, Item
-from app.exercises import Exercise, Exercises, Verdict
+from app.exercises import Exercise, Exercises, Verdict, form, parse_exercise
 from app.viewer.activity.activity import EXERCISES, Activity, GivenUp, Judged
 from app.viewer.activity.context import ExerciseContext
 from kin import KinematicsError
@@ -131,3 +133,26 @@ def test_the_same_note_is_reported_once(activity: Activity, changes: list[int]) 
     for note in ("Storing the answer …", "Storing the answer …", "✓ Stored for your teacher."):
         activity.say(note)
     assert len(changes) == 2
+
+
+def named(title: str) -> str:
+    """The file of an exercise *mine*."""
+    return form.to_toml({**tomllib.loads(OTHER.source), "id": "mine", "title": title})
+
+
+@pytest.mark.parametrize("seated", [False, True])
+def test_whose_exercise_counts_if_a_course_and_the_service_have_the_same_id(seated: bool, tmp_path: Path) -> None:
+    known = Exercises(tmp_path)
+    activity = Activity(Courses(known), lambda: b"secret", lambda: None)
+    if seated:
+        activity.take_seat(ExerciseContext("seat r s", b"k", seat=True), Room())
+    course = Course("Mine").bringing(parse_exercise(named("Of the course")))
+    activity.progress.course = course
+    activity.stock()
+    ours = course.own[0].exercise
+    assert activity.exercises.get("mine") is ours
+    saved = known.save(named("Of the service"))
+    assert activity.exercises.get("mine") is (saved if seated else ours), "a student replaces no task"
+    activity.sent, activity.progress.course = course, None
+    activity.stock()
+    assert activity.exercises.get("mine") is ours, "what the teacher sends counts"

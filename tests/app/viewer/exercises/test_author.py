@@ -6,6 +6,7 @@ import html
 import json
 import tomllib
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from app.exercises.files import MOST_BYTES
 from app.exercises.form import to_toml
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
+from app.shared.static_folder import static_folder
 from app.shared.store import Store
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
@@ -165,3 +167,147 @@ def test_an_exercise_goes_into_a_course_whose_link_hides_the_answer(tmp_path: Pa
         text = encode(PageState(lesson="course", features=foreign))
         with FakeBrowser(server, memory=json.dumps({"address": "http://127.0.0.1/", "state": text})) as tab:
             tab.wait(lambda: "The course cannot be used" in shown(tab) and "has sealed" in shown(tab))
+
+
+# In the folder of the service
+
+TOKEN = "open-sesame-42"
+BUTTON = 'data-guide-do="serve"'
+
+
+def access(token: str | None = None, read_only: bool = False) -> dict[str, object]:
+    return {"token": token, "read_only": read_only, "rate": 0.0, "login_page": static_folder() / "login.html"}
+
+
+def visitor(port: int, memory: str, **headers: str) -> FakeBrowser:
+    return FakeBrowser(port, memory=memory, additional_headers=headers)
+
+
+def test_a_teacher_saves_an_exercise_on_the_server_and_other_processes_have_it(tmp_path: Path) -> None:
+    settings = Settings(exercises=tmp_path)
+    with ExitStack() as stack:  # two processes of a service share no more than the folder
+        here, there = (
+            stack.enter_context(serve_viewer(ViewerServer(Store(), settings, Clouds()), access=access()))
+            for _ in range(2)
+        )
+        with visitor(here, stored(to_toml(DRAFT))) as tab:
+            tab.wait(lambda: "Save on the server" in shown(tab))
+            press(tab, ["set", "answer.value", 1], "hypot(")
+            tab.wait(lambda: "answer.value[0]:" in shown(tab))
+            press(tab, ["serve", 2])
+            press(tab, ["set", "answer.value", 3], "\n".join(map(str, np.atleast_1d(DRAFT["answer"]["value"]))))
+            tab.wait(lambda: "✓ Checked." in shown(tab))
+            assert list(tmp_path.iterdir()) == [], "what is no exercise is not saved"
+
+            press(tab, ["serve", 4])
+            tab.wait(lambda: "My own is saved on the server" in shown(tab))
+            tab.wait(lambda: "It is saved on the server, in the list of all pages." in shown(tab))
+            written = tomllib.loads((tmp_path / "my-own.toml").read_text())
+            assert {**written, "answer": DRAFT["answer"]} == DRAFT
+            press(tab, ["set", "title", 5], "Where <b>is</b> it?")
+            tab.wait(lambda: "Replace on the server" in shown(tab) and "It is saved" not in shown(tab))
+            tab.say("undo")
+            tab.wait(lambda: "It is saved on the server" in shown(tab))
+            tab.say("redo")
+            tab.wait(lambda: "It is saved on the server" not in shown(tab))
+            press(tab, ["serve", 6])
+            tab.wait(lambda: "Where <b>is</b> it? is replaced on the server" in shown(tab))
+            assert "<b>is</b>" not in tab.html
+            assert [path.name for path in tmp_path.iterdir()] == ["my-own.toml"]
+
+        text = encode(PageState(lesson="exercises", features={"exercises": {"seed": 1, "at": "", "done": {}}}))
+        with visitor(there, json.dumps({"address": "http://127.0.0.1/", "state": text})) as student:
+            student.wait(lambda: "Where &lt;b&gt;is&lt;/b&gt; it?" in student.html)
+            assert "<b>is</b>" not in student.html
+            student.say("feature", ["exercises", ["open", "my-own", 1], None])
+            student.wait(lambda: 'data-exercise="my-own"' in student.html)
+
+        # It is changed where it is by who begins with it; another page's copy is another exercise.
+        with visitor(there, stored()) as tab:
+            tab.wait(lambda: "Begin with a kind" in shown(tab))
+            press(tab, ["set", "new", 1], "my-own")
+            tab.wait(lambda: "It is saved on the server" in shown(tab) and 'value="my-own"' in tab.html)
+            press(tab, ["set", "level", 2], "3")
+            press(tab, ["serve", 3])
+            tab.wait(lambda: "is replaced on the server" in shown(tab))
+            assert tomllib.loads((tmp_path / "my-own.toml").read_text())["level"] == 3
+        with visitor(here, stored(to_toml({**DRAFT, "title": "By somebody else"}))) as tab:
+            tab.wait(lambda: "expected an id that no other exercise has" in shown(tab))
+            press(tab, ["serve", 1])
+            press(tab, ["set", "id", 2], "my-own-2")
+            tab.wait(lambda: "✓ Checked." in shown(tab))
+            press(tab, ["serve", 3])
+            tab.wait(lambda: "It is saved on the server" in shown(tab))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my-own-2.toml", "my-own.toml"]
+    assert tomllib.loads((tmp_path / "my-own.toml").read_text())["title"] == "Where <b>is</b> it?"
+
+
+def test_a_link_to_a_draft_knows_what_is_on_the_server(tmp_path: Path) -> None:
+    settings = Settings(exercises=tmp_path)
+    with serve_viewer(ViewerServer(Store(), settings, Clouds()), access=access()) as port:
+        with visitor(port, stored(to_toml(DRAFT))) as tab:
+            tab.wait(lambda: "Save on the server" in shown(tab))
+            press(tab, ["serve", 1])
+            tab.wait(lambda: "It is saved on the server" in shown(tab))
+            tab.wait(lambda: any("served" in decode(s, [SOURCE.robot]).features["author"] for s in tab.kept[-1:]))
+            kept = tab.kept[-1]
+        with visitor(port, json.dumps({"address": "http://127.0.0.1/", "state": kept})) as tab:
+            tab.wait(lambda: "It is saved on the server" in shown(tab))
+        state = decode(kept, [SOURCE.robot])
+        forged = {**state.features["author"], "served": "0" * 16}
+        text = encode(PageState(lesson="author", features={"author": forged}))
+        with visitor(port, json.dumps({"address": "http://127.0.0.1/", "state": text})) as tab:
+            tab.wait(lambda: "expected an id that no other exercise has" in shown(tab))
+
+
+@pytest.mark.parametrize(
+    ("options", "headers", "may"),
+    [
+        (access(), {}, True),
+        (access(), {"X-Forwarded-For": "10.0.0.7"}, False),  # another machine, through a proxy of this one
+        (access(TOKEN), {"Authorization": f"Bearer {TOKEN}"}, True),
+        (access(TOKEN), {"Authorization": f"Bearer {TOKEN}", "X-Forwarded-For": "10.0.0.7"}, True),
+        (None, {}, False),  # a student of a room, who has no token
+    ],
+)
+def test_who_may_save_on_the_server(
+    options: dict[str, object] | None, headers: dict[str, str], may: bool, tmp_path: Path
+) -> None:
+    viewer = ViewerServer(Store(), Settings(exercises=tmp_path), Clouds())
+    with (
+        serve_viewer(viewer, access=options) as port,
+        visitor(port, stored(to_toml(DRAFT)), **headers) as tab,
+    ):
+        tab.wait(lambda: "✓ Checked." in shown(tab))
+        assert (BUTTON in tab.html) == may
+        press(tab, ["serve", 1])
+        press(tab, ["set", "title", 2], "Afterwards")
+        tab.wait(lambda: 'value="Afterwards"' in tab.html)
+        assert [path.name for path in tmp_path.iterdir()] == ["my-own.toml"] * may
+
+
+def test_a_service_without_a_folder_says_so_to_whom_it_concerns(tmp_path: Path) -> None:
+    for options in (access(), None):
+        viewer = ViewerServer(Store(), Settings(), Clouds())
+        with serve_viewer(viewer, access=options) as port, visitor(port, stored(to_toml(DRAFT))) as tab:
+            tab.wait(lambda: "✓ Checked." in shown(tab))
+            assert BUTTON not in tab.html
+            assert ("set KINBOARD_EXERCISES" in shown(tab)) == (options is not None)
+
+
+def test_a_folder_that_fails_while_it_is_saved_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(number: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    viewer = ViewerServer(Store(), Settings(exercises=tmp_path), Clouds())
+    with serve_viewer(viewer, access=access()) as port, visitor(port, stored(to_toml(DRAFT))) as tab:
+        tab.wait(lambda: "Save on the server" in shown(tab))
+        with monkeypatch.context() as patched:
+            patched.setattr("os.fsync", full)
+            press(tab, ["serve", 1])
+            tab.wait(lambda: "No space left on device" in shown(tab))
+        assert 'value="My own"' in tab.html
+        press(tab, ["serve", 2])
+        tab.wait(lambda: "It is saved on the server" in shown(tab))

@@ -1,0 +1,255 @@
+"""The exercises that a service offers, and those that one page has besides.
+
+The operator's folder may grow while the service runs: pages save exercises in it, and the operator copies files
+into it. Each process looks at the folder again when it is asked for the list, and when it does not know an id, and
+reads the files that have changed. It keeps what it has read: a folder that goes away takes nothing from a class.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import re
+import threading
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+from app.exercises import form
+from app.exercises.exercise import TOPICS, Exercise
+from app.exercises.fields import ExerciseFileError
+from app.exercises.files import Find, builtin_exercises, load_exercise, load_folder, parse_exercise
+from kin import InputError, get_robot
+
+EVERY = 1.0  # s between two looks at the folder for the list
+STALE = 60.0  # s after which a file that was being written was left behind by a process that has ended
+MOST_FILES = 500  # in the folder: with more, pages save no further ones
+_DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9]")  # Windows takes a file of this name for a device
+
+log = logging.getLogger("kinboard.exercises")
+_reading = threading.RLock()  # of the folder; not an attribute, because processes are sent the exercises
+
+
+class _Stamp(NamedTuple):
+    """Another one: the file has changed."""
+
+    time: int
+    size: int
+    file: int
+
+
+class Exercises:
+    """The built-in exercises, and those of the operator's folder. Thread-safe.
+
+    Attributes:
+        folder: None: there is none.
+
+    Raises:
+        ExerciseFileError: a file of the folder is invalid, or its id is taken.
+    """
+
+    def __init__(self, folder: Path | None = None, find: Find = get_robot) -> None:
+        self.folder, self._find = folder, find
+        self._stamps = {} if folder is None or not folder.is_dir() else _stamps(folder)
+        self._looked = time.monotonic()
+        own = () if folder is None else load_folder(folder, find)
+        self._builtin = {exercise.id: exercise for exercise in builtin_exercises()}
+        for exercise in own:
+            if exercise.id in self._builtin:
+                raise ExerciseFileError(exercise.file, "id", exercise.id, "an id that no built-in exercise has")
+        self._set({exercise.id: exercise for exercise in own})
+
+    @property
+    def all(self) -> tuple[Exercise, ...]:
+        """In the order of the list."""
+        if self.folder is not None and time.monotonic() - self._looked >= EVERY:
+            self._look()
+        return self._all
+
+    def get(self, exercise_id: object) -> Exercise | None:
+        """One exercise; None if there is none with this id."""
+        if not isinstance(exercise_id, str):
+            return None
+        if exercise_id not in self._by_id:
+            self._look()
+        return self._by_id.get(exercise_id)
+
+    def topics(self) -> tuple[tuple[str, tuple[Exercise, ...]], ...]:
+        """The topics that have exercises, with these."""
+        known = self.all
+        found = ((topic, tuple(one for one in known if one.topic == topic)) for topic in TOPICS)
+        return tuple((topic, exercises) for topic, exercises in found if exercises)
+
+    @property
+    def obstacle(self) -> str:
+        """Why nothing can be saved in the folder, as a sentence; empty: it can."""
+        if self.folder is None:
+            return "This service has no folder for exercises: set KINBOARD_EXERCISES."
+        if not self.folder.is_dir():
+            return "The folder of this service for exercises is gone."
+        if not os.access(self.folder, os.W_OK | os.X_OK):
+            return "The folder of this service for exercises cannot be written."
+        return ""
+
+    def save(self, text: str, before: str = "") -> Exercise:
+        """Write an exercise into the folder, for all pages of all processes.
+
+        Args:
+            text: of the file, whose exercise can be solved.
+            before: `digest` of the file with this id, which it replaces; empty: there is none.
+
+        Raises:
+            ExerciseFileError: the text is no exercise.
+            InputError: the folder cannot be written or is full, or the id is another exercise's by now.
+        """
+        exercise = parse_exercise(text, "exercise", self._find)
+        name = exercise.id
+        if self.folder is None or self.obstacle:
+            raise InputError("folder", "KINBOARD_EXERCISES", f"a folder that can be written. {self.obstacle}")
+        if _DEVICE.fullmatch(name):
+            raise InputError("id", name, "a name that every system accepts for a file")
+        part = self.folder / f".{name}.saving"
+        try:
+            self._reserve(part, name)
+            try:
+                path = self._place(name, before)
+                with part.open("wb") as file:
+                    file.write(text.encode())
+                    file.flush()
+                    os.fsync(file.fileno())
+                part.replace(path)
+            finally:
+                part.unlink(missing_ok=True)
+        except OSError as error:
+            raise InputError("folder", error.strerror, "a folder that can be written and has room") from None
+        self._look()
+        return self._by_id[name]
+
+    def _reserve(self, part: Path, name: str) -> None:
+        """Create the file that is written first: of all who save this id, one at a time has it."""
+        for last in (False, True):
+            try:
+                part.open("xb").close()
+                return
+            except FileExistsError:
+                if last or time.time() - part.stat().st_mtime < STALE:
+                    raise InputError("id", name, "an id under which nobody else saves now: try again") from None
+                part.unlink(missing_ok=True)
+
+    def _place(self, name: str, before: str) -> Path:
+        """The file that an exercise with this id goes into; raises `InputError` if it is another one's."""
+        self._look()
+        assert self.folder is not None
+        known = self._by_id.get(name)
+        if known is not None and (known.builtin or digest(known.source) != before):
+            raise InputError("id", name, f"an id that no other exercise has: “{known.title}” has it")
+        if known is not None:
+            return Path(known.file)
+        path = self.folder / f"{name}.toml"
+        if os.path.lexists(path):
+            raise InputError("id", name, "an id that no other exercise has: a file of the folder has this name")
+        if len(self._stamps) >= MOST_FILES:
+            raise InputError("folder", f"{len(self._stamps)} exercises", f"at most {MOST_FILES}")
+        return path
+
+    def _look(self) -> None:
+        """Read what has changed in the folder. Files that are invalid are left out, with a line in the log."""
+        if self.folder is None:
+            return
+        with _reading:
+            self._looked = time.monotonic()
+            try:
+                stamps = _stamps(self.folder)
+            except OSError as error:
+                if self._stamps:
+                    log.warning("%s: what was read of it stays: %s", self.folder, error.strerror)
+                self._stamps = {}
+                return
+            changed = sorted(name for name, stamp in stamps.items() if self._stamps.get(name) != stamp)
+            self._stamps = stamps
+            if not changed:
+                return
+            own = dict(self._own)
+            for name in changed:
+                try:
+                    one = load_exercise(self.folder / name, self._find)
+                    other = self._by_id.get(one.id) or own.get(one.id)
+                    if other is not None and Path(other.file).name != name and Path(other.file).exists():
+                        raise ExerciseFileError(one.file, "id", one.id, "an id that no other exercise has")
+                except ExerciseFileError as error:
+                    log.warning("an exercise is left out: %s", error)
+                else:
+                    own[one.id] = one
+            self._set(own)
+
+    def _set(self, own: dict[str, Exercise]) -> None:
+        self._own = own
+        self._by_id = {**self._builtin, **own}
+        self._all = tuple(sorted(self._by_id.values(), key=lambda one: one.rank))
+
+
+class Shelf(Exercises):
+    """Those of a service, and those that one page has besides. Not thread-safe: the page's worker changes it."""
+
+    def __init__(self, known: Exercises) -> None:
+        self._known = known
+        self.put(())
+
+    def put(self, own: Iterable[Exercise], weak: Iterable[Exercise] = ()) -> None:
+        """Have these besides, instead of those before.
+
+        Args:
+            own: they take the place of those of the operator's folder with the same id, but not of built-in ones.
+            weak: they take nobody's place.
+        """
+        self._strong = {one.id: one for one in own if not self._is_builtin(one.id)}
+        self._weak = {one.id: one for one in weak}
+        self._seen: tuple[Exercise, ...] = ()
+
+    @property
+    def all(self) -> tuple[Exercise, ...]:
+        known = self._known.all
+        if known is not self._seen:
+            both = {**self._weak, **{one.id: one for one in known}, **self._strong}
+            self._seen, self._both = known, tuple(sorted(both.values(), key=lambda one: one.rank))
+        return self._both
+
+    def get(self, exercise_id: object) -> Exercise | None:
+        if not isinstance(exercise_id, str):
+            return None
+        mine = self._strong.get(exercise_id)
+        return mine or self._known.get(exercise_id) or self._weak.get(exercise_id)
+
+    def is_own(self, exercise_id: str) -> bool:
+        """Whether it is one that the page has besides."""
+        one = self.get(exercise_id)
+        return one is not None and one is not self._known.get(exercise_id)
+
+    def _is_builtin(self, exercise_id: str) -> bool:
+        one = self._known.get(exercise_id)
+        return one is not None and one.builtin
+
+
+def digest(text: str) -> str:
+    """What stands for the text of a file, to see whether it is still the same."""
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def written_in_a_page(exercise: Exercise) -> bool:
+    """Whether a page would write the exercise's file as it is: nothing of it is lost when a page changes it."""
+    return form.to_toml(form.read(exercise.source)) == exercise.source
+
+
+def _stamps(folder: Path) -> dict[str, _Stamp]:
+    """The exercise files of a folder; raises `OSError`."""
+    found = {}
+    for path in folder.iterdir():
+        if path.suffix == ".toml":
+            try:
+                facts = path.stat()
+            except FileNotFoundError:
+                continue  # removed in between, or a link to nothing
+            found[path.name] = _Stamp(facts.st_mtime_ns, facts.st_size, facts.st_ino)
+    return found
