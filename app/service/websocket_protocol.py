@@ -13,11 +13,13 @@ import contextlib
 import struct
 import sys
 import time
+from collections.abc import Callable
 from typing import Any, Final
 
 from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
 from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.exceptions import InvalidState
 from websockets.frames import CloseCode, Frame
 from websockets.http11 import Request
 
@@ -27,7 +29,7 @@ from app.live.codes import PATH as LIVE
 from app.service.guard import Outflow
 from app.service.http_protocol import GuardedConfig, raw_answer, require_shape
 from app.service.web.inspection import BURST, RATE, MessageLimit
-from app.shared.connection import DELAY, SILENCE
+from app.shared.connection import DELAY, LINE, SILENCE
 
 if sys.platform == "linux":
     import fcntl
@@ -41,6 +43,7 @@ LIVE_PING: Final = 2.0  # the same of a page's program: the page shows how long 
 MAX_LIVE: Final = 2 << 20  # bytes of a program's message: what is too large is refused in words, up to this size
 SMALL: Final = 64 * 1024  # bytes of a message that costs no more than any other
 LARGE_COST: Final = 1 / 8192  # of each byte of a larger one, in messages: 1 MiB costs half a second of them
+AT_ONCE: Final = 4  # messages of a client that are handled in a row, before others have their turn
 LINGER: Final = 5.0  # seconds between two looks whether a line is still slow
 
 
@@ -52,6 +55,7 @@ require_shape(
     *("send_receive_event_to_app", "curr_msg_data_type"),
     *("send_keepalive_ping", "keepalive_timeout", "conn", "queue", "frames", "transport"),
     *("read_paused", "close_sent", "handshake_initiated", "handshake_complete", "pong_timer"),
+    *("writable", "disconnected"),
     "last_ping_rtt",
 )
 
@@ -70,6 +74,10 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         self._resumed = False
         self._queued = 0
         self._heard = time.monotonic()
+        self._take: Callable[[bytes], bool] | None = None  # see `hear`
+        self._awaited = False  # whether the application waits for a message
+        self._taken = 0  # messages in a row that `_take` has handled
+        self.sent = 0
 
     # the connection
 
@@ -102,11 +110,16 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
 
     def data_received(self, data: bytes) -> None:
         self._heard = time.monotonic()
+        self._taken = 0
         self._unread += data
         self._parse_more()
 
     async def receive(self) -> ASGIReceiveEvent:
-        message = await self.queue.get()
+        self._awaited = True
+        try:
+            message = await self.queue.get()
+        finally:
+            self._awaited = False
         if self.queue.empty():
             self._parse_more()
         return message
@@ -156,6 +169,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             if self.response.status_code == 101:
                 self.scope["state"][SILENCE] = self._silence
                 self.scope["state"][DELAY] = self._delay
+                self.scope["state"][LINE] = self
                 if LIVE in event.path:
                     self.conn.max_message_size = MAX_LIVE
                     self.ping_interval = min(LIVE_PING, self.ping_interval or LIVE_PING)
@@ -183,7 +197,23 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
 
     def handle_bytes(self, event: Frame) -> None:
         self._spend(_cost(event, 1.0 if event.fin else CONTROL_COST))
-        super().handle_bytes(event)
+        if not (event.fin and self._is_taken(event.data)):
+            super().handle_bytes(event)
+
+    def hear(self, take: Callable[[bytes], bool]) -> None:
+        """Give `take` the whole binary messages that the application waits for: no task need wake for them.
+
+        What it returns True for is handled. No message overtakes another, and after `AT_ONCE` in a row one passes
+        through the application, so that a client who sends many at once holds up nobody.
+        """
+        self._take = take
+
+    def _is_taken(self, data: bytes | bytearray | memoryview) -> bool:
+        waits = self._awaited and self.queue.empty() and not self.close_sent and self._taken < AT_ONCE
+        if self._take is None or not waits:
+            return False
+        self._taken += 1
+        return self._take(bytes(data))
 
     def handle_cont(self, event: Frame) -> None:
         self._spend(_cost(event, CONTROL_COST))
@@ -214,6 +244,19 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         if self.handshake_complete and not self.close_sent and self.transport.is_closing():
             raise ClientDisconnected  # asyncio says so in its next round, and logs a line for each write before
         await super().send(message)
+
+    def send_now(self, data: bytes) -> bool:
+        """Send a binary message without a wait; False, and nothing is sent, if the line is full or has ended."""
+        is_open = self.handshake_complete and not (self.close_sent or self.disconnected)
+        if not is_open or not self.writable.is_set() or self.transport.is_closing():
+            return False
+        try:
+            self.conn.send_binary(data)
+        except InvalidState:
+            return False
+        self.transport.write(b"".join(self.conn.data_to_send()))
+        self.sent += len(data)
+        return True
 
     def send_keepalive_ping(self) -> None:
         self._queued, self._resumed = self._unsent(), False

@@ -12,6 +12,7 @@ from app.shared.security import Rights
 
 SILENCE = "kinboard.silence"  # what a websocket's scope has `Connection.silence` as, in its state
 DELAY = "kinboard.delay"  # and there: a function, the seconds from the last ping to its answer, None before one
+LINE = "kinboard.line"  # and there: a `Line`
 
 
 def never_silent() -> float:
@@ -28,6 +29,18 @@ class ConnectionEnded(Exception):  # noqa: N818 - not an error
         self.reason = reason
 
 
+class Line(Protocol):
+    """What a websocket can do without a task of the event loop, besides ASGI; only the loop's thread calls it."""
+
+    sent: int  # bytes of messages that `send_now` has sent
+
+    def hear(self, take: Callable[[bytes], bool]) -> None:
+        """Give `take` the binary messages that come while the application waits for one; see `Connection.hear`."""
+
+    def send_now(self, data: bytes) -> bool:
+        """Send a binary message; False, and nothing is sent, if the line is full or has ended."""
+
+
 class Connection(Protocol):
     """One visitor's connection. Messages of the visitor have been inspected."""
 
@@ -42,6 +55,16 @@ class Connection(Protocol):
 
     async def send(self, data: bytes) -> None:
         """Send a message; returns when the connection takes the next one. Raises `ConnectionEnded`."""
+
+    def hear(self, take: Callable[[bytes], bool]) -> None:
+        """Have messages that come while `receive` waits go to `take` first, at once and without an inspection.
+
+        What it returns True for is handled. It must be quick, and refuse all but messages that it has read wholly.
+        Some messages never get there, such as those that come in a burst: `receive` returns them.
+        """
+
+    def send_now(self, data: bytes) -> bool:
+        """Send a message if that needs no wait; False: nothing was sent, and `send` may wait or raise."""
 
 
 class Viewer(Protocol):

@@ -3,11 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from kin import Contact, IKOptions, JointConstraints, Obstacle, Robot, Task, fk
 from kin.collision.contacts import surroundings
 from kin.transforms import Array
+
+
+@lru_cache(maxsize=256)
+def _options(
+    task: Task,
+    locked: tuple[float | None, ...] | None,
+    branch: str | None,
+    avoid: bool,
+    obstacles: tuple[Obstacle, ...],
+) -> IKOptions:
+    """Options that are checked and hashed once for all targets of a drag."""
+    constraints = JointConstraints(locked=locked)
+    return IKOptions(
+        task=task, constraints=constraints, branch=branch, avoid_self_collision=avoid, obstacles=obstacles
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +72,7 @@ class Arm:
         locked = None
         if any(self.locks):
             locked = tuple(x if lock else None for x, lock in zip(self.goal.tolist(), self.locks, strict=True))
-        return IKOptions(
-            task=self.task,
-            constraints=JointConstraints(locked=locked),
-            branch=self.branch,
-            avoid_self_collision=self.avoid,
-            obstacles=self.obstacles if self.avoid else (),
-        )
+        return _options(self.task, locked, self.branch, self.avoid, self.obstacles if self.avoid else ())
 
     def contacts_at(self, q: Array) -> tuple[Contact, ...]:
         """What the arm touches at a configuration ``(n,)``, the deepest first.

@@ -71,6 +71,10 @@ class Stage(Protocol):
         """Seconds between two frames of a moving arm, which depend on how many visitors' arms move."""
 
     @property
+    def reading(self) -> float:
+        """Seconds between two updates of the numbers that follow a moving arm, which depend on it too."""
+
+    @property
     def service(self) -> Service:
         """Where this page has come from, for code that asks the service."""
 

@@ -45,10 +45,14 @@ class LoopWaker:
 
     Args:
         loop: the event loop.
+        when: calls a function that wakes the loop, at once or soon; any thread may call it.
     """
 
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self, loop: asyncio.AbstractEventLoop, when: Callable[[Callable[[], None]], None] = lambda wake: wake()
+    ) -> None:
         self.loop = loop
+        self._when = when
         self._waiting: deque[Callable[[], None]] = deque()
         self._woken = False
 
@@ -58,8 +62,11 @@ class LoopWaker:
         self._waiting.append(act)
         if not self._woken:
             self._woken = True
-            with contextlib.suppress(RuntimeError):  # closed: there is no visitor left
-                self.loop.call_soon_threadsafe(self._answer)
+            self._when(self._wake)
+
+    def _wake(self) -> None:
+        with contextlib.suppress(RuntimeError):  # closed: there is no visitor left
+            self.loop.call_soon_threadsafe(self._answer)
 
     def _answer(self) -> None:
         self._woken = False
@@ -106,6 +113,8 @@ class Outbox(AsyncMessageBuffer):
         self._asked: Callable[[], None] | None = None  # while it is held: what to call at the end
         self._waiter: asyncio.Future[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
+        self._send_now: Callable[[bytes], bool] = _never
+        self._refused: bytes | None = None  # packed, but not sent
 
     # Any thread
 
@@ -145,8 +154,24 @@ class Outbox(AsyncMessageBuffer):
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        if self._waiter is not None and not self._waiter.done():
+        if self._waiter is None or self._waiter.done():
+            return
+        try:
+            if not self.done and self._all_sent():
+                return
+        except Exception as error:  # noqa: BLE001 - raised where the connection is served
+            self._waiter.set_exception(error)
+        else:
             self._waiter.set_result(None)
+
+    def _all_sent(self) -> bool:
+        """Send what is pushed without a wait; False: a part must wait for the connection."""
+        while window := self._take():
+            data = self._packer.pack(window)
+            if not self._send_now(data):
+                self._refused = data
+                return False
+        return True
 
     def _send_soon(self) -> None:
         if self.done:
@@ -155,10 +180,17 @@ class Outbox(AsyncMessageBuffer):
             self._timer = self._waker.loop.call_later(self.window_duration_sec, self._send)
 
     async def send_to(self, connection: Connection) -> None:
-        """Send what is pushed, until the buffer is done or the connection ends; raises `ConnectionEnded`."""
+        """Send what is pushed, until the buffer is done or the connection ends; raises `ConnectionEnded`.
+
+        It sleeps while the connection takes everything at once.
+        """
+        self._send_now = connection.send_now
         try:
             while not self.done:
-                if window := self._take():
+                if self._refused is not None:
+                    data, self._refused = self._refused, None
+                    await connection.send(data)
+                elif window := self._take():
                     await connection.send(self._packer.pack(window))
                 else:
                     self._waiter = self._waker.loop.create_future()
@@ -208,6 +240,10 @@ class Packer:
         ]
         _infra._append_aligned_buffers(parts, binary, 16 + len(packed))
         return b"".join(parts)
+
+
+def _never(_: bytes) -> bool:
+    return False
 
 
 def _encodable(value: Any) -> Any:

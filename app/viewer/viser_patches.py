@@ -14,7 +14,8 @@ may have shown a newer value there meanwhile, as a moving arm does, and what was
 and `sent_value` have the value as it was sent.
 
 Drags: viser converts each field of an event by its type hints and passes it through six coroutines, of the shared
-scene and of the visitor's own. `drag_gizmo` does the same for a gizmo of the visitor alone, in one.
+scene and of the visitor's own. `drag_gizmo` does the same for a gizmo of the visitor alone, in one function, which
+needs no task of the event loop.
 
 Pages: viser evaluates the type hints of a class for each of its objects, a quarter of the cost of a page.
 `cache_type_hints` caches them.
@@ -38,7 +39,7 @@ import inspect
 import threading
 import time
 import typing
-from collections.abc import Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from typing import Any
 
 import msgspec
@@ -211,8 +212,8 @@ def uuid_of(handle: Any) -> str:
     return str(handle._impl.uuid)
 
 
-class _Drag(msgspec.Struct, tag_field="type", tag="TransformControlsUpdateMessage"):
-    """An event of a drag; lists of other lengths, and anything but numbers, are refused."""
+class _Drag(msgspec.Struct, tag_field="type", tag="TransformControlsUpdateMessage", forbid_unknown_fields=True):
+    """An event of a drag; lists of other lengths, anything but numbers, and other fields, are refused."""
 
     name: str
     owner: str
@@ -220,13 +221,17 @@ class _Drag(msgspec.Struct, tag_field="type", tag="TransformControlsUpdateMessag
     wxyz: tuple[float, float, float, float]
 
 
+_LARGEST = 1024  # bytes of an event of a drag
 _DRAG = _Drag.__struct_config__.tag.encode()  # type: ignore[union-attr]
 _read_drag = msgspec.msgpack.Decoder(_Drag).decode
 
 
-async def drag_gizmo(client: viser.ClientHandle, data: bytes) -> bool:
-    """Handle a message if it is an event of a drag of the visitor's own gizmo; False: viser must handle it."""
-    if _DRAG not in data:
+def drag_gizmo(client: viser.ClientHandle, data: bytes) -> bool:
+    """Handle a message if it is an event of a drag of the visitor's own gizmo; False: viser must handle it.
+
+    Callbacks of such a gizmo are coroutines that do not wait.
+    """
+    if len(data) > _LARGEST or _DRAG not in data:
         return False
     try:
         drag = _read_drag(data)
@@ -245,8 +250,19 @@ async def drag_gizmo(client: viser.ClientHandle, data: bytes) -> bool:
     gizmo._impl_aux.last_updated = time.time()
     event: Any = viser.TransformControlsEvent(client=client, client_id=number, target=gizmo, phase="update")
     for call in calls:
-        await call(event)
+        _run(call, event)
     return True
+
+
+def _run(call: Callable[[Any], Coroutine[Any, Any, None]], event: Any) -> None:
+    """Call a function whose coroutine does not wait."""
+    coroutine = call(event)
+    try:
+        coroutine.send(None)
+    except StopIteration:
+        return
+    coroutine.close()
+    raise RuntimeError(f"{call.__qualname__} waits, which a callback of a private gizmo may not")
 
 
 def keep_private(gizmo: viser.TransformControlsHandle) -> None:

@@ -35,6 +35,7 @@ from app.shared.connection import Connection, ConnectionEnded
 from app.shared.security import Rights
 from app.shared.throttled_log import ThrottledLog
 from app.viewer import viser_outbox
+from app.viewer.session.worker.threads import THREADS
 from app.viewer.viser_outbox import LoopWaker, Outbox, Packer
 from app.viewer.viser_patches import drag_gizmo
 
@@ -66,7 +67,7 @@ class PortlessServer(infra.WebsockServer):
         self.visitors: dict[int, viser.ClientHandle] = {}  # viser's own, by client id
         self._open = 0  # connections
         self._throttled = ThrottledLog(log)
-        self._waker, self._packer = LoopWaker(loop), Packer()
+        self._waker, self._packer = LoopWaker(loop, THREADS.after_steps), Packer()
         self._stopping: asyncio.Future[None]
         self._all_ended: asyncio.Event
 
@@ -113,6 +114,8 @@ class PortlessServer(infra.WebsockServer):
         self._client_state_from_id[number] = client._state
         self.rights[number], self.clients[number] = connection.rights, connection.client
         self.room_tokens[number], self.silences[number] = connection.room_token, connection.silence
+        if connection.rights.allow_message("TransformControlsUpdateMessage"):
+            connection.hear(functools.partial(self._drag, number))
         flows: list[asyncio.Task[Any]] = []
         try:
             await _call(self._client_connect_cb, client)
@@ -144,7 +147,7 @@ class PortlessServer(infra.WebsockServer):
         number = infra.ClientId(client.client_id)
         while True:
             data = await connection.receive()
-            if not await self._drag(number, data):
+            if not self._drag(number, data):
                 try:
                     message = self._message_class.deserialize(data)
                 except Exception as error:  # fields are converted without checks
@@ -154,11 +157,11 @@ class PortlessServer(infra.WebsockServer):
                         await self._handle(handler, number, message)
             await asyncio.sleep(0)  # others come between the messages of a burst
 
-    async def _drag(self, number: infra.ClientId, data: bytes) -> bool:
-        """Whether a message was an event of a drag, and has been handled."""
+    def _drag(self, number: infra.ClientId, data: bytes) -> bool:
+        """Whether a message, which nobody need have inspected, was an event of a drag, and has been handled."""
         visitor = self.visitors.get(number)
         try:
-            return visitor is not None and await drag_gizmo(visitor, data)
+            return visitor is not None and drag_gizmo(visitor, data)
         except Exception as error:  # noqa: BLE001 - of a callback
             self._note(error)
             return True

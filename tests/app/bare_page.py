@@ -38,7 +38,8 @@ class BarePage:
 
     def __init__(self, server: viser.ViserServer, robot: kin.Robot) -> None:
         self.client = SimpleNamespace(gui=server.gui, scene=server.scene, camera=_camera(), client_id=0)
-        self.store, self.units, self.dark, self.frame = STORE, DEFAULT_UNITS, False, 1 / 30
+        self.store, self.units, self.dark = STORE, DEFAULT_UNITS, False
+        self.frame, self.reading = 1 / 30, 0.05
         self.own: Any = None
         self.legend, self.driven, self.translucent = "", "", False
         self.notices: list[Any] = []

@@ -31,7 +31,7 @@ from app.service.web.inspection import MalformedMessageError, admitted
 from app.service.web.negotiation import accepts_gzip, is_current
 from app.service.web.short_page import short_page
 from app.shared.clients import client_of
-from app.shared.connection import SILENCE, ConnectionEnded, Viewer, never_silent
+from app.shared.connection import LINE, SILENCE, ConnectionEnded, Line, Viewer, never_silent
 from app.shared.metrics import DROPPED, STREAMED, VISITORS
 from app.shared.security import VIEWER_POLICY, origin_allowed
 from app.shared.slots import Slot, Slots
@@ -157,6 +157,7 @@ class VisitorConnection:
         self.silence: Callable[[], float] = visitor.scope.get("state", {}).get(SILENCE, never_silent)
         self.room_token: str = visitor.cookies.get(ROOM_COOKIE, "")
         self._streamed = STREAMED.labels("viewer")
+        self._line: Line | None = visitor.scope.get("state", {}).get(LINE)
 
     @property
     def is_open(self) -> bool:
@@ -189,6 +190,18 @@ class VisitorConnection:
         except WebSocketDisconnect:
             raise ConnectionEnded(1001) from None
         self._streamed.inc(len(data))
+
+    def hear(self, take: Callable[[bytes], bool]) -> None:
+        """Have messages that come while `receive` waits go to `take` first, without an inspection."""
+        if self._line is not None:
+            self._line.hear(take)
+
+    def send_now(self, data: bytes) -> bool:
+        """Send a message of the viewer if that needs no wait; False, and nothing is sent, otherwise."""
+        if self._line is None or not self.is_open or not self._line.send_now(data):
+            return False
+        self._streamed.inc(len(data))
+        return True
 
 
 async def _turn_away(visitor: WebSocket, why: str) -> None:

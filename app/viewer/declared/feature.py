@@ -44,7 +44,8 @@ class DeclaredFeature(Feature, Generic[S, F]):
     Attributes:
         settings_of, facts_of: the classes of settings and facts.
         undo: what undo calls an event, by the method that it calls, if not by the feature's title.
-        pace: the panel follows a moving arm at this interval (s): nobody reads faster, and HTML is long.
+        pace: the panel follows a moving arm at this interval (s), or more seldom where many visitors' arms move:
+            nobody reads faster, and HTML is long.
         facts: what is known of settings and arm now, made by `look`; the same object as long as both are. While an
             event is handled, they are those before it.
         read: the facts that the panel shows. Drawings that change no faster than the panel use these.
@@ -174,6 +175,10 @@ class DeclaredFeature(Feature, Generic[S, F]):
         if seen != self._seen:
             self._seen, self.facts = seen, self.look()
 
+    @property
+    def _interval(self) -> float:
+        return max(self.pace, self.stage.reading)
+
     def _begin(self) -> None:
         """Show what is declared, and ask for `advance` if there is anything to continue."""
         self.refresh()
@@ -215,7 +220,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def on_pose(self, T_base_tool: Array) -> None:
         self.draw()
-        self.wake(max(0.0, self.pace - (time.perf_counter() - self.shown_at)))
+        self.wake(max(0.0, self._interval - (time.perf_counter() - self.shown_at)))
 
     def on_style(self) -> None:
         self._begin()
@@ -226,10 +231,10 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def tick(self, now: float) -> None:
         again = self.advance(now)
-        wait = self.pace - (now - self.shown_at)
+        wait = self._interval - (now - self.shown_at)
         if wait <= 0.0 or self._stale:
             self.refresh()
-            wait = self.pace
+            wait = self._interval
         elif again is None:
             self.due = wait
         if again is not None:

@@ -161,6 +161,8 @@ class StatusLine:
     def __init__(self, gui: viser.GuiApi, first: Notice) -> None:
         self.count = 0
         self._result: IKResult | None = None
+        self._said: tuple[object, ...] | None = None  # what `_words` say; None: something that is not said again
+        self._words: Notice
         self._news_since: float | None = None
         self._over = False  # the visitor did something else, before the notice could be seen
         self._shown = first
@@ -214,7 +216,12 @@ class StatusLine:
 
     def show_result(self, result: IKResult, units: Units) -> None:
         """Show the result for a target."""
-        self.show(notice(result, units))
+        # While a target is dragged, one result is usually said in the words of the one before.
+        plain = isinstance(result.details, Solved) and not (result.singularities or result.target_error)
+        said = (result.details, result.cause, result.task, units) if plain else None
+        if said is None or said != self._said:
+            self._said, self._words = said, notice(result, units)
+        self.show(self._words)
         self._result, self._news_since = result, None
 
     def due(self, now: float) -> float | None:

@@ -48,7 +48,8 @@ def listen(handle: viser.TransformControlsHandle, ring: bool, post: Post) -> Non
 def travel(start: Array, T: Array, units: Units) -> str:
     """How far a pose ``(4, 4)`` is from another one, and how far it is turned, for a label."""
     parts = [units.distance(math.dist(T[:3, 3].tolist(), start[:3, 3].tolist()))]
-    angle = rotation_angle(T[:3, :3], start[:3, :3])
+    w, *xyz = wxyz_from_rotation(start[:3, :3].T @ T[:3, :3]).tolist()
+    angle = 2.0 * math.atan2(math.hypot(*xyz), w)  # as `rotation_angle`, in half of its time: once for each event
     if angle > _TURNED:
         parts.append(units.angle(angle))
         if parts[0] == units.distance(0.0):

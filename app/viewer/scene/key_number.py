@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
 import viser
 
 from app.viewer.labels import add_label
@@ -48,7 +47,8 @@ class KeyNumber:
         """Write beside a point ``(3,)``, for an arm in a sphere of this radius (m); "" hides the text."""
         if text:
             show_text(self._label, text)
-            assign(self._label, point + np.array([0.0, 0.0, self._height * radius]))
+            x, y, z = point.tolist()
+            assign(self._label, (x, y, z + self._height * radius))
         if self._label.visible != bool(text):
             self._label.visible = bool(text)
 

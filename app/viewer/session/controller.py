@@ -14,6 +14,7 @@ target goes back to following the tool once the arm has arrived.
 from __future__ import annotations
 
 import itertools
+import operator
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -96,6 +97,8 @@ class ArmController:
         self.avoid = False
         self.obstacles: tuple[Obstacle, ...] = ()
         self._in_base = False
+        self._parts: tuple[object, ...] | None = None  # of `_now`
+        self._now: Arm
         self._drag_start: tuple[Array, Array] = np.eye(4), np.eye(3)  # target pose, gizmo orientation
 
     def use(
@@ -136,8 +139,8 @@ class ArmController:
 
     @property
     def now(self) -> Arm:
-        """The arm as it is now."""
-        return Arm(
+        """The arm as it is now; the same object, with what was computed from it, until something has changed."""
+        parts = (
             self.robot,
             self.q,
             self.goal,
@@ -148,6 +151,10 @@ class ArmController:
             self.obstacles,
             self.avoid,
         )
+        # Nothing here is changed in place, so what is the same object has the same value.
+        if self._parts is None or not all(map(operator.is_, parts, self._parts)):
+            self._parts, self._now = parts, Arm(*parts)
+        return self._now
 
     def use_obstacles(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take these obstacles. An arm that is at rest stays, whatever it touches: see `solve_again`."""

@@ -139,6 +139,10 @@ class VisitorPage(ShownArm, Worker):
     def frame(self) -> float:
         return self._pace.interval
 
+    @property
+    def reading(self) -> float:
+        return self._pace.reading
+
     def move_to(self, q: Array, notice: Notice | None = None, at_once: bool = False) -> None:
         self.arm.move_to(q, ease=not at_once)
         self.status.show(notice or BY_HAND)
@@ -265,6 +269,12 @@ class VisitorPage(ShownArm, Worker):
         for feature in self.features:
             self._guard(lambda feature=feature: action(feature))  # type: ignore[misc]
 
+    def _tell(self, name: str, *args: object) -> None:
+        """Call the method of this name of every feature that has one of its own; often, while an arm moves."""
+        for feature in self.features:
+            if getattr(type(feature), name) is not getattr(Feature, name):
+                self._guard(partial(getattr(feature, name), *args))
+
     def _activity_changed(self) -> None:
         """Something else is open or withheld."""
         self.for_features(lambda feature: feature.on_activity())
@@ -276,7 +286,7 @@ class VisitorPage(ShownArm, Worker):
 
     def on_pose(self, T_base_tool: Array) -> None:
         self.numbers.use_pose()
-        self.for_features(lambda feature: feature.on_pose(T_base_tool))
+        self._tell("on_pose", T_base_tool)
 
     def on_goal(self, dragged: int | None) -> None:
         self.numbers.use_goal(dragged)
@@ -289,7 +299,7 @@ class VisitorPage(ShownArm, Worker):
         self.posture.use_result(result)
         self.status.show_result(result, self.units)
         self.numbers.use_result(result)
-        self.for_features(lambda feature: feature.on_result(result))
+        self._tell("on_result", result)
 
     def on_request(self) -> None:
         self.posture.show()

@@ -13,7 +13,7 @@ from app.viewer.panel import Post
 from app.viewer.panel.posture import BranchChoice, RedundancySliders, short
 from app.viewer.panel.status import Notice
 from app.viewer.self_motion import self_motion
-from kin import IKResult, Redundancy
+from kin import IKResult, IKSolution, Redundancy
 from kin.ik import solve
 from kin.ik.messages.values import listed, need, ranges
 from kin.transforms import Array
@@ -31,7 +31,7 @@ class PosturePanel:
         self._asked = False  # an open question asks for the posture
         self._sliders = RedundancySliders(stage.client.gui, folder, post)
         self._choice: BranchChoice
-        self._result: tuple[tuple[object, ...], tuple[Redundancy, ...]] | None = None
+        self._result: tuple[tuple[object, ...], IKSolution] | None = None
 
     def use_robot(self) -> None:
         """Show the choices of another robot."""
@@ -66,7 +66,7 @@ class PosturePanel:
         # In other tasks the parameter may be a turn about the target's axis, which is not the tool's axis until
         # the arm has arrived.
         if self._stage.now.task == "pose" and result.status == "solved" and best is not None:
-            self._result = self._request(), best.redundancy
+            self._result = self._request(), best
         else:
             self._result = None
 
@@ -145,7 +145,7 @@ class PosturePanel:
         """The redundancy parameters at the goal, on the branch of the goal."""
         arm = self._stage.now
         if self._result is not None and self._result[0] == self._request():
-            return self._result[1]
+            return self._result[1].redundancy
         seed = "seed" if kin.branch_names(arm.robot) else None
         options = replace(arm.options, branch=seed, max_solutions=1)
         found = solve(arm.robot, arm.T_goal, options, arm.goal)

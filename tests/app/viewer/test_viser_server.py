@@ -45,18 +45,36 @@ CAMERA = {
 class Visit:
     """A connection whose messages come from a list; it ends with the list."""
 
-    def __init__(self, *messages: dict[str, Any], subprotocol: str | None = PROTOCOL, stays: bool = False) -> None:
+    def __init__(
+        self,
+        *messages: dict[str, Any],
+        subprotocol: str | None = PROTOCOL,
+        stays: bool = False,
+        rights: Rights = Rights.FULL,
+    ) -> None:
         self.subprotocol = subprotocol
-        self.rights = Rights.FULL
+        self.rights = rights
         self.client = "10.0.0.1"
         self.room_token = ""
         self.silence = never_silent
         self.sent = 0
         self._messages = list(messages)
         self._stays = stays
+        self.take: Callable[[bytes], bool] | None = None
+        self.at_once = 0  # messages that were handled without `receive`
+
+    def hear(self, take: Callable[[bytes], bool]) -> None:
+        self.take = take
+
+    def send_now(self, data: bytes) -> bool:
+        self.sent += 1
+        return True
 
     async def receive(self) -> bytes:
         await asyncio.sleep(0.02)  # so that what the last message has caused is there
+        while self._messages and self.take is not None and self.take(msgspec.msgpack.encode(self._messages[0])):
+            self._messages.pop(0)
+            self.at_once += 1
         if self._messages:
             return msgspec.msgpack.encode(self._messages.pop(0))
         if self._stays:
@@ -313,6 +331,7 @@ def test_a_drag_has_the_same_effect_as_viser_s_own_way(server, serve, fast):
 
     visits.append(Visit(CAMERA | {"type": "ViewerCameraMessage"}))
     assert serve(visits[0]) == (1001, "left")
+    assert visits[0].at_once == (2 if fast else 0)
     assert seen == [
         ("update", True, 0, [1.0, 2.5, 3.0]),
         [0.0, 1.0, 0.0, 0.0],
@@ -325,7 +344,36 @@ def test_a_drag_has_the_same_effect_as_viser_s_own_way(server, serve, fast):
 def test_a_drag_of_another_shape_is_left_to_viser(position):
     data = msgspec.msgpack.encode(drag("", position=position))
     nobody: Any = object()  # it is not looked at
-    assert not asyncio.run(drag_gizmo(nobody, data))
+    assert not drag_gizmo(nobody, data)
+
+
+def test_a_drag_with_more_fields_or_more_bytes_than_any_is_left_to_viser():
+    nobody: Any = object()
+    for more in ({"depth": [[[]]]}, {"name": 2000 * "x"}):
+        assert not drag_gizmo(nobody, msgspec.msgpack.encode(drag("", **more)))
+
+
+def test_drags_of_a_visitor_who_may_only_look_are_not_heard(serve):
+    looking = Visit(rights=Rights.LOOK)
+    assert serve(looking) == (1001, "left")
+    assert looking.take is None
+
+
+def test_a_callback_of_a_private_gizmo_that_waits_is_an_error_with_its_name(server, serve, caplog):
+    visits: list[Visit] = []
+
+    @server[0].on_client_connect
+    async def _(client: viser.ClientHandle) -> None:
+        @gizmo(client, []).on_update
+        async def waiting(event: viser.TransformControlsEvent) -> None:
+            await asyncio.sleep(0.0)
+
+        visits[0]._messages += [drag(client.scene._owner_id)]
+
+    visits.append(Visit(CAMERA | {"type": "ViewerCameraMessage"}))
+    with caplog.at_level(logging.WARNING):
+        assert serve(visits[0]) == (1001, "left")
+    assert "waiting waits" in caplog.text
 
 
 def test_an_error_in_a_callback_of_a_drag_ends_nothing(server, serve, caplog):

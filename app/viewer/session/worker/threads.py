@@ -5,6 +5,9 @@ for each visitor, thirty who drag cost a dozen switches of threads per event and
 it takes the visitors in turn, each for one step. A second one watches. If a step lasts longer than `PATIENCE`, the
 watcher leads, and the thread of that step only ends it: a visitor whose step blocks holds up the others that long.
 
+The event loop is told once of the steps of a row (`VisitorThreads.after_steps`). Each time that it wakes, two threads
+want Python at once.
+
 Visitors who are there come first, and pages are built after their steps. If two hundred arrive at once, each page
 takes some ten milliseconds, and a visitor who drags waits for one of them at most.
 """
@@ -24,6 +27,7 @@ log = logging.getLogger(__name__)
 PATIENCE = 0.02  # s without a new step, after which another thread leads
 KEEP = 2.0  # s without work, after which the threads end
 IN_A_ROW = 10  # steps, after which a page is built that waits
+TOGETHER = 8  # steps, after which the event loop is told of them at the latest
 BUILDS = 4  # pages built at a time: more than one where the first take long
 LOG_EVERY = 10.0  # s between two log lines about threads that could not be started
 
@@ -62,6 +66,8 @@ class VisitorThreads:
         self._builds: deque[Turn] = deque()
         self._building = 0
         self._row = 0  # steps since a page was built
+        self._after: dict[Callable[[], None], None] = {}  # see `after_steps`
+        self._together = 0  # steps since the last of these calls
         self._due: list[tuple[float, int, Turn]] = []
         self._order = itertools.count()
         self._numbers = itertools.count(1)
@@ -83,6 +89,26 @@ class VisitorThreads:
                 self._leader = self._start(True)
             elif not self._step & 1:
                 self._work.notify()
+
+    def after_steps(self, act: Callable[[], None]) -> None:
+        """Call `act` once for several steps: when no visitor waits any more, or after `TOGETHER` steps.
+
+        Where it is not the leader who asks, it is called at once. It must be quick, and not fail.
+        """
+        with self._lock:
+            if is_leader := threading.current_thread() is self._leader:
+                self._after[act] = None
+        if not is_leader:
+            act()
+
+    def _call_after(self) -> None:
+        self._together += 1
+        if self._ready and not self._builds and self._together < TOGETHER:
+            return
+        with self._lock:
+            self._together, after, self._after = 0, self._after, {}
+        for act in after:
+            act()
 
     def _start(self, leads: bool) -> threading.Thread | None:
         """A new thread; None if the system has none left: the next call or step tries again."""
@@ -116,6 +142,8 @@ class VisitorThreads:
         turn: Turn | None = None
         again: float | None = None
         while True:
+            if self._after:
+                self._call_after()
             with self._lock:
                 if turn is not None:
                     self._end_step(turn, again)
