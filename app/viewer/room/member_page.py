@@ -51,14 +51,6 @@ class MemberPage(VisitorPage):
         """Let undo lead back to the state `before`."""
         self._actions.record(label, before)
 
-    def put_back(self) -> None:
-        """Show in all controls of the arm what is true."""
-        self.numbers.use_goal(None)
-        self.sliders.show_locks(self.arm.locks)
-        self.panel.robots.show(self.arm.robot, self.own)
-        self.forms.show()
-        self.posture.choose(self.arm.branch)
-
     def be_led(self, led: bool) -> None:
         """Another page leads this one, or none does."""
         self._persistence.led = led

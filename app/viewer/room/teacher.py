@@ -20,6 +20,7 @@ from app.viewer.room.member import Member, wanted
 from app.viewer.room.sharing import LEADER_EVERY
 from app.viewer.room.wall import MOST, SmallArm, Wall
 from app.viewer.room.wall import NAME as WALL
+from app.viewer.session.history import RESULT
 from app.viewer.session.state import PageState
 from app.viewer.viser_patches import SceneFilter
 from kin import InputError, Robot
@@ -62,6 +63,7 @@ class Teacher(Member):
         self._open_tab = 0
         self._chosen: Exercise | None = None  # the exercise in the form of the task
         self._wall: Wall | None = None
+        self._reopens = False  # the wall, which was on show before a reload
         self._filter: SceneFilter | None = None  # before all but the wall
         self._before: PageState | None = None  # the own page while a student's is on show, or the wall
 
@@ -295,8 +297,18 @@ class Teacher(Member):
             return "This is a student’s arm. Press Back to my arm first."
         return ""
 
+    def state(self) -> dict[str, object]:
+        return {} if self._wall is None and not self._reopens else {RESULT: True}
+
+    def restore(self, state: dict[str, object]) -> None:
+        if self._bar is None:  # as the page was stored: undo neither opens nor closes the wall
+            self._reopens = state.get(RESULT) is True
+
     def refresh(self) -> None:
         room = self.room
+        if self._reopens:
+            self._reopens = False
+            self._show_wall(not room.closed)
         exercises = self.page.activity.exercises
         task = None if room.task is None else exercises.get(room.task.exercise)
         update_html(self._head, views.lead_html(room))

@@ -260,6 +260,14 @@ class VisitorPage(ShownArm, Worker):
         """End the news in the status: show what is true now."""
         self.status.settle(None if self.arm.open_target is None else self._result, self.units)
 
+    def put_back(self) -> None:
+        """Show in all controls of the arm what is true."""
+        self.numbers.use_goal(None)
+        self.sliders.show_locks(self.arm.locks)
+        self.panel.robots.show(self.arm.robot, self.own)
+        self.forms.show()
+        self.posture.choose(self.arm.branch)
+
     def snapshot(self) -> PageState:
         """The present state."""
         return self._persistence.snapshot()

@@ -45,6 +45,9 @@ class Page(Stage, Protocol):
     def for_features(self, action: Callable[[Feature], None]) -> None:
         """Call every feature; an error of one does not stop the others."""
 
+    def put_back(self) -> None:
+        """Show in all controls of the arm what is true."""
+
     def snapshot(self) -> PageState:
         """The present state."""
 

@@ -3,9 +3,10 @@
 Compiling takes seconds. If an event were handled before that, the page would stand still without a reason. So it
 is held, the status card says what is being prepared, and the page can be used meanwhile.
 
-A page that opens with a stored state of such an arm shows another arm until then. Joint values and targets typed
-meanwhile, what a program sends, and a lesson that is chosen are meant for the stored state: they wait too, and are
-applied to it.
+A page that opens with a stored state of such an arm shows another arm until then. Sliders that are moved
+meanwhile, joint values and targets that are typed, what a program sends, and a lesson that is chosen are meant for
+the stored state: they wait too, and are applied to it. What starts from the arm on show, as a jog does, is refused
+in words, and that arm has no arrows to drag.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Final
 
 from app.viewer.feature import Feature, message_of
 from app.viewer.own_arm import own_arm
+from app.viewer.panel.status import Notice
 from app.viewer.session.events import LINK, RULES, name_of
 from app.viewer.session.lessons import lesson_titled, lesson_with_key
 from app.viewer.session.parts import Page
@@ -44,6 +46,7 @@ class Preparing:
         self._page = page
         self._preparation = preparation
         self._held: dict[Hashable, _Held] = {}
+        self._coming: Robot  # of the stored state that is held
 
     @property
     def due(self) -> float | None:
@@ -58,9 +61,17 @@ class Preparing:
         rule = RULES.get(name_of(key))
         if rule is not None and rule.replaces:
             self._give_up(key)
-        elif rule is not None and rule.follows and (state := self._held.get(LINK)) is not None:
-            self._hold(key, _Held(key, value, state.parts, state.what))
-            return False
+        elif rule is not None and (state := self._held.get(LINK)) is not None:
+            if self._lacks_joint(key):
+                self._page.put_back()
+                self._refuse(f"{state.what[:1].upper()}{state.what[1:]} has no such joint.")
+                return False
+            if rule.present:
+                self._refuse(f"The page waits for {state.what}. It can be moved when it is there.")
+                return False
+            if rule.follows:
+                self._hold(key, _Held(key, value, state.parts, state.what))
+                return False
         try:
             parts, what = self._needs(event, value)
         except InputError:  # who handles it says what is wrong
@@ -77,6 +88,8 @@ class Preparing:
 
     def hold_state(self, state: PageState, robot: Robot, tabs: Sequence[type[Feature]]) -> None:
         """Post a stored state as `LINK` when it can be shown."""
+        self._coming = robot
+        self._page.arm.scene.gizmo.visible = False
         self._hold(LINK, _Held(LINK, state, _parts_of(state, robot, tabs), f"the {robot.name}"))
 
     def tick(self) -> None:
@@ -85,12 +98,38 @@ class Preparing:
             if self._preparation.ready(held.parts):
                 if name != LINK:  # which is waited for until it is handled
                     del self._held[name]
-                self._page.post(held.key, held.value)
+                self._page.post(self._meant(held.key), held.value)
         self._show()
+
+    def _meant(self, key: Hashable) -> Hashable:
+        """The key of a held event; of a slider, for the same joint of the arm that has come."""
+        match key:
+            case ("joint", _, *rest):
+                return "joint", self._coming.id, *rest
+        return key
+
+    def _lacks_joint(self, key: Hashable) -> bool:
+        """Whether an event is of a slider whose joint the arm of the stored state does not have."""
+        match key:
+            case ("joint", _, int(index), *_):
+                kinds = [joint.kind for joint in self._coming.joints[index : index + 1]]
+                return kinds != [self._page.now.robot.joints[index].kind]
+        return False
+
+    def _refuse(self, why: str) -> None:
+        """Say why something cannot be done; sliders keep what is meant for the arm that comes."""
+        page = self._page
+        page.sliders.show_locks(page.arm.locks)
+        page.forms.show()
+        page.posture.show()
+        page.posture.choose(page.arm.branch)
+        page.status.show(Notice("advice", "Not now", why))
 
     def _give_up(self, key: Hashable) -> None:
         """Drop held events that this one replaces. Drop those for a stored state too, if it will not be shown."""
         linked = LINK in self._held and key != LINK
+        if LINK in self._held:
+            self._page.arm.scene.gizmo.visible = True
         for name in list(self._held):
             rule = RULES[name_of(name)]
             if rule.replaces or (linked and rule.follows):
@@ -117,7 +156,7 @@ class Preparing:
         done, of = self._preparation.steps(held.parts)
         step = f"step {min(done + 1, of)} of {of}"
         follows = (
-            " Typed joint values and targets, and the lesson you choose, are applied then."
+            " Joint values that you set or type, typed targets, and the lesson you choose are applied then."
             if LINK in self._held
             else ""
         )

@@ -533,6 +533,28 @@ def test_the_wall_sends_one_list_of_poses_for_all(room: Class) -> None:
     assert teacher.visible[teacher.gizmo] is True
 
 
+def test_the_wall_comes_back_after_a_reload(room: Class) -> None:
+    teacher, _ = room.teacher(), room.join("Ann")
+
+    def is_on(browser: FakeBrowser) -> bool:
+        arm = browser.visible.get(browser.gizmo) is False
+        return arm and any("/wall-" in name and name.endswith("/name/0") for name in browser.nodes)
+
+    press(teacher, "wall")
+    teacher.wait(lambda: is_on(teacher))
+    teacher.wait(lambda: teacher.kept and opened(teacher)["class"] == {"drawn": True})
+    again = room.browser(room.room.token, state=teacher.kept[-1])
+    again.wait(lambda: is_on(again))
+    again.wait(lambda: "data-class-wall" in again.html)
+    press(again, "wall")
+    again.wait(lambda: again.visible[again.gizmo] is True)
+    again.wait(lambda: again.kept and "class" not in opened(again))
+    student = room.browser(room.hub.rooms.tokens.sign(room.join("Bob")[1]), state=teacher.kept[-1])
+    student.wait(lambda: "data-class-bar" in student.html)
+    student.settle()
+    assert not any("/wall-" in name for name in student.nodes), "the link of a teacher opens it for no student"
+
+
 def test_the_wall_says_what_the_list_says(room: Class) -> None:
     def names() -> list[str]:
         found = {name: node["props"]["text"] for name, node in teacher.nodes.items() if "/name/" in name}
