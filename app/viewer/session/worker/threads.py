@@ -5,8 +5,8 @@ for each visitor, thirty who drag cost a dozen switches of threads per event and
 it takes the visitors in turn, each for one step. A second one watches. If a step lasts longer than `PATIENCE`, the
 watcher leads, and the thread of that step only ends it: a visitor whose step blocks holds up the others that long.
 
-The event loop is told once of the steps of a row (`VisitorThreads.after_steps`). Each time that it wakes, two threads
-want Python at once.
+The event loop is told once of the steps of a row (`VisitorThreads.after_steps`). Each time that it wakes, two
+threads want Python at once.
 
 Visitors who are there come first, and pages are built after their steps. If two hundred arrive at once, each page
 takes some ten milliseconds, and a visitor who drags waits for one of them at most.
