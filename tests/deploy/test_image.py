@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).parents[2]
 DOCKERFILE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
@@ -148,3 +149,14 @@ def test_the_health_check_asks_the_port_and_tells_by_its_exit_code() -> None:
 )
 def test_compose_keeps_the_container_small_and_to_itself(line: str) -> None:
     assert line in COMPOSE
+
+
+def test_https_of_compose_is_trusted_by_its_network_alone() -> None:
+    overlay = yaml.safe_load((ROOT / "deploy" / "compose.https.yaml").read_text(encoding="utf-8"))
+    (pool,) = overlay["networks"]["default"]["ipam"]["config"]
+    trusted = json.loads(overlay["services"]["kinboard"]["environment"]["KINBOARD_TRUSTED_PROXIES"])
+    assert trusted == [pool["subnet"]]
+    ports = overlay["services"]["https"]["ports"]
+    assert ports == ["80:80", "443:443"]
+    mounted = overlay["services"]["https"]["volumes"][0].split(":")[0]
+    assert (ROOT / mounted).is_file()

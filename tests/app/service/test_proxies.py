@@ -72,11 +72,20 @@ def nginx(folder: Path, port: int, upstream: int) -> list[str | Path]:
 
 
 def caddy(folder: Path, port: int, upstream: int) -> list[str | Path]:
+    return caddy_with("Caddyfile", "robots.example", "127.0.0.1:8000", folder, port, upstream)
+
+
+def of_compose(folder: Path, port: int, upstream: int) -> list[str | Path]:
+    return caddy_with("compose.Caddyfile", "{$KINBOARD_DOMAIN}", "kinboard:8000", folder, port, upstream)
+
+
+def caddy_with(name: str, site: str, behind: str, folder: Path, port: int, upstream: int) -> list[str | Path]:
+    """Caddy with a file of deploy/, which names a site and the service behind it."""
     changes = {
-        "robots.example {": f"localhost:{port} {{\n    tls {folder}/certificate.pem {folder}/key.pem",
-        "127.0.0.1:8000": f"127.0.0.1:{upstream}",
+        f"{site} {{": f"localhost:{port} {{\n    tls {folder}/certificate.pem {folder}/key.pem",
+        behind: f"127.0.0.1:{upstream}",
     }
-    snippet = replaced((DEPLOY / "Caddyfile").read_text(), changes)
+    snippet = replaced((DEPLOY / name).read_text(), changes)
     options = (
         "admin off",
         "auto_https disable_redirects",
@@ -269,3 +278,16 @@ def test_a_real_browser_is_asked_for_the_token_and_shown_the_viewer(address: str
         (cookie,) = page.context.cookies()
         assert (cookie["path"], cookie["secure"]) == ("/kinboard/", True)
         browser.close()
+
+
+def test_compose_puts_https_in_front(certificate: Path, tmp_path: Path) -> None:
+    settings = Settings(token=TOKEN, trusted_proxies=("127.0.0.1",))
+    app = create_app(settings)
+    with serve(app, settings) as port, running(of_compose, tmp_path / "caddy", certificate, port) as address:
+        trusted = ssl.create_default_context(cafile=certificate / "certificate.pem")
+        with httpx2.Client(base_url=f"https://{address}", verify=trusted, trust_env=False) as visitor:
+            assert visitor.get("/livez").status_code == 200
+            answer = visitor.post("/api/v1/robots/pioneer5/fk", json={"q": [0.0] * 5}, headers=BEARER)
+            assert np.allclose(answer.json()["pose"]["matrix"], kin.fk(PIONEER, [0.0] * 5))
+            login = visitor.post("/login", data={"token": TOKEN})
+            assert "Secure" in login.headers["set-cookie"]
