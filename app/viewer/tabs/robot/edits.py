@@ -36,6 +36,7 @@ AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 KINDS = ("revolute", "prismatic", "fixed")
 NEW_LINK = 100  # mm: the length of a new row, so that it is seen
 _PER_TIME = re.compile(r"/\s*s(?:\^?[23]|[²³])?\s*$")  # after a typed limit
+_HOME = re.compile(r"home\.q\[(\d+)\]")  # the field of one joint
 _SHOWN = {"theta": "θ", "alpha": "α", "low": "lower limit", "high": "upper limit"}
 Fields = dict[str, Any]
 
@@ -100,7 +101,7 @@ def typed(robot: Robot, own: OwnArm | None, texts: Mapping[Cell, str], units: Un
 
 
 def built(data: Fields, start: str, before: Robot, texts: Mapping[Cell, str] | None = None) -> OwnArm:
-    """The arm of these fields. A home that is not valid any more is replaced.
+    """The arm of these fields. A home value that is None, or not valid any more, is assumed; the others stay.
 
     It has the capsules of the arm `before`, as long as every joint moves the same link in the same way, and those
     of its motors whose joint is still there and of the same kind.
@@ -112,12 +113,7 @@ def built(data: Fields, start: str, before: Robot, texts: Mapping[Cell, str] | N
     if "motors" in data:
         data["motors"] = [motor for motor in data["motors"] if _fits(motor, data["rows"])]
     try:
-        try:
-            own = own_arm(data, start)
-        except RobotFileError as error:
-            if not error.field.startswith("home"):
-                raise
-            own = own_arm({key: value for key, value in data.items() if key != "home"}, start)
+        own = _with_home(data, start)
         robot = capsules_for(before, own.robot)
         return own_arm(kin.robot_to_dict(robot), start) if robot.capsules else own
     except (InputError, RobotFileError) as error:
@@ -126,6 +122,24 @@ def built(data: Fields, start: str, before: Robot, texts: Mapping[Cell, str] | N
         raise EditError(cell, f"{text}expected {error.expected}") from None
     except KinematicsError as error:
         raise EditError(None, str(error)) from None
+
+
+def _with_home(data: Fields, start: str) -> OwnArm:
+    """The arm of these fields, with assumed values for the joints whose home is None or outside their limits."""
+    q = list(data["home"]["q"])
+    kept = {joint for joint, value in enumerate(q) if value is not None}
+    while True:
+        if len(kept) < len(q):
+            homeless = own_arm({key: value for key, value in data.items() if key != "home"}, start)
+            assumed = kin.robot_to_dict(homeless.robot)["home"]["q"]
+            q = [q[joint] if joint in kept else value for joint, value in enumerate(assumed)]
+        try:
+            return own_arm({**data, "home": {"q": q}}, start)
+        except RobotFileError as error:
+            field = _HOME.fullmatch(error.field)
+            if field is None or int(field[1]) not in kept:
+                raise
+            kept.remove(int(field[1]))
 
 
 def _fits(motor: Fields, rows: list[Fields]) -> bool:
@@ -137,13 +151,18 @@ def _fits(motor: Fields, rows: list[Fields]) -> bool:
 
 
 def changed_rows(robot: Robot, own: OwnArm | None, change: Callable[[list[Fields]], None]) -> OwnArm:
-    """The arm with another list of rows; raises `EditError`."""
+    """The arm with another list of rows; a joint takes its home value along. Raises `EditError`."""
     data, start = fields_of(robot, own)
+    homes = _homes(data)
     change(data["rows"])
-    moving = [row.get("kind", "revolute") for row in data["rows"] if row.get("kind") != "fixed"]
-    if moving != [joint.kind for joint in robot.joints]:
-        data.pop("home")
+    data["home"] = {"q": [homes.get(id(row)) for row in data["rows"] if row.get("kind") != "fixed"]}
     return built(data, start, robot)
+
+
+def _homes(data: Fields) -> dict[int, object]:
+    """The home values of the joints, by the identity of their rows."""
+    joints = [row for row in data["rows"] if row.get("kind") != "fixed"]
+    return {id(row): value for row, value in zip(joints, data["home"]["q"], strict=True)}
 
 
 def add_row(rows: list[Fields], after: int, unit: str) -> None:
@@ -191,10 +210,11 @@ def _type_row(data: Fields, robot: Robot, index: int, column: str, text: str, un
             if motor.get("joint") == joint.name:
                 motor["joint"] = text
     elif column == "kind":
+        homes = _homes(data) | {id(row): None}
         row["kind"] = text
         for key in ("limits", *PEAK_FIELDS):
             row.pop(key, None)
-        data.pop("home", None)
+        data["home"] = {"q": [homes[id(each)] for each in data["rows"] if each.get("kind") != "fixed"]}
     elif column in ("low", "high"):
         if joint.kind == "fixed":
             raise ReadError("a fixed row has no limits")
@@ -215,7 +235,7 @@ def _type_motion(data: Fields, robot: Robot, index: int, column: str, text: str,
     if row.kind == "fixed":
         raise ReadError("a fixed row does not move")
     if column == "home":
-        joint = sum(each.kind != "fixed" for each in robot.rows[:index])
+        joint = sum(each.get("kind") != "fixed" for each in data["rows"][:index])
         unit, low, high = units.of(turning), float(robot.lower[joint]), float(robot.upper[joint])
         if not low <= read_cell(text, unit) <= high:
             raise ReadError(f"“{cut(text)}” is outside the limits: {unit.text(low)} to {unit.text(high)}")

@@ -86,6 +86,31 @@ def test_home_and_limits_of_motion_are_typed_in_the_units_of_the_joint():
     assert type_in(STANFORD, ((2, "velocity"), "0.25 m/s"), units=RADIANS).robot.rows[2].velocity == 0.25
 
 
+def test_home_values_stay_with_their_joints():
+    own = type_in(UR5, *(((i, "home"), str(10 * i)) for i in range(6)))
+    home = np.degrees(own.robot.q_home).round(9).tolist()
+    assert home == [0, 10, 20, 30, 40, 50]
+
+    def after(change):
+        return np.degrees(changed_rows(own.robot, own, change).robot.q_home).round(9).tolist()
+
+    added = after(lambda rows: add_row(rows, 1, "mm"))
+    assert [*added[:2], *added[3:]] == home, "a new joint alone has an assumed value"
+    assert after(lambda rows: rows.__delitem__(2)) == [0, 10, 30, 40, 50]
+    assert after(lambda rows: move_row(rows, 0, 1)) == [10, 0, 20, 30, 40, 50]
+
+
+def test_a_home_value_that_is_not_valid_any_more_is_the_only_one_replaced():
+    own = type_in(UR5, *(((i, "home"), str(10 * i)) for i in range(6)))
+    narrow = type_in(own.robot, ((2, "low"), "-90"), ((2, "high"), "-80"), own=own).robot
+    assert np.degrees(np.delete(narrow.q_home, 2)).round(9).tolist() == [0, 10, 30, 40, 50]
+    assert -90 <= np.degrees(narrow.q_home[2]) <= -80
+    slides = type_in(own.robot, ((3, "kind"), "prismatic"), ((4, "home"), "45"), own=own).robot
+    assert np.degrees(np.delete(slides.q_home, 3)).round(9).tolist() == [0, 10, 20, 45, 50]
+    fixed = type_in(own.robot, ((3, "kind"), "fixed"), ((4, "home"), "45"), own=own).robot
+    assert np.degrees(fixed.q_home).round(9).tolist() == [0, 10, 20, 45, 50]
+
+
 @pytest.mark.parametrize(
     ("column", "text", "words"),
     [
