@@ -23,24 +23,28 @@
     return pixels(part, "borderTopWidth", "paddingTop", "paddingBottom") + Math.max(...ends) - start;
   }
 
-  /** Make the drawer as high as the higher one of its parts. */
-  function fit() {
-    if (!root.hasAttribute("data-kb-drawer")) return;
-    const high = `${Math.ceil(Math.max(...parts().map(contents)))}px`;
-    if (root.style.getPropertyValue("--kb-contents") !== high) root.style.setProperty("--kb-contents", high);
+  // The sizes of what is in a part also tell when it comes and goes with its tab, however late viser draws that.
+  const sizes = new ResizeObserver(() => requestAnimationFrame(show)); // what it changes are sizes again
+  let measured = [];
+  function measure() {
+    const nodes = [...document.querySelectorAll("[data-wide] > *")];
+    if (nodes.length === measured.length && nodes.every((node, i) => node === measured[i])) return;
+    measured = nodes;
+    sizes.disconnect();
+    for (const node of nodes) sizes.observe(node);
   }
-  const sizes = new ResizeObserver(fit);
 
-  /** The drawer is there while it is wanted, and the open tab has something for it. */
+  /** The drawer is there while it is wanted and the open tab has something for it, as high as the higher one of its parts. */
   function show() {
-    const open = wanted && !SMALL.matches && parts().length > 0;
+    measure();
+    const shown = parts(), open = wanted && !SMALL.matches && shown.length > 0;
     if (open !== root.hasAttribute("data-kb-drawer")) root.toggleAttribute("data-kb-drawer", open);
     for (const button of document.querySelectorAll("[data-wide-do]")) {
       if (button.ariaPressed !== String(open)) button.ariaPressed = String(open);
     }
-    sizes.disconnect();
-    if (open) for (const part of parts()) for (const node of part.children) sizes.observe(node);
-    fit();
+    if (!open) return;
+    const high = `${Math.ceil(Math.max(...shown.map(contents)))}px`;
+    if (root.style.getPropertyValue("--kb-contents") !== high) root.style.setProperty("--kb-contents", high);
   }
 
   function toggle() {
@@ -50,9 +54,7 @@
   }
 
   addEventListener("click", (event) => {
-    if (!(event.target instanceof Element)) return;
-    if (event.target.closest("[data-wide-do]")) toggle();
-    else if (viserPage.titleAt(event.target)) setTimeout(show, 50); // another tab is about to open
+    if (event.target instanceof Element && event.target.closest("[data-wide-do]")) toggle();
   });
   addEventListener("keydown", (event) => {
     if (event.code !== "KeyB" || event.ctrlKey || event.metaKey || event.altKey || event.shiftKey || event.repeat) return;

@@ -25,12 +25,13 @@ const viserPage = (() => {
     thumb: '[role="slider"]',
     track: ".mantine-Slider-track",
     progress: '[role="progressbar"]',
+    menu: "input.mantine-Select-input", // whose options are searched by typing
     settings: "button .tabler-icon-adjustments", // viser's own settings
     icon: "svg.tabler-icon, svg[data-combobox-chevron]",
     messages: "div:has(> [data-answers]) + div input", // the hidden field behind our hidden HTML
   };
   // What viser calls, and how often it has since this page was loaded.
-  const HOOKS = { readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0, reportCamera: 0, writeHtml: 0, hear: 0 };
+  const HOOKS = { readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0, reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0 };
 
   // WebKit on Linux names the locale C as a language. viser's script would end there: no Intl knows it.
   const known = (tag) => { try { return Intl.getCanonicalLocales(tag).length > 0; } catch { return false; } };
@@ -258,6 +259,49 @@ const viserPage = (() => {
     renewAround(used, kept, twin, next);
   }
 
+  // Labels of the scene: viser draws black letters on a white box, whatever the colours of the page. Both are written into
+  // its shaders as constants; here each of them is a mix of its light and its dark colour, by a uniform of ours.
+
+  const SHADES = new Map([
+    ["gl_FragColor = vec4(0.0, 0.0, 0.0, a);", "gl_FragColor = vec4(mix(vec3(0.0), vec3(0.94), kbDark), a);"], // letters
+    ["gl_FragColor = vec4(1.0, 1.0, 1.0, 0.85 * vAlpha);", "gl_FragColor = vec4(mix(vec3(1.0), vec3(0.13, 0.15, 0.18), kbDark), 0.85 * vAlpha);"],
+  ]);
+  const shaded = new WeakSet(); // shaders with the uniform
+  const shadedPrograms = new Map(); // program → its context
+  const { shaderSource, attachShader, linkProgram } = WebGL2RenderingContext.prototype;
+  const isDark = () => document.documentElement.dataset.mantineColorScheme === "dark";
+  function shade(gl, program) {
+    const used = gl.getParameter(gl.CURRENT_PROGRAM);
+    gl.useProgram(program);
+    gl.uniform1f(gl.getUniformLocation(program, "kbDark"), isDark() ? 1 : 0);
+    gl.useProgram(used);
+  }
+  Object.assign(WebGL2RenderingContext.prototype, {
+    shaderSource(shader, source) {
+      const constant = [...SHADES.keys()].find((each) => source.includes(each));
+      if (constant) {
+        HOOKS.shadeLabel++;
+        shaded.add(shader);
+        source = source.replace(constant, SHADES.get(constant)).replace("void main() {", "uniform float kbDark;\nvoid main() {");
+      }
+      return shaderSource.call(this, shader, source);
+    },
+    attachShader(program, shader) {
+      if (shaded.has(shader)) shadedPrograms.set(program, this);
+      return attachShader.call(this, program, shader);
+    },
+    linkProgram(program) {
+      linkProgram.call(this, program);
+      if (shadedPrograms.has(program)) shade(this, program);
+    },
+  });
+  watch(() => {
+    for (const [program, gl] of shadedPrograms) {
+      if (gl.isProgram(program)) shade(gl, program);
+      else shadedPrograms.delete(program); // of a picture that is gone
+    }
+  }, { on: [COLOURS] });
+
   // Tabs
 
   const tabs = () => all(PARTS.tab);
@@ -360,6 +404,11 @@ const viserPage = (() => {
     if (!["Enter", " "].includes(event.key) || !(event.target instanceof Element) || !event.target.matches(PARTS.folderHead)) return;
     event.preventDefault();
     event.target.click();
+  });
+  // A menu's field has the name of what is chosen, and viser's menus search for what is typed there: a click marks the
+  // name, so that typing replaces it.
+  addEventListener("click", (event) => {
+    if (event.target instanceof HTMLInputElement && event.target.matches(PARTS.menu)) event.target.select();
   });
   addEventListener("DOMContentLoaded", () => {
     // Arrow keys on a control must not rotate the view as well.

@@ -92,3 +92,47 @@ def test_scripts_share_one_observer_whose_watchers_do_not_stop_each_other(deskto
     assert seen.index("first") < seen.index("second") < seen.index("late")
     with pytest.raises(Exception, match="data-other is not observed"):
         desktop.page.evaluate("viserPage.watch(() => {}, { on: ['data-other'] })")
+
+
+# What the programs that draw labels have for kbDark.
+SHADES = """() => {
+  const gl = document.querySelector("canvas[data-engine]").getContext("webgl2");
+  return labelPrograms.map((program) => gl.getUniform(program, gl.getUniformLocation(program, "kbDark")));
+}"""
+# The shaders of labels, from viser's page: collected as they are linked.
+COLLECT = """
+{
+  window.labelPrograms = [];
+  const { linkProgram } = WebGL2RenderingContext.prototype;
+  WebGL2RenderingContext.prototype.linkProgram = function (program) {
+    linkProgram.call(this, program);
+    if (this.getUniformLocation(program, "kbDark")) labelPrograms.push(program);
+  };
+}
+"""
+
+
+def test_labels_of_the_scene_follow_the_colours_of_the_page(tab: Tab) -> None:
+    page = tab.page
+    page.add_init_script(COLLECT)
+    page.reload()
+    page.wait_for_function("window.labelPrograms?.length >= 2", timeout=30_000)
+    assert not any(page.evaluate(SHADES))
+    tab.set_dark(True)
+    assert all(page.evaluate(SHADES)), "letters and boxes are drawn in the dark colours"
+    tab.set_dark(False)
+    assert not any(page.evaluate(SHADES))
+
+
+def test_typing_into_a_menu_replaces_the_name_that_is_chosen(desktop: Tab) -> None:
+    page, field = desktop.page, desktop.row("Robot").locator("input:visible").first
+    chosen = field.input_value()
+    field.click()
+    page.keyboard.type("UR5")
+    expect(field).to_have_value("UR5")
+    shown = page.locator("[data-combobox-option]:visible")
+    expect(shown.filter(has_text="UR5").first).to_be_visible()
+    expect(shown.filter(has_text="Panda")).to_have_count(0)
+    page.keyboard.press("Escape")
+    field.blur()
+    expect(field).to_have_value(chosen)

@@ -54,6 +54,10 @@ def test_the_whole_table_is_seen_below_the_scene_and_typed_into(desktop: Tab) ->
     table.locator('[data-cell="0 high"]').press("Enter")
     expect(tab.row("Robot").locator("input:visible").first).to_have_value(f"My arm ({UR5.name} variant)")
     expect(table.locator('[data-cell="0 high"]')).to_have_value("90")
+    table.evaluate("node => { node.style.display = 'none'; }")  # as a tab that viser hides long after the click
+    page.wait_for_function(f"{BOTTOM} > 719")
+    table.evaluate("node => { node.style.display = ''; }")
+    page.wait_for_function(f"{BOTTOM} < 720")
     tab.open("Move")
     page.wait_for_function(f"{BOTTOM} > 719")
     tab.open("Robot")
