@@ -224,7 +224,7 @@ def _solver(found: InspectionAnswer) -> dict[str, str]:
         words = f"a search from several starts: {found.reason}. It may miss solutions."
         return _fact("Inverse kinematics", words, "numeric:", "kb-amber")
     count = len(found.robot.branches)
-    postures = f", up to {count} posture{'s' * (count > 1)}" if count else ""
+    postures = {0: "", 1: ", one posture"}.get(count, f", up to {count} postures")
     return _fact("Inverse kinematics", f"solver {found.solver}{postures}: {found.reason}.", "exact:")
 
 

@@ -63,7 +63,8 @@ def test_a_warning_stands_apart_from_the_advice_which_a_led_page_hides() -> None
     status, element = line()
     status.warn("Link 4 touches the <table>.")
     advice = f'<span class="kb-status-advice">{READY.detail} </span>'
-    assert f"{advice}⚠ Link 4 touches the &lt;table&gt;." in element.content
+    warning = '<span class="kb-status-warning">⚠ Link 4 touches the &lt;table&gt;. </span>'
+    assert advice + warning in element.content
     status.show(Notice("hand", "Home"))
     assert "kb-status-advice" not in element.content
     assert "⚠ Link 4" in element.content
