@@ -14,7 +14,7 @@ from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
 from kin.solvers.blocks import OWN, VALUE, Arc, Entries, canonical_of, double, each, one, rows_of
 from kin.solvers.canonical import BASE, FOREARM, OFFSET, TOOL, UPPER_ARM
-from kin.solvers.collinear7.branches import REACH, solve
+from kin.solvers.collinear7.branches import SLACK, solve
 from kin.solvers.common import wrap
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -72,7 +72,7 @@ def _pairs(arm: Array, near: Array, count: int, S: Array) -> int:
         h2 = px * px + py * py
         h = math.sqrt(h2)
         k = (h2 + pz * pz + d3 * d3 - d5 * d5) / (2.0 * d3)
-        lost = abs(k) - h > REACH
+        lost = abs(k) - h > arm[SLACK]
         across = (h - k) * (h + k)
         across = math.sqrt(across if across > 0.0 else 0.0)
         across = math.nan if lost else across

@@ -27,6 +27,8 @@ from kin.solvers.common import (
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
+# After what `Geometry7.params` has: metres by which the forearm may miss the wrist centre and still close.
+SLACK = FOREARM + 1
 REACH = TOLERANCES.closure_position * 0.1
 _MERGE = TOLERANCES.merge
 # How the forearm lies to the upper arm.
@@ -45,7 +47,7 @@ def _azimuths(arm: Array, M: Array, box: Array) -> tuple[float, float, float]:
     k = (x * x + y * y + z * z + d3 * d3 - d5 * d5) / (2.0 * d3)
     if h < 1e-12 and abs(k) < 1e-12:
         return box[NEAR, 0] + box[NEAR, 1] + 0.5 * math.pi, 0.0, 0.0
-    if abs(k) - h > REACH:
+    if abs(k) - h > arm[SLACK]:
         return 0.0, 0.0, abs(k) - h
     return math.atan2(y, x), merged(math.atan2(math.sqrt(max((h - k) * (h + k), 0.0)), k)), 0.0
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from kin.axes import inverse, is_zero, links_by_rows, screw_z
 from kin.robot import Robot
 from kin.solvers.canonical import Geometry7
 from kin.solvers.collinear7.batch import branches_many, branches_one
-from kin.solvers.collinear7.branches import solve, solve_many
+from kin.solvers.collinear7.branches import REACH, SLACK, solve, solve_many
 from kin.solvers.contract import (
     APPROACH,
     POSE,
@@ -57,7 +59,7 @@ class Collinear7(ClosedForm):
     def __init__(self, geometry: Geometry7, robot: Robot) -> None:
         g = self.geometry = geometry
         self.lengths = (g.d3, g.d5)
-        self.kernels = BatchKernels(g.params, branches_one, branches_many)
+        self.kernels = BatchKernels(np.append(g.params, REACH), branches_one, branches_many)
         self.branches, self.meanings = self.names(robot, np.ones(7))
 
     def names(self, robot: Robot, sense: Array) -> Names:
@@ -96,6 +98,13 @@ class Collinear7(ClosedForm):
     def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many poses."""
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
+
+    def relaxed(self, by: float) -> Collinear7:
+        """The same with a forearm that may miss the wrist centre by some more metres."""
+        other, params = copy(self), self.kernels.params.copy()
+        params[SLACK] += by
+        other.kernels = replace(self.kernels, params=params)
+        return other
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the side of w on which u lies, and the signs of s4 and s6."""

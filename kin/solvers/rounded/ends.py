@@ -5,12 +5,16 @@ range ends. Newton's method then finds where that happens on the typed table (:m
 
 It is the same structure only if no interval appears, vanishes, divides or joins between the two tables. So it
 counts as certain only where the arm that was meant has the same intervals with limits and reach a little narrower,
-and a little wider.
+and a little wider, and where between the two ends of these nothing else can happen: there one joint goes straight
+through its limit, and the others stay away from theirs (`_is_alone`). Else a joint could leave its limits and come
+back between these ends unseen, and the interval would be two.
 """
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from kin.kernels.compile import jit
 from kin.solvers.common import TURN, wrap
@@ -26,6 +30,7 @@ _WHOLE = TURN - 1e-9
 _MOVED, _MOVED_BY, _MOVED_ROOT = 0.5, 2000.0, 50.0
 _NARROW = 50.0  # times the rounding: intervals narrower than that are in doubt
 _TOUCH = 1e-9  # rad between intervals that touch
+_STRAIGHT = 0.5  # of the length of a piece of a curve: it bends less than that
 _FIXED, _LOST = -4, -5  # the end of the joint's own range; nothing that is known
 
 
@@ -133,8 +138,8 @@ def _paired(branch: int, arcs: Array, others: Array, circular: bool) -> bool:
 
 @jit
 def move_ends(
-    model: Array, T: Array, setting: Array, limits: Array, outer: Array, inner: Array, places: Array, out: Array,
-    sure: Array,
+    model: Array, T: Array, setting: Array, limits: Array, outer: Array, inner: Array, within: Array,
+    places: Array, out: Array, sure: Array,
 ) -> None:  # fmt: skip
     """out ``(m, 3)`` ← the intervals of the typed table, from those of the arm that was meant.
 
@@ -142,12 +147,13 @@ def move_ends(
 
     Args:
         model, T, setting: as for `task_of`.
-        limits: ``(4, 7)`` lower, upper, and both a little wider.
+        limits: ``(6, 7)`` lower, upper, both a little wider, both a little narrower.
         outer, inner: intervals ``(m, 3)`` with wider and with narrower limits and reach.
+        within: ``(m, 2, 7)`` postures at the ends of `inner`.
         places: ``(m, 3, 7)`` postures at the ends of `outer`, overwritten by those at the ends of `out`; the third
             is one inside, NaN if it is not known.
     """
-    task, p = task_of(model, T, setting), new_point()
+    task, p, start = task_of(model, T, setting), new_point(), np.empty(7)
     circular, off, span = task.joint < 0, setting[OFF], (setting[SPAN], setting[SPAN + 1])
     for k in range(sure.shape[0]):
         sure[k] = 1.0 if _paired(k, outer, inner, circular) else 0.0
@@ -160,9 +166,17 @@ def move_ends(
         if circular and outer[i, 2] - outer[i, 1] > _WHOLE:
             sure[k] = 1.0 if _is_whole(k, inner) else 0.0
             continue
+        other = 0
+        while not _overlaps(outer[i], inner[other], circular):
+            other += 1
         for side in range(2):
+            for c in range(7):
+                start[c] = places[i, side, c]
             what = _moved_end(task, limits, span, off, places[i, side], out[i], side, p)
-            sure[k] = 0.0 if what == _LOST else sure[k]
+            apart = abs(wrap(outer[i, 1 + side] - inner[other, 1 + side]))
+            postures = within[other, side], places[i, side], start
+            if what == _LOST or not _is_alone(limits, what, apart, postures, p.n):
+                sure[k] = 0.0
             if what >= 0 or what == _FIXED:
                 for c in range(7):
                     places[i, 2, c] = places[i, side, c]
@@ -171,6 +185,30 @@ def move_ends(
         for j in range(i):
             if _overlaps(out[i], out[j], circular):
                 sure[k] = 0.0
+
+
+@jit
+def _is_alone(limits: Array, what: int, apart: float, postures: tuple[Array, Array, Array], n: Array) -> bool:
+    """Whether nothing else happens between an end with narrower limits and the same one with wider ones.
+
+    apart: of these two in the parameter; postures: those at the two, and between them that of the typed table,
+    where the curve has the direction n ``(7,)``.
+    """
+    if what == _FIXED:
+        return apart < _BOUND
+    inner, y, outer = postures
+    for c in range(7):
+        away = max(abs(wrap(inner[c] - y[c])), abs(wrap(outer[c] - y[c])))
+        if c != what and not slack_of(limits[0], limits[1], y, c) >= 2.0 * away:
+            return False
+    if what == FOLD:
+        return True
+    if not abs(slack_of(limits[4], limits[5], inner, what)) < _ACTIVE:
+        return False
+    length, bent = wrap(outer[what] - inner[what]) / n[what], 0.0
+    for c in range(7):
+        bent = max(bent, abs(wrap(outer[c] - inner[c]) - length * n[c]))
+    return bool(bent <= _STRAIGHT * abs(length))
 
 
 @jit

@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 
 from kin.axes import size
-from kin.fk import fk
+from kin.fk import fk, jacobian
 from kin.kernels.compile import MODEL, direct, record, row_of
 from kin.robot import Robot
 from kin.solvers import rolled
@@ -38,6 +38,7 @@ _MOVED, _MOVED_BY = 0.1, 100.0  # rad, or times the rounding: a row that moves f
 _ENDS, _MIDDLE = np.array([0.0, 1.0]), np.array([0.5])  # shares of an interval
 _SHARES = np.array([0.5, 0.02, 0.98])  # where curves are begun
 _ALIKE = 1e-7  # rad: intervals with ends this close are one
+_ASIDE, _BESIDE = 3.0, 50.0  # times the root of the rounding, and the rounding: from a fold
 _CLEAR = 0.5  # of the distance of the next row: closer than that, a posture is of the branch of the nearest row
 _SAME = 1e-8  # rad: postures this close are one
 _FREE = (math.nan,)
@@ -84,6 +85,7 @@ class Rounded7(Rounded):
             moved = np.ascontiguousarray(rows[:, :7])
             self._move_rows(p, setting, moved)
             rows[:, :7], rows[:, 7] = moved, np.where(np.isnan(moved[:, 0]), math.nan, p.values[0])
+            self._add_from_intervals(p, setting, limits, (arcs, places), rows)
             missed = np.isnan(rows[:, 0])
         else:
             bits = _choose()(self.robot.model, p.T, setting, limits, arcs, places, rows)
@@ -106,7 +108,7 @@ class Rounded7(Rounded):
         self.solve(p)
         self.solve(replace(p, values=(float(q[self._joint]) if self._joint >= 0 else 0.0,)))
         found = _Found()
-        found.follow(self.robot.model, p.T, self._set(p), self._widened(p), self._move, q)
+        found.follow(self.robot.model, p.T, self._set(p), self._widened(p), self._move, np.array([q]))
 
     def _in_one_turn(self, problem: SolverInput) -> SolverInput:
         """The same with contiguous arrays, and the limits of the parameter's joint at most one turn apart."""
@@ -130,13 +132,17 @@ class Rounded7(Rounded):
         return out
 
     def _widened(self, p: SolverInput) -> Array:
-        """``(6, 7)`` lower and upper limits: as they are, a little wider, a little narrower."""
-        out = np.empty((6, 7))
-        move = np.minimum(self._move, 0.25 * (p.upper - p.lower))
+        """``(6, 7)`` lower and upper limits: as they are, a little wider, a little narrower.
+
+        Limits a whole turn apart forbid nothing, and narrower ones must not either.
+        """
+        out, width = np.empty((6, 7)), p.upper - p.lower
+        move = np.minimum(self._move, 0.25 * width)
         if self._joint >= 0:
             move[self._joint] = 0.0
         out[0], out[1], out[2], out[3] = p.lower, p.upper, p.lower - move, p.upper + move
-        out[4], out[5] = p.lower + move, p.upper - move
+        inwards = np.where(width >= TURN, -move, move)
+        out[4], out[5] = p.lower + inwards, p.upper - inwards
         return out
 
     def _rows(self, p: SolverInput) -> tuple[Array, Flags]:
@@ -163,16 +169,20 @@ class Rounded7(Rounded):
         )
         outer, inner = self._joined(wide.arcs[0]), self._joined(narrow.arcs[0])
         arcs, sure, places = np.empty(outer.shape), np.empty(8), np.empty((len(outer), 3, 7))
-        places[:, :2] = self._postures(p, outer, _ENDS)
-        _ends()(self.robot.model, p.T, setting, limits, outer, inner, places, arcs, sure)
+        ends = self._postures(p, np.concatenate([outer, inner]), _ENDS)
+        places[:, :2] = ends[: len(outer)]
+        within = ends[len(outer) :]
+        _ends()(self.robot.model, p.T, setting, limits, outer, inner, within, places, arcs, sure)
         certain = True
         if not sure.all():
-            arcs, places, certain = self._traced(p, setting, limits, outer, inner, (arcs, places, sure))
+            moved = arcs, places, sure
+            arcs, places, certain = self._traced(p, setting, limits, outer, inner, _merged(wide.q), moved)
         inside = np.isnan(places[:, 2, 0])
         if inside.any():
             places[inside, 2] = self._postures(p, arcs[inside], _MIDDLE)[:, 0]
         rows = np.empty((8, 8))
         rows[:, :7], rows[:, 7:] = wide.q, wide.values
+        rows[_merged(wide.q)] = math.nan  # of two branches, which only its intervals tell apart
         return arcs, places, rows, ~np.isnan(narrow.q[:, 0]), certain
 
     def _joined(self, arcs: Array) -> Array:
@@ -204,6 +214,25 @@ class Rounded7(Rounded):
         """Move rows ``(8, 7)`` onto the target at the requested value, in place."""
         move_rows(self.robot.model, self._params, p.T[None], setting, np.array(p.values[:1]), rows[None])
 
+    def _add_from_intervals(
+        self, p: SolverInput, setting: Array, limits: Array, intervals: tuple[Array, Array], rows: Array
+    ) -> None:
+        """Rows ``(8, 8)`` at the requested value that are missing, from intervals that have it, in place.
+
+        Beside a fold the typed table's row may be farther from that of the arm that was meant than a row may move.
+        """
+        arcs, places = intervals
+        missing = np.isnan(rows[:, 0])
+        if not missing.any() or not len(arcs):
+            return
+        here = missing[arcs[:, 0].astype(int)]
+        here &= (p.values[0] - arcs[:, 1]) % TURN <= arcs[:, 2] - arcs[:, 1]
+        if here.any():
+            spans, found = arcs[here], np.full((8, 8), math.nan)
+            spans[:, 1:] = p.values[0]
+            _choose()(self.robot.model, p.T, setting, limits, spans, places[here], found)
+            rows[missing] = found[missing]
+
     def _single(self, p: SolverInput, setting: Array) -> tuple[Array, Array]:
         """The intervals of a joint that has one value only, and their postures."""
         value = float(p.lower[self._joint])
@@ -224,36 +253,49 @@ class Rounded7(Rounded):
         limits: Array,
         outer: Array,
         inner: Array,
+        merged: Flags,
         moved: tuple[Array, Array, Array],
     ) -> tuple[Array, Array, bool]:
         """Intervals and postures as in `moved`, but by following the curves where it is in doubt; whether certain.
 
         A curve begins inside each interval that such a branch has with wider or with narrower limits, and at the
-        ends of the wider ones.
+        ends of the wider ones; on both sides of a fold where two branches have `merged` ``(8,)``.
         """
         sure = moved[2][moved[0][:, 0].astype(int)] > 0.0
         arcs, places, certain = [(a, b, c) for a, b, c in moved[0][sure].tolist()], list(moved[1][sure]), True
         found = _Found()
         for intervals, shares in ((inner, _MIDDLE), (outer, _SHARES)):
             doubtful = intervals[moved[2][intervals[:, 0].astype(int)] == 0.0]
-            starts = self._postures(p, doubtful, shares)
-            for (branch, low, high), row in zip(doubtful.tolist(), starts, strict=True):
-                for share, start in zip(shares.tolist(), row, strict=True):
-                    if math.isnan(start[0]) or _is_known(arcs, branch, low + share * (high - low)):
-                        continue
-                    count = found.follow(self.robot.model, p.T, setting, limits, 3.0 * self._move, start)
-                    certain &= count >= 0
-                    if count <= 0:
-                        continue
-                    pieces, postures = found.pieces[:count], found.postures[:count]
-                    branches, clear = self._whose(p, pieces, postures)
-                    certain &= clear
-                    for whose, piece, posture in zip(branches, pieces.tolist(), postures, strict=True):
-                        ends = self._in_span(p, *piece[:2])
-                        if not any(whose == b and _are_alike(ends, (x, y)) for b, x, y in arcs):
-                            arcs.append((whose, *ends))
-                            places.append(posture.copy())
+            values = (doubtful[:, 1:2] + shares * (doubtful[:, 2:] - doubtful[:, 1:2])).ravel().tolist()
+            owners = list(zip(np.repeat(doubtful[:, 0], len(shares)).tolist(), values, strict=True))
+            starts = self._postures(p, doubtful, shares).reshape(-1, 7)
+            there = (~np.isnan(starts[:, 0])).tolist()
+            begun = [i for i, owner in enumerate(owners) if there[i] and not _is_known(arcs, *owner)]
+            whose = np.array([owners[i][0] for i in begun], dtype=np.int64)
+            starts = self._beside_folds(starts[begun], merged[whose])
+            if not len(starts):
+                continue
+            count, lost = found.follow(self.robot.model, p.T, setting, limits, 3.0 * self._move, starts)
+            pieces, postures = found.pieces[:count], found.postures[:count]
+            branches, clear = self._whose(p, pieces, postures)
+            certain &= clear
+            for branch, piece, posture in zip(branches, pieces.tolist(), postures, strict=True):
+                for ends in self._in_span(p, *piece[:2]):
+                    if not any(branch == b and _are_alike(ends, (x, y)) for b, x, y in arcs):
+                        arcs.append((branch, *ends))
+                        places.append(posture.copy())
+            certain &= not lost[len(begun) :].any()
+            certain &= all(_is_known(arcs, *owners[begun[i]]) for i in np.flatnonzero(lost[: len(begun)]).tolist())
         return np.array(arcs).reshape(-1, 3), np.array(places).reshape(-1, 3, 7), certain
+
+    def _beside_folds(self, starts: Array, merged: Flags) -> Array:
+        """Postures ``(k, 7)``, and two more for each where branches have merged: to either side of that fold."""
+        if not merged.any():
+            return starts
+        at = starts[merged]
+        across = np.linalg.svd(jacobian(self.robot, at))[2][:, 5]
+        step = _ASIDE * math.sqrt(self.off) * across
+        return np.concatenate([starts, at + step, at - step])
 
     def _whose(self, p: SolverInput, values: Array, postures: Array) -> tuple[list[float], bool]:
         """The branches of pieces with these values ``(k, 3)`` and postures ``(k, 3, 7)``; whether all are clear.
@@ -273,16 +315,29 @@ class Rounded7(Rounded):
         branches, clear = first[k, best].tolist(), share[k, best] < _CLEAR
         for i in np.flatnonzero(~clear).tolist():
             if known[i].any():
-                clear[i] = branches[i] == self.branch_of(postures[i, best[i]])
+                own, off = self.branch_of(postures[i, best[i]]), nearest[i, best[i]]
+                if next_one[i, best[i]] - off < _SAME and off > _BESIDE * self.off:
+                    branches[i], clear[i] = own, True  # of branches that have merged, its signs tell which
+                clear[i] = branches[i] == own
             else:
                 branches[i] = self.branch_of(postures[i, 2])
         return branches, bool(clear.all())
 
-    def _in_span(self, p: SolverInput, low: float, high: float) -> tuple[float, float]:
-        """An interval at the whole turn at which the range of the parameter has it."""
-        first = float(p.lower[self._joint]) if self._joint >= 0 else -math.pi
-        shift = TURN * math.floor((0.5 * (low + high) - first) / TURN)
-        return low - shift, high - shift
+    def _in_span(self, p: SolverInput, low: float, high: float) -> list[tuple[float, float]]:
+        """An interval at the whole turn at which the range of the parameter has it; parts, where that ends inside.
+
+        An arm angle begins in (−π, π] and may go on beyond.
+        """
+        j = self._joint
+        first, last = (float(p.lower[j]), float(p.upper[j])) if j >= 0 else (-math.pi, math.pi)
+        if j < 0 or last - first < TURN - _ALIKE:
+            shift = TURN * math.floor((0.5 * (low + high) - first) / TURN)
+            return [(low - shift, high - shift)]
+        if high - low > TURN - _ALIKE:
+            return [(first, last)]
+        shift = TURN * math.floor((low - first + _ALIKE) / TURN)
+        low, high = max(low - shift, first), high - shift
+        return [(low, min(high, last))] if high < last + _ALIKE else [(low, last), (first, high - TURN)]
 
     def _kernels(self, form: BatchKernels) -> BatchKernels:
         """The batch kernels: those of the family, and each row moved onto the target on the typed table."""
@@ -308,16 +363,28 @@ class _Found:
         self.pieces, self.postures = np.empty((PIECES, 3)), np.empty((PIECES, 3, 7))
         self._paths = Paths(np.empty((PATHS, 14)), np.zeros(1 + CURVES, dtype=np.int64))
 
-    def follow(self, model: Array, T: Array, setting: Array, limits: Array, margin: float, start: Array) -> int:
-        """How many pieces of the curve through a posture are now in `pieces` and `postures`, see `trace`."""
-        goal = model, T, setting, limits, margin, np.array(start)
-        return _trace()(*goal, self._paths, self.pieces, self.postures)
+    def follow(
+        self, model: Array, T: Array, setting: Array, limits: Array, margin: float, starts: Array
+    ) -> tuple[int, Array]:
+        """How many pieces of the curves through postures ``(k, 7)`` are now in `pieces` and `postures`.
+
+        Also returns ``(k,)`` which curves were lost, see `trace`.
+        """
+        lost = np.empty(len(starts))
+        goal = model, T, setting, limits, margin, starts
+        return _trace()(*goal, self._paths, self.pieces, self.postures, lost), lost
 
 
 def _are_apart(rows: Array) -> bool:
     """Whether no posture is given to two branches, of rows ``(8, 7)`` that are NaN where a branch has none."""
     away = np.abs(rolled.wrapped(rows[:, None] - rows)).max(axis=2)
     return int((away < _SAME).sum()) == int(np.isfinite(rows[:, 0]).sum())
+
+
+def _merged(rows: Array) -> Flags:
+    """Which of the rows ``(8, 7)`` are the posture of another branch, too."""
+    away = np.abs(rows[:, None] - rows).max(axis=2)
+    return np.asarray((away < _SAME).sum(axis=1) > 1)
 
 
 def _is_known(arcs: list[tuple[float, float, float]], branch: float, value: float) -> bool:
@@ -331,9 +398,9 @@ def _are_alike(a: tuple[float, float], b: tuple[float, float]) -> bool:
 
 
 @cache
-def _ends() -> Callable[[Array, Array, Array, Array, Array, Array, Array, Array, Array], None]:
+def _ends() -> Callable[..., None]:
     """`move_ends` without type dispatch."""
-    return direct(move_ends, MODEL, (4, 4), 1, 2, 2, 2, 3, 2, 1)
+    return direct(move_ends, MODEL, (4, 4), 1, 2, 2, 2, 3, 3, 2, 1)
 
 
 @cache
@@ -345,4 +412,4 @@ def _choose() -> Callable[[Array, Array, Array, Array, Array, Array, Array], int
 @cache
 def _trace() -> Callable[..., int]:
     """`trace` without type dispatch."""
-    return direct(trace, MODEL, (4, 4), 1, 2, float, 1, record(Paths, 2, row_of(int)), 2, 3)
+    return direct(trace, MODEL, (4, 4), 1, 2, float, 2, record(Paths, 2, row_of(int)), 2, 3, 1)

@@ -31,8 +31,8 @@ _STEP, _FIRST, _LEAST = 0.15, 0.05, 1e-6  # rad of all joints together
 _STRAIGHT, _TURN = 0.995, 0.95  # cosines between tangents: of a step that may grow, and of one that is too long
 _POINTS = 6000  # of a curve, from its start to one side
 PATHS, CURVES = 16384, 64  # points and curves that are kept
-_LANDINGS, _NEAR = 12, 1e-7  # steps; rad: the last one, to go on from there
-_MISSED = 1e-6  # m and rad: an error that such a step can remove
+_LANDINGS, _NEAR = 12, 1e-6  # steps; rad: the last one, to go on from there
+_MISSED = 1e-5  # m and rad: an error that such a step can remove
 _ERROR, _SPLITS = 0.02, 6  # of a cubic, times the fourth power of its length; how often a step is halved
 _BESIDE, _SAME = 1e-3, 1e-7  # rad from the cubics, and from the curve: a posture on it
 _EMPTY = 1e-12  # rad: what is between two events as close as that is no piece
@@ -86,32 +86,6 @@ def _land(task: Task, y: Array, p: Point) -> bool:
 
 
 @jit
-def _advance(task: Task, curve: Curve, bend: Array, h: float, sense: float, p: Point) -> float:
-    """Fill the second point of the curve, a step ahead of the first; returns the length to try next, 0 if none.
-
-    bend ``(7,)``: the derivative of the tangent, about; it becomes that of this step.
-    """
-    y0, n0, y1, n1 = curve
-    while h > _LEAST:
-        for i in range(7):
-            y1[i] = y0[i] + h * (n0[i] + 0.5 * h * bend[i])
-        if _land(task, y1, p):
-            dot, off, length = 0.0, 0.0, 0.0
-            for i in range(7):
-                n1[i] = sense * p.n[i]
-                dot += n0[i] * n1[i]
-                off = max(off, abs(y1[i] - y0[i] - h * n0[i]))
-                length += (y1[i] - y0[i]) ** 2
-            if dot > _TURN and off < 0.3 * h:
-                length = math.sqrt(length)
-                for i in range(7):
-                    bend[i] = (n1[i] - n0[i]) / length
-                return min(1.5 * h, _STEP) if dot > _STRAIGHT else h
-        h *= 0.5
-    return 0.0
-
-
-@jit
 def _length(curve: Curve) -> float:
     total = 0.0
     for i in range(7):
@@ -134,6 +108,33 @@ def _at(curve: Curve, s: float, y: Array) -> None:
     for c in range(7):
         a, b, d = _cubic(curve, c)
         y[c] = curve[0][c] + s * (a + s * (b + s * d))
+
+
+@jit
+def _advance(task: Task, before: Curve, curve: Curve, h: float, sense: float, p: Point) -> float:
+    """Fill the second point of the curve, a step ahead of the first; returns the length to try next, 0 if none.
+
+    before: the step that led to the first point, whose cubics go on to about the second; nothing is known of it
+    where both of its points are one.
+    """
+    y0, n0, y1, n1 = curve
+    length = _length(before)
+    while h > _LEAST:
+        if length > 0.0:
+            _at(before, 1.0 + h / length, y1)
+        else:
+            for i in range(7):
+                y1[i] = y0[i] + h * n0[i]
+        if _land(task, y1, p):
+            dot, off = 0.0, 0.0
+            for i in range(7):
+                n1[i] = sense * p.n[i]
+                dot += n0[i] * n1[i]
+                off = max(off, abs(y1[i] - y0[i] - h * n0[i]))
+            if dot > _TURN and off < 0.3 * h:
+                return min(1.5 * h, _STEP) if dot > _STRAIGHT else h
+        h *= 0.5
+    return 0.0
 
 
 @jit
@@ -279,18 +280,18 @@ def _walk(
 
     out ``(m, 14)`` ← further points, and tangents of the same sense. Returns why it ended, and how many they are.
     """
-    p, tangent, bend = new_point(), np.empty(7), np.zeros(7)
-    for i in range(7):
-        tangent[i] = sense * start[1][i]
+    p, tangent = new_point(), sense * start[1]
     curve = (start[0].copy(), tangent.copy(), np.empty(7), np.empty(7))
+    before = (start[0].copy(), tangent.copy(), curve[0], curve[1])
     h = _FIRST
     for count in range(out.shape[0]):
-        h = _advance(task, curve, bend, h, sense, p)
+        h = _advance(task, before, curve, h, sense, p)
         if h == 0.0:
             return FAILED, count
         if count > 2 and _closes(curve, start[0], tangent):
             return CLOSED, count
         for i in range(7):
+            before[0][i], before[1][i] = curve[0][i], curve[1][i]
             curve[0][i] = out[count, i] = curve[2][i]
             curve[1][i] = curve[3][i]
             out[count, 7 + i] = sense * curve[3][i]
@@ -353,12 +354,12 @@ def _is_on(task: Task, path: Array, y: Array) -> bool:
 
 @jit
 def trace(
-    model: Array, T: Array, setting: Array, box: Array, margin: float, start: Array, paths: Paths, arcs: Array,
-    places: Array,
+    model: Array, T: Array, setting: Array, box: Array, margin: float, starts: Array, paths: Paths, arcs: Array,
+    places: Array, lost: Array,
 ) -> int:  # fmt: skip
-    """The feasible intervals of the redundancy parameter on the curve through a posture; their number, −1 if lost.
+    """The feasible intervals of the redundancy parameter on the curves through postures; their number.
 
-    None if the posture is on a curve that has been followed. arcs ``(PIECES, 3)`` ← their ends and a value inside;
+    A posture on a curve that has been followed adds none. arcs ``(PIECES, 3)`` ← their ends and a value inside;
     places ``(PIECES, 3, 7)`` ← the postures there. An interval that is whole turns of the parameter has the same
     posture in all three.
 
@@ -366,10 +367,23 @@ def trace(
         model, T, setting: as for `task_of`.
         box: ``(≥ 2, 7)`` lower and upper limits.
         margin: radians by which a joint may be outside its limits on the way.
-        start: ``(7,)`` a posture close to the curve.
-        paths: the curves that have been followed; this one is added.
+        starts: ``(k, 7)`` postures close to the curves.
+        paths: the curves that have been followed; these are added.
+        lost: ``(k,)`` ← 1.0 for each posture whose curve was lost on the way.
     """
-    task, limits = task_of(model, T, setting), (box[0], box[1])
+    task, limits, count = task_of(model, T, setting), (box[0], box[1]), 0
+    for i in range(starts.shape[0]):
+        found = _trace(task, limits, margin, starts[i], paths, arcs[count:], places[count:])
+        lost[i] = 1.0 if found < 0 else 0.0
+        count += max(found, 0)
+    return count
+
+
+@jit
+def _trace(
+    task: Task, limits: tuple[Array, Array], margin: float, start: Array, paths: Paths, arcs: Array, places: Array
+) -> int:
+    """As `trace` for one posture ``(7,)``; −1 if its curve is lost."""
     y, p = start.copy(), new_point()
     if not arrive(task, LAND, 0.0, y, p):
         return -1
