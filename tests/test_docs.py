@@ -26,6 +26,7 @@ from app.shared.settings import Settings
 from app.viewer.lessons import LESSONS
 from kin.ik.results import Cause
 from kin.units import Units
+from scripts import figures
 
 ROOT = Path(__file__).parents[1]
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -309,6 +310,21 @@ def loaded(html: str) -> list[str]:
     parser = Resources()
     parser.feed(html)
     return parser.found
+
+
+def test_the_site_has_its_figures(site):
+    named = {
+        name: page
+        for page in (ROOT / "docs").rglob("*.md")
+        for name in figures.COMMENT.findall(page.read_text(encoding="utf-8"))
+    }
+    assert set(named) == set(figures.FIGURES)
+    for name, page in named.items():
+        built = site / page.relative_to(ROOT / "docs").with_suffix("") / "index.html"
+        (source,) = [each for each in loaded(built.read_text(encoding="utf-8")) if each.endswith(f"/{name}.html")]
+        figure = (built.parent / source).resolve()
+        assert figure == site / figures.address(name)
+        assert kin.get_robot(name).name in figure.read_text(encoding="utf-8")
 
 
 def test_the_site_loads_nothing_from_the_internet(site):
