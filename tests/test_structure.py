@@ -306,3 +306,34 @@ def test_modules_of_tests_have_names_of_their_own():
     """pytest refuses to collect two modules of one name, with all others of that run."""
     names = Counter(path.name for path in (ROOT / "tests").rglob("test_*.py"))
     assert [name for name, count in names.items() if count > 1] == []
+
+
+# Numbers that only fall: a change that makes one smaller writes the new one here.
+PRIVATE = 275  # uses of others' private names in tests
+IMPORTANT = 95  # in style sheets: most override what viser or Mantine writes into the style of an element
+NOT_PRIVATE = {"_replace", "_asdict", "_fields", "_make", "_repr_html_"}  # of named tuples and IPython
+
+
+def private_names(sources: Sources) -> Iterator[str]:
+    """Uses of private names of another object or module."""
+    for path, source in sources.items():
+        for node in ast.walk(tree(source)):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.ImportFrom) else []
+            if isinstance(node, ast.Attribute) and ast.unparse(node.value) not in ("self", "cls"):
+                names = [node.attr]
+            private = (name for name in names if re.match(r"_(?!_)", name) and name not in NOT_PRIVATE)
+            yield from (f"{path}: {name}" for name in private)
+
+
+def test_tests_use_fewer_and_fewer_private_names():
+    assert len([*private_names(read_sources("tests"))]) <= PRIVATE
+
+
+def test_private_names_are_found():
+    source = "import a\nfrom b import _x, y\na._z = self._own\na.b._c(t._replace(d=1))\na.__doc__"
+    assert sorted(private_names({"t.py": source})) == ["t.py: _c", "t.py: _x", "t.py: _z"]
+
+
+def test_style_sheets_have_fewer_and_fewer_important_declarations():
+    sheets = [path.read_text(encoding="utf-8") for path in (ROOT / "static").glob("*.css")]
+    assert 0 < sum(sheet.count("!important") for sheet in sheets) <= IMPORTANT

@@ -13,26 +13,30 @@ import msgspec
 import numpy as np
 import viser
 import zstandard
+from starlette.types import Message
+from starlette.websockets import WebSocket
 from websockets.sync.client import connect
 
+from app.service.web.viewer_proxy import VisitorConnection
 from app.viewer.panel.script import LABEL
 from app.viewer.session.persistence import SAVE_AFTER
-from app.viewer.session.worker.inbox import Inbox
 from app.viewer.session.worker.worker import Worker
 from kin.transforms import from_position_wxyz, wxyz_from_rotation
 
-ANSWER = 1.5  # s until a message is answered on a busy machine
+ANSWER = 1.5  # s until a message is answered on a busy machine, by a service in another process
 PATIENCE = 30.0  # s until something that must happen has happened, on a machine that does much else
 WORK = 10.0  # s for which `settle` waits for a worker that has something to do
 
-# Inboxes of this process, and workers that act.
-_inboxes: weakref.WeakSet[Inbox] = weakref.WeakSet()
+# Of services in this process: workers that something was posted to, those that act, and how many messages of each
+# visitor have been handled, by the visitor's port.
+_workers: weakref.WeakSet[Worker] = weakref.WeakSet()
 _acting: weakref.WeakSet[Worker] = weakref.WeakSet()
-_post, _act = Inbox.post, Worker._act_once
+_handled: dict[int, int] = {}
+_post, _act, _connect = Worker.post, Worker._act_once, VisitorConnection.__init__
 
 
-def _watched_post(self: Inbox, key: Hashable, value: object = None) -> None:
-    _inboxes.add(self)
+def _watched_post(self: Worker, key: Hashable, value: object = None) -> None:
+    _workers.add(self)
     _post(self, key, value)
 
 
@@ -44,20 +48,36 @@ def _watched_act(self: Worker) -> float | None:
         _acting.discard(self)
 
 
-Inbox.post, Worker._act_once = _watched_post, _watched_act  # type: ignore[method-assign]
+def _watched_connect(self: VisitorConnection, visitor: WebSocket) -> None:
+    _connect(self, visitor)
+    receive, received = visitor.receive, 0
+    port = visitor.client.port if visitor.client else 0
+
+    async def watched() -> Message:
+        nonlocal received
+        _handled[port] = received  # it asks for the next one
+        event = await receive()
+        received += event["type"] == "websocket.receive"
+        return event
+
+    visitor.receive = watched  # type: ignore[method-assign]
 
 
-def _working() -> bool:
+Worker.post, Worker._act_once = _watched_post, _watched_act  # type: ignore[method-assign]
+VisitorConnection.__init__ = _watched_connect  # type: ignore[method-assign]
+
+
+def working() -> bool:
     """Whether a viewer in this process has something to do that was posted: a page is not at rest then."""
-    return bool(list(_acting)) or any(not each.closed and each.waits for each in list(_inboxes))
+    return bool(list(_acting)) or any(not each.join(0.0) and each._inbox.waits for each in list(_workers))
 
 
 class FakeBrowser:
     """One visitor of a local port or of any URL, which may need more `options` to connect.
 
-    `pump` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`. `memory` is the content
-    of the page's storage, `kept` what the service has stored there. `camera` is where the service has moved it;
-    unlike a real page, this one reports it only with `look`.
+    `read` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`. `memory` is the content
+    of the page's storage, `kept` what the service has stored there. `said` has the last messages of the page's own
+    script. `camera` is where the service has moved it; unlike a real page, this one reports it only with `look`.
     """
 
     def __init__(
@@ -70,22 +90,25 @@ class FakeBrowser:
         **options: Any,
     ) -> None:
         self.memory = memory
-        self._said: list[list[Any]] = []
+        self.said: list[list[Any]] = []
         self.kept: list[str] = []
         self._socket = connect(
             where if isinstance(where, str) else f"ws://127.0.0.1:{where}{path}",
             subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
             max_size=None,
+            max_queue=None,  # or its end would wait ten seconds for messages that nobody has read
             compression=None,
             **options,
         )
+        self._port: int = self._socket.local_address[1]
         self.gui: dict[str, dict[str, Any]] = {}
         self.values: dict[str, Any] = {}
         self.poses: dict[str, dict[str, tuple[float, ...]]] = {}
         self.visible: dict[str, bool] = {}
         self.nodes: dict[str, dict[str, Any]] = {}
         self.log: list[dict[str, Any]] = []
-        self._owed = False  # whether a message was sent that may still be answered
+        self._sent = 0  # messages
+        self._owed = False  # whether one was sent that may still be answered
         self.answers = True  # whether the page reports its storage, as a page in the foreground does
         self.camera: dict[str, Any] = {"position": (3, 3, 3), "look_at": (0, 0, 0), "up_direction": (0, 0, 1)}
         self._size = {"image_width": width, "image_height": height}
@@ -102,11 +125,12 @@ class FakeBrowser:
         self._socket.close()
 
     def send(self, type_: str, **fields: Any) -> None:
-        self._socket.send(msgspec.msgpack.encode({"type": type_, **fields}))
-        self._owed = True
+        self.send_raw(msgspec.msgpack.encode({"type": type_, **fields}))
 
     def send_raw(self, data: bytes | str) -> None:
         self._socket.send(data)
+        self._sent += 1
+        self._owed = True
 
     # What is shown
 
@@ -164,9 +188,9 @@ class FakeBrowser:
 
     def say(self, name: str, argument: Any = None) -> int:
         """Send a message as the page's own script does; returns its number."""
-        number = self._said[-1][0] + 1 if self._said else 1
-        self._said = [*self._said[-19:], [number, name, argument]]
-        self.set(LABEL, json.dumps(self._said))
+        number = self.said[-1][0] + 1 if self.said else 1
+        self.said = [*self.said[-19:], [number, name, argument]]
+        self.set(LABEL, json.dumps(self.said))
         return int(number)
 
     @property
@@ -252,15 +276,22 @@ class FakeBrowser:
         while not until():
             left = end - time.monotonic()
             assert left > 0, f"not seen within {timeout} s; page shows: {self.html[:600]}"
-            self._read(left)
+            self.read(left)
 
     def settle(self, quiet: float = 0.3, timeout: float = PATIENCE) -> None:
-        """Read messages until none arrives for `quiet` seconds and no worker acts; the first may take longer."""
-        end = time.monotonic() + timeout
-        late = time.monotonic() + WORK
-        self._owed, patience = False, ANSWER if self._owed else quiet
-        while self._read(patience) or (_working() and time.monotonic() < late):
-            patience = quiet
+        """Read messages until the service has handled all that was sent, and then none comes for `quiet` s."""
+        now = time.monotonic()
+        end, late, answered = now + timeout, now + WORK, now + (ANSWER if self._owed else 0.0)
+        self._owed = False
+        while True:
+            if self._port in _handled:
+                rests = time.monotonic() > late or (_handled[self._port] >= self._sent and not working())
+            else:
+                rests = time.monotonic() > answered
+            if self.read(quiet if rests else 0.02):
+                answered = 0.0
+            elif rests:
+                return
             assert time.monotonic() < end, f"the page did not come to rest within {timeout} s"
 
     def stored(self) -> str:
@@ -269,7 +300,8 @@ class FakeBrowser:
         self.settle(quiet=SAVE_AFTER + 0.3)
         return self.kept[-1]
 
-    def _read(self, timeout: float) -> bool:
+    def read(self, timeout: float) -> bool:
+        """Read one frame of messages; returns whether one came in time."""
         try:
             data = self._socket.recv(timeout=timeout)
         except TimeoutError:

@@ -282,7 +282,7 @@ def test_a_worker_that_never_starts_is_not_replaced_forever(port, monkeypatch, c
         monkeypatch.setattr(app.viewer.panel.layout, "StatusLine", lambda *_: 1 / 0)
         tab.set("1 rotating base", 10.0)
         # Each new worker asks the page for its stored state, so the page must answer.
-        wait_for(lambda: tab._read(0.01) is None or "is not started again" in caplog.text)
+        wait_for(lambda: tab.read(0.01) is None or "is not started again" in caplog.text)
     assert caplog.text.count("ZeroDivisionError: division by zero") == RESTARTS
 
 

@@ -104,7 +104,7 @@ def tab(monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeBrowser]:
 def wait_for_call(tab: FakeBrowser, *call: object, times: int = 1) -> None:
     end = time.monotonic() + 10.0
     while Witness.calls.count(call) < times:
-        tab._read(0.05)
+        tab.read(0.05)
         assert time.monotonic() < end, Witness.calls
 
 

@@ -88,6 +88,7 @@ def test_the_scene_is_described_and_said_once_the_arm_rests(tab: Tab) -> None:
     x, y, z = (1000 * kin.fk(PIONEER, PIONEER.q_home)[:3, 3]).tolist()
     home = f"tool at x {x:.1f}, y {y:.1f}, z {z:.1f} mm.".replace("-", "−")
     expect(description).to_contain_text(f"Pioneer arm, front, elbow +, no-flip, {home}")
+    assert page.evaluate("document.scrollingElement.scrollHeight") == 720, "it makes the page no longer"
 
     # While a slider is held, nothing is said, however often the numbers change.
     page.evaluate(LISTEN)

@@ -266,7 +266,7 @@ def swing(tab: FakeBrowser, name: str, degrees: float) -> list[np.ndarray]:
     """Set the slider and wait; the tool's pose in every frame of the animation."""
     poses: list[np.ndarray] = []
     tab.set(name, degrees)
-    while tab._read(0.5 if poses else ANSWER):
+    while tab.read(0.5 if poses else ANSWER):
         poses.append(tab.tool_pose())
     return poses
 

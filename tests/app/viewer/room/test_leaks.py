@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_browser import FakeBrowser, _working
+from fake_browser import FakeBrowser, working
 from students import ALL, UNITS, Room, begin, exercise, press, text_of
 
 from app.exercises import Asked, Exercise, Variant
@@ -251,8 +251,8 @@ def open_all(students: Room, exercises: list[Exercise]) -> dict[str, list[tuple[
 def rest(tab: FakeBrowser) -> None:
     """Read all that was queued so far; the arm may move on."""
     end = time.monotonic() + 20.0
-    while (_working() or tab._read(0.003)) and time.monotonic() < end:
-        tab._read(0.003)
+    while (working() or tab.read(0.003)) and time.monotonic() < end:
+        tab.read(0.003)
 
 
 @pytest.fixture

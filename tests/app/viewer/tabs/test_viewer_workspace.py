@@ -454,7 +454,7 @@ def test_a_slow_page_is_not_flooded(tab):
     tab.wait(lambda: tab.count >= send_window.WINDOW)
     end = time.monotonic() + 0.7
     while time.monotonic() < end:
-        tab._read(0.05)
+        tab.read(0.05)
     assert tab.count < send_window.WINDOW + 2 * SAMPLED
     assert tab.state == "running"
     tab.click("Clear")
@@ -476,7 +476,7 @@ def test_a_dragged_arm_and_a_growing_cloud_share_the_connection(tab):
         T = home.copy()
         T[2, 3] += 0.01 * math.sin(5.0 * time.monotonic())
         tab.drag(T)
-        tab._read(0.05)
+        tab.read(0.05)
         moved.add(round(tab.tool_pose()[2, 3], 4))
     tab.release()
     assert len(moved) > 3

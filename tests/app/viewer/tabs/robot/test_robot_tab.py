@@ -331,7 +331,7 @@ def test_files_go_out_and_come_in(port: int) -> None:
         assert "The file was not used" in tab.html
         assert "bad.toml: rows[0].alhpa" in html.unescape(tab.html)
         for k in range(MOST // 20_000 + 1):
-            tab._said = tab._said[-1:]  # as the page's script does: a message to the service has a limit
+            tab.said = tab.said[-1:]  # as the page's script does: a message to the service has a limit
             say(tab, "upload", value=["big.toml", k == 0, False, "x" * 20_000])
         assert "too large" in tab.html
         shows(tab, UR5, UR5.q_home)

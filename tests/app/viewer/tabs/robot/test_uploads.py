@@ -35,7 +35,7 @@ STATIC = Path(__file__).parents[5] / "static"
 
 def send(tab: FakeBrowser, name: str, data: bytes) -> None:
     for at in range(0, len(data), PART):
-        tab._said = tab._said[-1:]  # as the page's script does: a message to the service has a limit
+        tab.said = tab.said[-1:]  # as the page's script does: a message to the service has a limit
         piece = base64.b64encode(data[at : at + PART]).decode()
         say(tab, "upload", value=[name, at == 0, at + PART >= len(data), piece, "base64", at, len(data)])
 
@@ -272,7 +272,7 @@ def test_an_upload_that_stalls_ends_and_gives_back_its_room(monkeypatch: pytest.
         assert "For 0.2 s no part of it has come" in tab.html
         assert "Receiving the zip" not in part(tab, "files")
         assert memory.held == 0
-        tab._said, reader.receive_timeout = tab._said[-1:], 30.0
+        tab.said, reader.receive_timeout = tab.said[-1:], 30.0
         say(tab, "upload", value=["slow.zip", True, False, piece, "base64", 0, 2_000_000])
         assert "Receiving the zip: 0.0 of 2.0 MB" in part(tab, "files")
         say(tab, "cancel")
