@@ -140,9 +140,17 @@ _HEAD: tuple[tuple[str, str, tuple[Field, ...]], ...] = (
             Cell("title", "Title", "Shown in the list."),
             Cell("id", "Id", "Lower-case letters, digits and hyphens; different from all others."),
             Cell("topic", "Topic", "", "choice", TOPICS),
-            Cell("level", "Level", "1 is easy, 3 is hard.", "number"),
-            Cell("place", "Place", f"Orders the exercises of one level, 1 to {LAST}.", "number"),
-            Cell("lesson", "Lesson", "The lesson that it belongs to.", "choice", tuple(LESSONS)),
+            Cell("level", "Level", "1 is easy, 3 is hard; empty: 1.", "number"),
+            Cell(
+                "place", "Place", f"Orders the exercises of one level, 1 to {LAST}; empty: at the end.", "number"
+            ),
+            Cell(
+                "lesson",
+                "Lesson",
+                "The lesson that it belongs to. The checks of later lessons may ask it.",
+                "choice",
+                tuple(LESSONS),
+            ),
             Cell("robot", "Arm", "An arm of this service.", "choice"),
         ),
     ),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import kin
-from app.exercises import Exercise, ExerciseFileError, Exercises, Trial, Variant, tried
+from app.exercises import Exercise, ExerciseFileError, Exercises, Trial, Variant, builtin_exercises, tried
 from app.exercises import form as forms
 from app.exercises.files import MOST_BYTES, Find, parse_exercise
 from app.exercises.kinds import KINDS
@@ -222,11 +222,15 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
                 raise InputError("exercise", name, "a control of the form")
 
     def _start(self, origin: str) -> None:
-        """A draft from an exercise, or from the first one of a kind, with an id of its own."""
+        """A draft from an exercise, or from the plainest one of a kind, with an id of its own."""
         known = self.stage.activity.exercises
         one = known.get(origin)
         if (kind := origin.removeprefix("kind:")) != origin:
-            one = next((each for each in known.all if each.kind.name == kind), None)
+            one = min(
+                (each for each in builtin_exercises() if each.kind.name == kind),
+                key=lambda each: (each.level, len(each.source)),
+                default=None,
+            )
         if one is None:
             raise InputError("exercise", origin, "the id of an exercise, or one of the kinds " + ", ".join(KINDS))
         data = forms.read(one.source)
@@ -236,6 +240,8 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
             data["id"] = _free(one.id, known)
             data["title"] = f"{one.title} (mine)"[:80]
             data.pop("place", None)
+            if kind != origin:
+                data.pop("lesson", None)  # with it, the checks of other lessons would ask it
         self._open(data)
 
     def _upload(self, file: str, text: str) -> None:

@@ -87,8 +87,8 @@ class Guide(Feature):
         self._show()
 
     def begin(self) -> None:
-        """The visitor has opened the lesson: the scene comes to the pose of the step on show."""
-        self._bring()
+        """The visitor has opened the lesson: the scene comes to the step on show."""
+        self._open_step()
 
     def handle(self, key: Hashable, value: object) -> None:
         progress = self._progress
@@ -108,7 +108,7 @@ class Guide(Feature):
                 progress.go(value)
                 self._sheets.clear()
                 self._show()
-                self._bring()
+                self._open_step()
             case ("answer" | "fields" | "posture", str(question), int()):
                 self._answer(question, value, key[0] == "fields")
             case ("pick", str(question), int()):
@@ -289,6 +289,15 @@ class Guide(Feature):
         progress = self._progress
         if (pose := progress.outline.pose_of(progress.at)) is not None:
             self._show_pose(pose, "The arm is at the pose of this step.")
+
+    def _open_step(self) -> None:
+        """Bring the scene to the step on show: once it is answered, to the answer, of which its words speak."""
+        steps, at = self._progress.outline.steps, self._progress.at
+        answered = at < len(steps) and steps[at].question is not None and self._progress.is_closed(str(at + 1))
+        if answered and steps[at].end is not None:
+            self._move_to_end(str(at + 1))
+        else:
+            self._bring()
 
     def _move_to_end(self, key: str) -> None:
         """Let the scene show the answer to a question of the step on show."""

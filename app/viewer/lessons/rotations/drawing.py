@@ -37,7 +37,8 @@ def frames(facts: RotationsFacts, figure: FigureNodes, click: tuple[Hashable, ..
             _chain(facts, figure, length) if facts.settings.chained else _rotation(facts, figure, length, click)
         )
     fixed = _frame("fixed", np.eye(4), 0.8 * length, THIN)
-    name = label("fixed-name", "{0}", np.array([0.0, 0.0, 0.92 * length]))
+    tip = 0 if facts.settings.chained else 2  # frames of a chain are often above the fixed one
+    name = label("fixed-name", "{0}", 0.92 * length * np.eye(3)[tip])
     return [frame("beside", fixed, name, *shown, position=_anchor(facts.robot))]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import re
 import tomllib
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -201,7 +202,7 @@ def test_a_teacher_saves_an_exercise_on_the_server_and_other_processes_have_it(t
 
             press(tab, ["serve", 4])
             tab.wait(lambda: "My own is saved on the server" in shown(tab))
-            tab.wait(lambda: "It is saved on the server, in the list of all pages." in shown(tab))
+            tab.wait(lambda: "It is saved on the server, in everybody’s list." in shown(tab))
             written = tomllib.loads((tmp_path / "my-own.toml").read_text())
             assert {**written, "answer": DRAFT["answer"]} == DRAFT
             press(tab, ["set", "title", 5], "Where <b>is</b> it?")
@@ -311,3 +312,20 @@ def test_a_folder_that_fails_while_it_is_saved_loses_nothing(
         assert 'value="My own"' in tab.html
         press(tab, ["serve", 2])
         tab.wait(lambda: "It is saved on the server" in shown(tab))
+
+
+def test_a_kind_begins_with_its_plainest_exercise(server: int) -> None:
+    with FakeBrowser(server, memory=stored()) as tab:
+        tab.wait(lambda: "Begin with a kind" in shown(tab))
+        for serial, kind in enumerate(sorted({one.kind.name for one in ALL.all})):
+            press(tab, ["set", "new", 2 * serial], f"kind:{kind}")
+            tab.wait(lambda kind=kind: f"Kind {kind}:" in shown(tab))
+            tab.wait(lambda: "✓ Checked." in shown(tab))
+            title = re.search(r'class="kb-exercise-top"><b>([^<]*)</b>', tab.html)
+            assert title is not None
+            origin = next(one for one in ALL.all if html.unescape(title[1]) == f"{one.title} (mine)")
+            others = [one for one in ALL.all if one.kind.name == kind]
+            assert origin.level == min(one.level for one in others)
+            assert not re.search(r"<option selected>(dh|velocity|inverse)</option>", tab.html), "no check asks it"
+            press(tab, ["close", 2 * serial + 1])
+            tab.wait(lambda: "Begin with a kind" in shown(tab))

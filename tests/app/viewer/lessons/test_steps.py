@@ -24,6 +24,7 @@ from app.shared.store import Store
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.outline import Choice, Number, Outline, Pose, Step
 from app.viewer.lessons.guide.progress import Progress
+from app.viewer.lessons.rotations.lesson import RotationsLesson
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.panel.joints import label
 from app.viewer.server import ViewerServer
@@ -60,6 +61,11 @@ def press(tab: FakeBrowser, key: list[object], value: object = None) -> None:
     tab.say("feature", ["guide", key, value])
 
 
+def frames_beside(tab: FakeBrowser) -> int:
+    """How many frames of a chain are drawn beside the arm."""
+    return sum("chain-" in name and tab.visible.get(name, True) for name in tab.nodes)
+
+
 def is_at(tab: FakeBrowser, robot: Robot, q: Any) -> bool:
     return np.allclose(tab.tool_pose(), kin.fk(robot, np.array(q)), atol=1e-6)
 
@@ -90,6 +96,28 @@ def test_opening_a_step_brings_the_arm_to_its_pose(server: int, lesson: Any, rob
                 tab.wait(lambda end=end: is_at(tab, robot, end.q))
             else:
                 tab.wait(lambda end=end: np.allclose(tab.gizmo_pose()[:3, 3], end.target[:3], atol=1e-6))
+
+
+def test_an_answered_step_opens_where_its_answer_led(server: int) -> None:
+    puma = kin.get_robot("puma560")
+    steps = RotationsLesson.outline(puma, DEGREES).steps
+    at, step = next((i, one) for i, one in enumerate(steps) if one.end is not None and one.end.drawing)
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.choose(puma.name)
+        tab.set("Lesson", RotationsLesson.title)
+        press(tab, ["go", 1], at)
+        tab.wait(lambda: f"{at + 1}. {step.title}" in tab.html)
+        assert frames_beside(tab) == 0, "not before the answer"
+        press(tab, ["reveal", str(at + 1), 2])
+        tab.wait(lambda: frames_beside(tab) > 0)
+        shown = frames_beside(tab)
+        press(tab, ["go", 3], 0)
+        tab.wait(lambda: f"1. {steps[0].title}" in tab.html and frames_beside(tab) == 0)
+        press(tab, ["go", 4], at)
+        tab.wait(lambda: frames_beside(tab) == shown)
+        press(tab, ["pose", 5])
+        tab.wait(lambda: frames_beside(tab) == 0)
 
 
 def test_a_step_is_one_step_of_undo(server: int) -> None:
