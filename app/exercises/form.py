@@ -227,7 +227,12 @@ ANSWERS: dict[str, tuple[Field, ...]] = {
             "Known mistakes",
             "Values that students get by a mistake, and what is said.",
             "mistake",
-            (Cell("value", "Value", "", "expressions"), Cell("when", "When", _WHEN, "expression"), _REASON),
+            (
+                Cell("value", "Value", "", "expressions"),
+                Cell("when", "When", _WHEN, "expression"),
+                _REASON,
+                Cell("beyond", "All larger sizes", "No right value is as large.", "flag"),
+            ),
             {"value": "0", "reason": "Why this is wrong."},
         ),
     ),

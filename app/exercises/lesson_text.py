@@ -31,9 +31,9 @@ same fields::
 
 Poses and figures are the lesson's own. The scene shows `end` with the right answer; `drawn` is a pose that shows a
 wrong one, with the answer as the value of a joint. Of lengths, it is two points: a bar as long as the answer leads
-from one towards the other, as in ``{ from = "tool", to = "target" }``. What is `withheld` is nowhere to be seen
-before. `arm` is one of the library that shows what this one cannot; a button changes to it. An `estimate` is asked
-before the question: it is a choice that looking answers.
+from one towards the other, as in ``{ from = "tool", to = "target" }``; with `scale`, so many times as long. What
+is `withheld` is nowhere to be seen before. `arm` is one of the library that shows what this one cannot; a button
+changes to it. An `estimate` is asked before the question: it is a choice that looking answers.
 
 An `example` is worked on an arm of its own: :mod:`app.exercises.worked`.
 
@@ -75,10 +75,15 @@ class QuestionText:
 
 @dataclass(frozen=True)
 class BarText:
-    """How lengths are drawn: from a point in the direction of another, each one of `POINTS` or its coordinates."""
+    """How lengths are drawn: from a point in the direction of another, each one of `POINTS` or its coordinates.
+
+    Attributes:
+        scale: how long 1 m, or 1 m/s, is in the scene, m.
+    """
 
     start: str | tuple[Expression, ...]
     end: str | tuple[Expression, ...]
+    scale: Expression
 
 
 @dataclass(frozen=True)
@@ -213,7 +218,7 @@ def _asked(fields: Fields, name: str) -> tuple[QuestionText, ...]:
 
 def _drawn(fields: Fields) -> tuple[str, int] | BarText:
     if fields.has("from"):
-        bar = BarText(_point(fields, "from"), _point(fields, "to"))
+        bar = BarText(_point(fields, "from"), _point(fields, "to"), fields.expression("scale", "1"))
         fields.done()
         return bar
     found = fields.text("pose"), fields.whole("joint", 1, MOST_JOINTS)

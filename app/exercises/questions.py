@@ -180,10 +180,15 @@ class Choice(Question):
 
 @dataclass(frozen=True)
 class Mistake:
-    """A value that a usual mistake gives, and the reason why it is wrong."""
+    """A value that a usual mistake gives, and the reason why it is wrong.
+
+    Attributes:
+        beyond: whether it is about all larger sizes instead: no right value has one.
+    """
 
     value: float
     reason: str
+    beyond: bool = False
 
 
 @dataclass(frozen=True)
@@ -229,6 +234,8 @@ class Number(Question):
 
     def read_text(self, text: str) -> float:
         """A typed answer in radians, metres or SI units; raises `EntryError` with what is valid."""
+        if self.unit == PLAIN and not self._is_count and text.rstrip().endswith("%"):
+            return read_number(text.rstrip()[:-1], self.unit) / 100.0
         return read_number(text, self.unit)
 
     def is_answer(self, answer: object) -> bool:
@@ -240,9 +247,14 @@ class Number(Question):
         for way in self.ways:
             if self._near(answer, way.value):
                 return Verdict(True, way.reason)
+        if slip := self.slip(answer):  # nearer than a mistake may be: the tolerance is that of the right value
+            return Verdict(False, slip, way=self.method)
         for mistake in self.mistakes:
-            if self._near(answer, mistake.value):
+            if not mistake.beyond and self._near(answer, mistake.value):
                 return Verdict(False, mistake.reason)
+        for mistake in self.mistakes:
+            if mistake.beyond and abs(answer) > abs(mistake.value) + self.tolerance:
+                return Verdict(False, mistake.reason, way=self.method)
         return Verdict(False, self._what_is_wrong(answer), way=self.method)
 
     def right(self) -> float:
@@ -269,29 +281,34 @@ class Number(Question):
     @property
     def tolerance_text(self) -> str:
         """The accepted error, such as ± 1°."""
-        return "a whole number" if self._is_count else f"± {self.unit.brief(self.tolerance)}".rstrip()
+        if self._is_count:
+            return "a whole number"
+        shown = _rounded_down(self.tolerance * self.unit.scale) / self.unit.scale
+        return f"± {self.unit.brief(shown)}".rstrip()
 
     def _what_is_wrong(self, answer: float) -> str:
         """What is wrong with an answer that is no known mistake."""
         if (self._is_count or not self.ordered) and (answer < 0.0 or abs(answer - round(answer)) > WHOLE):
             return "The answer is a whole number, and not negative."
-        if slip := self.slip(answer) or self._relation(answer):
-            return slip
+        if relation := self._relation(answer):
+            return relation
         if self.whole_turns or not self.ordered:
             return ""
+        size = "large" if abs(answer) > abs(self.answer) else "small"
         if answer * self.answer < 0.0:
-            return "The sign is not right."
-        size = "The size is too" if self.answer < 0.0 else "Too"
-        return f"{size} {'large' if abs(answer) > abs(self.answer) else 'small'}."
+            return f"The sign is not right, and the size is too {size}."
+        return f"{'The size is too' if self.answer < 0.0 else 'Too'} {size}."
 
     def slip(self, answer: float) -> str:
         """What the typed number would be right in: another unit, whatever its sign; "" if in none."""
+        if self._is_count or not self.ordered:
+            return ""
         typed_number = answer * self.unit.scale
         for name, scale, words in _other_units(self.unit):
             for sign, remark in ((1.0, ""), (-1.0, ", with the wrong sign")):
                 if typed_number and abs(sign * typed_number / scale - self.answer) <= self.tolerance:
-                    unit = _words(self.unit)
-                    return f"This is the value in {words}{remark}. The unit is {unit}; or type {name} after it."
+                    unit = f" The unit is {_words(self.unit)}; or type" if self.unit.name else " Type"
+                    return f"This is the value in {words}{remark}.{unit} {name} after it."
         return ""
 
     def _relation(self, answer: float) -> str:
@@ -350,6 +367,8 @@ def _other_units(unit: Unit) -> list[tuple[str, float, str]]:
     for family in (angles, lengths):
         if unit.name in [name for name, *_ in family]:
             return [row for row in family if row[0] != unit.name]
+    if unit == PLAIN:
+        return [("%", 100.0, "per cent")]
     others = [(name, 1.0 / size, name) for name, size in units_like(unit).items()]
     return [row for row in others if not math.isclose(row[1], unit.scale)]
 
@@ -377,8 +396,9 @@ def apart(question: Number, least: float = LEAST) -> Number:
 
     Mistakes within twice `least` of a right value are left out: for this arm they give the right value.
     """
-    wrong = tuple(m for m in question.mistakes if _gap(question, m.value) > 2.0 * least)
-    gaps = [gap for value in (0.0, *(m.value for m in wrong)) if (gap := _gap(question, value)) > 2.0 * least]
+    wrong = tuple(m for m in question.mistakes if m.beyond or _gap(question, m.value) > 2.0 * least)
+    values = (0.0, *(m.value for m in wrong if not m.beyond))
+    gaps = [gap for value in values if (gap := _gap(question, value)) > 2.0 * least]
     tolerance = max(question.tolerance, least)
     if gaps and tolerance > _SHARE * min(gaps):
         tolerance = _rounded_down(_SHARE * min(gaps))

@@ -170,6 +170,9 @@ class Stage(Protocol):
         A view chosen by the visitor stays.
         """
 
+    def keep_in_view(self, target: Array | None = None) -> None:
+        """Glide to where the picture contains the arm at its goal, and a target ``(3,)``, if it does not."""
+
     def toward_camera(self) -> Array:
         """A vector ``(3,)`` in the world frame, from the point the visitor looks at to the camera."""
 

@@ -89,6 +89,8 @@ class BarePage:
     def fit_view(self, spheres: Any, points: Array | None = None) -> None:
         self.views.append((spheres, points))
 
+    def keep_in_view(self, target: Array | None = None) -> None: ...
+
     def toward_camera(self) -> Array:
         return np.ones(3)
 

@@ -32,7 +32,7 @@ class NumberKind(Kind):
         tolerance: the accepted error, or as `part` of the value.
         part: the tolerance as a part of the value, in place of `tolerance`; 0: it is no part.
         least: the finest tolerance; with it, the tolerance keeps off known mistakes and zero as well.
-        mistakes: known wrong values, whether they are, and the reason.
+        mistakes: known wrong values, whether they are, the reason, and whether all larger sizes are meant.
     """
 
     name: ClassVar[str] = "number"
@@ -45,7 +45,7 @@ class NumberKind(Kind):
     tolerance: float
     method: Words
     whole_turns: bool
-    mistakes: tuple[tuple[tuple[Expression, ...], Expression, Words], ...]
+    mistakes: tuple[tuple[tuple[Expression, ...], Expression, Words, bool], ...]
     part: float = 0.0
     least: Expression | None = None
 
@@ -72,7 +72,8 @@ class NumberKind(Kind):
             wrong = item.expressions("value", 1)
             if len(wrong) != len(values):
                 raise item.refuse("value", len(wrong), f"as many values as the answer has: {len(values)}")
-            mistakes.append((wrong, item.expression("when", "1"), item.words("reason")))
+            reason, beyond = item.words("reason"), item.flag("beyond")
+            mistakes.append((wrong, item.expression("when", "1"), reason, beyond))
             item.done()
         least = fields.expression("least") if fields.has("least") else None
         method, turns = fields.words("method"), fields.flag("whole_turns")
@@ -91,8 +92,8 @@ class NumberKind(Kind):
     def _questions(self, variant: Variant, units: Units) -> list[Number]:
         unit, method = self._shown_unit(units), variant.text(self.method, units)
         wrong = [
-            (variant.vector(values), variant.text(reason, units))
-            for values, when, reason in self.mistakes
+            (variant.vector(values), variant.text(reason, units), beyond)
+            for values, when, reason, beyond in self.mistakes
             if variant.number(when)
         ]
         found = []
@@ -105,7 +106,7 @@ class NumberKind(Kind):
                 unit,
                 tolerance,
                 method,
-                tuple(Mistake(float(values[i]), reason) for values, reason in wrong),
+                tuple(Mistake(float(values[i]), reason, beyond) for values, reason, beyond in wrong),
                 self.whole_turns,
                 ordered=self.unit != "joint",
             )

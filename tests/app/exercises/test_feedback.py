@@ -7,7 +7,7 @@ import math
 import pytest
 
 from app.exercises.kinds.number import OTHER
-from app.exercises.questions import Mistake, Number
+from app.exercises.questions import Mistake, Number, apart, count
 from app.exercises.typed import QUANTITIES, EntryError, read_number, units_like
 from kin.units import DEGREES, PLAIN, RADIANS, Unit
 
@@ -88,7 +88,8 @@ THIRTY, SIZE = math.radians(30.0), 0.6
         ),
         (asked(THIRTY, DEGREES), "41", "Too large."),
         (asked(-THIRTY, DEGREES), "-41", "The size is too large."),
-        (asked(-THIRTY, DEGREES), "41", "The sign is not right."),
+        (asked(-THIRTY, DEGREES), "41", "The sign is not right, and the size is too large."),
+        (asked(-THIRTY, DEGREES), "11", "The sign is not right, and the size is too small."),
         (asked(0.16, SPEED), "160", "This is the value in mm/s. The unit is m/s; or type mm/s after it."),
         (asked(2.007, RATE), "2.007", "This is the value in rad/s. The unit is °/s; or type rad/s after it."),
         (asked(2.007, RATE), "-115", "The size is right, the sign is not."),
@@ -101,6 +102,8 @@ THIRTY, SIZE = math.radians(30.0), 0.6
         (asked(SIZE, PLAIN), "1.2", "This is twice the right value."),
         (asked(SIZE, PLAIN), "0.7", "Too large."),
         (asked(SIZE, PLAIN), "0", "Too small."),
+        (asked(SIZE, PLAIN), "60", "This is the value in per cent. Type % after it."),
+        (asked(-SIZE, PLAIN), "60", "This is the value in per cent, with the wrong sign. Type % after it."),
     ],
 )
 def test_the_mistake_is_named_before_the_way(question: Number, typed: str, said: str) -> None:
@@ -114,6 +117,31 @@ def test_the_mistake_is_named_before_the_way(question: Number, typed: str, said:
 def test_a_known_mistake_goes_before_a_relation() -> None:
     question = asked(THIRTY, DEGREES, mistakes=(Mistake(math.radians(60.0), "That is the angle to y."),))
     assert question.judge(math.radians(60.0)).reason == "That is the angle to y."
+
+
+@pytest.mark.parametrize("typed", ["60 %", "60%", " 0.6", "3/5"])
+def test_a_share_is_read_in_per_cent(typed: str) -> None:
+    question = asked(SIZE, PLAIN)
+    assert question.judge(question.read_text(typed)).right
+    with pytest.raises(EntryError):
+        count("?", 2, WAY).read_text("200 %")
+
+
+def test_the_value_in_another_unit_goes_before_a_mistake_that_is_near_it() -> None:
+    one = math.radians(1.0)
+    question = Number("?", 1.0, DEGREES, 0.02, WAY, (Mistake(0.02, "Divide by it."),))
+    assert question.judge(one).reason.startswith("This is the value in radians.")
+    assert question.judge(0.02).reason == "Divide by it."
+    assert question.tolerance_text == "± 1.1°"
+
+
+def test_what_no_right_value_can_be_is_said_of_all_larger_sizes() -> None:
+    reason = "It is a cosine: between −1 and 1."
+    question = apart(asked(-SIZE, PLAIN, mistakes=(Mistake(0.8, "The sine."), Mistake(1.0, reason, beyond=True))))
+    assert question.judge(77.0).reason == question.judge(-1.2).reason == reason
+    assert question.judge(77.0).way == WAY
+    assert question.judge(0.8).reason == "The sine."
+    assert question.judge(1.0).reason == "The sign is not right, and the size is too large."
 
 
 def test_relations_are_not_said_of_counts_and_whole_turns() -> None:

@@ -42,7 +42,7 @@ def answer_nodes(robot: Robot, step: Step, given: object, closed: bool) -> list[
 
 
 def _is_way(question: Number) -> bool:
-    """Whether an answer is a length, or a speed, which is drawn as the way in a second."""
+    """Whether an answer is a length, or a speed, which is drawn as a way."""
     return question.unit.is_length or question.unit.name == "m/s"
 
 
@@ -53,7 +53,7 @@ def _bar(key: str, robot: Robot, bar: Bar, value: float, words: str, color: Colo
         return []
     size, most = body(robot).size, FARTHEST * robot.reach
     direction = way / length
-    end = start + min(max(value, -most), most) * direction
+    end = start + min(max(bar.scale * value, -most), most) * direction
     if broken:  # beside the whole one, which has its place between the points
         aside = ASIDE * size * _across(direction)
         start, end = start + aside, end + aside

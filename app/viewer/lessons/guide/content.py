@@ -103,7 +103,7 @@ class _Maker:
         match text.drawn:
             case BarText():
                 start = self._point(text, text.drawn.start)
-                return Bar(start, self._point(text, text.drawn.end))
+                return Bar(start, self._point(text, text.drawn.end), self.variant.number(text.drawn.scale))
             case (name, joint):
                 return self._joint(name, joint)
         return None

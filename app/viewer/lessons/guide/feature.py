@@ -313,6 +313,7 @@ class Guide(Feature):
             self._shown.restore(dict(pose.drawing))
         if pose.target is not None:
             self.stage.set_target(from_position_wxyz(pose.target[:3], np.array(pose.target[3:])))
+        self.stage.keep_in_view(None if pose.target is None else np.array(pose.target[:3]))
 
     def _show(self) -> None:
         if self._shown is not None and (outline := self._shown.on_steps(self._progress)) is not None:

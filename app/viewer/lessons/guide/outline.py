@@ -95,10 +95,12 @@ class Bar:
     Attributes:
         start: where it begins, ``(3,)`` (m).
         end: where the right one leads; only the direction counts.
+        scale: how long it is in the scene (m) for 1 m or 1 m/s.
     """
 
     start: tuple[float, ...]
     end: tuple[float, ...]
+    scale: float = 1.0
 
 
 @dataclass(frozen=True)

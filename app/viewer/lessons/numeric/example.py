@@ -1,4 +1,4 @@
-"""The example of the steps: a target far from singularities, and a start near it."""
+"""The example of the steps: a target far from singularities, and a start near it, clear of floor and base."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.viewer.scene.clearance import clearance
 from kin import Robot, fk
 from kin.differential import iteration
 from kin.differential.iteration import Match, Problem, Run, Settings
@@ -37,7 +38,17 @@ def example(robot: Robot) -> Example:
     match = usual_match(robot)
     probe = Problem(robot, fk(robot, robot.q_home), match)
     smallest = np.linalg.svd(probe.jacobian(q), compute_uv=False)[:, -1]
-    aim = q[int(np.argmax(smallest))]
+    best, space = q[np.argsort(-smallest)], clearance(robot, skeleton=True)
+    for aim in best:
+        found = _near(robot, aim, match)
+        ends = found.start, found.newton.q[-1]
+        if found.newton.outcome == "reached" and all(space.at(end) is None for end in ends):
+            return found
+    return _near(robot, best[0], match)
+
+
+def _near(robot: Robot, aim: Array, match: Match) -> Example:
+    """The example whose target is the tool's pose at `aim` ``(n,)``."""
     problem = Problem(robot, fk(robot, aim), match)
     pattern = np.where(np.arange(robot.n) % 2, -1.0, 1.0) * np.where(robot.revolute, 1.0, _SLIDE) * problem.travel
     for offset in _OFFSETS:

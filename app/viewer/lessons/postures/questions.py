@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+import re
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from app.exports.worksheet.sheet import SUBSCRIPTS
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Configuration, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration, distance
 from app.viewer.lessons.postures import planar
 from app.viewer.scene.chain import rotation
-from kin import IKOptions, IKSolution, Robot, Status, branch_names, branch_of, fk, jacobian
+from kin import IKOptions, IKSolution, Robot, Status, branch_meanings, branch_names, branch_of, fk, jacobian
 from kin.axes import NEARLY
 from kin.differential.task import free_motions, rank
 from kin.ik import solve
@@ -21,7 +23,7 @@ from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units
 
 ROLL = math.radians(30.0)
-BEYOND = 1.2  # reaches: a target that no arm has
+BEYOND = 1.2  # lengths of all links: a target that no arm has
 
 
 class Solved(NamedTuple):
@@ -93,7 +95,8 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "rolled": known.rolled,
         "limits": known.roll is Status.LIMITS,
     }
-    words = {"here": known.here, "roll": units.angles.brief(ROLL)}
+    words = {"here": known.here, "roll": units.angles.brief(ROLL), "meanings": _meanings(robot)}
+    words["stretched_shown"] = f"{100.0 * numbers['stretched']:.0f} %"
     for place in (1, 2, 3):
         words[f"other{place}"], words[f"part{place}"] = wrong.get(place, ("", ""))
     by_hand, by_hand_words = planar.facts(robot, units)
@@ -118,6 +121,12 @@ def beyond(robot: Robot) -> tuple[float, ...]:
     way = out / far if far > 1e-9 else np.array([1.0, 0.0, 0.0])
     point = base + BEYOND * robot.reach * way
     return (*point.tolist(), *wxyz_from_rotation(T[:3, :3]).tolist())
+
+
+def _meanings(robot: Robot) -> str:
+    """What one word of each pair in the names of postures means."""
+    said = [f"“{part}”: {meaning}." for part, meaning in list(branch_meanings(robot).items())[::2]]
+    return re.sub(r"(?<=θ)\d+", lambda number: number[0].translate(SUBSCRIPTS), " ".join(said))
 
 
 def _others(known: Solved) -> dict[int, tuple[str, str]]:

@@ -7,6 +7,8 @@ import numpy as np
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.velocity.facts import scale_of
+from app.viewer.lessons.velocity.views import SAMPLE
 from kin import Robot, Singularity, fk, jacobian, singularities
 from kin.axes import NEARLY, joint_axes, size
 from kin.differential.task import lifts, natural_task, rank, task_jacobian, usual_rank
@@ -41,6 +43,8 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "fastest": float(semi[0]),
         "slowest": float(semi[-1]),
         "singular": float(found is not None),
+        "metre": SAMPLE / scale_of(robot, "velocity"),
+        "flattened": float(found is not None and _axes(robot, found[0]) < _axes(robot, home)),
         "usual": float(usual_rank(robot, natural_task(robot))),
         "rank_there": float("nan") if found is None else float(rank_of(robot, found[0])),
     }
@@ -66,6 +70,12 @@ def singular(robot: Robot) -> tuple[Array, Singularity] | None:
         if within and rank_of(robot, q) < usual_rank(robot, natural_task(robot)):
             return q, near
     return None
+
+
+def _axes(robot: Robot, q: Array) -> int:
+    """How many axes the ellipsoid of the tool point's velocities has at q ``(n,)``."""
+    semi = np.linalg.svd(jacobian(robot, q)[:3], compute_uv=False)
+    return int((semi > NEARLY * size(robot)).sum())
 
 
 def rank_of(robot: Robot, q: Array) -> int:

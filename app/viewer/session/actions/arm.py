@@ -69,7 +69,7 @@ class ArmControls:
     def _move_into_view(self, motion: Callable[[], None], title: str) -> None:
         """Move the arm, and the camera if it would not show the whole arm."""
         self._move(motion, title)
-        self._page.camera.keep(kin.link_frames(self._page.now.robot, self._page.now.goal)[:, :3, 3])
+        self._page.keep_in_view()
 
     def _move(self, motion: Callable[[], None], title: str) -> None:
         motion()

@@ -81,7 +81,7 @@ class TypedInput:
         elif given == "pose" and kind != "position" and page.now.task == "position":
             page.set_task("pose")
         arm.set_target(T)
-        page.camera.keep(kin.link_frames(page.now.robot, arm.goal)[:, :3, 3], T[:3, 3])
+        page.keep_in_view(T[:3, 3])
 
     def _answer(self, number: int, action: Callable[[], None]) -> None:
         """Act on a typed text, and tell the page whether it was valid."""

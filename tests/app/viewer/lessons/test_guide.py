@@ -89,7 +89,7 @@ def test_a_wrong_answer_gets_its_reason() -> None:
     assert LENGTH.judge(0.2).full == "The size is right, the sign is not. Measure."
     assert LENGTH.judge(-0.3).full == "The size is too large. Measure."
     assert LENGTH.judge(0.0).full == "The size is too small. Measure."
-    assert LENGTH.judge(0.3).reason == "The sign is not right.", "a size says nothing about a sign"
+    assert LENGTH.judge(0.3).reason == "The sign is not right, and the size is too large."
     assert LENGTH.judge(-0.0002).reason.startswith("This is the value in metres. The unit is millimetres")
     assert ANGLE.judge(math.radians(math.pi / 2)).reason.startswith("This is the value in radians.")
     assert (SUM.judge(1).right, SUM.judge(1).reason) == (False, "One too many.")

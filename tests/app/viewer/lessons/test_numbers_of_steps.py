@@ -194,6 +194,10 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
         ),
         (rf"smallest σ of this arm is {N}", lambda h, m: [smallest(h)]),
         (rf"Let λ = {N}", lambda h, m: [h.drawing["damping"]]),
+        (
+            rf"It is {N} % of the arm’s reach",
+            lambda h, m: [100 * float(np.linalg.norm(aim(h) - h.T[:3, 3])) / h.robot.reach],
+        ),
         (rf"A share of {N} remains", lambda h, m: [0.01 / (round(smallest(h), 3) ** 2 + 0.01)]),
     ),
     "screws": (
@@ -222,7 +226,8 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
         (rf"The table has {N} rows", lambda h, m: [len(h.robot.rows)]),
     ),
     "postures": (
-        (rf"to {N} times the arm’s reach", lambda h, m: [reach(h)]),
+        (rf"to {N} times the length of all links", lambda h, m: [reach(h)]),
+        (rf"From base to tool it is {N} % of that length", lambda h, m: [100 * spread(h)]),
         (rf"l₁ = {N} mm and l₂ = {N} mm", lambda h, m: mm([row.a for row in h.robot.rows[:2]])),
         (
             rf"ring from {N} mm to {N} mm",
@@ -302,6 +307,7 @@ FORMULAS: dict[str, tuple[str, ...]] = {
         r"→ 0",
         r"θ₂ > 0",
         r"J⁻¹",
+        r"from 0 to 1|a share of 1",
     ),
     "screws": (r"1 (?:rad|m)/s", r"length 1\b", r"v = 0|ω = 0|= 1\b|p = 0|= 0\b"),
     "equations": (r"is not 1|instead of 0|entries of that row are 0|is [−-]?[\d.]+ then",),
@@ -314,6 +320,7 @@ FORMULAS: dict[str, tuple[str, ...]] = {
         r"θ₃ is 0|θ₂ is 0",
         r"\d+ postures?",
         r"30°",
+        r"axes \d, \d and \d|z\d × z\d",
     ),
     "redundancy": (r"times any factor|speed is [\d.]+", r"joints are \(.*\)"),
     "velocity": (r"1 (?:rad|m)/s", r"is [01] rad/s per", r"Press 1 "),
@@ -488,7 +495,7 @@ ESTIMATES: dict[str, Callable[[Here], int]] = {
     "trajectories": lambda h: 1,
     "screws": lambda h: (lambda count: 0 if count == 0 else 1 if count < h.robot.n else 2)(upright(h)),
     "dh": lambda h: (lambda side, up: 0 if up > side else 2 if -up > side else 1)(*from_base(h)),
-    "postures": lambda h: place(float(np.linalg.norm(from_base(h))) / h.robot.reach, 0.5, 0.9),
+    "postures": lambda h: place(spread(h), 0.5, 0.9),
     "inverse": lambda h: (
         place(float(np.linalg.norm(from_base(h))) / h.robot.reach, 0.5)
         if "planar" in h.robot.id
@@ -506,6 +513,11 @@ def from_base(h: Here) -> tuple[float, float]:
     """How far the tool is beside the base, and above it."""
     way = h.T[:3, 3] - np.array(h.robot.base)[:3, 3]
     return float(np.hypot(*way[:2])), float(way[2])
+
+
+def spread(h: Here) -> float:
+    """How far the tool is from the base, as a part of the length of all links."""
+    return float(np.linalg.norm(from_base(h))) / h.robot.reach
 
 
 def scenes(robot: Robot, outline: Outline) -> list[Here]:

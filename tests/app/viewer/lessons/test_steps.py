@@ -70,6 +70,38 @@ def is_at(tab: FakeBrowser, robot: Robot, q: Any) -> bool:
     return np.allclose(tab.tool_pose(), kin.fk(robot, np.array(q)), atol=1e-6)
 
 
+def test_the_ellipsoid_is_called_flat_where_an_axis_is_lost() -> None:
+    said = set()
+    for robot in CLASSICS:
+        for step in VelocityLesson.outline(robot, DEGREES).steps:
+            if step.title == "A singular configuration":
+                assert step.end is not None
+                home, there = (
+                    np.linalg.svd(kin.jacobian(robot, q)[:3])[1] for q in (robot.q_home, np.array(step.end.q))
+                )
+                flat = bool(there[-1] < 1e-3 * there[0] and home[-1] > 1e-3 * home[0])
+                assert ("is flat now" in step.practice) == flat, robot.id
+                assert ("is not flat" in step.practice) == (not flat), robot.id
+                said.add(flat)
+    assert said == {True, False}
+
+
+def test_the_camera_follows_a_target_that_leaves_the_picture(server: int) -> None:
+    def distance() -> float:
+        return float(np.linalg.norm(np.subtract(tab.camera["position"], tab.camera["look_at"])))
+
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        before = distance()
+        tab.set("Lesson", "Postures")
+        tab.wait(lambda: "1. Signs" in tab.html)
+        press(tab, ["go", 1], 3)
+        tab.wait(lambda: "4. Out of reach" in tab.html)
+        assert distance() == pytest.approx(before), "nothing is given away"
+        press(tab, ["reveal", "4", 1])
+        tab.wait(lambda: distance() > 1.2 * before)
+
+
 @pytest.mark.parametrize(
     "robot",
     [pytest.param(r, id=r.id, marks=[] if r.id in ("ur5", "planar2r") else pytest.mark.slow) for r in CLASSICS],

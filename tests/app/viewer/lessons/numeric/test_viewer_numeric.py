@@ -23,6 +23,8 @@ from app.shared.store import Store
 from app.viewer.lessons.numeric import basins, questions, views
 from app.viewer.lessons.numeric.drawing import COPIES, chosen
 from app.viewer.lessons.numeric.example import example
+from app.viewer.scene.clearance import clearance
+from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, encode
 from kin import Robot
@@ -141,6 +143,14 @@ def test_newton_converges_quadratically_near_a_regular_solution(robot: Robot) ->
     gauss = run(known.problem, Settings("gauss-newton"), known.start)
     assert gauss.outcome == "reached"
     assert (np.diff(gauss.errors) < 0.0).all(), "Gauss–Newton never lets the error grow"
+
+
+@pytest.mark.parametrize("robot", CLASSICS, ids=lambda robot: robot.id)
+def test_the_example_touches_neither_floor_nor_base(robot: Robot) -> None:
+    known = example(robot)
+    for q in (known.start, known.newton.q[-1]):
+        assert robot.in_limits(q)
+        assert clearance(robot).at(q) is None
 
 
 @pytest.mark.parametrize("robot", [PLANAR, PIONEER, UR5, SCARA], ids=lambda robot: robot.id)
@@ -393,7 +403,9 @@ def test_all_iterates_are_in_view_until_the_lesson_is_closed(server: int) -> Non
         tab.settle()
         before = distance()
     # A link: the lesson opened by hand goes to the pose of its step.
-    answered = {"guide": {"revealed": ["1"]}}
+    some = PIONEER.random_q(np.random.default_rng(2), 400)
+    stretched = some[int(np.linalg.norm(kin.fk(PIONEER, some)[:, :3, 3] - body(PIONEER).center, axis=1).argmax())]
+    answered = {"guide": {"revealed": ["1"]}, "numeric": {"start": stretched.tolist(), "follow": False}}
     state = encode(PageState(robot=PIONEER.id, q=PIONEER.q_home, lesson="numeric", features=answered))
     with FakeBrowser(server, memory=json.dumps({"address": "http://127.0.0.1/", "state": state})) as tab:
         tab.wait(lambda: "Converged in" in tab.html and distance() > 1.1 * before)
