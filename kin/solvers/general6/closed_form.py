@@ -63,7 +63,8 @@ _JOINTS = np.arange(6)
 SolveAll = Callable[[Array, Array, Array], int]
 # Beside curves: random starts of each of two searches, rows that are compared.
 _STARTS, _MOST_ROWS = 40, 60
-_FOLD, _NEAR_FOLD = 1e-2, 1e-4  # smallest singular values: near a fold, and so near that nothing is agreed
+# Smallest singular values: near a fold, so near that targets close by are asked, so near that nothing is agreed.
+_FOLD, _NEAR_FOLD, _AT_FOLD = 1e-2, 1e-4, 1e-5
 _ALONG = np.array([1e-3, -1e-3, 3e-3, -3e-3, 1e-2, -1e-2, 3e-2, -3e-2, 0.1, -0.1, 0.3, -0.3])
 _RARE = 1  # of these poses, those with an odd number of solutions on an arm without special axes
 
@@ -270,7 +271,7 @@ class General6(ClosedForm):
                 starts = near[:, None] + _ALONG[None, :, None] * weak[:, None]
                 count = self._add(T, starts.reshape(-1, 6), q, count)
         even = count > 0 and count % 2 == 0
-        return even and count == found and bool(self._folds(q[:count]).min() > _NEAR_FOLD)
+        return even and count == found and bool(self._folds(q[:count]).min() > _AT_FOLD)
 
     def _add(self, T: Array, starts: Array, q: Array, count: int) -> int:
         """Add to the first `count` rows of q ``(16, 6)`` where descents from `starts` end; their number."""

@@ -14,8 +14,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from kin.kernels.compile import jit
 from kin.solvers.common import TURN, wrap
 from kin.solvers.rounded.motion import FOLD, OFF, SPAN, Point, Task, arrive, dial_of, new_point, task_of
@@ -138,8 +136,8 @@ def _paired(branch: int, arcs: Array, others: Array, circular: bool) -> bool:
 
 @jit
 def move_ends(
-    model: Array, T: Array, setting: Array, limits: Array, outer: Array, inner: Array, within: Array,
-    places: Array, out: Array, sure: Array,
+    model: Array, T: Array, setting: Array, limits: Array, known: Array, ends: Array, places: Array, out: Array,
+    sure: Array,
 ) -> None:  # fmt: skip
     """out ``(m, 3)`` ← the intervals of the typed table, from those of the arm that was meant.
 
@@ -148,18 +146,21 @@ def move_ends(
     Args:
         model, T, setting: as for `task_of`.
         limits: ``(6, 7)`` lower, upper, both a little wider, both a little narrower.
-        outer, inner: intervals ``(m, 3)`` with wider and with narrower limits and reach.
-        within: ``(m, 2, 7)`` postures at the ends of `inner`.
-        places: ``(m, 3, 7)`` postures at the ends of `outer`, overwritten by those at the ends of `out`; the third
-            is one inside, NaN if it is not known.
+        known: ``(m + k, 3)`` the m intervals with wider limits and reach, and then those with narrower ones.
+        ends: ``(m + k, 2, 7)`` postures at the ends of these.
+        places: ``(m, 3, 7)`` ← postures at the ends of `out`; the third is one inside, NaN if it is not known.
     """
-    task, p, start = task_of(model, T, setting), new_point(), np.empty(7)
+    task, p, m = task_of(model, T, setting), new_point(), out.shape[0]
+    outer, inner = known[:m], known[m:]
     circular, off, span = task.joint < 0, setting[OFF], (setting[SPAN], setting[SPAN + 1])
     for k in range(sure.shape[0]):
         sure[k] = 1.0 if _paired(k, outer, inner, circular) else 0.0
     for i in range(outer.shape[0]):
         k = int(outer[i, 0])
         out[i, 0], out[i, 1], out[i, 2] = outer[i, 0], outer[i, 1], outer[i, 2]
+        for side in range(2):
+            for c in range(7):
+                places[i, side, c] = ends[i, side, c]
         places[i, 2, 0] = math.nan
         if sure[k] == 0.0:
             continue
@@ -170,11 +171,9 @@ def move_ends(
         while not _overlaps(outer[i], inner[other], circular):
             other += 1
         for side in range(2):
-            for c in range(7):
-                start[c] = places[i, side, c]
             what = _moved_end(task, limits, span, off, places[i, side], out[i], side, p)
             apart = abs(wrap(outer[i, 1 + side] - inner[other, 1 + side]))
-            postures = within[other, side], places[i, side], start
+            postures = ends[m + other, side], places[i, side], ends[i, side]
             if what == _LOST or not _is_alone(limits, what, apart, postures, p.n):
                 sure[k] = 0.0
             if what >= 0 or what == _FIXED:

@@ -169,10 +169,9 @@ class Rounded7(Rounded):
         )
         outer, inner = self._joined(wide.arcs[0]), self._joined(narrow.arcs[0])
         arcs, sure, places = np.empty(outer.shape), np.empty(8), np.empty((len(outer), 3, 7))
-        ends = self._postures(p, np.concatenate([outer, inner]), _ENDS)
-        places[:, :2] = ends[: len(outer)]
-        within = ends[len(outer) :]
-        _ends()(self.robot.model, p.T, setting, limits, outer, inner, within, places, arcs, sure)
+        known = np.concatenate([outer, inner])
+        ends = self._postures(p, known, _ENDS)
+        _ends()(self.robot.model, p.T, setting, limits, known, ends, places, arcs, sure)
         certain = True
         if not sure.all():
             moved = arcs, places, sure
@@ -365,14 +364,14 @@ class _Found:
 
     def follow(
         self, model: Array, T: Array, setting: Array, limits: Array, margin: float, starts: Array
-    ) -> tuple[int, Array]:
+    ) -> tuple[int, Flags]:
         """How many pieces of the curves through postures ``(k, 7)`` are now in `pieces` and `postures`.
 
         Also returns ``(k,)`` which curves were lost, see `trace`.
         """
-        lost = np.empty(len(starts))
-        goal = model, T, setting, limits, margin, starts
-        return _trace()(*goal, self._paths, self.pieces, self.postures, lost), lost
+        goal, starts = (model, T, setting, limits, margin), starts.copy()
+        count = _trace()(*goal, starts, self._paths, self.pieces, self.postures)
+        return count, np.isnan(starts[:, 0])
 
 
 def _are_apart(rows: Array) -> bool:
@@ -400,7 +399,7 @@ def _are_alike(a: tuple[float, float], b: tuple[float, float]) -> bool:
 @cache
 def _ends() -> Callable[..., None]:
     """`move_ends` without type dispatch."""
-    return direct(move_ends, MODEL, (4, 4), 1, 2, 2, 2, 3, 3, 2, 1)
+    return direct(move_ends, MODEL, (4, 4), 1, 2, 2, 3, 3, 2, 1)
 
 
 @cache
@@ -412,4 +411,4 @@ def _choose() -> Callable[[Array, Array, Array, Array, Array, Array, Array], int
 @cache
 def _trace() -> Callable[..., int]:
     """`trace` without type dispatch."""
-    return direct(trace, MODEL, (4, 4), 1, 2, float, 2, record(Paths, 2, row_of(int)), 2, 3, 1)
+    return direct(trace, MODEL, (4, 4), 1, 2, float, 2, record(Paths, 2, row_of(int)), 2, 3)

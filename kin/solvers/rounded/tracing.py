@@ -355,7 +355,7 @@ def _is_on(task: Task, path: Array, y: Array) -> bool:
 @jit
 def trace(
     model: Array, T: Array, setting: Array, box: Array, margin: float, starts: Array, paths: Paths, arcs: Array,
-    places: Array, lost: Array,
+    places: Array,
 ) -> int:  # fmt: skip
     """The feasible intervals of the redundancy parameter on the curves through postures; their number.
 
@@ -367,14 +367,14 @@ def trace(
         model, T, setting: as for `task_of`.
         box: ``(≥ 2, 7)`` lower and upper limits.
         margin: radians by which a joint may be outside its limits on the way.
-        starts: ``(k, 7)`` postures close to the curves.
+        starts: ``(k, 7)`` postures close to the curves; NaN ← where the curve was lost on the way.
         paths: the curves that have been followed; these are added.
-        lost: ``(k,)`` ← 1.0 for each posture whose curve was lost on the way.
     """
     task, limits, count = task_of(model, T, setting), (box[0], box[1]), 0
     for i in range(starts.shape[0]):
         found = _trace(task, limits, margin, starts[i], paths, arcs[count:], places[count:])
-        lost[i] = 1.0 if found < 0 else 0.0
+        if found < 0:
+            starts[i, 0] = math.nan
         count += max(found, 0)
     return count
 

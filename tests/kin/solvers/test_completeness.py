@@ -302,6 +302,18 @@ def test_no_posture_at_the_corner_of_the_reach_is_not_called_complete():
     assert (len(found), known) == (0, "agreed")
 
 
+@pytest.mark.parametrize("place", [318, 4823, 5020])
+def test_two_postures_beside_a_fold_are_agreed_where_targets_close_by_lead_to_no_other(place):
+    """A spherical wrist whose twists are typed 1.571, nearly straight: both of its postures are known."""
+    robot = typed(DOOSAN, 3)
+    q = np.random.default_rng(21).uniform(-PI, PI, (6000, 6))[place]
+    found, known = candidates(robot, kin.fk(robot, q), q)
+    assert known == "agreed"
+    assert len(found) == 8
+    assert apart(found, q).min() < 1e-6
+    assert min(np.linalg.svd(kin.jacobian(robot, each), compute_uv=False)[-1] for each in found) < 2e-4
+
+
 def near_folds(robot, count):
     """Targets within 1e-5 to 0.1 rad of a fold: what is called complete has the configuration."""
     rng = np.random.default_rng(2)
