@@ -5,7 +5,7 @@ for each visitor, thirty who drag cost a dozen switches of threads per event and
 it takes the visitors in turn, each for one step. A second one watches. If a step lasts longer than `PATIENCE`, the
 watcher leads, and the thread of that step only ends it: a visitor whose step blocks holds up the others that long.
 
-The event loop is told once of the steps of a row (`VisitorThreads.after_steps`). Each time that it wakes, two
+The event loop is woken once for the steps of a row (`VisitorThreads.after_steps`). Whenever it wakes, two
 threads want Python at once.
 
 Visitors who are there come first, and pages are built after their steps. If two hundred arrive at once, each page
@@ -27,7 +27,7 @@ log = logging.getLogger(__name__)
 PATIENCE = 0.02  # s without a new step, after which another thread leads
 KEEP = 2.0  # s without work, after which the threads end
 IN_A_ROW = 10  # steps, after which a page is built that waits
-TOGETHER = 8  # steps, after which the event loop is told of them at the latest
+TOGETHER = 8  # steps, after which the event loop is woken for them at the latest
 BUILDS = 4  # pages built at a time: more than one where the first take long
 LOG_EVERY = 10.0  # s between two log lines about threads that could not be started
 
@@ -93,7 +93,7 @@ class VisitorThreads:
     def after_steps(self, act: Callable[[], None]) -> None:
         """Call `act` once for several steps: when no visitor waits any more, or after `TOGETHER` steps.
 
-        Where it is not the leader who asks, it is called at once. It must be quick, and not fail.
+        Outside of the leading thread it is called at once. It must be quick, and not fail.
         """
         with self._lock:
             if is_leader := threading.current_thread() is self._leader:

@@ -388,50 +388,50 @@ def test_what_is_waited_for_before_a_page_is_built_fails_that_page_alone(caplog)
     assert "no answer" in caplog.text
 
 
-def test_the_event_loop_is_told_once_of_the_steps_of_a_row(threads):
-    told: list[int] = []
+def test_the_event_loop_is_woken_once_for_the_steps_of_a_row(threads):
+    woken: list[int] = []
     done: list[int] = []
     gate, count = threading.Event(), 2 * TOGETHER + 1
 
-    def tell() -> None:
-        told.append(len(done))
+    def wake() -> None:
+        woken.append(len(done))
 
     def step(k: int) -> Callable[[], float | None]:
         def act() -> None:
             if k == 0:
                 gate.wait(WAIT)  # until all wait
             done.append(k)
-            threads.after_steps(tell)
+            threads.after_steps(wake)
 
         return act
 
     turns = [Turn(threads, step(k)) for k in range(count)]
-    threads._patience = WAIT  # nobody takes over from the one who waits at the gate
+    threads._patience = WAIT  # nobody takes over from the step at the gate
     for turn in turns:
         turn.call()
     gate.set()
-    wait_for(lambda: told and told[-1] == count)
-    assert told == [TOGETHER, 2 * TOGETHER, count]
+    wait_for(lambda: woken and woken[-1] == count)
+    assert woken == [TOGETHER, 2 * TOGETHER, count]
 
 
-def test_who_does_not_lead_tells_at_once(threads):
-    told: list[str] = []
-    threads.after_steps(lambda: told.append(threading.current_thread().name))
-    assert told == [threading.current_thread().name]
+def test_another_thread_than_the_leader_wakes_it_at_once(threads):
+    woken: list[str] = []
+    threads.after_steps(lambda: woken.append(threading.current_thread().name))
+    assert woken == [threading.current_thread().name]
 
 
-def test_what_a_step_leaves_is_told_by_who_takes_over(threads):
-    told: list[float] = []
+def test_what_a_step_leaves_is_done_by_the_thread_that_takes_over(threads):
+    woken: list[float] = []
     first, long = Visitor(threads), Visitor(threads, LONG)
     act = first.act
 
     def leaves() -> float | None:
         long.turn.call()  # it waits, so that there is more to come after this step
-        threads.after_steps(lambda: told.append(time.monotonic()))
+        threads.after_steps(lambda: woken.append(time.monotonic()))
         return act()
 
     first.turn.act = leaves
     began = time.monotonic()
     first.turn.call()
-    wait_for(lambda: told)
-    assert told[0] - began < 0.5 * LONG
+    wait_for(lambda: woken)
+    assert woken[0] - began < 0.5 * LONG
