@@ -22,6 +22,7 @@ from kin.files.write import rpy_of
 from kin.frames import from_xyz_rpy
 from kin.transforms import Array, from_position_wxyz
 
+MOUNTING, FLOOR = "kinboard_mounting", "kinboard_floor"  # names of custom data: text, and metres
 MOST_SHAPES = 240  # shapes that are drawn
 _KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "floating", "free": "floating"}
 _SHAPES = ("sphere", "capsule", "box", "cylinder")
@@ -64,6 +65,10 @@ class _Converter:
         for world in root.findall("worldbody"):
             self._body(world, "world", np.eye(4), "main")
         self._follow(root)
+        found = {each.get("name"): each.get("data", "") for custom in root.findall("custom") for each in custom}
+        stated = {"mounting": found.get(MOUNTING), "floor": found.get(FLOOR)}
+        if any(value is not None for value in stated.values()):
+            SubElement(self.robot, "kinboard", {key: value for key, value in stated.items() if value is not None})
 
     def _refuse(self, field: str, value: object, expected: str) -> RobotFileError:
         return RobotFileError(self._file, field, value, expected)

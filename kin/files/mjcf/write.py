@@ -13,6 +13,7 @@ import numpy as np
 from kin.axes import inverse, screw_x, screw_z
 from kin.collision.bodies import Bodies, bodies_of
 from kin.errors import InputError
+from kin.files.mjcf.convert import FLOOR, MOUNTING
 from kin.files.names import distinct, quoted, unused
 from kin.fk import link_frames
 from kin.named import robot_of
@@ -30,6 +31,9 @@ _SHORTEST = 1e-9  # m: a shorter capsule is a sphere
 
 def to_mjcf(robot: Robot | str) -> str:
     """The arm as MJCF, for MuJoCo: joints, limits, capsules, the tool as a site, the home as a keyframe.
+
+    A floor whose height is stated is a plane. All links but the first, which turns close to it, touch it. The
+    height, and what the arm is mounted on, are custom data too, which `load_urdf` reads.
 
     The values of the joints are those of the arm. Links that are not compared for collisions here are
     excluded from contacts. An effort limits the force of its joint.
@@ -61,7 +65,9 @@ def to_mjcf(robot: Robot | str) -> str:
         f"  <!-- {ASSUMED} -->",
         '  <compiler angle="radian" autolimits="true"/>',
         f'  <default><geom density="{DENSITY:g}"/></default>',
+        *_stated(robot),
         "  <worldbody>",
+        *_floor(robot),
         f"    <body name={quoted(base)}>",
         *_geoms(robot, bodies, 0, robot.T_world_base, "      "),
     ]
@@ -84,7 +90,7 @@ def to_mjcf(robot: Robot | str) -> str:
     indent = "    " + "  " * (robot.n + 1)
     lines.append(f'{indent}<site name="tool"{_placed(inverse(before) @ tool)}/>')
     lines += ["    " + "  " * k + "</body>" for k in range(robot.n, -1, -1)]
-    lines += ["  </worldbody>", *_contacts(bodies, links), "  <keyframe>"]
+    lines += ["  </worldbody>", *_contacts(bodies, links, robot.floor is not None), "  <keyframe>"]
     lines.append(f'    <key name="home" qpos="{_numbers(robot.home)}"/>')
     return "\n".join([*lines, "  </keyframe>", "</mujoco>", ""])
 
@@ -133,7 +139,22 @@ def _geoms(robot: Robot, bodies: Bodies, link: int, T_world_body: Array, indent:
             yield f'{indent}<geom type="capsule" fromto="{ends}" size="{each.radius!r}"/>'
 
 
-def _contacts(bodies: Bodies, links: Sequence[str]) -> list[str]:
+def _stated(robot: Robot) -> list[str]:
+    """What the arm is mounted on, and the height of the floor, as far as they are stated."""
+    lines = []
+    if robot.mounting is not None:
+        lines.append(f'    <text name="{MOUNTING}" data="{robot.mounting}"/>')
+    if robot.floor is not None:
+        lines.append(f'    <numeric name="{FLOOR}" data="{robot.floor!r}"/>')
+    return ["  <custom>", *lines, "  </custom>"] if lines else []
+
+
+def _floor(robot: Robot) -> Iterator[str]:
+    if robot.floor is not None:
+        yield f'    <geom name="floor" type="plane" pos="0 0 {robot.floor!r}" size="0 0 0.05"/>'
+
+
+def _contacts(bodies: Bodies, links: Sequence[str], floor: bool) -> list[str]:
     """Pairs of links that are not compared; those that share a joint, where MuJoCo would compare them."""
     present = sorted({each.link for each in bodies.capsules})
     compared = {(bodies.capsules[i].link, bodies.capsules[j].link) for i, j in bodies.pairs.tolist()}
@@ -143,6 +164,8 @@ def _contacts(bodies: Bodies, links: Sequence[str]) -> list[str]:
         for j in present
         if i < j and (i, j) not in compared and (j > i + 1 or i == 0)
     ]
+    if floor:
+        lines.append(f'    <exclude body1="world" body2={quoted(links[1])}/>')
     return ["  <contact>", *lines, "  </contact>"] if lines else []
 
 

@@ -17,11 +17,12 @@ from typing import NamedTuple
 import numpy as np
 
 from kin.axes import frame_of, inverse, perpendicular_to
+from kin.checks import one_of
 from kin.dh import SAMPLES, table_of_chain
 from kin.errors import InputError, RobotFileError
 from kin.files.home import default_home
 from kin.files.names import unused
-from kin.files.numbers import LARGEST
+from kin.files.numbers import LARGEST, number_of
 from kin.files.read import MAX_REACH, MAX_ROWS
 from kin.files.urdf.collisions import (
     Fit,
@@ -36,7 +37,7 @@ from kin.files.urdf.poses import motion_of
 from kin.files.urdf.tree import Tip, UrdfJoint, UrdfTree, read_tree
 from kin.fk import fk
 from kin.frames import matrix_of
-from kin.robot import DEFAULT_LIMITS, Joint, Mounting, Robot
+from kin.robot import DEFAULT_LIMITS, MOUNTINGS, Joint, Mounting, Robot
 from kin.transforms import Array
 
 _UPRIGHT = 0.7  # of the height of a vertical axis of unit length
@@ -195,6 +196,7 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
     if len(rows) > MAX_ROWS:
         raise RobotFileError(tree.file, "joint", f"{len(rows)} DH rows", f"at most {MAX_ROWS}")
     name = tree.name.strip() or "robot"
+    mounting, floor = _stated(tree, chain[0])
     robot = Robot(
         id=re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40].strip("-") or "robot",
         name=name[:200].strip(),
@@ -204,8 +206,8 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
         home=tuple(0.5 * sum(joint.limits or (0.0,)) for joint in joints),
         base=table.base,
         tool=table.tool,
-        mounting=_mounting(chain[0]),
-        floor=0.0,
+        mounting=mounting,
+        floor=floor,
     )
     if robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3])) > MAX_REACH:
         expected = f"at most {MAX_REACH:g} m with the base"
@@ -230,6 +232,22 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
         samples=SAMPLES,
     )
     return UrdfRobot(robot, report)
+
+
+def _stated(tree: UrdfTree, first: UrdfJoint) -> tuple[Mounting | None, float | None]:
+    """What the arm is mounted on, and the height of the floor: as `to_urdf` writes them, or assumed."""
+    stated = tree.root.find("kinboard")
+    if stated is None or first.parent in tree.parents:  # a base further up stands somewhere else
+        return _mounting(first), 0.0
+    mounting, floor = stated.get("mounting"), stated.get("floor")
+    if mounting is not None and mounting not in MOUNTINGS:
+        raise RobotFileError(tree.file, "kinboard: mounting", mounting, one_of(*MOUNTINGS))
+    height = None if floor is None else number_of(floor)
+    if height is not None and not abs(height) <= MAX_REACH:
+        raise RobotFileError(
+            tree.file, "kinboard: floor", floor, f"a height of at most {MAX_REACH:g} m either way"
+        )
+    return mounting, height
 
 
 def _mounting(first: UrdfJoint) -> Mounting:

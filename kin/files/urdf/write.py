@@ -20,7 +20,9 @@ _UNKNOWN = 0.0  # velocity and effort are required by URDF
 def to_urdf(robot: Robot | str) -> str:
     """The arm as a URDF without bodies: links ``base``, one per row, and ``tool``.
 
-    A velocity or effort that is not known is written as 0.
+    A velocity or effort that is not known is written as 0. An arm whose mounting or floor is stated has a link
+    ``world`` too, to which a fixed joint mounts its base. An element ``<kinboard>`` states what it is mounted on,
+    and how high the floor is. Other programs ignore that element, and `load_urdf` reads it.
 
     Args:
         robot: the arm, or the id of a built-in one.
@@ -40,16 +42,28 @@ def to_urdf(robot: Robot | str) -> str:
     lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoted(robot.id)}>"]
     names = distinct([row.name for row in robot.rows])
     links = ["base", *(f"link_{k + 1}" for k in range(len(robot.rows))), "tool"]
+    taken, T = names, robot.T_world_base
+    if robot.mounting is not None or robot.floor is not None:
+        mounted = unused("mounting", names)
+        lines += [_stated(robot), '  <link name="world"/>']
+        lines += _joint(Joint(mounted, kind="fixed"), mounted, "world", "base", T)
+        taken, T = [*names, mounted], np.eye(4)
     lines += [f"  <link name={quoted(link)}/>" for link in links]
-    T = robot.T_world_base
     for k, (row, name) in enumerate(zip(robot.rows, names, strict=True)):
         x, z = screw_x(row.a, row.alpha), screw_z(row.theta, row.d)
         standard = robot.convention == "standard"
         lines += _joint(row, name, links[k], links[k + 1], T @ z if standard else T @ x @ z)
         T = x if standard else np.eye(4)
-    end = unused("tool" if "tool" not in names else "tool end", names)
+    end = unused("tool" if "tool" not in taken else "tool end", taken)
     lines += _joint(Joint(end, kind="fixed"), end, links[-2], links[-1], T @ robot.T_last_tool)
     return "\n".join([*lines, "</robot>", ""])
+
+
+def _stated(robot: Robot) -> str:
+    """What the arm is mounted on, and the height of the floor, as far as they are stated."""
+    mounting = "" if robot.mounting is None else f' mounting="{robot.mounting}"'
+    floor = "" if robot.floor is None else f' floor="{robot.floor!r}"'
+    return f"  <kinboard{mounting}{floor}/>"
 
 
 def _joint(row: Joint, name: str, parent: str, child: str, T: Array) -> list[str]:

@@ -15,6 +15,7 @@ from kin import InputError, Robot, RobotFileError
 mujoco = pytest.importorskip("mujoco")
 
 ARMS = list(kin.builtin_robots().values())
+UR5 = kin.get_robot("ur5")
 NEAR = 1e-9  # of a pose; the tables are exact to 1e-12
 
 
@@ -73,8 +74,9 @@ def test_capsules_are_where_the_arm_has_them_and_touch_where_it_says(robot):
     """
     text = kin.to_mjcf(robot)
     model, data = loaded(text)
-    assert model.ngeom == len(kin.capsules(robot))
-    assert sorted(model.geom_size[:, 0]) == pytest.approx(sorted(c.radius for c in kin.capsules(robot)))
+    solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
+    assert solid.sum() == len(kin.capsules(robot))
+    assert sorted(model.geom_size[solid, 0]) == pytest.approx(sorted(c.radius for c in kin.capsules(robot)))
     touching = 0
     for q in robot.random_q(np.random.default_rng(4), 150 if robot in CLASSICS else 25):
         distance = float(kin.self_distance(robot, q))
@@ -82,10 +84,99 @@ def test_capsules_are_where_the_arm_has_them_and_touch_where_it_says(robot):
             continue
         data.qpos[:] = q
         mujoco.mj_fwdPosition(model, data)
-        assert bool(data.ncon) == (distance < 0.0), q
+        among = [solid[contact.geom].all() for contact in data.contact]  # the others are with the floor
+        assert any(among) == (distance < 0.0), q
         touching += distance < 0.0
     if robot.id in ("ur5", "puma560"):
         assert touching > 3
+
+
+MOUNTED = [
+    ("floor", 0.0, np.eye(3)),
+    ("table", -0.75, np.eye(3)),
+    ("wall", -1.2, np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])),
+    ("ceiling", -2.0, np.diag([1.0, -1.0, -1.0])),
+    ("pedestal", None, np.eye(3)),
+    (None, -0.3, np.eye(3)),
+]
+
+
+@pytest.mark.parametrize(("mounting", "floor", "turn"), MOUNTED)
+def test_mounting_and_floor_are_written_and_read_back(mounting, floor, turn):
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = turn, (0.1, -0.2, 0.05)
+    robot = replace(UR5, base=T, mounting=mounting, floor=floor)
+    text = kin.to_mjcf(robot)
+    assert_moves_alike(robot, text)
+    model, data = loaded(text)
+    planes = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+    mujoco.mj_kinematics(model, data)
+    assert [data.geom_xpos[i].tolist() for i in planes] == ([] if floor is None else [[0.0, 0.0, floor]])
+    for written in (text, kin.to_urdf(robot)):
+        back = kin.load_urdf(written)
+        assert (back.mounting, back.floor) == (mounting, floor)
+        q = robot.random_q(np.random.default_rng(1), 50)
+        assert kin.fk(back, q) == pytest.approx(kin.fk(robot, q), abs=1e-11)
+
+
+def test_links_touch_the_floor_but_for_the_first_one():
+    robot = replace(UR5, mounting="floor", floor=0.0)
+    model, data = loaded(kin.to_mjcf(robot))
+
+    def on_floor(q: np.ndarray) -> set[int]:
+        """The bodies that touch the plane."""
+        data.qpos[:] = q
+        mujoco.mj_fwdPosition(model, data)
+        (plane,) = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+        return {int(model.geom_bodyid[i]) for each in data.contact if plane in each.geom for i in each.geom} - {0}
+
+    assert on_floor(robot.q_home) == set()
+    down = np.radians([0.0, 60.0, 0.0, 0.0, 0.0, 0.0])
+    assert kin.fk(robot, down)[2, 3] < 0.0, "the tool is below the floor"
+    assert on_floor(down)
+    assert model.body(robot.joints[0].name).id not in on_floor(down)
+
+
+def test_a_urdf_with_a_mounting_is_loaded_by_mujoco():
+    T = np.diag([1.0, -1.0, -1.0, 1.0])
+    robot = replace(UR5, base=T, mounting="ceiling", floor=-2.0)
+    bodies = "".join(
+        f'<link name="link_{k}"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        for k in range(1, 7)
+    )
+    text = kin.to_urdf(robot)
+    for k in range(1, 7):
+        text = text.replace(f'  <link name="link_{k}"/>\n', "")
+    text = text.replace('  <link name="tool"/>\n', f'  <link name="tool"/>{bodies}\n')
+    text = text.replace("<kinboard", '<mujoco><compiler fusestatic="false"/></mujoco><kinboard')
+    model, data = loaded(text)
+    for q in robot.random_q(np.random.default_rng(2), 5):
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        assert data.body("tool").xpos == pytest.approx(kin.fk(robot, q)[:3, 3], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "field"),
+    [
+        ('mounting="boat"', "kinboard: mounting"),
+        ('mounting="floor" floor="deep"', "kinboard: floor"),
+        ('floor="inf"', "kinboard: floor"),
+        ('floor="1e300"', "kinboard: floor"),
+    ],
+)
+def test_what_is_no_mounting_is_refused_by_name(attributes, field):
+    text = kin.to_urdf(replace(UR5, mounting="floor")).replace('mounting="floor"', attributes)
+    with pytest.raises(RobotFileError) as error:
+        kin.load_urdf(text)
+    assert error.value.field == field
+
+
+def test_what_an_inner_link_stands_on_is_not_what_the_world_holds():
+    robot = replace(UR5, mounting="ceiling", floor=-2.0, base=np.diag([1.0, -1.0, -1.0, 1.0]))
+    inner = kin.load_urdf(kin.to_urdf(robot), base="base")
+    assert (inner.mounting, inner.floor) == ("floor", 0.0)
 
 
 @pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
