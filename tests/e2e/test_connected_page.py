@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -44,7 +45,11 @@ def connected(tab: Tab, address: str) -> Iterator[Any]:
     tab.open("Program")
     tab.page.get_by_role("button", name="Connect a program").click()
     code = tab.page.locator("[data-live-code]").inner_text()
-    with kin.connect(address, code, name="arm.py", drives="SO-101 at /dev/ttyACM0") as arm:
+    said = re.search(r'page = kin\.connect\("(\S+)", "(\S+)"\)', tab.page.locator(".kb-live").inner_text())
+    assert said is not None
+    at, typed = said.groups()
+    assert (at + "/", typed) == (address, code)
+    with kin.connect(at, typed, name="arm.py", drives="SO-101 at /dev/ttyACM0") as arm:
         yield arm
     tab.open("Program")
     withdraw = tab.page.get_by_role("button", name="Withdraw the code")

@@ -25,9 +25,13 @@ def websocket(address: str, code: str) -> str:
 
 
 def code(code: str, address: str) -> str:
-    """The code of the page, and where programs find it."""
-    box = box_html(websocket(address, code), "Copy address", wrap=True)
-    return render("live/code", code=show_code(code), address=address, box=box)
+    """The code of the page, how a program in Python connects, and where others do."""
+    python = f'import kin\n\npage = kin.connect("{address.rstrip("/")}", "{show_code(code)}")'
+    boxes = (
+        box_html(python, "Copy Python", wrap=True),
+        box_html(websocket(address, code), "Copy address", wrap=True),
+    )
+    return render("live/code", code=show_code(code), boxes=boxes)
 
 
 def state_of(program: Program | None) -> tuple[str, int, str]:
