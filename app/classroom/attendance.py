@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from app.classroom.rooms import Swept
 
 LONGEST_PAGE = 16_000  # characters, as `app.viewer.session.state` has it
+LONGEST_NAME = 60  # characters of what a program drives
 LONGEST_QUESTION, LONGEST_CHOICE, MOST_CHOICES = 200, 80, 8
 
 
@@ -121,6 +122,13 @@ class Attendance:
         seat = self.room.seat
         if seat is not None and seat.gone != gone:
             self._tell_seat(gone=gone)
+
+    def tell_driven(self, name: str) -> None:
+        """What a program drives with the arm of this page, or empty."""
+        self._only_student()
+        seat = self.room.seat
+        if seat is not None and seat.driven != name:
+            self._tell_seat(driven=name[:LONGEST_NAME])
 
     def secret(self) -> bytes:
         """A secret of the seat, from which the numbers of its exercises follow; raises `ClassroomUnavailable`."""

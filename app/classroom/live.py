@@ -200,7 +200,7 @@ class LiveRoom:
         )
 
     def _seat(self, row: Mapping[str, Any]) -> SeatView:
-        names = ("id", "alias", "hand", "task", "gone", "work", "page")
+        names = ("id", "alias", "hand", "task", "gone", "driven", "work", "page")
         seen = row["beat"] > 0 or row["id"] in self.here
         return SeatView(**{name: row[name] for name in names}, away=row["id"] in self.away, seen=seen)
 

@@ -191,6 +191,7 @@ class Rooms:
                     version=version,
                     removed=False,
                     gone=False,
+                    driven="",
                 )
             )
         return ticket

@@ -23,6 +23,7 @@ class Standing:
         exercise: what `progress` is about: the task of the room, else what the page shows; empty: nothing.
         progress: None without an exercise.
         elsewhere: whether the page shows something else than the task.
+        driven: what a program drives with the arm, or empty.
     """
 
     presence: Presence
@@ -31,6 +32,7 @@ class Standing:
     progress: Progress | None
     work: Work
     elsewhere: bool = False
+    driven: str = ""
 
     @property
     def here(self) -> bool:
@@ -43,10 +45,10 @@ class Standing:
         return self.presence != "has not come"
 
     @property
-    def rank(self) -> tuple[bool, bool, bool, int]:
-        """Sorts students: who needs the teacher first; then who is away, and who has never come."""
+    def rank(self) -> tuple[bool, bool, bool, bool, int]:
+        """Sorts students: who drives something first, then who needs the teacher; who is away, who never came."""
         urgency = URGENCY.index(self.progress or "at it")
-        return not self.came, not self.here, not self.hand, urgency
+        return not self.came, not self.here, not self.driven, not self.hand, urgency
 
 
 def standing(seat: SeatView, room: RoomView) -> Standing:
@@ -59,4 +61,6 @@ def standing(seat: SeatView, room: RoomView) -> Standing:
     exercise = seat.task if room.task is None else room.task.exercise
     work = seat.work.get(exercise, NOTHING)
     progress = work.progress if exercise else None
-    return Standing(presence, seat.hand > 0.0, exercise, progress, work, bool(exercise) and seat.task != exercise)
+    elsewhere = bool(exercise) and seat.task != exercise
+    driven = "" if seat.away else seat.driven
+    return Standing(presence, seat.hand > 0.0, exercise, progress, work, elsewhere, driven)

@@ -65,6 +65,7 @@ class Seat(Base):
         tries: how many attempts are stored; pages read the attempts again when it has changed.
         solved: of earlier versions; not read any more.
         gone: whether the student has stopped following.
+        driven: what a program drives with the arm of the page, or empty.
         voted: id of the poll that `vote` belongs to.
         beat: grows every few seconds while a page of this seat is connected.
         version: that of the room when the seat last changed.
@@ -88,6 +89,7 @@ class Seat(Base):
     version: Mapped[int] = mapped_column(BigInteger, default=0)
     removed: Mapped[bool] = mapped_column(default=False, server_default=false())
     gone: Mapped[bool] = mapped_column(default=False, server_default=false())
+    driven: Mapped[str] = mapped_column(Text, default="", server_default="")
 
 
 class Attempt(Base):

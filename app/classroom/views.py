@@ -71,6 +71,7 @@ class SeatView:
         hand: when the hand was raised, in seconds since 1970; 0: it is down.
         task: the exercise that the student's page shows, or empty.
         gone: whether the student has stopped following.
+        driven: what a program drives with the arm of the student's page, or empty.
         work: what was answered, by exercise.
         page: the packed state of the page (`app.viewer.session.state`), or empty.
         away: whether no page of this seat is connected.
@@ -82,6 +83,7 @@ class SeatView:
     hand: float = 0.0
     task: str = ""
     gone: bool = False
+    driven: str = ""
     work: Mapping[str, Work] = field(default_factory=dict)
     page: str = ""
     away: bool = False

@@ -55,8 +55,8 @@ class Student(Member):
         self._course: tuple[str, float] | None = None  # the room's, and when it was sent; None: not known yet
         self._open_tab = 0
         self._read = ""  # the question whose result was read
-        # The exercise on show and `_gone`, as the room was last sent them.
-        self._sent_last: tuple[str, bool] | None = None
+        # The exercise on show, `_gone` and what is driven, as the room was last sent them.
+        self._sent_last: tuple[str, bool, str] | None = None
         self._answered: tuple[str, int] | None = None  # exercise and seed of the last answer
         self._submissions = Submissions(self.attendance.submit, lambda: stage.post(("news", self.key, STORED)))
         ticket = self.attendance.ticket
@@ -276,11 +276,12 @@ class Student(Member):
     def _tell(self) -> None:
         """Say what this page shows, if it is something else: of two tabs, the one that has changed last counts."""
         at = self.activity.exercise
-        shows = "" if at is None else at.id, self._gone and self.leader == ""
+        shows = "" if at is None else at.id, self._gone and self.leader == "", self.page.driven
         if shows != self._sent_last and self.attendance.room.seat is not None:
             self._sent_last = shows
             self.attendance.tell_task(shows[0])
             self.attendance.tell_gone(shows[1])
+            self.attendance.tell_driven(shows[2])
 
     def refusal(self, act: str) -> str:
         if self.room.closed and self.page.guest:

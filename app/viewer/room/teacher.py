@@ -263,7 +263,7 @@ class Teacher(Member):
             if robot is not None and state.q is not None:
                 found = standing(seat, self.room)
                 state_of = "away" if not found.here else found.progress or "none"
-                arms.append(SmallArm(seat.id, seat.alias, robot, state.q, state_of, found.hand))
+                arms.append(SmallArm(seat.id, seat.alias, robot, state.q, state_of, found.hand, found.driven))
         return arms[:MOST]
 
     def _robot(self, state: PageState) -> Robot | None:

@@ -226,6 +226,7 @@ def _row(seat: SeatView, room: RoomView, exercises: Exercises) -> dict[str, obje
     return {
         "seat": seat,
         "hand": found.hand,
+        "driven": found.driven,
         "symbol": symbol,
         "color": color,
         "away": not found.here,
@@ -245,6 +246,8 @@ def _words(seat: SeatView, room: RoomView, found: Standing, exercises: Exercises
     if not found.came:
         return [found.presence]
     words: list[str] = [] if found.here else [found.presence]
+    if found.driven:
+        words.append(f"drives {found.driven}")
     if found.hand:
         words.append("hand up")
     if found.progress:

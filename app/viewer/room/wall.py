@@ -57,6 +57,7 @@ SYMBOLS: dict[State, str] = {
     "away": "… ",
 }
 HAND, RAISED = "☝ ", _lit(240, 190, 0)  # before the name, and colour of the pad's column
+DRIVES, DRIVEN = "● ", _lit(200, 30, 30)  # before what is driven, and colour of the pad: that of the page's frame
 LINK, JOINT, AWAY = (86, 140, 190), (44, 62, 80), (165, 170, 175)
 MOST = 40  # arms on the wall
 WIDTH = 4.4  # of the wall, in radii of the sphere around the arm on show, which the picture shows as well
@@ -79,6 +80,7 @@ class SmallArm:
 
     Attributes:
         hand: whether it is up, whatever the state is.
+        driven: what a program drives with the arm, or empty: more urgent than how the student is doing.
     """
 
     seat: str
@@ -87,12 +89,23 @@ class SmallArm:
     q: Array
     state: State
     hand: bool = False
+    driven: str = ""
 
     def label(self, letters: int) -> str:
         """The name, cut to so many letters, and below it how the student is doing, in a symbol and words."""
-        name = self.name if len(self.name) <= letters else f"{self.name[: letters - 1]}…"
         words = "" if self.state == "none" else f"{SYMBOLS[self.state]}{self.state}"
-        return f"{HAND if self.hand else ''}{name}\n{words}".rstrip()
+        if self.driven:
+            words = _cut(f"{DRIVES}drives {self.driven}", letters)
+        return f"{HAND if self.hand else ''}{_cut(self.name, letters)}\n{words}".rstrip()
+
+    @property
+    def pad(self) -> tuple[int, int, int]:
+        """The colour of the pad below it."""
+        return DRIVEN if self.driven else PADS[self.state]
+
+
+def _cut(text: str, letters: int) -> str:
+    return text if len(text) <= letters else f"{text[: letters - 1]}…"
 
 
 @dataclass(frozen=True)
@@ -170,7 +183,7 @@ class Wall:
         self._scene, self._around, self._aspect, self._clicked = scene, around, aspect, clicked
         self._arms: tuple[tuple[str, Robot], ...] | None = None  # seats and robots, by cell
         self._shown: list[bytes] = []
-        self._states: tuple[tuple[State, bool], ...] = ()
+        self._states: tuple[tuple[State, bool, bool], ...] = ()
         self._root: viser.SceneNodeHandle | None = None
         self._nodes: list[viser.BatchedMeshHandle] = []
         self._labels: list[viser.LabelHandle] = []
@@ -187,12 +200,12 @@ class Wall:
         if fresh:
             self._build(arms, shown)
         self._pose(arms)
-        states = tuple((arm.state, arm.hand) for arm in arms)
+        states = tuple((arm.state, arm.hand, bool(arm.driven)) for arm in arms)
         if self._nodes and (fresh or states != self._states):
             self._states = states
             self._nodes[0].batched_colors = _colors(arms)
-            pads = [PADS[state] for state, _ in states]
-            columns = [RAISED if hand else PADS[state] for state, hand in states]
+            pads = [arm.pad for arm in arms]
+            columns = [RAISED if arm.hand else arm.pad for arm in arms]
             self._nodes[1].batched_colors = np.array(pads + columns, np.uint8)
         for label, arm in zip(self._labels, arms, strict=True):
             if label.text != (text := arm.label(self._layout.letters)):

@@ -126,6 +126,7 @@ class VisitorPage(ShownArm, Worker):
         )
         self.looks = Looks(self)
         self.live = LiveInput(self)
+        self.driven = ""  # what a program drives with the arm
         self._actions = Actions(self, self.live)
         self._preparing = Preparing(self, services.preparation)
 
@@ -194,6 +195,7 @@ class VisitorPage(ShownArm, Worker):
             update_html(self.panel.legend, self._legend)
 
     def show_driven(self, name: str) -> None:
+        self.driven = name
         update_html(self.panel.driven, render("live/driven", name=name))
 
     def show_joints(self, folder: viser.GuiFolderHandle | None) -> None:

@@ -17,6 +17,7 @@ from pydantic import SecretStr
 
 import kin
 from app.classroom import COOKIE, Hub, Ticket
+from app.live import Line, Lines
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -24,7 +25,7 @@ from app.viewer.room.following import decoded
 from app.viewer.room.member import SURE, Member
 from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
-from app.viewer.room.wall import PADS
+from app.viewer.room.wall import DRIVEN, PADS
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import decode
 from app.viewer.session.worker.threads import BUILDS
@@ -584,6 +585,37 @@ def test_the_wall_says_what_the_list_says(room: Class) -> None:
     room.hub.rooms.end(room.room.id)
     teacher.wait(lambda: names() == [])
     teacher.wait(lambda: "Close the wall" not in teacher.html)
+
+
+def test_a_driven_arm_is_marked_on_the_wall_and_in_the_list(room: Class, monkeypatch: pytest.MonkeyPatch) -> None:
+    lines: list[Line] = []
+    open_line = Lines.open
+
+    def opened(self: Lines, *arguments: Any) -> Line:
+        lines.append(open_line(self, *arguments))
+        return lines[-1]
+
+    monkeypatch.setattr(Lines, "open", opened)
+
+    def names() -> list[str]:
+        return [node["props"]["text"] for name, node in sorted(teacher.nodes.items()) if "/name/" in name]
+
+    teacher, (student, _), (other, _) = room.teacher(), room.join("Ann"), room.join("Bob")
+    student.set("Connect a program", True)
+    student.wait(lambda: "data-live-code" in student.html)
+    press(teacher, "wall")
+    teacher.wait(lambda: names() == ["Ann", "Bob"])
+    lines[0].send({"drives": "welder 7"})
+    teacher.wait(lambda: names() == ["Ann\n● drives welder 7", "Bob"])
+    assert "drives welder 7" in teacher.html, "in the list"
+    pads = next(node for name, node in teacher.nodes.items() if name.endswith("/pads"))
+    assert [tuple(row) for row in np.reshape(pads["props"]["batched_colors"], (-1, 3))][:2] == [
+        DRIVEN,
+        PADS["none"],
+    ]
+    assert "welder 7" not in other.html, "the class does not see it"
+    lines[0].send({"drives": None})
+    teacher.wait(lambda: names() == ["Ann", "Bob"])
 
 
 def test_the_wall_shows_arms_only(room: Class) -> None:

@@ -66,6 +66,9 @@ def test_a_long_name_is_cut_and_a_state_is_not() -> None:
     arm = SmallArm("1", "Bartholomew Featherstone", robot, robot.q_home, "not begun", hand=True)
     assert arm.label(12) == "☝ Bartholomew…\n○ not begun"
     assert SmallArm("1", "Ada", robot, robot.q_home, "none").label(12) == "Ada"
+    driven = SmallArm("1", "Ada", robot, robot.q_home, "stuck", driven="SO-101 at /dev/ttyACM0")
+    assert driven.label(16) == "Ada\n● drives SO-101…"
+    assert driven.pad not in PADS.values()
 
 
 def test_a_state_is_sent_at_most_so_often_and_only_if_it_changed() -> None:
@@ -153,6 +156,13 @@ ALONE = "by themselves"
         ({"task": "swing", "work": work(0, 0.5, 0)}, ALONE, "stuck", "stuck · 3 tries"),
         ({"work": work(0, None)}, ALONE, "gave up", "gave up · 1 try · at the arm"),
         ({"task": "x", "work": work(0, 1, 0)}, ALONE, "solved", "solved · 3 tries · at the arm"),
+        (
+            {"task": "swing", "driven": "SO-101", "work": work(0.0)},
+            ALONE,
+            "at it",
+            "drives SO-101 · at it · 1 try",
+        ),
+        ({"away": True, "driven": "SO-101", "work": work(1.0)}, "away", "solved", "away · solved · 1 try"),
         ({"task": "swing", "hand": 3.0, "work": work(1.0)}, ALONE, "solved", "hand up · solved · 1 try"),
         ({"away": True, "work": work(1.0)}, "away", "solved", "away · solved · 1 try"),
         ({"away": True, "seen": False}, "has not come", "not begun", "has not come"),
