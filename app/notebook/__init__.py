@@ -25,6 +25,7 @@ from kin.named import robot_of
 from kin.transforms import Array
 
 RATE = 30.0  # configurations of a path that are sent a second
+LONGEST_NAME = 60  # characters of what is driven
 LONGEST = 3600.0  # s that a path may take
 HUB = "JUPYTERHUB_SERVICE_PREFIX"
 
@@ -44,13 +45,22 @@ def running() -> ServiceProcess:
 class ArmView:
     """An arm on show. Notebooks show it as a frame."""
 
-    def __init__(self, robot: Robot, q: Array, size: tuple[int | str, int], panel: bool, address: str) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        q: Array,
+        size: tuple[int | str, int],
+        panel: bool,
+        address: str,
+        drives: str | None = None,
+    ) -> None:
         self.robot = robot
         self._q = q
         self._size = size
         self._service = running()
         self._key = new_code() + new_code()
         self._page: Page | None = None
+        self._drives = _named(drives)
         self._state = _state_of(robot, q)
         mode = "panel" if panel else "1"
         base = address.replace("{port}", str(self._service.port))
@@ -69,7 +79,9 @@ class ArmView:
         Raises `KinematicsError` while no frame is open.
         """
         if self._page is None or not self._page.connected:
-            self._page = Page(f"http://127.0.0.1:{self._service.port}", self._key, "The notebook")
+            self._page = Page(
+                f"http://127.0.0.1:{self._service.port}", self._key, "The notebook", drives=self._drives
+            )
         return self._page
 
     @property
@@ -86,6 +98,20 @@ class ArmView:
         self._send([self._q], 0.0)
         if (page := self._open_page()) is not None and page.robot.n == self.robot.n:
             page.q = self._q
+
+    @property
+    def drives(self) -> str | None:
+        """What the notebook moves with the arm, named in the red border of the frame; None: nothing.
+
+        A frame that is opened later has the border once the notebook reads or moves the arm in it.
+        """
+        return self._drives
+
+    @drives.setter
+    def drives(self, name: str | None) -> None:
+        self._drives = _named(name)
+        if (page := self._open_page()) is not None:
+            page.drives = self._drives
 
     def _open_page(self) -> Page | None:
         try:
@@ -125,6 +151,7 @@ def show(
     width: int | str,
     height: int,
     address: str | None,
+    drives: str | None = None,
 ) -> ArmView:
     """As `kin.show`."""
     robot = robot_of(robot)
@@ -133,10 +160,18 @@ def show(
     if address is None:
         prefix = os.environ.get(HUB)
         address = f"{prefix}proxy/{{port}}/" if prefix else "http://localhost:{port}/"
-    view = ArmView(robot, start, (width, height), panel, address)
+    view = ArmView(robot, start, (width, height), panel, address, drives)
     if steps is not None:
         view.play(steps, seconds)
     return view
+
+
+def _named(name: str | None) -> str | None:
+    """The name of what is driven, as a page takes it; raises `InputError`."""
+    shown = name is None or (isinstance(name, str) and any(c.isprintable() and not c.isspace() for c in name))
+    if not shown or len(name or "") > LONGEST_NAME:
+        raise InputError("drives", name, f"a name of at most {LONGEST_NAME} characters that can be read, or None")
+    return name
 
 
 def _configuration(robot: Robot, value: ArrayLike) -> Array:

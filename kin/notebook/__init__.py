@@ -35,6 +35,7 @@ def show(
     width: int | str = "100%",
     height: int = 480,
     address: str | None = None,
+    drives: str | None = None,
 ) -> Any:
     """Show an arm in a notebook (Jupyter), in a frame in which it can be moved.
 
@@ -50,6 +51,8 @@ def show(
         width, height: of the frame, in pixels or as CSS has it.
         address: where the browser finds the service, with ``{port}``; needed where the notebook runs on another
             machine than the browser.
+        drives: what this notebook moves with the arm, as for `connect`: the frame has a red border with this name
+            from the first time that the notebook reads or moves the arm in it, until ``arm.drives = None``.
 
     Returns:
         The arm on show: assign its ``q`` to move it, or read it after a drag; call its ``play(path, seconds)``;
@@ -58,7 +61,7 @@ def show(
     Raises:
         KinematicsError: for an invalid argument, or if the service is not installed or does not start.
     """
-    return _service("notebook", "show").show(robot, q, path, seconds, panel, width, height, address)
+    return _service("notebook", "show").show(robot, q, path, seconds, panel, width, height, address, drives)
 
 
 def connect(
