@@ -9,6 +9,7 @@ all methods are thread-safe.
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,6 +26,7 @@ VALUES: Final = ("q", "target", "result", "contacts", "program")  # what a progr
 MOVES, DRAWS = EVENTS = ("live", "drawn")  # what a page is to take: what undo restores, and what it does not
 MERGED: Final = "draw"  # of this kind the newest value of each name is kept
 QUIET: Final = frozenset({"drives", "readings", "measured", "draw", "clear"})  # changes nothing that undo restores
+PREPARING: Final = 2.0  # s between two messages about the same step of what is compiled
 LETTERS: Final = 64  # answers that may wait for a program; older ones are dropped
 REVOKED: Final = "The page has withdrawn the code."
 LEFT: Final = "The page was closed."
@@ -83,10 +85,15 @@ class Program:
 
 @dataclass(frozen=True)
 class Letter:
-    """What a program hears once: that what the message of this number asks for is done, or why it is not."""
+    """What a program hears once: that what the message of this number asks for is done, or why it is not.
+
+    Attributes:
+        preparing: what the page must compile before it can do it, the step, and how many there are.
+    """
 
     number: int | None = None
     problem: Problem | None = None
+    preparing: tuple[str, int, int] | None = None
 
 
 @dataclass
@@ -119,6 +126,10 @@ class Line:
         self.ended = ""  # why, once it has
         self.readings: Sequence[float] | None = None  # the newest ones of the motors of a real arm
         self.recording: Recording | None = None
+        self._prepared: tuple[tuple[str, int, int], float] = (
+            ("", 0, 0),
+            0.0,
+        )  # what the program has heard of last, and when
 
     def note(self, way: str, message: Mapping[str, Any]) -> None:
         """Record a message of the connection, if it is recorded."""
@@ -205,6 +216,20 @@ class Line:
         with self._lock:
             return self._parcels[MOVES].values.get(name)
 
+    def prepare(self, what: str, step: int, of: int) -> None:
+        """Tell the program how far the page is that compiles what its message needs.
+
+        It hears of each step, and every `PREPARING` seconds, so that it knows that the page is there.
+        """
+        found, now = (what, step, of), time.monotonic()
+        if found == self._prepared[0] and now - self._prepared[1] < PREPARING:
+            return
+        self._prepared = found, now
+        with self._lock:
+            numbers = self._parcels[MOVES].numbers
+            number = numbers[-1] if numbers else None
+        self._post_letter(Letter(number, preparing=found))
+
     def publish(self, name: str, value: object, anew: bool = True) -> None:
         """What the page shows now; unless `anew`, only where it is another object than before."""
         with self._lock:
@@ -226,10 +251,13 @@ class Line:
 
     def write(self, number: int | None = None, problem: Problem | None = None) -> None:
         """Tell the program something once."""
+        self._post_letter(Letter(number, problem))
+
+    def _post_letter(self, letter: Letter) -> None:
         with self._lock:
             program = self._program
             if program is not None:
-                self._letters.append(Letter(number, problem))
+                self._letters.append(letter)
         if program is not None:
             program.wake()
 

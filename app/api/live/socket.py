@@ -264,7 +264,7 @@ class Conversation:
                 self._known.update({name: number for name, (number, _) in values.items()})
                 await self._send(news({name: value for name, (_, value) in values.items()}))
             for letter in letters:
-                self._own.append(_letter(letter.number, letter.problem))
+                self._own.append(_letter(letter.number, letter.problem, letter.preparing))
             while self._own:
                 await self._send(self._own.popleft())
 
@@ -273,8 +273,13 @@ class Conversation:
         await self._visitor.send_text(as_json(message).decode())
 
 
-def _letter(number: int | None, problem: Problem | None) -> dict[str, Any]:
+def _letter(
+    number: int | None, problem: Problem | None, preparing: tuple[str, int, int] | None = None
+) -> dict[str, Any]:
     given = {} if number is None else {"id": number}
+    if preparing is not None:
+        what, step, of = preparing
+        return {"type": "preparing", **given, "what": what, "step": step, "of": of}
     if problem is None:
         return {"type": "done", **given}
     return {"type": "problem", **given, "problem": problem.model_dump()}

@@ -8,6 +8,7 @@ program comes back by itself, with the word by which the page knows it.
 from __future__ import annotations
 
 import json
+import math
 import secrets
 import threading
 import time
@@ -78,6 +79,7 @@ class Connection:
         self._answers: dict[int, Future[None]] = {}
         self._number = 0
         self._socket: ClientConnection | None = None
+        self._prepared = -math.inf  # when the page last said that it compiles something for us
         self.ended = ""  # why it has ended for good
         self._open()
         self._threads = [
@@ -122,12 +124,19 @@ class Connection:
             self._streams = None
             self._lock.notify_all()
         try:
-            answer.result(timeout)
-        except TimeoutError:
-            raise KinematicsError(f"the page has not answered within {timeout:g} s") from None
+            self._wait(answer, timeout)
         finally:
             with self._lock:
                 self._answers.pop(number, None)
+
+    def _wait(self, answer: Future[None], timeout: float) -> None:
+        """Wait for an answer; while the page compiles what the message needs, it says so, and may take longer."""
+        while True:
+            try:
+                return answer.result(timeout)
+            except TimeoutError:
+                if answer.done() or time.monotonic() - self._prepared >= timeout:
+                    raise KinematicsError(f"the page has not answered within {timeout:g} s") from None
 
     def _check(self) -> None:
         if self.ended:
@@ -176,6 +185,9 @@ class Connection:
         if message["type"] == "end":
             self.end(message["reason"])
         self._heard(message | {"asked": answer is not None})
+        if message["type"] == "preparing":
+            self._prepared = time.monotonic()
+            return
         if answer is not None and not answer.done():
             if message["type"] == "problem":
                 answer.set_exception(RefusedError(message["problem"]))

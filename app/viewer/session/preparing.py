@@ -153,8 +153,10 @@ class Preparing:
             self._page.status.wait("")
             return
         held = list(self._held.values())[-1]
-        done, of = self._preparation.steps(held.parts)
-        step = f"step {min(done + 1, of)} of {of}"
+        at, of = self._step(held)
+        if (asked := self._held.get("live")) is not None and self._page.door.line is not None:
+            self._page.door.line.prepare(asked.what, *self._step(asked))
+        step = f"step {at} of {of}"
         follows = (
             " Joint values that you set or type, typed targets, and the lesson you choose are applied then."
             if LINK in self._held
@@ -163,6 +165,11 @@ class Preparing:
         self._page.status.wait(
             f"Preparing {held.what} for the first time on this machine: {step}. This continues by itself.{follows}"
         )
+
+    def _step(self, held: _Held) -> tuple[int, int]:
+        """At which step its preparation is, and how many there are."""
+        done, of = self._preparation.steps(held.parts)
+        return min(done + 1, of), of
 
     def _needs(self, event: Hashable, value: object) -> tuple[tuple[str, ...], str]:
         """The parts of the core that an event needs, and what they are for."""

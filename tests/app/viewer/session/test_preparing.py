@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from collections.abc import Collection, Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -12,9 +14,11 @@ from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 import kin
+from app.api import ComputeSlots, api_routes
 from app.live import Lines
 from app.live.codes import read_code
 from app.live.line import Letter, Line, Program
+from app.service.web.rooms.limits import Limits
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -298,12 +302,12 @@ def test_what_a_program_sends_waits_for_the_arm_of_a_link(port, preparation, lin
         line = program(tab, lines)
         line.send({"q": q}, 1)
         tab.settle()
-        assert line.letters() == []
+        assert all(letter.preparing is not None for letter in line.letters())
         compile_parts(preparation, parts())
         tab.wait(lambda: "Preparing" not in tab.html)
         tab.settle()
         assert np.allclose(tab.tool_pose(), kin.fk(SCARA, q))
-        assert line.letters() == [Letter(1)]
+        assert [letter for letter in line.letters() if letter.preparing is None] == [Letter(1)]
 
 
 def test_a_program_that_sends_q_for_a_link_is_answered_if_another_robot_is_chosen(port, preparation, lines):
@@ -315,7 +319,7 @@ def test_a_program_that_sends_q_for_a_link_is_answered_if_another_robot_is_chose
         tab.set("Robot", PLANAR.name)
         waits_for(tab, f"the {PLANAR.name}")
         tab.settle()
-        (letter,) = line.letters()
+        (letter,) = [letter for letter in line.letters() if letter.preparing is None]
         assert letter.number == 1
         assert letter.problem is not None, "it has too many values for the arm on show"
 
@@ -328,12 +332,50 @@ def test_a_robot_that_a_program_sends_waits_for_its_kernels(port, preparation, l
         line.send({"robot": UR5, "q": q}, 1)
         waits_for(tab, "the UR5")
         assert tab.value("Robot") == PIONEER.name
-        assert line.letters() == []
-        compile_parts(preparation, (COLLISIONS, family_of(UR5)))
+        first, *more = line.letters()
+        assert (first.number, first.problem) == (1, None)
+        assert first.preparing is not None
+        what, step, of = first.preparing
+        assert (what, step) == ("the UR5", 1)
+        assert set(more) <= {first}, "again now and then, so that the program knows that the page is there"
+        compile_parts(preparation, (COLLISIONS,))
+        tab.wait(lambda: f"step 1 of {of}" not in tab.html)
+        later = [letter.preparing for letter in line.letters()]
+        assert later
+        assert all(at is not None and at[0] == what and 1 < at[1] <= at[2] for at in later)
+        tab.say("undo")  # the page can be used meanwhile
+        compile_parts(preparation, (family_of(UR5),))
         tab.wait(lambda: "Preparing" not in tab.html)
         tab.settle()
         assert np.allclose(tab.tool_pose(), kin.fk(UR5, q))
-        assert line.letters() == [Letter(1)]
+        assert [letter for letter in line.letters() if letter.preparing is None] == [Letter(1)]
+
+
+def test_a_program_that_shows_another_arm_waits_until_it_is_compiled(preparation, lines, monkeypatch):
+    monkeypatch.setattr("app.live.line.PREPARING", 0.1)
+    monkeypatch.setattr("app.live.client.page.TIMEOUT", 0.5)
+    state = {
+        "settings": Settings(),
+        "store": STORE,
+        "compute": ComputeSlots(2, 5.0),
+        "lines": lines,
+        "tries": Limits(),
+    }
+    viewer = ViewerServer(STORE, Settings(), Clouds(), lines=lines, preparation=preparation)
+    with serve_viewer(viewer, api_routes(), **state) as port, FakeBrowser(port) as tab:
+        tab.settle()
+        line = program(tab, lines)
+        line.disconnect(line.program)
+        with kin.connect(f"http://127.0.0.1:{port}", line.code) as arm, ThreadPoolExecutor() as pool:
+            heard = arm.events()
+            asked = pool.submit(setattr, arm, "robot", "ur5")
+            event = next(each for each in heard if each.kind == "preparing")
+            assert (event.value["what"], event.value["step"]) == ("the UR5", 1)
+            time.sleep(1.2)  # longer than an answer may take
+            assert not asked.done()
+            compile_parts(preparation, (COLLISIONS, family_of(UR5)))
+            asked.result(30)
+            assert arm.robot == UR5
 
 
 def test_an_impatient_visitor_fills_no_memory(preparation):
