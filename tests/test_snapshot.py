@@ -551,6 +551,15 @@ WORKSPACE: dict[str, Request] = {
 }
 
 ROBOTS: dict[str, Request] = {
+    "so101: motors, one of which counts backwards": post(
+        "so101",
+        "motors/match",
+        q=[[0.0] * 5, [0.7, 0.8, 0.9, 1.0, 1.1]],
+        readings=[[0, 91.4, 0, 0, 0], [40.1, 45.6, 51.6, 57.3, 0]],
+    ),
+    "so101: motors that it has not": post(
+        "so101", "motors/match", q=[[0.0] * 5] * 2, readings=[[1]] * 2, motors=[]
+    ),
     "list": get(),
     **{arm: get(f"/{arm}") for arm in SOMEWHERE},
     "pioneer5: equations": get("/pioneer5/equations"),
@@ -712,6 +721,11 @@ q = [0, 0, 0, 0]
 WHERE = "--position 45 191 -211 --approach -0.31 -0.164 -0.936"
 HAND = "--position 300 200 700 --wxyz 0.4 0.8 0.3 -0.2"
 CLI: dict[str, Request] = {
+    "motors: poses": Command("motors so101"),
+    "motors: found": Command(
+        "motors so101 --pose 0 0 0 0 0 --read 0 91.4 0 0 0 --pose 40 50 45 60 70 --read 40 41.4 45 60 0"
+    ),
+    "motors: none": Command("motors ur5"),
     **{
         f"{arm}: fk": Command(f"fk {arm} " + " ".join(["10", "20", "30", "40", "30", "20", "10"][: len(q)]))
         for arm, q in SOMEWHERE.items()

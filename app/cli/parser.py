@@ -230,6 +230,12 @@ def _load_compare() -> Run:
     return run_compare
 
 
+def _load_motors() -> Run:
+    from app.cli.robots import run_motors
+
+    return run_motors
+
+
 def _load_doctor() -> Run:
     from app.cli.doctor import run
 
@@ -321,6 +327,7 @@ COMMANDS = (
     Command(declare.add_bench, _load_bench),
     Command(declare.add_check, _load_check, interpreted=True),
     Command(declare.add_compare, _load_compare, interpreted=True),
+    Command(declare.add_motors, _load_motors, interpreted=True),
     Command(declare.add_doctor, _load_doctor, interpreted=True),
     Command(declare.add_capability, _load_capability),
     Command(declare.add_import, _load_import, interpreted=True),

@@ -1,12 +1,20 @@
-"""``kinboard robots``: the robots, and the DH table of one. ``kinboard compare``: whether two are the same."""
+"""``kinboard robots``, ``kinboard compare`` and ``kinboard motors``.
+
+The robots and the DH table of one; whether two are the same; the signs and zeros of one's motors.
+"""
 
 from __future__ import annotations
 
 from argparse import Namespace
+from dataclasses import replace
 
+import numpy as np
+
+from app.cli.files import write_file
 from app.cli.terminal import (
     Notation,
     clean,
+    configuration,
     named_robot,
     print_json,
     quantity,
@@ -16,10 +24,14 @@ from app.cli.terminal import (
     units_of,
 )
 from app.shared.answers.comparison import comparison_answer
+from app.shared.answers.motors import motor_match_answer
 from app.shared.answers.robots import RobotAnswer, robot_answer
 from app.shared.finding import find_robots
-from kin import Comparison, Robot, compare
+from kin import Comparison, InputError, Robot, compare, match_motors, match_poses, robot_to_toml
 from kin.comparison import messages
+from kin.files.numbers import LARGEST, number_of
+from kin.readings.joints import moving_motors
+from kin.transforms import Array
 from kin.units import Units
 
 
@@ -80,6 +92,49 @@ def run_compare(arguments: Namespace) -> int:
     else:
         print("\n".join(_comparison(found, a, b, units)))
     return 0 if found.is_same else 1
+
+
+def run_motors(arguments: Namespace) -> int:
+    """Find the signs and zeros of motors, or propose poses for it; the exit code is 1 if one does not match."""
+    robot, units = robot_of(arguments), units_of(arguments)
+    given = [configuration(robot, texts, "--pose", units) for texts in arguments.pose]
+    if not arguments.read:
+        poses = np.array(given) if given else match_poses(robot)
+        if arguments.json:
+            print_json({"q": poses.tolist()})
+        else:
+            print("\n".join(_poses(robot, poses, arguments.rad)))
+        return 0
+    readings = [[_reading(text) for text in texts] for texts in arguments.read]
+    if given and len(given) != len(readings):
+        raise InputError("--read", f"{len(readings)} poses", f"as many as --pose: {len(given)}")
+    if not given and not 2 <= len(readings) <= len(match_poses(robot)):
+        raise InputError(
+            "--read", f"{len(readings)} poses", "2 or 3, those that are proposed; --pose gives others"
+        )
+    found = match_motors(robot, given or match_poses(robot)[: len(readings)], readings)
+    if arguments.output is not None:
+        write_file(arguments.output, robot_to_toml(replace(robot, motors=found.motors)))
+    if arguments.json:
+        print_json(motor_match_answer(found))
+    else:
+        print("\n".join(finding.text for finding in found.findings))
+    return 0 if found.complete else 1
+
+
+def _reading(text: str) -> float:
+    value = number_of(text.replace("−", "-"))
+    if not abs(value) < LARGEST:
+        raise InputError("--read", text, f"a number below {LARGEST:g}")
+    return value
+
+
+def _poses(robot: Robot, poses: Array, rad: bool) -> list[str]:
+    notation = Notation(robot, rad)
+    rows = [[str(k + 1), *(notation.joint(i, value) for i, value in enumerate(q))] for k, q in enumerate(poses)]
+    shown = table(["pose", *(joint.name for joint in robot.joints)], rows)
+    motors = ", ".join(f"{motor.id} {motor.joint}" for motor in moving_motors(robot))
+    return [shown, "", f"In each pose: --read and what the motors {motors} read, in this order."]
 
 
 def _comparison(found: Comparison, a: Robot, b: Robot, units: Units) -> list[str]:

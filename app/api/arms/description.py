@@ -148,6 +148,12 @@ _MOTOR: dict[str, Any] = {
         "homing_offset": {**_TICKS, "description": "As LeRobot's calibration states it, 0 by default."},
     },
 }
+MOTORS: dict[str, Any] = {
+    "type": "array",
+    "maxItems": MAX_MOTORS,
+    "items": _MOTOR,
+    "description": "What the motors of the joints read: offset + sign · q, with q in the motor's unit.",
+}
 _SCHEMA: dict[str, Any] = {
     "type": "object",
     "description": "An arm as the fields of a robot file: a DH table with its units. `id`, `name` and `source` "
@@ -202,12 +208,7 @@ _SCHEMA: dict[str, Any] = {
             "description": "What the arm is mounted on, for drawings. How it is turned, `base` states.",
         },
         "floor": _quantity(_LENGTH, "Height of the floor in the world frame, in the length unit, for drawings."),
-        "motors": {
-            "type": "array",
-            "maxItems": MAX_MOTORS,
-            "items": _MOTOR,
-            "description": "What the motors of the joints read: offset + sign · q, with q in the motor's unit.",
-        },
+        "motors": MOTORS,
         "base": {**_TRANSFORM, "description": "Constant transform before the first row."},
         "tool": {**_TRANSFORM, "description": "Constant transform after the last row."},
     },

@@ -409,6 +409,36 @@ def add_import(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     return parser
 
 
+def add_motors(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard motors``."""
+    parser = _command(
+        commands,
+        "motors",
+        "signs and zeros of an arm's motors, from what they read in two or three poses",
+        parents.robots,
+        parents.output,
+    )
+    parser.add_argument(
+        "--read",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar="NUMBER",
+        help="what the motors read in a pose, in their order and units; once for each pose. Without it, poses are "
+        "proposed",
+    )
+    parser.add_argument(
+        "--pose",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar="VALUE",
+        help=f"the joint values of a pose, once for each --read (default: the proposed poses); {UNITS_NOTE}",
+    )
+    parser.add_argument("-o", "--output", metavar="FILE", help="write the arm with these motors as a robot file")
+    return parser
+
+
 def add_doctor(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard doctor``."""
     parser = _command(commands, "doctor", "find what is wrong in a URDF, and mend it", takes_robot=False)
