@@ -112,7 +112,6 @@
       awaited = OPENS[button.dataset.programDo] ?? "";
       act(button.dataset.programDo, button.dataset.argument ?? null, ...index);
     }
-    if (target.closest("[data-program-upload]")) document.querySelector("[data-program-file]").click();
     if (plot && event.pointerType === "touch") { pointAt(event); plot = null; }
   });
   addEventListener("change", (event) => {
@@ -156,17 +155,6 @@
     if (name) opened[event.target.open ? "add" : "delete"](name);
   }, true);
   function reopen() { for (const node of all("[data-program-details]")) if (opened.has(node.dataset.programDetails) && !node.open) node.open = true; }
-
-  // Files
-
-  addEventListener("change", async (event) => {
-    const input = event.target.closest?.("[data-program-file]");
-    const file = input?.files[0];
-    if (!file) return;
-    const text = file.size <= Number(input.dataset.most) ? await file.text() : null;
-    input.value = "";
-    act("upload", [file.name.slice(0, 100), text]);
-  });
 
   function follow() {
     if (!part("clock")) return;

@@ -1,31 +1,50 @@
 "use strict";
-// Runs in viser's page: files for the tab Robot (app/viewer/tabs/robot). Several files, or a folder, become a zip here. A
-// text is sent as it is, a zip in base64; both in parts, because a message has a limit.
+// Runs in viser's page: files that are opened or dropped, on whatever tab. `kindOf` says which file goes where. Several
+// files, or a folder, become a zip here. Texts are sent as they are, other files in base64; both in parts, because a
+// message has a limit.
 (() => {
+  // Where files go: feature, tab, and the most bytes of one. The service refuses larger ones itself.
+  const KINDS = {
+    arm: { feature: "robot", tab: "Robot", most: 300_000 },
+    zip: { feature: "robot", tab: "Robot", most: 20_000_000 },
+    calibration: { feature: "motors", tab: "Robot", most: 15_000 },
+    program: { feature: "program", tab: "Program", most: 30_000 },
+    recording: { feature: "connect", tab: "Program", most: 16_777_216 },
+  };
   const PART = 16000; // bytes of a text in one message
-  const PART_OF_ZIP = 32000; // bytes of a zip in one message, which base64 makes a third longer
+  const PART_OF_BYTES = 32000; // bytes of another file in one message, which base64 makes a third longer
   const AT_ONCE = 6; // parts on their way
   const MOST_FILES = 500;
   const WANTED = /\.(urdf|xacro|xml|toml|stl|obj|mtl|dae|glb)$/i; // what is worth sending of a folder
   const HIDDEN = /(^|\/)(\.|__MACOSX)/;
 
-  const block = () => document.querySelector('[data-arm="files"]');
-  const limit = (name) => Number(block().querySelector("[data-arm-file]").dataset[name]);
-  const send = (value, done, direct = false, key = "upload") => viserPage.send("feature", ["robot", [key], value], done, direct);
+  const send = (kind, value, done, direct = false, key = "upload") => viserPage.send("feature", [kind.feature, [key], value], done, direct);
+
+  /** Which kind of file this is, as it begins, and what its name says where that tells nothing. */
+  async function kindOf(name, file, usual) {
+    const head = await file.slice(0, 20_000).text();
+    const text = head.replace(/^\ufeff/, "");
+    if (head.startsWith("PK")) return "zip";
+    if (head.slice(1, 6) === "MCAP0" || text.startsWith("t (s),") || /\.(mcap|csv)$/i.test(name)) return "recording";
+    if (text.trimStart().startsWith("{")) return /"segments"\s*:/.test(text) ? "program" : "calibration";
+    return /^\s*(\[\[\s*segments\s*\]\]|segments\s*=)/m.test(text) ? "program" : usual;
+  }
 
   // Choosing and dropping
 
   addEventListener("click", (event) => {
     const button = event.target.closest?.("[data-arm-upload]");
-    if (button) block().querySelector(button.dataset.armUpload === "folder" ? "[data-arm-folder]" : "[data-arm-file]").click();
+    if (button) document.querySelector(button.dataset.armUpload === "folder" ? "[data-arm-folder]" : "[data-arm-file]").click();
+    if (event.target.closest?.("[data-program-upload]")) document.querySelector("[data-program-file]").click();
     if (event.target.closest?.('[data-arm-do="cancel"]')) uploading++;
   });
   addEventListener("change", (event) => {
-    const input = event.target.closest?.("[data-arm-file], [data-arm-folder]");
+    const input = event.target.closest?.("[data-arm-file], [data-arm-folder], [data-program-file]");
     if (!input?.files.length) return;
     const files = [...input.files].map((file) => [file.webkitRelativePath || file.name, file]);
+    const usual = input.matches("[data-program-file]") ? "program" : "arm";
     input.value = "";
-    open(files);
+    open(files, usual);
   });
 
   const holdsFiles = (event) => [...(event.dataTransfer?.types ?? [])].includes("Files");
@@ -37,13 +56,12 @@
   });
   for (const name of ["dragleave", "drop"]) addEventListener(name, () => document.documentElement.removeAttribute("data-arm-drop"));
   addEventListener("drop", async (event) => {
-    if (!holdsFiles(event) || !viserPage.openTab("Robot")) return; // it says how far the file is, and asks where it must
+    if (!holdsFiles(event) || !viserPage.tab("Robot")) return;
     event.preventDefault();
     const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry?.()).filter(Boolean);
     const found = entries.length ? [] : [...event.dataTransfer.files].map((file) => [file.name, file]);
     for (const entry of entries) await collect(entry, found);
-    for (let looks = 0; !block() && looks < 100; looks++) await new Promise((done) => { setTimeout(done, 50); }); // until the tab is drawn
-    if (found.length && block()) open(found);
+    if (found.length) open(found, "arm");
   });
 
   /** The files of a dropped file or folder, with their paths. */
@@ -61,23 +79,40 @@
     }
   }
 
-  async function open(files) {
+  /** Send files to where they belong, and open that tab: it says how far they are, and asks where it must. */
+  async function open(files, usual) {
     const mine = ++uploading;
     if (files.length > 1) {
+      viserPage.openTab(KINDS.zip.tab);
       const wanted = files.filter(([path]) => WANTED.test(path) && !HIDDEN.test(path));
       const roots = new Set(files.map(([path]) => path.split("/")[0]));
       const name = roots.size === 1 ? [...roots][0] : (wanted.find(([path]) => /\.urdf$/i.test(path)) ?? files[0])[0].split("/").pop();
       const bytes = await zip(wanted);
-      if (mine === uploading) sendZip(name.slice(0, 100), bytes, mine);
+      if (mine === uploading) sendBytes(KINDS.zip, name.slice(0, 100), bytes, mine);
       return;
     }
     const [[path, file]] = files;
     const name = path.split("/").pop().slice(0, 100);
-    const head = new Uint8Array(await file.slice(0, 2).arrayBuffer());
-    if (head[0] === 0x50 && head[1] === 0x4b) { // PK
-      sendZip(name, new Uint8Array(await file.slice(0, limit("mostZip") + 1).arrayBuffer()), mine);
-    } else sendText(name, await file.slice(0, limit("most") + 1).text(), 0, mine);
+    const kind = await kindOf(name, file, usual);
+    const { tab, most } = KINDS[kind];
+    viserPage.openTab(tab);
+    if (kind === "zip" || kind === "recording") {
+      const bytes = new Uint8Array(await file.slice(0, most + 1).arrayBuffer());
+      if (mine !== uploading) return;
+      shown = kind === "recording" ? null : shown;
+      sendBytes(KINDS[kind], name, bytes, mine);
+    } else if (kind === "arm") sendText(name, await file.slice(0, most + 1).text(), 0, mine);
+    else send(KINDS[kind], [name, file.size > most ? null : await file.text()]);
   }
+
+  // A recording that was opened is shown below the program, which may be long.
+  let shown = ""; // the one that has been shown; null: it is still to come
+  viserPage.watch(() => {
+    const table = document.querySelector('[data-live-recording="opened"]');
+    if (shown !== null || !table) return;
+    shown = "";
+    requestAnimationFrame(() => table.scrollIntoView({ block: "center" }));
+  });
 
   // The arm to compare with: its text is shown in the field, and sent
 
@@ -91,7 +126,7 @@
     const [file] = input?.files ?? [];
     if (!file) return;
     input.value = "";
-    const text = await file.slice(0, limit("most") + 1).text();
+    const text = await file.slice(0, KINDS.arm.most + 1).text();
     document.querySelector("[data-compare-text]").value = text;
     sendText(file.name.slice(0, 100), text, 0, ++uploading, "other-text");
   });
@@ -127,7 +162,7 @@
       parts.push(record([0x04034b50], 20, ...about, 0), name, packed);
       list.push(record([0x02014b50], 20, 20, ...about, 0, 0, 0, 0, [0], [at]), name);
       at += 30 + name.length + packed.length;
-      if (at > limit("mostZip")) break;
+      if (at > KINDS.zip.most) break;
     }
     const length = list.reduce((sum, one) => sum + one.length, 0);
     const end = record([0x06054b50], 0, 0, list.length / 2, list.length / 2, [length], [at], 0);
@@ -138,16 +173,18 @@
 
   let uploading = 0; // the upload that goes on: a newer one ends it
   addEventListener("kinboard-connect", () => { uploading++; });
-  function sendZip(name, bytes, mine) {
+  function sendBytes(kind, name, bytes, mine) {
     let from = 0;
+    let begun = false;
     let direct = false;
     const next = () => {
-      if (mine !== uploading || from >= bytes.length) return;
+      if (mine !== uploading || (begun && from >= bytes.length)) return;
+      begun = true;
       const start = from;
-      const to = from = Math.min(start + PART_OF_ZIP, bytes.length);
+      const to = from = Math.min(start + PART_OF_BYTES, bytes.length);
       const part = btoa(String.fromCharCode(...bytes.subarray(start, to)));
       const first = start === 0;
-      direct = send([name, first, to >= bytes.length, part, "base64", start, bytes.length], first ? begin : next, true);
+      direct = send(kind, [name, first, to >= bytes.length, part, "base64", start, bytes.length], first ? begin : next, true);
     };
     const begin = () => { for (let k = 0; k < (direct ? AT_ONCE : 1); k++) next(); };
     next();
@@ -163,6 +200,6 @@
     if (mine !== uploading) return;
     const to = endOfPart(text, from);
     const next = () => { if (to < text.length) sendText(name, text, to, mine, key); };
-    send([name, from === 0, to >= text.length, text.slice(from, to)], next, false, key);
+    send(KINDS.arm, [name, from === 0, to >= text.length, text.slice(from, to)], next, false, key);
   }
 })();

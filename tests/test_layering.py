@@ -61,7 +61,7 @@ RULES: dict[str, set[str]] = {
     "app/live": {"kin", "app.classroom.tokens", "app.live", "app.shared.problems"},
     # A program's end of the line needs nothing of the service.
     "app/live/client": {"kin", "numpy", "websockets", "app.live.client", "app.live.recording"},
-    "app/live/recording": {"kin", "numpy", "mcap", "app.live.recording"},
+    "app/live/recording": {"kin", "lz4", "mcap", "numpy", "zstandard", "app.live.recording"},
     "app/bench": {"kin", "numpy", "numba", "app.bench"},
     # A page of a recorded run needs neither the core nor other libraries.
     "app/bench/board": {"jinja2", "markupsafe", "app.bench.board"},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -11,6 +12,7 @@ from page import Tab
 from playwright.sync_api import expect
 
 import kin
+from app.live.recording import Entry, Recording, to_csv, to_mcap
 
 pytestmark = pytest.mark.browser
 
@@ -103,6 +105,58 @@ def test_the_frame_stays_and_goes_while_the_panel_is_folded_away(tab: Tab, drivi
     tab.page.get_by_label("Expand").first.click()
     expect(tab.page.locator("[data-status]")).to_be_visible()
     assert_framed(tab)
+
+
+OPEN = """([name, text, drop]) => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File([Uint8Array.from(text)], name));
+  if (drop) {
+    const event = new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true });
+    document.querySelector("canvas[data-engine]").dispatchEvent(event);
+  } else {
+    const input = document.querySelector("[data-arm-file], [data-program-file]");
+    input.files = dataTransfer.files;
+    input.dispatchEvent(new Event("change", { bubbles: true }));
+  }
+}"""
+
+
+def test_what_is_dropped_or_opened_goes_to_where_it_belongs(tab: Tab) -> None:
+    page, robot = tab.page, kin.get_robot("ur5")
+    tab.show(robot)
+    tab.open("Robot")
+    made = Recording(robot)
+    rows = [robot.q_home + 0.02 * k for k in range(6)]
+    entries = [Entry(0.2 * k, "/page/q", json.dumps({"q": q.tolist()}).encode()) for k, q in enumerate(rows)]
+    made.restored(entries, 1.0)
+    # A recording is dropped while another tab is open.
+    page.evaluate(OPEN, ["run.mcap", list(to_mcap(made)), True])
+    expect(page.locator('[data-live-recording="opened"]')).to_be_in_viewport(ratio=1)
+    expect(page.get_by_role("tab", name="Program")).to_have_attribute("aria-selected", "true")
+    page.get_by_role("button", name="Play recording").click()
+    tab.wait_for_tool(kin.fk(robot, rows[-1])[:3, 3], within=0.06)
+    tab.screenshot("recording-opened")
+    page.get_by_role("button", name="Discard recording").click()
+    # A table is opened by the button of the programs, and a program by that of the arms.
+    page.evaluate(OPEN, ["run.csv", list(to_csv(made).encode()), False])
+    expect(page.locator('[data-live-recording="opened"]')).to_be_visible()
+    page.get_by_role("button", name="Discard recording").click()
+    tab.open("Robot")
+    text = "".join(f"[[segments]]\nkind = 'ptp'\nq = {rows[k].tolist()}\n" for k in (0, 3))
+    page.evaluate(OPEN, ["two.toml", list(text.encode()), False])
+    expect(page.locator("[data-program-item]")).to_have_count(2)
+    # A calibration is dropped.
+    so101 = kin.get_robot("so101")
+    tab.show(so101)
+    entry = {"drive_mode": 0, "homing_offset": 0, "range_min": 700, "range_max": 3300}
+    text = json.dumps({motor.name: {"id": motor.id, **entry} for motor in so101.motors})
+    page.evaluate(OPEN, ["my_arm.json", list(text.encode()), True])
+    expect(tab.status.first).to_contain_text("The calibration my_arm.json is used")
+    # Something else is refused, and everything stays.
+    page.evaluate(OPEN, ["photo.csv", [255, 216, 255, 0], True])
+    expect(tab.status.first).to_contain_text("The file was not used")
+    page.evaluate(OPEN, ["empty.mcap", [], True])
+    expect(tab.status.first).to_contain_text("a recording of a connection (MCAP or CSV)")
 
 
 def test_the_words_fit_a_phone(phone: Tab, address: str) -> None:

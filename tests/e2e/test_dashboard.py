@@ -189,7 +189,7 @@ DROP = """(text) => {
 
 def test_a_file_dropped_onto_the_scene_is_the_arm(tab: Tab) -> None:
     page, two = tab.page, kin.load_urdf(TWO_JOINTS)
-    assert "to open the arm" in page.evaluate(DROP, TWO_JOINTS)
+    assert "to open it" in page.evaluate(DROP, TWO_JOINTS)
     tab.wait_for_tool(kin.fk(two, two.q_home)[:3, 3], within=0.06)
     expect(page.get_by_role("tab", name="Robot")).to_have_attribute("aria-selected", "true")
     page.get_by_role("button", name="Delete my arm").click()

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 import kin
 from app.live.client.connection import Connection, Message, RefusedError
 from app.live.client.drawing import Drawing
-from app.live.recording import Recording, read_mcap, save
+from app.live.recording import Bounds, Recording, read, save
 from kin import InputError, KinematicsError, Motion, Obstacle, Program, Robot
 from kin.readings.joints import moving_motors
 from kin.transforms import Array, finite_array, from_position_wxyz
@@ -247,7 +247,7 @@ class Page:
             raise InputError("path", str(path), "a name that ends with .mcap or .csv")
         self._check()
         with self._lock:
-            recording = Recording(self._robot, self._name, seconds, int(megabytes * 1e6))
+            recording = Recording(self._robot, self._name, Bounds(seconds, int(megabytes * 1e6)))
             recording.add("/heard/q", {"q": self._values["q"].tolist()})
             self._recordings.append(recording)
         try:
@@ -260,13 +260,13 @@ class Page:
                 save(recording, path)
 
     def replay(self, recording: Recording | str | Path, rate: float = 1.0) -> None:
-        """Show a recording, or that of an MCAP file, in the page, so many times as fast; returns at its end.
+        """Show a recording, or that of an MCAP or CSV file, in the page, that many times as fast; ends with it.
 
         Raises:
             KinematicsError: it is no recording, or of an arm with other joints than that on show.
         """
         if not isinstance(recording, Recording):
-            recording = read_mcap(Path(recording).read_bytes())
+            recording = read(Path(recording).read_bytes(), self.robot)
         if recording.robot.n != self._robot.n or not (recording.robot.revolute == self._robot.revolute).all():
             raise InputError("recording", f"one of the {recording.robot.name}", f"one of the {self._robot.name}")
         if not 0.01 <= rate <= 100.0:
@@ -370,6 +370,8 @@ class Page:
             if kind == "problem" and not message.get("asked"):
                 self._refused = RefusedError(message["problem"])
                 self._tell(Event("problem", self._refused))
+            elif kind == "preparing":
+                self._tell(Event("preparing", {name: message[name] for name in ("what", "step", "of")}))
             elif kind == "disconnected":
                 self._sent = None
                 self._tell(Event("disconnected"))

@@ -1,6 +1,7 @@
 """Recordings of a connection: what a program sends and hears, over time, as a file."""
 
-from app.live.recording.files import read_mcap, save, to_csv, to_mcap
-from app.live.recording.recording import Entry, Recording, Track
+from app.live.recording.files import read, read_mcap, save, to_mcap
+from app.live.recording.recording import Bounds, Entry, Recording, Track
+from app.live.recording.table import to_csv
 
-__all__ = ["Entry", "Recording", "Track", "read_mcap", "save", "to_csv", "to_mcap"]
+__all__ = ["Bounds", "Entry", "Recording", "Track", "read", "read_mcap", "save", "to_csv", "to_mcap"]

@@ -1,4 +1,4 @@
-"""Recordings as files: MCAP with everything in it, and CSV with what was commanded and measured.
+"""Recordings as files: MCAP with everything in it; for CSV see `table`.
 
 MCAP (https://mcap.dev) has one channel for each topic, as JSON with a JSON Schema, which Foxglove, PlotJuggler and
 Rerun read. The arm is in it as the attachment ``robot.json``, so that the file can be played again.
@@ -8,15 +8,24 @@ from __future__ import annotations
 
 import io
 import json
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from app.live.recording.recording import Entry, Recording
-from kin import InputError, KinematicsError, robot_from_dict, robot_to_dict
+from app.live.recording.recording import ENTRY, Bounds, Entry, Recording, too_large
+from app.live.recording.table import from_csv, to_csv
+from kin import InputError, KinematicsError, Robot, robot_from_dict, robot_to_dict
 from kin._version import __version__
 
+if TYPE_CHECKING:
+    from mcap.records import Attachment, Chunk
+
 EXTRA: Final = "pip install 'kinboard[mcap]'"
-LARGEST: Final = 512 << 20  # bytes of a file that is read
+FILE: Final = Bounds(seconds=math.inf, size=512 << 20)  # of a file that a program reads
+MAGIC: Final = b"\x89MCAP0\r\n"
 ROBOT, META = "robot.json", "kinboard"
 _NANO = 1_000_000_000
 _NUMBERS = {"type": "array", "items": {"type": "number"}}
@@ -76,50 +85,87 @@ def _schema(topic: str, title: str) -> dict[str, Any]:
     return {"title": title, "type": "object", "properties": properties}
 
 
-def read_mcap(data: bytes) -> Recording:
-    """A recording from the bytes of a file that `to_mcap` wrote; raises `InputError` for any other."""
+def read_mcap(data: bytes, bounds: Bounds = FILE) -> Recording:
+    """A recording from a file that `to_mcap` wrote; raises `InputError` for any other, or a larger one."""
     try:
-        from mcap.reader import make_reader
+        from mcap.records import Attachment, Channel, Message, Metadata
     except ImportError:
         raise InputError("format", "mcap", f"the package mcap: {EXTRA}") from None
     wrong = InputError("recording", f"{len(data)} bytes", "a recording of a connection (MCAP)")
-    if len(data) > LARGEST:
-        raise InputError("recording", f"{len(data)} bytes", f"at most {LARGEST} bytes")
+    if len(data) > bounds.size:
+        raise InputError("recording", f"{len(data)} bytes", f"at most {bounds.size} bytes")
+    topics: dict[int, str] = {}
+    meta: dict[str, str] | None = None
+    robot: Attachment | None = None
+    messages: list[tuple[int, int, bytes]] = []
+    size = 0
     try:
-        reader = make_reader(io.BytesIO(data))
-        meta = next((each.metadata for each in reader.iter_metadata() if each.name == META), None)
-        robot = next((each for each in reader.iter_attachments() if each.name == ROBOT), None)
+        for record in _records(data, bounds.size):
+            match record:
+                case Channel():
+                    topics[record.id] = record.topic
+                case Message():
+                    size += len(record.data) + ENTRY
+                    if size > bounds.size:
+                        raise too_large(bounds.size)
+                    messages.append((record.log_time, record.channel_id, record.data))
+                case Metadata(name=name) if name == META:
+                    meta = record.metadata
+                case Attachment(name=name) if name == ROBOT:
+                    robot = record
         if meta is None or robot is None:
             raise wrong
         arm, start = robot_from_dict(json.loads(robot.data)), robot.log_time
-        entries = [
-            Entry((message.log_time - start) / _NANO, channel.topic, message.data)
-            for _, channel, message in reader.iter_messages()
-        ]
-        found = Recording(arm, meta.get("program", ""), started=start)
-        found.restored(entries, float(meta.get("seconds", "nan")))
-        found.track()
+        messages.sort(key=itemgetter(0))
+        entries = [Entry((at - start) / _NANO, topics[channel], content) for at, channel, content in messages]
+        found = Recording(arm, meta.get("program", ""), bounds, start)
+        return found.restored(entries, float(meta.get("seconds", "nan")))
     except KinematicsError:
         raise
     except Exception as error:  # the library and its decompressors raise what the bytes provoke
         raise wrong from error
-    return found
 
 
-def to_csv(recording: Recording) -> str:
-    """What was commanded and measured at each change, joint by joint; an empty cell: nothing yet."""
-    track, robot = recording.track(), recording.robot
-    units = ["rad" if turns else "m" for turns in robot.revolute]
-    heads = [
-        f"{what} {joint.name.replace(',', ' ')} ({unit})"
-        for what in ("commanded", "measured")
-        for joint, unit in zip(robot.joints, units, strict=True)
-    ]
-    lines = [",".join(["t (s)", *heads])]
-    for t, q, measured in zip(track.t.tolist(), track.commanded.tolist(), track.measured.tolist(), strict=True):
-        cells = ["" if value != value else repr(value) for value in (*q, *measured)]
-        lines.append(",".join([f"{t:.6f}", *cells]))
-    return "\n".join(lines) + "\n"
+def _records(data: bytes, most: int) -> Iterator[Any]:
+    """The records of a file, those in its chunks too: a few bytes may be made to become gigabytes there."""
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader, breakup_chunk
+
+    left = most
+    for record in StreamReader(io.BytesIO(data), emit_chunks=True, record_size_limit=len(data)).records:
+        if isinstance(record, Chunk):
+            content = _unpacked(record, left)
+            left -= len(content)
+            yield from breakup_chunk(replace(record, compression="", data=content))
+        else:
+            yield record
+
+
+def _unpacked(chunk: Chunk, most: int) -> bytes:
+    """The bytes of a chunk; raises `InputError` if there are more than `most`."""
+    from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+    from zstandard import ZstdDecompressor
+
+    match chunk.compression:
+        case "lz4":
+            content: bytes = LZ4FrameDecompressor().decompress(chunk.data, most + 1)
+        case "zstd":
+            with ZstdDecompressor().stream_reader(chunk.data) as stream:
+                content = stream.read(most + 1)
+        case _:
+            content = chunk.data
+    if len(content) > most:
+        raise InputError("recording", f"more than {most} bytes when unpacked", f"at most {most} bytes")
+    return content
+
+
+def read(data: bytes, robot: Robot, bounds: Bounds = FILE) -> Recording:
+    """A recording from the bytes of a file, MCAP or CSV as they begin; raises `InputError` for any other.
+
+    Args:
+        robot: the arm of a CSV file, which does not say it.
+    """
+    return read_mcap(data, bounds) if data.startswith(MAGIC) else from_csv(data, robot, bounds)
 
 
 def save(recording: Recording, path: str | Path) -> None:

@@ -8,6 +8,7 @@ configurations that the page showed.
 from __future__ import annotations
 
 import json
+import math
 import threading
 import time
 from collections.abc import Mapping
@@ -17,13 +18,15 @@ from weakref import WeakSet
 
 import numpy as np
 
-from kin import Robot
+from kin import InputError, Robot
 from kin.transforms import Array
 
 SHOWN: Final = "/page/q"
 MEASURED: Final = "/sent/measured"
 SPOKEN: Final = ("/sent/q", "/heard/q")  # what was commanded, where the page itself was not recorded
+READ: Final = "read from a file"  # why one has ended that was not made here
 ENTRY: Final = 120  # bytes of an entry beside its data
+LARGEST: Final = 1e6  # radians, metres
 STEP: Final = 1 << 20  # bytes between two looks at all recordings of a process
 
 _shared: WeakSet[Recording] = WeakSet()
@@ -61,14 +64,28 @@ class Track:
         return tuple(None if np.isnan(q).any() else q for q in found)  # type: ignore[return-value]
 
 
+@dataclass(frozen=True)
+class Bounds:
+    """What a recording may take.
+
+    Attributes:
+        seconds: its length.
+        size: bytes in memory, and of its file.
+        shared: bytes of all recordings of this process that have this bound; None: it does not count among them.
+    """
+
+    seconds: float = 3600.0
+    size: int = 256 << 20
+    shared: int | None = None
+
+
 class Recording:
     """See the module. All methods are thread-safe.
 
     Args:
         robot: the arm.
         name: of the program.
-        most_seconds, most_bytes: its bounds.
-        shared: bytes of all recordings of this process that have this bound; None: it does not count among them.
+        bounds: what it may take.
         started: when it began (ns since 1970); None: now.
 
     Attributes:
@@ -81,29 +98,26 @@ class Recording:
         self,
         robot: Robot,
         name: str = "",
-        most_seconds: float = 3600.0,
-        most_bytes: int = 256 << 20,
-        shared: int | None = None,
+        bounds: Bounds = Bounds(),
         started: int | None = None,
     ) -> None:
         self.robot, self.name = robot, name
-        self.most_seconds, self.most_bytes = most_seconds, most_bytes
+        self.bounds = bounds
         self.started = time.time_ns() if started is None else started
         self.ended: str | None = None
         self.entries: list[Entry] = []
         self.size = 0
-        self._most_of_all = shared
         self._began = time.monotonic()
         self._end = 0.0
         self._lock = threading.Lock()
-        if shared is not None:
+        if bounds.shared is not None:
             with _shared_lock:
                 _shared.add(self)
 
     @property
     def seconds(self) -> float:
         """How long it is."""
-        return min(time.monotonic() - self._began, self.most_seconds) if self.ended is None else self._end
+        return min(time.monotonic() - self._began, self.bounds.seconds) if self.ended is None else self._end
 
     def take(self, way: str, message: Mapping[str, Any]) -> None:
         """Record a message of the connection, ``"sent"`` or ``"heard"``: each value under its own topic."""
@@ -125,10 +139,12 @@ class Recording:
         data = json.dumps(message, separators=(",", ":")).encode()
         now, cost = time.monotonic() - self._began, len(data) + ENTRY
         with self._lock:
-            if now > self.most_seconds:
-                self._finish(self.most_seconds, f"it has reached {self.most_seconds:g} s, the most there may be")
-            elif self.size + cost > self.most_bytes:
-                self._finish(now, f"it has reached {self.most_bytes / 1e6:.0f} MB, the most there may be")
+            if now > self.bounds.seconds:
+                self._finish(
+                    self.bounds.seconds, f"it has reached {self.bounds.seconds:g} s, the most there may be"
+                )
+            elif self.size + cost > self.bounds.size:
+                self._finish(now, f"it has reached {self.bounds.size / 1e6:.0f} MB, the most there may be")
             elif self.size // STEP != (self.size + cost) // STEP and self._crowded():
                 self._finish(now, "the recordings of all pages have filled the service's memory for them")
             elif self.ended is None:
@@ -138,13 +154,30 @@ class Recording:
     def end(self, why: str = "stopped") -> None:
         """End it."""
         with self._lock:
-            self._finish(min(time.monotonic() - self._began, self.most_seconds), why)
+            self._finish(min(time.monotonic() - self._began, self.bounds.seconds), why)
 
     def restored(self, entries: list[Entry], seconds: float) -> Recording:
-        """This recording with the entries of a file."""
+        """This recording with the entries of a file, in the order of their times.
+
+        Raises:
+            InputError: times before its beginning, more of them or more bytes than it may have, configurations
+                that are none, or no room for it in this process.
+        """
+        end = max(seconds if math.isfinite(seconds) else 0.0, entries[-1].time if entries else 0.0)
+        size = sum(len(each.data) + ENTRY for each in entries)
+        if entries and entries[0].time < 0.0:
+            raise InputError("recording", f"a time of {entries[0].time:g} s", "times from its beginning on")
+        if end > self.bounds.seconds:
+            raise InputError("recording", f"{end:g} s", f"at most {self.bounds.seconds:g} s")
+        if size > self.bounds.size:
+            raise too_large(self.bounds.size)
         with self._lock:
-            self.entries, self.size = entries, sum(len(each.data) + ENTRY for each in entries)
-            self._finish(seconds, "read from a file")
+            self.entries, self.size = entries, size
+            self._finish(end, READ)
+        if self._crowded():
+            self.entries, self.size = [], 0
+            raise InputError("recording", "no room in the service for it", "another try, when others are closed")
+        self.track()
         return self
 
     def _finish(self, seconds: float, why: str) -> None:
@@ -152,10 +185,17 @@ class Recording:
             self._end, self.ended = seconds, why
 
     def _crowded(self) -> bool:
-        if self._most_of_all is None:
+        if self.bounds.shared is None:
             return False
         with _shared_lock:
-            return sum(each.size for each in _shared) + STEP > self._most_of_all
+            return sum(each.size for each in _shared) + STEP > self.bounds.shared
+
+    def _values(self, given: object) -> Array:
+        """A configuration; NaN where it is none that can be drawn."""
+        values = np.array(given, dtype=float)
+        if values.shape != (self.robot.n,):
+            raise InputError("recording", str(given), f"configurations of {self.robot.n} numbers")
+        return values if (np.abs(values) < LARGEST).all() else np.full(self.robot.n, np.nan)
 
     def track(self) -> Track:
         """The arm over time."""
@@ -169,8 +209,13 @@ class Recording:
                 continue
             field = each.topic.rpartition("/")[2]
             value = json.loads(each.data)[field]
-            now[field] = unknown if value is None or len(value) != n else np.array(value, dtype=float)
+            now[field] = unknown if value is None or len(value) != n else self._values(value)
             times.append(each.time)
             rows.append((now["q"], now["measured"]))
         found = np.array(rows).reshape(-1, 2, n)
         return Track(np.array(times), found[:, 0], found[:, 1])
+
+
+def too_large(most: int) -> InputError:
+    """The messages of a recording take more than it may have."""
+    return InputError("recording", f"more than {most / 1e6:.3g} MB in memory", f"at most {most / 1e6:.3g} MB")

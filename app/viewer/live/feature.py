@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
+from app.live.recording import Bounds, Recording
+from app.live.recording.recording import READ
 from app.viewer.declared.facts import Facts
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.fields import Settings, slider
-from app.viewer.declared.panel import Button, Buttons, Control, Html
+from app.viewer.declared.panel import Button, Buttons, Control, Html, Progress
 from app.viewer.declared.panel import Node as PanelNode
 from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.feature import Stage
 from app.viewer.live import views
 from app.viewer.live.drawings import Drawings, merged, nodes
-from app.viewer.live.tape import SECONDS, WRITERS, Tape
+from app.viewer.live.opening import Opening
+from app.viewer.live.tape import BYTES, LONGEST, OF_ALL, WRITERS, Tape
+from app.viewer.meshes.archive import MeshError
+from app.viewer.meshes.incoming import late
+from app.viewer.own_arm import own_arm
 from app.viewer.panel.status import Notice
 from app.viewer.skeleton import ghost
-from kin import Contact
+from kin import Contact, KinematicsError, robot_to_dict
 from kin.transforms import Array
 
 STOPPED = "stopped"
+UNUSED = "The file was not used"
+OPENED = Bounds(LONGEST, BYTES, OF_ALL)
 LOOK_AGAIN = 1.0  # s between two looks at the rate of a program and its delay
 GHOST, OPACITY = (230, 159, 0), 0.45
 
@@ -37,7 +45,7 @@ AT_HINT = "Shows the arm as it was commanded then, and the measured arm beside i
 class TapeSettings(Settings):
     """Where the recording is shown. A link keeps nothing of a connection."""
 
-    at: float = slider("Time (s)", 0.0, (0.0, SECONDS), hint=AT_HINT, digits=2, step=0.01, link=False)
+    at: float = slider("Time (s)", 0.0, (0.0, LONGEST), hint=AT_HINT, digits=2, step=0.01, link=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +63,8 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
     key = "connect"
     title = "Connected program"
     settings_of, facts_of = TapeSettings, ConnectFacts
+    messages = frozenset({"upload"})
+    undo: ClassVar[dict[str, str]] = {"on_show_arm": "Another arm"}
 
     def __init__(self, stage: Stage) -> None:
         self.contacts: Sequence[Contact] = ()
@@ -63,6 +73,7 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
         self._measured: Array | None = None
         self._driven = ""  # what the program drives
         self._tape = Tape(stage)
+        self._opening = Opening(stage, self.post, OPENED)
         self._was = ""  # the program of the last look
         super().__init__(stage)
 
@@ -86,6 +97,67 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
         if drawn := values.get("draw"):
             self._drawings = merged(self._drawings, drawn, self._numbers)
 
+    # A recording that is opened
+
+    def handle(self, key: Hashable, value: object) -> None:
+        match key:
+            case ("upload",):
+                self.wake()
+                self._try(lambda: self._opening.take(value))
+            case ("read", int(number)):
+                self.wake()
+                self._try(lambda: self._use(self._opening.result(number, value)))
+            case _:
+                super().handle(key, value)
+
+    def step_name(self, key: Hashable) -> str:
+        return "Recording opened" if isinstance(key, tuple) and key[0] == "read" else super().step_name(key)
+
+    def _try(self, act: Callable[[], None]) -> None:
+        try:
+            act()
+        except (MeshError, KinematicsError) as error:
+            words = (
+                f"{error.field}: got {error.value}, expected {error.expected}"
+                if isinstance(error, MeshError)
+                else str(error)
+            )
+            self.stage.notify(Notice("error", UNUSED, words))
+
+    def _use(self, recording: Recording | None) -> None:
+        """Have a recording in place of the last one, and show its arm unless something is driven."""
+        if recording is None:
+            return
+        self._tape.open(recording)
+        self._measured = None
+        self.change(at=0.0)
+        self._write = True
+        if recording.robot != self.stage.now.robot and not self._driven:
+            self.on_show_arm()
+        words = f"{recording.seconds:.1f} s of the {recording.robot.name}. Play it in the tab Program."
+        self.stage.notify(Notice("hand", f"{self._opening.name} is open", words))
+
+    def on_show_arm(self) -> None:
+        """Show the arm of the recording; raises `InputError`."""
+        recording = self._tape.recording
+        assert recording is not None
+        if self._driven:
+            words = (
+                f"{self._driven} is driven",
+                "Another arm on show would be driven as well. End its program first.",
+            )
+            self.stage.notify(Notice("error", *words))
+        elif recording.robot in self.stage.store.robots:
+            self.stage.change_robot(recording.robot)
+        else:
+            own = own_arm(robot_to_dict(recording.robot))
+            recording.robot = own.robot
+            self.stage.show_own(own)
+
+    def on_cancel(self) -> None:
+        """Open no recording after all."""
+        self._opening.stop()
+
     # Feature
 
     def on_robot(self) -> None:
@@ -102,6 +174,7 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
             super().on_pose(T_base_tool)
 
     def on_leave(self) -> None:
+        self._opening.stop()
         self._tape.discard()
         self.stage.door.close("The page was closed.")
 
@@ -109,7 +182,7 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
 
     def besides(self) -> tuple[object, ...]:
         measured = None if self._measured is None else self._measured.tobytes()
-        return measured, tuple(number for number, _ in self._drawings.values())
+        return measured, self._opening.busy, tuple(number for number, _ in self._drawings.values())
 
     def advance(self, now: float) -> float | None:
         line = self.stage.door.line
@@ -121,34 +194,41 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
                 self.stage.notify(Notice("hand", f"{self._was} has left", "The code still counts."))
             self._was = name
             self._stale = True
+        timeout = self.stage.meshes.reader.receive_timeout
+        if name := self._opening.stalled(now, timeout):
+            self.stage.notify(Notice("error", f"{name} did not arrive", late(timeout)))
+            self._stale = True
         if self._tape.playing:
             self._measured = self._tape.advance(now)
             self.change(at=self._tape.time)
             self._write = True
             return self.stage.frame
-        live = bool(name) or self._tape.running
+        live = bool(self._was) or self._tape.running or self._opening.busy is not None
         if live and now - self.shown_at >= LOOK_AGAIN:
             self._stale = True
         return LOOK_AGAIN if live else None
 
     def panel(self) -> Sequence[PanelNode]:
         door, line = self.stage.door, self.stage.door.line
+        shown = [*self._compared(), *self._recorded()]
         if door.locked:
-            return []
+            return shown
         if line is None:
             about = Html(views.about)
-            return [about, Button("Connect a program", self.event(self.on_open), key="open"), *self._recorded()]
-        shown = Html(views.code, (line.code, self.stage.service.address), key="code")
+            return [about, Button("Connect a program", self.event(self.on_open), key="open"), *shown]
+        code = Html(views.code, (line.code, self.stage.service.address), key="code")
         state = Html(views.state, views.state_of(line.program), key="state")
-        found: list[PanelNode] = [shown, state]
-        if self._measured is not None:
-            arm = self.stage.now
-            gap = np.round(self._measured - arm.q, 6)
-            args = arm.robot, gap.tobytes(), self._measured.tobytes(), self.stage.units
-            found.append(Html(views.measured, args, key="measured"))
-        found += self._recorded()
         hint = "The connection ends, and this code counts no more"
-        return [*found, Button("Withdraw the code", self.event(self.on_close), hint, key="close")]
+        return [code, state, *shown, Button("Withdraw the code", self.event(self.on_close), hint, key="close")]
+
+    def _compared(self) -> list[PanelNode]:
+        """Where the arm was measured, and by how much that is beyond where it is commanded."""
+        if self._measured is None:
+            return []
+        arm = self.stage.now
+        gap = np.round(self._measured - arm.q, 6)
+        args = arm.robot, gap.tobytes(), self._measured.tobytes(), self.stage.units
+        return [Html(views.measured, args, key="measured")]
 
     def _recorded(self) -> list[PanelNode]:
         """The recording, and what can be done with it."""
@@ -156,12 +236,17 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
         recording = tape.recording
         label = "Record the connection" if recording is None else "Record anew"
         begin = Button(label, self.event(self.on_record), hint, key="record")
-        new = [] if self.stage.door.line is None else [begin]
+        new: list[PanelNode] = [] if self.stage.door.line is None else [begin]
+        if (busy := self._opening.busy) is not None:
+            words, done = busy
+            cancel = Button("Cancel", self.event(self.on_cancel), "Opens no recording", key="cancel")
+            new += [Html(views.opening, (words,), key="opening"), Progress(done, key="opened"), cancel]
         if recording is None:
-            return list(new)
-        why = "" if recording.ended in (None, STOPPED) else recording.ended
+            return new
+        why = "" if recording.ended in (None, STOPPED, READ) else recording.ended
         other = "" if recording.robot == self.stage.now.robot else recording.robot.name
-        args = round(recording.seconds, 1), len(recording.entries), recording.size, tape.running, why, other
+        state = "running" if tape.running else "opened" if recording.ended == READ else "ended"
+        args = round(recording.seconds, 1), len(recording.entries), recording.size, state, why, other
         shown = Html(views.recording, args, key="recording")
         if tape.running:
             return [shown, Button("Stop recording", self.event(self.on_stop), key="stop")]
@@ -171,6 +256,10 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
             spec = replace(self.spec("at"), limits=ends, slider=ends, clip=True)
             play = Button("Pause" if tape.playing else "Play recording", self.event(self.on_play), key="play")
             found += [Control("at", spec=spec, of=id(recording)), play]
+        if other:
+            found.append(
+                Button("Show that arm", self.event(self.on_show_arm), "The arm of the recording", key="arm")
+            )
         saves = {kind: self.event(self.on_save, kind) for kind in WRITERS}
         discard = Button("Discard recording", self.event(self.on_discard), key="discard")
         return [*found, Buttons("Save as", saves, key="save"), discard, *new]

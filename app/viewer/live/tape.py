@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.live import Line
-from app.live.recording import Recording, Track, to_csv, to_mcap
+from app.live.recording import Bounds, Recording, Track, to_csv, to_mcap
 from app.live.recording.recording import SHOWN
 from app.viewer.feature import Stage
 from app.viewer.panel.status import Notice
@@ -12,6 +12,7 @@ from kin.transforms import Array
 
 SECONDS, BYTES = 600.0, 16 << 20  # of one recording
 OF_ALL = 256 << 20  # bytes of the recordings of all pages of a process
+LONGEST = 3600.0  # s of one that is opened: a program may record for longer than a page
 WRITERS = {"MCAP": ".mcap", "CSV": ".csv"}
 
 
@@ -53,9 +54,16 @@ class Tape:
         """Record from now on, in place of the last recording."""
         self.discard()
         arm, program = self._stage.now, line.program
-        self.recording = Recording(arm.robot, "" if program is None else program.name, SECONDS, BYTES, OF_ALL)
+        self.recording = Recording(
+            arm.robot, "" if program is None else program.name, Bounds(SECONDS, BYTES, OF_ALL)
+        )
         self.recording.add(SHOWN, {"q": arm.q.tolist()})
         self._line, line.recording = line, self.recording
+
+    def open(self, recording: Recording) -> None:
+        """Have this recording in place of the last one."""
+        self.discard()
+        self.recording = recording
 
     def end(self, why: str) -> None:
         """End the recording; it stays, and is at its end."""

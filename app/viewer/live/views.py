@@ -47,14 +47,26 @@ def state(name: str, rate: int, delay: str) -> str:
     return render("live/state", name=name, rate=rate, delay=delay)
 
 
-def recording(seconds: float, count: int, size: int, running: bool, why: str, other: str) -> str:
-    """How far a recording is, of how much; why it has ended by itself, and of which arm that is not on show."""
+def opening(words: str) -> str:
+    """What goes on with a recording that is opened."""
+    return render("live/opening", words=words)
+
+
+def recording(seconds: float, count: int, size: int, state: str, why: str, other: str) -> str:
+    """How far a recording is, of how much.
+
+    Args:
+        state: "running", "ended", or "opened": it came from a file.
+        why: it has ended by itself.
+        other: the arm that it is of, if that is not on show.
+    """
     return render(
         "live/recording",
         seconds=f"{seconds:.1f}",
         count=count,
         size=f"{size / 1e6:.2f}",
-        running=running,
+        state=state,
+        running=state == "running",
         why=why,
         other=other,
         most_seconds=f"{SECONDS:g}",

@@ -300,6 +300,39 @@ class InProcess:
         child.follow([json.dumps(command)])
 
 
+def frame(arm: notebook.ArmView, viewer: int) -> FakeBrowser:
+    """A browser that opens the frame of the arm."""
+    parts = urlsplit(arm.url)
+    stored = {
+        "state": parse_qs(parts.fragment)["s"][0],
+        "shown": parse_qs(parts.query)["shown"][0],
+        "address": f"http://127.0.0.1:{viewer}/",
+    }
+    return FakeBrowser(viewer, memory=json.dumps(stored))
+
+
+def test_a_notebook_says_what_it_drives(viewer, monkeypatch):
+    monkeypatch.setattr(notebook, "_service", InProcess(viewer))
+    for name in ("", " \t", "x" * 61, "\x00", 3):
+        with pytest.raises(kin.InputError, match=r"drives: got .*a name of at most 60 characters"):
+            notebook.show("ur5", Q, None, 4.0, True, 400, 300, None, name)
+    arm = notebook.show("ur5", Q, None, 4.0, True, 400, 300, None, "SO-101 at /dev/ttyACM0")
+    with frame(arm, viewer) as page:
+        page.wait(lambda: "data-live-code" in page.html)
+        assert 'data-driven=""' in page.html, "the notebook has not moved it yet"
+        arm.q = Q + 0.1
+        page.wait(lambda: "Drives: <bdi>SO-101 at /dev/ttyACM0</bdi>" in page.html)
+        with pytest.raises(kin.InputError, match="drives"):
+            arm.drives = "\n"
+        assert arm.drives == "SO-101 at /dev/ttyACM0"
+        arm.drives = None
+        page.wait(lambda: 'data-driven=""' in page.html)
+        arm.drives = "Panda"
+        page.wait(lambda: "Drives: <bdi>Panda</bdi>" in page.html)
+        arm.page.close()
+        page.wait(lambda: 'data-driven=""' in page.html)
+
+
 def test_a_notebook_reads_what_is_dragged_in_its_frame(viewer, monkeypatch):
     monkeypatch.setattr(notebook, "_service", InProcess(viewer))
     arm = notebook.show("ur5", Q, None, 4.0, True, 400, 300, None)
@@ -307,13 +340,7 @@ def test_a_notebook_reads_what_is_dragged_in_its_frame(viewer, monkeypatch):
     for _ in range(40):  # which is no guess
         with pytest.raises(RefusedError, match="No page has the code"):
             _ = arm.page
-    parts = urlsplit(arm.url)
-    stored = {
-        "state": parse_qs(parts.fragment)["s"][0],
-        "shown": parse_qs(parts.query)["shown"][0],
-        "address": f"http://127.0.0.1:{viewer}/",
-    }
-    with FakeBrowser(viewer, memory=json.dumps(stored)) as page:
+    with frame(arm, viewer) as page:
         page.wait(lambda: "data-live-code" in page.html)
         shown(page, kin.fk(ARM, Q))
         T = kin.fk(ARM, Q)

@@ -19,7 +19,7 @@ from test_connect import ARM, Q, code_of, shown
 from test_live_page import press
 
 import kin
-from app.live.recording import Recording, read_mcap, save, to_mcap
+from app.live.recording import Bounds, Recording, read_mcap, save, to_mcap
 from app.live.recording import recording as module
 
 A, B = Q, Q + 0.2
@@ -105,21 +105,21 @@ def test_a_recording_ends_with_its_arm_and_needs_a_known_ending(arm, tmp_path):
 
 
 def test_its_bounds_end_it_and_it_says_why(monkeypatch):
-    short = Recording(ARM, most_seconds=0.05)
+    short = Recording(ARM, bounds=Bounds(seconds=0.05))
     short.add("/sent/q", {"q": A.tolist()})
     time.sleep(0.06)
     short.add("/sent/q", {"q": B.tolist()})
     assert short.ended == "it has reached 0.05 s, the most there may be"
     assert short.seconds == 0.05
     assert len(short.entries) == 1
-    small = Recording(ARM, most_bytes=2000)
+    small = Recording(ARM, bounds=Bounds(size=2000))
     for _ in range(100):
         small.add("/sent/q", {"q": A.tolist()})
     assert "it has reached 0 MB" in str(small.ended)
     assert 0 < small.size <= 2000
     assert len(small.track().t) == len(small.entries)
     monkeypatch.setattr(module, "STEP", 1000)
-    first, second = (Recording(ARM, shared=4000) for _ in range(2))
+    first, second = (Recording(ARM, bounds=Bounds(shared=4000)) for _ in range(2))
     for _ in range(100):
         first.add("/sent/q", {"q": A.tolist()})
         second.add("/sent/q", {"q": A.tolist()})

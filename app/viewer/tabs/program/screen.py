@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from app.exports.motion_snippets import SNIPPETS
 from app.viewer.feature import Stage
+from app.viewer.live.tape import BYTES
 from app.viewer.panel import update_html
 from app.viewer.panel.share import box_html
 from app.viewer.scene.camera import Sphere, round_points
@@ -123,7 +124,7 @@ class Screen:
                 "program/files",
                 any=any_items,
                 most=f"{LARGEST // 1000} kB",
-                bytes=LARGEST,
+                most_recording=f"{BYTES // 1_000_000} MB",
                 code=code,
                 languages=list(SNIPPETS),
                 language=self.language,

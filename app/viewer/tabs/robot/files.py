@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 import re
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import kin
-from app.shared.memory.answers import AnswerMemory, MemoryFullError, Reservation
-from app.viewer.meshes.archive import MB, MOST_BYTES, MOST_OF_URDF, Archive, MeshError
-from app.viewer.meshes.reader import full
+from app.shared.memory.answers import Reservation
+from app.viewer.meshes.archive import MOST_OF_URDF, Archive, MeshError
 from app.viewer.own_arm import OwnArm, own_arm
 from kin import InputError, Robot, RobotFileError
 from kin.files.urdf.collisions import Fitted, LinkPieces, collisions_of, said, with_bodies
 from kin.files.urdf.tree import Tip, read_tree
-from kin.typed import cut
 from kin.units import general
 
 # The root element after a declaration and comments.
@@ -66,90 +61,6 @@ class Source:
         except MeshError as error:
             raise file_error(self.name, error) from None
         return replace(self, text=text, urdf=urdf, tips=tips_of(f"{self.name}: {urdf}", text))
-
-
-class Incoming:
-    """A file that arrives in parts: text, or bytes in base64.
-
-    Args:
-        memory: where room for a zip is reserved while it arrives.
-
-    Attributes:
-        name: of the file of which more is to come; empty if there is none.
-        last: when the last part came, as `time.perf_counter` tells it.
-        total: bytes of a zip of which more is to come, as its sender says.
-    """
-
-    def __init__(self, memory: AnswerMemory) -> None:
-        self._memory = memory
-        self.forget()
-
-    def forget(self) -> None:
-        """Drop what has arrived."""
-        self.name, self.last, self.total = "", 0.0, 0
-        self._parts: list[str | bytes] = []
-        self._length = 0
-        self._room = self._memory.reserve(0)
-
-    @property
-    def arrived(self) -> int:
-        """Bytes of a zip of which more is to come."""
-        return self._length if self._parts and isinstance(self._parts[0], bytes) else 0
-
-    def take(self, value: object) -> tuple[str, str | bytes, Reservation] | None:
-        """Add a part; name, content and room of the file if it was the last one.
-
-        Raises:
-            MeshError: the file is too large; its parts are forgotten.
-            kin.InputError: not a part of a file.
-        """
-        name, first, last, part, from_, total = _part(value)
-        from_ = self._length if from_ is None else from_
-        if first:
-            self.forget()
-            self.name, self.total = name, total
-        elif not self._parts:
-            return None  # the rest of a file that was refused
-        elif not self._follows(name, part, from_):
-            self.forget()
-            raise MeshError(f"{name}: part", "a part that does not follow the one before", "another try")
-        self._parts.append(part)
-        self.last = time.perf_counter()
-        self._length += len(part)
-        most = MOST if isinstance(part, str) else MOST_BYTES
-        try:
-            self._room.resize(0 if isinstance(part, str) else min(self._length, MOST_BYTES))
-        except MemoryFullError:
-            self.forget()
-            raise full() from None
-        if self._length > most:
-            self.forget()
-            limit = f"{MOST // 1000} kB" if isinstance(part, str) else f"{MOST_BYTES // MB} MB for a zip"
-            raise MeshError(f"{name}: size", "it is too large", f"at most {limit}")
-        if not last:
-            return None
-        empty: str | bytes = type(part)()
-        content, room = empty.join(self._parts), self._room  # type: ignore[arg-type]
-        self.forget()
-        return name, content, room
-
-    def _follows(self, name: str, part: str | bytes, before: int) -> bool:
-        """Whether a part continues what has arrived."""
-        same = name == self.name and type(part) is type(self._parts[0])
-        return same and before == self._length
-
-
-def _part(value: object) -> tuple[str, bool, bool, str | bytes, int | None, int]:
-    """Name, whether it is the first and the last part, content; of a zip how much came before, and its size."""
-    match value:
-        case [str(name), bool(first), bool(last), str(part)] if part or last:
-            return cut(name), first, last, part, None, 0
-        case [str(name), bool(first), bool(last), str(part), "base64", int(before), int(total)] if part or last:
-            try:
-                return cut(name), first, last, base64.b64decode(part, validate=True), before, total
-            except (binascii.Error, ValueError):
-                pass
-    raise InputError("upload", value, "name, whether it is the first part, the last part, and its text or base64")
 
 
 def opened(name: str, content: str | bytes, room: Reservation) -> Source:

@@ -9,7 +9,8 @@ from functools import partial
 
 from app.shared.memory.answers import MemoryFullError, Reservation
 from app.viewer.feature import Stage
-from app.viewer.meshes.archive import MeshError, TooLargeError
+from app.viewer.meshes.archive import MOST_BYTES, MeshError, TooLargeError
+from app.viewer.meshes.incoming import Incoming, late
 from app.viewer.meshes.links import drawing_of, drawing_without_meshes, shapes_of, size_of
 from app.viewer.meshes.placing import Shapes
 from app.viewer.meshes.reader import MOST_TRIANGLES, Meshes, full
@@ -19,8 +20,8 @@ from app.viewer.panel.status import Notice
 from app.viewer.scene.bodies.drawing import Drawing
 from app.viewer.tabs.robot.doctor import Doctor
 from app.viewer.tabs.robot.files import (
+    MOST,
     Busy,
-    Incoming,
     Source,
     arm_of,
     bodies_in,
@@ -79,7 +80,7 @@ class Uploads:
         self._stage = stage
         self._post = post
         self._begin = begin
-        self._incoming = Incoming(stage.meshes.memory)
+        self._incoming = Incoming(stage.meshes.memory, MOST, MOST_BYTES, "a zip")
         self._number = 0
         self._tip: str | None = None  # of the URDF that was opened last
         self._reading: _Reading | None = None
@@ -150,15 +151,12 @@ class Uploads:
         Returns:
             The seconds after which to call this again; None: nothing is on its way.
         """
-        name, last = self._incoming.name, self._incoming.last
-        if not name:
-            return None
-        timeout = self._stage.meshes.reader.receive_timeout
-        if now - last < timeout:
-            return last + timeout - now
+        name, timeout = self._incoming.name, self._stage.meshes.reader.receive_timeout
+        left = self._incoming.left(now, timeout)
+        if left is None or left > 0.0:
+            return left
         self._incoming.forget()
-        detail = f"For {timeout:g} s no part of it has come. Open it again."
-        self._stage.notify(Notice("error", f"{name} did not arrive", detail))
+        self._stage.notify(Notice("error", f"{name} did not arrive", late(timeout)))
         return None
 
     def choose(self, what: str, value: object) -> None:

@@ -305,11 +305,9 @@ def files(waiting: Source | None, busy: Busy | None, meshes: str, heavy: bool) -
             choice = {"key": "urdf", "label": "Robot", "words": "robots: choose its URDF"}
         choice |= {"file": waiting.name, "options": options[:MOST_TIPS], "more": max(0, len(options) - MOST_TIPS)}
     most = f"{MOST // 1000} kB", f"{MOST_BYTES // MB} MB"
-    limits = {"text": MOST, "zip": MOST_BYTES}
     return render(
         "robot/files",
         most=most,
-        limits=limits,
         choice=choice,
         busy=busy,
         shown="" if busy is None else _amount(busy),

@@ -13,6 +13,8 @@ from app.shared.computations import Subscription
 from app.shared.memory.answers import AnswerMemory
 from app.viewer.declared.scene import SceneView
 from app.viewer.feature import Stage
+from app.viewer.meshes.archive import MOST_BYTES
+from app.viewer.meshes.incoming import Incoming
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post, assign, listen, update_html
 from app.viewer.panel.status import Notice
@@ -21,7 +23,7 @@ from app.viewer.tabs.robot.compare import reference, views
 from app.viewer.tabs.robot.compare.drawing import Overlay
 from app.viewer.tabs.robot.compare.reference import Reference
 from app.viewer.tabs.robot.edits import EditError
-from app.viewer.tabs.robot.files import Incoming
+from app.viewer.tabs.robot.files import MOST
 from kin import Comparison, InputError, KinematicsError
 from kin.comparison import Frames
 from kin.transforms import Array
@@ -39,7 +41,7 @@ class Comparing:
 
     def __init__(self, stage: Stage, memory: AnswerMemory, post: Post) -> None:
         self._stage = stage
-        self._incoming = Incoming(memory)
+        self._incoming = Incoming(memory, MOST, MOST_BYTES, "a zip")
         self._other: Reference | None = None
         self._frames: Frames = "fixed"
         self._typing = False  # whether the field for a text is open

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -13,6 +13,7 @@ from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.fields import Settings, choice, number, text
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
 from app.viewer.feature import Stage
+from app.viewer.own_arm import clean
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits
 from app.viewer.tabs.robot.edits import EditError
@@ -25,6 +26,7 @@ from kin.readings.joints import moving_motors
 FIELDS = ("id", "sign", "offset", "unit", "lead")
 LEAD = 0.01  # m in a turn of the motor of a slide, until it is stated
 LOOK_AGAIN = 0.5  # s
+LARGEST = 15_000  # bytes of a calibration: it comes in one message of the page
 SAVED = "LeRobot reads it from its folder of calibrations, under the name of the arm."
 READ_HINT = "Numbers with spaces or commas between them, as a script prints them"
 
@@ -69,6 +71,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
     key = "motors"
     title = "Motors"
     settings_of, facts_of = MotorSettings, MotorFacts
+    messages = frozenset({"upload"})
     undo: ClassVar[dict[str, str]] = {"on_use": "Motors matched", "on_add": "Motors", "on_remove": "Motors"}
 
     def __init__(self, stage: Stage) -> None:
@@ -153,6 +156,30 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
         ]
 
     # Events
+
+    def handle(self, key: Hashable, value: object) -> None:
+        if key == ("upload",):
+            self.wake()
+            self._open(value)
+        else:
+            super().handle(key, value)
+
+    def step_name(self, key: Hashable) -> str:
+        return "Calibration" if key == ("upload",) else super().step_name(key)
+
+    def _open(self, value: object) -> None:
+        """Use a file with LeRobot's calibration that the page sends."""
+        try:
+            match value:
+                case [str(file), str(text)] if len(text.encode(errors="replace")) <= LARGEST:
+                    motors = kin.motors_from_lerobot(self.stage.now.robot, text)
+                    self._use(motors, f"The calibration {clean(file, 60)} is used")
+                case [str(file), _]:
+                    raise InputError("file", clean(file, 60), f"a file of at most {LARGEST // 1000} kB")
+                case _:
+                    raise InputError("upload", value, "the name and the text of a file")
+        except InputError as error:
+            self.stage.notify(Notice("error", "The file was not used", str(error)))
 
     def changed(self, path: str) -> None:
         motor = self.look().motor

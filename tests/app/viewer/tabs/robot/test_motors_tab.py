@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 from dataclasses import replace
@@ -145,6 +146,36 @@ def test_fields_change_one_motor_and_undo_takes_it_back(port: int) -> None:
         tab.say("undo")
         tab.settle()
         assert motors_of(tab)[1].range is None
+
+
+def test_a_calibration_is_opened_as_a_file(port: int) -> None:
+    entry = {"drive_mode": 0, "homing_offset": 5, "range_min": 700, "range_max": 3300}
+    text = json.dumps({motor.name: {"id": motor.id, **entry} for motor in SO101.motors})
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.choose("SO-101")
+        tab.say("feature", ["motors", ["upload"], ["my_arm.json", text]])
+        tab.wait(lambda: "The calibration my_arm.json is used" in tab.html)
+        tab.settle()
+        assert [motor.range for motor in motors_of(tab)] == [(700, 3300)] * len(SO101.motors)
+        for value, message in [
+            (["a.json", "{"], "LeRobot's calibration: for each motor the fields"),
+            (["a.json", text.replace('"drive_mode": 0', '"drive_mode": 7')], "drive_mode"),
+            (["a.json", text.replace("3300", "NaN")], "range_max"),
+            (["a.json", "{" * 14_000], "LeRobot's calibration: for each motor the fields"),
+            (["a.json", None], "a file of at most 15 kB"),
+            (["b.json", "x" * 15_001], "a file of at most 15 kB"),
+            ("x", "the name and the text of a file"),
+        ]:
+            tab.log.clear()
+            tab.say("feature", ["motors", ["upload"], value])
+            tab.wait(lambda: any("The file was not used" in str(m) for m in tab.log))
+            assert message in html.unescape(tab.html)
+        assert [motor.range for motor in motors_of(tab)] == [(700, 3300)] * len(SO101.motors)
+        tab.say("undo")
+        tab.wait(lambda: "Calibration" in tab.html)
+        tab.settle()
+        assert decode(tab.stored(), tuple(ROBOTS.values())).own is None
 
 
 def test_match_motors_shows_poses_and_writes_what_it_finds(port: int) -> None:

@@ -154,7 +154,7 @@ def test_parts_of_a_zip_fit_the_field_beside_other_messages_and_the_field_fits_a
         for file in ("robot", "upload", "input", "viser_page")
         for name, value in re.findall(r"const (\w+) = (\d+);", (STATIC / f"{file}.js").read_text(encoding="utf-8"))
     }
-    assert 4 / 3 * constants["PART_OF_ZIP"] + 12_000 < constants["LONGEST"] < MAX_MESSAGE - 8_000
+    assert 4 / 3 * constants["PART_OF_BYTES"] + 12_000 < constants["LONGEST"] < MAX_MESSAGE - 8_000
     assert constants["PAUSE"] < constants["REST"]
 
 

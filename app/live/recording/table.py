@@ -1,0 +1,98 @@
+"""Recordings as CSV: a row for each change of the commanded or the measured configuration, joint by joint."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import json
+import math
+
+from app.live.recording.recording import MEASURED, SHOWN, Bounds, Entry, Recording
+from kin import InputError, Robot
+
+WAYS = {"commanded": SHOWN, "measured": MEASURED}
+
+
+def heads(robot: Robot) -> list[str]:
+    """The first row of the table of an arm."""
+    units = ["rad" if turns else "m" for turns in robot.revolute]
+    joints = [joint.name.replace(",", " ") for joint in robot.joints]
+    return [
+        "t (s)",
+        *(f"{what} {name} ({unit})" for what in WAYS for name, unit in zip(joints, units, strict=True)),
+    ]
+
+
+def to_csv(recording: Recording) -> str:
+    """What was commanded and measured at each change, joint by joint; an empty cell: nothing yet."""
+    track = recording.track()
+    lines = [",".join(heads(recording.robot))]
+    for t, q, measured in zip(track.t.tolist(), track.commanded.tolist(), track.measured.tolist(), strict=True):
+        cells = ["" if value != value else repr(value) for value in (*q, *measured)]
+        lines.append(",".join([f"{t:.6f}", *cells]))
+    return "\n".join(lines) + "\n"
+
+
+def from_csv(data: bytes, robot: Robot, bounds: Bounds) -> Recording:
+    """A recording of this arm from the bytes of a file that `to_csv` wrote, as a spreadsheet may have saved it.
+
+    Raises:
+        InputError: it has more bytes than `bounds` says, is no such table, or that of an arm with other joints.
+    """
+    if len(data) > bounds.size:
+        raise InputError("recording", f"{len(data)} bytes", f"at most {bounds.size} bytes")
+    try:
+        rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
+        first = next(rows, [])
+        if first != heads(robot):
+            raise _other_table(first, robot)
+        entries: list[Entry] = []
+        last, seen = 0.0, dict.fromkeys(WAYS, "")
+        for row in rows:
+            last = _take(row, rows.line_num, robot.n, last, seen, entries)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError("recording", str(error), "a recording of a connection (CSV)") from None
+    return Recording(robot, bounds=bounds).restored(entries, last)
+
+
+def _take(row: list[str], line: int, n: int, last: float, seen: dict[str, str], entries: list[Entry]) -> float:
+    """Add what has changed in a row since those before; returns its time."""
+    if len(row) != 1 + 2 * n:
+        raise InputError(f"recording, line {line}", f"{len(row)} cells", f"{1 + 2 * n} cells")
+    t = _number(row[0], line)
+    if t < last:
+        raise InputError(f"recording, line {line}", row[0], f"a time from {last:g} s on")
+    before = len(entries)
+    for k, (what, topic) in enumerate(WAYS.items()):
+        cells = row[1 + k * n : 1 + (k + 1) * n]
+        values = [_number(cell, line) for cell in cells] if any(cells) else None
+        text = json.dumps({topic.rpartition("/")[2]: values})
+        if text != seen[what] and (values is not None or seen[what]):
+            entries.append(Entry(t, topic, text.encode()))
+            seen[what] = text
+    if len(entries) == before and entries:
+        entries.append(Entry(t, entries[-1].topic, entries[-1].data))  # said once more
+    return t
+
+
+def _number(cell: str, line: int) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"recording, line {line}", cell, "a number")
+    return value
+
+
+def _other_table(first: list[str], robot: Robot) -> InputError:
+    """Why this is not the first row of a recording of the arm."""
+    known = [name for name in first if name.startswith("commanded ")]
+    if first[:1] != ["t (s)"] or not known:
+        return InputError("recording", ", ".join(first), "a recording of a connection (MCAP or CSV)")
+    given, own = (
+        ", ".join(itertools.islice((name.removeprefix("commanded ") for name in names), robot.n + 1))
+        for names in (known, heads(robot)[1 : 1 + robot.n])
+    )
+    return InputError("recording", f"joints {given}", f"those of the arm on show, {robot.name}: {own}")
