@@ -56,8 +56,7 @@ def to_mjcf(robot: Robot | str) -> str:
     robot = robot_of(robot)
     bodies = bodies_of(robot)
     names = distinct([row.name for row in robot.joints])
-    taken = set(names)
-    base = unused("base", taken)
+    base = unused("base", set(names))
     links = [base, *names]
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
@@ -81,10 +80,7 @@ def to_mjcf(robot: Robot | str) -> str:
             *_geoms(robot, bodies, k, frames[k - 1], indent + "  "),
         ]
         if not any(each.link == k for each in bodies.capsules):
-            mass, radius = BALL
-            moment = repr(0.4 * mass * radius**2)
-            diagonal = " ".join([moment] * 3)
-            lines.append(f'{indent}  <inertial pos="0 0 0" mass="{mass!r}" diaginertia="{diagonal}"/>')
+            lines.append(f"{indent}  {_ball()}")
         before = frames[k - 1]
     tool = link_frames(robot, np.zeros(robot.n))[-1] @ robot.T_last_tool
     indent = "    " + "  " * (robot.n + 1)
@@ -120,6 +116,13 @@ def _joint(joint: Joint, name: str) -> str:
     if joint.effort is not None:
         text += f' actuatorfrcrange="{_numbers((-joint.effort, joint.effort))}"'
     return text + "/>"
+
+
+def _ball() -> str:
+    """The mass of a link without a capsule."""
+    mass, radius = BALL
+    diagonal = " ".join([repr(0.4 * mass * radius**2)] * 3)
+    return f'<inertial pos="0 0 0" mass="{mass!r}" diaginertia="{diagonal}"/>'
 
 
 def _geoms(robot: Robot, bodies: Bodies, link: int, T_world_body: Array, indent: str) -> Iterator[str]:
