@@ -138,7 +138,7 @@ def _others(known: Solved) -> dict[int, tuple[str, str]]:
     for name in known.names:
         differing = [a for a, b in zip(name.split(" · "), here, strict=True) if a != b]
         if len(differing) == 1:
-            found.append((name, differing[0]))
+            found.append((name, differing[0] if len(here) > 1 else ""))  # of one part nothing else is right
     found = (found or [(name, "") for name in known.names if name != known.here])[:3]
     # A single one comes after the right option, more of them around it.
     return dict(enumerate(found, 1 if len(found) > 1 else 2))
