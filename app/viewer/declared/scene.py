@@ -36,6 +36,7 @@ class Node:
         drag: the event of a handle that is dragged; the method also gets the phase and the position ``(3,)``.
         click: the event of a click.
         keep: whether it is only hidden when it is not shown.
+        once: whether its key is never used again once it is gone, so that nobody needs to remember its name.
     """
 
     kind: str
@@ -47,6 +48,7 @@ class Node:
     drag: tuple[Hashable, ...] | None = None
     keep: bool = True
     click: tuple[Hashable, ...] | None = None
+    once: bool = False
 
 
 @dataclass(slots=True, eq=False)
@@ -157,7 +159,9 @@ class SceneView:
         self._top = None
         self._shown.clear()
 
-    def _fill(self, parent: str, nodes: Sequence[Node | Lazy], shown: dict[str, _Shown]) -> None:
+    def _fill(
+        self, parent: str, nodes: Sequence[Node | Lazy], shown: dict[str, _Shown], once: bool = False
+    ) -> None:
         gone = set(shown)
         for node in nodes:
             gone.discard(node.key)
@@ -167,17 +171,18 @@ class SceneView:
                     one = shown[node.key] = _Shown(None, "", {}, True)
                 if not one.visible or one.args is None or not same(node.args, one.args):
                     one.args, one.visible = node.args, True
-                    self._fill(parent, node.view(*node.args), one.children)
+                    self._fill(parent, node.view(*node.args), one.children, once)
                 continue
             if one is None:
                 name = f"{parent}/{node.key}"
                 name = f"{name}~{next(self._again)}" if name in self._names else name
-                self._names.add(name)
+                if not (once or node.once):
+                    self._names.add(name)
                 one = shown[node.key] = self._make(name, node)
             else:
                 self._update(one, node)
             if node.children or one.children:
-                self._fill(one.handle.name, node.children, one.children)
+                self._fill(one.handle.name, node.children, one.children, once or node.once)
         for key in gone:
             if shown[key].handle is None:
                 shown[key].visible = False

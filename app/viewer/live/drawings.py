@@ -57,7 +57,7 @@ def _node(key: str, fields: Mapping[str, Any]) -> Node:
             node = axes(key, T, length, 0.03 * length)
         case _:
             node = label(key, fields["text"], fields["position"])
-    node.keep = False
+    node.keep, node.once = False, True
     return node
 
 

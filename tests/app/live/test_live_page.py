@@ -7,8 +7,10 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,8 @@ import kin
 from app.live import VALUES
 from app.service.main import create_app
 from app.shared.settings import Settings
+from app.viewer.declared.scene import Lazy, SceneView
+from app.viewer.live.drawings import merged, nodes
 
 ROOT = Path(__file__).parents[3]
 DOCUMENT = (ROOT / "docs/connect.md").read_text(encoding="utf-8")
@@ -344,3 +348,30 @@ def test_the_documents_have_the_schema_and_every_field():
     sent, heard = DOCUMENT.split("### What a program hears")
     assert set(re.findall(r"^\| `(\w+)` \|", sent, re.MULTILINE)) == set(schema["properties"])
     assert set(VALUES) < set(re.findall(r"^\| `(\w+)` \|", heard, re.MULTILINE))
+
+
+def test_drawings_that_are_replaced_all_day_leave_no_names_behind(monkeypatch):
+    made: list[str] = []
+
+    class Scene:
+        """A scene of viser's, as far as drawings use it."""
+
+        def __getattr__(self, add: str) -> Callable[..., Any]:
+            def added(name: str, *_: Any, **__: Any) -> Any:
+                made.append(name)
+                return SimpleNamespace(name=name, visible=True, remove=lambda: None)
+
+            return added
+
+    monkeypatch.setattr("app.viewer.declared.scene.assign", lambda *_: None)
+    view, numbers, drawings = SceneView(Scene(), "connect", lambda *_: None), count(1), {}  # type: ignore[arg-type]
+    more = {
+        "wall": {"kind": "line", "points": [[0, 0, 0], [0, 0, 1]], "width": 2, "color": "#ff0000"},
+        "place": {"kind": "frame", "position": [0, 0, 0], "wxyz": [1, 0, 0, 0], "length": 0.1},
+    }
+    for _ in range(100):
+        drawings = merged(drawings, more, numbers)
+        view.show([Lazy("drawings", nodes, (tuple(drawings.values()),))])
+    assert len(made) >= 200
+    assert len(set(made)) == len(made), "browsers give the pose of a removed node to the next one of its name"
+    assert len(view._names) == 0
