@@ -70,7 +70,7 @@ def counts(arm: Arm, key: StepKey, units: Units) -> str:
         "wrist": tuple(range(4 + (arm.family == "srs7"), arm.robot.n + 1)),
     }
     shifts = [shift for number in numbers.get(key, ()) if (shift := conversion(arm, number, units))]
-    return f" The slider counts otherwise: {', '.join(shifts)}." if shifts else ""
+    return f" The slider counts otherwise, up to a whole turn: {', '.join(shifts)}." if shifts else ""
 
 
 def conversion(arm: Arm, number: int, units: Units) -> str:
