@@ -136,7 +136,7 @@ def _named(answer: Any, asked: Asked) -> object:
 
 def _with_units(cells: Sequence[str], units: Sequence[str]) -> list[str]:
     pairs = zip(cells, units, strict=True)
-    known = {*ANGLES, *LENGTH_UNITS, "°/s", "rad/s"}  # those that depend on the reader
+    known = {*ANGLES, *LENGTH_UNITS, "°/s", "rad/s", "mm/s", "cm/s", "m/s"}  # those that depend on the reader
     return [f"{text} {unit}" if unit in known and _BARE.fullmatch(text) else text for text, unit in pairs]
 
 

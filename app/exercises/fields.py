@@ -216,6 +216,10 @@ class Fields:
             return (self._expression(field, value),)
         return tuple(self._expression(f"{field}[{i}]", item) for i, item in enumerate(self.items(field, least)))
 
+    def check_function(self, field: str, name: str) -> None:
+        """Refuse what cannot be the name of a function of one number."""
+        self._expression(field, f"{name}(1)")
+
     def _expression(self, field: str, value: object) -> Expression:
         if type(value) in (int, float):
             value = repr(value)

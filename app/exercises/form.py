@@ -20,6 +20,7 @@ from app.exercises.exercise import TOPICS
 from app.exercises.fields import MOST_ITEMS
 from app.exercises.files import LAST, MOST_HINTS, UNITS
 from app.exercises.kinds import KINDS
+from app.exercises.kinds.find import MEASURES, NONE
 from app.exercises.kinds.mistake import MISTAKES
 from app.exercises.kinds.number import OTHER, SCALES
 from app.exercises.lessons import LESSONS
@@ -275,6 +276,25 @@ ANSWERS: dict[str, tuple[Field, ...]] = {
         _TURNED,
         Cell("line", "Line to", "x, y and z of the end of a line that the tool drives from there.", "expressions"),
     ),
+    "find": (
+        Table(
+            "conditions",
+            "Conditions",
+            "All of them must hold where the arm is driven.",
+            "condition",
+            (
+                Cell("text", "Required", "As a part of a sentence.", "text"),
+                Cell("holds", "Holds if", "An expression about the arm at the answer.", "expression"),
+                Cell("wrong", "Otherwise", "Said if it does not hold.", "text"),
+                Cell("value", "Value", "Said after that.", "expression"),
+                Cell("measure", "Shown as", "", "choice", MEASURES),
+            ),
+            {"text": "the tool is above the base", "holds": "z > pz(0)", "wrong": "It is not above the base."},
+        ),
+        Cell("stays", "What stays", "Of the tool, as in the target.", "choice", (NONE, *TASKS)),
+        Cell("at", "For instance at", "One right configuration, one joint in each line.", "expressions"),
+        Cell("method", "Method", "How one is found.", "text"),
+    ),
     "solutions": (
         Cell("task", "What must match", "", "choice", tuple(TASKS)),
         Cell("rows", "Rows", "Of the form.", "number"),
@@ -317,6 +337,33 @@ ANSWERS: dict[str, tuple[Field, ...]] = {
         _TURNED,
     ),
     "order": (_MOTIONS, _FIXED_AXES),
+    "sort": (
+        Table(
+            "items",
+            "Things",
+            "At least two.",
+            "thing",
+            (
+                Cell("text", "Text", "", "text"),
+                Cell("value", "Size", "", "expression"),
+                Cell("shown", "Size in words", "Instead of the number."),
+                Cell("offered", "Offered when", _WHEN, "expression"),
+            ),
+            {"text": "Another one", "value": "0"},
+        ),
+        Cell("larger", "Larger ones are", "Such as: farther away."),
+        Cell("measure", "Sizes are shown as", "", "choice", MEASURES),
+        Cell("method", "Method", "How sizes are found.", "text"),
+    ),
+    "sketch": (
+        Cell("turns", "The joint turns", "0: it slides.", "expression"),
+        Cell("way", "Way", "", "expression"),
+        Cell("time", "Time, s", "", "expression"),
+        Cell("parts", "Parts", "Of the time; there is a value at the end of each.", "number"),
+        Cell("velocity", "Largest velocity", "In rad/s or m/s.", "expression"),
+        Cell("acceleration", "Largest acceleration", "In rad/s² or m/s².", "expression"),
+        Cell("method", "Method", "How one is found.", "text"),
+    ),
     "program": (
         Cell("straight", "Off the line at most, mm", "", "number"),
         Cell("arrives", "Off the target at most, mm", "", "number"),

@@ -31,9 +31,11 @@ same fields::
 
 Poses and figures are the lesson's own. The scene shows `end` with the right answer; `drawn` is a pose that shows a
 wrong one, with the answer as the value of a joint. Of lengths, it is two points: a bar as long as the answer leads
-from one towards the other, as in ``{ from = "tool", to = "target" }``; with `scale`, so many times as long. What
-is `withheld` is nowhere to be seen before. `arm` is one of the library that shows what this one cannot; a button
-changes to it. An `estimate` is asked before the question: it is a choice that looking answers.
+from one towards the other, as in ``{ from = "tool", to = "target" }``; with `scale`, so many times as long. The
+options of a choice are drawn as what its `leads` name: directions, poses of the arm, ways and frames of the
+lesson's own. `answered` is a figure of the last answer. What is `withheld` is nowhere to be seen before. `arm` is
+one of the library that shows what this one cannot; a button changes to it. An `estimate` is asked before the
+question: it is a choice that looking answers.
 
 An `example` is worked on an arm of its own: :mod:`app.exercises.worked`.
 
@@ -53,6 +55,7 @@ from app.exercises.contract import Kind
 from app.exercises.expressions import Expression
 from app.exercises.fields import ExerciseFileError, Fields, Words, text_of, toml_of
 from app.exercises.kinds import KINDS
+from app.exercises.kinds.choice import ChoiceKind
 from app.exercises.lessons import LESSONS
 from app.exercises.variant import Facts
 from app.exercises.worked import WorkedText, read_worked
@@ -60,17 +63,24 @@ from app.exercises.worked import WorkedText, read_worked
 _FACT = re.compile(r"([a-z][a-z0-9_]*)(?:\([a-z0-9_, ]+\))?")
 MOST_JOINTS = 12
 POINTS = ("tool", "end", "target")  # of the tool at the pose of a step, or at its end, and the step's target
+NOWHERE = "nowhere"
 _NONE = ""  # the name of no pose and of no figure
 
 
 @dataclass(frozen=True)
 class QuestionText:
-    """A question: when it is asked, its prompt, its kind with its fields, and the facts that it withholds."""
+    """A question: when it is asked, its prompt, its kind with its fields, and the facts that it withholds.
+
+    Attributes:
+        leads: of a choice, names of where its options lead, in the order of the file; `NOWHERE` for those that do
+            not. Empty: it is not drawn.
+    """
 
     when: Expression
     prompt: Words
     kind: Kind
     withheld: frozenset[str]
+    leads: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -95,6 +105,7 @@ class StepText:
         estimate: what is asked before, as `questions`.
         drawn: how an answer is drawn: a joint value as the pose that has it, with the number of the joint.
         arm: when another arm is offered, and its id.
+        answered: the name of a figure of the answer.
     """
 
     when: Expression
@@ -109,6 +120,7 @@ class StepText:
     figure: str
     drawn: tuple[str, int] | BarText | None
     arm: tuple[Expression, str] | None
+    answered: str = _NONE
 
 
 @dataclass(frozen=True)
@@ -203,6 +215,7 @@ def _step(fields: Fields) -> StepText:
         fields.text("figure", _NONE),
         _drawn(fields.sub("drawn")) if fields.has("drawn") else None,
         _arm(fields.sub("arm")) if fields.has("arm") else None,
+        fields.text("answered", _NONE),
     )
     fields.done()
     return step
@@ -254,6 +267,17 @@ def _question(fields: Fields) -> QuestionText:
     kind = KINDS[fields.choice("kind", KINDS)]
     prompt, when = fields.words("prompt"), fields.expression("when", "1")
     withheld = frozenset(fields.texts("withheld"))
-    question = QuestionText(when, prompt, kind.read(fields), withheld)
+    read = kind.read(fields)
+    question = QuestionText(when, prompt, read, withheld, _leads(fields, read))
     fields.done()
     return question
+
+
+def _leads(fields: Fields, kind: Kind) -> tuple[str, ...]:
+    """Where the options of a choice lead."""
+    if not fields.has("leads"):
+        return ()
+    leads = fields.texts("leads")
+    if not isinstance(kind, ChoiceKind) or kind.shuffle or len(leads) != len(kind.options):
+        raise fields.refuse("leads", list(leads), "a name for each option of a choice that is not shuffled")
+    return leads

@@ -28,7 +28,8 @@ class Facts(Mapping[str, "float | Function"]):
     Names: ``x y z`` of the tool point, the columns ``nx … az`` of its rotation, ``q1 … qn``, ``w`` (the
     manipulability), ``rank`` and ``n``. Functions of numbers from 1: ``J(row, joint)``, ``sigma(i)`` (singular
     values, the largest first), ``px(i) py(i) pz(i)`` (the origin of frame i; 0: the base), ``theta(i) d(i) a(i)
-    alpha(i)`` of a row, ``low(i) high(i)`` of a joint, and ``postures()``: how many solutions the tool's pose has.
+    alpha(i)`` of a row, ``q(i) low(i) high(i)`` of a joint, and ``postures()``: how many solutions the tool's
+    pose has.
     """
 
     def __init__(self, robot: Robot, q: Array) -> None:
@@ -40,6 +41,7 @@ class Facts(Mapping[str, "float | Function"]):
             "J": lambda: self._entry(kin.jacobian(robot, q)),
             "sigma": lambda: self._entry(np.linalg.svd(task_jacobian(robot, q), compute_uv=False)),
             "postures": lambda: lambda: self._postures,
+            "q": lambda: self._entry(q),
             "low": lambda: self._entry(robot.lower),
             "high": lambda: self._entry(robot.upper),
         }

@@ -67,8 +67,8 @@ class ReachKind(Kind):
         if self.task != "position":
             what = "orientation" if self.task == "pose" else "approach direction"
             conditions.append(f"its {what} within {units.angles.brief(self.rotation_tolerance)}")
-        if self.branch:
-            conditions.append(f"posture: {self.branch}")
+        if branch := variant.text(self.branch, units):
+            conditions.append(f"posture: {branch}")
         for joint, value in self.locked:
             unit = units.of(bool(robot.revolute[joint]))
             conditions.append(f"joint {joint + 1} at {unit.brief(variant.number(value))}")
@@ -83,14 +83,13 @@ class ReachKind(Kind):
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
         robot = variant.robot
         q = numbers(given, robot.n, "one configuration in radians and metres")
-        parts = [self._at_target(variant, q, units)]
-        if not robot.in_limits(q, 1e-6):
-            outside = [f"joint {i + 1}" for i in range(robot.n) if not robot.lower[i] <= q[i] <= robot.upper[i]]
-            parts.append((False, f"Outside its limits: {listed(outside)}."))
-        if self.branch:
+        parts = [at_target(variant, q, units, self.task, self.position_tolerance, self.rotation_tolerance)]
+        if outside := outside_limits(robot, q):
+            parts.append((False, outside))
+        if branch := variant.text(self.branch, units):
             name = kin.branch_of(robot, q)
-            fits = has_parts(name, self.branch)
-            parts.append((fits, f"The posture is “{name}”{'' if fits else f', asked is “{self.branch}”'}."))
+            fits = has_parts(name, branch)
+            parts.append((fits, f"The posture is “{name}”{'' if fits else f', asked is “{branch}”'}."))
         for joint, value in self.locked:
             unit, wanted = units.of(bool(robot.revolute[joint])), variant.number(value)
             fits = abs(q[joint] - wanted) <= LOCKED[0 if robot.revolute[joint] else 1]
@@ -108,21 +107,6 @@ class ReachKind(Kind):
             parts.append(self._along_line(variant, q, units) if parts[0][0] else (False, "The line begins there."))
         return Verdict.of(parts, " ".join(reason for _, reason in parts))
 
-    def _at_target(self, variant: Variant, q: Array, units: Units) -> tuple[bool, str]:
-        T, goal = kin.fk(variant.robot, q), variant.pose
-        off = float(np.linalg.norm(T[:3, 3] - goal[:3, 3]))
-        if off > self.position_tolerance:
-            return False, f"The tool is {units.lengths.text(off, 1)} from the target.{self._negated(variant, q)}"
-        turned = (
-            float(rotation_angle(T[:3, :3], goal[:3, :3]))
-            if self.task == "pose"
-            else float(vector_angle(T[:3, 2], goal[:3, 2]))
-        )
-        if self.task != "position" and turned > self.rotation_tolerance:
-            what = "orientation" if self.task == "pose" else "approach direction"
-            return False, f"The point is reached; the {what} is off by {units.angles.text(turned, 1)}."
-        return True, "The target is reached."
-
     def _along_line(self, variant: Variant, q: Array, units: Units) -> tuple[bool, str]:
         """Whether the tool can drive the line from a configuration without a change of posture."""
         x, y, z = (variant.number(value) for value in self.line)
@@ -131,18 +115,6 @@ class ReachKind(Kind):
         if motion.planned:
             return True, "From this posture the whole line can be driven."
         return False, f"From this posture the line does not go through. {motion.explain(units)}"
-
-    def _negated(self, variant: Variant, q: Array) -> str:
-        """Whether one joint with the other sign would reach the target."""
-        for i in range(variant.robot.n):
-            flipped = q.copy()
-            flipped[i] = -flipped[i]
-            point, now = kin.fk(variant.robot, flipped)[:3, 3], kin.fk(variant.robot, q)[:3, 3]
-            there = np.linalg.norm(point - variant.pose[:3, 3]) <= self.position_tolerance
-            # A small joint value brings the tool there by chance, when another joint is a little wrong.
-            if there and np.linalg.norm(point - now) > FAR * self.position_tolerance:
-                return f" With the other sign of joint {i + 1} it would be there."
-        return ""
 
     def _in_margin(self, robot: Robot, q: Array, units: Units) -> tuple[bool, str]:
         span = robot.upper - robot.lower
@@ -168,7 +140,7 @@ class ReachKind(Kind):
             ]
         options = IKOptions(
             task=self.task,
-            branch=self.branch or None,
+            branch=variant.text(self.branch, Units()) or None,
             constraints=JointConstraints(limits=limits, locked=locked),
             prefer="manipulability" if variant.number(self.manipulability) > 0.0 else "nearest",
         )
@@ -201,3 +173,44 @@ class ReachKind(Kind):
 def has_parts(name: str, wanted: str) -> bool:
     """Whether the name of a branch, such as ``"shoulder left · elbow up"``, has the parts asked for."""
     return all(part.strip() in name for part in wanted.split(","))
+
+
+def at_target(
+    variant: Variant, q: Array, units: Units, task: str, position_tolerance: float, rotation_tolerance: float
+) -> tuple[bool, str]:
+    """Whether the tool is at the pose of a variant as far as the task asks, and what is said; m and rad."""
+    T, goal = kin.fk(variant.robot, q), variant.pose
+    off = float(np.linalg.norm(T[:3, 3] - goal[:3, 3]))
+    if off > position_tolerance:
+        negated = _negated(variant, q, position_tolerance)
+        return False, f"The tool is {units.lengths.text(off, 1)} from the target.{negated}"
+    turned = (
+        float(rotation_angle(T[:3, :3], goal[:3, :3]))
+        if task == "pose"
+        else float(vector_angle(T[:3, 2], goal[:3, 2]))
+    )
+    if task != "position" and turned > rotation_tolerance:
+        what = "orientation" if task == "pose" else "approach direction"
+        return False, f"The point is reached; the {what} is off by {units.angles.text(turned, 1)}."
+    return True, "The target is reached."
+
+
+def _negated(variant: Variant, q: Array, near: float) -> str:
+    """Whether one joint with the other sign would reach the target."""
+    for i in range(variant.robot.n):
+        flipped = q.copy()
+        flipped[i] = -flipped[i]
+        point, now = kin.fk(variant.robot, flipped)[:3, 3], kin.fk(variant.robot, q)[:3, 3]
+        there = np.linalg.norm(point - variant.pose[:3, 3]) <= near
+        # A small joint value brings the tool there by chance, when another joint is a little wrong.
+        if there and np.linalg.norm(point - now) > FAR * near:
+            return f" With the other sign of joint {i + 1} it would be there."
+    return ""
+
+
+def outside_limits(robot: Robot, q: Array) -> str:
+    """Which joints are outside their limits, in words; "" if none is."""
+    if robot.in_limits(q, 1e-6):
+        return ""
+    outside = [f"joint {i + 1}" for i in range(robot.n) if not robot.lower[i] <= q[i] <= robot.upper[i]]
+    return f"Outside its limits: {listed(outside)}."

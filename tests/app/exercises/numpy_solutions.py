@@ -680,3 +680,24 @@ def newton_step(v: Numbers, labels: list[str]) -> object:
     step = 1e-6
     J = (turn("z", step) @ np.array([v["r"], 0.0, 0.0, 1.0]))[1] / step
     return plain(v["e"] / J / DEG)
+
+
+@solves("axis-counterexample")
+def axis_counterexample(v: Numbers, labels: list[str]) -> object:
+    (one, two), _ = rows_of("planar2r")
+    first = v["t"] + 2 * DEG
+    lowered = math.asin(-one["a"] * math.sin(first) / two["a"])  # of link 2, so that it ends on the axis
+    return [first, lowered - first]
+
+
+@solves("joints-by-speed")
+def joints_by_speed(v: Numbers, labels: list[str]) -> object:
+    J = jacobian("ur5", [0.0, v["t2"], v["t3"], -math.pi / 2, -math.pi / 2, 0.0])
+    speeds = [float(np.linalg.norm(J[:3, int(label.removeprefix("Joint ")) - 1])) for label in labels]
+    return sorted(range(len(labels)), key=speeds.__getitem__)
+
+
+@solves("sketch-profile")
+def sketch_profile(v: Numbers, labels: list[str]) -> object:
+    top = 1.5 * v["way"] / 3.0 / DEG  # two thirds of the time at it, by area
+    return plain(0.0, top / 2, top, top, top, top / 2, 0.0)

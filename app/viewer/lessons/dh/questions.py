@@ -10,9 +10,12 @@ from typing import cast
 import numpy as np
 
 from app.exercises.rows import Factor, turns
+from app.exercises.variant import Quantity
+from app.viewer.lessons.axes import axes_at
 from app.viewer.lessons.dh.steps import MOVED, amount, axis_name, expression, low, symbol, value
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
-from app.viewer.lessons.guide.outline import Outline, Pose
+from app.viewer.lessons.guide.leads import DOWN, UP, direction, level, line
+from app.viewer.lessons.guide.outline import Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration, distance, moved
 from kin import Comparison, Robot, compare, fk, link_frames
 from kin.axes import joint_axes, pairs
@@ -22,8 +25,16 @@ from kin.units import Units
 
 TURN = math.radians(30.0)
 SLIDE = 0.05
+ROW = {  # an example whose motions do not commute
+    "turn": Quantity(math.radians(40.0), "angle"),
+    "rise": Quantity(0.3, "length"),
+    "reach_out": Quantity(0.2, "length"),
+    "twist": Quantity(math.radians(60.0), "angle"),
+}
 _SKEW = 0.01  # sine of a twist that turns the next axis
 RELATIONS = ("one", "parallel", "perpendicular", "meet", "skew")  # by their numbers in the file
+LYING = ("one line", "parallel", "right angle", "another angle", "skew")  # what the options of these are drawn as
+OFF = 0.15  # of the reach: between two lines that do not meet
 VERDICTS = ("identical", "same", "different")
 
 
@@ -73,7 +84,44 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         ),
     }
     poses = {"home": Pose(as_configuration(robot.q_home)), "moved": Pose(as_configuration(q))}
-    return LessonFacts({name: float(number) for name, number in numbers.items()}, functions, words, poses)
+    values = {name: float(number) for name, number in numbers.items()}
+    return LessonFacts({**values, **ROW}, functions, words, poses, leads=leads(robot, pair))
+
+
+def leads(robot: Robot, pair: int) -> dict[str, Lead | None]:
+    """Where options lead: from the base to the tool, and along a second axis that lies as an option says.
+
+    Args:
+        pair: the number of the first of two axes; the second is where the option says, and truly where it is.
+    """
+    base, tool = robot.T_world_base[:3, 3], fk(robot, robot.q_home)[:3, 3]
+    way = tool - base
+    side, up = float(np.hypot(way[0], way[1])), float(way[2])
+    ways = {"above": UP, "beside": level(way), "below": DOWN}
+    ways["above" if up > side else "below" if -up > side else "beside"] = way
+    found = {name: direction(robot, base, each) for name, each in ways.items()}
+    if robot.n < 2:
+        return {**found, **dict.fromkeys(LYING)}
+    points, axes = axes_at(robot, robot.q_home)
+    point, z, off = points[pair - 1], axes[pair - 1], OFF * robot.reach
+    across = np.cross(z, [1.0, 0.0, 0.0] if abs(z[0]) < 0.7 else [0.0, 1.0, 0.0])
+    across /= np.linalg.norm(across)
+    third = np.cross(z, across)
+    lines = dict(
+        zip(
+            LYING,
+            (
+                (point, z),
+                (point + off * third, z),
+                (point, across),
+                (point, (z + across) / math.sqrt(2.0)),
+                (point + off * third, across),
+            ),
+            strict=True,
+        )
+    )
+    lines[LYING[RELATIONS.index(relation(robot, pair - 1))]] = points[pair], axes[pair]
+    return {**found, **{name: line(robot, *each) for name, each in lines.items()}}
 
 
 def _little(robot: Robot, joint: int) -> float:

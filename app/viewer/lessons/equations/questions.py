@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
+from app.exercises.variant import Quantity
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
-from app.viewer.lessons.guide.outline import Outline, Pose
+from app.viewer.lessons.guide.leads import DOWN, UP, bar, direction
+from app.viewer.lessons.guide.outline import Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from kin import Robot, fk, jacobian
 from kin.axes import NEARLY
@@ -14,6 +18,9 @@ from kin.transforms import Array
 from kin.units import Units, fixed
 
 SAMPLES = 8
+LEVEL = 1e-3  # m of height that count as none
+NEAR = 0.01  # m by which a printed coordinate may differ from the right one
+_TRIED, _ROUNDS = 40, 20
 
 
 def outline(robot: Robot, units: Units) -> Outline:
@@ -27,21 +34,58 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     a = np.cross(T[:3, 0], T[:3, 1])
     k, tested = int(np.argmax(np.abs(a))), int(np.argmax(np.abs(T[:3, 0])))
     i, j = "xyz"[(k + 1) % 3], "xyz"[(k + 2) % 3]
+    entry = int(np.argmax(np.abs(T[:3, 3])))
+    hidden = without(robot, entry)
     product = flipped(T, tested, 0)
-    numbers = {
+    numbers: dict[str, float | Quantity] = {
         "largest": float(a[k]),
         "found": float(product > NEARLY),
+        "entry": entry + 1.0,
+        "hidden": float(hidden is not None),
+        "near": Quantity(NEAR, "length"),
         "raises": float(changes_height(robot, 0)),
     }
     words = {
         "p": "(" + ", ".join(units.lengths.number(v) for v in T[:3, 3].tolist()) + f"){units.lengths.suffix}",
         **{f"{name}_column": _vector(T[:3, column]) for column, name in enumerate("noa")},
+        "entry_name": f"p{'xyz'[entry]}",
         "component": "xyz"[k],
         "terms": f"n{i} o{j} − n{j} o{i}",
         "tested": f"n{'xyz'[tested]}",
         "product": fixed(product, 3),
     }
-    return LessonFacts(numbers, {}, words, {"home": Pose(as_configuration(robot.q_home))})
+    there = robot.q_home if hidden is None else hidden
+    functions = {"hides": lambda joint: float(there[int(joint) - 1])}
+    return LessonFacts(
+        numbers, functions, words, {"home": Pose(as_configuration(robot.q_home))}, leads=leads(robot, T)
+    )
+
+
+def leads(robot: Robot, T: Array) -> dict[str, Lead | None]:
+    """The columns of the tool's pose ``(4, 4)``, and ways up, level and down to where the tool point is."""
+    p, foot = T[:3, 3], np.array([T[0, 3], T[1, 3], 0.0])
+    ways = {name: direction(robot, p, T[:3, column]) for column, name in enumerate("noa")}
+    heights = {"higher": direction(robot, foot, UP), "lower": direction(robot, foot, DOWN)}
+    if abs(p[2]) > LEVEL:
+        heights["higher" if p[2] > 0.0 else "lower"] = bar(foot, p)
+    level = bar(np.zeros(3), foot) if np.linalg.norm(foot) > LEVEL else None
+    return {**ways, **heights, "p": bar(np.zeros(3), p), "as high": level}
+
+
+@lru_cache(maxsize=64)
+def without(robot: Robot, entry: int) -> Array | None:
+    """A configuration ``(n,)`` with one coordinate of the tool point at zero; None: none, or home has it."""
+    if abs(fk(robot, robot.q_home)[entry, 3]) <= NEAR:
+        return None
+    for q in (robot.q_home, *robot.random_q(np.random.default_rng(6), _TRIED)):
+        for _ in range(_ROUNDS):
+            value, row = float(fk(robot, q)[entry, 3]), jacobian(robot, q)[entry]
+            if abs(value) < 0.01 * NEAR:
+                return np.asarray(q)
+            if not (size := float(row @ row)) > 1e-9:
+                break
+            q = np.clip(q - value / size * row, robot.lower, robot.upper)
+    return None
 
 
 def _vector(column: Array) -> str:

@@ -7,15 +7,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.exercises.questions import Number
-from app.viewer.declared.scene import Color, Node, bars, label
+from app.exercises.contract import Posed
+from app.exercises.questions import Choice, Number, Question
+from app.viewer.declared.scene import Color, Node, axes, bars, label
+from app.viewer.exercises.drawing import SIZE
 from app.viewer.lessons.figure_shapes import GREEN, VERMILION
-from app.viewer.lessons.guide.outline import Bar, Drawn, Step
+from app.viewer.lessons.guide.outline import Bar, Drawn, Ghost, Lead, Leads, Path, Place, Step
 from app.viewer.scene.meshes import body
 from app.viewer.skeleton import ghost
-from kin import Robot, fk
-from kin.transforms import Array
+from kin import Robot, fk, link_frames
+from kin.transforms import Array, from_position_wxyz
 
+YOURS = "your answer"
 OPACITY = 0.42  # of a copy of the arm
 THICK, DASHES = 0.6, 9  # of a bar, in the arm's thickness; parts of a broken one
 FARTHEST = 3.0  # reaches of the arm that a bar is long at most; its label has the value
@@ -27,18 +30,93 @@ def answer_nodes(robot: Robot, step: Step, given: object, closed: bool) -> list[
     match step.drawn:
         case Drawn() if isinstance(given, float | int) and not closed:
             q = np.array(step.drawn.at(float(given)))
-            name = label("words", "your answer", fk(robot, q)[:3, 3], anchor=None)
+            name = label("words", YOURS, fk(robot, q)[:3, 3], anchor=None)
             return [ghost("arm", robot, q, VERMILION, OPACITY), name]
         case Bar() if isinstance(step.question, Number) and _is_way(step.question):
             question, nodes = step.question, list[Node]()
             if isinstance(given, float | int) and not question.judge(float(given)).right:
-                words = f"your answer: {question.unit.text(float(given))}"
+                words = f"{YOURS}: {question.unit.text(float(given))}"
                 nodes += _bar("wrong", robot, step.drawn, float(given), words, VERMILION, broken=True)
             if closed:
                 words = f"right: {question.value_text}"
                 nodes += _bar("right", robot, step.drawn, question.answer, words, GREEN, broken=False)
             return nodes
+        case Leads():
+            return lead_nodes(robot, step.question, step.drawn, given, closed)
+    if isinstance(step.question, Posed) and step.question.asked().form == "frame":
+        return _frame_nodes(robot, step.question, given, closed)
     return []
+
+
+def lead_nodes(robot: Robot, question: Question | None, leads: Leads, given: object, closed: bool) -> list[Node]:
+    """Where the chosen option leads if it is wrong, and the right one once it is on show."""
+    nodes = list[Node]()
+    if not isinstance(question, Choice):
+        return nodes
+    right = type(given) is int and question.is_answer(given) and question.options[given].right
+    if type(given) is int and question.is_answer(given) and not right:
+        nodes += _lead("wrong", robot, leads.options[given], YOURS, VERMILION, broken=True)
+    if closed:
+        at = given if right and type(given) is int else question.right()
+        nodes += _lead("right", robot, leads.options[at], "right", GREEN, broken=False)
+    return nodes
+
+
+def _lead(key: str, robot: Robot, lead: Lead | None, words: str, color: Color, broken: bool) -> list[Node]:
+    match lead:
+        case Bar():
+            length = float(np.linalg.norm(np.subtract(lead.end, lead.start)))
+            return _bar(key, robot, lead, length, words, color, broken)
+        case Ghost():
+            q = np.array(lead.q)
+            joints = np.concatenate([robot.T_world_base[None], link_frames(robot, q)])[:, :3, 3]
+            name = label(f"{key}-words", words, fk(robot, q)[:3, 3], anchor=None)
+            return [ghost(key, robot, q, color, OPACITY), _line(f"{key}-line", robot, joints, color, broken), name]
+        case Path():
+            points = np.array(lead.points)
+            name = label(f"{key}-words", words, points[len(points) // 2], anchor="bottom-center")
+            return [_line(key, robot, points, color, broken), name]
+        case Place():
+            return _frame(key, np.array(lead.T), lead.length, words, color, broken)
+    return []
+
+
+def _line(key: str, robot: Robot, points: Array, color: Color, broken: bool) -> Node:
+    """A line through points ``(k, 3)``, whole or of parts."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    count = 2 * 3 * DASHES if broken else max(2, len(points))
+    at = np.linspace(0.0, way[-1], count) if broken else way
+    along = np.stack([np.interp(at, way, points[:, i]) for i in range(3)], axis=1)
+    ends = along.reshape(-1, 2, 3) if broken else np.stack([along[:-1], along[1:]], axis=1)
+    return bars(key, ends, color, THICK * body(robot).size)
+
+
+def _frame(key: str, T: Array, length: float, words: str, color: Color, broken: bool) -> list[Node]:
+    """The axes of a frame, thin if they are broken, with an origin of this colour."""
+    radius = (0.02 if broken else 0.05) * length
+    node = axes(key, T, length, radius, origin_color=color, origin_radius=3.0 * radius)
+    return [node, label(f"{key}-words", words, T[:3, 3] + 1.15 * length * T[:3, 2], anchor="bottom-center")]
+
+
+def _frame_nodes(robot: Robot, question: Posed, given: object, closed: bool) -> list[Node]:
+    """The frame that was placed, if it is wrong, and the right one with the way between both."""
+    nodes, length = list[Node](), SIZE * robot.reach
+    right = _pose_of(question.right())
+    wrong = None
+    if isinstance(given, list) and question.is_answer(given) and not question.judge(given).right:
+        wrong = _pose_of(given)
+        nodes += _frame("wrong", wrong, length, YOURS, VERMILION, broken=True)
+    if closed:
+        nodes += _frame("right", right, length, "right", GREEN, broken=False)
+        if wrong is not None and np.linalg.norm(wrong[:3, 3] - right[:3, 3]) > 1e-6:
+            points = np.stack([wrong[:3, 3], right[:3, 3]])
+            nodes.append(_line("between", robot, points, VERMILION, broken=True))
+    return nodes
+
+
+def _pose_of(given: object) -> Array:
+    values = np.array(given, dtype=float)
+    return from_position_wxyz(values[:3], values[3:] / np.linalg.norm(values[3:]))
 
 
 def _is_way(question: Number) -> bool:

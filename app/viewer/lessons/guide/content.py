@@ -12,10 +12,19 @@ from markupsafe import Markup
 
 from app.exercises.expressions import Expression, Function
 from app.exercises.fields import ExerciseFileError
-from app.exercises.lesson_text import BarText, LessonText, QuestionText, StepText, lesson_files, load_lesson
+from app.exercises.kinds.choice import ChoiceKind
+from app.exercises.lesson_text import (
+    NOWHERE,
+    BarText,
+    LessonText,
+    QuestionText,
+    StepText,
+    lesson_files,
+    load_lesson,
+)
 from app.exercises.variant import Quantity, Variant
 from app.exercises.worked import WorkedText
-from app.viewer.lessons.guide.outline import Bar, Drawn, Outline, Pose, Question, Step
+from app.viewer.lessons.guide.outline import Answered, Bar, Drawn, Lead, Leads, Outline, Pose, Question, Step
 from kin import Robot, fk
 from kin.units import Units
 
@@ -32,6 +41,8 @@ class LessonFacts:
         words: texts, in the reader's units.
         poses: those that steps are about. A step that names none has the pose "home".
         figures: those that are shown with an answer.
+        answered: figures of an answer, by the names that steps give.
+        leads: where options of choices lead, by the names that questions give; None: nowhere on this arm.
     """
 
     numbers: Mapping[str, float | Quantity]
@@ -39,6 +50,8 @@ class LessonFacts:
     words: Mapping[str, str] = field(default_factory=dict)
     poses: Mapping[str, Pose] = field(default_factory=dict)
     figures: Mapping[str, Markup] = field(default_factory=dict)
+    leads: Mapping[str, Lead | None] = field(default_factory=dict)
+    answered: Mapping[str, Answered] = field(default_factory=dict)
 
 
 @cache
@@ -98,8 +111,22 @@ class _Maker:
             raise ExerciseFileError(self.file, field, name, f"one of {', '.join(sorted(offered))}")
         return offered.get(name)
 
-    def drawn(self, text: StepText) -> Drawn | Bar | None:
+    def leads(self, text: QuestionText | None) -> Leads | None:
+        """Where the options lead that are offered for this arm."""
+        if text is None or not text.leads or not isinstance(text.kind, ChoiceKind):
+            return None
+        names = [
+            name
+            for name, (*_, offered) in zip(text.leads, text.kind.options, strict=True)
+            if self.variant.number(offered)
+        ]
+        known = {**self.facts.leads, NOWHERE: None}
+        return Leads(tuple(self.named("leads", name, known) for name in names))
+
+    def drawn(self, text: StepText, asked: QuestionText | None) -> Drawn | Bar | Leads | None:
         """How answers to a step are drawn."""
+        if (leads := self.leads(asked)) is not None:
+            return leads
         match text.drawn:
             case BarText():
                 start = self._point(text, text.drawn.start)
@@ -143,7 +170,9 @@ class _Maker:
             practice,
             self.named("figure", text.figure, self.facts.figures),
             withheld=frozenset() if asked is None else asked.withheld,
-            drawn=self.drawn(text),
+            drawn=self.drawn(text, asked),
             estimate=None if before is None else self.question(before),
+            guessed=self.leads(before),
+            answered=self.named("answered", text.answered, self.facts.answered),
             arm="" if text.arm is None or not self.holds(text.arm[0]) else text.arm[1],
         )

@@ -17,7 +17,7 @@ from app.viewer.exercises.drawing import GHOST, Drawing
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import earlier, views
-from app.viewer.lessons.guide.answer_drawing import answer_nodes
+from app.viewer.lessons.guide.answer_drawing import answer_nodes, lead_nodes
 from app.viewer.lessons.guide.content import written_example
 from app.viewer.lessons.guide.example_view import ExampleView
 from app.viewer.lessons.guide.lesson import Lesson
@@ -300,9 +300,14 @@ class Guide(Feature):
             self._bring()
 
     def _move_to_end(self, key: str) -> None:
-        """Let the scene show the answer to a question of the step on show."""
+        """Let the scene show the answer to a question of the step on show; an arm that was driven there stays."""
         steps, at = self._progress.outline.steps, self._progress.at
-        if key == str(at + 1) and at < len(steps) and (end := steps[at].end) is not None:
+        if key != str(at + 1) or at >= len(steps):
+            return
+        question, end = steps[at].question, steps[at].end
+        if end is None and key in self._progress.revealed and question is not None:
+            end = Pose(tuple(question.right())) if question.asked().form == "posture" else None  # type: ignore[arg-type]
+        if end is not None:
             self._show_pose(end, "The arm shows the answer.")
 
     def _show_pose(self, pose: Pose, words: str) -> None:
@@ -356,8 +361,12 @@ class Guide(Feature):
         progress = self._progress
         steps, key, nodes = progress.outline.steps, str(progress.at + 1), list[Node]()
         if progress.at < len(steps):
-            robot, closed = self.stage.now.robot, progress.is_closed(key)
-            nodes = answer_nodes(robot, steps[progress.at], progress.given.get(key), closed)
+            robot, step = self.stage.now.robot, steps[progress.at]
+            nodes = answer_nodes(robot, step, progress.given.get(key), progress.is_closed(key))
+            if not nodes and step.guessed is not None and key not in progress.given:
+                before = f"e{key}"
+                given, closed = progress.given.get(before), progress.is_closed(before)
+                nodes = lead_nodes(robot, step.estimate, step.guessed, given, closed)
         self._copies.show(nodes)
 
     def _show_joints(self, on: bool) -> None:

@@ -6,7 +6,7 @@ in radians, metres and SI units.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from markupsafe import Markup
@@ -35,10 +35,15 @@ __all__ = [
     "Choice",
     "Configuration",
     "Drawn",
+    "Ghost",
+    "Lead",
+    "Leads",
     "Mistake",
     "Number",
     "Option",
     "Outline",
+    "Path",
+    "Place",
     "Pose",
     "Question",
     "Step",
@@ -50,6 +55,7 @@ __all__ = [
 ]
 
 Configuration = tuple[float, ...]
+Answered = Callable[[object, bool, bool], Markup]  # of an answer, whether it is right, and a right one is on show
 
 
 @dataclass(frozen=True)
@@ -104,6 +110,38 @@ class Bar:
 
 
 @dataclass(frozen=True)
+class Ghost:
+    """An option that leads the arm to a configuration ``(n,)``: a copy of it is drawn there."""
+
+    q: Configuration
+
+
+@dataclass(frozen=True)
+class Path:
+    """An option that leads along points ``(k, 3)`` (m)."""
+
+    points: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Place:
+    """An option that leads a frame to a pose ``(4, 4)``, by rows; its axes are drawn with this length (m)."""
+
+    T: tuple[tuple[float, ...], ...]
+    length: float
+
+
+Lead = Bar | Ghost | Path | Place
+
+
+@dataclass(frozen=True)
+class Leads:
+    """Where the options of a choice lead, in their order; None: this one leads nowhere."""
+
+    options: tuple[Lead | None, ...]
+
+
+@dataclass(frozen=True)
 class Step:
     """One step of a lesson. Opening it brings the scene to its pose, as one step of undo.
 
@@ -117,6 +155,8 @@ class Step:
         figure: a figure that belongs to `shown`.
         drawn: what the scene shows of an answer, beside what it shows anyway.
         estimate: what is asked before the question, and answered by looking.
+        guessed: how its answer is drawn, as `drawn`.
+        answered: a figure of the last answer, which also has the right one once it is on show.
         arm: the id of an arm of the library that shows what the arm on show cannot; "": it can.
         withheld: facts that nothing in the page shows while the question is open:
             names of `app.viewer.activity.activity.FACTS`.
@@ -131,8 +171,10 @@ class Step:
     practice: str = ""
     figure: Markup | None = None
     withheld: frozenset[str] = frozenset()
-    drawn: Drawn | Bar | None = None
+    drawn: Drawn | Bar | Leads | None = None
     estimate: Question | None = None
+    guessed: Leads | None = None
+    answered: Answered | None = None
     arm: str = ""
 
 

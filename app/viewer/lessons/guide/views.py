@@ -56,6 +56,7 @@ def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "") -> s
         )
     step, key, before = steps[at], str(at + 1), f"e{at + 1}"
     closed = step.question is None or progress.is_closed(key)
+    fine, given = progress.mark(key) == "right", progress.given.get(key)
     estimate = step.estimate if not closed or progress.mark(before) != "open" else None
     return render(
         "guide/step",
@@ -66,6 +67,7 @@ def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "") -> s
         question=None if step.question is None else _question(progress, key, step.question, sheets),
         estimate=None if estimate is None else _question(progress, before, estimate, sheets),
         open=closed,
+        answered="" if step.answered is None else step.answered(given, fine, closed),
     )
 
 

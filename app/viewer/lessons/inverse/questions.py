@@ -8,9 +8,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from app.viewer.lessons.guide.leads import bar, up_or_down
 from app.viewer.lessons.guide.outline import (
     Choice,
     Drawn,
+    Leads,
     Mistake,
     Number,
     Option,
@@ -50,7 +52,8 @@ def outline(robot: Robot, units: Units) -> Outline:
 def outline_of(given: Exercise, units: Units) -> Outline:
     """The outline for a target and the branch that is followed."""
     texts, keys = words.texts(given.arm.robot, units), given.arm.keys
-    steps = tuple(_step(given, key, step, units) for key, step in zip(keys, texts.steps, strict=True))
+    asked, more = texts.steps[: len(keys)], texts.steps[len(keys) :]  # those after the derivation are as they are
+    steps = (*(_step(given, key, step, units) for key, step in zip(keys, asked, strict=True)), *more)
     return replace(texts, steps=steps, pose=Pose(as_configuration(given.q)))
 
 
@@ -59,7 +62,10 @@ def _step(given: Exercise, key: StepKey, step: Step, units: Units) -> Step:
     branch, text = given.followed, step.text + words.counts(given.arm, key, units)
     found, ended = branch.derivation.step(key), branch.derivation.failed
     if key == "centre":
-        text, step = f"{_target(given, units)} {text}", replace(step, estimate=_estimate(given))
+        text, step = (
+            f"{_target(given, units)} {text}",
+            replace(step, estimate=_estimate(given), guessed=_guessed(given)),
+        )
     if key == "joints":
         end = Pose(as_configuration(branch.q)) if branch.available and branch.q is not None else None
         practice = f"The numbers below lead to the branch {branch.name}. Choose another one with Follow."
@@ -72,6 +78,9 @@ def _step(given: Exercise, key: StepKey, step: Step, units: Units) -> Step:
         return replace(step, text=f"{text} {words.failure_text(found, units)}{_way_back(given)}")
     question, text = _question(given, found, units), f"{text} {words.special_text(given.arm, found)}".rstrip()
     step = replace(step, text=text, question=question, practice=_shown(given, found))
+    if question is not None and key == "centre" and given.arm.robot.n == 2:  # the distance of the tool
+        base, tool = given.arm.robot.T_world_base[:3, 3], given.T[:3, 3]
+        return replace(step, drawn=bar(base, tool))
     if question is None or question.unit != units.angles:
         return step
     return replace(step, withheld=TURNS, drawn=_drawn(given, key))
@@ -124,6 +133,18 @@ def _estimate(given: Exercise) -> Choice:
         "Look at the arm, whose tool is at the target: which way does the tool point?",
         tuple(Option(text, why, right) for text, right in directions),
     )
+
+
+def _guessed(given: Exercise) -> Leads:
+    """Where the options of the estimate lead."""
+    robot, tool = given.arm.robot, given.T[:3, 3]
+    if given.arm.family != "planar":
+        found = up_or_down(robot, tool, given.T[:3, 2], LEVEL)
+        return Leads((found["up"], found["level"], found["down"]))
+    base = robot.T_world_base[:3, 3]
+    far = float(np.linalg.norm(tool - base)) / robot.reach
+    shares = (far, 0.5 * (HALF + 1.0)) if far < HALF else (0.5 * HALF, far)
+    return Leads(tuple(bar(base, base + share / max(far, 1e-9) * (tool - base)) for share in shares))
 
 
 def _shown(given: Exercise, found: DerivedStep) -> str:

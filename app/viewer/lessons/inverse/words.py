@@ -8,16 +8,20 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
+import numpy as np
+
 from app.exercises.variant import Quantity
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.inverse.arm import Arm, arm_of
 from app.viewer.lessons.inverse.sheet import DerivedStep, StepKey
-from kin import Robot
+from kin import Robot, branch_names, fk, solve_ik
 from kin.axes import is_zero
+from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units, fixed
 
+TRIED = 30  # configurations
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
@@ -47,7 +51,27 @@ def _facts(robot: Robot) -> LessonFacts:
     }
     elbow = sub(f"θ{2 if family == 'planar' else 4 if family == 'srs7' else 3}")
     home = Pose(as_configuration(robot.q_home))
-    return LessonFacts(numbers, words={"elbow": elbow, "arm": robot.name}, poses={"home": home})
+    most, strays = fewer(robot) if branch_names(robot) else (0, None)
+    there = robot.q_home if strays is None else strays
+    numbers |= {"most": float(most), "fewer": float(strays is not None)}
+    functions = {"strays": lambda joint: float(there[int(joint) - 1])}
+    return LessonFacts(numbers, functions, {"elbow": elbow, "arm": robot.name}, {"home": home})
+
+
+@lru_cache(maxsize=64)
+def fewer(robot: Robot) -> tuple[int, Array | None]:
+    """How many postures reach the pose of home, and a configuration ``(n,)`` whose pose fewer reach."""
+
+    def count(q: Array) -> int:
+        return len(solve_ik(robot, fk(robot, q), q_seed=q).solutions)
+
+    most = count(robot.q_home)
+    stretched = robot.q_home.copy()
+    stretched[1:] = np.clip(0.0, robot.lower[1:], robot.upper[1:])
+    tried = (stretched, *robot.random_q(np.random.default_rng(8), TRIED))
+    if robot.n == 2:  # a planar arm: only the point is asked for
+        return most, stretched
+    return most, next((np.asarray(q) for q in tried if 0 < count(q) < most), None)
 
 
 def title(arm: Arm, key: StepKey) -> str:

@@ -8,7 +8,8 @@ import numpy as np
 from markupsafe import Markup
 
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
-from app.viewer.lessons.guide.outline import Outline, Pose
+from app.viewer.lessons.guide.leads import bar
+from app.viewer.lessons.guide.outline import Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.numeric.example import Example, example
 from app.viewer.lessons.numeric.settings import LIMITS
@@ -16,10 +17,11 @@ from app.viewer.lessons.numeric.views import NAMES, amount, error_chart
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from kin import Robot, fk, get_robot
 from kin.differential import iteration
-from kin.differential.iteration import Method, Problem, Settings
+from kin.differential.iteration import Method, Problem, Run, Settings
 from kin.transforms import Array
 from kin.units import Units, power
 
+NEVER = 1e6  # steps of a method that does not arrive
 DAMPING, ERROR = 0.1, 0.2
 # Settings of the lesson that show what the steps speak of, and what changes with the answers.
 DRAWING: dict[str, object] = {"start": None, "at": None, "damping": DAMPING, "gain": 1.0, "longest": LIMITS[1]}
@@ -56,6 +58,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "sum": np.abs(there - here).sum(),
         "newton": newton.count,
         "transpose": transpose.count,
+        "damped": damped.count,
         "arrives": transpose.outcome == "reached",
         "sigma": sigma,
         "damping": DAMPING,
@@ -83,10 +86,31 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "newton": error_chart(problem, [("newton", newton)], units),
         "transpose": error_chart(problem, [("newton", newton), ("transpose", transpose)], units),
         "damped": error_chart(problem, [("newton", newton), ("damped", damped)], units),
+        "three": error_chart(problem, [("newton", newton), ("damped", damped), ("transpose", transpose)], units),
         "singularity": _near_singularity(units),
     }
     values = {name: float(value) for name, value in numbers.items()}
-    return LessonFacts(values, {}, words, poses, figures)
+    words |= {
+        f"needs{place}": f"{each.count} steps" if each.outcome == "reached" else "does not arrive"
+        for place, each in enumerate((newton, damped, transpose), 1)
+    }
+    steps = [_steps(each) for each in (newton, damped, transpose)]
+    functions = {"needs": lambda place: steps[int(place) - 1]}
+    return LessonFacts(values, functions, words, poses, figures, leads(robot, here, there))
+
+
+def leads(robot: Robot, here: Array, there: Array) -> dict[str, Lead | None]:
+    """From the tool towards its target, as far as an estimate says; the true one leads to the target."""
+    way = there - here
+    part = float(np.linalg.norm(way)) / robot.reach
+    shares = {"near": 0.05, "middle": 0.3, "distant": 0.7}
+    shares["near" if part < 0.1 else "middle" if part <= 0.5 else "distant"] = part
+    return {name: bar(here, here + share / part * way) for name, share in shares.items()}
+
+
+def _steps(run: Run) -> float:
+    """How many steps it takes; more than any number of steps if it does not arrive."""
+    return float(run.count) if run.outcome == "reached" else NEVER
 
 
 def _place(point: Array, units: Units) -> str:

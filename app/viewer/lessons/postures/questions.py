@@ -11,7 +11,7 @@ import numpy as np
 
 from app.exports.worksheet.sheet import SUBSCRIPTS
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
-from app.viewer.lessons.guide.outline import Configuration, Outline, Pose
+from app.viewer.lessons.guide.outline import Configuration, Ghost, Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration, distance
 from app.viewer.lessons.postures import planar
 from app.viewer.scene.chain import rotation
@@ -37,6 +37,8 @@ class Solved(NamedTuple):
         rolled: how many solutions within the limits there are if the tool is rolled by `ROLL`.
         roll: the status of that target.
         rank: of the Jacobian at home.
+        goal: the posture of another solution, the one that differs in the fewest parts; "" if there is none.
+        postures: a configuration of each branch that reaches the pose, or the point, within the limits.
     """
 
     names: tuple[str, ...]
@@ -46,6 +48,8 @@ class Solved(NamedTuple):
     rolled: int
     roll: Status
     rank: int
+    goal: str
+    postures: dict[str, Configuration]
 
 
 @lru_cache(maxsize=64)
@@ -59,7 +63,17 @@ def solved(robot: Robot) -> Solved:
     other = as_configuration(solutions[int(np.argmax(away))].q) if away and max(away) > 1e-3 else None
     status, rolled = _exact(robot, T @ rotation(2, ROLL))
     here = branch_of(robot, q) if names else ""
-    return Solved(names, here, len(solutions), other, len(rolled), status, rank(robot, jacobian(robot, q), NEARLY))
+    point = solve(robot, T[:3, 3], IKOptions(task="position"), q).solutions if robot.n < 6 and names else ()
+    postures = {branch_of(robot, s.q): as_configuration(s.q) for s in (*point, *solutions) if names}
+    reached = postures.keys() - {here}
+    goal = min(sorted(reached), key=lambda name: _parts_apart(name, here), default="")
+    at_home = rank(robot, jacobian(robot, q), NEARLY)
+    return Solved(names, here, len(solutions), other, len(rolled), status, at_home, goal, postures)
+
+
+def _parts_apart(one: str, other: str) -> int:
+    """In how many parts two names of postures differ."""
+    return sum(a != b for a, b in zip(one.split(" · "), other.split(" · "), strict=True))
 
 
 def _exact(robot: Robot, T: Array) -> tuple[Status, tuple[IKSolution, ...]]:
@@ -95,7 +109,13 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "rolled": known.rolled,
         "limits": known.roll is Status.LIMITS,
     }
-    words = {"here": known.here, "roll": units.angles.brief(ROLL), "meanings": _meanings(robot)}
+    numbers["reachable"] = bool(known.goal)
+    words = {
+        "here": known.here,
+        "goal_posture": known.goal,
+        "roll": units.angles.brief(ROLL),
+        "meanings": _meanings(robot),
+    }
     words["stretched_shown"] = f"{100.0 * numbers['stretched']:.0f} %"
     for place in (1, 2, 3):
         words[f"other{place}"], words[f"part{place}"] = wrong.get(place, ("", ""))
@@ -110,7 +130,11 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     if planar.is_planar(robot):
         poses |= planar.poses(robot)
     values = {name: float(value) for name, value in numbers.items()}
-    return LessonFacts(values | by_hand, functions, words | by_hand_words, poses)
+    leads: dict[str, Lead | None] = {"here": Ghost(home.q)}
+    for place in (1, 2, 3):
+        q = known.postures.get(wrong.get(place, ("", ""))[0])
+        leads[f"other{place}"] = None if q is None else Ghost(q)
+    return LessonFacts(values | by_hand, functions, words | by_hand_words, poses, leads=leads)
 
 
 def beyond(robot: Robot) -> tuple[float, ...]:

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
+
 import numpy as np
 
+from app.exercises.variant import Quantity
+from app.viewer.lessons.axes import axes_at
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
-from app.viewer.lessons.guide.outline import Outline, Pose
+from app.viewer.lessons.guide.leads import line
+from app.viewer.lessons.guide.outline import Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
-from kin import Robot, jacobian
+from kin import Robot, fk, jacobian
 from kin.axes import NEARLY
+from kin.differential.null_space import lead
 from kin.differential.task import free_motions, rank
 from kin.transforms import Array
 from kin.units import Units, fixed
 
 STILL = 1e-6
+WAYS, ROOM, PARTS = (math.radians(30.0), math.radians(15.0), math.radians(5.0)), 1.2, 31
 
 
 def outline(robot: Robot, units: Units) -> Outline:
@@ -28,7 +36,11 @@ def facts(robot: Robot) -> LessonFacts:
     slow = [k for k in np.argsort(size).tolist() if size[k] < size.max() - STILL]
     slow = slow[:2] + slow[2:][-1:]
     fast = [k for k in range(robot.n) if size[k] >= size.max() - STILL][:2]
-    numbers = {
+    joint, led, there = self_moved(robot)
+    numbers: dict[str, float | Quantity] = {
+        "leads": joint + 1.0,
+        "led": Quantity(led, "angle"),
+        "led_from": float(robot.q_home[joint]),
         "joints": float(robot.n),
         "free": float(free),
         "rank_of_pose": float(robot.n - free),
@@ -46,13 +58,54 @@ def facts(robot: Robot) -> LessonFacts:
         **{f"fast{i}": f"Joint {k + 1}" for i, k in enumerate(fast, 1)},
     }
     names = (*(f"{name}{i}" for name in ("slow", "speed") for i in (1, 2, 3)), "fast2")
-    functions = {"still": lambda place: float(size[slow[int(place) - 1]] < STILL)}
+    functions = {
+        "led_to": lambda joint: float(there[int(joint) - 1]),
+        "still": lambda place: float(size[slow[int(place) - 1]] < STILL),
+    }
+    points, ways = axes_at(robot, robot.q_home)
+    chosen = {f"slow{i}": k for i, k in enumerate(slow, 1)} | {f"fast{i}": k for i, k in enumerate(fast, 1)}
+    leads: dict[str, Lead | None] = {
+        **dict.fromkeys(("slow1", "slow2", "slow3", "fast1", "fast2")),
+        **{name: line(robot, points[k], ways[k]) for name, k in chosen.items()},
+    }
     home = as_configuration(robot.q_home)
     poses = {
         "home": Pose(home, drawing={"swing": False}),
         "self-motion": Pose(home, drawing={"swing": bool(np.any(z))}),
     }
-    return LessonFacts(numbers, functions, dict.fromkeys(names, "") | words, poses)
+    return LessonFacts(numbers, functions, dict.fromkeys(names, "") | words, poses, leads=leads)
+
+
+@lru_cache(maxsize=64)
+def self_moved(robot: Robot) -> tuple[int, float, Array]:
+    """A joint that a self-motion from home moves by one of `WAYS`, this way, and the configuration ``(n,)`` then.
+
+    It is found by the null space; the joint is −1 if no self-motion moves one so far. Joints that turn only.
+    """
+    home, z = robot.q_home, np.abs(null_vector(robot))
+    if not z.any() or free_motions(robot, "pose") == 0:
+        return -1, 0.0, home
+    for way in WAYS:
+        for joint in np.argsort(-z).tolist():
+            if not robot.revolute[joint] or z[joint] < STILL:
+                continue
+            for end in (ROOM * way, -ROOM * way):
+                found = _led(robot, joint, end)
+                if found is not None and robot.in_limits(found):
+                    return joint, way, found
+    return -1, 0.0, home
+
+
+def _led(robot: Robot, joint: int, end: float) -> Array | None:
+    """The configuration after a self-motion that moves a joint by `end` (rad) from home; None: it ends."""
+    home, T = robot.q_home, fk(robot, robot.q_home)
+    q = home
+    for part in np.linspace(0.0, end, PARTS)[1:].tolist():
+        after = lead(robot, q, T, "pose", joint, float(home[joint]) + part)
+        if after is None:
+            return None
+        q = after
+    return q
 
 
 def null_vector(robot: Robot) -> Array:

@@ -26,7 +26,7 @@ COLORS = BLUE, GREEN, AMBER
 
 def room(robot: Robot) -> Sphere:
     """Where the frames are."""
-    return _anchor(robot), ROOM * body(robot).radius
+    return anchor(robot), ROOM * body(robot).radius
 
 
 def frames(facts: RotationsFacts, figure: FigureNodes, click: tuple[Hashable, ...]) -> list[Node]:
@@ -39,10 +39,11 @@ def frames(facts: RotationsFacts, figure: FigureNodes, click: tuple[Hashable, ..
     fixed = _frame("fixed", np.eye(4), 0.8 * length, THIN)
     tip = 0 if facts.settings.chained else 2  # frames of a chain are often above the fixed one
     name = label("fixed-name", "{0}", 0.92 * length * np.eye(3)[tip])
-    return [frame("beside", fixed, name, *shown, position=_anchor(facts.robot))]
+    return [frame("beside", fixed, name, *shown, position=anchor(facts.robot))]
 
 
-def _anchor(robot: Robot) -> Array:
+def anchor(robot: Robot) -> Array:
+    """Where the frames begin, beside the arm ``(3,)``."""
     shape = body(robot)
     anchor = np.array(shape.center, dtype=np.float64)
     anchor[1] += ASIDE * shape.radius

@@ -7,17 +7,22 @@ from functools import lru_cache
 
 import numpy as np
 
+from app.exercises.variant import Quantity
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
-from app.viewer.lessons.guide.outline import Outline, Pose
+from app.viewer.lessons.guide.leads import direction, place, up_or_down
+from app.viewer.lessons.guide.outline import Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.rotations.conventions import PAGE, Convention, axis_angle
-from app.viewer.lessons.rotations.frames import Motion, as_json
+from app.viewer.lessons.rotations.drawing import LENGTH, anchor
+from app.viewer.lessons.rotations.frames import Motion, as_json, places
+from app.viewer.scene.chain import rotation
+from app.viewer.scene.meshes import body
 from kin import Robot, fk
 from kin.axes import inverse
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units, fixed
 
-_SAMPLES = 64
+_SAMPLES, LEVEL = 64, 0.1  # configurations; the vertical part of a direction that is nearly level
 ZYZ = Convention("zyz", False)
 TWO_TURNS = Motion(True, 2, math.pi / 2, True), Motion(True, 0, math.pi / 2, True)
 # The 1st and the 3rd axis coincide.
@@ -94,16 +99,56 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "locked": Pose(start, drawing=LOCKED),
         "no turns": Pose(start, drawing={"chained": True, "chain": []}),
         "two turns": Pose(start, drawing={"chained": True, "chain": as_json(TWO_TURNS)}),
+        "placed": Pose(start, drawing={"chained": True, "chain": as_json(placed(robot))}),
         "camera": Pose(start, drawing={"chained": True, "chain": as_json(camera(robot))}),
     }
     poses["home"] = poses["tool"]  # of steps without a pose of their own
-    return LessonFacts({name: float(value) for name, value in numbers.items()}, {}, words, poses)
+    values: dict[str, float | Quantity] = {name: float(value) for name, value in numbers.items()}
+    found = {**values, "far": Quantity(slide_of(robot), "length")}
+    return LessonFacts(found, {}, words, poses, leads=leads(robot, T))
+
+
+def leads(robot: Robot, T: Array) -> dict[str, Lead | None]:
+    """Where options lead: beside the arm, where the lesson draws its frames, and at the tool ``(4, 4)``."""
+    length, beside = LENGTH * body(robot).radius, np.eye(4)
+    beside[:3, 3] = anchor(robot)
+    alpha, beta, gamma = PAGE.twin.angles(T[:3, :3])
+    there, on = (_product(part) for part in (camera(robot)[:2], camera(robot)[2:]))
+    frames = {
+        "fixed order": rotation(2, alpha) @ rotation(1, beta) @ rotation(0, gamma),
+        "other order": rotation(0, gamma) @ rotation(1, beta) @ rotation(2, alpha),
+        "other angles": rotation(2, gamma) @ rotation(1, beta) @ rotation(0, alpha),
+        "camera then workpiece": there @ on,
+        "workpiece then camera": on @ there,
+        "back and workpiece": inverse(there) @ on,
+    }
+    ways = {"minus y": (0.0, -1.0, 0.0), "plus x": (1.0, 0.0, 0.0), "minus x": (-1.0, 0.0, 0.0)}
+    return {
+        **up_or_down(robot, T[:3, 3], T[:3, 2], LEVEL),
+        **{name: direction(robot, anchor(robot), np.array(way)) for name, way in ways.items()},
+        **{name: place(beside @ F, length) for name, F in frames.items()},
+    }
+
+
+def _product(motions: tuple[Motion, ...]) -> Array:
+    return np.asarray(places(motions)[-1])
 
 
 def camera(robot: Robot) -> tuple[Motion, ...]:
     """The way to a camera that looks down, and from it to a workpiece."""
     far = round(0.3 * robot.reach, 2)
     return Motion(False, 2, far, True), Motion(True, 0, math.pi, True), Motion(False, 2, round(0.6 * far, 2), True)
+
+
+def slide_of(robot: Robot) -> float:
+    """By how much the frame of the last step slides (m), in steps of 50 mm."""
+    return max(round(0.4 * robot.reach / 0.05), 2) * 0.05
+
+
+def placed(robot: Robot) -> tuple[Motion, ...]:
+    """The motions of the last step."""
+    slide = Motion(False, 2, slide_of(robot), True)
+    return slide, Motion(True, 0, math.pi / 2, True), slide
 
 
 def turned(R: Array, convention: Convention) -> dict[str, object]:

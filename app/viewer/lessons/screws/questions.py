@@ -8,15 +8,17 @@ import numpy as np
 
 from app.viewer.lessons.axes import axes_at
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
-from app.viewer.lessons.guide.outline import LEAST, Outline, Pose
+from app.viewer.lessons.guide.outline import LEAST, Configuration, Ghost, Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.screws.product import foot
 from kin import Robot, screws
 from kin.transforms import Array
 from kin.units import Units, fixed
 
+TURNED = math.radians(40.0)
 UPRIGHT = 0.999  # of the vertical part of a direction
 SPACE = {"form": "space", "axes": "zero"}
+MOST_SORTED, APART = 4, 0.04  # joints that are sorted, and how different they are, in the largest |v|
 _INDICES = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
@@ -43,14 +45,31 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     far_numbers, far_words = _far(robot, found.S, units)
     joint = far_joint(found.S)
     nearest = np.zeros(3) if joint < 0 else foot(found.S[:, joint])
+    chosen = far_apart(found.S)
+    sizes = np.linalg.norm(found.S[3:, chosen], axis=0)
+    numbers["sorted"] = float(len(chosen))
+    names = {f"near{place}": f"Joint {k + 1}" for place, k in enumerate(chosen, 1)}
+    words |= {f"near{place}": "" for place in range(1, MOST_SORTED + 1)} | names
     functions = {
+        "passes": lambda place: float(sizes[int(place) - 1]),
         "turns": lambda joint: float(robot.revolute[int(joint) - 1]),
         "foot": lambda coordinate: float(nearest[int(coordinate) - 1]),
     }
     home, zeros = as_configuration(robot.q_home), np.zeros(n)
     zero = as_configuration(zeros) if robot.in_limits(zeros) else home
     poses = {"home": Pose(home), "zero": Pose(zero, drawing=SPACE)}
-    return LessonFacts(numbers | far_numbers, functions, words | far_words, poses)
+    leads: dict[str, Lead | None] = {
+        "last first": Ghost(alone(robot, n - 1)),
+        "joint 1 first": Ghost(alone(robot, 0)),
+    }
+    return LessonFacts(numbers | far_numbers, functions, words | far_words, poses, leads=leads)
+
+
+def alone(robot: Robot, joint: int) -> Configuration:
+    """All joints at zero but one, which is where it is at home, or moved if it is at zero there too."""
+    q = np.zeros(robot.n)
+    q[joint] = robot.q_home[joint] or (TURNED if robot.revolute[joint] else 0.1 * robot.reach)
+    return as_configuration(q)
 
 
 def _far(robot: Robot, S: Array, units: Units) -> tuple[dict[str, float], dict[str, str]]:
@@ -77,6 +96,16 @@ def _far(robot: Robot, S: Array, units: Units) -> tuple[dict[str, float], dict[s
         "near_axis": "xyz"[axis],
         "near_v": _vector(v),
     }
+
+
+def far_apart(S: Array) -> list[int]:
+    """Up to `MOST_SORTED` joints that turn, all differently far from the origin; none if there is only one."""
+    size = np.linalg.norm(S[3:], axis=0)
+    chosen: list[int] = []
+    for k in np.flatnonzero(np.linalg.norm(S[:3], axis=0) > 0.5).tolist():
+        if all(abs(size[k] - size[other]) > APART * size.max() for other in chosen):
+            chosen.append(k)
+    return chosen[:MOST_SORTED] if len(chosen) > 1 else []
 
 
 def _vector(values: Array) -> str:

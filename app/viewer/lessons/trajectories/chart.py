@@ -20,11 +20,18 @@ FEW = 4  # numbers on an axis
 
 
 class Curve(NamedTuple):
-    """One curve: its name, and for each row its values ``(k,)`` at `times` ``(k,)``; None: not in this row."""
+    """One curve: its name, and for each row its values ``(k,)`` at `times` ``(k,)``; None: not in this row.
+
+    Attributes:
+        color: as CSS; "": the next one.
+        broken: whether its line is.
+    """
 
     name: str
     times: Array
     rows: tuple[Array | None, ...]
+    color: str = ""
+    broken: bool = False
 
 
 @dataclass(frozen=True)
@@ -70,10 +77,16 @@ def chart(rows: tuple[Row, ...], curves: tuple[Curve, ...], label: str, axis: st
                 f'<text x="{x:.1f}" y="{bottom + 13:.1f}" text-anchor="middle" class="kb-axis">{words}</text>'
             )
     name = Markup('<span class="kb-chart-name"><i style="background:{}"></i>{}</span> ')
-    legend = Markup("").join(name.format(joint_colour(i), curve.name) for i, curve in enumerate(curves))
+    legend = Markup("").join(name.format(_key(i, curve), curve.name) for i, curve in enumerate(curves))
     words = "; ".join(_extremes(row, k, curves, axis) for k, row in enumerate(rows))
     drawn = Markup(svg.chart(WIDTH, bottom + BOTTOM, f"{label}. {words}.", "".join(parts)))
     return Markup('<span class="kb-chart">') + drawn + legend + Markup("</span>")
+
+
+def _key(index: int, curve: Curve) -> str:
+    """The background of a curve's mark in the legend: broken as its line is."""
+    color = curve.color or joint_colour(index)
+    return f"repeating-linear-gradient(90deg,{color} 0 4px,transparent 4px 6px)" if curve.broken else color
 
 
 def _extremes(row: Row, k: int, curves: tuple[Curve, ...], axis: str) -> str:
@@ -114,7 +127,9 @@ def _row(row: Row, k: int, curves: tuple[Curve, ...], ends: tuple[float, float])
             across = LEFT + (curve.times - ends[0]) / (ends[1] - ends[0]) * (right - LEFT)
             points = zip(across.tolist(), np.vectorize(y)(shown).tolist(), strict=True)
             path = "L".join(f"{a:.1f} {b:.1f}" for a, b in points)
-            parts.append(f'<path class="kb-motion-curve" d="M{path}" stroke="{joint_colour(i)}"/>')
+            dashes = ' stroke-dasharray="5 3"' if curve.broken else ""
+            color = curve.color or joint_colour(i)
+            parts.append(f'<path class="kb-motion-curve" d="M{path}" stroke="{color}"{dashes}/>')
     parts.append(
         f'<rect x="{LEFT}" y="{top:.1f}" width="{right - LEFT:.1f}" height="{HIGH}" fill="none" '
         'stroke="currentColor" stroke-opacity=".4"/>'

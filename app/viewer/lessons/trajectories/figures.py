@@ -7,13 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
+from app.exercises.typed import EntryError, read_number
+from app.viewer.lessons.figure_shapes import GREEN, VERMILION
+from app.viewer.lessons.guide.outline import Answered
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
-from app.viewer.lessons.trajectories.motions import Ways, example, family, frequency, sampled, swing
+from app.viewer.lessons.trajectories.motions import Sketched, Ways, example, family, frequency, sampled, swing
 from kin import Robot
 from kin.motion import profiles
 from kin.transforms import Array
 from kin.units import Unit, Units
 
+RIGHT, WRONG = (f"rgb{color}" for color in (GREEN, VERMILION))
+SHORTEST, LONGEST = 0.2, 5.0  # of the right time, or of the limit: what is drawn
 _TITLES = ("Position", "Velocity", "Acceleration", "Jerk")
 
 
@@ -102,3 +107,68 @@ def elbows(share: Array, found: Array, angles: Unit) -> Markup:
     )
     rows = (Row(f"Joint 1, {angles.name}", np.pi * angles.scale),)
     return chart(rows, curves, "Joint 1 along the line, both elbows", "%")
+
+
+def timed(unit: Unit, way: float, limits: Array) -> Answered:
+    """The velocity of a trapezoidal profile that takes a typed time, beside the fastest within the limits.
+
+    It accelerates as the joint may; if the time is too short for that, it is a triangle that is steeper.
+    """
+    v, a = limits[:2].tolist()
+
+    right = way / v + v / a
+
+    def figure(given: object, fine: bool, closed: bool) -> Markup:
+        curves = []
+        if isinstance(given, float | int) and not fine and SHORTEST * right < given < LONGEST * right:
+            curves.append(
+                Curve(f"your answer {given:.2f} s", *_trapezoid(float(given), way, a, unit), WRONG, True)
+            )
+        if closed:
+            curves.append(Curve(f"right {right:.2f} s", *_trapezoid(right, way, a, unit), RIGHT))
+        if not curves:
+            return Markup("")
+        rows = (Row(f"Velocity, {unit.name}/s", v * unit.scale, shows=(0.0,)),)
+        return chart(rows, tuple(curves), "Velocity of the trapezoidal profile")
+
+    return figure
+
+
+def _trapezoid(time: float, way: float, a: float, unit: Unit) -> tuple[Array, tuple[Array]]:
+    """Corners of the velocity that covers a way in a time, with slope `a` where that is possible."""
+    free = (a * time) ** 2 - 4.0 * a * way
+    top = 0.5 * (a * time - free**0.5) if free >= 0.0 else 2.0 * way / time
+    ramp = top / a if free >= 0.0 else 0.5 * time
+    times = np.array([0.0, ramp, time - ramp, time])
+    return times, (np.array([0.0, top, top, 0.0]) * unit.scale,)
+
+
+def sketched(unit: Unit, asked: Sketched, limits: Array) -> Answered:
+    """A sketch of the velocity, and a right one beside one that is wrong once that is on show."""
+    v = float(limits[0])
+    rate, right = Unit(f"{unit.name}/s", unit.scale, unit.finer), asked.trapezoid
+    times = np.linspace(0.0, asked.time, len(right))
+
+    def figure(given: object, fine: bool, closed: bool) -> Markup:
+        curves, values = [], _typed(given, rate, len(times))
+        if values is not None and np.abs(values).max() <= LONGEST * v:
+            color = RIGHT if fine else WRONG
+            curves.append(Curve("your sketch", times, (values * unit.scale,), color, not fine))
+        if closed and not fine:
+            curves.append(Curve("a right one", times, (right * unit.scale,), RIGHT))
+        if not curves:
+            return Markup("")
+        rows = (Row(f"Velocity, {unit.name}/s", v * unit.scale, shows=(0.0,)),)
+        return chart(rows, tuple(curves), "Sketch of the velocity")
+
+    return figure
+
+
+def _typed(given: object, unit: Unit, count: int) -> Array | None:
+    """So many typed numbers ``(count,)``; None for anything else, such as an answer of an old link."""
+    if not isinstance(given, list) or len(given) != count or not all(isinstance(text, str) for text in given):
+        return None
+    try:
+        return np.array([read_number(text, unit) for text in given])
+    except EntryError:
+        return None

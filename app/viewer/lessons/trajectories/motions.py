@@ -3,6 +3,7 @@ load."""
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from kin.motion.profiles import Profile
 from kin.transforms import Array
 
 SAMPLES = 161
+ROOM, TIME_STEP = 1.05, 0.06  # of the time of a sketch: how much more than it needs, and its step (s)
 STEPS = (0.6, 0.45, 0.3, 0.2, 0.12, 0.06)  # parts of a joint's way that are tried for the two poses
 SLOWEST, FASTEST, DAMPING = 2.0, 25.0, 0.01  # Hz of the swinging load, and part of the critical damping
 AFTER = 8  # periods of swinging that are shown
@@ -37,6 +39,28 @@ def example(robot: Robot) -> Example:
     found = np.array([limits.velocity[0], limits.acceleration[0], limits.jerk[0]])
     v, a, j = found.tolist()
     return Example(0, robot.joints[0].name, 1.5 * (v * v / a + v * a / j), found)
+
+
+class Sketched(NamedTuple):
+    """What the student sketches: a way (rad or m) of the example's joint, and its time (s)."""
+
+    way: float
+    time: float
+
+    @property
+    def trapezoid(self) -> Array:
+        """Velocities at the ends of sixths of the time ``(7,)``: two are a ramp, two the plateau, two a ramp."""
+        return 1.5 * self.way / self.time * np.array([0.0, 0.5, 1.0, 1.0, 1.0, 0.5, 0.0])
+
+
+def sketched(robot: Robot) -> Sketched:
+    """A round way and time; a trapezoid with two ramps of a third of it covers the way within the limits."""
+    _, _, way, (v, a, _) = example(robot)
+    step = math.radians(10.0) if robot.revolute[0] else 0.05
+    way = max(round(way / step), 1) * step
+    # Its plateau is 1.5 way / T, and its ramps are of T / 3.
+    least = max(1.5 * way / v, math.sqrt(4.5 * way / a))
+    return Sketched(way, math.ceil(ROOM * least / TIME_STEP) * TIME_STEP)
 
 
 def joint_ends(robot: Robot) -> tuple[Array, Array]:

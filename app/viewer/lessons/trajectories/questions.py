@@ -8,22 +8,26 @@ from functools import lru_cache
 import numpy as np
 
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
-from app.viewer.lessons.guide.outline import Outline, Pose
+from app.viewer.lessons.guide.outline import Lead, Outline, Path, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.trajectories import figures
 from app.viewer.lessons.trajectories.motions import (
+    Ways,
     both_elbows,
     example,
     family,
     frequency,
     joint_ends,
     residual,
+    sketched,
     turning_past,
     ways,
 )
 from kin import Robot
 from kin.units import Units
 
+LONG = 1.5  # ways of the sketch
+POINTS = 41  # of a way that is drawn
 SPEED, HALF = 0.2, 0.25  # m/s of the tool, and half the length of the line past the axis
 OFFSETS = (0.1, 0.05, 0.02)  # m
 LINKS, START, END = (1.0, 0.6), (-1.2, 0.7), (-1.2, -0.3)  # m: two links, and a line in their plane
@@ -43,17 +47,31 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     share, elbows = both_elbows(START, END, LINKS)
     hertz, decimals = frequency(robot), 0 if units.degrees else 2
     swings = residual(found["trapezoidal"], hertz) / max(residual(found["S-curve"], hertz), 1e-12)
+    sketch = sketched(robot)
+    long, (v, a, _) = LONG * sketch.way, joint.limits.tolist()
     numbers = {
         "both": float(between is not None),
         "speed": SPEED,
         "closest": OFFSETS[0],
         "swings": swings,
+        "turns": float(robot.revolute[0]),
+        "sketched": sketch.way,
+        "sketch_time": sketch.time,
+        "largest": float(joint.limits[0]),
+        "shortest": long / v + v / a,
+        "at_top": long / v,
+        "as_triangle": 2.0 * math.sqrt(long / a),
+        "steepest": float(joint.limits[1]),
     }
     rates = (f"{angles.number(float(rate.max()), decimals)} {angles.name}/s" for _, rate in past)
     words = {
         "joint": joint.name,
         "way": unit.text(joint.way),
         "velocity": f"{unit.number(float(joint.limits[0]), 0)} {unit.name}/s",
+        "acceleration": f"{unit.brief(float(joint.limits[1]))}/s²",
+        "long_way": unit.brief(long),
+        "sketch_way": unit.brief(sketch.way),
+        "sketch_seconds": f"{sketch.time:.3g}",
         "duration": f"{found['cubic'].duration:.2f}",
         "speed_shown": f"{lengths.brief(SPEED)}/s",
         "closest_shown": lengths.brief(OFFSETS[0]),
@@ -78,6 +96,10 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "load": figures.load(robot, unit),
         "elbows": figures.elbows(share, elbows, angles),
     }
+    answered = {
+        "time": figures.timed(unit, long, joint.limits),
+        "sketch": figures.sketched(unit, sketch, joint.limits),
+    }
     if between is not None:
         _, off = between.off_line()
         ptp, lin = between
@@ -87,7 +109,22 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
             "lin": f"{lin.duration:.2f}",
         }
         shown["ways"] = figures.two_ways(between, units)
-    return LessonFacts(numbers, {}, words, _poses(robot), shown)
+    return LessonFacts(numbers, {}, words, _poses(robot), shown, leads(between), answered)
+
+
+def leads(between: Ways | None) -> dict[str, Lead | None]:
+    """The way of the tool on a PTP, the straight line between its ends, and an arc of a circle."""
+    if between is None:
+        return dict.fromkeys(("ptp", "straight", "arc"))
+    points = between.ptp.sample(np.linspace(0.0, between.ptp.duration, POINTS)).T[:, :3, 3]
+    start, end = points[0], points[-1]
+    way = end - start
+    side = np.cross(way, [0.0, 0.0, 1.0] if abs(way[2]) < 0.9 * np.linalg.norm(way) else [1.0, 0.0, 0.0])
+    side *= 0.5 * np.linalg.norm(way) / np.linalg.norm(side)
+    turn = np.linspace(0.0, np.pi, POINTS)[:, None]
+    arc = 0.5 * (start + end) - 0.5 * np.cos(turn) * way + np.sin(turn) * side
+    ways = {"ptp": points, "straight": points[[0, -1]], "arc": arc}
+    return {name: Path(tuple(map(tuple, each.tolist()))) for name, each in ways.items()}
 
 
 def _poses(robot: Robot) -> dict[str, Pose]:

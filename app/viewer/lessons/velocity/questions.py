@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
+
 import numpy as np
 
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
-from app.viewer.lessons.guide.outline import Outline, Pose
+from app.viewer.lessons.guide.leads import UP, direction, level
+from app.viewer.lessons.guide.outline import Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.velocity.facts import scale_of
 from app.viewer.lessons.velocity.views import SAMPLE
@@ -14,9 +18,11 @@ from kin.axes import NEARLY, joint_axes, size
 from kin.differential.task import lifts, natural_task, rank, task_jacobian, usual_rank
 from kin.ik.messages.singularity import short
 from kin.transforms import Array
-from kin.units import Units
+from kin.units import Units, general
 
-LOAD = 10.0  # N
+LOAD, SLOW = 10.0, 1e-3  # N, m/s
+SAMPLES, SCANNED = 32, 73  # configurations at random, and along the range of a joint
+FLAT, CLEAR = 0.04, 2.0  # of the largest σ that was found: what counts as none; home has more than twice as much
 
 
 def outline(robot: Robot, units: Units) -> Outline:
@@ -30,6 +36,8 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     heavy = int(np.argmax([abs(torque(J, k)) for k in range(robot.n)]))
     semi = np.linalg.svd(J[:3], compute_uv=False)
     found = singular(robot)
+    flat = FLAT * max(_smallest(robot, q) for q in robot.random_q(np.random.default_rng(4), SAMPLES))
+    there = driven(robot, flat)
     numbers = {
         "last": float(robot.n),
         "load": LOAD,
@@ -45,18 +53,56 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "singular": float(found is not None),
         "metre": SAMPLE / scale_of(robot, "velocity"),
         "flattened": float(found is not None and _axes(robot, found[0]) < _axes(robot, home)),
+        "flat": round(flat, 4),
+        "drives": float(there is not None),
         "usual": float(usual_rank(robot, natural_task(robot))),
         "rank_there": float("nan") if found is None else float(rank_of(robot, found[0])),
     }
     functions = {
         "turns": lambda joint: float(robot.revolute[int(joint) - 1]),
+        "reaches": lambda joint: float((home if there is None else there)[int(joint) - 1]),
         "lifts": lambda joint: float(lifts(robot, J, int(joint) - 1)),
     }
-    poses = {"home": Pose(as_configuration(home))}
+    lead = leads(robot, J)
+    poses, words = {"home": Pose(as_configuration(home))}, {"sigma_home": general(_smallest(robot, home), 3)}
     if found is None:
-        return LessonFacts(numbers, functions, {"singularity": ""}, poses)
+        return LessonFacts(numbers, functions, {**words, "singularity": ""}, poses, leads=lead)
     poses["singularity"] = Pose(as_configuration(found[0]))
-    return LessonFacts(numbers, functions, {"singularity": short(found[1], units)}, poses)
+    return LessonFacts(numbers, functions, {**words, "singularity": short(found[1], units)}, poses, leads=lead)
+
+
+def leads(robot: Robot, J: Array) -> dict[str, Lead | None]:
+    """The ways of the tool point that joint 1 may have; the true one is its velocity."""
+    tool, v = fk(robot, robot.q_home)[:3, 3], J[:3, 0]
+    ways = {"lifts": UP, "level": level(v)}
+    if np.linalg.norm(v) > SLOW:
+        ways["lifts" if lifts(robot, J, 0) else "level"] = v
+    return {name: direction(robot, tool, way) for name, way in ways.items()}
+
+
+@lru_cache(maxsize=64)
+def driven(robot: Robot, flat: float) -> Array | None:
+    """A configuration ``(n,)`` whose smallest σ is well below `flat`, if possible one joint away from home.
+
+    None: there is none, or home is one.
+    """
+    home = robot.q_home
+    if _smallest(robot, home) < CLEAR * flat:
+        return None
+    tried = [] if (found := singular(robot)) is None else [found[0]]
+    for joint in range(robot.n):
+        low, high = max(float(robot.lower[joint]), -math.pi), min(float(robot.upper[joint]), math.pi)
+        scan = np.repeat(home[None], SCANNED, axis=0)
+        scan[:, joint] = np.linspace(low, high, SCANNED)
+        tried.append(scan[int(np.argmin([_smallest(robot, q) for q in scan]))])
+    tried.append(np.clip(0.0, robot.lower, robot.upper))
+    return next((np.asarray(q) for q in tried if robot.in_limits(q) and _smallest(robot, q) < 0.5 * flat), None)
+
+
+def _smallest(robot: Robot, q: Array) -> float:
+    """The smallest singular value of the task that is not always zero, at q ``(n,)``."""
+    values = np.linalg.svd(task_jacobian(robot, q), compute_uv=False)
+    return float(values[usual_rank(robot, natural_task(robot)) - 1])
 
 
 def singular(robot: Robot) -> tuple[Array, Singularity] | None:

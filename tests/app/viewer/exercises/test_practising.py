@@ -185,7 +185,7 @@ def test_motions_are_put_in_order_and_frames_placed(server: int) -> None:
     with FakeBrowser(server, memory=begun()) as tab:
         tab.settle()
         press(tab, ["open", order.id, 1])
-        tab.wait(lambda: "Press the motions in their order" in shown(tab))
+        tab.wait(lambda: "Press them in their order" in shown(tab))
         for serial, pick in enumerate([picks[2], picks[0], picks[2], *picks], 2):
             press(tab, ["pick", serial], pick)  # two, taken back, then all in order
         press(tab, ["answer", 20])
@@ -246,7 +246,7 @@ def test_messages_that_no_control_sends_are_refused(server: int) -> None:
         press(tab, ["open", "no-such", 1])
         tab.wait(lambda: "the id of an exercise" in shown(tab))
         press(tab, ["open", "dh-order", 2])
-        tab.wait(lambda: "Press the motions" in shown(tab))
+        tab.wait(lambda: "Press them in their order" in shown(tab))
         press(tab, ["pick", 3], 99)
         tab.wait(lambda: "the index of a motion" in shown(tab))
         press(tab, ["fields", 4], [[1, 2]])

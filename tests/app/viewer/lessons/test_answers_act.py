@@ -1,7 +1,7 @@
 """A student's answer acts: which kinds are drawn in the scene, and that they lead where they say.
 
-`ACTS` lists the questions of all steps whose answer is a length, a speed or an angle. Choices and counts are not
-drawn.
+`ACTS` lists the questions of all steps whose answer is a length, a speed, an angle or a time. Choices are in
+test_choices_act.py; counts are not drawn.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 
 STORE = Store()
 UR5 = STORE.get("ur5")
-BAR, ARM = "a bar", "a copy of the arm"
+BAR, ARM, FIGURE = "a bar", "a copy of the arm", "a figure"
 ACTS: dict[tuple[str, str], str] = {
     ("dh", "Row # as a distance"): BAR,
     ("dh", "A joint and its column"): BAR,
@@ -46,6 +46,8 @@ ACTS: dict[tuple[str, str], str] = {
     ("inverse", "The shoulder"): ARM,
     ("inverse", "θ₁"): ARM,
     ("inverse", "The last joint"): ARM,
+    ("trajectories", "How long it takes"): FIGURE,
+    ("inverse", "The distance"): BAR,
     # Not drawn, and why.
     ("rotations", "Roll pitch yaw"): "one of three angles: what the frame does depends on the two others",
     ("rotations", "The same in Z-Y-Z"): "one of three angles: what the frame does depends on the two others",
@@ -55,7 +57,6 @@ ACTS: dict[tuple[str, str], str] = {
     ("inverse", "The wrist centre"): "one coordinate of a point",
     ("inverse", "Back along the last link"): "one coordinate of a point",
     ("inverse", "The elbow on its circle"): "the radius of a circle, which has no direction",
-    ("inverse", "The distance"): "made by the code of the lesson, which draws angles only",
     ("postures", "By hand: the triangle"): "an angle without its sign",
     ("numeric", "Near a singularity"): "of no pose: the largest step that damping allows",
     ("trajectories", "Past a singularity"): "a rate, at another place than the arm is",
@@ -73,7 +74,7 @@ def steps() -> Iterator[tuple[kin.Robot, tuple[str, str], Step]]:
 def is_measured(step: Step) -> bool:
     assert isinstance(step.question, Number)
     unit = step.question.unit
-    return unit.is_length or unit.is_angle or unit.name in ("m/s", "°/s")
+    return unit.is_length or unit.is_angle or unit.name in ("m/s", "°/s", "s")
 
 
 def test_the_list_of_answers_that_act_is_complete() -> None:
@@ -81,11 +82,12 @@ def test_the_list_of_answers_that_act_is_complete() -> None:
     for _, name, step in steps():
         if is_measured(step):
             kind = {Bar: BAR, Drawn: ARM}.get(type(step.drawn), "none")  # type: ignore[call-overload]
+            kind = FIGURE if step.answered is not None else kind
             found.setdefault(name, set()).add(kind)
     assert found.keys() == ACTS.keys()
     assert {name: kinds for name, kinds in found.items() if kinds != {ACTS[name]} and kinds != {"none"}} == {}
     assert {name for name, kinds in found.items() if kinds == {"none"}} == {
-        name for name, how in ACTS.items() if how not in (BAR, ARM)
+        name for name, how in ACTS.items() if how not in (BAR, ARM, FIGURE)
     }
 
 

@@ -22,9 +22,10 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.outline import Choice, Number, Outline, Step
 from app.viewer.lessons.numeric.example import example
 from app.viewer.lessons.rotations.conventions import Convention
-from app.viewer.lessons.trajectories.motions import ways
+from app.viewer.lessons.trajectories.motions import sketched, ways
 from kin import Robot
 from kin.differential.task import natural_task
+from kin.motion import limits_of
 from kin.units import Units
 
 SAMPLE = ("ur5", "scara", "planar2r", "redundant7")
@@ -180,6 +181,11 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
         (rf"r([₁₂₃])([₁₂₃]) = {N}", lambda h, m: [m[0], m[1], h.T[LOW.index(m[0]) - 1, LOW.index(m[1]) - 1]]),
         (rf"the trace is {N}", lambda h, m: [np.trace(h.T[:3, :3])]),
         (rf"cos(?: θ =|ine is) {N}", lambda h, m: [(np.trace(h.T[:3, :3]) - 1) / 2]),
+        (rf"slides by {N} mm along its own z axis", lambda h, m: mm(sliding(h))),
+        (
+            rf"x = {N} mm, y = {N} mm, z = {N} mm; its axes: x = {TRIPLE}, y = {TRIPLE}, z = {TRIPLE}",
+            lambda h, m: [0, *mm([-sliding(h), sliding(h)]), 1, 0, 0, 0, 0, 1, 0, -1, 0],
+        ),
         (
             rf"column {N} of R is {TRIPLE}, and p = {TRIPLE} mm",
             lambda h, m: [None, *h.T[:3, int(m[0]) - 1], *mm(h.T[:3, 3])],
@@ -241,12 +247,21 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
     ),
     "redundancy": ((rf"The arm has {N} joints", lambda h, m: [h.robot.n]),),
     "velocity": (
+        (rf"It is {N} at home", lambda h, m: [smallest_task_value(h)]),
         (rf"Which (?:torque|force) does joint {N} apply", lambda h, m: [1 + int(np.argmax(np.abs(effort(h))))]),
         (rf"A weight of {N} N|\(0, 0, {N}\)|{N} N times", lambda h, m: [10, -10, 10]),
         (rf"\(θ{N} = {N}°\)", lambda h, m: [None, *deg(h.end[int(m[0]) - 1])]),
         (rf"has rank {N}\.", lambda h, m: [task_rank(h, h.q + 0.1)]),
     ),
     "trajectories": (
+        (
+            rf"goes {N}° in {N} s, from rest to rest, with at most {N} °/s and {N}°/s²",
+            lambda h, m: [*deg(sketched(h.robot).way), sketched(h.robot).time, *deg(limits_of_first(h.robot))],
+        ),
+        (
+            rf"goes {N}° from rest to rest with a trapezoidal profile: at most {N} °/s and {N}°/s²",
+            lambda h, m: deg([1.5 * sketched(h.robot).way, *limits_of_first(h.robot)]),
+        ),
         (rf"\) goes {N}° from rest", lambda h, m: deg((h.end - h.q)[0])),
         (rf"leaves the line by up to {N} mm", lambda h, m: mm(line_gap(h))),
         (
@@ -257,6 +272,24 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
 }
 
 
+def sliding(h: Here) -> float:
+    """By how much the chain that is drawn at the end slides (m)."""
+    assert h.step.end is not None
+    return float(h.step.end.drawing["chain"][0][2])  # type: ignore[index]
+
+
+def smallest_task_value(h: Here) -> float:
+    """The smallest singular value of the motions of the arm's task that is not always zero."""
+    values = np.linalg.svd(task_rows(h, h.q), compute_uv=False)
+    return float(values[task_rank(h, h.q + 0.1) - 1])
+
+
+def limits_of_first(robot: Robot) -> list[float]:
+    """Velocity and acceleration of the first joint (rad/s, rad/s²)."""
+    found = limits_of(robot)
+    return [float(found.velocity[0]), float(found.acceleration[0])]
+
+
 def effort(h: Here) -> np.ndarray:
     """What each joint applies to hold a weight of 10 N; of equal ones, the first is meant."""
     return np.round(10.0 * h.J[2], 9)
@@ -264,9 +297,14 @@ def effort(h: Here) -> np.ndarray:
 
 def task_rank(h: Here, q: np.ndarray) -> int:
     """How many motions the arm's task has at a configuration."""
+    return rank(task_rows(h, q))
+
+
+def task_rows(h: Here, q: np.ndarray) -> np.ndarray:
+    """The rows of the Jacobian that the arm's task has; those of others are zero."""
     J, a, task = numpy_arm.jacobian(h.robot, q), numpy_arm.pose(h.robot, q)[:3, 2], natural_task(h.robot)
     turning = {"pose": J[3:], "approach": J[3:] - np.outer(a, a @ J[3:]), "position": 0.0 * J[3:]}[task]
-    return rank(np.concatenate([J[:3], turning]))
+    return np.concatenate([J[:3], turning])
 
 
 def rank(J: np.ndarray) -> int:
@@ -275,6 +313,9 @@ def rank(J: np.ndarray) -> int:
 
 # The numbers that belong to formulas, names and what does not depend on the arm.
 ALWAYS = (
+    r"(?:For instance j|J)oint 1 at .*$",  # test_varied_verbs.py has the answers of these steps
+    r"For instance 0, .* 0 (?:°|mm)/s\.",
+    r"In order: .*?\)\.",
     r"[Jj]oints? \d+(?: (?:and|to) \d+)?",
     r"[Rr]ow \d+",
     r"[Cc]olumn \d+",
@@ -310,7 +351,7 @@ FORMULAS: dict[str, tuple[str, ...]] = {
         r"from 0 to 1|a share of 1",
     ),
     "screws": (r"1 (?:rad|m)/s", r"length 1\b", r"v = 0|ω = 0|= 1\b|p = 0|= 0\b"),
-    "equations": (r"is not 1|instead of 0|entries of that row are 0|is [−-]?[\d.]+ then",),
+    "equations": (r"p[xyz] = 0|is not 1|instead of 0|entries of that row are 0|is [−-]?[\d.]+ then",),
     "postures": (
         r"above 1",
         r"\d+ × a choice of two: 2 to the power \d+",
@@ -322,7 +363,7 @@ FORMULAS: dict[str, tuple[str, ...]] = {
         r"30°",
         r"axes \d, \d and \d|z\d × z\d",
     ),
-    "redundancy": (r"times any factor|speed is [\d.]+", r"joints are \(.*\)"),
+    "redundancy": (r"by \d+° or more", r"times any factor|speed is [\d.]+", r"joints are \(.*\)"),
     "velocity": (r"1 (?:rad|m)/s", r"is [01] rad/s per", r"Press 1 "),
     "trajectories": (
         r"\d s[²³]|1\.5 for|1\.875 for|½",
@@ -433,6 +474,15 @@ def apart(h: Here) -> float:
     return float(np.linalg.norm(frames[i][:3, 3] - frames[j][:3, 3]))
 
 
+def shortest(h: Here) -> float:
+    """The least time by trying: ramps of the largest acceleration around a plateau, which cover the way."""
+    (v, a), way = limits_of_first(h.robot), 1.5 * sketched(h.robot).way
+    times = np.linspace(0.0, 4.0 * (way / v + v / a), 400001)
+    ramp = np.minimum(0.5 * times, v / a)
+    covered = a * ramp**2 + a * ramp * (times - 2.0 * ramp)
+    return float(times[np.searchsorted(covered, way)])
+
+
 ANSWERS: dict[tuple[str, str], Callable[[Here], float]] = {
     ("rotations", "Columns"): lambda h: entry(h, (int(prompted(h, r"row (\d)")[0]), 3)),
     ("rotations", "The inverse"): inverse_entry,
@@ -470,6 +520,7 @@ ANSWERS: dict[tuple[str, str], Callable[[Here], float]] = {
         np.linalg.norm(numpy_arm.pose(h.robot, h.end)[:3, 3] - h.T[:3, 3])
     ),
     ("trajectories", "Past a singularity"): lambda h: 0.2 / 0.1,
+    ("trajectories", "How long it takes"): shortest,
 }
 # Counts of closed forms, which tests of their own compare; and a number that is the same for all arms.
 ELSEWHERE = {
