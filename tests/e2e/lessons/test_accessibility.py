@@ -13,6 +13,7 @@ from page import Tab
 from playwright.sync_api import expect
 
 import kin
+from app.exercises.contract import Posed
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.equations.lesson import EquationsLesson
 from app.viewer.lessons.guide.lesson import Lesson
@@ -143,8 +144,14 @@ class Keys:
         assert measured(self.tab, "focus") == []
 
     def answer(self, key: str, question: Question) -> None:
-        box = f'[data-question="{key}"]'
-        if isinstance(question, Number):
+        box, said = f'[data-question="{key}"]', "Right."
+        if isinstance(question, Posed):  # the arm stands elsewhere, and is driven there by the answer
+            assert question.asked().form == "posture"
+            self.press(f"{box} [data-guide-do=posture]")
+            self.page.wait_for_function("kbSaid.some((text) => text.includes('Not quite.'))")
+            self.press(f"{box} [data-guide-do=reveal]")
+            said = "The answer."
+        elif isinstance(question, Number):
             self.reach(f"{box} input")
             self.page.keyboard.type(question.value_text)
             self.page.keyboard.press("Enter")
@@ -153,7 +160,7 @@ class Keys:
             right = next(i for i, option in enumerate(question.options) if option.right)
             self.press(f'{box} [data-guide-do=answer][data-argument="{right}"]')
         expect(self.page.locator(box)).to_have_attribute("data-closed", "1")
-        self.page.wait_for_function("kbSaid.some((text) => text.includes('Right.'))")
+        self.page.wait_for_function(f"kbSaid.some((text) => text.includes('{said}'))")
         self.page.evaluate("kbSaid.length = 0")
         self.stays()
 

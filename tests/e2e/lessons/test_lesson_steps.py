@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import numpy as np
 import pytest
 from page import Tab
 from playwright.sync_api import Locator, expect
 
 import kin
+from app.exercises.contract import Posed
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Choice, Number, Question
+from app.viewer.panel.rotations import roll_pitch_yaw
+from kin.transforms import from_position_wxyz
 from kin.units import Units
 
 pytestmark = pytest.mark.browser
@@ -25,9 +31,38 @@ def right(question: Question) -> str:
     return next(str(i) for i, option in enumerate(question.options) if option.right)
 
 
+def do(box: Locator, question: Posed, press: Callable[[Locator], None]) -> str:
+    """Sort, put into order, place or sketch; an arm that has to be driven is driven by *Show the answer*."""
+    asked, right = question.asked(), question.right()
+    enter = box.locator(".kb-exercise-answer, [data-guide-do=fields]")
+    match asked.form:
+        case "order":
+            for place in right:  # type: ignore[attr-defined]
+                press(box.locator(f'[data-guide-do=pick][data-argument="{place}"]'))
+                expect(box.locator(f'[data-guide-do=pick][data-argument="{place}"]')).to_have_attribute(
+                    "aria-pressed", "true"
+                )
+        case "fields":
+            for i, text in enumerate(right):  # type: ignore[arg-type]
+                box.locator("input").nth(i).fill(text)
+        case "frame":
+            pose = from_position_wxyz(right[:3], np.array(right[3:]))  # type: ignore[index]
+            angles = np.degrees(roll_pitch_yaw(pose[:3, :3]))
+            box.locator("input").fill(" ".join(f"{x:.3f}" for x in [*(1e3 * pose[:3, 3]), *angles]))
+        case _:
+            press(enter)
+            expect(box.locator("[data-feedback]")).to_contain_text("Not quite.")
+            press(box.locator("[data-guide-do=reveal]"))
+            return "The answer."
+    press(enter)
+    return "Right."
+
+
 def answer(tab: Tab, key: str, question: Question, keyboard: bool) -> None:
-    box = tab.page.locator(f'[data-question="{key}"]')
-    if isinstance(question, Number):
+    box, said = tab.page.locator(f'[data-question="{key}"]'), "Right."
+    if isinstance(question, Posed):
+        said = do(box, question, lambda button: button.press("Enter") if keyboard else button.click())
+    elif isinstance(question, Number):
         field = box.locator("input")
         field.fill(right(question))
         if keyboard:
@@ -41,7 +76,7 @@ def answer(tab: Tab, key: str, question: Question, keyboard: bool) -> None:
         else:
             option.click()
     expect(box).to_have_attribute("data-closed", "1")
-    expect(box.locator("[data-feedback]")).to_contain_text("Right.")
+    expect(box.locator("[data-feedback]")).to_contain_text(said)
 
 
 def turn(tab: Tab, keyboard: bool) -> Locator:
