@@ -191,6 +191,7 @@ def wrong_answers(question: Question) -> Iterator[Any]:
         asked = question.asked()
         other = {
             "order": list(range(len(asked.labels))),
+            "fields": ["1"] * len(asked.labels),
             "posture": [value + 0.4 for value in question.variant.robot.q_home.tolist()],
             "frame": [0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0],
         }
