@@ -52,6 +52,10 @@ class ViewerServer:
         preparation: which kernels are compiled; None: all are.
         courses: shared with REST, as are the exercises in them; None: the viewer reads both.
         lines: shared with REST, which connects programs to them; None: none is.
+
+    Attributes:
+        services: what all pages share.
+        pages: those of visitors who are there, by viser's number of the visitor.
     """
 
     def __init__(
@@ -72,14 +76,14 @@ class ViewerServer:
         caches = clouds, maps or Maps(), summaries or Summaries()
         readers = meshes, Library(meshes)
         kernels = preparation or Preparation()
-        self._services = Services(store, *caches, *readers, Pace(), known, hub, kernels, lines or Lines())
+        self.services = Services(store, *caches, *readers, Pace(), known, hub, kernels, lines or Lines())
         self._owns_maps = maps is None
         self._owns_summaries = summaries is None
         self._owns_classroom = classroom is None
         self._settings = settings
         self._server: viser.ViserServer | None = None
         self._connections: PortlessServer
-        self._pages: dict[int, VisitorPage] = {}
+        self.pages: dict[int, VisitorPage] = {}
         self._lock = threading.Lock()
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
@@ -110,7 +114,7 @@ class ViewerServer:
         if server is None:
             return
         with self._lock:
-            pages, self._pages = list(self._pages.values()), {}
+            pages, self.pages = list(self.pages.values()), {}
         for page in pages:
             page.end()
         server.stop()
@@ -118,18 +122,18 @@ class ViewerServer:
         for page in pages:
             if not page.join(max(0.0, deadline - time.monotonic())):
                 log.error("a visitor's worker did not end within %s s", STOP_TIMEOUT)
-        self._services.meshes.close()
+        self.services.meshes.close()
         if self._owns_maps:
-            self._services.maps.close()
+            self.services.maps.close()
         if self._owns_summaries:
-            self._services.summaries.close()
+            self.services.summaries.close()
         if self._owns_classroom:
-            self._services.classroom.close()
+            self.services.classroom.close()
 
     @property
     def visitors(self) -> int:
         """The number of connected tabs."""
-        return len(self._pages)
+        return len(self.pages)
 
     async def _connect(self, client: viser.ClientHandle) -> None:
         token, ticket, welcome = self._connections.room_tokens.get(client.client_id, ""), None, READY
@@ -142,7 +146,7 @@ class ViewerServer:
 
     def _ticket(self, token: str) -> Ticket | None:
         """The ticket of a browser that is in a room which has not ended; raises `ClassroomUnavailable`."""
-        hub = self._services.classroom
+        hub = self.services.classroom
         ticket = hub.ticket(token)
         return None if ticket is None or hub.rooms.find(ticket) is None else ticket
 
@@ -152,7 +156,7 @@ class ViewerServer:
         rights = self._connections.rights.get(client.client_id, Rights.LOOK)  # if absent, the visitor has left
         arguments = (
             client,
-            self._services,
+            self.services,
             self._settings.token is not None,
             LOOKING if welcome is READY and rights is Rights.LOOK else welcome,
             lambda: self._restart(client, restarts, ticket),
@@ -168,13 +172,13 @@ class ViewerServer:
         with self._lock:
             if client.client_id not in self._connections.rights:
                 return  # the visitor has left: nobody would end the page
-            self._pages[client.client_id] = page
+            self.pages[client.client_id] = page
         page.start()
 
     def _restart(self, client: viser.ClientHandle, restarts: int, ticket: Ticket | None) -> None:
         """Restart the page of a visitor whose worker failed; called last by that worker."""
         with self._lock:
-            left = self._pages.pop(client.client_id, None) is None
+            left = self.pages.pop(client.client_id, None) is None
         if left:
             return
         if restarts == 0:
@@ -189,6 +193,6 @@ class ViewerServer:
 
     async def _disconnect(self, client: viser.ClientHandle) -> None:
         with self._lock:
-            page = self._pages.pop(client.client_id, None)
+            page = self.pages.pop(client.client_id, None)
         if page is not None:
             page.end()

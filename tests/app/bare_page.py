@@ -28,6 +28,12 @@ STORE = Store()
 EYE = np.array([1.7, 1.1, 0.9])
 
 
+def nodes_of(scene: Any) -> dict[str, Any]:
+    """The nodes that a scene of viser has, by name."""
+    nodes: dict[str, Any] = scene._handle_from_node_name
+    return nodes
+
+
 class BarePage:
     """The stage of one feature; the arm moves where it is sent, at once.
 
@@ -199,7 +205,7 @@ class BarePage:
 
     def scene(self) -> list[tuple[str, list[float], dict[str, Any]]]:
         """What is drawn: kind, pose in the scene ``(12,)``, and properties of each visible node."""
-        nodes = self.client.scene._handle_from_node_name
+        nodes = nodes_of(self.client.scene)
         found = []
         for name, node in nodes.items():
             if (T := _pose(nodes, name)) is None:

@@ -284,12 +284,15 @@ class FakeBrowser:
         end, late, answered = now + timeout, now + WORK, now + (ANSWER if self._owed else 0.0)
         self._owed = False
         while True:
+            now = time.monotonic()
+            if now > answered and self._port in _handled:
+                self._sent = _handled[self._port]  # some messages are not passed on
             if self._port in _handled:
-                rests = time.monotonic() > late or (_handled[self._port] >= self._sent and not working())
+                rests = now > late or (_handled[self._port] >= self._sent and not working())
             else:
-                rests = time.monotonic() > answered
+                rests = now > answered
             if self.read(quiet if rests else 0.02):
-                answered = 0.0
+                answered = answered if self._port in _handled else 0.0
             elif rests:
                 return
             assert time.monotonic() < end, f"the page did not come to rest within {timeout} s"

@@ -36,7 +36,7 @@ class ClassroomPage(MemberPage):
 
     def _build(self) -> None:
         super()._build()
-        self._member = next((tab for tab in self._tabs if isinstance(tab, Member)), None)
+        self._member = next((tab for tab in self.tabs if isinstance(tab, Member)), None)
         if self._member is None:
             return
         with self.client.atomic():

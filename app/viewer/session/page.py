@@ -78,6 +78,9 @@ class VisitorPage(ShownArm, Worker):
         failed: called last by a worker that cannot continue.
         rights: what the visitor may cause.
         address: the visitor's name in limits per client.
+
+    Attributes:
+        tabs: the features of the tabs, none until the page is built.
     """
 
     def __init__(
@@ -105,7 +108,7 @@ class VisitorPage(ShownArm, Worker):
         self.door = Door(services.lines, self.post, self._looking)
         self._persistence = Persistence(self, token, self._guard, rights)
         self.offered: tuple[type[Feature], ...] = TABS
-        self._tabs: list[Feature] = []
+        self.tabs: list[Feature] = []
         self._result: IKResult | None = None  # for the last target
         self._legend = ""
         self._alone: SceneFilter | None = None  # before all but what is shown alone
@@ -227,7 +230,7 @@ class VisitorPage(ShownArm, Worker):
     @property
     def features(self) -> list[Feature]:
         """The tabs, and the open lesson with its steps."""
-        return [*self._tabs, *self.lessons.features] if self._tabs else []
+        return [*self.tabs, *self.lessons.features] if self.tabs else []
 
     def set_locks(self, locks: Sequence[bool]) -> None:
         """Lock exactly these joints ``(n,)``."""
@@ -291,7 +294,7 @@ class VisitorPage(ShownArm, Worker):
     def _activity_changed(self) -> None:
         """Something else is open or withheld."""
         self.for_features(lambda feature: feature.on_activity())
-        if self._tabs:
+        if self.tabs:
             self.posture.use_activity()
             self.numbers.use_pose()
 
@@ -454,7 +457,7 @@ class VisitorPage(ShownArm, Worker):
                 features, containers = (*features, Connect), [*containers, tabs[self.offered.index(ProgramTab)]]
             for tab, container in zip(features, containers, strict=True):
                 with container:
-                    self._tabs.append(tab(self))
+                    self.tabs.append(tab(self))
             self._persistence.restore(saved)
             self.arm.draw(fresh=False)
             self._show_hints()

@@ -264,7 +264,7 @@ def test_a_visitor_who_leaves_while_the_page_restarts_leaves_no_page_behind(monk
     with serve_viewer(viewer) as port:
         with FakeBrowser(port) as tab:
             tab.settle()
-            (page,) = viewer._pages.values()
+            (page,) = viewer.pages.values()
             monkeypatch.setattr(ArmController, "draw", dies)
             monkeypatch.setattr(viser.GuiApi, "reset", slow)
             tab.set("1 rotating base", 10.0)

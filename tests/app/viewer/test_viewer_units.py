@@ -74,7 +74,7 @@ def test_a_sliding_joint_is_moved_in_the_unit_and_late_events_are_dropped(server
         tab.settle()
         T = tab.tool_pose()
         # 100 from the replaced slider is in millimetres; read as metres it would be clamped to the limit.
-        *_, session = server._pages.values()
+        *_, session = server.pages.values()
         session.post(("joint", SCARA.id, 2, Units(), 0), 100.0)
         tab.settle()
         assert np.array_equal(tab.tool_pose(), T)

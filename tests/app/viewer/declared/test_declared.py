@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from arms import CLASSICS
-from bare_page import STORE, BarePage, bare_page
+from bare_page import STORE, BarePage, bare_page, nodes_of
 
 from app.viewer.declared import panel
 from app.viewer.declared.facts import Facts
@@ -317,14 +317,14 @@ def test_the_scene_is_changed_and_hidden_not_made_again(page: BarePage) -> None:
     toy.change(step=0.05, force=replace(toy.settings.force, on=True))
     toy.refresh()
     assert sorted(node[2]["text"] for node in page.scene() if "text" in node[2]) == ["0.05", "0.05"]
-    names = set(page.client.scene._handle_from_node_name)
+    names = set(nodes_of(page.client.scene))
     for on in (False, True, False):
         toy.change(step=0.05 if on else 0.005, force=replace(toy.settings.force, on=on))
         toy.refresh()
         assert len(page.scene()) == (4 if on else 2)
-        assert set(page.client.scene._handle_from_node_name) == names
+        assert set(nodes_of(page.client.scene)) == names
     page.change(STORE.get("scara"))
-    assert not names & set(page.client.scene._handle_from_node_name) - {"/WorldAxes"}, "names are never used again"
+    assert not names & set(nodes_of(page.client.scene)) - {"/WorldAxes"}, "names are never used again"
 
 
 def test_a_frame_sends_only_what_moved_and_renders_nothing_twice(page: BarePage) -> None:

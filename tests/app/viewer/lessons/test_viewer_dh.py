@@ -351,7 +351,7 @@ def tab(served: tuple[ViewerServer, int]) -> Iterator[FakeBrowser]:
 
 def lesson_of(server: ViewerServer) -> DHLesson:
     """The lesson of the newest visitor."""
-    session = server._pages[max(server._pages)]
+    session = server.pages[max(server.pages)]
     shown = session.lessons.shown
     assert isinstance(shown, DHLesson)
     return shown

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 import viser
+from bare_page import nodes_of
 from scipy.spatial import cKDTree
 
 import kin
@@ -81,7 +82,7 @@ def test_an_arm_is_drawn_in_three_ways(server: viser.ViserServer) -> None:
     T = kin.fk(robot, robot.q_home)
 
     def seen(*names: str) -> set[bool]:
-        nodes = server.scene._handle_from_node_name
+        nodes = nodes_of(server.scene)
         return {
             n.visible
             for key, n in nodes.items()
@@ -107,6 +108,6 @@ def test_an_arm_without_a_body_stays_a_skeleton(server: viser.ViserServer) -> No
     arm = ArmScene(server.scene, kin.get_robot("pioneer5"))
     arm.show_as("body")
     arm.show_axes(True)
-    nodes = server.scene._handle_from_node_name
+    nodes = nodes_of(server.scene)
     assert all(node.visible for key, node in nodes.items() if key.endswith(("/housing", "/axis")))
     arm.remove()

@@ -10,6 +10,7 @@ import pytest
 import trimesh
 import viser
 from arms import CLASSICS
+from bare_page import nodes_of
 
 import kin
 from app.shared.static_folder import static_folder
@@ -81,7 +82,7 @@ def world(scene: viser.SceneApi, name: str) -> np.ndarray:
 
 
 def node_names(scene: viser.SceneApi, end: str) -> list[str]:
-    return [n for n in scene._handle_from_node_name if n.split("/")[-1] == end]
+    return [n for n in nodes_of(scene) if n.split("/")[-1] == end]
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=IDS)
@@ -115,7 +116,7 @@ def test_posed_nodes_agree_with_the_kinematics(server: viser.ViserServer, robot:
             assert np.allclose(world(server.scene, arm.gizmo.name), kin.fk(robot, q), atol=1e-12)
     finally:
         arm.remove()
-    assert not [n for n in server.scene._handle_from_node_name if n.startswith("/arm")]
+    assert not [n for n in nodes_of(server.scene) if n.startswith("/arm")]
 
 
 def test_the_last_small_step_is_not_dropped(server: viser.ViserServer) -> None:
@@ -231,9 +232,7 @@ def test_every_part_has_a_node_of_its_own(server: viser.ViserServer, robot: kin.
     arm = ArmScene(server.scene, robot)
     for name in ("housing", "axis", "link", "link-bar"):
         wanted = sum(part.name == name for parts in made.parts for part in parts)
-        shown = [
-            n for n in server.scene._handle_from_node_name if re.fullmatch(rf"{name}(-\d+)?", n.split("/")[-1])
-        ]
+        shown = [n for n in nodes_of(server.scene) if re.fullmatch(rf"{name}(-\d+)?", n.split("/")[-1])]
         assert len(shown) == wanted
     arm.remove()
 

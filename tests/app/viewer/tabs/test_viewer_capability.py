@@ -441,7 +441,7 @@ def test_an_address_restores_the_map(service):
     port, _, server = service
     with Visitor(port) as tab:
         tab.settle(0.2)
-        feature = next(t for t in server._pages[max(server._pages)]._tabs if t.key == "workspace")
+        feature = next(t for t in server.pages[max(server.pages)].tabs if t.key == "workspace")
         state = {"resolution": LENGTH, "directions": 12, "by": "manipulability", "least": 0.4, "drawn": True}
         with feature.stage.client.atomic():
             feature.restore({"capability": state, "map": "viridis"})

@@ -539,8 +539,8 @@ def test_the_tab_follows_the_unit_of_length_and_keeps_its_state():
     server = ViewerServer(STORE, Settings(), Clouds())
     with serve_viewer(server) as port, Visitor(port) as tab:
         tab.settle(0.2)
-        (session,) = server._pages.values()
-        shown = next(tab for tab in session._tabs if tab.key == "workspace")
+        (session,) = server.pages.values()
+        shown = next(tab for tab in session.tabs if tab.key == "workspace")
         tab.draw(2000, seed=17)
         tab.set("Cut", "across z (level)")
         tab.set("Sizes", True)
@@ -878,7 +878,7 @@ def test_an_address_restores_the_tab(service):
     server = ViewerServer(STORE, Settings(), clouds)
     with serve_viewer(server) as port, Visitor(port) as tab:
         tab.settle(0.2)
-        feature = next(t for t in next(iter(server._pages.values()))._tabs if t.key == "workspace")
+        feature = next(t for t in next(iter(server.pages.values())).tabs if t.key == "workspace")
         with feature.stage.client.atomic():
             feature.restore({"n": 3000, "seed": 5, "axis": "z", "at": 0.1, "by": "nonsense", "drawn": True})
         feature.post("more")

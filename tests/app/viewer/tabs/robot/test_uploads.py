@@ -241,7 +241,7 @@ def test_steps_made_while_a_file_is_read_that_is_refused_are_taken_back_with_it(
         done.wait(30.0)
         raise TooLargeError("meshes", "more", "less")
 
-    monkeypatch.setattr(viewer._services.meshes, "_answer", answer)
+    monkeypatch.setattr(viewer.services.meshes, "_answer", answer)
     with serve_viewer(viewer) as port, FakeBrowser(port) as tab:
         tab.settle()
         before = tab.value("Robot")
@@ -259,7 +259,7 @@ def test_steps_made_while_a_file_is_read_that_is_refused_are_taken_back_with_it(
 def test_an_upload_that_stalls_ends_and_gives_back_its_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
     viewer = ViewerServer(Store(), Settings(), Clouds())
-    reader = viewer._services.meshes
+    reader = viewer.services.meshes
     memory = reader.memory
     with serve_viewer(viewer) as port, FakeBrowser(port) as tab:
         tab.settle()
@@ -289,7 +289,7 @@ def test_an_upload_that_stalls_ends_and_gives_back_its_room(monkeypatch: pytest.
 def test_the_next_zip_and_leaving_end_what_is_being_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
     viewer = ViewerServer(Store(), Settings(), Clouds())
-    reader = viewer._services.meshes
+    reader = viewer.services.meshes
     begun, ended = threading.Semaphore(0), threading.Event()
 
     def answer(request: readers._Request) -> bytes:
@@ -322,7 +322,7 @@ def test_the_next_zip_and_leaving_end_what_is_being_read(monkeypatch: pytest.Mon
 
 def test_a_real_shape_that_cannot_be_read_is_said_in_the_page() -> None:
     viewer = ViewerServer(Store(), Settings(), Clouds())
-    viewer._services.meshes._of_packages._most = 0
+    viewer.services.meshes._of_packages._most = 0
     with serve_viewer(viewer) as port, FakeBrowser(port) as tab:
         tab.settle()
         tab.choose(STORE.get("puma560").name)
