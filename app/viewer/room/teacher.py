@@ -244,6 +244,9 @@ class Teacher(Member):
                 self._filter = None
             self._return()
 
+    def on_activity(self) -> None:
+        self._dirty, self.due = True, 0.0  # an open course may be sent
+
     def on_robot(self) -> None:
         if self._wall is not None:  # another arm is on show than the one to return to
             self._before = None

@@ -389,6 +389,20 @@ def test_a_task_ends_the_obstacles_of_who_was_followed(room: Class) -> None:
     bob.wait(lambda: shown(bob, "sphere"))
 
 
+def test_a_new_course_of_the_teacher_can_be_sent_at_once(room: Class) -> None:
+    teacher, student = room.teacher(), room.join("Ann")[0]
+    teacher.wait(lambda: 'aria-label="Course"' in teacher.html)
+    assert ">My course</option>" not in teacher.html
+    teacher.set("Lesson", "Courses")
+    teacher.wait(lambda: 'data-course="choose"' in teacher.html)
+    teacher.say("feature", ["course", ["new", 1], 0])
+    teacher.wait(lambda: 'data-guide-change="add"' in teacher.html)
+    teacher.say("feature", ["course", ["set", "add", 1], "lesson:postures"])
+    teacher.wait(lambda: ">My course</option>" in teacher.html)
+    press(teacher, "fields", "course", value=[["0"]])
+    student.wait(lambda: 'data-course="follow"' in student.html and "My course" in student.html)
+
+
 def test_a_course_opens_on_every_page(room: Class) -> None:
     teacher, student, _, _ = lead(room)
     press(teacher, "fields", "course", value=[["0"]])
