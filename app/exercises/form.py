@@ -3,6 +3,8 @@
 A draft is the data of a file, as `tomllib` reads it. `groups` says which cells stand where and what is in them,
 `with_cell`, `with_row` and `without_row` change one of them, and `to_toml` writes the file. Whether the draft is
 an exercise, only `files.parse_exercise` says: what makes no sense is kept as it was typed.
+
+Long because it lists every field of every kind with its label and its help.
 """
 
 from __future__ import annotations

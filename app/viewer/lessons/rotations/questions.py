@@ -10,7 +10,7 @@ import numpy as np
 from app.exercises.variant import Quantity
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import direction, place, up_or_down
-from app.viewer.lessons.guide.outline import Lead, Outline, Pose
+from app.viewer.lessons.guide.outline import Configuration, Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.rotations.conventions import PAGE, Convention, axis_angle
 from app.viewer.lessons.rotations.drawing import LENGTH, anchor
@@ -92,6 +92,14 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "column": _vector(R[:, k]),
         "p": "(" + ", ".join(units.lengths.number(v) for v in p.tolist()) + f"){units.lengths.suffix}",
     }
+    poses = _poses(robot, start, R)
+    values: dict[str, float | Quantity] = {name: float(value) for name, value in numbers.items()}
+    found = {**values, "far": Quantity(slide_of(robot), "length")}
+    return LessonFacts(found, {}, words, poses, leads=leads(robot, T))
+
+
+def _poses(robot: Robot, start: Configuration, R: Array) -> dict[str, Pose]:
+    """What the steps show beside the arm at a configuration ``(n,)``."""
     poses = {
         "tool": Pose(start, drawing=turned(R, PAGE)),
         "z-y-z": Pose(start, drawing=turned(R, ZYZ)),
@@ -103,9 +111,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "camera": Pose(start, drawing={"chained": True, "chain": as_json(camera(robot))}),
     }
     poses["home"] = poses["tool"]  # of steps without a pose of their own
-    values: dict[str, float | Quantity] = {name: float(value) for name, value in numbers.items()}
-    found = {**values, "far": Quantity(slide_of(robot), "length")}
-    return LessonFacts(found, {}, words, poses, leads=leads(robot, T))
+    return poses
 
 
 def leads(robot: Robot, T: Array) -> dict[str, Lead | None]:

@@ -6,6 +6,7 @@ import math
 from functools import lru_cache
 
 import numpy as np
+from markupsafe import Markup
 
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Lead, Outline, Path, Pose
@@ -88,7 +89,23 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "blocked": f"{100.0 * float(share[np.argmax(elbows[1] > math.pi)]):.0f}",
         **dict.fromkeys(("off", "ptp", "lin"), ""),
     }
-    shown = {
+    shown = _figures(robot, units)
+    answered = {
+        "time": figures.timed(unit, long, joint.limits),
+        "sketch": figures.sketched(unit, sketch, joint.limits),
+    }
+    if between is not None:
+        words |= _compared(between, units)
+        shown["ways"] = figures.two_ways(between, units)
+    return LessonFacts(numbers, {}, words, _poses(robot), shown, leads(between), answered)
+
+
+def _figures(robot: Robot, units: Units) -> dict[str, Markup]:
+    """The charts that are shown with answers."""
+    unit, angles = units.of(bool(robot.revolute[0])), units.angles
+    past = [turning_past(offset, SPEED, HALF) for offset in OFFSETS]
+    share, elbows = both_elbows(START, END, LINKS)
+    return {
         "cubic": figures.cubic(robot, unit),
         "profiles": figures.family_of(robot, unit),
         "ends": figures.ends(robot, unit),
@@ -96,20 +113,16 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "load": figures.load(robot, unit),
         "elbows": figures.elbows(share, elbows, angles),
     }
-    answered = {
-        "time": figures.timed(unit, long, joint.limits),
-        "sketch": figures.sketched(unit, sketch, joint.limits),
+
+
+def _compared(between: Ways, units: Units) -> dict[str, str]:
+    """How far the PTP leaves the line, and how long both take."""
+    _, off = between.off_line()
+    return {
+        "off": units.lengths.value(float(off.max())),
+        "ptp": f"{between.ptp.duration:.2f}",
+        "lin": f"{between.lin.duration:.2f}",
     }
-    if between is not None:
-        _, off = between.off_line()
-        ptp, lin = between
-        words |= {
-            "off": lengths.value(float(off.max())),
-            "ptp": f"{ptp.duration:.2f}",
-            "lin": f"{lin.duration:.2f}",
-        }
-        shown["ways"] = figures.two_ways(between, units)
-    return LessonFacts(numbers, {}, words, _poses(robot), shown, leads(between), answered)
 
 
 def leads(between: Ways | None) -> dict[str, Lead | None]:

@@ -116,8 +116,8 @@ def test_nothing_that_is_shown_gives_the_answer_away() -> None:
             ]  # type: ignore[call-overload]
             assert moved, (robot.id, lesson)
             unit = [UNITS.of(bool(robot.revolute[i])) for i in moved]
-            told = [u.text(question.right()[i], 1) for i, u in zip(moved, unit, strict=True)]  # type: ignore[index]
-            assert not all(text in shown for text in told), (robot.id, lesson, told)
+            shown_values = [u.text(question.right()[i], 1) for i, u in zip(moved, unit, strict=True)]  # type: ignore[index]
+            assert not all(text in shown for text in shown_values), (robot.id, lesson, shown_values)
 
 
 def wrong_answers(robot: Robot, question: Posed) -> tuple[Any, Any]:
