@@ -54,7 +54,7 @@ class Simulation:
     """MuJoCo's model of an arm, at rest at its home configuration.
 
     Args:
-        robot: the arm; `kin.to_mjcf` gives it bodies and invented masses.
+        robot: the arm; `kin.robot_to_mjcf` gives it bodies and invented masses.
         payload: kg at the tool point, a ball of steel.
         mass: kg of the whole arm, if it is known; its links keep their shares.
 
@@ -69,7 +69,7 @@ class Simulation:
 
     def __init__(self, robot: kin.Robot, payload: float = 0.0, mass: float | None = None) -> None:
         self.robot = robot
-        spec = mujoco.MjSpec.from_string(kin.to_mjcf(robot))
+        spec = mujoco.MjSpec.from_string(kin.robot_to_mjcf(robot))
         spec.option.timestep = STEP
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         own = float(spec.compile().body_mass.sum())
@@ -79,10 +79,10 @@ class Simulation:
             body.inertia *= self.mass / own
         for geom in spec.geoms:
             geom.density *= self.mass / own
-        stated = kin.limits_of(robot).effort
+        stated = kin.motion_limits(robot).effort
         self.effort = np.where(np.isnan(stated), _invented(spec.compile(), robot), stated)
         self.invented = [robot.joints[i].name for i in np.flatnonzero(np.isnan(stated))]
-        self._speed = kin.limits_of(robot).velocity
+        self._speed = kin.motion_limits(robot).velocity
         for i, joint in enumerate(spec.joints):
             stiffness = self.effort[i] / FULL[0 if robot.revolute[i] else 1]
             joint.armature = stiffness / FASTEST**2

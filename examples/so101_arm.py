@@ -225,10 +225,10 @@ class Servos:
 
     def read(self) -> Array:
         """The configuration of the arm ``(n,)``, radians."""
-        return kin.q_of_readings(self._robot, self._readings())
+        return kin.q_from_readings(self._robot, self._readings())
 
     def _readings(self) -> Array:
-        return kin.readings_of_ticks(self._motors, self._bus.positions())
+        return kin.readings_from_ticks(self._motors, self._bus.positions())
 
     def show(self, page: Any, shown: kin.Robot) -> None:
         """Send where the arm is: as readings, for *Match motors*, where the page's arm has these motors."""
@@ -240,18 +240,18 @@ class Servos:
         if theirs and set(theirs) == set(own):
             page.readings = [own[motor] for motor in theirs]
         else:
-            page.measured = kin.q_of_readings(self._robot, readings)
+            page.measured = kin.q_from_readings(self._robot, readings)
 
     def write(self, q: Array) -> None:
         """Lead the servos to a configuration ``(n,)``, within their calibrated ranges."""
-        ticks = kin.ticks_of_readings(self._motors, kin.readings_of_q(self._robot, q))
+        ticks = kin.ticks_from_readings(self._motors, kin.readings_from_q(self._robot, q))
         ids = [motor.id for motor in self._motors]
         self._bus.move(dict(zip(ids, np.clip(ticks, *self._ends).tolist(), strict=True)))
 
     @property
     def limits(self) -> tuple[Array, Array]:
         """The configurations ``(n,)`` at the ends of the calibrated ranges: lower and upper ones."""
-        ends = kin.q_of_readings(self._robot, kin.readings_of_ticks(self._motors, self._ends))
+        ends = kin.q_from_readings(self._robot, kin.readings_from_ticks(self._motors, self._ends))
         return ends.min(axis=0), ends.max(axis=0)
 
 

@@ -6,6 +6,9 @@
 [-0.03, 0.157, -0.194]
 """
 
+from typing import TYPE_CHECKING
+
+from kin import deprecated
 from kin._version import __version__
 from kin.collision import (
     Capsule,
@@ -17,10 +20,9 @@ from kin.collision import (
     nearest_contact,
     nearest_links,
     obstacle_from_dict,
-    self_distance,
 )
 from kin.comparison import Comparison, compare
-from kin.dh import Screws, convert, exp_screw, robot_from_screws, screws
+from kin.dh import Screws, convert_dh, exp_screw, robot_from_screws, screws
 from kin.differential.task import Task
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
 from kin.files import (
@@ -32,21 +34,21 @@ from kin.files import (
     classic_robots,
     examine_urdf,
     get_robot,
-    load_folder,
     load_robot,
+    load_robots,
     load_urdf,
     parse_robot,
     read_urdf,
     robot_from_dict,
     robot_to_dict,
+    robot_to_mjcf,
     robot_to_toml,
+    robot_to_urdf,
     save_robot,
-    to_mjcf,
-    to_urdf,
     urdf_tips,
 )
 from kin.fk import fk, fk_positions, jacobian, link_frames, manipulability
-from kin.frames import frame_pose, from_xyz_rpy
+from kin.frames import frame_pose, pose_from_xyz_rpy
 from kin.ik import IKOptions, JointConstraints, branch_meanings, branch_names, branch_of, solve_ik
 from kin.ik.batch import IKResults, ik_branches, solve_ik_many
 from kin.ik.details import LimitViolation, Redundancy
@@ -66,7 +68,7 @@ from kin.motion import (
     Refusal,
     SegmentTimes,
     Spline,
-    limits_of,
+    motion_limits,
     parse_program,
     plan_motion,
     program_from_dict,
@@ -79,21 +81,19 @@ from kin.readings import (
     MotorFinding,
     MotorMatch,
     match_motors,
-    match_poses,
+    motor_poses,
     motors_from_lerobot,
     motors_to_lerobot,
-    q_of_readings,
-    readings_of_q,
-    readings_of_ticks,
-    ticks_of_readings,
+    q_from_readings,
+    readings_from_q,
+    readings_from_ticks,
+    ticks_from_readings,
 )
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
-from kin.transforms import from_position_wxyz, rotation_from_wxyz, wxyz_from_rotation
-from kin.warmup import warm_up, warm_up_rest
+from kin.transforms import pose_from_position_wxyz, rotation_from_wxyz, wxyz_from_rotation
+from kin.warmup import warm_up
 from kin.workspace import (
-    CapabilityBlock,
-    CapabilityGrid,
     CapabilityMap,
     Estimate,
     Extreme,
@@ -101,21 +101,16 @@ from kin.workspace import (
     SectionArc,
     WorkspaceChunk,
     WorkspaceFacts,
-    capability_block,
-    capability_grid,
-    capability_join,
     capability_map,
-    configuration_at,
     sample_workspace,
-    section,
+    workspace_configurations,
     workspace_facts,
+    workspace_section,
     workspace_slice,
 )
 
 __all__ = [
     "BlockedBranch",
-    "CapabilityBlock",
-    "CapabilityGrid",
     "CapabilityMap",
     "Capsule",
     "Circ",
@@ -175,35 +170,29 @@ __all__ = [
     "branch_names",
     "branch_of",
     "builtin_robots",
-    "capability_block",
-    "capability_grid",
-    "capability_join",
     "capability_map",
     "capsules",
     "classic_robots",
     "clearance",
     "compare",
-    "configuration_at",
     "connect",
-    "convert",
+    "convert_dh",
     "examine_urdf",
     "exp_screw",
     "fk",
     "fk_positions",
     "frame_pose",
-    "from_position_wxyz",
-    "from_xyz_rpy",
     "get_robot",
     "ik_branches",
     "jacobian",
-    "limits_of",
     "link_frames",
-    "load_folder",
     "load_robot",
+    "load_robots",
     "load_urdf",
     "manipulability",
     "match_motors",
-    "match_poses",
+    "motion_limits",
+    "motor_poses",
     "motors_from_lerobot",
     "motors_to_lerobot",
     "nearest_contact",
@@ -213,35 +202,44 @@ __all__ = [
     "parse_robot",
     "path_postures",
     "plan_motion",
+    "pose_from_position_wxyz",
+    "pose_from_xyz_rpy",
     "program_from_dict",
     "program_to_dict",
-    "q_of_readings",
+    "q_from_readings",
     "read_urdf",
-    "readings_of_q",
-    "readings_of_ticks",
+    "readings_from_q",
+    "readings_from_ticks",
     "robot_from_dict",
     "robot_from_screws",
     "robot_to_dict",
+    "robot_to_mjcf",
     "robot_to_toml",
+    "robot_to_urdf",
     "rotation_from_wxyz",
     "sample_workspace",
     "save_page",
     "save_robot",
     "screws",
-    "section",
-    "self_distance",
     "show",
     "singularities",
     "solve_ik",
     "solve_ik_many",
     "solve_path",
-    "ticks_of_readings",
-    "to_mjcf",
-    "to_urdf",
+    "ticks_from_readings",
     "urdf_tips",
     "warm_up",
-    "warm_up_rest",
+    "workspace_configurations",
     "workspace_facts",
+    "workspace_section",
     "workspace_slice",
     "wxyz_from_rotation",
 ]
+
+
+if not TYPE_CHECKING:  # a type checker knows no name that has gone
+
+    def __getattr__(name: str) -> object:
+        if name in deprecated.MOVED:
+            return deprecated.moved(name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

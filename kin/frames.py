@@ -33,7 +33,7 @@ def matrix_of(xyz: Sequence[float], rpy: Sequence[float]) -> Matrix:
     )
 
 
-def from_xyz_rpy(xyz: ArrayLike, rpy: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+def pose_from_xyz_rpy(xyz: ArrayLike, rpy: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     """Transform ``(4, 4)`` with a position in metres and the rotation Rz(yaw) Ry(pitch) Rx(roll) in radians.
 
     Args:
@@ -48,7 +48,7 @@ def from_xyz_rpy(xyz: ArrayLike, rpy: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
 
     Examples:
         >>> import kin, math
-        >>> kin.from_xyz_rpy([0.4, 0.0, 0.2], [0.0, 0.0, math.pi / 2])[:3, 0].round(9)
+        >>> kin.pose_from_xyz_rpy([0.4, 0.0, 0.2], [0.0, 0.0, math.pi / 2])[:3, 0].round(9)
         array([ 0.,  1., -0.])
     """
     parts = [finite_array(name, value, (3,)) for name, value in (("xyz", xyz), ("rpy", rpy))]
@@ -80,7 +80,7 @@ def frame_pose(
 
     Examples:
         >>> import kin
-        >>> table = kin.from_xyz_rpy([0.5, 0.0, 0.1])
+        >>> table = kin.pose_from_xyz_rpy([0.5, 0.0, 0.1])
         >>> kin.frame_pose("ur5", "table", {"table": table})[:3, 3]
         array([0.5, 0. , 0.1])
     """

@@ -254,7 +254,7 @@ class Robot:
 
         Examples:
             >>> import kin
-            >>> arm = kin.get_robot("planar2r").with_base(kin.from_xyz_rpy([0.0, 0.0, 0.5]))
+            >>> arm = kin.get_robot("planar2r").with_base(kin.pose_from_xyz_rpy([0.0, 0.0, 0.5]))
             >>> kin.fk(arm, [0.0, 0.0])[:3, 3]
             array([1.6, 0. , 0.5])
         """
@@ -274,7 +274,7 @@ class Robot:
 
         Examples:
             >>> import kin
-            >>> arm = kin.get_robot("planar2r").with_tool(kin.from_xyz_rpy([0.1, 0.0, 0.0]))
+            >>> arm = kin.get_robot("planar2r").with_tool(kin.pose_from_xyz_rpy([0.1, 0.0, 0.0]))
             >>> kin.fk(arm, [0.0, 0.0])[:3, 3]
             array([1.7, 0. , 0. ])
         """
@@ -294,7 +294,7 @@ class Robot:
 
         Examples:
             >>> import kin
-            >>> gripper = kin.from_xyz_rpy([0.0, 0.0, 0.12])
+            >>> gripper = kin.pose_from_xyz_rpy([0.0, 0.0, 0.12])
             >>> twice = kin.get_robot("ur5").with_mounted(gripper).with_mounted(gripper)
             >>> twice.T_last_tool[:3, 3]
             array([0.  , 0.  , 0.24])

@@ -98,7 +98,7 @@ def as_transform(value: ArrayLike, field: str = "target") -> Array:
     return out
 
 
-def from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) -> Array:
+def pose_from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) -> Array:
     """Transform ``(4, 4)`` from a position ``(3,)`` in metres and a quaternion ``(4,)`` (scalar first).
 
     The quaternion is normalised.
@@ -115,7 +115,7 @@ def from_position_wxyz(position: ArrayLike, wxyz: ArrayLike | None = None) -> Ar
 
     Examples:
         >>> import kin
-        >>> kin.from_position_wxyz([0.4, 0.0, 0.2], [0.0, 1.0, 0.0, 0.0])[:3, 2]  # upside down
+        >>> kin.pose_from_position_wxyz([0.4, 0.0, 0.2], [0.0, 1.0, 0.0, 0.0])[:3, 2]  # upside down
         array([ 0.,  0., -1.])
     """
     T = np.eye(4)

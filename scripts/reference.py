@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 SOURCES = {
     "kin.IKOptions": ("kin/ik/options.py", "IKOptions"),
     "kin.JointConstraints": ("kin/ik/options.py", "JointConstraints"),
-    "kin.capability_grid": ("kin/workspace/capability/blocks.py", "capability_grid"),
+    "kin.workspace.capability_grid": ("kin/workspace/capability/blocks.py", "capability_grid"),
     "kin.sample_workspace": ("kin/workspace/clouds/cloud.py", "sample_workspace"),
     "kin.solve_ik": ("kin/ik/__init__.py", "solve_ik"),
     "kin.solve_path": ("kin/path/__init__.py", "solve_path"),

@@ -28,7 +28,7 @@ install_programs() {
 }
 
 compile_kernels() {
-  python -c 'import kin; kin.warm_up(); kin.warm_up_rest()'
+  python -c 'import kin; kin.warm_up(everything=True)'
 }
 
 cd "$root"
@@ -50,7 +50,7 @@ fi
 install_kinboard ""
 compile_kernels &
 compiling=$!
-python -c 'import kin; kin.warm_up_rest(backwards=True)' &
+python -c 'from kin.warmup import warm_up_rest; warm_up_rest(backwards=True)' &
 backwards=$!
 install_kinboard "[test]"
 ruff check .

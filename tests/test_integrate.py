@@ -22,7 +22,7 @@ from app.shared.settings import Settings
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "integrate.md").read_text(encoding="utf-8")
-GRIPPER = kin.from_xyz_rpy([0.0, 0.0, 0.12])
+GRIPPER = kin.pose_from_xyz_rpy([0.0, 0.0, 0.12])
 
 
 # Runs hour.py where nothing is installed but what `kin` needs.

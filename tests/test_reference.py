@@ -26,11 +26,9 @@ METHODS = sorted(
     if value.__module__.startswith("kin.")
 )
 # What has no example that can run here: a notebook, and what only fills the cache of compiled kernels.
-NO_EXAMPLE = {"connect", "save_page", "show", "warm_up", "warm_up_rest"}
+NO_EXAMPLE = {"connect", "save_page", "show", "warm_up"}
 # Nothing that they may be given is refused.
-NEVER_RAISES = {
-    *("builtin_robots", "capability_join", "classic_robots", "warm_up", "warm_up_rest", "wxyz_from_rotation"),
-}
+NEVER_RAISES = {"builtin_robots", "classic_robots", "warm_up", "wxyz_from_rotation"}
 # Numbers of a parameter with this annotation have units.
 NUMBERS = re.compile(r"\b(float|ArrayLike|Array|Limits|Locks|Values|MotionLimits)\b")
 UNITS = re.compile(

@@ -36,7 +36,7 @@ from kin.transforms import (
     Array,
     frame_from_approach,
     frames_from_approaches,
-    from_position_wxyz,
+    pose_from_position_wxyz,
     rotations_from_wxyz,
 )
 
@@ -117,7 +117,7 @@ class Target(schemas.Body):
         if self.matrix is None:
             assert self.position is not None
             # These numbers have been checked: nothing is left to do for a point.
-            T = _IDENTITY.copy() if self.wxyz is None else from_position_wxyz(self.position, self.wxyz)
+            T = _IDENTITY.copy() if self.wxyz is None else pose_from_position_wxyz(self.position, self.wxyz)
             T[:3, 3] = self.position
             if self.approach is not None:
                 T[:3, :3] = frame_from_approach(self.approach)
@@ -130,7 +130,7 @@ class Target(schemas.Body):
                 f"{field}.position", str(self.position), "the position the matrix has, or only one of them"
             )
         if self.wxyz is not None:
-            R = from_position_wxyz([0.0, 0.0, 0.0], self.wxyz)[:3, :3]
+            R = pose_from_position_wxyz([0.0, 0.0, 0.0], self.wxyz)[:3, :3]
             if np.abs(T[:3, :3] - R).max() > max(AGREEMENT, 2.0 * error):
                 raise _wrong(f"{field}.wxyz", str(self.wxyz), "the rotation the matrix has, or only one of them")
         return T

@@ -31,7 +31,7 @@ from kin import IKOptions, InputError, Robot, Task
 from kin.frames import TOOL
 from kin.ik import solve
 from kin.ik.options import MASK_NAMES
-from kin.transforms import Array, frame_from_approach, from_position_wxyz
+from kin.transforms import Array, frame_from_approach, pose_from_position_wxyz
 from kin.units import PLAIN, Unit, Units
 
 
@@ -45,7 +45,7 @@ def run(arguments: Namespace) -> int:
         if getattr(arguments, option) is not None:
             raise InputError(f"--{option}", getattr(arguments, option), "--targets FILE as well")
     wxyz = None if arguments.wxyz is None else _vector(arguments.wxyz, PLAIN, "--wxyz")
-    T = from_position_wxyz(_vector(arguments.position, units.lengths, "--position"), wxyz)
+    T = pose_from_position_wxyz(_vector(arguments.position, units.lengths, "--position"), wxyz)
     if arguments.approach is not None:
         T[:3, :3] = frame_from_approach(_vector(arguments.approach, PLAIN, "--approach"))
     task = _task(arguments)

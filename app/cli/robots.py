@@ -27,7 +27,7 @@ from app.shared.answers.comparison import comparison_answer
 from app.shared.answers.motors import motor_match_answer
 from app.shared.answers.robots import RobotAnswer, robot_answer
 from app.shared.finding import find_robots
-from kin import Comparison, InputError, Robot, compare, match_motors, match_poses, robot_to_toml
+from kin import Comparison, InputError, Robot, compare, match_motors, motor_poses, robot_to_toml
 from kin.comparison import messages
 from kin.files.numbers import LARGEST, number_of
 from kin.readings.joints import moving_motors
@@ -99,7 +99,7 @@ def run_motors(arguments: Namespace) -> int:
     robot, units = robot_of(arguments), units_of(arguments)
     given = [configuration(robot, texts, "--pose", units) for texts in arguments.pose]
     if not arguments.read:
-        poses = np.array(given) if given else match_poses(robot)
+        poses = np.array(given) if given else motor_poses(robot)
         if arguments.json:
             print_json({"q": poses.tolist()})
         else:
@@ -108,11 +108,11 @@ def run_motors(arguments: Namespace) -> int:
     readings = [[_reading(text) for text in texts] for texts in arguments.read]
     if given and len(given) != len(readings):
         raise InputError("--read", f"{len(readings)} poses", f"as many as --pose: {len(given)}")
-    if not given and not 2 <= len(readings) <= len(match_poses(robot)):
+    if not given and not 2 <= len(readings) <= len(motor_poses(robot)):
         raise InputError(
             "--read", f"{len(readings)} poses", "2 or 3, those that are proposed; --pose gives others"
         )
-    found = match_motors(robot, given or match_poses(robot)[: len(readings)], readings)
+    found = match_motors(robot, given or motor_poses(robot)[: len(readings)], readings)
     if arguments.output is not None:
         write_file(arguments.output, robot_to_toml(replace(robot, motors=found.motors)))
     if arguments.json:

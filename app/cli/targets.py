@@ -30,7 +30,7 @@ from app.exports.progress import progress_bar
 from app.shared.mapreduce import dask_client
 from app.shared.threads import processors
 from kin import IKOptions, InputError, Robot, Status, solve_ik_many
-from kin.transforms import from_position_wxyz, rotations_from_wxyz
+from kin.transforms import pose_from_position_wxyz, rotations_from_wxyz
 
 Array = NDArray[np.float64]
 AT_ONCE = 4096  # targets of one piece
@@ -260,7 +260,7 @@ def _pose(place: int, row: list[str]) -> Array:
     """One row of a .csv file as a pose ``(4, 4)``."""
     try:
         x, y, z, *wxyz = map(float, row)
-        return from_position_wxyz([x, y, z], wxyz)
+        return pose_from_position_wxyz([x, y, z], wxyz)
     except (ValueError, InputError):
         raise InputError(f"{_FIELD}[{place}]", ",".join(row), "seven numbers: " + ", ".join(COLUMNS)) from None
 

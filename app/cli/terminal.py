@@ -23,9 +23,9 @@ from kin import (
     Obstacle,
     Robot,
     frame_pose,
-    from_xyz_rpy,
     load_robot,
     load_urdf,
+    pose_from_xyz_rpy,
 )
 from kin.collision.obstacles import checked_obstacles
 from kin.frames import FRAMES
@@ -69,7 +69,7 @@ def mounted_robot_of(arguments: Namespace) -> Robot:
 def pose_of(texts: list[str], field: str, units: Units) -> Array:
     """X, Y, Z, ROLL, PITCH, YAW as a transform ``(4, 4)``."""
     values = [quantity(text, units.of(k >= 3), field) for k, text in enumerate(texts)]
-    return from_xyz_rpy(values[:3], values[3:])
+    return pose_from_xyz_rpy(values[:3], values[3:])
 
 
 def joint_constraints(robot: Robot, arguments: Namespace) -> JointConstraints:

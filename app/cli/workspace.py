@@ -14,7 +14,15 @@ from app.exports.picture import draw
 from app.exports.save import opened, reading, save
 from app.shared.answers.workspace import workspace_answer
 from app.shared.clouds import Cloud
-from kin import InputError, JointConstraints, Robot, WorkspaceFacts, sample_workspace, section, workspace_facts
+from kin import (
+    InputError,
+    JointConstraints,
+    Robot,
+    WorkspaceFacts,
+    sample_workspace,
+    workspace_facts,
+    workspace_section,
+)
 
 _INTERRUPTED = 130  # exit code that shells expect after Ctrl-C
 
@@ -97,7 +105,7 @@ def _picture_writer(cloud: Cloud, target: str, arguments: Namespace) -> Callable
         robot, constraints = cloud.robot, cloud.constraints
         facts = _facts(robot, constraints, arguments)
         turns = robot.joints[0].kind == "revolute"
-        cut = section(robot, constraints=constraints) if turns else None
+        cut = workspace_section(robot, constraints=constraints) if turns else None
         with reading(cloud, _shows_progress(arguments)) as chunks, opened(target) as file:
             file.write(draw(robot, chunks, facts, cut).encode())
         return f"{cloud.n} points"

@@ -15,7 +15,7 @@ from app.exercises.expressions import Expression, ExpressionError, Function
 from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Facts, Joined, Quantity, Variant
 from kin import Robot
-from kin.transforms import Array, from_position_wxyz
+from kin.transforms import Array, pose_from_position_wxyz
 from kin.units import Units
 
 TOPICS = ("Frames and DH tables", "Forward kinematics", "Inverse kinematics", "Velocity", "Motions")
@@ -159,7 +159,7 @@ class Exercise:
             return None
         if self.target.q:
             return np.asarray(kin.fk(self.robot, np.array([value.value(scope) for value in self.target.q])))
-        T = from_position_wxyz([value.value(scope) for value in self.target.position])
+        T = pose_from_position_wxyz([value.value(scope) for value in self.target.position])
         T[:3, :3] = kin.fk(self.robot, q)[:3, :3]
         return T
 

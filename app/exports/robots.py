@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kin import Robot, convert, robot_to_toml, to_mjcf, to_urdf
+from kin import Robot, convert_dh, robot_to_mjcf, robot_to_toml, robot_to_urdf
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ FORMATS = {
 def robot_file(robot: Robot, name: str) -> str:
     """The text of a file in one of `FORMATS`; raises `InputError` for an arm that the format cannot describe."""
     if name == "urdf":
-        return to_urdf(robot)
+        return robot_to_urdf(robot)
     if name == "mjcf":
-        return to_mjcf(robot)
+        return robot_to_mjcf(robot)
     if name == "toml":
         return robot_to_toml(robot)
-    return robot_to_toml(convert(robot, "standard" if name == "dh" else "modified"))
+    return robot_to_toml(convert_dh(robot, "standard" if name == "dh" else "modified"))

@@ -1,8 +1,8 @@
 """The blocks of a capability map, computed by threads of this process or by the workers of a Dask cluster.
 
-This is a plain map-reduce: each block is a pure function of the grid and its number, and `kin.capability_join`
-accepts blocks in any order. So both ways give the same bits (on one kind of processor and with one version of
-Kinboard), and a block whose worker died is simply computed again by another.
+This is a plain map-reduce: each block is a pure function of the grid and its number, and
+`kin.workspace.capability_join` accepts blocks in any order. So both ways give the same bits (on one kind of
+processor and with one version of Kinboard), and a block whose worker died is simply computed again by another.
 
 Blocks are yielded as they are finished; closing the iterator cancels those that have not begun. The grid contains
 the whole arm: a worker needs Kinboard, but not the operator's robot files. Dask sends code as pickles: use only
@@ -19,7 +19,8 @@ from functools import partial
 from typing import Any
 
 from app.shared.threads import processors
-from kin import CapabilityBlock, CapabilityGrid, InputError, capability_block
+from kin import InputError
+from kin.workspace import CapabilityBlock, CapabilityGrid, capability_block
 
 _CONNECT = 10.0  # s to find the scheduler
 _WORKER = 60.0  # s to wait for the first worker

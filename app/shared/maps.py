@@ -14,15 +14,16 @@ from dataclasses import dataclass
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.mapreduce import run_local
 from app.shared.threads import background_threads, lower_priority
-from kin import CapabilityBlock, CapabilityMap, JointConstraints, Robot, capability_grid, capability_join
+from kin import CapabilityMap, JointConstraints, Robot
 from kin.ik.options import FREE
+from kin.workspace import CapabilityBlock, capability_grid, capability_join
 
 PUBLISHED_EVERY = 0.5  # s between two partial results
 
 
 @dataclass(frozen=True)
 class MapRequest:
-    """Description of a map: what `kin.capability_grid` takes, hashable."""
+    """Description of a map: what `kin.workspace.capability_grid` takes, hashable."""
 
     robot: Robot
     resolution: int = 25
@@ -67,7 +68,7 @@ class Maps:
     def subscribe(self, request: MapRequest) -> Subscription[CapabilityMap]:
         """A reader of this map: progress in blocks, the growing map, and the future of the whole map.
 
-        The future raises `kin.InputError` for an invalid description, as `kin.capability_grid` does.
+        The future raises `kin.InputError` for an invalid description, as `kin.workspace.capability_grid` does.
         """
         return self._maps.subscribe(request, lambda computation: self._compute(request, computation))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kin import Robot, RobotFileError, UnknownRobotError, builtin_robots, load_folder
+from kin import Robot, RobotFileError, UnknownRobotError, builtin_robots, load_robots
 
 
 class Store:
@@ -23,7 +23,7 @@ class Store:
             return
         if not folder.is_dir():
             raise RobotFileError(str(folder), "robots", str(folder), "an existing folder with robot files")
-        for robot in load_folder(folder).values():
+        for robot in load_robots(folder).values():
             if robot.id in self._robots:
                 raise RobotFileError(str(folder), "id", robot.id, "an id that no built-in robot has")
             self._robots[robot.id] = robot

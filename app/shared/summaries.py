@@ -9,7 +9,16 @@ from __future__ import annotations
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.threads import background_threads, lower_priority
 from app.shared.threads.executor import DaemonExecutor
-from kin import Comparison, JointConstraints, Robot, Section, WorkspaceFacts, compare, section, workspace_facts
+from kin import (
+    Comparison,
+    JointConstraints,
+    Robot,
+    Section,
+    WorkspaceFacts,
+    compare,
+    workspace_facts,
+    workspace_section,
+)
 from kin.comparison import Frames
 from kin.ik.options import FREE
 
@@ -19,7 +28,7 @@ KEPT = 64  # sizes, and as many sections
 
 
 class Summaries:
-    """Cache of `kin.workspace_facts`, `kin.section` and `kin.compare`. Any thread may use it.
+    """Cache of `kin.workspace_facts`, `kin.workspace_section` and `kin.compare`. Any thread may use it.
 
     Args:
         kept: how many results of each kind are kept.
@@ -67,11 +76,13 @@ class Summaries:
         limited: bool = False,
         signed: bool = False,
     ) -> Subscription[Section]:
-        """A section as by `kin.section`. `constraints` and `limited` as in `facts`."""
+        """A section as by `kin.workspace_section`. `constraints` and `limited` as in `facts`."""
 
         def compute(computation: SharedComputation[Section]) -> Section:
             stop = computation.check
-            return section(robot, plane, constraints=constraints, resolution=resolution, signed=signed, stop=stop)
+            return workspace_section(
+                robot, plane, constraints=constraints, resolution=resolution, signed=signed, stop=stop
+            )
 
         key = (robot, plane, constraints, resolution, signed)
         return self._sections.subscribe(key, compute, self._max_pending if limited else None)

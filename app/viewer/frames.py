@@ -16,7 +16,7 @@ import viser
 
 from app.viewer.labels import add_label
 from app.viewer.own_arm import clean
-from kin import InputError, Robot, frame_pose, from_xyz_rpy
+from kin import InputError, Robot, frame_pose, pose_from_xyz_rpy
 from kin.frames import BASE, FRAMES, TOOL, WORLD
 from kin.transforms import Array, wxyz_from_rotation
 
@@ -49,7 +49,7 @@ class Frames:
     @cached_property
     def poses(self) -> Mapping[str, Array]:
         """Poses ``(4, 4)`` of the workpieces in the world frame, by name."""
-        return {each.name: from_xyz_rpy(each.values[:3], each.values[3:]) for each in self.workpieces}
+        return {each.name: pose_from_xyz_rpy(each.values[:3], each.values[3:]) for each in self.workpieces}
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ def main() -> int:
             visit()
         finally:
             service.terminate()
-    kin.warm_up_rest()  # what a service does not wait for when it starts
+    kin.warm_up(everything=True)  # what a service does not wait for when it starts
     return service.returncode
 
 

@@ -1,9 +1,9 @@
 """Whether an arm touches itself or obstacles: distances of capsules that stand for its links.
 
-`self_distance` is the number for any batch of configurations; `nearest_links` says which two links, and where.
-`clearance` and `nearest_contact` are the same with obstacles (`kin.collision.obstacles`). Distances are those of
-capsules, which robot files state or which are assumed from the DH table (`kin.collision.bodies`): they warn early
-or late by the difference to the real bodies.
+`clearance` is the number for any batch of configurations, to the arm itself and to obstacles
+(`kin.collision.obstacles`); `nearest_contact` says what it is between, `nearest_links` which two links are
+nearest, and where. Distances are those of capsules, which robot files state or which are assumed from the DH
+table (`kin.collision.bodies`): they warn early or late by the difference to the real bodies.
 """
 
 from __future__ import annotations
@@ -35,7 +35,6 @@ __all__ = [
     "nearest_contact",
     "nearest_links",
     "obstacle_from_dict",
-    "self_distance",
 ]
 
 
@@ -53,29 +52,6 @@ class NearestLinks:
     distance: float
     links: tuple[int, int]
     points: Array
-
-
-def self_distance(robot: Robot | str, q: ArrayLike) -> Array:
-    """Least distance between links ``(...)`` in metres, for configurations ``(..., n)``.
-
-    Negative where capsules overlap; infinite for an arm of which no two links could meet.
-
-    Args:
-        robot: the arm, or the id of a built-in one.
-        q: ``(n,)`` or any batch ``(..., n)`` of configurations, radians (metres for a slide).
-
-    Returns:
-        One distance for each configuration.
-
-    Raises:
-        InputError: as in `fk`.
-
-    Examples:
-        >>> import kin
-        >>> bool(kin.self_distance("panda", kin.get_robot("panda").q_home) > 0.0)
-        True
-    """
-    return clearance(robot, q)
 
 
 def nearest_links(robot: Robot | str, q: ArrayLike) -> NearestLinks | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from kin.collision.solids import BOX, COLUMNS, CYLINDER, SPHERE
 from kin.errors import InputError
-from kin.frames import from_xyz_rpy
+from kin.frames import pose_from_xyz_rpy
 from kin.transforms import Array
 
 Shape = Literal["box", "sphere", "cylinder", "table"]
@@ -82,7 +82,7 @@ class Obstacle:
     @cached_property
     def T(self) -> Array:
         """Pose of its centre ``(4, 4)``."""
-        T = from_xyz_rpy(self.xyz, self.rpy)
+        T = pose_from_xyz_rpy(self.xyz, self.rpy)
         if self.shape == "table":
             T[:3, 3] -= 0.5 * self._sides[2] * T[:3, 2]
         return T

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from kin.comparison.tables import ALPHA, COLUMNS, THETA, A, D, Tables
-from kin.dh.tables import convert
+from kin.dh.tables import convert_dh
 from kin.robot import CONVENTIONS, KIND_CODES, Convention, Robot
 from kin.transforms import Array
 
@@ -67,7 +67,7 @@ class Edit:
 @lru_cache(maxsize=16)
 def table_in(reference: Robot, convention: Convention) -> Tables:
     """The table of the reference in a convention; not to be written to."""
-    return Tables.of(convert(replace(reference, capsules=(), capsules_source=""), convention))
+    return Tables.of(convert_dh(replace(reference, capsules=(), capsules_source=""), convention))
 
 
 def edits(m: int, reference: Robot, frames_too: bool) -> Iterator[Edit]:

@@ -1,12 +1,12 @@
 """DH tables of arms that are described otherwise: by the other convention, by frames, by screws."""
 
 from kin.dh.exponentials import Screws, exp_screw, robot_from_screws, screws
-from kin.dh.tables import SAMPLES, convert, largest_difference, table_of_chain
+from kin.dh.tables import SAMPLES, convert_dh, largest_difference, table_of_chain
 
 __all__ = [
     "SAMPLES",
     "Screws",
-    "convert",
+    "convert_dh",
     "exp_screw",
     "largest_difference",
     "robot_from_screws",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.axes import frame_of, inverse, perpendicular_to
-from kin.dh.tables import convert, table_of_chain
+from kin.dh.tables import convert_dh, table_of_chain
 from kin.errors import InputError
 from kin.fk import fk, jacobian
 from kin.named import robot_of
@@ -195,7 +195,7 @@ def robot_from_screws(
     robot = Robot.from_dh(
         table.rows, robot_id=robot_id, name=name, source=source, home=home, base=table.base, tool=table.tool
     )
-    return convert(robot, convention)
+    return convert_dh(robot, convention)
 
 
 def _values(value: ArrayLike) -> Array:

@@ -33,7 +33,7 @@ PARALLEL = 2e-14  # radians: a tilt this small is dropped
 SAMPLES = 256
 
 
-def convert(robot: Robot | str, convention: Convention) -> Robot:
+def convert_dh(robot: Robot | str, convention: Convention) -> Robot:
     """The same arm as a table in this convention: the same joints, limits and tool poses.
 
     Args:
@@ -49,7 +49,7 @@ def convert(robot: Robot | str, convention: Convention) -> Robot:
     Examples:
         >>> import kin
         >>> arm = kin.get_robot("puma560")
-        >>> craig = kin.convert(arm, "modified")
+        >>> craig = kin.convert_dh(arm, "modified")
         >>> bool(abs(kin.fk(craig, arm.q_home) - kin.fk(arm, arm.q_home)).max() < 1e-12)
         True
     """

@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from kin.errors import UnknownRobotError
-from kin.files.read import load_folder
+from kin.files.read import load_robots
 from kin.named import finds_robots
 from kin.robot import Robot
 
@@ -30,7 +30,7 @@ def classic_robots() -> dict[str, Robot]:
         >>> len(kin.classic_robots()), "ur3e" in kin.classic_robots(), "ur3e" in kin.builtin_robots()
         (12, False, True)
     """
-    robots = load_folder(BUILTIN)
+    robots = load_robots(BUILTIN)
     return {robot_id: robots[robot_id] for robot_id in dict.fromkeys((*FIRST, *robots))}
 
 
@@ -47,7 +47,7 @@ def builtin_robots() -> dict[str, Robot]:
         True
     """
     robots = dict(classic_robots())
-    library = [robot for folder in BUILTIN.iterdir() if folder.is_dir() for robot in load_folder(folder).values()]
+    library = [robot for folder in BUILTIN.iterdir() if folder.is_dir() for robot in load_robots(folder).values()]
     for robot in sorted(library, key=lambda each: (not each.maker, each.maker.lower(), each.id)):
         if robot.id in robots:
             raise ValueError(f"two built-in robots have the id {robot.id}")

@@ -54,7 +54,7 @@ _LONGEST_PATH = 4096
 UNLIMITED = "none"
 
 
-def load_folder(folder: Path | str) -> dict[str, Robot]:
+def load_robots(folder: Path | str) -> dict[str, Robot]:
     """The robots of every ``*.toml`` file in a folder, by id.
 
     Args:
@@ -71,7 +71,7 @@ def load_folder(folder: Path | str) -> dict[str, Robot]:
         >>> import kin, tempfile, pathlib
         >>> folder = pathlib.Path(tempfile.mkdtemp())
         >>> kin.save_robot("scara", folder / "scara.toml")
-        >>> list(kin.load_folder(folder))
+        >>> list(kin.load_robots(folder))
         ['scara']
     """
     robots: dict[str, Robot] = {}

@@ -105,7 +105,7 @@ def solve_ik(
         >>> result = kin.solve_ik(arm, kin.fk(arm, arm.q_home))
         >>> result.status.value, len(result.solutions), result.complete
         ('solved', 8, True)
-        >>> far = kin.from_xyz_rpy([2.0, 0.0, 0.5])
+        >>> far = kin.pose_from_xyz_rpy([2.0, 0.0, 0.5])
         >>> kin.solve_ik(arm, far).status.value
         'unreachable'
         >>> left = kin.solve_ik(arm, kin.fk(arm, arm.q_home), branch="shoulder left", prefer="limits")

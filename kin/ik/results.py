@@ -205,7 +205,8 @@ class IKResult(Deferred):
 
         Examples:
             >>> import kin
-            >>> kin.solve_ik("planar2r", kin.from_xyz_rpy([3.0, 0.0, 0.0]), task="position").explain().headline
+            >>> far = kin.pose_from_xyz_rpy([3.0, 0.0, 0.0])
+            >>> kin.solve_ik("planar2r", far, task="position").explain().headline
             'Out of reach by 1400.0 mm'
         """
         found = explain(self.details, self.cause, self.task, self.singularities, units)

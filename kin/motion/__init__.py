@@ -25,7 +25,7 @@ from kin.errors import InputError
 from kin.ik.options import IKOptions
 from kin.ik.problem import never_cancel
 from kin.motion.arrivals import Arrival
-from kin.motion.limits import MotionLimits, limits_of
+from kin.motion.limits import MotionLimits, motion_limits
 from kin.motion.planner import planned
 from kin.motion.planning.collisions import checked
 from kin.motion.planning.plan import task_of
@@ -52,7 +52,7 @@ __all__ = [
     "Refusal",
     "SegmentTimes",
     "Spline",
-    "limits_of",
+    "motion_limits",
     "parse_program",
     "plan_motion",
     "program_from_dict",
@@ -80,7 +80,7 @@ def plan_motion(
         robot: the arm, or the id of a built-in one.
         program: a `Program`, its segments, or plain data as in `program_from_dict`.
         q_start: ``(n,)`` where the arm is, radians (metres); the home pose by default.
-        limits: other limits than those of `limits_of`, in radians (metres) and seconds.
+        limits: other limits than those of `motion_limits`, in radians (metres) and seconds.
         options: the next two as one value. All others have to be the default: the program states the task, and
             its start the posture.
         avoid_self_collision, obstacles: the motion is checked, and refused at the first place where the arm
@@ -111,7 +111,7 @@ def plan_motion(
     if q.ndim != 1:
         raise InputError("q_start", f"shape {q.shape}", f"one configuration of {robot.n} values")
     if limits is None:
-        limits = limits_of(robot)
+        limits = motion_limits(robot)
     elif not isinstance(limits, MotionLimits) or len(limits.velocity) != robot.n:
         raise InputError("limits", limits, f"MotionLimits of {robot.n} joints")
     wanted = IKOptions.of(options, avoid_self_collision=avoid_self_collision, obstacles=obstacles)

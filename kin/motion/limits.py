@@ -72,7 +72,7 @@ def _checked(key: str, values: ArrayLike, n: int, expected: str) -> Array:
 
 
 @lru_cache(maxsize=256)
-def limits_of(robot: Robot | str) -> MotionLimits:
+def motion_limits(robot: Robot | str) -> MotionLimits:
     """The limits of an arm: stated in its file, or assumed.
 
     Args:
@@ -86,7 +86,7 @@ def limits_of(robot: Robot | str) -> MotionLimits:
 
     Examples:
         >>> import kin
-        >>> kin.limits_of("ur5").velocity.round(3)
+        >>> kin.motion_limits("ur5").velocity.round(3)
         array([3.142, 3.142, 3.142, 3.142, 3.142, 3.142])
     """
     robot = robot_of(robot)

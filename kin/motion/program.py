@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.options import finite_number, shape_of
-from kin.transforms import Array, as_transform, from_position_wxyz, wxyz_from_rotation
+from kin.transforms import Array, as_transform, pose_from_position_wxyz, wxyz_from_rotation
 
 Orientation = Literal["geodesic", "two-axis"]
 Kind = Literal["ptp", "lin", "circ", "spline", "dwell"]
@@ -80,7 +80,7 @@ class PoseTarget:
 
         Examples:
             >>> import kin
-            >>> kin.PoseTarget.of(kin.from_xyz_rpy([0.4, 0.1, 0.3])).position
+            >>> kin.PoseTarget.of(kin.pose_from_xyz_rpy([0.4, 0.1, 0.3])).position
             (0.4, 0.1, 0.3)
         """
         pose = as_transform(T, "pose")
@@ -103,7 +103,7 @@ class PoseTarget:
             >>> kin.PoseTarget((0.4, 0.1, 0.3)).pose(np.eye(4))[:3, 3]
             array([0.4, 0.1, 0.3])
         """
-        T = from_position_wxyz(self.position, self.wxyz)
+        T = pose_from_position_wxyz(self.position, self.wxyz)
         if self.wxyz is None:
             T[:3, :3] = before[:3, :3]
         return T

@@ -105,7 +105,7 @@ class PathGap:
 
         Examples:
             >>> import kin
-            >>> far = kin.from_xyz_rpy([3.0, 0.0, 0.0])
+            >>> far = kin.pose_from_xyz_rpy([3.0, 0.0, 0.0])
             >>> kin.solve_path("planar2r", [far, far], task="position").gaps[0].explain().partition(":")[0]
             'Out of reach by 1400.0 mm'
         """

@@ -9,20 +9,20 @@
 """
 
 from kin.readings.findings import MotorFinding, MotorMatch
-from kin.readings.joints import q_of_readings, readings_of_q, readings_of_ticks, ticks_of_readings
+from kin.readings.joints import q_from_readings, readings_from_q, readings_from_ticks, ticks_from_readings
 from kin.readings.lerobot import motors_from_lerobot, motors_to_lerobot
 from kin.readings.match import match_motors
-from kin.readings.poses import match_poses
+from kin.readings.poses import motor_poses
 
 __all__ = [
     "MotorFinding",
     "MotorMatch",
     "match_motors",
-    "match_poses",
+    "motor_poses",
     "motors_from_lerobot",
     "motors_to_lerobot",
-    "q_of_readings",
-    "readings_of_q",
-    "readings_of_ticks",
-    "ticks_of_readings",
+    "q_from_readings",
+    "readings_from_q",
+    "readings_from_ticks",
+    "ticks_from_readings",
 ]

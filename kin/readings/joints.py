@@ -38,7 +38,7 @@ def moving_motors(robot: Robot, motors: Sequence[Motor] | None = None) -> tuple[
     return moving
 
 
-def q_of_readings(robot: Robot | str, readings: ArrayLike) -> Array:
+def q_from_readings(robot: Robot | str, readings: ArrayLike) -> Array:
     """The configurations in which the motors of an arm have these readings.
 
     Args:
@@ -58,7 +58,7 @@ def q_of_readings(robot: Robot | str, readings: ArrayLike) -> Array:
         >>> shoulder = kin.Motor("shoulder", 1, sign=-1, offset=90.0)
         >>> elbow = kin.Motor("elbow", 2, offset=1024, unit="ticks")
         >>> arm = dataclasses.replace(kin.get_robot("planar2r"), motors=(shoulder, elbow))
-        >>> np.degrees(kin.q_of_readings(arm, [60.0, 2048])).round(3).tolist()
+        >>> np.degrees(kin.q_from_readings(arm, [60.0, 2048])).round(3).tolist()
         [30.0, 90.0]
     """
     robot = robot_of(robot)
@@ -85,7 +85,7 @@ def joint_values(robot: Robot, j: int, motor: Motor, readings: Array) -> Array:
     return np.where((values >= low) & (values <= high) & np.isfinite(low + high), values, nearest)
 
 
-def readings_of_q(robot: Robot | str, q: ArrayLike) -> Array:
+def readings_from_q(robot: Robot | str, q: ArrayLike) -> Array:
     """What the motors of an arm read in configurations.
 
     Args:
@@ -104,7 +104,7 @@ def readings_of_q(robot: Robot | str, q: ArrayLike) -> Array:
         >>> shoulder = kin.Motor("shoulder", 1, sign=-1, offset=90.0)
         >>> elbow = kin.Motor("elbow", 2, offset=1024, unit="ticks")
         >>> arm = dataclasses.replace(kin.get_robot("planar2r"), motors=(shoulder, elbow))
-        >>> kin.readings_of_q(arm, np.radians([30.0, 90.0])).round(9).tolist()
+        >>> kin.readings_from_q(arm, np.radians([30.0, 90.0])).round(9).tolist()
         [60.0, 2048.0]
     """
     robot = robot_of(robot)
@@ -119,7 +119,7 @@ def readings_of_q(robot: Robot | str, q: ArrayLike) -> Array:
     return readings
 
 
-def readings_of_ticks(motors: Sequence[Motor], ticks: ArrayLike) -> Array:
+def readings_from_ticks(motors: Sequence[Motor], ticks: ArrayLike) -> Array:
     """The ticks of servos as readings, as LeRobot normalises them.
 
     Ticks are those that a servo sends: it has subtracted its homing offset. LeRobot's degrees begin in the middle
@@ -138,7 +138,7 @@ def readings_of_ticks(motors: Sequence[Motor], ticks: ArrayLike) -> Array:
     Examples:
         >>> import kin
         >>> motor = kin.Motor("elbow", 3, unit="range_m100_100", range=(1000, 3000))
-        >>> kin.readings_of_ticks([motor], [[1000], [2500], [3900]]).tolist()
+        >>> kin.readings_from_ticks([motor], [[1000], [2500], [3900]]).tolist()
         [[-100.0], [50.0], [100.0]]
     """
     motors = checked_motors(motors)
@@ -158,8 +158,8 @@ def readings_of_ticks(motors: Sequence[Motor], ticks: ArrayLike) -> Array:
     return readings
 
 
-def ticks_of_readings(motors: Sequence[Motor], readings: ArrayLike) -> Array:
-    """The ticks that LeRobot sends to servos for these readings; for the reverse, see `readings_of_ticks`.
+def ticks_from_readings(motors: Sequence[Motor], readings: ArrayLike) -> Array:
+    """The ticks that LeRobot sends to servos for these readings; for the reverse, see `readings_from_ticks`.
 
     Args:
         motors: with a calibrated `range`, unless they read ticks.
@@ -174,7 +174,7 @@ def ticks_of_readings(motors: Sequence[Motor], readings: ArrayLike) -> Array:
     Examples:
         >>> import kin
         >>> motor = kin.Motor("elbow", 3, unit="range_m100_100", range=(1000, 3000))
-        >>> kin.ticks_of_readings([motor], [[-100.0], [50.0], [170.0]]).tolist()
+        >>> kin.ticks_from_readings([motor], [[-100.0], [50.0], [170.0]]).tolist()
         [[1000.0], [2500.0], [3000.0]]
     """
     motors = checked_motors(motors)

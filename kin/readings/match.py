@@ -47,7 +47,7 @@ def match_motors(
 
     Args:
         robot: the arm, or the id of a built-in one.
-        q: ``(k, n)`` joint values of the poses, radians (metres). `match_poses` proposes some.
+        q: ``(k, n)`` joint values of the poses, radians (metres). `motor_poses` proposes some.
         readings: ``(k, m)`` in these poses, of each motor that moves a joint, in their order and units. Those that
             begin again after a turn may have done so.
         motors: whose signs and zeros are not known; by default those of the arm.

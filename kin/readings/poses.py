@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kin.collision import capsules, self_distance
+from kin.collision import capsules, clearance
 from kin.errors import InputError
 from kin.fk import link_frames
 from kin.named import robot_of
@@ -29,7 +29,7 @@ _CHECKS = 3000  # configurations that are looked at
 _APART = 0.001  # m between links, and above the floor
 
 
-def match_poses(robot: Robot | str, count: int = 3, allowed: Callable[[Array], bool] | None = None) -> Array:
+def motor_poses(robot: Robot | str, count: int = 3, allowed: Callable[[Array], bool] | None = None) -> Array:
     """Poses for `match_motors`, in which every joint moves clearly: inside the limits and free of collisions.
 
     Args:
@@ -46,7 +46,7 @@ def match_poses(robot: Robot | str, count: int = 3, allowed: Callable[[Array], b
 
     Examples:
         >>> import kin, numpy as np
-        >>> poses = kin.match_poses("so101")
+        >>> poses = kin.motor_poses("so101")
         >>> bool(np.abs(poses[1] - poses[0]).min() > np.radians(35))
         True
     """
@@ -123,7 +123,7 @@ def _apart(robot: Robot, poses: Array) -> float:
 
 def _free(robot: Robot, q: Array) -> bool:
     """Whether no link touches another one, and none is below the floor."""
-    if self_distance(robot, q) < _APART:
+    if clearance(robot, q) < _APART:
         return False
     if robot.floor is None:
         return True

@@ -20,7 +20,7 @@ from types import MappingProxyType
 import numpy as np
 from numba.core.event import install_recorder
 
-from kin.collision import Obstacle, clearance, nearest_links, self_distance
+from kin.collision import Obstacle, clearance, nearest_links
 from kin.collision.contacts import surroundings
 from kin.collision.sweep import touches_along
 from kin.differential.task import Task
@@ -43,9 +43,9 @@ from kin.workspace import (
     MEASURES,
     STRATEGIES,
     capability_map,
-    configuration_at,
-    section,
+    workspace_configurations,
     workspace_facts,
+    workspace_section,
     workspace_slice,
 )
 from kin.workspace.capability.kernels import raise_best
@@ -70,10 +70,14 @@ def warm_up_first(*, backwards: bool = False) -> None:
         step()
 
 
-def warm_up() -> None:
+def warm_up(everything: bool = False) -> None:
     """Load what moves the first arm; if that had to be compiled, compile the kernels of all families.
 
     A cache that contains the kernels of the first arm is assumed to contain the others; they load on first use.
+
+    Args:
+        everything: the other kernels as well, such as those of clouds, motions and collisions. On a new machine
+            that takes minutes.
     """
     first, *others = one_of_each_family()
     with install_recorder("numba:compile") as compiled:
@@ -84,6 +88,8 @@ def warm_up() -> None:
         for robot in (first, *others):
             for step in _calls(robot):
                 step()
+    if everything:
+        warm_up_rest()
 
 
 def warm_up_rest(stop: Callable[[], bool] = lambda: False, *, backwards: bool = False) -> None:
@@ -217,7 +223,7 @@ def _collisions(robot: Robot) -> list[Step]:
     q, box = robot.q_home, Obstacle("box", size=(1.0, 1.0, 1.0))
     return [
         partial(nearest_links, robot, q),
-        partial(self_distance, robot, q),
+        partial(clearance, robot, q),
         partial(clearance, robot, q, [box]),
         lambda: surroundings(robot, (box,)).touches(q),
         lambda: touches_along(surroundings(robot, (box,)), q[None], (), lambda: None),
@@ -286,8 +292,8 @@ def _rest() -> Iterator[tuple[str, Step]]:
     locked = [None, None, *first.q_home[2:].tolist()]
     for strategy in STRATEGIES:
         yield CLOUDS, partial(workspace_slice, first, 2, 0, 2, strategy=strategy, measure=MEASURES, locked=locked)
-    yield CLOUDS, partial(configuration_at, first, 0, locked=locked)
-    yield CLOUDS, partial(section, first, resolution=8, locked=locked)
+    yield CLOUDS, partial(workspace_configurations, first, 0, locked=locked)
+    yield CLOUDS, partial(workspace_section, first, resolution=8, locked=locked)
     yield CLOUDS, partial(workspace_facts, first, effort=2, locked=locked)
     for robot in robots:
         locked = [None, None, *robot.q_home[2:].tolist()]

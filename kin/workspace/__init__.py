@@ -14,11 +14,17 @@ from kin.workspace.capability.blocks import (
     capability_join,
     capability_map,
 )
-from kin.workspace.clouds.cloud import STRATEGIES, Strategy, configuration_at, sample_workspace, workspace_slice
+from kin.workspace.clouds.cloud import (
+    STRATEGIES,
+    Strategy,
+    sample_workspace,
+    workspace_configurations,
+    workspace_slice,
+)
 from kin.workspace.clouds.measures import MEASURES, Measure
 from kin.workspace.facts import workspace_facts
 from kin.workspace.results import Estimate, Extreme, Section, SectionArc, Span, WorkspaceChunk, WorkspaceFacts
-from kin.workspace.sections.cut import section
+from kin.workspace.sections.cut import workspace_section
 
 __all__ = [
     "MEASURES",
@@ -39,9 +45,9 @@ __all__ = [
     "capability_grid",
     "capability_join",
     "capability_map",
-    "configuration_at",
     "sample_workspace",
-    "section",
+    "workspace_configurations",
     "workspace_facts",
+    "workspace_section",
     "workspace_slice",
 ]

@@ -21,7 +21,7 @@ import kin
 from app.shared.store import Store
 from app.viewer.arm import Arm
 from app.viewer.feature import Feature
-from kin.transforms import Array, from_position_wxyz
+from kin.transforms import Array, pose_from_position_wxyz
 from kin.units import DEFAULT_UNITS
 
 STORE = Store()
@@ -264,7 +264,7 @@ def _pose(nodes: dict[str, Any], name: str) -> Array | None:
             continue
         if not above._impl.visible:
             return None
-        T = T @ from_position_wxyz(above._impl.position, above._impl.wxyz)
+        T = T @ pose_from_position_wxyz(above._impl.position, above._impl.wxyz)
     return T
 
 

@@ -21,7 +21,7 @@ from app.service.web.viewer_proxy import VisitorConnection
 from app.viewer.panel.script import LABEL
 from app.viewer.session.persistence import SAVE_AFTER
 from app.viewer.session.worker.worker import Worker
-from kin.transforms import from_position_wxyz, wxyz_from_rotation
+from kin.transforms import pose_from_position_wxyz, wxyz_from_rotation
 
 ANSWER = 1.5  # s until a message is answered on a busy machine, by a service in another process
 PATIENCE = 30.0  # s until something that must happen has happened, on a machine that does much else
@@ -177,7 +177,7 @@ class FakeBrowser:
 
     def local(self, name: str) -> np.ndarray:
         pose = self.poses.get(name, {})
-        return from_position_wxyz(pose.get("position", (0, 0, 0)), pose.get("wxyz", (1, 0, 0, 0)))
+        return pose_from_position_wxyz(pose.get("position", (0, 0, 0)), pose.get("wxyz", (1, 0, 0, 0)))
 
     # Actions of the visitor
 

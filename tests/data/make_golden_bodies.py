@@ -86,7 +86,7 @@ def main() -> None:
         q = robot.random_q(rng, many or 240).round(3)
         touching = contacts(name, q)
         true = np.array([bool(each) for each in touching])
-        ours = kin.self_distance(robot, q) < 0.0
+        ours = kin.clearance(robot, q) < 0.0
         false = (ours & ~true).sum() / max(1, (~true).sum())
         print(
             f"{name}: {len(robot.capsules)} capsules; {true.mean():.1%} touch, {(true & ~ours).sum()} missed "

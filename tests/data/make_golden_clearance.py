@@ -17,7 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import kin
-from kin.collision import capsules, clearance, self_distance
+from kin.collision import capsules, clearance
 from kin.collision.bodies import bodies_of
 
 OBSTACLES = [
@@ -69,7 +69,7 @@ def rotation_to(z: np.ndarray) -> np.ndarray:
 def compared(robot: kin.Robot, q: np.ndarray, obstacles=()) -> list[dict]:
     """Configurations with their distances by coal, after a line about the differences."""
     theirs = np.array([distance_by_coal(robot, each, obstacles) for each in q])
-    ours = clearance(robot, q, obstacles) if obstacles else self_distance(robot, q)
+    ours = clearance(robot, q, obstacles)
     free = theirs > 0.0 if obstacles else np.ones(len(q), bool)
     apart = np.abs(ours - theirs)[free].max(initial=0.0)
     wrong = int(((theirs < 0.0) != (ours < 0.0)).sum())

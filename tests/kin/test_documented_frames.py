@@ -7,8 +7,8 @@ import numpy as np
 import kin
 from kin.transforms import frame_from_approach, rotation_vector
 
-BASE = kin.from_xyz_rpy([0.3, -0.5, 0.8], [0.4, -0.7, 1.9])
-TOOL = kin.from_xyz_rpy([0.02, 0.05, 0.11], [0.3, 0.2, -0.4])
+BASE = kin.pose_from_xyz_rpy([0.3, -0.5, 0.8], [0.4, -0.7, 1.9])
+TOOL = kin.pose_from_xyz_rpy([0.02, 0.05, 0.11], [0.3, 0.2, -0.4])
 PLAIN = kin.get_robot("ur5")
 ARM = PLAIN.with_base(BASE).with_tool(TOOL)
 Q = np.array([0.4, -1.3, 1.1, -0.6, 0.9, 0.2])
@@ -95,7 +95,7 @@ def test_named_frames_and_screws_are_in_the_world_frame():
 def test_sections_and_voxels_are_in_the_world_frame():
     arm = kin.get_robot("scara").with_base(BASE)
     plain = kin.get_robot("scara")
-    section = kin.section(arm)
+    section = kin.workspace_section(arm)
     arc = section.arcs[0]
     s, t = arc.points[0]
     point = (BASE @ kin.fk(plain, arc.q))[:3, 3]
@@ -114,11 +114,11 @@ def test_sections_and_voxels_are_in_the_world_frame():
 
 
 def test_a_rotation_mask_has_the_axes_of_the_world_frame_or_of_the_target():
-    turned = world(Q) @ kin.from_xyz_rpy([0, 0, 0], [0, 0, 0.7])  # about the z axis of the target
+    turned = world(Q) @ kin.pose_from_xyz_rpy([0, 0, 0], [0, 0, 0.7])  # about the z axis of the target
     mask = [True] * 5 + [False]
     free = kin.solve_ik(ARM, turned, mask=mask, mask_frame="tool", q_seed=Q)
     assert np.allclose(world(free.solutions[0].q)[:3, 2], turned[:3, 2], atol=1e-6)
-    upright = kin.from_xyz_rpy([0, 0, 0], [0, 0, 0.7])
+    upright = kin.pose_from_xyz_rpy([0, 0, 0], [0, 0, 0.7])
     about_world = np.eye(4)
     about_world[:3, :3] = upright[:3, :3] @ world(Q)[:3, :3]
     about_world[:3, 3] = world(Q)[:3, 3]
@@ -145,6 +145,6 @@ def test_contacts_and_obstacles_are_in_the_world_frame():
 
 
 def test_a_mounted_tool_goes_on_the_tool_of_the_arm_and_another_tool_replaces_it():
-    tip = kin.from_xyz_rpy([0.0, 0.0, 0.2], [0.0, 0.5, 0.0])
+    tip = kin.pose_from_xyz_rpy([0.0, 0.0, 0.2], [0.0, 0.5, 0.0])
     assert np.allclose(kin.fk(ARM.with_mounted(tip), Q), world(Q) @ tip, atol=1e-12)
     assert np.allclose(kin.fk(ARM.with_tool(tip), Q), BASE @ kin.fk(PLAIN, Q) @ tip, atol=1e-12)

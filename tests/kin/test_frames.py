@@ -13,7 +13,7 @@ import kin
 
 UR5 = kin.get_robot("ur5")
 Q = np.array([0.3, -1.2, 1.4, 0.2, 0.7, 0.1])
-T_TABLE = kin.from_xyz_rpy([0.3, 0.2, 0.1], [0.1, -0.2, 0.3])
+T_TABLE = kin.pose_from_xyz_rpy([0.3, 0.2, 0.1], [0.1, -0.2, 0.3])
 ANGLES = st.floats(-math.pi, math.pi)
 
 
@@ -21,16 +21,16 @@ ANGLES = st.floats(-math.pi, math.pi)
 def test_roll_pitch_yaw_are_three_turns_about_fixed_axes(rpy):
     def turn(axis, angle):
         w, v = math.cos(angle / 2), math.sin(angle / 2)
-        return kin.from_position_wxyz([0, 0, 0], [w, *(v * np.eye(3)[axis])])
+        return kin.pose_from_position_wxyz([0, 0, 0], [w, *(v * np.eye(3)[axis])])
 
     roll, pitch, yaw = rpy
     expected = turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)
     expected[:3, 3] = [1.0, 2.0, 3.0]
-    assert np.allclose(kin.from_xyz_rpy([1, 2, 3], rpy), expected, atol=1e-15)
+    assert np.allclose(kin.pose_from_xyz_rpy([1, 2, 3], rpy), expected, atol=1e-15)
 
 
 def test_each_frame_has_its_pose():
-    stand = kin.from_xyz_rpy([0.0, 0.5, 0.0], [0.0, 0.0, math.pi / 2])
+    stand = kin.pose_from_xyz_rpy([0.0, 0.5, 0.0], [0.0, 0.0, math.pi / 2])
     arm = UR5.with_base(stand)
     assert np.array_equal(kin.frame_pose(arm, "world"), np.eye(4))
     assert np.array_equal(kin.frame_pose(arm, "base"), arm.T_world_base)
@@ -81,4 +81,4 @@ def test_what_is_no_frame_is_refused_by_name(frame, workpieces, q, field):
 )
 def test_what_is_no_position_or_rotation_is_refused(xyz, rpy):
     with pytest.raises(kin.InputError, match=r"^(xyz|rpy)"):
-        kin.from_xyz_rpy(xyz, rpy)
+        kin.pose_from_xyz_rpy(xyz, rpy)

@@ -20,12 +20,11 @@ CALLS = {
     "branch_meanings": (),
     "branch_names": (),
     "branch_of": (UR5.q_home,),
-    "capability_grid": (),
     "capability_map": (),
     "capsules": (),
     "clearance": (UR5.q_home,),
-    "configuration_at": (3,),
-    "convert": ("modified",),
+    "workspace_configurations": (3,),
+    "convert_dh": ("modified",),
     "frame_pose": ("base",),
     "fk": (UR5.q_home,),
     "fk_positions": (UR5.q_home,),
@@ -42,29 +41,27 @@ CALLS = {
     "sample_workspace": (8,),
     "save_robot": (),
     "screws": (),
-    "section": (),
-    "self_distance": (UR5.q_home,),
+    "workspace_section": (),
     "singularities": (UR5.q_home,),
     "solve_ik": (T,),
     "solve_ik_many": (T[None],),
     "solve_path": (T[None],),
-    "to_mjcf": (),
-    "to_urdf": (),
+    "robot_to_mjcf": (),
+    "robot_to_urdf": (),
     "workspace_facts": (),
     "workspace_slice": (8, 0, 8),
 }
 # The same of those that take an arm with motors.
 OF_MOTORS = {
-    "match_motors": (POSES, kin.readings_of_q(SO101, POSES)),
-    "match_poses": (2,),
+    "match_motors": (POSES, kin.readings_from_q(SO101, POSES)),
+    "motor_poses": (2,),
     "motors_from_lerobot": ({"shoulder_pan": PAN},),
-    "q_of_readings": (kin.readings_of_q(SO101, POSES),),
-    "readings_of_q": (POSES,),
+    "q_from_readings": (kin.readings_from_q(SO101, POSES),),
+    "readings_from_q": (POSES,),
 }
 MORE = {
-    "capability_grid": {"resolution": 4, "directions": 12},
     "capability_map": {"resolution": 2, "directions": 12},
-    "section": {"resolution": 8},
+    "workspace_section": {"resolution": 8},
     "workspace_facts": {"volume": False},
 }
 
@@ -125,12 +122,12 @@ def test_results_print_as_one_line():
     narrowed = kin.solve_ik("ur5", T, limits=[(0.0, 0.1)] + [None] * 5)
     (chunk,) = kin.sample_workspace("ur5", 8, with_q=True, measure="limit_margin")
     facts = kin.workspace_facts("ur5", volume=False)
-    section = kin.section("ur5", resolution=8)
-    grid = kin.capability_grid("ur5", resolution=2, directions=12)
-    block = kin.capability_block(grid, 0)
+    section = kin.workspace_section("ur5", resolution=8)
+    grid = kin.workspace.capability_grid("ur5", resolution=2, directions=12)
+    block = kin.workspace.capability_block(grid, 0)
     results = [
         *(path, *path.gaps, *path.jumps, narrowed, *narrowed.blocked, chunk, facts, facts.x.least),
-        *(section, *section.arcs, grid, block, kin.capability_join(grid, [block])),
+        *(section, *section.arcs, grid, block, kin.workspace.capability_join(grid, [block])),
         *(kin.solve_ik_many("ur5", far), kin.solve_ik("ur5", T).solutions[0]),
     ]
     assert path.gaps

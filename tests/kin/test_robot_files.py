@@ -183,7 +183,7 @@ def test_two_files_with_the_same_id(tmp_path):
     for name in ("a.toml", "b.toml"):
         (tmp_path / name).write_text(GOOD, encoding="utf-8")
     with pytest.raises(RobotFileError, match="no other file"):
-        kin.load_folder(tmp_path)
+        kin.load_robots(tmp_path)
 
 
 def test_built_in_files_are_named_after_their_robots():
@@ -458,9 +458,9 @@ def test_lengths_keep_their_digits_in_any_unit(unit, per_metre):
 @pytest.mark.parametrize(
     ("call", "field", "valid"),
     [
-        (lambda: kin.load_folder(None), "folder", "a path"),
-        (lambda: kin.load_folder("/no/such/folder"), "folder", "a folder that can be read"),
-        (lambda: kin.load_folder(Path("with\0null")), "folder", "a folder that can be read"),
+        (lambda: kin.load_robots(None), "folder", "a path"),
+        (lambda: kin.load_robots("/no/such/folder"), "folder", "a folder that can be read"),
+        (lambda: kin.load_robots(Path("with\0null")), "folder", "a folder that can be read"),
         (lambda: kin.load_robot(None), "path", "a path"),
         (lambda: kin.load_robot("id = 'a'\nname = 'A'"), "path", "a path; kin.parse_robot takes the text"),
         (lambda: kin.parse_robot(b""), "text", "the text of a robot file"),
@@ -486,4 +486,4 @@ def test_a_path_instead_of_the_text_of_a_robot_file_is_named(path):
 
 
 def test_a_folder_may_be_given_as_text(tmp_path):
-    assert kin.load_folder(str(tmp_path)) == {}
+    assert kin.load_robots(str(tmp_path)) == {}

@@ -112,7 +112,7 @@ def test_lists_and_integers_are_taken_as_they_are_meant():
 
 
 def test_another_base_and_tool():
-    T = kin.from_position_wxyz([0.1, -0.2, 0.3], [0.5, 0.5, -0.5, 0.5])
+    T = kin.pose_from_position_wxyz([0.1, -0.2, 0.3], [0.5, 0.5, -0.5, 0.5])
     robot = kin.get_robot("ur5")
     q = robot.q_home
     assert np.allclose(kin.fk(robot.with_tool(T), q), kin.fk(robot, q) @ T, atol=1e-12)
@@ -123,7 +123,7 @@ def test_another_base_and_tool():
 
 
 def test_quaternions_are_public():
-    T = kin.from_position_wxyz([0, 0, 0], [0.6, 0.0, 0.8, 0.0])
+    T = kin.pose_from_position_wxyz([0, 0, 0], [0.6, 0.0, 0.8, 0.0])
     assert kin.wxyz_from_rotation(T[:3, :3]) == pytest.approx([0.6, 0.0, 0.8, 0.0])
     assert kin.rotation_from_wxyz(np.array([0.6, 0.0, 0.8, 0.0])) == pytest.approx(T[:3, :3])
 

@@ -14,7 +14,7 @@ from kin import InputError
 from kin.transforms import (
     as_transform,
     frame_from_approach,
-    from_position_wxyz,
+    pose_from_position_wxyz,
     rotation_about,
     rotation_angle,
     rotation_from_wxyz,
@@ -66,7 +66,7 @@ def test_an_approach_direction_becomes_a_frame(direction):
 
 
 def test_a_rounded_target_is_made_orthonormal():
-    T = from_position_wxyz([0.1, 0.2, 0.3], [0.3, -0.2, 0.9, 0.1])
+    T = pose_from_position_wxyz([0.1, 0.2, 0.3], [0.3, -0.2, 0.9, 0.1])
     R = as_transform(np.round(T, 7))[:3, :3]
     assert np.abs(R.T @ R - np.eye(3)).max() < 1e-14
     assert as_transform(T) == pytest.approx(T, abs=1e-15)
@@ -88,17 +88,17 @@ def test_a_rounded_target_is_made_orthonormal():
 )
 def test_an_invalid_pose_is_rejected(change, field):
     with pytest.raises(InputError) as caught:
-        as_transform(change(from_position_wxyz([0.1, 0.2, 0.3], [1, 0, 0, 0])))
+        as_transform(change(pose_from_position_wxyz([0.1, 0.2, 0.3], [1, 0, 0, 0])))
     assert caught.value.field.startswith(field)
 
 
 @pytest.mark.parametrize(
     ("call", "field"),
     [
-        (lambda: from_position_wxyz([0, 0], [1, 0, 0, 0]), "position"),
-        (lambda: from_position_wxyz([0, 0, math.inf]), "position[2]"),
-        (lambda: from_position_wxyz([0, 0, 0], [0, 0, 0, 0]), "wxyz"),
-        (lambda: from_position_wxyz([0, 0, 0], [1, 0, 0]), "wxyz"),
+        (lambda: pose_from_position_wxyz([0, 0], [1, 0, 0, 0]), "position"),
+        (lambda: pose_from_position_wxyz([0, 0, math.inf]), "position[2]"),
+        (lambda: pose_from_position_wxyz([0, 0, 0], [0, 0, 0, 0]), "wxyz"),
+        (lambda: pose_from_position_wxyz([0, 0, 0], [1, 0, 0]), "wxyz"),
         (lambda: frame_from_approach([0, 0, 0]), "approach"),
         (lambda: frame_from_approach([[0, 0, 1]]), "approach"),
     ],

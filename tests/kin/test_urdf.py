@@ -409,7 +409,7 @@ def test_manufacturers_files(name, tip, family, same_as):
 
 @pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
 def test_a_built_in_arm_written_and_read(robot):
-    again, report = kin.read_urdf(kin.to_urdf(robot))
+    again, report = kin.read_urdf(kin.robot_to_urdf(robot))
     q = robot.random_q(np.random.default_rng(0), 100)
     assert np.abs(kin.fk(robot, q) - kin.fk(again, q)).max() <= EXACT
     assert report.difference <= EXACT
@@ -421,7 +421,7 @@ def test_a_built_in_arm_written_and_read(robot):
 @given(st.integers(0, 2**32 - 1))
 def test_any_arm_written_and_read(seed):
     robot = random_robot(seed)
-    again, report = kin.read_urdf(kin.to_urdf(robot))
+    again, report = kin.read_urdf(kin.robot_to_urdf(robot))
     q = robot.random_q(np.random.default_rng(0), 16)
     assert np.abs(kin.fk(robot, q) - kin.fk(again, q)).max() <= EXACT
     assert report.difference <= EXACT
@@ -453,7 +453,7 @@ def test_names_and_limits_are_written():
         Joint("twin", a=0.2, kind="prismatic", limits=(0, 1)),
         Joint("twin", alpha=0.3, limits=(-1, 1)),
     ]
-    text = kin.to_urdf(Robot.from_dh(rows))
+    text = kin.robot_to_urdf(Robot.from_dh(rows))
     robot = kin.load_urdf(text)
     assert [joint.name for joint in robot.joints] == ['a <b> & "c" _', "twin 2", "twin 3"]
     assert (robot.joints[0].limits, robot.joints[0].velocity, robot.joints[0].effort) == (None, 2.5, 87.0)
@@ -471,16 +471,16 @@ def test_names_and_limits_are_written():
     ],
 )
 def test_names_are_written_once(names, written):
-    text = kin.to_urdf(Robot.from_dh([Joint(name, a=0.1, limits=(-1, 1)) for name in names]))
+    text = kin.robot_to_urdf(Robot.from_dh([Joint(name, a=0.1, limits=(-1, 1)) for name in names]))
     _, report = kin.read_urdf(text)
     assert [*report.joints, *report.merged] == written
 
 
 def test_a_slide_without_limits_is_not_written():
     with pytest.raises(InputError, match="URDF has no slide without them"):
-        kin.to_urdf(Robot.from_dh([Joint("slide", kind="prismatic")]))
+        kin.robot_to_urdf(Robot.from_dh([Joint("slide", kind="prismatic")]))
 
 
 def test_a_joint_that_cannot_move_is_not_written():
     with pytest.raises(InputError, match=r"limits of stuck: .*lower below upper"):
-        kin.to_urdf(Robot.from_dh([Joint("stuck", a=0.1, limits=(0.5, 0.5))]))
+        kin.robot_to_urdf(Robot.from_dh([Joint("stuck", a=0.1, limits=(0.5, 0.5))]))

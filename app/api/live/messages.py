@@ -22,7 +22,7 @@ from app.api.workspace.query import validated
 from app.live import VALUES
 from app.shared.problems import FieldError, from_input_error, show
 from app.shared.store import Store
-from kin import InputError, Robot, UnknownRobotError, program_from_dict, q_of_readings
+from kin import InputError, Robot, UnknownRobotError, program_from_dict, q_from_readings
 from kin.collision.obstacles import MOST_OBSTACLES, checked_obstacles
 from kin.readings.joints import moving_motors
 from kin.transforms import Array
@@ -242,7 +242,7 @@ def _read_motors(robot: Robot, readings: list[float] | None) -> dict[str, Any]:
         raise invalid(FieldError(field="readings", value=f"{len(readings)} values", expected=expected))
     driven = {motor.joint for motor in motors}
     known = all(joint.name in driven for joint in robot.joints)
-    return {"readings": readings, **({"measured": q_of_readings(robot, readings)} if known else {})}
+    return {"readings": readings, **({"measured": q_from_readings(robot, readings)} if known else {})}
 
 
 def _printable(name: str) -> str:

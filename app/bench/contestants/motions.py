@@ -1,4 +1,4 @@
-"""Motions: ours, and those of other libraries. Limits are those of `kin.limits_of`, assumed ones included."""
+"""Motions: ours, and those of other libraries. Limits are those of `kin.motion_limits`, assumed ones included."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _FREE = 1e6  # the largest squared speed along a path where nothing else limits 
 
 def limits_of(task: Task) -> Array:
     """Velocity, acceleration and jerk of each joint ``(n, 3)``."""
-    limits = kin.limits_of(task.robot)
+    limits = kin.motion_limits(task.robot)
     return np.stack([limits.velocity, limits.acceleration, limits.jerk], axis=1)
 
 
@@ -138,7 +138,7 @@ def roboplan(task: Task) -> list[Contestant]:
     if task.row.kind != "pace":
         return []
     # Joints and links have one name space there.
-    urdf = re.sub(r'<joint name="([^"]*)"', r'<joint name="joint of \1"', kin.to_urdf(task.robot))
+    urdf = re.sub(r'<joint name="([^"]*)"', r'<joint name="joint of \1"', kin.robot_to_urdf(task.robot))
     scene = core.Scene("arm", core.loadUrdfSceneDescriptionFromXml(urdf))
     names = scene.getJointNames()
     lines = ["joint_limits:"]

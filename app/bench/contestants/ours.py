@@ -39,7 +39,7 @@ def ours(task: Task) -> list[Contestant]:
         return motions.ours(task)
     if row.kind == "collision":
         return [
-            Contestant(OURS, kin.self_distance, [(robot, task.q)], list, len(task.q)),
+            Contestant(OURS, kin.clearance, [(robot, task.q)], list, len(task.q)),
             Contestant(
                 f"{OURS}, kinematics only", kin.link_frames, [(robot, task.q)], no_answers, len(task.q), floor=True
             ),

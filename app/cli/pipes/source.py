@@ -23,7 +23,7 @@ from app.cli.pipes.parquet import MAGIC, opened_columns, rows_of
 from kin import InputError, Robot, Task
 from kin.ik.problem import read_pose
 from kin.solvers import contract
-from kin.transforms import frame_from_approach, from_position_wxyz
+from kin.transforms import frame_from_approach, pose_from_position_wxyz
 
 Array = NDArray[np.float64]
 Form = Literal["csv", "npy", "ndjson"]
@@ -154,7 +154,7 @@ class Source:
         if "position" not in given or ("wxyz" in given and "approach" in given):
             raise InputError(field, sorted(given), "position, with wxyz, approach or neither; or matrix")
         try:
-            T = from_position_wxyz(given["position"], given.get("wxyz"))
+            T = pose_from_position_wxyz(given["position"], given.get("wxyz"))
             if "approach" in given:
                 T[:3, :3] = frame_from_approach(given["approach"])
         except InputError as error:
@@ -250,7 +250,7 @@ def opened_source(path: str, field: str) -> Iterator[Source]:
 def pose_of(numbers: list[float], field: str) -> Array:
     """Seven numbers of a row as a pose ``(4, 4)``."""
     try:
-        return from_position_wxyz(numbers[:3], numbers[3:])
+        return pose_from_position_wxyz(numbers[:3], numbers[3:])
     except InputError:
         raise InputError(field, numbers, "seven numbers: " + ", ".join(POSE)) from None
 

@@ -16,7 +16,7 @@ from app.exercises.poses import Elementary, as_numbers, errors, pose_text, produ
 from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 from kin import InputError
-from kin.transforms import Array, from_position_wxyz
+from kin.transforms import Array, pose_from_position_wxyz
 from kin.units import Units
 
 _CLOSE = 1e-9
@@ -100,7 +100,7 @@ class FrameKind(Kind):
         size = float(np.linalg.norm(values[3:]))
         if size < 1e-6:
             raise InputError("answer", given, "a quaternion that is not zero")
-        placed = from_position_wxyz(values[:3], values[3:] / size)
+        placed = pose_from_position_wxyz(values[:3], values[3:] / size)
         right = self._right(variant)
         off, angle = errors(placed, right)
         here, turned = off <= self.position_tolerance, angle <= self.rotation_tolerance

@@ -22,7 +22,7 @@ from app.live.client.drawing import Drawing
 from app.live.recording import Bounds, Recording, read, save
 from kin import InputError, KinematicsError, Motion, Obstacle, Program, Robot
 from kin.readings.joints import moving_motors
-from kin.transforms import Array, finite_array, from_position_wxyz
+from kin.transforms import Array, finite_array, pose_from_position_wxyz
 
 VALUES: Final = ("q", "target", "result", "contacts", "program")
 RATE: Final = 30.0  # news a second
@@ -147,7 +147,7 @@ class Page:
 
     @property
     def readings(self) -> Array | None:
-        """What the motors of a real arm read ``(m,)``, in their order and units, as for `kin.q_of_readings`.
+        """What the motors of a real arm read ``(m,)``, in their order and units, as for `kin.q_from_readings`.
 
         The page shows the arm as `measured`, and *Match motors* takes them. None: they are not known.
         """
@@ -390,7 +390,7 @@ class Page:
             self._values["q"] = value = np.array(value)
         else:
             if name == "target" and value is not None:
-                value = from_position_wxyz(value["position"], value["wxyz"])
+                value = pose_from_position_wxyz(value["position"], value["wxyz"])
             self._values[name] = value
         self._tell(Event(name, value))
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from app.shared.answers.answer import Answer
 from app.shared.answers.robots import RobotAnswer, robot_answer
-from kin import Robot, UrdfRobot, convert, robot_to_dict, robot_to_toml
+from kin import Robot, UrdfRobot, convert_dh, robot_to_dict, robot_to_toml
 from kin.dh import SAMPLES, largest_difference
 from kin.robot import Convention
 
@@ -96,7 +96,7 @@ class ImportAnswer(Answer):
 
 def convert_answer(robot: Robot, convention: Convention) -> ConvertAnswer:
     """The arm as a table in this convention."""
-    other = convert(robot, convention)
+    other = convert_dh(robot, convention)
     return ConvertAnswer(
         robot=robot_answer(other),
         description=robot_to_dict(other),

@@ -107,5 +107,5 @@ class WorkspaceAnswer(Answer):
 
 
 def workspace_answer(facts: WorkspaceFacts, cut: Section | None = None) -> WorkspaceAnswer:
-    """Sizes by `kin.workspace_facts`, and a section by `kin.section`."""
+    """Sizes by `kin.workspace_facts`, and a section by `kin.workspace_section`."""
     return WorkspaceAnswer.of(facts, section=None if cut is None else SectionAnswer.of(cut))

@@ -22,7 +22,7 @@ from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import round_points
 from kin import InputError
-from kin.transforms import Array, from_position_wxyz
+from kin.transforms import Array, pose_from_position_wxyz
 
 LONGEST_SENDING = 40  # characters
 
@@ -246,7 +246,7 @@ class Practising(Feature):
         """The ghost was dragged."""
         match value:
             case (list(position), list(wxyz)):
-                self._sheet.drag(from_position_wxyz(position, np.array(wxyz)), self.stage.units)
+                self._sheet.drag(pose_from_position_wxyz(position, np.array(wxyz)), self.stage.units)
                 self._update()
 
     def _answer(self, how: str, value: object, sending: str = "") -> None:
@@ -357,4 +357,4 @@ class Practising(Feature):
 
 def _pose(numbers: object) -> Array:
     assert isinstance(numbers, list)
-    return from_position_wxyz(numbers[:3], np.array(numbers[3:]))
+    return pose_from_position_wxyz(numbers[:3], np.array(numbers[3:]))

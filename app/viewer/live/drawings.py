@@ -9,7 +9,7 @@ import numpy as np
 
 from app.viewer.declared.scene import Node, axes, label, lines
 from kin import InputError
-from kin.transforms import from_position_wxyz
+from kin.transforms import pose_from_position_wxyz
 
 MOST, MOST_POINTS = 100, 20_000  # drawings, and points in all of them
 
@@ -53,7 +53,7 @@ def _node(key: str, fields: Mapping[str, Any]) -> Node:
             chords = np.stack([points[:-1], points[1:]], axis=1)
             node = lines(key, chords, _rgb(fields["color"]), fields["width"])
         case "frame":
-            T, length = from_position_wxyz(fields["position"], fields["wxyz"]), fields["length"]
+            T, length = pose_from_position_wxyz(fields["position"], fields["wxyz"]), fields["length"]
             node = axes(key, T, length, 0.03 * length)
         case _:
             node = label(key, fields["text"], fields["position"])

@@ -24,7 +24,7 @@ from app.viewer.tabs.robot.views import text_of
 from app.viewer.views.templates import render
 from kin import Contact, InputError, Obstacle
 from kin.collision.obstacles import MOST_OBSTACLES, Shape
-from kin.transforms import from_position_wxyz
+from kin.transforms import pose_from_position_wxyz
 from kin.typed import ReadError, cut
 
 _ORDER: tuple[Shape, ...] = ("table", "box", "sphere", "cylinder")
@@ -141,7 +141,7 @@ class ObstaclesFeature(Feature):
         if pull.phase == "start":
             self._start = placed.pose(self.stage.now.obstacles[self._chosen])
         else:
-            T = from_position_wxyz(pull.position, pull.wxyz)
+            T = pose_from_position_wxyz(pull.position, pull.wxyz)
             self._wrong = None
             self._use(placed.moved(self.stage.now.obstacles, self._chosen, T))
         if self._held:

@@ -61,7 +61,7 @@ def of_sizes(shape: Shape, values: Sequence[float]) -> dict[str, Any]:
 
 def pose(obstacle: Obstacle) -> Array:
     """The frame ``(4, 4)`` that its place and its rotation state: of a table, in the middle of its top."""
-    return kin.from_xyz_rpy(obstacle.xyz, obstacle.rpy)
+    return kin.pose_from_xyz_rpy(obstacle.xyz, obstacle.rpy)
 
 
 def added(items: Obstacles, shape: object, robot: Robot, q: Array) -> Obstacles:

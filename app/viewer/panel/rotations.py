@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from app.exercises.typed import EntryError
-from kin import from_xyz_rpy
+from kin import pose_from_xyz_rpy
 from kin.transforms import Array, rotation_about, rotation_from_wxyz, rotation_vector, wxyz_from_rotation
 
 _LEVEL = 1e-9  # sine of an angle at which two axes coincide
@@ -105,7 +105,7 @@ RPY: Final = Notation(
     "R = Rz(yaw)·Ry(pitch)·Rx(roll)",
     (True,) * 3,
     roll_pitch_yaw,
-    lambda given: from_xyz_rpy(np.zeros(3), given)[:3, :3],
+    lambda given: pose_from_xyz_rpy(np.zeros(3), given)[:3, :3],
     "0 0 0",
 )
 ZYZ: Final = Notation(

@@ -34,7 +34,7 @@ from app.viewer.panel.script import read_json
 from app.viewer.scene.viewpoints import UP
 from app.viewer.session.choices import ViewState
 from kin import KinematicsError, Robot, Task, branch_names, robot_to_dict
-from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
+from kin.transforms import Array, pose_from_position_wxyz, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS, LENGTHS, Units
 
 VERSION = 1
@@ -367,7 +367,7 @@ def _pose(value: object) -> Array | None:
         return None
     if not math.isclose(math.hypot(*numbers[3:].tolist()), 1.0, abs_tol=1e-3):
         return None
-    return from_position_wxyz(numbers[:3], numbers[3:])
+    return pose_from_position_wxyz(numbers[:3], numbers[3:])
 
 
 def _joints(value: object, robot: Robot) -> tuple[int, ...]:

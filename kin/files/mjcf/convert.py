@@ -19,8 +19,8 @@ from kin.errors import RobotFileError
 from kin.files.names import unused
 from kin.files.numbers import number_of
 from kin.files.write import rpy_of
-from kin.frames import from_xyz_rpy
-from kin.transforms import Array, from_position_wxyz
+from kin.frames import pose_from_xyz_rpy
+from kin.transforms import Array, pose_from_position_wxyz
 
 MOUNTING, FLOOR = "kinboard_mounting", "kinboard_floor"  # names of custom data: text, and metres
 MOST_SHAPES = 240  # shapes that are drawn
@@ -113,7 +113,7 @@ class _Converter:
             wxyz = self._numbers(values, "quat", where, 4, "")
             if not any(wxyz):
                 raise self._refuse(f"{where}: quat", values["quat"], "a quaternion that is not zero")
-            T = from_position_wxyz([0.0, 0.0, 0.0], wxyz)
+            T = pose_from_position_wxyz([0.0, 0.0, 0.0], wxyz)
         elif "axisangle" in values:
             *axis, angle = self._numbers(values, "axisangle", where, 4, "")
             T = _turn(self._unit(axis, f"{where}: axisangle"), angle * self._angle)
@@ -306,7 +306,7 @@ def _turned_to(z: Array) -> Array:
     axis = np.array([-z[1], z[0], 0.0])
     sine = float(np.linalg.norm(axis))
     if sine < 1e-12:
-        return np.eye(4) if z[2] > 0.0 else from_xyz_rpy([0.0, 0.0, 0.0], [math.pi, 0.0, 0.0])
+        return np.eye(4) if z[2] > 0.0 else pose_from_xyz_rpy([0.0, 0.0, 0.0], [math.pi, 0.0, 0.0])
     return _turn(axis / sine, math.atan2(sine, float(z[2])))
 
 

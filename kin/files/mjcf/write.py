@@ -29,7 +29,7 @@ ASSUMED = (
 _SHORTEST = 1e-9  # m: a shorter capsule is a sphere
 
 
-def to_mjcf(robot: Robot | str) -> str:
+def robot_to_mjcf(robot: Robot | str) -> str:
     """The arm as MJCF, for MuJoCo: joints, limits, capsules, the tool as a site, the home as a keyframe.
 
     A floor whose height is stated is a plane. All links but the first, which turns close to it, touch it. The
@@ -49,7 +49,7 @@ def to_mjcf(robot: Robot | str) -> str:
         UnknownRobotError: an id that does not exist.
 
     Examples:
-        >>> text = to_mjcf("planar2r")
+        >>> text = robot_to_mjcf("planar2r")
         >>> text.count("<joint ")
         2
     """

@@ -103,7 +103,7 @@ def load_urdf(source: Path | str, base: str | None = None, tip: str | None = Non
 
     Examples:
         >>> import kin
-        >>> kin.load_urdf(kin.to_urdf("ur5")).n
+        >>> kin.load_urdf(kin.robot_to_urdf("ur5")).n
         6
     """
     return read_urdf(source, base, tip).robot
@@ -138,7 +138,7 @@ def read_urdf(
 
     Examples:
         >>> import kin
-        >>> kin.read_urdf(kin.to_urdf("ur5")).robot.n
+        >>> kin.read_urdf(kin.robot_to_urdf("ur5")).robot.n
         6
     """
     tree = _tree(source, file)
@@ -165,7 +165,7 @@ def urdf_tips(source: Path | str, file: str = "") -> tuple[Tip, ...]:
 
     Examples:
         >>> import kin
-        >>> kin.urdf_tips(kin.to_urdf("ur5"))[0].link
+        >>> kin.urdf_tips(kin.robot_to_urdf("ur5"))[0].link
         'tool'
     """
     return _tree(source, file).tips
@@ -235,7 +235,7 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
 
 
 def _stated(tree: UrdfTree, first: UrdfJoint) -> tuple[Mounting | None, float | None]:
-    """What the arm is mounted on, and the height of the floor: as `to_urdf` writes them, or assumed."""
+    """What the arm is mounted on, and the height of the floor: as `robot_to_urdf` writes them, or assumed."""
     stated = tree.root.find("kinboard")
     if stated is None or first.parent in tree.parents:  # a base further up stands somewhere else
         return _mounting(first), 0.0

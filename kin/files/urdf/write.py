@@ -17,7 +17,7 @@ from kin.transforms import Array
 _UNKNOWN = 0.0  # velocity and effort are required by URDF
 
 
-def to_urdf(robot: Robot | str) -> str:
+def robot_to_urdf(robot: Robot | str) -> str:
     """The arm as a URDF without bodies: links ``base``, one per row, and ``tool``.
 
     A velocity or effort that is not known is written as 0. An arm whose mounting or floor is stated has a link
@@ -35,7 +35,7 @@ def to_urdf(robot: Robot | str) -> str:
 
     Examples:
         >>> import kin
-        >>> kin.to_urdf("ur5").startswith("<?xml")
+        >>> kin.robot_to_urdf("ur5").startswith("<?xml")
         True
     """
     robot = robot_of(robot)

@@ -105,7 +105,7 @@ class CapabilityGrid:
 
         Examples:
             >>> import kin, numpy as np
-            >>> grid = kin.capability_grid("planar2r", resolution=6, directions=12)
+            >>> grid = kin.workspace.capability_grid("planar2r", resolution=6, directions=12)
             >>> grid.index(np.array([0, 1])).shape
             (2, 3)
         """
@@ -122,7 +122,7 @@ class CapabilityGrid:
 
         Examples:
             >>> import kin, numpy as np
-            >>> grid = kin.capability_grid("planar2r", resolution=6, directions=12)
+            >>> grid = kin.workspace.capability_grid("planar2r", resolution=6, directions=12)
             >>> bool(np.allclose(grid.centres(np.zeros((1, 3))), np.array(grid.origin) + grid.voxel / 2))
             True
         """
@@ -205,7 +205,7 @@ def capability_grid(
 
     Examples:
         >>> import kin
-        >>> len(kin.capability_grid("planar2r", resolution=6, directions=12).blocks) > 0
+        >>> len(kin.workspace.capability_grid("planar2r", resolution=6, directions=12).blocks) > 0
         True
     """
     spherical_design(directions)
@@ -249,8 +249,8 @@ def capability_block(grid: CapabilityGrid, block: int) -> CapabilityBlock:
 
     Examples:
         >>> import kin
-        >>> grid = kin.capability_grid("planar2r", resolution=6, directions=12)
-        >>> kin.capability_block(grid, 0).block
+        >>> grid = kin.workspace.capability_grid("planar2r", resolution=6, directions=12)
+        >>> kin.workspace.capability_block(grid, 0).block
         0
     """
     number = checked_integer(
@@ -288,9 +288,9 @@ def capability_join(grid: CapabilityGrid, blocks: Iterable[CapabilityBlock]) -> 
 
     Examples:
         >>> import kin
-        >>> grid = kin.capability_grid("planar2r", resolution=6, directions=12)
-        >>> blocks = [kin.capability_block(grid, i) for i in range(len(grid.blocks))]
-        >>> bool(kin.capability_join(grid, blocks).share.max() > 0.0)
+        >>> grid = kin.workspace.capability_grid("planar2r", resolution=6, directions=12)
+        >>> blocks = [kin.workspace.capability_block(grid, i) for i in range(len(grid.blocks))]
+        >>> bool(kin.workspace.capability_join(grid, blocks).share.max() > 0.0)
         True
     """
     found = sorted({part.block: part for part in blocks}.values(), key=lambda part: part.block)
@@ -321,7 +321,7 @@ def capability_map(
 
     Args:
         robot: the arm, or the id of a built-in one.
-        voxel, resolution, limits, locked, constraints, directions: as in `kin.capability_grid`.
+        voxel, resolution, limits, locked, constraints, directions: as in `kin.workspace.capability_grid`.
 
     Returns:
         The reachable voxels, and the share of directions that each allows.

@@ -126,7 +126,7 @@ def workspace_slice(
     return samples.slice(first, last, total, measure_names(measure), with_q)
 
 
-def configuration_at(
+def workspace_configurations(
     robot: Robot | str,
     index: ArrayLike,
     *,
@@ -151,7 +151,7 @@ def configuration_at(
 
     Examples:
         >>> import kin
-        >>> kin.configuration_at("ur5", [0, 17]).shape
+        >>> kin.workspace_configurations("ur5", [0, 17]).shape
         (2, 6)
     """
     robot = robot_of(robot)

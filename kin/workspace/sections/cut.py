@@ -43,7 +43,7 @@ _DOUBTS = 64  # descents from all over the workspace for a node in a hole
 ALIKE = 3
 
 
-def section(
+def workspace_section(
     robot: Robot | str,
     plane: tuple[ArrayLike, ArrayLike] | None = None,
     *,
@@ -74,7 +74,7 @@ def section(
 
     Examples:
         >>> import kin
-        >>> len(kin.section("scara", resolution=48).curves) > 0
+        >>> len(kin.workspace_section("scara", resolution=48).curves) > 0
         True
     """
     region = Region.finite(robot_of(robot), JointConstraints.of(limits, locked, constraints))
@@ -115,7 +115,7 @@ def faced(robot: Robot, axis: Array) -> Array:
 def profile(
     region: Region, resolution: int, signed: bool = False, stop: Callable[[], None] = never_cancel
 ) -> Section:
-    """The section in (r, z); `signed` and `stop` as of `section`.
+    """The section in (r, z); `signed` and `stop` as of `workspace_section`.
 
     A point at the distance r in the half-plane that joint 1 faces at 0 is reached from there with |θ1| ≤ 90° if
     the tool is in front of the axis. In the opposite half-plane the same values reach what is behind.

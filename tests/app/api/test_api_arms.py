@@ -53,7 +53,7 @@ def schema(app):
 
 @pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
 def test_what_is_written_fits_the_schema(schema, robot):
-    other = kin.convert(robot, "modified" if robot.convention == "standard" else "standard")
+    other = kin.convert_dh(robot, "modified" if robot.convention == "standard" else "standard")
     for arm in (robot, other):
         for length in ("m", "cm", "mm"):
             for angle in ("deg", "rad"):
@@ -225,7 +225,7 @@ def test_mounting_and_floor_of_an_arm(client):
     assert (answer["mounting"], answer["floor"]) == (None, None)
     sent = {**EXAMPLE, "mounting": "wall", "floor": -750}
     assert post(client, "fk", {"robot": sent, "q": Q}) == post(client, "fk", {"robot": EXAMPLE, "q": Q})
-    found = post(client, "robots/import", {"urdf": kin.to_urdf("ur5")})
+    found = post(client, "robots/import", {"urdf": kin.robot_to_urdf("ur5")})
     assert (found["description"]["mounting"], found["description"]["floor"]) == ("floor", 0)
     assert (found["robot"]["mounting"], found["robot"]["floor"]) == ("floor", 0.0)
 
@@ -294,7 +294,7 @@ def test_jacobians_and_motions_with_base_and_tool_are_in_the_world_frame(client)
         "tool": {"xyz": [0.02, 0.05, 0.11], "rpy": [0.3, 0.2, -0.4]},
         "base": {"xyz": [1, 2, 3], "rpy": [0.4, 0, 1]},
     }
-    base, tool = (kin.from_xyz_rpy(asked[name]["xyz"], asked[name]["rpy"]) for name in ("base", "tool"))
+    base, tool = (kin.pose_from_xyz_rpy(asked[name]["xyz"], asked[name]["rpy"]) for name in ("base", "tool"))
 
     def world(q):
         return base @ kin.fk("ur5", q) @ tool
@@ -310,7 +310,7 @@ def test_jacobians_and_motions_with_base_and_tool_are_in_the_world_frame(client)
         "samples"
     ]
     for q, position, wxyz in zip(samples["q"], samples["position"], samples["wxyz"], strict=True):
-        assert np.allclose(kin.from_position_wxyz(position, wxyz), world(q), atol=1e-9)
+        assert np.allclose(kin.pose_from_position_wxyz(position, wxyz), world(q), atol=1e-9)
 
 
 def test_what_an_arm_is(client):
@@ -330,7 +330,7 @@ def test_conversion_with_proof(client):
     found = client.get("/api/v1/robots/panda/convert").json()
     assert found["robot"]["convention"] == "standard"
     assert found["difference"] <= 1e-12
-    assert kin.robot_from_dict(found["description"]) == kin.convert(kin.get_robot("panda"), "standard")
+    assert kin.robot_from_dict(found["description"]) == kin.convert_dh(kin.get_robot("panda"), "standard")
     again = post(client, "robots/convert", {"robot": found["description"], "convention": "modified"})
     assert again["robot"]["rows"][3] == pytest.approx(client.get("/api/v1/robots/panda").json()["rows"][3])
     same = post(client, "robots/convert", {"robot": found["description"], "convention": "standard"})
@@ -384,7 +384,7 @@ def test_export(client):
         response = client.get(f"/api/v1/robots/panda/export?format={name}")
         assert response.headers["content-type"].startswith("application/toml")
         assert response.headers["content-disposition"].endswith('.toml"')
-        assert kin.parse_robot(response.text) == kin.convert(panda, convention)
+        assert kin.parse_robot(response.text) == kin.convert_dh(panda, convention)
     response = client.get("/api/v1/robots/panda/export?format=mjcf")
     assert response.headers["content-disposition"] == 'attachment; filename="panda.xml"'
     again = post(client, "robots/import", {"urdf": response.text})
@@ -426,7 +426,7 @@ def signatures():
 def test_an_arm_sent_along_compiles_nothing(client):
     """All kernels take any arm: what is compiled before the first one is enough."""
     kin.warm_up()
-    kin.warm_up_rest()
+    kin.warm_up(everything=True)
     before = signatures()
     assert before > 10
     for robot in arms(12):
@@ -466,7 +466,7 @@ UR5 = kin.get_robot("ur5")
 SIX = [0.3, -1.2, 1.4, 0.2, 0.7, 0.1]
 TABLE = {"xyz": [0.3, 0.2, 0.1], "rpy": [0.1, -0.2, 0.3]}
 STAND = {"xyz": [0.0, 0.5, 0.2], "rpy": [0.0, 0.0, 1.0]}
-T_TABLE = kin.from_xyz_rpy(TABLE["xyz"], TABLE["rpy"])
+T_TABLE = kin.pose_from_xyz_rpy(TABLE["xyz"], TABLE["rpy"])
 OPTIONS = [{}, {"base": STAND}, {"base": STAND, "tool": {"xyz": [0, 0, 0.1]}}]
 
 
@@ -486,7 +486,7 @@ def test_a_pose_answered_in_a_frame_is_a_target_in_it(client, frame, options):
 
 
 def test_a_frame_moves_the_numbers_of_a_pose(client):
-    arm = UR5.with_base(kin.from_xyz_rpy(STAND["xyz"], STAND["rpy"]))
+    arm = UR5.with_base(kin.pose_from_xyz_rpy(STAND["xyz"], STAND["rpy"]))
     asked = {"q": SIX, "base": STAND, "workpieces": {"table": TABLE}}
     for frame in ("world", "base", "table"):
         expected = np.linalg.solve(kin.frame_pose(arm, frame, {"table": T_TABLE}), kin.fk(arm, np.array(SIX)))
@@ -496,14 +496,14 @@ def test_a_frame_moves_the_numbers_of_a_pose(client):
 
 def test_targets_in_the_frame_of_the_tool_are_steps_from_the_present_configuration(client):
     ahead = {"position": [0, 0, 0.03], "wxyz": [1, 0, 0, 0], "frame": "tool"}
-    expected = kin.fk(UR5, np.array(SIX)) @ kin.from_xyz_rpy([0, 0, 0.03])
+    expected = kin.fk(UR5, np.array(SIX)) @ kin.pose_from_xyz_rpy([0, 0, 0.03])
     answer = post(client, "robots/ur5/ik", {"target": ahead, "q_seed": SIX})
     assert np.allclose(kin.fk(UR5, answer["solutions"][0]["q"]), expected, atol=1e-9)
     other = [0.1, *SIX[1:]]
     several = post(client, "robots/ur5/ik", {"target": [ahead, ahead], "q_seed": [SIX, other]})["results"]
     ends = [kin.fk(UR5, each["solutions"][0]["q"]) for each in several]
     starts = [kin.fk(UR5, np.array(q)) for q in (SIX, other)]
-    assert np.allclose(np.linalg.solve(starts, ends), kin.from_xyz_rpy([0, 0, 0.03]), atol=1e-9)
+    assert np.allclose(np.linalg.solve(starts, ends), kin.pose_from_xyz_rpy([0, 0, 0.03]), atol=1e-9)
     path = post(client, "robots/ur5/ik/path", {"targets": [ahead], "q_start": SIX})
     assert np.allclose(kin.fk(UR5, path["q"][0]), expected, atol=1e-9)
 

@@ -64,7 +64,8 @@ def test_the_same_arm_sent_along_has_the_same_motion(client):
 def test_poses_of_a_motion_are_those_of_the_tool_and_base_of_the_request(client):
     frames = {"base": {"xyz": [0, 0, 0.5]}, "tool": {"xyz": [0, 0, 0.1]}}
     answer = post(client, {**frames, "rate": 10, "q_start": Q}).json()["samples"]
-    arm = UR5.with_base(kin.from_xyz_rpy([0, 0, 0.5])).with_tool(UR5.T_last_tool @ kin.from_xyz_rpy([0, 0, 0.1]))
+    tool = UR5.T_last_tool @ kin.pose_from_xyz_rpy([0, 0, 0.1])
+    arm = UR5.with_base(kin.pose_from_xyz_rpy([0, 0, 0.5])).with_tool(tool)
     assert answer["q"][0] == Q
     assert np.allclose(answer["position"][0], kin.fk(arm, np.array(Q))[:3, 3], atol=1e-12)
 
@@ -328,8 +329,8 @@ def test_postures_along_a_path_are_those_of_the_core(client):
 
 
 def test_poses_in_the_frame_of_a_workpiece_are_those_of_the_world(client):
-    table = kin.from_xyz_rpy([0.1, 0.05, -0.1], [0.0, 0.0, 0.4])
-    base = kin.from_xyz_rpy([0.0, 0.0, 0.2], [0.0, 0.0, 1.0])
+    table = kin.pose_from_xyz_rpy([0.1, 0.05, -0.1], [0.0, 0.0, 0.4])
+    base = kin.pose_from_xyz_rpy([0.0, 0.0, 0.2], [0.0, 0.0, 1.0])
     arm = kin.get_robot("pioneer5").with_base(base)
     there = np.linalg.inv(table) @ kin.fk(arm, [1.3, 0.6, 0.9, 0.4, 0.6])
     body = {

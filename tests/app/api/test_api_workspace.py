@@ -259,7 +259,7 @@ def test_the_summary_agrees_with_the_core(client):
     for name in ("volume", "surface"):
         estimate = getattr(facts, name)
         assert answer[name] == {"value": estimate.value, "error": estimate.error, "method": estimate.method}
-    cut = kin.section(PIONEER, resolution=24)
+    cut = kin.workspace_section(PIONEER, resolution=24)
     assert answer["section"]["curves"] == [curve.tolist() for curve in cut.curves]
     assert answer["section"]["area"] == cut.area
     assert len(answer["section"]["arcs"]) == len(cut.arcs) > 0
@@ -273,7 +273,7 @@ def test_any_plane_can_be_cut(client):
     answer = client.get(f"{WORKSPACE}/summary?volume=false&resolution=16&plane=0:0:0.1:0:0:2&lock=5:0.5").json()
     TypeAdapter(WorkspaceAnswer).validate_python(answer, strict=True)
     locked = [None, None, None, None, 0.5]
-    cut = kin.section(PIONEER, ([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]), locked=locked, resolution=16)
+    cut = kin.workspace_section(PIONEER, ([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]), locked=locked, resolution=16)
     assert answer["section"]["area"] == cut.area > 0.1
     assert answer["section"]["curves"] == [curve.tolist() for curve in cut.curves]
     assert (answer["section"]["u"], answer["section"]["v"]) == (cut.u.tolist(), cut.v.tolist())

@@ -121,7 +121,7 @@ def test_a_target_in_the_frame_of_the_tool_is_a_step_from_the_seed(capsys):
     step = ("--position", 0, 0, 30, "--wxyz", 1, 0, 0, 0, "--frame", "tool", "--seed", *seed)
     found = answer(capsys, "ik", "ur5", *step)
     ur5 = kin.get_robot("ur5")
-    expected = kin.fk(ur5, np.radians(seed)) @ kin.from_xyz_rpy([0, 0, 0.03])
+    expected = kin.fk(ur5, np.radians(seed)) @ kin.pose_from_xyz_rpy([0, 0, 0.03])
     assert np.allclose(kin.fk(ur5, found["solutions"][0]["q"]), expected, atol=1e-9)
 
 

@@ -27,7 +27,7 @@ TARGETS = [
     {"position": [0.4, 0.1, 0.3], "wxyz": [0.0, 1.0, 0.0, 0.0]},
     {"position": [9.0, 0.0, 0.0]},
     {"position": [0.3, -0.2, 0.4], "approach": [0.0, 0.0, -2.0]},
-    {"matrix": kin.from_position_wxyz([0.2, 0.4, 0.3], [0.3, 0.9, 0.1, 0.2]).tolist()},
+    {"matrix": kin.pose_from_position_wxyz([0.2, 0.4, 0.3], [0.3, 0.9, 0.1, 0.2]).tolist()},
 ]
 
 
@@ -81,7 +81,7 @@ def test_a_task_that_is_named_holds_for_all_lines(run, client, task):
 
 
 def test_lines_in_frames_of_their_own_are_those_of_rest(run, client):
-    rounded = np.round(kin.from_position_wxyz([0.1, 0.0, 0.2], [0.3, 0.9, 0.1, 0.2]), 5).tolist()
+    rounded = np.round(kin.pose_from_position_wxyz([0.1, 0.0, 0.2], [0.3, 0.9, 0.1, 0.2]), 5).tolist()
     some = [{**TARGETS[0], "frame": "table"}, TARGETS[0], {"matrix": rounded, "frame": "table"}]
     words = ("--workpiece", "table=100:0:50:0:0:90", "--tool", "0:0:120", "--base", "0:0:10:0:0:45")
     _, out, _ = run("ik", "ur5", "--targets", "-", *words, given=lines(some))
@@ -94,12 +94,12 @@ def test_lines_in_frames_of_their_own_are_those_of_rest(run, client):
     assert [json.loads(line) for line in out.splitlines()] == client.post(
         "/api/v1/robots/ur5/ik", json=asked
     ).json()["results"]
-    framed = UR5.with_base(kin.from_xyz_rpy([0, 0, 0.01], [0, 0, np.pi / 4])).with_mounted(
-        kin.from_xyz_rpy([0, 0, 0.12])
+    framed = UR5.with_base(kin.pose_from_xyz_rpy([0, 0, 0.01], [0, 0, np.pi / 4])).with_mounted(
+        kin.pose_from_xyz_rpy([0, 0, 0.12])
     )
-    table = kin.from_xyz_rpy([0.1, 0, 0.05], [0, 0, np.pi / 2])
+    table = kin.pose_from_xyz_rpy([0.1, 0, 0.05], [0, 0, np.pi / 2])
     first = json.loads(out.splitlines()[0])["solutions"][0]["q"]
-    expected = table @ kin.from_position_wxyz(TARGETS[0]["position"], TARGETS[0]["wxyz"])
+    expected = table @ kin.pose_from_position_wxyz(TARGETS[0]["position"], TARGETS[0]["wxyz"])
     assert np.abs(kin.fk(framed, first) - expected).max() < 1e-9
 
 

@@ -20,7 +20,7 @@ from app.exercises.questions import Number, count
 from app.exercises.typed import EntryError
 from app.viewer.exercises.views import Sheet, question_html
 from kin import InputError
-from kin.dh import convert
+from kin.dh import convert_dh
 from kin.units import PLAIN, Unit, Units
 
 UNITS, RADIANS = Units(), Units(degrees=False, length="m")
@@ -160,7 +160,7 @@ def test_a_frame_may_turn_half_about_its_own_z() -> None:
 def test_the_other_convention_is_recognised() -> None:
     """The same arm in Craig's convention: its numbers are right there, and are said to be."""
     arm = ROWS[1].robot
-    verdict = judged(ROWS, rows_of(ROWS, convert(arm, "modified")))
+    verdict = judged(ROWS, rows_of(ROWS, convert_dh(arm, "modified")))
     assert not verdict.right
     assert verdict.reason.startswith("This is correct for the other convention, Craig’s convention.")
     assert verdict.credit == 0.5

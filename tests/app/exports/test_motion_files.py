@@ -111,7 +111,7 @@ def test_a_recording_is_read_by_the_reader_of_mcap(motion: kin.Motion) -> None:
         T = kin.fk(motion.robot, q[k])
         assert list(tool["translation"].values()) == pytest.approx(T[:3, 3].tolist())
         r = tool["rotation"]
-        R = kin.transforms.from_position_wxyz((0, 0, 0), (r["w"], r["x"], r["y"], r["z"]))[:3, :3]
+        R = kin.transforms.pose_from_position_wxyz((0, 0, 0), (r["w"], r["x"], r["y"], r["z"]))[:3, :3]
         assert np.allclose(R, T[:3, :3], atol=1e-12)
         assert len(transforms["transforms"]) == len(motion.robot.rows) + 1
     (metadata,) = reader.iter_metadata()

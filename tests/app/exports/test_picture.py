@@ -26,7 +26,7 @@ def facts():
 
 @pytest.fixture(scope="module")
 def section():
-    return kin.section(ARM, resolution=24)
+    return kin.workspace_section(ARM, resolution=24)
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +122,7 @@ def test_a_flat_workspace_is_drawn(tmp_path):
     )
     flat = kin.load_robot(tmp_path / "flat.toml")
     facts = kin.workspace_facts(flat, volume=False)
-    text = draw(flat, kin.sample_workspace(flat, 1000), facts, kin.section(flat, resolution=16))
+    text = draw(flat, kin.sample_workspace(flat, 1000), facts, kin.workspace_section(flat, resolution=16))
     assert "Flat &amp; &lt;thin&gt;" in text
     assert len(list(ET.fromstring(text).iter(f"{SVG}image"))) == 4
 

@@ -91,7 +91,7 @@ def busy(client, name):
 
 
 def test_a_worker_killed_in_mid_run_loses_nothing(cluster):
-    grid = kin.capability_grid(OWN, resolution=14)
+    grid = kin.workspace.capability_grid(OWN, resolution=14)
     with distributed.Client(cluster.address, set_as_default=False) as client:
         client.wait_for_workers(2, timeout=60)
         blocks, killed = [], None
@@ -105,8 +105,8 @@ def test_a_worker_killed_in_mid_run_loses_nothing(cluster):
         assert killed < len(grid.blocks) - 2
         assert len(client.scheduler_info(n_workers=-1)["workers"]) == 1
     assert sorted(block.block for block in blocks) == list(range(len(grid.blocks)))
-    there = kin.capability_join(grid, blocks)
-    assert_same(there, kin.capability_join(grid, mapreduce.run_local(grid)))
+    there = kin.workspace.capability_join(grid, blocks)
+    assert_same(there, kin.workspace.capability_join(grid, mapreduce.run_local(grid)))
     assert len(there.index) > 500
 
 
@@ -121,7 +121,7 @@ def test_the_command_line_gives_the_same_file_from_a_cluster(cluster, capsys, tm
 
 
 def test_an_iterator_closed_early_leaves_the_cluster_free(cluster):
-    grid = kin.capability_grid(OWN, resolution=14)
+    grid = kin.workspace.capability_grid(OWN, resolution=14)
     blocks = mapreduce.run_dask(grid, cluster.address)
     next(blocks)
     blocks.close()
@@ -133,7 +133,7 @@ def test_an_iterator_closed_early_leaves_the_cluster_free(cluster):
 
 
 def test_a_map_is_not_cut_short_when_the_scheduler_dies(cluster, caplog):
-    grid = kin.capability_grid(OWN, resolution=14)
+    grid = kin.workspace.capability_grid(OWN, resolution=14)
     blocks = mapreduce.run_dask(grid, cluster.address)
     next(blocks)
     cluster.processes["scheduler"].kill()
@@ -146,14 +146,14 @@ def test_a_map_is_not_cut_short_when_the_scheduler_dies(cluster, caplog):
 
 @pytest.mark.parametrize("threads", [1, 3])
 def test_threads_do_not_change_a_bit(threads):
-    grid = kin.capability_grid(kin.get_robot("puma560"), resolution=10)
+    grid = kin.workspace.capability_grid(kin.get_robot("puma560"), resolution=10)
     blocks = list(mapreduce.run_local(grid, threads))
     assert len(blocks) == len(grid.blocks) > 2
-    assert_same(kin.capability_join(grid, blocks), kin.capability_map(grid.robot, resolution=10))
+    assert_same(kin.workspace.capability_join(grid, blocks), kin.capability_map(grid.robot, resolution=10))
 
 
 def test_closing_the_iterator_cancels_what_has_not_begun(monkeypatch):
-    grid = kin.capability_grid(kin.get_robot("pioneer5"), resolution=60, directions=12)
+    grid = kin.workspace.capability_grid(kin.get_robot("pioneer5"), resolution=60, directions=12)
     begun = []
 
     def slow(grid, block):
@@ -186,7 +186,7 @@ def test_a_scheduler_that_is_not_there(monkeypatch, capsys, address, expected):
 
 def test_without_the_extra_the_message_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    grid = kin.capability_grid(kin.get_robot("pioneer5"), resolution=4)
+    grid = kin.workspace.capability_grid(kin.get_robot("pioneer5"), resolution=4)
     with pytest.raises(InputError, match=r"kinboard\[cluster\]"):
         next(mapreduce.run_dask(grid, "tcp://127.0.0.1:1"))
 

@@ -83,7 +83,7 @@ def test_postures_of_the_target_meet_it():
 
 
 def test_a_target_out_of_reach_has_a_reason_and_no_postures():
-    data = data_of(web_page(SavedArm(UR5, Q, target=kin.from_xyz_rpy([3.0, 0.0, 0.5]))))["target"]
+    data = data_of(web_page(SavedArm(UR5, Q, target=kin.pose_from_xyz_rpy([3.0, 0.0, 0.5]))))["target"]
     assert data["postures"] == []
     assert "out of reach" in data["reason"].lower()
 

@@ -48,7 +48,7 @@ def say(tab: FakeBrowser, *key: object, value: object = None) -> None:
 
 
 def near(shown: list[float], T: np.ndarray) -> bool:
-    rotation = kin.from_xyz_rpy([0, 0, 0], np.radians(shown[3:]))
+    rotation = kin.pose_from_xyz_rpy([0, 0, 0], np.radians(shown[3:]))
     same = np.allclose(rotation[:3, :3], T[:3, :3], atol=2e-3)
     return bool(np.allclose(shown[:3], 1000 * T[:3, 3], atol=0.051) and same)
 
@@ -71,7 +71,7 @@ def test_a_workpiece_is_added_named_placed_and_chosen(port: int) -> None:
             say(tab, "cell", "frame-0", column, value=[0, text])
         tab.wait(lambda: "my <b>box</b>" in [html.unescape(name) for name in offered(tab)[0]])
         tab.say("frame", "my <b>box</b>")
-        box = kin.from_xyz_rpy([0.1, 0.2, -0.3], [0, 0, math.pi / 2])
+        box = kin.pose_from_xyz_rpy([0.1, 0.2, -0.3], [0, 0, math.pi / 2])
         expected = np.linalg.solve(box, kin.fk(PIONEER, PIONEER.q_home))
         tab.wait(lambda: near(shown(tab), expected))
         assert "<b>box" not in "".join(m["props"].get("content", "") for m in tab.gui.values())
@@ -84,7 +84,7 @@ def test_a_workpiece_is_added_named_placed_and_chosen(port: int) -> None:
 
 def test_typed_targets_are_in_the_frame_of_the_read_out_or_of_the_tool(port: int) -> None:
     state = PageState(robot="ur5", frames=Frames((TABLE,), "table"))
-    T_table = kin.from_xyz_rpy(TABLE.values[:3], TABLE.values[3:])
+    T_table = kin.pose_from_xyz_rpy(TABLE.values[:3], TABLE.values[3:])
     with FakeBrowser(port, memory=stored(state)) as tab:
         tab.settle()
         assert offered(tab) == (["world", "base", "table"], "table")
@@ -95,10 +95,10 @@ def test_typed_targets_are_in_the_frame_of_the_read_out_or_of_the_tool(port: int
         tab.say("target", ["pose", " ".join(f"{v:.12f}" for v in matrix[:3].ravel()) + " m"])
         tab.wait(lambda: np.allclose(tab.tool_pose(), goal, atol=1e-6))
         tab.say("target", ["position", "0 0 -20", "tool"])
-        ahead = goal @ kin.from_xyz_rpy([0.0, 0.0, -0.02])
+        ahead = goal @ kin.pose_from_xyz_rpy([0.0, 0.0, -0.02])
         tab.wait(lambda: np.allclose(tab.tool_pose(), ahead, atol=1e-6))
         tab.say("target", ["angles", "0 0 10", "tool"])
-        turned = ahead @ kin.from_xyz_rpy([0, 0, 0], [0, 0, math.radians(10)])
+        turned = ahead @ kin.pose_from_xyz_rpy([0, 0, 0], [0, 0, math.radians(10)])
         tab.wait(lambda: np.allclose(tab.tool_pose(), turned, atol=1e-6))
 
 

@@ -15,7 +15,7 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Choice, Number, Question
 from app.viewer.panel.rotations import roll_pitch_yaw
-from kin.transforms import from_position_wxyz
+from kin.transforms import pose_from_position_wxyz
 from kin.units import Units
 
 pytestmark = pytest.mark.browser
@@ -46,7 +46,7 @@ def do(box: Locator, question: Posed, press: Callable[[Locator], None]) -> str:
             for i, text in enumerate(right):  # type: ignore[arg-type]
                 box.locator("input").nth(i).fill(text)
         case "frame":
-            pose = from_position_wxyz(right[:3], np.array(right[3:]))  # type: ignore[index]
+            pose = pose_from_position_wxyz(right[:3], np.array(right[3:]))  # type: ignore[index]
             angles = np.degrees(roll_pitch_yaw(pose[:3, :3]))
             box.locator("input").fill(" ".join(f"{x:.3f}" for x in [*(1e3 * pose[:3, 3]), *angles]))
         case _:

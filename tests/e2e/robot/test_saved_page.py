@@ -91,7 +91,7 @@ def test_a_slider_and_a_typed_value_move_the_arm(saved: Page) -> None:
     q = Q.copy()
     q[2] = np.radians(-30.5)
     T = kin.fk(UR5, q)
-    seen = kin.from_xyz_rpy(np.array(shown(saved)[:3]) / 1000.0, np.radians(shown(saved)[3:]))
+    seen = kin.pose_from_xyz_rpy(np.array(shown(saved)[:3]) / 1000.0, np.radians(shown(saved)[3:]))
     assert np.abs(seen - T).max() < 2e-3, "as rounded on screen: tenths of millimetres and degrees"
     slider = saved.get_by_label("base", exact=True)
     slider.focus()

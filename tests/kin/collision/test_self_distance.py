@@ -37,7 +37,7 @@ def test_distances_agree_with_coal(robot_id):
     """Recorded by tests/data/make_golden_clearance.py."""
     q = np.array([each["q"] for each in GOLDEN[robot_id]])
     expected = [each["distance"] for each in GOLDEN[robot_id]]
-    assert np.abs(kin.self_distance(robot_id, q) - expected).max() < 1e-12
+    assert np.abs(kin.clearance(robot_id, q) - expected).max() < 1e-12
 
 
 whole = st.integers(-3, 3).map(float)  # integers meet in parallels, crossings and points
@@ -85,7 +85,7 @@ def test_stated_capsules_reach_every_link_and_the_tool(robot):
     """Every link has a body, home is clear, and the last one ends at the tool point."""
     found = kin.capsules(robot)
     assert {c.link for c in found} == set(range(robot.n + 1))
-    assert kin.self_distance(robot, robot.q_home) > 0.0
+    assert kin.clearance(robot, robot.q_home) > 0.0
     tool, far = kin.fk(robot, robot.q_home)[:3, 3], []
     for c in found:
         if c.link == robot.n:
@@ -96,7 +96,7 @@ def test_stated_capsules_reach_every_link_and_the_tool(robot):
 
 
 def test_a_longer_tool_gets_a_body():
-    arm = kin.get_robot("ur5").with_tool(kin.from_xyz_rpy((0.0, 0.0, 0.4)))
+    arm = kin.get_robot("ur5").with_tool(kin.pose_from_xyz_rpy((0.0, 0.0, 0.4)))
     last = kin.capsules(arm)[-1]
     assert (last.link, last.end) == (6, (0.0, 0.0, 0.4))
     assert len(kin.capsules(arm)) == len(arm.capsules) + 1
@@ -114,7 +114,7 @@ def test_a_folded_planar_arm_touches_itself_and_a_straight_one_does_not():
     radius = kin.capsules(arm)[0].radius
     straight, folded = np.zeros(3), np.array([0.0, 2.8, 2.8])
     lengths = [row.a for row in arm.rows]
-    assert kin.self_distance(arm, straight) == pytest.approx(lengths[1] - 2.0 * radius)
+    assert kin.clearance(arm, straight) == pytest.approx(lengths[1] - 2.0 * radius)
     touching = kin.nearest_links(arm, folded)
     assert touching is not None
     assert touching.links == (1, 3)
@@ -122,8 +122,8 @@ def test_a_folded_planar_arm_touches_itself_and_a_straight_one_does_not():
     assert touching.distance == pytest.approx(abs(tip[1]) - 2.0 * radius), (
         "the tip is nearest to link 1, on the x axis"
     )
-    assert kin.self_distance(arm, [straight, folded]).tolist() == [
-        kin.self_distance(arm, straight),
+    assert kin.clearance(arm, [straight, folded]).tolist() == [
+        kin.clearance(arm, straight),
         touching.distance,
     ]
 
@@ -148,7 +148,7 @@ def test_the_points_lie_on_the_surfaces_of_the_links_named(robot):
 
 
 def test_an_arm_of_two_links_cannot_touch_itself():
-    assert kin.self_distance("planar2r", [[0.0, 3.0], [1.0, 1.0]]).tolist() == [np.inf, np.inf]
+    assert kin.clearance("planar2r", [[0.0, 3.0], [1.0, 1.0]]).tolist() == [np.inf, np.inf]
     assert kin.nearest_links("planar2r", [0.0, 3.0]) is None
 
 
@@ -170,7 +170,7 @@ def test_a_rod_that_slides_back_may_touch_what_is_behind():
 @pytest.mark.parametrize("q", [[np.nan] * 6, [0.0] * 5, "home"])
 def test_a_wrong_configuration_is_refused(q):
     with pytest.raises(kin.InputError, match="q"):
-        kin.self_distance("puma560", q)
+        kin.clearance("puma560", q)
 
 
 def test_nearest_links_takes_one_configuration():

@@ -19,7 +19,7 @@ from kin.comparison.matching import Tolerance
 from kin.comparison.mistakes import Edit, applied, edits, fewer_rows, known_edits
 from kin.comparison.tables import Tables, invariants
 from kin.robot import Joint, Robot
-from kin.transforms import from_position_wxyz
+from kin.transforms import pose_from_position_wxyz
 from kin.units import Units
 
 ARMS = list(kin.classic_robots().values())
@@ -31,7 +31,7 @@ def ids(arm: Robot) -> str:
 
 
 def random_frame(rng: np.random.Generator) -> np.ndarray:
-    return from_position_wxyz(0.3 * rng.normal(size=3), rng.normal(size=4))
+    return pose_from_position_wxyz(0.3 * rng.normal(size=3), rng.normal(size=4))
 
 
 def in_other_frames(a: Robot, rng: np.random.Generator) -> Robot:
@@ -44,7 +44,7 @@ def in_other_frames(a: Robot, rng: np.random.Generator) -> Robot:
     omega, v = R @ there.S[:3], R @ there.S[3:]
     v += np.cross(p, omega, axisb=0, axisc=0)
     b = kin.robot_from_screws(signs * np.concatenate([omega, v]), inverse(B) @ there.M @ inverse(E))
-    return kin.convert(b, rng.choice(["standard", "modified"]))
+    return kin.convert_dh(b, rng.choice(["standard", "modified"]))
 
 
 def random_arm(rng: np.random.Generator) -> Robot:
@@ -79,7 +79,7 @@ def test_differences_of_poses_are_distances_and_angles():
     rng = np.random.default_rng(4)
     one, turns = random_frame(rng), [0.0, 1e-9, 1e-5, 0.3, 2.0, 3.1]
     other = np.array(
-        [one @ from_position_wxyz([0, 0, 0.2], [math.cos(t / 2), 0, math.sin(t / 2), 0]) for t in turns]
+        [one @ pose_from_position_wxyz([0, 0, 0.2], [math.cos(t / 2), 0, math.sin(t / 2), 0]) for t in turns]
     )
     position, rotation = differences(np.tile(one, (6, 1, 1)), other)
     assert position == pytest.approx([0.2] * 6)
@@ -89,7 +89,7 @@ def test_differences_of_poses_are_distances_and_angles():
 @pytest.mark.parametrize("arm", ARMS, ids=ids)
 def test_an_arm_is_identical_to_itself_in_both_conventions(arm):
     for convention in ("standard", "modified"):
-        found = kin.compare(arm, kin.convert(arm, convention))
+        found = kin.compare(arm, kin.convert_dh(arm, convention))
         assert found.verdict == "identical"
         assert found.first is None
         assert found.explanations == ()

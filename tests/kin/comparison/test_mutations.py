@@ -20,7 +20,7 @@ from kin.comparison import Frames
 from kin.comparison.mistakes import Edit, edits, fewer_rows
 from kin.comparison.tables import Tables
 from kin.robot import Robot
-from kin.transforms import from_position_wxyz
+from kin.transforms import pose_from_position_wxyz
 
 ARMS = CLASSICS
 # What loses numbers that nothing but a guess could bring back.
@@ -44,7 +44,7 @@ def single(table: Tables, reference: Robot) -> list[Edit]:
 
 def mutated(arm: Robot, count: int, rng: np.random.Generator) -> Case | None:
     """The arm with so many random mistakes; None if poses cannot see them, or no arm is left."""
-    a = kin.convert(arm, str(rng.choice(["standard", "modified"])))
+    a = kin.convert_dh(arm, str(rng.choice(["standard", "modified"])))
     table, made = Tables.of(a), []
     for _ in range(count):
         several = single(table, a)
@@ -62,7 +62,7 @@ def mutated(arm: Robot, count: int, rng: np.random.Generator) -> Case | None:
 
 def in_random_frames(case: Case, rng: np.random.Generator) -> Case:
     """The reference with another base and tool."""
-    before, after = (from_position_wxyz(0.3 * rng.normal(size=3), rng.normal(size=4)) for _ in range(2))
+    before, after = (pose_from_position_wxyz(0.3 * rng.normal(size=3), rng.normal(size=4)) for _ in range(2))
     moved = case.reference.with_base(before @ case.reference.T_world_base)
     return replace(case, reference=moved.with_tool(moved.T_last_tool @ after))
 

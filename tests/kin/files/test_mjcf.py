@@ -42,7 +42,7 @@ def assert_moves_alike(robot: Robot, text: str, site: str = "tool") -> None:
 
 @pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
 def test_a_built_in_arm_is_loaded_by_mujoco_and_read_back(robot):
-    text = kin.to_mjcf(robot)
+    text = kin.robot_to_mjcf(robot)
     assert_moves_alike(robot, text)
     model, _ = loaded(text)
     assert model.jnt_range[model.jnt_limited == 1].tolist() == [
@@ -63,23 +63,23 @@ def test_any_arm_is_loaded_by_mujoco(seed):
     limited = [
         replace(row, limits=row.limits or (-0.4, 0.4)) if row.kind == "prismatic" else row for row in robot.rows
     ]
-    assert_moves_alike(replace(robot, rows=tuple(limited)), kin.to_mjcf(robot))
+    assert_moves_alike(replace(robot, rows=tuple(limited)), kin.robot_to_mjcf(robot))
 
 
 @pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
 def test_capsules_are_where_the_arm_has_them_and_touch_where_it_says(robot):
-    """Contacts that MuJoCo finds are those of `kin.self_distance`: its capsules and pairs are the same.
+    """Contacts that MuJoCo finds are those of `kin.clearance`: its capsules and pairs are the same.
 
     Arms of the library have assumed tubes along their lengths.
     """
-    text = kin.to_mjcf(robot)
+    text = kin.robot_to_mjcf(robot)
     model, data = loaded(text)
     solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
     assert solid.sum() == len(kin.capsules(robot))
     assert sorted(model.geom_size[solid, 0]) == pytest.approx(sorted(c.radius for c in kin.capsules(robot)))
     touching = 0
     for q in robot.random_q(np.random.default_rng(4), 150 if robot in CLASSICS else 25):
-        distance = float(kin.self_distance(robot, q))
+        distance = float(kin.clearance(robot, q))
         if abs(distance) < 1e-4:
             continue
         data.qpos[:] = q
@@ -106,13 +106,13 @@ def test_mounting_and_floor_are_written_and_read_back(mounting, floor, turn):
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = turn, (0.1, -0.2, 0.05)
     robot = replace(UR5, base=T, mounting=mounting, floor=floor)
-    text = kin.to_mjcf(robot)
+    text = kin.robot_to_mjcf(robot)
     assert_moves_alike(robot, text)
     model, data = loaded(text)
     planes = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
     mujoco.mj_kinematics(model, data)
     assert [data.geom_xpos[i].tolist() for i in planes] == ([] if floor is None else [[0.0, 0.0, floor]])
-    for written in (text, kin.to_urdf(robot)):
+    for written in (text, kin.robot_to_urdf(robot)):
         back = kin.load_urdf(written)
         assert (back.mounting, back.floor) == (mounting, floor)
         q = robot.random_q(np.random.default_rng(1), 50)
@@ -121,7 +121,7 @@ def test_mounting_and_floor_are_written_and_read_back(mounting, floor, turn):
 
 def test_links_touch_the_floor_but_for_the_first_one():
     robot = replace(UR5, mounting="floor", floor=0.0)
-    model, data = loaded(kin.to_mjcf(robot))
+    model, data = loaded(kin.robot_to_mjcf(robot))
 
     def on_floor(q: np.ndarray) -> set[int]:
         """The bodies that touch the plane."""
@@ -145,7 +145,7 @@ def test_a_urdf_with_a_mounting_is_loaded_by_mujoco():
         '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
         for k in range(1, 7)
     )
-    text = kin.to_urdf(robot)
+    text = kin.robot_to_urdf(robot)
     for k in range(1, 7):
         text = text.replace(f'  <link name="link_{k}"/>\n', "")
     text = text.replace('  <link name="tool"/>\n', f'  <link name="tool"/>{bodies}\n')
@@ -167,7 +167,7 @@ def test_a_urdf_with_a_mounting_is_loaded_by_mujoco():
     ],
 )
 def test_what_is_no_mounting_is_refused_by_name(attributes, field):
-    text = kin.to_urdf(replace(UR5, mounting="floor")).replace('mounting="floor"', attributes)
+    text = kin.robot_to_urdf(replace(UR5, mounting="floor")).replace('mounting="floor"', attributes)
     with pytest.raises(RobotFileError) as error:
         kin.load_urdf(text)
     assert error.value.field == field
@@ -175,13 +175,13 @@ def test_what_is_no_mounting_is_refused_by_name(attributes, field):
 
 def test_what_an_inner_link_stands_on_is_not_what_the_world_holds():
     robot = replace(UR5, mounting="ceiling", floor=-2.0, base=np.diag([1.0, -1.0, -1.0, 1.0]))
-    inner = kin.load_urdf(kin.to_urdf(robot), base="base")
+    inner = kin.load_urdf(kin.robot_to_urdf(robot), base="base")
     assert (inner.mounting, inner.floor) == ("floor", 0.0)
 
 
 @pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
 def test_masses_are_said_to_be_assumed(robot):
-    text = kin.to_mjcf(robot)
+    text = kin.robot_to_mjcf(robot)
     assert "Masses and inertia are assumed: 1000 kg/m3" in text
     model, data = loaded(text)
     assert (model.body_mass[2:] > 0.0).all(), "MuJoCo refuses a moving body without mass"
@@ -197,10 +197,10 @@ def test_limits_that_leave_no_motion_are_refused():
     arm = kin.get_robot("planar2r")
     rows = (replace(arm.rows[0], limits=(0.5, 0.5)), *arm.rows[1:])
     with pytest.raises(InputError, match="limits of"):
-        kin.to_mjcf(replace(arm, rows=rows, home=(0.5, 0.0)))
+        kin.robot_to_mjcf(replace(arm, rows=rows, home=(0.5, 0.0)))
 
 
-# Everything that is written in another way than `to_mjcf` does.
+# Everything that is written in another way than `robot_to_mjcf` does.
 RICH = """<mujoco model="rich">
   <compiler {compiler}/>
   <default>
@@ -261,9 +261,9 @@ def test_radians_are_read_as_such():
 
 def test_capsules_of_mjcf_are_those_of_the_arm():
     arm = kin.get_robot("ur5")
-    back = kin.load_urdf(kin.to_mjcf(arm))
+    back = kin.load_urdf(kin.robot_to_mjcf(arm))
     q = arm.random_q(np.random.default_rng(9), 40)
-    assert kin.self_distance(back, q) == pytest.approx(kin.self_distance(arm, q), abs=0.02)
+    assert kin.clearance(back, q) == pytest.approx(kin.clearance(arm, q), abs=0.02)
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ def test_no_contact_of_the_makers_meshes_is_missed(name):
     links = np.array([each.link for each in robot.capsules])
     compared = {tuple(pair) for pair in links[bodies_of(robot).pairs].tolist()}
     q, touching = np.array(GOLDEN[name]["q"]), GOLDEN[name]["touching"]
-    ours = kin.self_distance(robot, q) < 0.0
+    ours = kin.clearance(robot, q) < 0.0
     left_out = set()
     for verdict, pairs in zip(ours, touching, strict=True):
         seen = [tuple(pair) for pair in pairs if tuple(pair) in compared]
@@ -66,7 +66,7 @@ def test_the_capsules_hold_every_corner_of_the_makers_meshes(name):
     (robot, report), links = imported(name)
     assert {body.link for body in report.bodies if body.capsules} == set(range(robot.n + 1))
     assert not any(body.assumed or body.missing for body in report.bodies)
-    assert kin.self_distance(robot, robot.q_home) > 0.0
+    assert kin.clearance(robot, robot.q_home) > 0.0
     rng = np.random.default_rng(1)
     for link in links:
         own = [c for c in robot.capsules if c.link == link.link]
@@ -158,7 +158,7 @@ def test_a_malformed_body_is_a_tube_and_never_refuses_the_arm(wrong, words):
 
 
 def test_without_collision_bodies_all_is_assumed():
-    text = kin.to_urdf(kin.get_robot("puma560"))
+    text = kin.robot_to_urdf(kin.get_robot("puma560"))
     robot, report = kin.read_urdf(text, tip="tool")
     assert robot.capsules == ()
     assert "all bodies are assumed" in report.about_bodies
@@ -183,5 +183,5 @@ def test_the_home_of_an_import_is_free_of_contacts():
     assert fold in walled
     robot = kin.read_urdf(walled, tip="hand").robot
     assert robot.home != free.home
-    assert kin.self_distance(robot, robot.q_home) > 0.0
-    assert kin.self_distance(robot, free.q_home) < 0.0
+    assert kin.clearance(robot, robot.q_home) > 0.0
+    assert kin.clearance(robot, free.q_home) < 0.0

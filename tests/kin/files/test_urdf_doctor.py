@@ -405,4 +405,4 @@ def test_what_cannot_be_mended_is_refused(mends):
     ):
         kin.examine_urdf(THREE, mends=mends)
     with pytest.raises(kin.InputError, match="none, for nothing can be mended"):
-        kin.examine_urdf(kin.to_urdf("planar2r"), mends=[0])
+        kin.examine_urdf(kin.robot_to_urdf("planar2r"), mends=[0])

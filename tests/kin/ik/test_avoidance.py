@@ -32,7 +32,7 @@ def test_solutions_are_those_that_do_not_touch(robot):
     for T in targets(robot, 40):
         every = kin.solve_ik(robot, T).solutions
         found = kin.solve_ik(robot, T, avoid_self_collision=True)
-        clear = [s for s in every if kin.self_distance(robot, s.q) >= 0.0]
+        clear = [s for s in every if kin.clearance(robot, s.q) >= 0.0]
         dropped += len(every) - len(clear)
         assert [s.branch for s in found.solutions] == [s.branch for s in clear]
         if not clear:

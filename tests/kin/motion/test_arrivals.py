@@ -22,7 +22,7 @@ from kin.motion import (
     start_as_recorded,
 )
 from kin.motion.details import ArrivesOtherwise
-from kin.transforms import from_position_wxyz
+from kin.transforms import pose_from_position_wxyz
 
 UR5, PANDA = kin.get_robot("ur5"), kin.get_robot("panda")
 DOWN = (0.0, math.sqrt(0.5), -math.sqrt(0.5), 0.0)  # the tool points down: roll 180°, yaw −90°
@@ -30,7 +30,7 @@ NEAR, FAR = (0.3, 0.35, 0.35), (-0.4, -0.1, 0.3)
 
 
 def solved(position: tuple[float, float, float]) -> list[np.ndarray]:
-    return [each.q for each in kin.solve_ik(UR5, from_position_wxyz(position, DOWN)).solutions]
+    return [each.q for each in kin.solve_ik(UR5, pose_from_position_wxyz(position, DOWN)).solutions]
 
 
 def recorded(*targets: np.ndarray, kind: type = Lin) -> Program:

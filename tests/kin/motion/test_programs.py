@@ -184,13 +184,13 @@ def test_what_is_no_program_is_not_written():
 
 
 def test_limits_are_those_of_an_arm_or_of_its_id():
-    assert np.array_equal(kin.limits_of("ur5").jerk, kin.limits_of(kin.get_robot("ur5")).jerk)
+    assert np.array_equal(kin.motion_limits("ur5").jerk, kin.motion_limits(kin.get_robot("ur5")).jerk)
     with pytest.raises(kin.UnknownRobotError):
-        kin.limits_of("nobody")
+        kin.motion_limits("nobody")
 
 
 def test_poses_and_joint_values_are_targets_as_they_are():
-    T = kin.from_position_wxyz([0.4, 0.1, 0.3], [0.0, 1.0, 0.0, 0.0])
+    T = kin.pose_from_position_wxyz([0.4, 0.1, 0.3], [0.0, 1.0, 0.0, 0.0])
     q = np.array([0.1, -1.0, 1.2, 0.3, 1.1, 0.2])
     assert kin.Lin(T).target == kin.Lin(T.tolist()).target == kin.PoseTarget.of(T)
     assert kin.Ptp(q, speed=0.5).target == kin.Ptp(q.tolist(), speed=0.5).target == kin.JointTarget(tuple(q))
@@ -201,9 +201,9 @@ def test_poses_and_joint_values_are_targets_as_they_are():
 
 
 def test_frames_of_workpieces_become_poses_in_the_world():
-    table = kin.from_xyz_rpy([0.3, -0.1, 0.2], [0.1, 0.2, 0.3])
-    arm = kin.get_robot("ur5").with_base(kin.from_xyz_rpy([0.0, 0.0, 1.0], [0.0, 0.0, 2.0]))
-    T = kin.from_position_wxyz([0.1, 0.2, 0.05], [0.3, 0.9, 0.1, 0.2])
+    table = kin.pose_from_xyz_rpy([0.3, -0.1, 0.2], [0.1, 0.2, 0.3])
+    arm = kin.get_robot("ur5").with_base(kin.pose_from_xyz_rpy([0.0, 0.0, 1.0], [0.0, 0.0, 2.0]))
+    T = kin.pose_from_position_wxyz([0.1, 0.2, 0.05], [0.3, 0.9, 0.1, 0.2])
     where = {"position": T[:3, 3].tolist(), "wxyz": kin.wxyz_from_rotation(T[:3, :3]).tolist()}
     data = {
         "segments": [

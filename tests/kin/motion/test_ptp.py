@@ -143,16 +143,16 @@ def test_a_pose_out_of_reach_and_a_start_outside_are_refused():
 
 
 def test_assumed_limits_are_marked():
-    panda, ur5 = kin.limits_of(kin.get_robot("panda")), kin.limits_of(kin.get_robot("ur5"))
+    panda, ur5 = kin.motion_limits(kin.get_robot("panda")), kin.motion_limits(kin.get_robot("ur5"))
     assert panda.assumed == ((),) * 7
     assert panda.jerk[0] == 7500
     assert ur5.assumed == (("acceleration", "jerk"),) * 6
     assert ur5.velocity[0] == pytest.approx(math.pi)
-    scara = kin.limits_of(kin.get_robot("scara"))
+    scara = kin.motion_limits(kin.get_robot("scara"))
     assert scara.velocity[2] == pytest.approx(1.1)
     assert np.isnan(scara.effort).all()
     own = kin.Robot.from_dh([kin.Joint("slide", kind="prismatic", limits=(0, 1)), (0, 0, 1, 0)])
-    found = kin.limits_of(own)
+    found = kin.motion_limits(own)
     assert found.assumed == (("velocity", "acceleration", "jerk"),) * 2
     assert found.velocity.tolist() == [1.0, math.pi]
     peaks = kin.plan_motion(own, [kin.Ptp(kin.JointTarget((0.2, 1)))]).peaks
@@ -165,7 +165,7 @@ def test_assumed_limits_are_marked():
 )
 def test_a_compromise_is_no_target(arm, task, why):
     robot = kin.get_robot(arm)
-    T = kin.fk(robot, robot.q_home) @ kin.from_xyz_rpy((0, 0, 0), (0.3, 0, 0))
+    T = kin.fk(robot, robot.q_home) @ kin.pose_from_xyz_rpy((0, 0, 0), (0.3, 0, 0))
     motion = kin.plan_motion(robot, kin.Program([kin.Ptp(kin.PoseTarget.of(T))], task=task))
     assert motion.refusal.cause == "unreachable"
     assert why in motion.reason
@@ -269,7 +269,7 @@ def test_a_distance_too_short_to_take_any_time_takes_none():
     ],
 )
 def test_limits_are_checked(change, field):
-    given = kin.limits_of(kin.get_robot("ur5"))
+    given = kin.motion_limits(kin.get_robot("ur5"))
     values = {key: getattr(given, key) for key in ("velocity", "acceleration", "jerk", "effort", "assumed")}
     with pytest.raises(kin.InputError) as caught:
         kin.MotionLimits(**values | change)
@@ -280,15 +280,15 @@ def test_limits_are_those_of_the_arm():
     ur5, panda = kin.get_robot("ur5"), kin.get_robot("panda")
     program = [kin.Ptp(kin.JointTarget(ur5.q_home + 0.5))]
     with pytest.raises(kin.InputError, match=r"limits: .* of 6 joints"):
-        kin.plan_motion(ur5, program, limits=kin.limits_of(panda))
+        kin.plan_motion(ur5, program, limits=kin.motion_limits(panda))
     none = [math.nan] * 6
     whole = kin.MotionLimits([1] * 6, np.full(6, 2), [10**9] * 6, none, ((),) * 6)
     assert not whole.velocity.flags.writeable
     assert kin.plan_motion(ur5, program, limits=whole).duration == pytest.approx(0.5 + 0.5)
     wild = kin.Robot.from_dh([kin.Joint("a", velocity=1e308), (0, 0, 1, 0)])
     with pytest.raises(kin.InputError, match=r"limits.velocity\[0\]"):
-        kin.limits_of(wild)
-    fast = kin.limits_of(kin.Robot.from_dh([kin.Joint("a", velocity=1e12), (0, 0, 1, 0)]))
+        kin.motion_limits(wild)
+    fast = kin.motion_limits(kin.Robot.from_dh([kin.Joint("a", velocity=1e12), (0, 0, 1, 0)]))
     assert (fast.acceleration[0], fast.jerk[0]) == (1e12, 1e12)
 
 

@@ -37,7 +37,7 @@ def random_case(robot, seed):
             segments.append(kin.Lin(kin.PoseTarget.of(kin.fk(robot, q)), **fields))
         else:
             segments.append(kin.Ptp(kin.JointTarget(q), **fields))
-    limits = kin.limits_of(robot)
+    limits = kin.motion_limits(robot)
     limits = replace(limits, jerk=limits.jerk * 10 ** rng.uniform(-1, 1))
     return kin.Program(segments, jerk_limited=bool(rng.random() < 0.7)), start, limits
 

@@ -67,23 +67,23 @@ def test_joints_that_are_named_like_the_ids_are_found():
 def test_ticks_are_normalised_as_lerobot_does(unit: Any):
     motors = [replace(motor, unit=unit) for motor in kin.motors_from_lerobot(replace(SO101, motors=()), FILE)]
     raw = np.random.default_rng(2).integers(0, 4096, (50, len(motors)))
-    readings = kin.readings_of_ticks(motors, raw)
+    readings = kin.readings_from_ticks(motors, raw)
     for i in range(len(raw)):
         for k, name in enumerate(NAMES):
             low, high = FILE[name]["range_min"], FILE[name]["range_max"]
             expected = normalized(float(raw[i, k]), unit, low, high, bool(FILE[name]["drive_mode"]))
             assert readings[i, k] == pytest.approx(expected, abs=1e-9)
     lows, highs = (np.array([entry[key] for entry in FILE.values()]) for key in ("range_min", "range_max"))
-    back = kin.ticks_of_readings(motors, readings)
+    back = kin.ticks_from_readings(motors, readings)
     bounded = raw if unit == "deg" else np.clip(raw, lows, highs)
     assert np.abs(back - bounded).max() <= 1, "LeRobot cuts a tick off where rounding makes it smaller"
     assert np.array_equal(back, np.trunc(back))
 
 
 def test_ticks_pass_as_they_are_and_a_motor_without_a_range_is_named():
-    assert kin.readings_of_ticks([Motor("elbow", 3, unit="ticks")], [7.0]).tolist() == [7.0]
-    assert kin.ticks_of_readings([Motor("elbow", 3, unit="ticks")], [7.9]).tolist() == [7.0]
-    for convert in (kin.readings_of_ticks, kin.ticks_of_readings):
+    assert kin.readings_from_ticks([Motor("elbow", 3, unit="ticks")], [7.0]).tolist() == [7.0]
+    assert kin.ticks_from_readings([Motor("elbow", 3, unit="ticks")], [7.9]).tolist() == [7.0]
+    for convert in (kin.readings_from_ticks, kin.ticks_from_readings):
         with pytest.raises(InputError, match=r"motors\[0\].range: .* of motor 3, elbow"):
             convert([Motor("elbow", 3)], [7.0])
 
@@ -129,4 +129,4 @@ def test_what_lerobot_could_not_read_is_not_written():
 def test_the_so101_has_the_motors_of_its_bus_and_lerobots_degrees_are_its_joint_values():
     assert [(motor.name, motor.id) for motor in SO101.motors] == [(name, i + 1) for i, name in enumerate(NAMES)]
     degrees = [10.0, -20.0, 30.0, 40.0, -50.0]
-    assert kin.q_of_readings(SO101, degrees) == pytest.approx(np.radians(degrees))
+    assert kin.q_from_readings(SO101, degrees) == pytest.approx(np.radians(degrees))

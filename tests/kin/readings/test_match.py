@@ -38,7 +38,7 @@ def unknown(motors: list[Motor]) -> list[Motor]:
 
 
 def read(robot: kin.Robot, motors: list[Motor], q: Any) -> Any:
-    return kin.readings_of_q(replace(robot, motors=motors), q)
+    return kin.readings_from_q(replace(robot, motors=motors), q)
 
 
 @pytest.mark.parametrize("fields", UNITS, ids=lambda fields: fields["unit"])
@@ -46,7 +46,7 @@ def read(robot: kin.Robot, motors: list[Motor], q: Any) -> Any:
 def test_signs_and_zeros_are_found_from_two_and_three_poses(robot_id: str, fields: dict[str, Any]):
     robot, rng = kin.get_robot(robot_id), np.random.default_rng(3)
     for count in (2, 3):
-        poses = kin.match_poses(robot, count)
+        poses = kin.motor_poses(robot, count)
         for _ in range(4):
             motors = motors_of(robot, rng, **fields)
             # The arm was put into the poses by hand, and the shafts have turned since the motors were switched on.
@@ -59,7 +59,7 @@ def test_signs_and_zeros_are_found_from_two_and_three_poses(robot_id: str, field
             assert [m.sign for m in found.motors] == [m.sign for m in motors]
             # What counts is where the arm is drawn: at joint values as close as it was put to them.
             q = robot.random_q(rng, 20)
-            made = kin.q_of_readings(replace(robot, motors=found.motors), read(robot, motors, q))
+            made = kin.q_from_readings(replace(robot, motors=found.motors), read(robot, motors, q))
             away = np.abs(made - q)
             away = np.where(robot.revolute, np.minimum(away, np.abs(away - 2 * math.pi)), away)
             assert away.max() < math.radians(3.1)
@@ -73,7 +73,7 @@ def test_exact_readings_give_exact_zeros_and_say_so():
         Motor("wrist flex", 4, offset=12.0, unit="range_m100_100", range=(1000, 3000)),
         Motor("wrist roll", 5),
     ]
-    poses = kin.match_poses(SO101)
+    poses = kin.motor_poses(SO101)
     found = kin.match_motors(SO101, poses, read(SO101, motors, poses), unknown(motors))
     assert [m.sign for m in found.motors] == [m.sign for m in motors]
     assert [m.offset for m in found.motors] == pytest.approx([m.offset for m in motors], abs=0.5)
@@ -90,7 +90,7 @@ def test_exact_readings_give_exact_zeros_and_say_so():
 def case(change: Any, count: int = 3, unit: str = "deg") -> kin.MotorMatch:
     """What is found where readings ``(k, 5)`` and poses are changed before."""
     motors = [Motor(joint.name, i + 1, offset=20.0 * i, unit=unit) for i, joint in enumerate(SO101.joints)]  # type: ignore[arg-type]
-    poses = kin.match_poses(SO101, count)
+    poses = kin.motor_poses(SO101, count)
     poses, readings = change(poses.copy(), read(SO101, motors, poses), motors)
     return kin.match_motors(SO101, poses, readings, unknown(motors))
 
@@ -197,7 +197,7 @@ def test_readings_without_sense_are_a_contradiction_with_both_numbers():
 
 
 def test_no_wrong_sign_is_found_in_careless_runs():
-    rng, poses = np.random.default_rng(8), kin.match_poses(SO101)
+    rng, poses = np.random.default_rng(8), kin.motor_poses(SO101)
     for _ in range(200):
         motors = motors_of(SO101, rng)
         put = poses + rng.normal(0.0, math.radians(6.0), poses.shape)
@@ -245,11 +245,11 @@ def test_other_invalid_input_is_refused():
 @pytest.mark.parametrize("robot_id", sorted(kin.builtin_robots()))
 def test_poses_move_every_joint_clearly_inside_its_limits_and_touch_nothing(robot_id: str):
     robot = kin.get_robot(robot_id)
-    poses = kin.match_poses(robot)
+    poses = kin.motor_poses(robot)
     assert poses.shape == (3, robot.n)
-    assert np.array_equal(poses, kin.match_poses(robot)), "the same poses each time"
+    assert np.array_equal(poses, kin.motor_poses(robot)), "the same poses each time"
     assert robot.in_limits(poses).all()
-    assert (kin.self_distance(robot, poses) > 0.0).all()
+    assert (kin.clearance(robot, poses) > 0.0).all()
     moved, span = np.abs(poses[1] - poses[0]), robot.upper - robot.lower
     least = np.where(robot.revolute, np.minimum(math.radians(40.0), 0.5 * span), 0.4 * span)
     assert np.all(moved >= least - 1e-9)
@@ -260,9 +260,9 @@ def test_poses_move_every_joint_clearly_inside_its_limits_and_touch_nothing(robo
 
 def test_poses_obey_what_a_caller_allows():
     arm = kin.get_robot("planar2r")
-    poses = kin.match_poses(arm, 2, lambda q: kin.fk(arm, q)[1, 3] > 0.2)
+    poses = kin.motor_poses(arm, 2, lambda q: kin.fk(arm, q)[1, 3] > 0.2)
     assert (kin.fk(arm, poses)[:, 1, 3] > 0.2).all()
     with pytest.raises(InputError, match="move each joint clearly"):
-        kin.match_poses(arm, 2, lambda q: False)
+        kin.motor_poses(arm, 2, lambda q: False)
     with pytest.raises(InputError, match="2 or 3"):
-        kin.match_poses(arm, 4)
+        kin.motor_poses(arm, 4)

@@ -327,7 +327,7 @@ def test_a_point_leaves_the_last_joint_free(robot):
 def test_orientations_that_three_joints_do_not_reach_keep_the_point():
     for robot in (TURNED3, ELBOW):
         for q in robot.random_q(np.random.default_rng(3), 4):
-            T = kin.fk(robot, q) @ kin.from_xyz_rpy([0, 0, 0], [0.2, 0.1, 0.3])
+            T = kin.fk(robot, q) @ kin.pose_from_xyz_rpy([0, 0, 0], [0.2, 0.1, 0.3])
             result = kin.solve_ik(robot, T)
             assert result.status is Status.APPROXIMATE
             assert result.solutions[0].position_error < 1e-9

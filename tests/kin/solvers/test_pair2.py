@@ -117,7 +117,7 @@ def test_a_last_joint_that_keeps_the_tool_is_free():
 
 FOLDED = kin.Robot.from_dh([(0, 0, 1, 0), (0, 0, 1, 0)])
 FOLDED_ACROSS = kin.Robot.from_dh([(0, 0, 1, PI / 2), (0, 0, 1, 0)])
-POINTER = kin.Robot.from_dh([(0, 0.3, 0, PI / 2), (PI / 2, 0, 0, PI / 2)], tool=kin.from_xyz_rpy([0, 0, 0.2]))
+POINTER = kin.Robot.from_dh([(0, 0.3, 0, PI / 2), (PI / 2, 0, 0, PI / 2)], tool=kin.pose_from_xyz_rpy([0, 0, 0.2]))
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_branches_of_two_joints_exist_at_reachable_points_only():
     for x, exists in ((2.0, True), (2.0 + 1e-8, False), (2.015, False)):
         T[0, 3] = x
         assert np.isnan(kin.ik_branches(FOLDED, T)).all() != exists
-    tilted = kin.fk(OBLIQUE2, (0.4, -0.7)) @ kin.from_xyz_rpy([0, 0, 0], [1e-4, 0, 0])
+    tilted = kin.fk(OBLIQUE2, (0.4, -0.7)) @ kin.pose_from_xyz_rpy([0, 0, 0], [1e-4, 0, 0])
     rows = kin.ik_branches(OBLIQUE2, tilted)
     (row,) = rows[~np.isnan(rows[:, 0])]
     assert np.linalg.norm(kin.fk(OBLIQUE2, row)[:3, 3] - tilted[:3, 3]) < 1e-12

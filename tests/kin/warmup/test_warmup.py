@@ -24,8 +24,7 @@ def compilations():
     kernels = {id(k): k for m in modules for k in vars(m).values() if isinstance(k, Dispatcher)}
     return {f"{k.__module__}.{k.__name__}": len(k.overloads) for k in kernels.values() if k.overloads}
 
-kin.warm_up()
-kin.warm_up_rest()
+kin.warm_up(everything=True)
 before = compilations()
 assert len(before) > 40, before
 for robot in kin.classic_robots().values():
@@ -51,7 +50,7 @@ obstacles = [
 ]
 for robot in (*kin.classic_robots().values(), *random_arms(8)):
     for q in (robot.q_home, robot.q_home + 0.01, [robot.home] * 3):
-        kin.self_distance(robot, q)
+        kin.clearance(robot, q)
         kin.clearance(robot, q, obstacles)
     kin.nearest_links(robot, robot.q_home)
     kin.nearest_contact(robot, robot.home, obstacles)
@@ -63,8 +62,8 @@ arm = kin.get_robot("pioneer5")
 locked = [None, None, None, 0.3, 0.3]
 for strategy in ("uniform", "quasi", "boundary", "volume"):
     kin.workspace_slice(arm, 9, 2, 7, strategy=strategy, measure="limits", with_q=True, locked=locked)
-kin.section(arm, ((0.0, 0.0, 0.1), (0.0, 1.0, 1.0)), resolution=8, locked=locked)
-kin.section(arm, resolution=8, locked=locked)
+kin.workspace_section(arm, ((0.0, 0.0, 0.1), (0.0, 1.0, 1.0)), resolution=8, locked=locked)
+kin.workspace_section(arm, resolution=8, locked=locked)
 kin.workspace_facts(arm, effort=2, locked=locked)
 for robot in kin.classic_robots().values():
     end = kin.JointTarget(robot.q_home + 0.05)
@@ -87,11 +86,11 @@ def test_warm_up_rest_can_be_cancelled_between_kernels(monkeypatch):
     steps: list[int] = []
     made = [lambda i=i: steps.append(i) for i in range(9)]
     monkeypatch.setattr(warmup, "parts", lambda: {"one": tuple(made[:4]), "two": tuple(made[4:])})
-    kin.warm_up_rest(lambda: len(steps) == 3)
+    warmup.warm_up_rest(lambda: len(steps) == 3)
     assert steps == [0, 1, 2]
-    kin.warm_up_rest()
+    warmup.warm_up_rest()
     assert steps[3:] == list(range(9))
-    kin.warm_up_rest(backwards=True)
+    warmup.warm_up_rest(backwards=True)
     assert steps[12:] == list(range(9))[::-1]
 
 

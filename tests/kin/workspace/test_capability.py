@@ -14,7 +14,7 @@ import pytest
 from arms import eight_joints
 
 import kin
-from kin import InputError
+from kin import InputError, workspace
 from kin.axes import screw_x, screw_z
 from kin.robot import Joint, Robot
 from kin.transforms import frame_from_approach
@@ -138,9 +138,9 @@ def test_the_redundancy_of_a_singular_target_is_resolved_inside_the_limits():
     # arbitrary. The value that a batch of branches chooses, that of home, is outside of these limits.
     robot = kin.get_robot("irb120")
     limits = [(0.5, 1.0), None, None, None, None, None]
-    grid = kin.capability_grid(robot, resolution=7, directions=12, limits=limits)
+    grid = workspace.capability_grid(robot, resolution=7, directions=12, limits=limits)
     grid = replace(grid, origin=(-0.02, -0.02, -0.2), voxel=0.04, shape=(1, 1, 30))
-    found = kin.capability_join(grid, [kin.capability_block(grid, 0)])
+    found = workspace.capability_join(grid, [workspace.capability_block(grid, 0)])
     pairs = np.array([*compared(found, np.random.default_rng(3), 8, limits=limits)])
     assert (pairs[:, 0] == pairs[:, 1]).all()
     assert found.approachable[:, 0].sum() > 3
@@ -195,34 +195,34 @@ def same(a, b):
 
 
 def test_blocks_are_bit_identical_in_any_order_thread_and_copy():
-    grid = kin.capability_grid(kin.get_robot("redundant7-craig"), resolution=10)
+    grid = workspace.capability_grid(kin.get_robot("redundant7-craig"), resolution=10)
     count = len(grid.blocks)
     assert count > 1
-    blocks = [kin.capability_block(grid, block) for block in range(count)]
-    whole = kin.capability_join(grid, blocks)
+    blocks = [workspace.capability_block(grid, block) for block in range(count)]
+    whole = workspace.capability_join(grid, blocks)
     assert same(whole, kin.capability_map(grid.robot, resolution=10))
     assert (np.diff(np.ravel_multi_index(whole.index.T, grid.shape)) > 0).all()
-    assert same(whole, kin.capability_join(grid, [*blocks[::-1], blocks[0]]))
+    assert same(whole, workspace.capability_join(grid, [*blocks[::-1], blocks[0]]))
     copy = pickle.loads(pickle.dumps(grid))
     assert copy == grid
     assert hash(copy) == hash(grid)
     with ThreadPoolExecutor(2) as pool:
-        again = pool.map(lambda block: kin.capability_block(copy, block), reversed(range(count)))
-    assert same(whole, kin.capability_join(copy, pickle.loads(pickle.dumps([*again]))))
-    part = kin.capability_join(grid, blocks[1:2])
+        again = pool.map(lambda block: workspace.capability_block(copy, block), reversed(range(count)))
+    assert same(whole, workspace.capability_join(copy, pickle.loads(pickle.dumps([*again]))))
+    part = workspace.capability_join(grid, blocks[1:2])
     assert part.index.tolist() == grid.index(blocks[1].numbers).tolist()
 
 
 def test_blocks_of_another_size_give_the_same_voxels(monkeypatch):
     for name in ("puma560", "panda"):
-        grid = kin.capability_grid(arm(name), resolution=4, directions=12)
-        whole = kin.capability_join(grid, [kin.capability_block(grid, 0)])
+        grid = workspace.capability_grid(arm(name), resolution=4, directions=12)
+        whole = workspace.capability_join(grid, [workspace.capability_block(grid, 0)])
         with monkeypatch.context() as patch:
             patch.setattr(capability, "_TARGETS", 60)
             fine = replace(grid)
-            blocks = [kin.capability_block(fine, block) for block in range(len(fine.blocks))]
+            blocks = [workspace.capability_block(fine, block) for block in range(len(fine.blocks))]
             assert len(blocks) > 5
-            assert same(whole, kin.capability_join(fine, blocks))
+            assert same(whole, workspace.capability_join(fine, blocks))
 
 
 def test_voxels_have_the_right_indices_and_centres():
@@ -272,10 +272,10 @@ def test_limits_and_locks_are_respected():
 
 
 def test_narrower_limits_only_remove_voxels():
-    grid = kin.capability_grid(kin.get_robot("redundant7-craig"), resolution=6, directions=24)
+    grid = workspace.capability_grid(kin.get_robot("redundant7-craig"), resolution=6, directions=24)
     narrow = replace(grid, bounds=((-1.0, 1.0), *grid.bounds[1:4], (-0.3, 0.3), *grid.bounds[5:]))
     wide, less = (
-        dense(kin.capability_join(g, [kin.capability_block(g, b) for b in range(len(g.blocks))]))
+        dense(workspace.capability_join(g, [workspace.capability_block(g, b) for b in range(len(g.blocks))]))
         for g in (grid, narrow)
     )
     assert not (less[0] & ~wide[0]).any()
@@ -326,13 +326,13 @@ def test_joints_without_limits_take_any_value():
 )
 def test_invalid_input_names_the_argument(arguments, field):
     with pytest.raises(InputError) as caught:
-        kin.capability_grid(kin.get_robot("pioneer5"), **arguments)
+        workspace.capability_grid(kin.get_robot("pioneer5"), **arguments)
     assert caught.value.field == field
 
 
 @pytest.mark.parametrize("block", [-1, 1, 0.0, None])
 def test_a_block_outside_the_grid_is_rejected(block):
-    grid = kin.capability_grid(kin.get_robot("pioneer5"), voxel=0.2, directions=12)
+    grid = workspace.capability_grid(kin.get_robot("pioneer5"), voxel=0.2, directions=12)
     assert len(grid.blocks) == 1
     with pytest.raises(InputError, match="block"):
-        kin.capability_block(grid, block)
+        workspace.capability_block(grid, block)

@@ -44,7 +44,7 @@ def check(found: kin.Section, robot: kin.Robot) -> None:
 @pytest.mark.parametrize(("robot_id", "resolution"), OVERSHOOTING)
 def test_a_section_reaches_beyond_the_points_that_made_its_map(robot_id, resolution):
     robot = kin.get_robot(robot_id)
-    found = kin.section(robot, resolution=resolution)
+    found = kin.workspace_section(robot, resolution=resolution)
     assert found.arcs
     check(found, robot)
     points = kin.workspace_slice(robot, 2000, 0, 2000).points.astype(float)
@@ -73,7 +73,7 @@ def random_sections(seed: int, count: int, finest: int) -> None:
         if robot.joints[0].kind == "prismatic" or rng.random() < 0.5:
             plane = robot.reach * rng.uniform(-0.3, 0.3, 3), rng.normal(size=3)
         resolution = int(np.exp(rng.uniform(math.log(8), math.log(finest))))
-        found = kin.section(robot, plane, limits=limits, locked=locked, resolution=resolution)
+        found = kin.workspace_section(robot, plane, limits=limits, locked=locked, resolution=resolution)
         try:
             check(found, robot)
         except AssertionError:

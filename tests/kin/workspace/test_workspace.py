@@ -104,11 +104,11 @@ def test_points_are_those_of_their_configurations(robot_id, strategy):
     robot = kin.get_robot(robot_id)
     n = min(FEW[strategy], 2000)
     (chunk,) = kin.sample_workspace(robot, n, seed=3, strategy=strategy, with_q=True)
-    q = kin.configuration_at(robot, np.arange(n), seed=3, strategy=strategy)
+    q = kin.workspace_configurations(robot, np.arange(n), seed=3, strategy=strategy)
     assert (q == chunk.q).all()
     assert np.abs(fk_positions(robot, q) - chunk.points).max() < 1e-7
     assert robot.in_limits(q).all()
-    one = kin.configuration_at(robot, n - 1, seed=3, strategy=strategy)
+    one = kin.workspace_configurations(robot, n - 1, seed=3, strategy=strategy)
     assert one.shape == (robot.n,)
     assert (one == q[-1]).all()
 
@@ -122,12 +122,12 @@ def test_samples_late_in_the_sequence_are_evenly_distributed():
         assert chunk.done == chunk.total == far + 5000
         part = (chunk.q - robot.lower) / (robot.upper - robot.lower)
         assert np.abs(part.mean(axis=0) - 0.5).max() < 0.02
-        assert (kin.configuration_at(robot, far + 17, strategy=strategy) == chunk.q[17]).all()
+        assert (kin.workspace_configurations(robot, far + 17, strategy=strategy) == chunk.q[17]).all()
 
 
 def test_joints_are_sampled_evenly_and_independently():
     robot = kin.get_robot("redundant7")
-    q = kin.configuration_at(robot, np.arange(100_000), seed=11)
+    q = kin.workspace_configurations(robot, np.arange(100_000), seed=11)
     part = (q - robot.lower) / (robot.upper - robot.lower)
     counts = np.stack([np.histogram(part[:, j], 50, (0.0, 1.0))[0] for j in range(7)])
     assert np.abs(counts / 2000.0 - 1.0).max() < 0.12  # five standard deviations
@@ -139,7 +139,7 @@ def test_quasi_random_samples_are_more_even():
     robot = kin.get_robot("redundant7")
     spread = {}
     for strategy in ("uniform", "quasi"):
-        q = kin.configuration_at(robot, np.arange(4096), strategy=strategy)
+        q = kin.workspace_configurations(robot, np.arange(4096), strategy=strategy)
         part = (q - robot.lower) / (robot.upper - robot.lower)
         counts = np.stack([np.histogram(part[:, j], 64, (0.0, 1.0))[0] for j in range(7)])
         spread[strategy] = counts.std()
@@ -151,7 +151,7 @@ def test_narrowed_limits_and_locks_are_respected_exactly(strategy):
     robot = kin.get_robot("redundant7-craig")
     limits = [(0.1, 0.4), None, (-1.0, -0.5), None, None, None, None]
     locked = [None, None, None, 0.75, None, None, -1.25]
-    q = kin.configuration_at(robot, np.arange(300), strategy=strategy, limits=limits, locked=locked)
+    q = kin.workspace_configurations(robot, np.arange(300), strategy=strategy, limits=limits, locked=locked)
     assert (q[:, 3] == 0.75).all()
     assert (q[:, 6] == -1.25).all()
     assert (q[:, [0, 2]] >= [0.1, -1.0]).all()
@@ -163,7 +163,7 @@ def test_narrowed_limits_and_locks_are_respected_exactly(strategy):
 
 def test_joints_without_limits_are_sampled_from_a_whole_turn():
     robot = chain(Joint("a", a=0.3), Joint("b", a=0.2))
-    q = kin.configuration_at(robot, np.arange(20_000))
+    q = kin.workspace_configurations(robot, np.arange(20_000))
     assert np.abs(q).max() <= math.pi
     assert (np.abs(q).max(axis=0) > 3.13).all()
 
@@ -242,7 +242,7 @@ def test_measures_are_those_of_their_points():
     robot = kin.get_robot("pioneer5")
     limits = [(0.5, 1.5), None, None, None, None]
     (chunk,) = kin.sample_workspace(robot, 500, measure=MEASURES, limits=limits, locked=[None] * 4 + [0.5])
-    q = kin.configuration_at(robot, np.arange(500), limits=limits, locked=[None] * 4 + [0.5])
+    q = kin.workspace_configurations(robot, np.arange(500), limits=limits, locked=[None] * 4 + [0.5])
     assert chunk.q is None
     assert np.abs(chunk.measures["manipulability"] - kin.manipulability(robot, q)).max() < 1e-7
     low, high = np.maximum(robot.lower, [0.5, *robot.lower[1:]]), np.minimum(robot.upper, [1.5, *robot.upper[1:]])
@@ -263,12 +263,12 @@ def test_limits_and_locks_may_be_given_as_one_value():
     limits, locked = [(0.5, 1.5), None, None, None, None], [None, None, None, 0.25, None]
     one = kin.JointConstraints(limits, locked)
     for function, attribute in (
-        (lambda **given: kin.configuration_at(robot, 7, **given), None),
+        (lambda **given: kin.workspace_configurations(robot, 7, **given), None),
         (lambda **given: kin.workspace_slice(robot, 10, 2, 9, **given), "points"),
         (lambda **given: next(kin.sample_workspace(robot, 10, **given)), "points"),
         (lambda **given: kin.workspace_facts(robot, volume=False, **given).x.largest, "q"),
-        (lambda **given: kin.section(robot, resolution=8, **given).curves[0], None),
-        (lambda **given: kin.capability_grid(robot, resolution=3, **given), "bounds"),
+        (lambda **given: kin.workspace_section(robot, resolution=8, **given).curves[0], None),
+        (lambda **given: kin.workspace.capability_grid(robot, resolution=3, **given), "bounds"),
         (lambda **given: kin.capability_map(robot, resolution=2, directions=12, **given), "manipulability"),
     ):
         a, b, free = function(limits=limits, locked=locked), function(constraints=one), function()
@@ -316,18 +316,18 @@ def test_wrong_arguments_are_named_at_the_call(arguments, field):
         (lambda robot: kin.workspace_slice(robot, 10, 10, 11), "start"),
         (lambda robot: kin.workspace_slice(robot, 10, 5, 5), "stop"),
         (lambda robot: kin.workspace_slice(robot, 10, 5, 11), "stop"),
-        (lambda robot: kin.configuration_at(robot, -1), "index"),
-        (lambda robot: kin.configuration_at(robot, 0.5), "index"),
-        (lambda robot: kin.configuration_at(robot, 2**53), "index"),
-        (lambda robot: kin.configuration_at(robot, [[0], [1, 2]]), "index"),
+        (lambda robot: kin.workspace_configurations(robot, -1), "index"),
+        (lambda robot: kin.workspace_configurations(robot, 0.5), "index"),
+        (lambda robot: kin.workspace_configurations(robot, 2**53), "index"),
+        (lambda robot: kin.workspace_configurations(robot, [[0], [1, 2]]), "index"),
         (lambda robot: kin.workspace_facts(robot, effort=1), "effort"),
         (lambda robot: kin.workspace_facts(robot, limits=3), "limits"),
-        (lambda robot: kin.section(robot, resolution=4), "resolution"),
-        (lambda robot: kin.section(robot, 3), "plane"),
-        (lambda robot: kin.section(robot, ([0, 0, 0], [0, 0, 0])), "plane"),
-        (lambda robot: kin.section(robot, ([0, 0], [0, 0, 1])), "plane[0]"),
-        (lambda robot: kin.section(robot, ([0, 0, 0], [0, math.inf, 1])), "plane[1][1]"),
-        (lambda robot: kin.section(GANTRY), "plane"),
+        (lambda robot: kin.workspace_section(robot, resolution=4), "resolution"),
+        (lambda robot: kin.workspace_section(robot, 3), "plane"),
+        (lambda robot: kin.workspace_section(robot, ([0, 0, 0], [0, 0, 0])), "plane"),
+        (lambda robot: kin.workspace_section(robot, ([0, 0], [0, 0, 1])), "plane[0]"),
+        (lambda robot: kin.workspace_section(robot, ([0, 0, 0], [0, math.inf, 1])), "plane[1][1]"),
+        (lambda robot: kin.workspace_section(GANTRY), "plane"),
     ],
 )
 def test_wrong_arguments_of_other_functions_are_named(call, field):
@@ -377,7 +377,7 @@ def test_a_gantry_is_a_box():
     assert sorted(sides) == pytest.approx([0.25, 0.5, 1.0], abs=1e-12)
     assert found.volume.value == pytest.approx(0.125, abs=1e-4)
     assert abs(found.surface.value - 1.75) < 3.0 * found.surface.error
-    assert kin.section(GANTRY, ([0, 0, 0.3], [0, 0, 1])).area == pytest.approx(0.125, abs=1e-6)
+    assert kin.workspace_section(GANTRY, ([0, 0, 0.3], [0, 0, 1])).area == pytest.approx(0.125, abs=1e-6)
 
 
 def test_a_planar_arm_is_a_ring():
@@ -386,7 +386,7 @@ def test_a_planar_arm_is_a_ring():
     assert found.radius.least.value == pytest.approx(inner, abs=1e-9)
     assert found.radius.largest.value == pytest.approx(0.5, abs=1e-9)
     assert found.volume.value == pytest.approx(0.0, abs=1e-6)
-    ring = kin.section(PLANAR, ([0, 0, 0], [0, 0, 1]), resolution=64)
+    ring = kin.workspace_section(PLANAR, ([0, 0, 0], [0, 0, 1]), resolution=64)
     assert len(ring.curves) == 2
     assert ring.area == pytest.approx(math.pi * (0.25 - inner**2), rel=1e-3)
 
@@ -412,11 +412,11 @@ def test_errors_shrink_with_effort():
 
 def test_the_section_of_the_pioneer_arm_equals_the_reference():
     robot = kin.get_robot("pioneer5")
-    found = kin.section(robot)
+    found = kin.workspace_section(robot)
     # The reference, a raster of 2 mm, includes the cells on the boundary, on average half a cell too many.
     rim = sum(np.linalg.norm(curve - np.roll(curve, 1, axis=0), axis=1).sum() for curve in found.curves)
     assert found.area == pytest.approx(0.1879 - 0.001 * rim, abs=0.001)
-    upright = kin.section(robot, ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0]))
+    upright = kin.workspace_section(robot, ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0]))
     front = sum(area_of(np.maximum(curve * [1.0, 0.0], 0.0) + curve * [0.0, 1.0]) for curve in upright.curves)
     assert upright.u.tolist() == [0.0, 1.0, 0.0]
     assert front == pytest.approx(0.1023, abs=0.0025)
@@ -431,7 +431,7 @@ def area_of(curve):
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_no_point_is_outside_of_the_section(robot_id):
     robot = kin.get_robot(robot_id)
-    found = kin.section(robot, resolution=64)
+    found = kin.workspace_section(robot, resolution=64)
     p = cloud(robot, 3000).astype(float)
     at = np.stack([np.hypot(p[:, 0], p[:, 1]), p[:, 2]], axis=1)
     turns = sum(windings(curve, at) for curve in found.curves)
@@ -453,7 +453,7 @@ def windings(curve, at):
 
 def test_vertices_of_a_section_are_on_the_boundary():
     robot = kin.get_robot("redundant7")
-    (curve,) = kin.section(robot, resolution=48).curves
+    (curve,) = kin.workspace_section(robot, resolution=48).curves
     # The straight forearm traces a circle around the end of the horizontal upper arm.
     around = np.hypot(curve[:, 0] - 0.35, curve[:, 1] - 0.30)
     far = curve[:, 0] > 0.5
@@ -462,7 +462,7 @@ def test_vertices_of_a_section_are_on_the_boundary():
 
 def test_the_arcs_of_the_pioneer_arm_equal_the_reference():
     robot = kin.get_robot("pioneer5")
-    found = kin.section(robot)
+    found = kin.workspace_section(robot)
     front = next(arc for arc in found.arcs if arc.radius and abs(arc.radius - 0.417069130) < 1e-8)
     assert front.joint == 1
     assert front.centre == pytest.approx((0.070, 0.130), abs=1e-9)
@@ -481,7 +481,7 @@ def test_the_arcs_of_the_pioneer_arm_equal_the_reference():
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_arcs_lie_on_the_boundary_and_are_traced_by_one_joint(robot_id):
     robot = kin.get_robot(robot_id)
-    found = kin.section(robot, resolution=48)
+    found = kin.workspace_section(robot, resolution=48)
     edges = np.concatenate([halfway(curve) for curve in found.curves])
     assert found.arcs
     for arc in found.arcs:
@@ -507,7 +507,7 @@ def test_the_workspace_of_a_slide_without_limits_has_no_end():
     robot = replace(arm, id="railed", rows=(rail, *arm.rows), home=(0.0, *arm.home))
     with pytest.raises(InputError, match=r"limits of rail.*slides without end"):
         kin.workspace_facts(robot, volume=False)
-    for ask in (kin.workspace_slice, kin.section, kin.capability_map):
+    for ask in (kin.workspace_slice, kin.workspace_section, kin.capability_map):
         given = (10, 0, 10) if ask is kin.workspace_slice else ()
         with pytest.raises(InputError, match=r"limits of rail.*slides without end"):
             ask(robot, *given)

@@ -29,7 +29,7 @@ from app.viewer.lessons.dh.steps import (
 from app.viewer.views import mathml as m
 from app.viewer.views.templates import render
 from kin import Robot
-from kin.dh.tables import convert
+from kin.dh.tables import convert_dh
 from kin.robot import Convention
 from kin.transforms import Array
 from kin.units import Unit, Units
@@ -192,7 +192,7 @@ def nine_steps_html(convention: Convention) -> str:
 
 def same_arm_html(robot: Robot, units: Units) -> str:
     """The same arm in both conventions: θ and d are common, a and α move down by a row; what is left over."""
-    tables = {convention: convert(robot, convention) for convention in TITLES}
+    tables = {convention: convert_dh(robot, convention) for convention in TITLES}
     standard, craig = tables["standard"], tables["modified"]
     rows = []
     for i, row in enumerate(standard.rows):

@@ -16,7 +16,7 @@ from app.viewer.lessons.guide.outline import Bar, Drawn, Ghost, Lead, Leads, Pat
 from app.viewer.scene.meshes import body
 from app.viewer.skeleton import ghost
 from kin import Robot, fk, link_frames
-from kin.transforms import Array, from_position_wxyz
+from kin.transforms import Array, pose_from_position_wxyz
 
 YOURS = "your answer"
 OPACITY = 0.42  # of a copy of the arm
@@ -116,7 +116,7 @@ def _frame_nodes(robot: Robot, question: Posed, given: object, closed: bool) -> 
 
 def _pose_of(given: object) -> Array:
     values = np.array(given, dtype=float)
-    return from_position_wxyz(values[:3], values[3:] / np.linalg.norm(values[3:]))
+    return pose_from_position_wxyz(values[:3], values[3:] / np.linalg.norm(values[3:]))
 
 
 def _is_way(question: Number) -> bool:

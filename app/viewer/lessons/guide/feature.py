@@ -27,7 +27,7 @@ from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.status import Notice
 from kin import InputError, Robot
-from kin.transforms import Array, from_position_wxyz
+from kin.transforms import Array, pose_from_position_wxyz
 
 JOINTS_HINT = "The sliders of the tab Move, here as well. A target is typed with Type a target, above the tabs."
 
@@ -141,7 +141,7 @@ class Guide(Feature):
                 self._show()
                 self._bring()
             case _ if key == GHOST and isinstance(value, list | tuple) and len(value) == 2:
-                T = from_position_wxyz(value[0], np.array(value[1]))
+                T = pose_from_position_wxyz(value[0], np.array(value[1]))
                 self._sheet(str(progress.at + 1)).drag(T, self.stage.units)
             case _:
                 raise InputError("lesson", key, "a control of its steps")
@@ -317,7 +317,7 @@ class Guide(Feature):
         if pose.drawing and self._shown is not None:
             self._shown.restore(dict(pose.drawing))
         if pose.target is not None:
-            self.stage.set_target(from_position_wxyz(pose.target[:3], np.array(pose.target[3:])))
+            self.stage.set_target(pose_from_position_wxyz(pose.target[:3], np.array(pose.target[3:])))
         self.stage.keep_in_view(None if pose.target is None else np.array(pose.target[:3]))
 
     def _show(self) -> None:

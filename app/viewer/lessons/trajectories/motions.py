@@ -11,7 +11,7 @@ import numpy as np
 
 import kin
 from kin import Robot
-from kin.motion import JointTarget, Lin, Motion, PoseTarget, Ptp, limits_of, profiles
+from kin.motion import JointTarget, Lin, Motion, PoseTarget, Ptp, motion_limits, profiles
 from kin.motion.profiles import Profile
 from kin.transforms import Array
 
@@ -35,7 +35,7 @@ class Example(NamedTuple):
 @lru_cache(maxsize=64)
 def example(robot: Robot) -> Example:
     """The first joint from rest to rest over a way on which it reaches its largest velocity."""
-    limits = limits_of(robot)
+    limits = motion_limits(robot)
     found = np.array([limits.velocity[0], limits.acceleration[0], limits.jerk[0]])
     v, a, j = found.tolist()
     return Example(0, robot.joints[0].name, 1.5 * (v * v / a + v * a / j), found)

@@ -26,7 +26,7 @@ from app.viewer.scene.lights import add_lamp
 from app.viewer.scene.meshes import body
 from app.viewer.viser_patches import assign, keep_private
 from kin import Robot, fk
-from kin.transforms import Array, from_position_wxyz, wxyz_from_rotation
+from kin.transforms import Array, pose_from_position_wxyz, wxyz_from_rotation
 
 # Parts without shadows: these would cost as much as the shadows of the bodies, and are not visible.
 NO_SHADOW = ("trim", "axis", "approach")
@@ -137,7 +137,7 @@ class ArmScene:
 
     def pulled(self, position: Sequence[float], wxyz: Sequence[float], ring: bool) -> Array:
         """The target ``(4, 4)`` for a pose of the gizmo or, in the gizmo's frame, of one of its rings."""
-        T = from_position_wxyz(position, wxyz)
+        T = pose_from_position_wxyz(position, wxyz)
         if ring:  # rings are children of the gizmo, which stays still until the ring is released
             T = self.gizmo_pose @ T
         T[:3, :3] = T[:3, :3] @ self._R_gizmo_target
@@ -146,7 +146,7 @@ class ArmScene:
     @property
     def gizmo_pose(self) -> Array:
         """The pose ``(4, 4)`` of the gizmo itself, without its rings."""
-        return from_position_wxyz(self.gizmo.position, self.gizmo.wxyz)
+        return pose_from_position_wxyz(self.gizmo.position, self.gizmo.wxyz)
 
     def size_gizmo(self, small: bool) -> None:
         """Make the gizmo large enough for fingers in a small picture, or as large as usual."""

@@ -303,7 +303,8 @@ def _cell_of(field: str, texts: Mapping[Cell, str]) -> Cell | None:
 
 def converted(robot: Robot, own: OwnArm | None) -> OwnArm:
     """The same arm as a table in the other convention; raises `EditError`."""
-    return with_table(robot, own, kin.convert(robot, "modified" if robot.convention == "standard" else "standard"))
+    other = kin.convert_dh(robot, "modified" if robot.convention == "standard" else "standard")
+    return with_table(robot, own, other)
 
 
 def with_table(robot: Robot, own: OwnArm | None, other: Robot) -> OwnArm:

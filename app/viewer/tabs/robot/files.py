@@ -148,7 +148,7 @@ def text_of(robot: Robot, kind: object) -> tuple[str, str]:
     if kind == "toml":
         return f"{robot.id}.toml", kin.robot_to_toml(robot)
     if kind == "urdf":
-        return f"{robot.id}.urdf", kin.to_urdf(robot)
+        return f"{robot.id}.urdf", kin.robot_to_urdf(robot)
     if kind == "mjcf":
-        return f"{robot.id}.xml", kin.to_mjcf(robot)
+        return f"{robot.id}.xml", kin.robot_to_mjcf(robot)
     raise InputError("download", kind, "toml, urdf or mjcf")

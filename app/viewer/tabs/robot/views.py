@@ -96,7 +96,7 @@ def table(robot: Robot, units: Units, revision: int, written: int, texts: Texts)
 
 def motion(robot: Robot, units: Units, texts: Texts) -> str:
     """Fields for the home configuration and for the limits of motion; those that are assumed are empty."""
-    limits, rows = kin.limits_of(robot), []
+    limits, rows = kin.motion_limits(robot), []
     moving = [(index, row) for index, row in enumerate(robot.rows) if row.kind != "fixed"]
     for joint, (index, row) in enumerate(moving):
         angle, cells = row.kind == "revolute", []

@@ -111,7 +111,7 @@ class PointPicker:
                     best = found
             q = None
             if best is not None:
-                q = kin.configuration_at(
+                q = kin.workspace_configurations(
                     cloud.robot,
                     best.index,
                     seed=cloud.seed,

@@ -58,8 +58,8 @@ def examine_urdf(
         RobotFileError: there is no such file, or it is no text.
 
     Examples:
-        >>> from kin import to_urdf
-        >>> found = examine_urdf(to_urdf("planar2r").replace('xyz="0 0 1"', 'xyz="0 0 2"', 1))
+        >>> from kin import robot_to_urdf
+        >>> found = examine_urdf(robot_to_urdf("planar2r").replace('xyz="0 0 1"', 'xyz="0 0 2"', 1))
         >>> found.findings[0].text
         'Its axis has the length 2, not 1; only the direction counts here.'
         >>> found.mended_arm.robot.n

@@ -20,12 +20,12 @@ from app.viewer.lessons.dh.assignment import ACCEPTED, Assignment, family, free_
 from app.viewer.lessons.dh.normals import axis_lines, common_normal
 from app.viewer.lessons.dh.steps import OTHER
 from kin.axes import pairs, size
-from kin.dh.tables import convert
+from kin.dh.tables import convert_dh
 from kin.transforms import Array
 from kin.units import Units
 
 BUILT_IN = [*kin.classic_robots().values()]
-ARMS = [arm for robot in BUILT_IN for arm in (robot, convert(robot, OTHER[robot.convention]))]
+ARMS = [arm for robot in BUILT_IN for arm in (robot, convert_dh(robot, OTHER[robot.convention]))]
 NAMES = [f"{arm.id}-{arm.convention}" for arm in ARMS]
 WRONG = {"theta": math.radians(17.0), "d": 0.013, "a": 0.017, "alpha": math.radians(23.0)}
 
@@ -227,7 +227,7 @@ def test_special_cases_are_named_where_they_occur() -> None:
     assert "z₁ and z₂ are parallel" in words(ur5, 2)
     assert "z₀ and z₁ intersect" in words(ur5, 1)
     assert "z₀ and z₁ are one line" in words(printed, 1)
-    assert "z₁ and z₂ are one line" in words(convert(printed, "modified"), 1)
+    assert "z₁ and z₂ are one line" in words(convert_dh(printed, "modified"), 1)
     assert "prismatic" in words(kin.get_robot("stanford"), 2)
 
 

@@ -19,11 +19,11 @@ from app.viewer.lessons.dh.assignment import Assignment, read_row
 from app.viewer.lessons.dh.attempt import Attempt, error_of
 from app.viewer.lessons.dh.settings import DHSettings
 from app.viewer.lessons.dh.steps import OTHER
-from kin.dh.tables import convert
+from kin.dh.tables import convert_dh
 from kin.units import DEFAULT_UNITS, Units
 
 BUILT_IN = [*kin.classic_robots().values()]
-ARMS = [arm for robot in BUILT_IN for arm in (robot, convert(robot, OTHER[robot.convention]))]
+ARMS = [arm for robot in BUILT_IN for arm in (robot, convert_dh(robot, OTHER[robot.convention]))]
 arms = pytest.mark.parametrize("robot", ARMS, ids=lambda r: f"{r.id}-{r.convention}")
 PIONEER, CRAIG = kin.get_robot("pioneer5"), kin.get_robot("redundant7-craig")
 IN_M = Units(degrees=False, length="m")

@@ -25,7 +25,7 @@ from app.viewer.lessons.rotations.conventions import Convention
 from app.viewer.lessons.trajectories.motions import sketched, ways
 from kin import Robot
 from kin.differential.task import natural_task
-from kin.motion import limits_of
+from kin.motion import motion_limits
 from kin.units import Units
 
 SAMPLE = ("ur5", "scara", "planar2r", "redundant7")
@@ -286,7 +286,7 @@ def smallest_task_value(h: Here) -> float:
 
 def limits_of_first(robot: Robot) -> list[float]:
     """Velocity and acceleration of the first joint (rad/s, rad/s²)."""
-    found = limits_of(robot)
+    found = motion_limits(robot)
     return [float(found.velocity[0]), float(found.acceleration[0])]
 
 

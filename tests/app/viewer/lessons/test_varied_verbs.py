@@ -22,7 +22,7 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.outline import Choice, Number, Step
 from app.viewer.lessons.guide.progress import Progress
 from kin import Robot
-from kin.motion import limits_of
+from kin.motion import motion_limits
 from kin.units import Units
 
 UNITS, RADIANS = Units(), Units(degrees=False, length="m")
@@ -217,7 +217,7 @@ def sketched(robot: Robot, question: Posed, cells: list[str]) -> None:
     asked = question.kind.sketch(question.variant)
     t = np.linspace(0.0, asked.times[-1], 60001)
     fine = np.interp(t, asked.times, v)
-    limits = limits_of(robot)
+    limits = motion_limits(robot)
     assert fine[0] == fine[-1] == 0.0
     assert fine.mean() * asked.times[-1] == pytest.approx(asked.way, rel=1e-3)
     assert fine.max() <= limits.velocity[0] * (1.0 + 1e-9)

@@ -20,7 +20,7 @@ from app.viewer.lessons.dh import drawing, player, steps, views
 from app.viewer.lessons.dh.lesson import DHLesson
 from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
-from kin.dh.tables import convert
+from kin.dh.tables import convert_dh
 from kin.units import DEFAULT_UNITS, Units
 
 ROBOTS = [*kin.classic_robots().values()]
@@ -219,7 +219,7 @@ def test_both_tables_of_one_arm_have_the_same_pairs_one_row_apart(robot: kin.Rob
 
 
 def test_what_no_row_takes_is_said() -> None:
-    craig = convert(PIONEER, "modified")
+    craig = convert_dh(PIONEER, "modified")
     assert "transform" not in views.same_arm_html(PIONEER, DEFAULT_UNITS), "the last row has no a and α"
     assert "transform" not in views.same_arm_html(craig, DEFAULT_UNITS)
     planar = kin.get_robot("planar2r")

@@ -130,7 +130,7 @@ def test_the_body_stays_on_another_table_of_the_same_arm(two: tuple[Robot, Drawi
     T = np.eye(4)
     T[:3, 3] = 0.1, 0.2, 0.3
     assert carried_over(body, robot, robot.with_tool(T)) is body
-    others = [kin.convert(robot, "modified"), replace(robot, base=tuple(map(tuple, T @ robot.T_world_base)))]
+    others = [kin.convert_dh(robot, "modified"), replace(robot, base=tuple(map(tuple, T @ robot.T_world_base)))]
     for other, moved in zip(others, (np.eye(4), T), strict=True):
         carried = carried_over(body, robot, other)
         assert carried is not None

@@ -26,7 +26,7 @@ def test_new_obstacles_are_within_reach_and_free(robot):
     for shape in (*SHAPES, *SHAPES):
         items = placed.added(items, shape, robot, robot.q_home)
     assert len({each.name for each in items}) == len(items)
-    assert kin.clearance(robot, robot.q_home, items[:4]) > 0.0 or kin.self_distance(robot, robot.q_home) <= 0.0
+    assert kin.clearance(robot, robot.q_home, items[:4]) > 0.0 or kin.clearance(robot, robot.q_home) <= 0.0
     for each in items[:4]:
         away = math.dist(each.xyz, robot.T_world_base[:3, 3])
         assert 0.1 * robot.reach < away < 1.5 * robot.reach
@@ -76,7 +76,7 @@ def test_a_value_that_is_not_valid_is_named(field, value):
 
 def test_a_dragged_obstacle_has_round_numbers():
     items = placed.added((), "box", UR5, UR5.q_home)
-    T = kin.from_xyz_rpy([0.12345678, -0.5, 0.3], [0.1, -0.2, 0.3])
+    T = kin.pose_from_xyz_rpy([0.12345678, -0.5, 0.3], [0.1, -0.2, 0.3])
     (box,) = placed.moved(items, 0, T)
     assert box.xyz == (0.123, -0.5, 0.3)
     assert np.abs(np.degrees(box.rpy) * 10 - np.round(np.degrees(box.rpy) * 10)).max() < 1e-6

@@ -79,9 +79,9 @@ def test_contacts_with_a_surface_are_those_of_the_frames(kind: str, skeleton: bo
 
 def test_an_arm_that_is_mounted_nowhere_stands_or_hangs_as_its_base_is_turned() -> None:
     assert body(UR5).mount.kind == "pedestal"
-    hanging = UR5.with_base(kin.from_xyz_rpy([0.0, 0.0, 1.5], [np.pi, 0.0, 0.0]))
+    hanging = UR5.with_base(kin.pose_from_xyz_rpy([0.0, 0.0, 1.5], [np.pi, 0.0, 0.0]))
     assert body(hanging).mount.kind == "ceiling"
-    tilted = body(UR5.with_base(kin.from_xyz_rpy([0.0, 0.0, 0.5], [1.2, 0.0, 0.0]))).mount
+    tilted = body(UR5.with_base(kin.pose_from_xyz_rpy([0.0, 0.0, 0.5], [1.2, 0.0, 0.0]))).mount
     assert tilted.part.mesh.bounds[0, 2] == pytest.approx(tilted.floor)
 
 

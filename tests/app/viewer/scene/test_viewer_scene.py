@@ -23,7 +23,7 @@ from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.chain import chain, link_poses
 from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import box, tube
-from kin.transforms import from_position_wxyz
+from kin.transforms import pose_from_position_wxyz
 from kin.units import DEFAULT_UNITS, Units
 
 ROW = '[[rows]]\nname = "{}"\nkind = "{}"\ntheta = {}\nd = {}\na = {}\nalpha = {}\n'
@@ -77,7 +77,7 @@ def world(scene: viser.SceneApi, name: str) -> np.ndarray:
     for k in range(len(parts)):
         node = scene.get_handle_by_name("/" + "/".join(parts[: k + 1]))
         assert node is not None
-        T = T @ from_position_wxyz(node.position, node.wxyz)
+        T = T @ pose_from_position_wxyz(node.position, node.wxyz)
     return T
 
 
@@ -91,7 +91,7 @@ def test_the_links_compose_to_the_forward_kinematics(robot: kin.Robot) -> None:
     for q in robot.random_q(np.random.default_rng(1), 20):
         T, frames = np.eye(4), {}
         for link, value in zip(links.links, [0.0, *q], strict=True):
-            T = T @ from_position_wxyz(*link.pose(float(value)))
+            T = T @ pose_from_position_wxyz(*link.pose(float(value)))
             frames |= {row: T @ F for row, F in link.frames}
         assert np.allclose(T @ links.T_last_tool, kin.fk(robot, q), atol=1e-12)
         expected = kin.link_frames(robot, q)

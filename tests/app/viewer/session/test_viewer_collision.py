@@ -85,7 +85,7 @@ def test_dragging_avoids_self_collision_on_request(port: int) -> None:
         shown = np.radians([tab.value(label(UR5, i)) for i in range(6)])
         result = kin.solve_ik(UR5, T, avoid_self_collision=True)
         if result.status == "solved":
-            assert kin.self_distance(UR5, shown) >= -1e-6
+            assert kin.clearance(UR5, shown) >= -1e-6
         else:
             assert "No collision-free posture found" in tab.html
         tab.release()

@@ -74,7 +74,7 @@ class Run:
 def begun(robot: Robot, obstacles: Sequence[Obstacle]) -> Run:
     """A run at its first pose; raises `InputError` if the arm has no motors, or no such poses."""
     moving_motors(robot)
-    return Run(robot, kin.match_poses(robot, COUNT, free(robot, obstacles)))
+    return Run(robot, kin.motor_poses(robot, COUNT, free(robot, obstacles)))
 
 
 def free(robot: Robot, obstacles: Sequence[Obstacle]) -> Callable[[Array], bool]:

@@ -17,7 +17,7 @@ from app.viewer.lessons.rotations.lesson import RotationsLesson
 from app.viewer.lessons.rotations.settings import RotationsSettings
 from app.viewer.lessons.rotations.turning import REST, TIME, Turning
 from app.viewer.lessons.rotations.views import turning_html
-from kin.transforms import from_position_wxyz
+from kin.transforms import pose_from_position_wxyz
 
 ROBOT = STORE.get("ur5")
 
@@ -112,7 +112,7 @@ def turned_frame(lesson: RotationsLesson) -> Node:
 
 
 def rotation_of(node: Node) -> np.ndarray:
-    return np.asarray(from_position_wxyz((0, 0, 0), node.wxyz)[:3, :3])
+    return np.asarray(pose_from_position_wxyz((0, 0, 0), node.wxyz)[:3, :3])
 
 
 @pytest.mark.parametrize("by", ["click", "convention", "button"])

@@ -29,7 +29,7 @@ from app.viewer.lessons.rotations.typed import read_rotation
 from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.server import ViewerServer
 from kin import InputError, Robot
-from kin.transforms import from_position_wxyz
+from kin.transforms import pose_from_position_wxyz
 from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -100,8 +100,8 @@ def test_axes_are_those_about_which_the_angles_turn(convention: Convention) -> N
 @given(angles=TRIPLES)
 def test_the_page_uses_one_convention_everywhere(angles: Angles) -> None:
     R = PAGE.rotation(angles)
-    assert np.allclose(R, kin.from_xyz_rpy([0.0, 0.0, 0.0], angles)[:3, :3], atol=1e-12)
-    shown = kin.from_xyz_rpy([0.0, 0.0, 0.0], roll_pitch_yaw(R))
+    assert np.allclose(R, kin.pose_from_xyz_rpy([0.0, 0.0, 0.0], angles)[:3, :3], atol=1e-12)
+    shown = kin.pose_from_xyz_rpy([0.0, 0.0, 0.0], roll_pitch_yaw(R))
     assert np.allclose(PAGE.rotation(PAGE.angles(R)), shown[:3, :3], atol=1e-9)
     assert PAGE.name.startswith("Roll pitch yaw about fixed axes")
 
@@ -243,7 +243,7 @@ def test_numbers_of_the_questions(robot: Robot) -> None:
     assert found["2"] == pytest.approx(np.linalg.inv(R)[i, j])
     roll, pitch, yaw = roll_pitch_yaw(R)
     assert found["5"] == pytest.approx(pitch)
-    assert np.allclose(kin.from_xyz_rpy([0.0, 0.0, 0.0], (roll, pitch, yaw))[:3, :3], R, atol=1e-9)
+    assert np.allclose(kin.pose_from_xyz_rpy([0.0, 0.0, 0.0], (roll, pitch, yaw))[:3, :3], R, atol=1e-9)
     assert found["6"] == pytest.approx(math.acos(max(-1.0, min(1.0, R[2, 2]))), abs=1e-6)
     assert found["7"] == pytest.approx(turn.magnitude(), abs=1e-6)
     assert found["8"] == pytest.approx(math.cos(turn.magnitude() / 2.0), abs=1e-6)
@@ -278,7 +278,7 @@ def server() -> Iterator[int]:
 def turned(tab: FakeBrowser) -> np.ndarray:
     """The turned frame in the scene."""
     name = next(n for n in tab.nodes if n.startswith("/rotations") and n.endswith("/turned"))
-    return from_position_wxyz((0, 0, 0), tab.poses[name]["wxyz"])[:3, :3]
+    return pose_from_position_wxyz((0, 0, 0), tab.poses[name]["wxyz"])[:3, :3]
 
 
 def test_a_visitor_turns_a_frame_and_builds_a_chain(server: int) -> None:

@@ -26,7 +26,7 @@ from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.program.views import QUANTITIES, assumption, comparison
 from kin import InputError
 from kin.ik.details import OrientationNotMet
-from kin.motion import limits_of
+from kin.motion import motion_limits
 from kin.motion.details import NotReached
 from kin.units import DEFAULT_UNITS
 
@@ -340,11 +340,11 @@ def test_the_player_keeps_time() -> None:
 
 def test_assumed_limits_are_said() -> None:
     panda = kin.get_robot("panda")
-    assert assumption(limits_of(panda), False, DEFAULT_UNITS) == ""
-    said = assumption(limits_of(UR5), False, DEFAULT_UNITS)
+    assert assumption(motion_limits(panda), False, DEFAULT_UNITS) == ""
+    said = assumption(motion_limits(UR5), False, DEFAULT_UNITS)
     assert said.startswith("The maker publishes no ")
     assert "full acceleration after 0.1 s" in said
-    assert assumption(limits_of(PIONEER), True, DEFAULT_UNITS).startswith("Your arm states no velocities,")
+    assert assumption(motion_limits(PIONEER), True, DEFAULT_UNITS).startswith("Your arm states no velocities,")
 
 
 def test_labels_that_would_overprint_are_one() -> None:

@@ -223,7 +223,7 @@ def test_what_is_wrong_in_a_text_is_named(text, field):
 
 
 def test_a_urdf_with_several_ends_is_read_to_the_one_with_as_many_joints():
-    urdf = kin.to_urdf(UR5)
+    urdf = kin.robot_to_urdf(UR5)
     finger = '<link name="finger"/><joint name="g" type="prismatic"><parent link="{}"/><child link="finger"/>'
     links = re.findall(r'<link name="([^"]+)"', urdf)
     side = (
@@ -246,7 +246,7 @@ def test_a_long_text_stays_out_of_the_link_and_a_bad_link_is_ignored():
 
 def test_the_ghost_stands_where_the_mapping_puts_it() -> None:
     """The tool of the ghost is at that of the arm on show, for another base, sense and zero."""
-    other = kin.convert(kin.robot_from_screws(*_moved(UR5)), "modified")
+    other = kin.convert_dh(kin.robot_from_screws(*_moved(UR5)), "modified")
     found = kin.compare(other, UR5, frames="free")
     assert found.verdict == "same"
     mapping = mapping_of(found, UR5.n)
@@ -268,7 +268,7 @@ def _moved(robot: kin.Robot) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_the_code_that_is_shown_maps_joint_values():
-    other = kin.convert(kin.robot_from_screws(*_moved(UR5)), "standard")
+    other = kin.convert_dh(kin.robot_from_screws(*_moved(UR5)), "standard")
     found = kin.compare(other, UR5, frames="free")
     assert found.mapping is not None
     names: dict[str, object] = {}

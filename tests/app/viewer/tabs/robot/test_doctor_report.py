@@ -142,7 +142,7 @@ def test_mjcf_is_opened_without_a_report(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         upload(tab, LONG)
-        upload(tab, kin.to_mjcf(TWO), "two.xml")
+        upload(tab, kin.robot_to_mjcf(TWO), "two.xml")
         shows(tab, TWO, TWO.q_home)
         tab.wait(lambda: 'data-arm="doctor"' not in tab.html)
         assert "MJCF" in tab.html

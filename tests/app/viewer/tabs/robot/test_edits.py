@@ -21,7 +21,7 @@ from app.viewer.tabs.robot.edits import (
     typed,
 )
 from app.viewer.tabs.robot.presets import PRESETS
-from kin.transforms import from_position_wxyz
+from kin.transforms import pose_from_position_wxyz
 from kin.units import Units
 
 UR5, PANDA, STANFORD = (kin.get_robot(name) for name in ("ur5", "panda", "stanford"))
@@ -76,8 +76,8 @@ def test_home_and_limits_of_motion_are_typed_in_the_units_of_the_joint():
     assert robot.q_home.tolist() == [UR5.q_home[0], math.radians(-80), *UR5.q_home[2:]]
     assert robot.rows[1].velocity == pytest.approx(math.pi / 2)
     assert robot.rows[2].acceleration == 3.0
-    assert kin.limits_of(robot).jerk[3] == pytest.approx(math.radians(5000))
-    assert "jerk" not in kin.limits_of(robot).assumed[3]
+    assert kin.motion_limits(robot).jerk[3] == pytest.approx(math.radians(5000))
+    assert "jerk" not in kin.motion_limits(robot).assumed[3]
     assumed = type_in(robot, ((1, "velocity"), " "), own=own)
     assert assumed.robot.rows[1].velocity is None
     assert assumed.robot.rows[2].acceleration == 3.0
@@ -175,10 +175,10 @@ def test_all_lengths_zero_is_no_arm():
 
 def test_a_tool_moves_the_tool_point_and_a_base_the_whole_arm():
     own = type_in(UR5, (("tool", "z"), "120"), (("tool", "roll"), "180"))
-    T = kin.fk(UR5, UR5.q_home) @ from_position_wxyz([0, 0, 0.12], [0, 1, 0, 0])
+    T = kin.fk(UR5, UR5.q_home) @ pose_from_position_wxyz([0, 0, 0.12], [0, 1, 0, 0])
     assert np.abs(kin.fk(own.robot, UR5.q_home) - T).max() < 1e-15
     based = type_in(own.robot, (("base", "x"), "0.5"), (("base", "yaw"), "pi/2"), units=RADIANS, own=own)
-    B = from_position_wxyz([0.5, 0, 0], [math.sqrt(0.5), 0, 0, math.sqrt(0.5)])
+    B = pose_from_position_wxyz([0.5, 0, 0], [math.sqrt(0.5), 0, 0, math.sqrt(0.5)])
     assert np.abs(kin.fk(based.robot, UR5.q_home) - B @ T).max() < 1e-15
     assert frame_values(based.robot, "tool")[2:4] == (0.12, math.pi)
     assert frame_values(based.robot, "base") == (0.5, 0.0, 0.0, 0.0, 0.0, math.pi / 2)
@@ -205,7 +205,7 @@ def test_motors_follow_their_joints_and_go_with_them():
 
 
 def test_another_mounting_turns_the_arm_with_its_base_and_back():
-    q, placed = UR5.q_home, UR5.with_base(kin.from_xyz_rpy([0.1, 0.2, 0.3], [0.0, 0.0, 0.4]))
+    q, placed = UR5.q_home, UR5.with_base(kin.pose_from_xyz_rpy([0.1, 0.2, 0.3], [0.0, 0.0, 0.4]))
     own, T = None, kin.fk(placed, q)
     robot = placed
     for mounting, turn in (
@@ -216,7 +216,7 @@ def test_another_mounting_turns_the_arm_with_its_base_and_back():
         own = type_in(robot, (("arm", "mounting"), mounting), own=own)
         robot = own.robot
         assert robot.mounting == mounting
-        about = kin.from_xyz_rpy([0.0, 0.0, 0.0], turn)[:3, :3]
+        about = kin.pose_from_xyz_rpy([0.0, 0.0, 0.0], turn)[:3, :3]
         expected = about @ (T[:3, 3] - [0.1, 0.2, 0.3]) + [0.1, 0.2, 0.3]
         assert np.abs(kin.fk(robot, q)[:3, 3] - expected).max() < 1e-12
         assert np.abs(kin.fk(robot, q)[:3, :3] - about @ T[:3, :3]).max() < 1e-12

@@ -30,7 +30,7 @@ REAL = [
 
 
 def read(run_or_poses: np.ndarray) -> list[list[float]]:
-    return kin.readings_of_q(replace(SO101, motors=REAL), run_or_poses).round(1).tolist()
+    return kin.readings_from_q(replace(SO101, motors=REAL), run_or_poses).round(1).tolist()
 
 
 @pytest.mark.parametrize("robot_id", sorted(ROBOTS))
@@ -43,7 +43,7 @@ def test_the_poses_touch_nothing_that_is_drawn(robot_id: str) -> None:
         assert not robot.revolute.all(), "slides that are drawn into the floor at home"
     else:
         assert [drawn.at(q) for q in run.poses] == [None] * COUNT
-    assert (kin.self_distance(robot, run.poses) > 0.0).all()
+    assert (kin.clearance(robot, run.poses) > 0.0).all()
 
 
 def replace_slide(motor: Motor, kind: str) -> Motor:

@@ -414,7 +414,7 @@ def test_the_same_arm_in_the_other_convention(port: int) -> None:
 
 
 def test_a_urdf_comes_in_with_the_tip_that_is_chosen(port: int) -> None:
-    text = kin.to_urdf(UR5)
+    text = kin.robot_to_urdf(UR5)
     branch = (
         '<link name="camera"/><joint name="mount" type="revolute"><parent link="link_2"/><child link="camera"/>'
         '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'

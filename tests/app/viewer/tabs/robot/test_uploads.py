@@ -136,7 +136,7 @@ def test_what_is_wanted_of_a_zip_is_asked(port: int) -> None:
     )
     with FakeBrowser(port) as tab:
         tab.settle()
-        send(tab, "robots.zip", packed({**robot_files(fork), "two/urdf/other.urdf": kin.to_urdf(UR5)}))
+        send(tab, "robots.zip", packed({**robot_files(fork), "two/urdf/other.urdf": kin.robot_to_urdf(UR5)}))
         assert "robots.zip has several robots" in tab.html
         assert '<option value="two/urdf/two.urdf">' in part(tab, "files")
         say(tab, "urdf", value="two/urdf/none.urdf")
