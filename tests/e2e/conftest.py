@@ -13,11 +13,10 @@ from pathlib import Path
 
 import pytest
 from page import Tab
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser
 
 import kin
 
-CHROMIUM = Path(os.environ.get("KINBOARD_TEST_CHROMIUM", "/usr/bin/chromium"))
 ROOT = Path(__file__).parents[2]
 
 
@@ -80,18 +79,6 @@ def wait_until_ready(url: str, seconds: float = 180.0) -> None:
             reason = str(error)
         time.sleep(0.2)
     pytest.fail(f"not ready after {seconds} s: {reason}")
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    if not CHROMIUM.exists():
-        pytest.fail(
-            f"no Chromium at {CHROMIUM}: install it (apt-get install chromium) or set KINBOARD_TEST_CHROMIUM"
-        )
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox"])
-        yield started
-        started.close()
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from fake_browser import FakeBrowser
 from live_server import serve, wait_for
-from playwright.sync_api import expect, sync_playwright
+from playwright.sync_api import Browser, expect
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.sync.server import serve as serve_websocket
@@ -28,7 +28,6 @@ from app.service.main import create_app
 from app.shared.settings import Settings
 
 DEPLOY = Path(__file__).parents[3] / "deploy"
-CHROMIUM = os.environ.get("KINBOARD_TEST_CHROMIUM", "/usr/bin/chromium")
 PIONEER = kin.get_robot("pioneer5")
 LARGE = 12 * 1024 * 1024
 TOKEN = "a token for proxies"
@@ -262,11 +261,10 @@ def test_large_messages_pass_both_ways(name: str, certificate: Path, tls: ssl.SS
 
 @pytest.mark.browser
 @pytest.mark.parametrize("address", ["nginx"], indirect=True)
-def test_a_real_browser_is_asked_for_the_token_and_shown_the_viewer(address: str) -> None:
+def test_a_real_browser_is_asked_for_the_token_and_shown_the_viewer(address: str, browser: Browser) -> None:
     """The pages find their way back: wss, the prefix, and a cookie for them alone."""
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page(ignore_https_errors=True)
+    with browser.new_context(ignore_https_errors=True) as visitor:
+        page = visitor.new_page()
         dialled: list[str] = []
         page.on("websocket", lambda opened: dialled.append(opened.url))
         page.goto(f"https://{address}/kinboard/viewer/")
@@ -275,9 +273,8 @@ def test_a_real_browser_is_asked_for_the_token_and_shown_the_viewer(address: str
         expect(page.locator("[data-status]")).to_have_attribute("data-status", "hand", timeout=30_000)
         assert page.url.partition("?")[0] == f"https://{address}/kinboard/viewer/"
         assert f"wss://{address}/kinboard/viewer" in [url.rstrip("/") for url in dialled]
-        (cookie,) = page.context.cookies()
+        (cookie,) = visitor.cookies()
         assert (cookie["path"], cookie["secure"]) == ("/kinboard/", True)
-        browser.close()
 
 
 def test_compose_puts_https_in_front(certificate: Path, tmp_path: Path) -> None:
