@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+import signal
 import threading
 from _thread import interrupt_main
 from xml.etree import ElementTree
@@ -169,7 +170,12 @@ def test_ctrl_c_ends_cleanly(viewer, page, monkeypatch, capsys):
             interrupt_main()
 
     monkeypatch.setattr(Simulation, "advance", interrupted)
-    assert mujoco_arm.main([code_of(page), "--address", f"http://127.0.0.1:{viewer}"]) == 0
+    # A shell starts what runs in the background with Ctrl+C switched off, and so perhaps these tests.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        assert mujoco_arm.main([code_of(page), "--address", f"http://127.0.0.1:{viewer}"]) == 0
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert len(steps) == 30
     assert capsys.readouterr().out.endswith("Ended.\n")
     page.settle()
