@@ -62,11 +62,13 @@ def test_a_path_that_takes_too_long_is_abandoned(hurried):
     refused_as_too_slow(hurried.post(f"{PANDA}/ik/path", json={"targets": [FAR] * 1000}))
 
 
-def test_targets_checked_in_time_are_returned_with_a_problem(hurried):
-    answer = hurried.post(f"{PANDA}/reachable", json={"target": [FAR] * 200})
+def test_targets_checked_in_time_are_returned_with_a_problem():
+    # Long enough for some also where a busy machine lets the computation begin late.
+    client = TestClient(create_app(Settings(time_budget=1.0)))
+    answer = client.post(f"{PANDA}/reachable", json={"target": [FAR] * 10_000})
     assert answer.status_code == 200
     document = answer.json()
-    assert 0 < len(document["results"]) < 200
+    assert 0 < len(document["results"]) < 10_000
     assert document["problem"]["type"] == "urn:kinboard:problem:too-slow"
 
 

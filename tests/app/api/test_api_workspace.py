@@ -319,7 +319,7 @@ def test_a_repeated_summary_is_served_from_the_cache(client, monkeypatch):
 def test_rest_uses_what_the_viewer_has_computed(app, client, monkeypatch):
     for requested in (app.state.summaries.facts(SRS, effort=None), app.state.summaries.section(SRS)):
         requested.future.result(60)  # as the workspace tab requests them
-    for name in ("workspace_facts", "section"):
+    for name in ("workspace_facts", "workspace_section"):
         monkeypatch.setattr(f"app.shared.summaries.{name}", lambda *_, **__: pytest.fail("computed again"))
     answer = client.get(f"{API}/{SRS.id}/workspace/summary?volume=false&section=true")
     assert answer.status_code == 200

@@ -71,7 +71,7 @@ def quick_answers(monkeypatch):
         "app.shared.summaries.workspace_facts",
         lambda robot, **asked: facts(robot, **asked | {"effort": 2, "volume": False}),
     )
-    monkeypatch.setattr("app.shared.summaries.section", coarse(kin.workspace_section, 16))
+    monkeypatch.setattr("app.shared.summaries.workspace_section", coarse(kin.workspace_section, 16))
     monkeypatch.setattr("app.shared.maps.capability_grid", coarse(kin.workspace.capability_grid, 4))
     monkeypatch.setattr("app.api.arms.compare.compare", partial(kin.compare, seconds=0.1))
 

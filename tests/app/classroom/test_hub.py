@@ -218,6 +218,7 @@ STUDENTS = {
     "vote": (0,),
     "tell_task": ("swing",),
     "tell_gone": (True,),
+    "tell_driven": ("SO-101",),
     "submit": (attempt(),),
 }
 BOTH = {"room", "leave", "tell_page", "ticket", "changed"}

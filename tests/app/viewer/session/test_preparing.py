@@ -16,6 +16,8 @@ from live_server import serve_viewer
 import kin
 from app.api import ComputeSlots, api_routes
 from app.live import Lines
+from app.live import line as live_line
+from app.live.client import page as client_page
 from app.live.codes import read_code
 from app.live.line import Letter, Line, Program
 from app.service.web.rooms.limits import Limits
@@ -352,8 +354,8 @@ def test_a_robot_that_a_program_sends_waits_for_its_kernels(port, preparation, l
 
 
 def test_a_program_that_shows_another_arm_waits_until_it_is_compiled(preparation, lines, monkeypatch):
-    monkeypatch.setattr("app.live.line.PREPARING", 0.1)
-    monkeypatch.setattr("app.live.client.page.TIMEOUT", 0.5)
+    monkeypatch.setattr(live_line, "PREPARING", 0.1)
+    monkeypatch.setattr(client_page, "TIMEOUT", 0.5)
     state = {
         "settings": Settings(),
         "store": STORE,
