@@ -19,6 +19,7 @@ from fastapi.testclient import TestClient
 
 import kin
 from app.cli.parser import subcommands
+from app.exercises import builtin_exercises
 from app.exercises.kinds import KINDS
 from app.exports.formats import FORMATS
 from app.service.main import create_app
@@ -396,6 +397,17 @@ def mapped_files() -> list[str]:
         folders[depth:] = [name]
         found.append("".join(folders))
     return found
+
+
+def test_exercises_and_arms_are_counted_rightly():
+    for file in ("README.md", "docs/new.md"):
+        text = (ROOT / file).read_text(encoding="utf-8")
+        assert {int(found) for found in re.findall(r"(\d+)(?: exercises\*\*| in the page, with hints)", text)} == {
+            len(builtin_exercises())
+        }
+        assert {int(found) for found in re.findall(r"(\d+) arms(?:\*\*)? are built in", text)} == {
+            len(kin.builtin_robots())
+        }
 
 
 def test_the_map_names_every_folder_and_nothing_else():
