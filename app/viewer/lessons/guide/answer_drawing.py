@@ -116,7 +116,7 @@ def _frame_nodes(robot: Robot, question: Posed, given: object, closed: bool) -> 
 
 def _pose_of(given: object) -> Array:
     values = np.array(given, dtype=float)
-    return pose_from_position_wxyz(values[:3], values[3:] / np.linalg.norm(values[3:]))
+    return pose_from_position_wxyz(values[:3], values[3:])
 
 
 def _is_way(question: Number) -> bool:
