@@ -20,6 +20,10 @@ from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.settings import Settings
 from app.viewer.server import ViewerServer
 
+# For `python -c`, before a program that shall end by Ctrl+C: what a shell starts in the background ignores it, and
+# so do its children.
+LISTENING = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+
 
 @contextmanager
 def serve(app: ASGIApp, settings: Settings | None = None) -> Iterator[int]:

@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import trimesh
+from live_server import LISTENING
 from zips import COLLISIONS, announced, robot_files
 
 import kin
@@ -798,12 +799,10 @@ def test_an_interrupted_cloud_leaves_nothing_behind(tmp_path):
     old = tmp_path / "cloud.bin"
     old.write_bytes(b"old")
     words = ["workspace", "pioneer5", "-n", "1e10", "-o", str(old), "--progress"]
-    # As at a terminal: what a shell starts in the background ignores Ctrl-C, and so do its children.
-    listening = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
     command = [
         sys.executable,
         "-c",
-        f"{listening}; import sys; from app.cli.parser import main; sys.exit(main())",
+        f"{LISTENING}; import sys; from app.cli.parser import main; sys.exit(main())",
         *words,
     ]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:

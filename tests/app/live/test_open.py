@@ -18,7 +18,7 @@ from urllib.parse import parse_qs, urlsplit
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
-from live_server import wait_for
+from live_server import LISTENING, wait_for
 
 import kin
 from app.cli import parser
@@ -158,10 +158,8 @@ def test_the_program_opens_the_browser_and_ends_with_ctrl_c(tmp_path):
     browser.write_text(f'#!/bin/sh\nprintf %s "$1" > {seen}.part && mv {seen}.part {seen}\n')
     browser.chmod(0o755)
     environment = {**os.environ, "BROWSER": f"{browser} %s", "PYTHONPATH": str(ROOT)}
-    # A shell starts what runs in the background with Ctrl+C switched off, and so perhaps these tests.
-    listening = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
     opening = "import sys; from app.cli.parser import main; sys.exit(main(['open', 'ur5']))"
-    words = [sys.executable, "-c", f"{listening}; {opening}"]
+    words = [sys.executable, "-c", f"{LISTENING}; {opening}"]
     with said.open("w") as out:
         process = subprocess.Popen(words, env=environment, stdout=out, stderr=out)
     try:
