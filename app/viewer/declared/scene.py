@@ -132,6 +132,11 @@ class _Shown:
     children: dict[str, _Shown] = field(default_factory=dict)
 
 
+def _is_same_kind(one: _Shown, node: Node | Lazy) -> bool:
+    """Whether what is shown can become this node: a bar cannot become a frame by other properties."""
+    return isinstance(node, Node) and one.kind == node.kind and one.props.keys() == node.props.keys()
+
+
 class SceneView:
     """The drawings of one feature.
 
@@ -166,6 +171,9 @@ class SceneView:
         for node in nodes:
             gone.discard(node.key)
             one = shown.get(node.key)
+            if one is not None and one.handle is not None and not _is_same_kind(one, node):
+                shown.pop(node.key).handle.remove()
+                one = None
             if isinstance(node, Lazy):
                 if one is None:
                     one = shown[node.key] = _Shown(None, "", {}, True)

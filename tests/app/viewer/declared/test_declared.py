@@ -36,7 +36,7 @@ from app.viewer.declared.fields import (
     vector,
 )
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node, Progress
-from app.viewer.declared.scene import Lazy, arrows, axes, frame, label
+from app.viewer.declared.scene import Lazy, SceneView, arrows, axes, bars, frame, label
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.lesson import Lesson
@@ -325,6 +325,31 @@ def test_the_scene_is_changed_and_hidden_not_made_again(page: BarePage) -> None:
         assert set(nodes_of(page.client.scene)) == names
     page.change(STORE.get("scara"))
     assert not names & set(nodes_of(page.client.scene)) - {"/WorldAxes"}, "names are never used again"
+
+
+def test_a_drawing_of_another_kind_takes_the_place_of_one(page: BarePage) -> None:
+    """A wrong answer is a bar in one step of a lesson and a frame in the next, and both are called so."""
+    view = SceneView(page.client.scene, "copies", page.post)
+    ends = np.array([[np.zeros(3), np.ones(3)]])
+    kinds = [
+        (bars("wrong", ends, (200, 0, 0), 0.01), "LineSegmentsHandle"),
+        (axes("wrong", np.eye(4), 0.1, 0.01), "FrameHandle"),
+        (label("wrong", "yours", np.zeros(3), anchor=None), "LabelHandle"),
+        (label("wrong", "yours", np.zeros(3), anchor="bottom-center"), "LabelHandle"),
+        (frame("wrong", label("words", "yours", np.zeros(3))), "FrameHandle"),
+        (bars("wrong", ends, (200, 0, 0), 0.01), "LineSegmentsHandle"),
+    ]
+    names = set[str]()
+    for node, kind in kinds:
+        view.show([node])
+        shown = {name: found for name, found in nodes_of(page.client.scene).items() if "/wrong" in name}
+        top = {name for name in shown if name.split("/")[-1].startswith("wrong")}
+        assert [type(shown[name]).__name__ for name in top] == [kind]
+        assert not names & top, "names are never used again"
+        assert len(shown) == 1 + len(node.children)
+        names |= top
+    view.show([])
+    assert [found.visible for name, found in nodes_of(page.client.scene).items() if "/wrong" in name] == [False]
 
 
 def test_a_frame_sends_only_what_moved_and_renders_nothing_twice(page: BarePage) -> None:
