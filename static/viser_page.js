@@ -31,7 +31,9 @@ const viserPage = (() => {
     messages: "div:has(> [data-answers]) + div input", // the hidden field behind our hidden HTML
   };
   // What viser calls, and how often it has since this page was loaded.
-  const HOOKS = { readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0, reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0 };
+  const HOOKS = {
+    readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0, reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0, findParent: 0,
+  };
 
   // WebKit on Linux names the locale C as a language. viser's script would end there: no Intl knows it.
   const known = (tag) => { try { return Intl.getCanonicalLocales(tag).length > 0; } catch { return false; } };
@@ -301,6 +303,28 @@ const viserPage = (() => {
       else shadedPrograms.delete(program); // of a picture that is gone
     }
   }, { on: [COLOURS] });
+
+  // viser places the labels of a frame before it draws, where their parents were drawn last: a label came a frame after
+  // what it names, and a new one stood elsewhere for a frame. The parent it asks for is here moved to its present place.
+
+  const placed = new WeakSet(); // tables of nodes that move what they are asked for
+  function placeParents() {
+    const canvas = document.querySelector(PARTS.scene);
+    let fiber = canvas?.[Object.keys(canvas).find((key) => key.startsWith("__reactFiber$"))]; // what React keeps of it
+    while (fiber && !fiber.memoizedProps?.value?.mutable?.current?.nodeRefFromName) fiber = fiber.return;
+    const viewer = fiber?.memoizedProps.value.mutable.current;
+    if (!viewer || placed.has(viewer.nodeRefFromName)) return;
+    viewer.nodeRefFromName = new Proxy(viewer.nodeRefFromName, {
+      get(nodes, name) {
+        const node = nodes[name];
+        node?.updateWorldMatrix?.(true, false);
+        HOOKS.findParent++;
+        return node;
+      },
+    });
+    placed.add(viewer.nodeRefFromName);
+  }
+  watch(placeParents, { delay: 50 });
 
   // Tabs
 

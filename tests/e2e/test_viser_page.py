@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 from page import Tab
-from playwright.sync_api import expect
+from playwright.sync_api import Browser, expect
 
+import kin
 from app.viewer.panel.theme import SYSTEM_IS_DARK
 
 pytestmark = pytest.mark.browser
@@ -122,6 +123,76 @@ def test_labels_of_the_scene_follow_the_colours_of_the_page(tab: Tab) -> None:
     assert all(page.evaluate(SHADES)), "letters and boxes are drawn in the dark colours"
     tab.set_dark(False)
     assert not any(page.evaluate(SHADES))
+
+
+class LabelsTab(Tab):
+    """A tab that compares where each label is drawn with where it belongs, in every frame.
+
+    viser writes the places of all labels into a texture of 4096 pixels, and sends it while it draws a frame.
+    By then all nodes are where they are drawn. `strayed` has for each frame: the labels, and how far the worst
+    is off (m).
+    """
+
+    scripts = (
+        Tab.scripts
+        + """
+{
+  window.strayed = [];
+  const gl = WebGL2RenderingContext.prototype;
+  const find = () => {
+    const canvas = document.querySelector("canvas[data-engine]");
+    let fiber = canvas?.[Object.keys(canvas).find((key) => key.startsWith("__reactFiber$"))];
+    while (fiber && !fiber.memoizedProps?.value?.mutable?.current?.nodeRefFromName) fiber = fiber.return;
+    return fiber?.memoizedProps.value;
+  };
+  const look = (data) => {
+    const viewer = find();
+    if (!viewer) return;
+    const { nodeRefFromName: nodes, nodePoseData: poses } = viewer.mutable.current;
+    const drawn = [];
+    for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 0) drawn.push([data[i], data[i + 1], data[i + 2]]);
+    const off = [];
+    for (const name of Object.keys(nodes)) {
+      const { message, effectiveVisibility } = viewer.useSceneTree.get(name) ?? {};
+      const parent = nodes[name.slice(0, name.lastIndexOf("/"))];
+      if (message?.type !== "LabelMessage" || !effectiveVisibility || !parent) continue;
+      const at = parent.position.clone().set(...(poses[name]?.position ?? [0, 0, 0]));
+      at.applyMatrix4(parent.matrixWorld);
+      off.push(Math.min(...drawn.map(([x, y, z]) => Math.hypot(at.x - x, at.y - y, at.z - z))));
+    }
+    if (drawn.length) strayed.push([off.length, Math.max(...off)]);
+  };
+  for (const name of ["texSubImage2D", "texImage2D"]) {
+    const send = gl[name];
+    gl[name] = function (...what) {
+      const data = what.find((each) => each instanceof Float32Array);
+      if (data?.length === 4 * 4096) look(data);
+      return send.apply(this, what);
+    };
+  }
+}
+"""
+    )
+
+
+def test_labels_are_drawn_where_they_belong_while_the_arm_moves_and_another_comes(
+    browser: Browser, address: str
+) -> None:
+    tab = LabelsTab(browser, address, 900, 600)
+    frames = "count => strayed.length >= count"
+    tab.open("View")
+    tab.check("Link frames")
+    tab.open("Move")
+    tab.page.wait_for_function("strayed.some(([labels]) => labels > 6)")  # of each row, and at the scale bar
+    for degrees in (20, 40, 60, 80):
+        seen = tab.page.evaluate("strayed.length")
+        tab.type_number("1 rotating base", str(degrees))
+        tab.page.wait_for_function(frames, arg=seen + 2)
+    tab.select(kin.get_robot("ur5"))
+    tab.page.wait_for_function(frames, arg=tab.page.evaluate("strayed.length") + 2)
+    strayed = tab.page.evaluate("strayed")
+    assert max(off for _, off in strayed) < 1e-5, strayed
+    tab.close()
 
 
 def test_typing_into_a_menu_replaces_the_name_that_is_chosen(desktop: Tab) -> None:
