@@ -327,16 +327,20 @@ class VisitorCamera:
 
     def _go(self, viewpoint: Array, glide: bool = False) -> None:
         start, now = self._viewpoint, time.perf_counter()
+        # The page reports only changes. What it reported before it arrives elsewhere is older than the way there.
+        here = self._reported is not None and _same(self._reported, viewpoint)
+        elsewhere = here and not self._settled and not _same(self._aimed, viewpoint)
         self._aimed, self._aimed_at = viewpoint, now
-        # The page reports only changes.
-        self._arrived = self._reported is not None and _same(self._reported, viewpoint)
+        self._arrived = here and not elsewhere
         self._glide = (start, now) if glide and not self._arrived else None
         if self._glide is None:
-            self._send(viewpoint)
+            self._send(viewpoint, elsewhere)
 
-    def _send(self, viewpoint: Array) -> None:
+    def _send(self, viewpoint: Array, anew: bool = False) -> None:
         position, look_at, up = viewpoint
         self._camera.up_direction = up
+        if anew:  # viser sends nothing that equals the last report
+            self._camera.position = position + up
         self._camera.position = position
         self._camera.look_at = look_at
 

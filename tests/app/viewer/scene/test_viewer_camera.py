@@ -102,6 +102,26 @@ def test_a_picture_of_another_shape_shows_the_same(port: int) -> None:
         assert np.abs(rest(tab).camera - ASIDE).max() < 1e-3
 
 
+def test_a_picture_that_is_narrow_for_a_moment_leaves_the_view(port: int) -> None:
+    """A window made as narrow as a phone squeezes the picture beside the panel before the panel moves below it."""
+    narrow = default(PIONEER, 64 / 350)
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.look()
+        tab.look(image_width=64, image_height=350)
+        tab.wait(lambda: np.allclose(shown(tab), narrow))
+        # The page has not moved yet when it reports that the panel has.
+        orbit(tab, default(PIONEER, DESKTOP), image_width=500, image_height=350)
+        tab.wait(lambda: np.allclose(shown(tab), default(PIONEER, DESKTOP)))
+        orbit(tab, narrow, image_width=500, image_height=350)
+        orbit(tab, default(PIONEER, DESKTOP), image_width=500, image_height=350)
+        tab.settle()
+        tab.look(image_width=1280, image_height=720)
+        tab.settle()
+        assert np.allclose(shown(tab), default(PIONEER, DESKTOP))
+        assert tab.kept == [], "nobody has chosen a view"
+
+
 def test_the_camera_is_stored_when_it_stops_and_restored(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
