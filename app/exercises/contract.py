@@ -19,9 +19,11 @@ from app.exercises.questions import Asked, Question, Verdict
 from app.exercises.variant import Variant
 from kin import InputError, KinematicsError
 from kin.transforms import Array
-from kin.units import ANGLES, LENGTH_UNITS, Unit, Units
+from kin.units import ANGLES, LENGTH_UNITS, Unit, Units, general
 
 LONGEST_PROGRAM = 4000  # characters
+DIGITS = (4, 5, 6, 8)  # significant ones of a right answer on show: the fewest with which it is right
+NOISE = 9  # decimals beyond which a computed number is zero
 
 
 class Kind(ABC):
@@ -120,6 +122,21 @@ class Posed(Question):
             return [list(row) for row in answer]
         return [list(answer)] if form == "fields" else [[answer]] if form == "program" else []
 
+    def right_cells(self) -> list[list[str]]:
+        answer: Any = self.kind.answer(self.variant)
+        own = self.asked()
+        if own.form not in ("fields", "table", "postures"):
+            return self.cells(answer)
+        units = list(zip(self.kind.asked(self.variant, PLAIN_UNITS).units, own.units, strict=True))
+        exact = [list(row) for row in ([answer] if own.form == "fields" else answer)]
+        for digits in DIGITS:
+            rows = [
+                [_rounded(text, *pair, digits) for text, pair in zip(row, units, strict=True)] for row in exact
+            ]
+            if self.judge(rows[0] if own.form == "fields" else rows).right:
+                return rows
+        return self.cells(self.right())
+
 
 _BARE = re.compile(r"\s*[-+−]?[\d.,]+(?:e[-+−]?\d+)?\s*")
 
@@ -138,6 +155,18 @@ def _with_units(cells: Sequence[str], units: Sequence[str]) -> list[str]:
     pairs = zip(cells, units, strict=True)
     known = {*ANGLES, *LENGTH_UNITS, "°/s", "rad/s", "mm/s", "cm/s", "m/s"}  # those that depend on the reader
     return [f"{text} {unit}" if unit in known and _BARE.fullmatch(text) else text for text, unit in pairs]
+
+
+def _rounded(text: str, unit: str, shown: str, digits: int) -> str:
+    """A typed number in the unit that is shown, with this many significant digits; another text as it is."""
+    try:
+        value = float(text)
+    except ValueError:
+        return text
+    if unit != shown:
+        known = {**ANGLES, **LENGTH_UNITS}
+        value *= known[shown.removesuffix("/s")].scale / known[unit.removesuffix("/s")].scale
+    return general(round(value, NOISE), digits)
 
 
 def numbers(given: object, count: int, what: str) -> Array:

@@ -129,6 +129,10 @@ class Question(ABC):
     def cells(self, answer: Any) -> list[list[str]]:
         """A kept answer as the typed rows of the form; empty if it is not typed."""
 
+    def right_cells(self) -> list[list[str]]:
+        """A right answer as `cells`, in the reader's units and rounded as it is asked."""
+        return self.cells(self.right())
+
 
 @dataclass(frozen=True)
 class Option:
@@ -265,6 +269,9 @@ class Number(Question):
 
     def cells(self, answer: float) -> list[list[str]]:
         return [[general(answer * self.unit.scale)]]
+
+    def right_cells(self) -> list[list[str]]:
+        return [[self.value_text.removesuffix(self.unit.suffix.rstrip())]]
 
     def way_of(self, answer: float) -> int:
         """Which right value is given: 0 for the answer, 1 for the first of the other ways, −1 for none."""

@@ -56,6 +56,18 @@ def test_an_independent_solution_is_right(exercise: Exercise) -> None:
 
 
 @pytest.mark.parametrize("exercise", EXERCISES, ids=each)
+@pytest.mark.parametrize("units", [DEGREES, RADIANS], ids=["degrees", "radians"])
+def test_a_right_answer_on_show_is_rounded_and_right(exercise: Exercise, units: Units) -> None:
+    for seed in seeds(exercise):
+        question = exercise.kind.ask("?", exercise.variant(seed), units)
+        cells, form = question.right_cells(), question.asked().form
+        if form in ("fields", "table", "postures"):
+            assert question.judge(question.read(cells[0] if form == "fields" else cells)).right, (seed, cells)
+            assert all(len(re.sub(r"\D|^0+\.0*", "", text)) <= 5 for row in cells for text in row), (seed, cells)
+            assert not any(text.endswith(unit) for row in cells for text in row for unit in ("°", "m", "s"))
+
+
+@pytest.mark.parametrize("exercise", EXERCISES, ids=each)
 def test_a_wrong_answer_is_wrong_and_gets_a_reason(exercise: Exercise) -> None:
     variant = exercise.variant(3)
     asked = exercise.asked(variant, DEGREES)

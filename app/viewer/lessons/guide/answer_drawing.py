@@ -12,7 +12,7 @@ from app.exercises.questions import Choice, Number, Question
 from app.viewer.declared.scene import Color, Node, axes, bars, label
 from app.viewer.exercises.drawing import SIZE
 from app.viewer.lessons.figure_shapes import GREEN, VERMILION
-from app.viewer.lessons.guide.outline import Bar, Drawn, Ghost, Lead, Leads, Path, Place, Step
+from app.viewer.lessons.guide.outline import Bar, Drawn, Ghost, Lead, Leads, Path, Place, SemiAxis, Step
 from app.viewer.scene.meshes import body
 from app.viewer.skeleton import ghost
 from kin import Robot, fk, link_frames
@@ -23,6 +23,7 @@ OPACITY = 0.42  # of a copy of the arm
 THICK, DASHES = 0.6, 9  # of a bar, in the arm's thickness; parts of a broken one
 FARTHEST = 3.0  # reaches of the arm that a bar is long at most; its label has the value
 ASIDE = 1.4  # from the broken bar to the whole one, in the arm's thickness
+ROUND, THIN = 48, 0.4  # parts of an ellipse, of which a broken one has every other; its thickness, of a bar's
 
 
 def answer_nodes(robot: Robot, step: Step, given: object, closed: bool) -> list[Node]:
@@ -32,14 +33,14 @@ def answer_nodes(robot: Robot, step: Step, given: object, closed: bool) -> list[
             q = np.array(step.drawn.at(float(given)))
             name = label("words", YOURS, fk(robot, q)[:3, 3], anchor=None)
             return [ghost("arm", robot, q, VERMILION, OPACITY), name]
-        case Bar() if isinstance(step.question, Number) and _is_way(step.question):
+        case Bar() | SemiAxis() if isinstance(step.question, Number) and _is_way(step.question):
             question, nodes = step.question, list[Node]()
             if isinstance(given, float | int) and not question.judge(float(given)).right:
-                words = f"{YOURS}: {question.unit.text(float(given))}"
-                nodes += _bar("wrong", robot, step.drawn, float(given), words, VERMILION, broken=True)
+                words = f"{YOURS}: {question.unit.brief(float(given))}"
+                nodes += _length("wrong", robot, step.drawn, float(given), words, VERMILION, broken=True)
             if closed:
                 words = f"right: {question.value_text}"
-                nodes += _bar("right", robot, step.drawn, question.answer, words, GREEN, broken=False)
+                nodes += _length("right", robot, step.drawn, question.answer, words, GREEN, broken=False)
             return nodes
         case Leads():
             return lead_nodes(robot, step.question, step.drawn, given, closed)
@@ -124,6 +125,14 @@ def _is_way(question: Number) -> bool:
     return question.unit.is_length or question.unit.name == "m/s"
 
 
+def _length(
+    key: str, robot: Robot, drawn: Bar | SemiAxis, value: float, words: str, color: Color, broken: bool
+) -> list[Node]:
+    if isinstance(drawn, Bar):
+        return _bar(key, robot, drawn, value, words, color, broken)
+    return _ellipsoid(key, robot, drawn, value, words, color, broken)
+
+
 def _bar(key: str, robot: Robot, bar: Bar, value: float, words: str, color: Color, broken: bool) -> list[Node]:
     start, way = np.array(bar.start), np.array(bar.end) - bar.start
     length = float(np.linalg.norm(way))
@@ -137,6 +146,31 @@ def _bar(key: str, robot: Robot, bar: Bar, value: float, words: str, color: Colo
         start, end = start + aside, end + aside
     ends = np.linspace(start, end, 2 * DASHES if broken else 2).reshape(-1, 2, 3)
     return [bars(key, ends, color, THICK * size), label(f"{key}-words", words, end, anchor="bottom-center")]
+
+
+def _ellipsoid(
+    key: str, robot: Robot, axis: SemiAxis, value: float, words: str, color: Color, broken: bool
+) -> list[Node]:
+    """The ellipses of an ellipsoid with one semi-axis of this length, and this semi-axis as a bar.
+
+    The bars of a wrong and of the right one are on opposite sides.
+    """
+    center, size, most = np.array(axis.center), body(robot).size, FARTHEST * robot.reach
+    lengths = np.clip(axis.scale * np.array([*axis.others, value]), -most, most)
+    semi = lengths[:, None] * np.array(axis.axes)
+    angles = np.linspace(0.0, 2.0 * np.pi, ROUND + 1)
+    found = []
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        if abs(lengths[i] * lengths[j]) > 1e-12:
+            around = center + np.outer(np.cos(angles), semi[i]) + np.outer(np.sin(angles), semi[j])
+            found.append(np.stack([around[:-1], around[1:]], axis=1)[:: 2 if broken else 1])
+    end = center + (semi[2] if broken else -semi[2])
+    bar = np.linspace(center, end, 2 * DASHES if broken else 2).reshape(-1, 2, 3)
+    return [
+        bars(f"{key}-round", np.concatenate(found), color, THIN * THICK * size),
+        bars(key, bar, color, THICK * size),
+        label(f"{key}-words", words, end, anchor="bottom-center"),
+    ]
 
 
 def _across(direction: Array) -> Array:

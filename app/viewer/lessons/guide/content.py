@@ -24,7 +24,18 @@ from app.exercises.lesson_text import (
 )
 from app.exercises.variant import Quantity, Variant
 from app.exercises.worked import WorkedText
-from app.viewer.lessons.guide.outline import Answered, Bar, Drawn, Lead, Leads, Outline, Pose, Question, Step
+from app.viewer.lessons.guide.outline import (
+    Answered,
+    Bar,
+    Drawn,
+    Lead,
+    Leads,
+    Outline,
+    Pose,
+    Question,
+    SemiAxis,
+    Step,
+)
 from kin import Robot, fk
 from kin.units import Units
 
@@ -43,6 +54,7 @@ class LessonFacts:
         figures: those that are shown with an answer.
         answered: figures of an answer, by the names that steps give.
         leads: where options of choices lead, by the names that questions give; None: nowhere on this arm.
+        semi_axes: of ellipsoids, as which answers are drawn.
     """
 
     numbers: Mapping[str, float | Quantity]
@@ -52,6 +64,7 @@ class LessonFacts:
     figures: Mapping[str, Markup] = field(default_factory=dict)
     leads: Mapping[str, Lead | None] = field(default_factory=dict)
     answered: Mapping[str, Answered] = field(default_factory=dict)
+    semi_axes: Mapping[str, SemiAxis] = field(default_factory=dict)
 
 
 @cache
@@ -123,7 +136,7 @@ class _Maker:
         known = {**self.facts.leads, NOWHERE: None}
         return Leads(tuple(self.named("leads", name, known) for name in names))
 
-    def drawn(self, text: StepText, asked: QuestionText | None) -> Drawn | Bar | Leads | None:
+    def drawn(self, text: StepText, asked: QuestionText | None) -> Drawn | Bar | SemiAxis | Leads | None:
         """How answers to a step are drawn."""
         if (leads := self.leads(asked)) is not None:
             return leads
@@ -133,6 +146,8 @@ class _Maker:
                 return Bar(start, self._point(text, text.drawn.end), self.variant.number(text.drawn.scale))
             case (name, joint):
                 return self._joint(name, joint)
+            case str(name):
+                return self.named("drawn.semi_axis", name, self.facts.semi_axes)
         return None
 
     def _point(self, text: StepText, given: str | tuple[Expression, ...]) -> tuple[float, ...]:

@@ -239,11 +239,12 @@ class Guide(Feature):
         if key not in self._sheets:
             progress, sheet = self._progress, Sheet()
             question = progress.question(key)
-            answer: Any = question.right() if key in progress.revealed else progress.given.get(key)
+            shown = key in progress.revealed
+            answer: Any = question.right() if shown else progress.given.get(key)
             if answer is not None:
-                sheet.cells = question.cells(answer)
+                sheet.cells = question.right_cells() if shown else question.cells(answer)
                 form = question.asked().form
-                if form == "options" and key not in progress.revealed:
+                if form == "options" and not shown:
                     sheet.chosen = answer
                 elif form == "order":
                     sheet.picked = list(answer)

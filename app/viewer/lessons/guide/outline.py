@@ -46,6 +46,7 @@ __all__ = [
     "Place",
     "Pose",
     "Question",
+    "SemiAxis",
     "Step",
     "Way",
     "apart",
@@ -106,6 +107,23 @@ class Bar:
 
     start: tuple[float, ...]
     end: tuple[float, ...]
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class SemiAxis:
+    """How a length, or a speed, is drawn: as a semi-axis of an ellipsoid whose others are known.
+
+    Attributes:
+        center: the centre ``(3,)`` (m).
+        axes: unit vectors along the axes as rows ``(3, 3)``; the last one is asked for.
+        others: the lengths of the first two, in the unit of the answer; 0 of a flat one.
+        scale: how long it is in the scene (m) for 1 m or 1 m/s.
+    """
+
+    center: tuple[float, ...]
+    axes: tuple[tuple[float, ...], ...]
+    others: tuple[float, float]
     scale: float = 1.0
 
 
@@ -171,7 +189,7 @@ class Step:
     practice: str = ""
     figure: Markup | None = None
     withheld: frozenset[str] = frozenset()
-    drawn: Drawn | Bar | Leads | None = None
+    drawn: Drawn | Bar | SemiAxis | Leads | None = None
     estimate: Question | None = None
     guessed: Leads | None = None
     answered: Answered | None = None

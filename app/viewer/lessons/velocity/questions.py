@@ -9,7 +9,7 @@ import numpy as np
 
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import UP, direction, level
-from app.viewer.lessons.guide.outline import Lead, Outline, Pose
+from app.viewer.lessons.guide.outline import Lead, Outline, Pose, SemiAxis
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.velocity.facts import scale_of
 from app.viewer.lessons.velocity.views import SAMPLE
@@ -34,7 +34,8 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     """What the file declares; joints count from 1."""
     home, J = robot.q_home, jacobian(robot, robot.q_home)
     heavy = int(np.argmax([abs(torque(J, k)) for k in range(robot.n)]))
-    semi = np.linalg.svd(J[:3], compute_uv=False)
+    U, semi, _ = np.linalg.svd(J[:3])
+    axes = _axes(robot, home)
     found = singular(robot)
     flat = FLAT * max(_smallest(robot, q) for q in robot.random_q(np.random.default_rng(4), SAMPLES))
     there = driven(robot, flat)
@@ -49,7 +50,9 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "torque": torque(J, heavy) if lifts(robot, J, heavy) else 0.0,
         "least_torque": 0.25 * LOAD * NEARLY * (size(robot) if robot.revolute[heavy] else 1.0),
         "fastest": float(semi[0]),
-        "slowest": float(semi[-1]),
+        "slowest": float(semi[axes - 1]),
+        "axes": float(axes),
+        "round": float(semi[:axes].prod() ** (1.0 / axes)),
         "singular": float(found is not None),
         "metre": SAMPLE / scale_of(robot, "velocity"),
         "flattened": float(found is not None and _axes(robot, found[0]) < _axes(robot, home)),
@@ -64,11 +67,26 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "lifts": lambda joint: float(lifts(robot, J, int(joint) - 1)),
     }
     lead = leads(robot, J)
-    poses, words = {"home": Pose(as_configuration(home))}, {"sigma_home": general(_smallest(robot, home), 3)}
-    if found is None:
-        return LessonFacts(numbers, functions, {**words, "singularity": ""}, poses, leads=lead)
-    poses["singularity"] = Pose(as_configuration(found[0]))
-    return LessonFacts(numbers, functions, {**words, "singularity": short(found[1], units)}, poses, leads=lead)
+    words = {
+        "sigma_home": general(_smallest(robot, home), 3),
+        "others": " and ".join(f"{general(value, 4)} m/s" for value in semi[1:axes]),
+        "product": f"{general(float(semi[:axes].prod()), 4)} {'m²/s²' if axes == 2 else 'm³/s³'}",
+        "singularity": "" if found is None else short(found[1], units),
+    }
+    poses = {"home": Pose(as_configuration(home))}
+    if found is not None:
+        poses["singularity"] = Pose(as_configuration(found[0]))
+    drawn = {"fastest": semi_axis(robot, U, semi, axes)}
+    return LessonFacts(numbers, functions, words, poses, leads=lead, semi_axes=drawn)
+
+
+def semi_axis(robot: Robot, U: Array, semi: Array, axes: int) -> SemiAxis:
+    """The longest semi-axis of the velocity ellipsoid at home, and the others."""
+    others = [float(semi[k]) if k < axes else 0.0 for k in (1, 2)]
+    ways = tuple(tuple(U[:, k].tolist()) for k in (1, 2, 0))
+    scale = SAMPLE / scale_of(robot, "velocity")
+    center = tuple(fk(robot, robot.q_home)[:3, 3].tolist())
+    return SemiAxis(center, ways, (others[0], others[1]), scale)
 
 
 def leads(robot: Robot, J: Array) -> dict[str, Lead | None]:

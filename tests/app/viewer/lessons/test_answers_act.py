@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 
 import numpy as np
+import numpy_arm
 import pytest
 from arms import CLASSICS
 from fake_browser import FakeBrowser
@@ -21,7 +22,7 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.answer_drawing import DASHES, FARTHEST, answer_nodes
-from app.viewer.lessons.guide.outline import Bar, Drawn, Number, Step
+from app.viewer.lessons.guide.outline import Bar, Drawn, Number, SemiAxis, Step
 from app.viewer.server import ViewerServer
 from kin.units import Units
 
@@ -29,7 +30,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connecti
 
 STORE = Store()
 UR5 = STORE.get("ur5")
-BAR, ARM, FIGURE = "a bar", "a copy of the arm", "a figure"
+BAR, ARM, FIGURE, AXIS = "a bar", "a copy of the arm", "a figure", "an ellipsoid"
 ACTS: dict[tuple[str, str], str] = {
     ("dh", "Row # as a distance"): BAR,
     ("dh", "A joint and its column"): BAR,
@@ -37,6 +38,7 @@ ACTS: dict[tuple[str, str], str] = {
     ("equations", "The tool point"): BAR,
     ("numeric", "The error"): BAR,
     ("velocity", "A column"): BAR,
+    ("velocity", "The ellipsoid"): AXIS,
     ("postures", "By hand: the ring"): BAR,
     ("postures", "By hand: the other elbow"): ARM,
     ("inverse", "θ₁ from above"): ARM,
@@ -81,13 +83,13 @@ def test_the_list_of_answers_that_act_is_complete() -> None:
     found: dict[tuple[str, str], set[str]] = {}
     for _, name, step in steps():
         if is_measured(step):
-            kind = {Bar: BAR, Drawn: ARM}.get(type(step.drawn), "none")  # type: ignore[call-overload]
+            kind = {Bar: BAR, Drawn: ARM, SemiAxis: AXIS}.get(type(step.drawn), "none")  # type: ignore[call-overload]
             kind = FIGURE if step.answered is not None else kind
             found.setdefault(name, set()).add(kind)
     assert found.keys() == ACTS.keys()
     assert {name: kinds for name, kinds in found.items() if kinds != {ACTS[name]} and kinds != {"none"}} == {}
     assert {name for name, kinds in found.items() if kinds == {"none"}} == {
-        name for name, how in ACTS.items() if how not in (BAR, ARM, FIGURE)
+        name for name, how in ACTS.items() if how not in (BAR, ARM, FIGURE, AXIS)
     }
 
 
@@ -115,7 +117,7 @@ def test_true_and_wrong_differ_in_colour_line_and_length() -> None:
     assert answer_nodes(UR5, step, None, closed=False) == []
     shown = {node.key: node for node in answer_nodes(UR5, step, wrong, closed=False)}
     assert shown.keys() == {"wrong", "wrong-words"}, "the right one is not given away"
-    assert shown["wrong-words"].props["text"] == f"your answer: {step.question.unit.text(wrong)}"
+    assert shown["wrong-words"].props["text"] == f"your answer: {step.question.unit.brief(wrong)}"
     assert [node.key for node in answer_nodes(UR5, step, right, closed=True)] == ["right", "right-words"]
     both = {node.key: node for node in answer_nodes(UR5, step, wrong, closed=True)}
     assert len(both) == 4
@@ -128,14 +130,68 @@ def test_true_and_wrong_differ_in_colour_line_and_length() -> None:
 
 
 @pytest.mark.parametrize("given", [1e300, -1e300, 0.0])
-def test_answers_of_any_size_stay_in_the_picture(given: float) -> None:
-    outline = next(lesson for lesson in LESSONS if lesson.key == "equations").outline(UR5, Units())
-    step = next(each for each in outline.steps if each.title == "The tool point")
-    bar, words = answer_nodes(UR5, step, given, closed=False)
-    points = bar.props["points"]
-    assert np.isfinite(points).all()
-    assert np.abs(points).max() < (FARTHEST + 1) * UR5.reach
+@pytest.mark.parametrize(("lesson", "title"), [("equations", "The tool point"), ("velocity", "The ellipsoid")])
+def test_answers_of_any_size_stay_in_the_picture(lesson: str, title: str, given: float) -> None:
+    outline = next(each for each in LESSONS if each.key == lesson).outline(UR5, Units())
+    step = next(each for each in outline.steps if each.title == title)
+    *drawn, words = answer_nodes(UR5, step, given, closed=False)
+    for bar in drawn:
+        points = bar.props["points"]
+        assert np.isfinite(points).all()
+        assert np.abs(points).max() < (FARTHEST + 1) * UR5.reach
     assert "your answer" in words.props["text"]
+
+
+def ellipsoids() -> Iterator[tuple[kin.Robot, Step]]:
+    found = [(robot, step) for robot, _, step in steps() if isinstance(step.drawn, SemiAxis)]
+    assert len(found) == len(CLASSICS)
+    yield from found
+
+
+def test_the_right_ellipsoid_is_that_of_the_tools_velocities() -> None:
+    """The lines pass through velocities that joint speeds of size 1 give, by NumPy alone."""
+    for robot, step in ellipsoids():
+        assert isinstance(step.question, Number)
+        assert isinstance(step.drawn, SemiAxis)
+        J, tool = (part(robot, robot.q_home) for part in (numpy_arm.jacobian, numpy_arm.pose))
+        nodes = {node.key: node for node in answer_nodes(robot, step, None, closed=True)}
+        assert nodes.keys() == {"right", "right-round", "right-words"}
+        for key in ("right-round", "right"):
+            tips = (nodes[key].props["points"].reshape(-1, 3) - tool[:3, 3]) / step.drawn.scale
+            rates = np.linalg.pinv(J[:3], rcond=1e-6) @ tips.T
+            assert np.allclose(J[:3] @ rates, tips.T, atol=1e-5), "velocities that the tool point can have"
+            size = np.linalg.norm(rates, axis=0)
+            assert np.allclose(size, 1.0 if key == "right-round" else [0.0, 1.0], atol=1e-4), robot.id
+        start, end = nodes["right"].props["points"][0]
+        assert np.linalg.norm(end - start) / step.drawn.scale == pytest.approx(step.question.answer, rel=1e-4)
+
+
+def test_a_typed_semi_axis_differs_in_colour_line_and_length() -> None:
+    for robot, step in ellipsoids():
+        assert isinstance(step.question, Number)
+        assert isinstance(step.drawn, SemiAxis)
+        right, wrong = step.question.answer, 1.4 * step.question.answer
+        assert answer_nodes(robot, step, None, closed=False) == []
+        before = {node.key for node in answer_nodes(robot, step, wrong, closed=False)}
+        assert before == {"wrong", "wrong-round", "wrong-words"}, "the right one is not given away"
+        assert {node.key for node in answer_nodes(robot, step, right, closed=True)} == {
+            "right",
+            "right-round",
+            "right-words",
+        }
+        both = {node.key: node for node in answer_nodes(robot, step, wrong, closed=True)}
+        assert len(both) == 6
+        points = {key: both[key].props["points"] for key in ("wrong", "right", "wrong-round", "right-round")}
+        gaps = {key: np.linalg.norm(at[1:, 0] - at[:-1, 1], axis=1) for key, at in points.items()}
+        assert gaps["wrong"].min() > 1e-6, "broken"
+        assert (gaps["wrong-round"] > 1e-6).all(), "broken"
+        assert (gaps["right-round"] < 1e-6).sum() >= len(gaps["right-round"]) - 2, "whole, but between ellipses"
+        for one, other in (("wrong", "right"), ("wrong-round", "right-round")):
+            assert both[one].props["colors"] != both[other].props["colors"]
+        lengths = {key: np.linalg.norm(points[key][-1, 1] - points[key][0, 0]) for key in ("wrong", "right")}
+        assert lengths["wrong"] == pytest.approx(1.4 * lengths["right"], rel=1e-4)
+        tips = [np.array(both[f"{key}-words"].position) - step.drawn.center for key in ("wrong", "right")]
+        assert tips[0] @ tips[1] < 0.0, "the two labels are on opposite sides"
 
 
 @pytest.fixture(scope="module")

@@ -36,7 +36,6 @@ MOVED = [lesson for lesson in LESSONS if lesson.key in KEYS]
 COMMON = {float(n) for n in range(-12, 13)}  # numbers of joints and steps
 # What is to be read from the page, or equals other numbers of it by chance.
 READ = {
-    ("velocity", "c2"): "the longest semi-axis among those of the ellipsoid",
     ("dh", "c1"): "right angles are in many columns of a table; test_dh_facts asks at other configurations",
 }
 SCALES = {"°": (1.0, math.radians(1.0)), "mm": (1.0, 1e-3, 0.1)}  # of a value in the question's unit

@@ -251,6 +251,14 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
         (rf"Which (?:torque|force) does joint {N} apply", lambda h, m: [1 + int(np.argmax(np.abs(effort(h))))]),
         (rf"A weight of {N} N|\(0, 0, {N}\)|{N} N times", lambda h, m: [10, -10, 10]),
         (rf"\(θ{N} = {N}°\)", lambda h, m: [None, *deg(h.end[int(m[0]) - 1])]),
+        (
+            rf"two semi-axes are {N} m/s and {N} m/s long, and the product of all three is {N} m³/s³",
+            lambda h, m: [*semi_axes(h)[1:], semi_axes(h).prod()],
+        ),
+        (
+            rf"one semi-axis is {N} m/s long, and the product of both is {N} m²/s²",
+            lambda h, m: [*semi_axes(h)[1:], semi_axes(h).prod()],
+        ),
         (rf"has rank {N}\.", lambda h, m: [task_rank(h, h.q + 0.1)]),
     ),
     "trajectories": (
@@ -276,6 +284,12 @@ def sliding(h: Here) -> float:
     """By how much the chain that is drawn at the end slides (m)."""
     assert h.step.end is not None
     return float(h.step.end.drawing["chain"][0][2])  # type: ignore[index]
+
+
+def semi_axes(h: Here) -> np.ndarray:
+    """The semi-axes of the tool point's velocities that are not zero: roots of the eigenvalues of J Jᵀ."""
+    values = np.linalg.eigvalsh(h.J[:3] @ h.J[:3].T)[::-1]
+    return np.asarray(np.sqrt(values[values > 1e-12]))
 
 
 def smallest_task_value(h: Here) -> float:
@@ -364,7 +378,7 @@ FORMULAS: dict[str, tuple[str, ...]] = {
         r"axes \d, \d and \d|z\d × z\d",
     ),
     "redundancy": (r"by \d+° or more", r"times any factor|speed is [\d.]+", r"joints are \(.*\)"),
-    "velocity": (r"1 (?:rad|m)/s", r"is [01] rad/s per", r"Press 1 "),
+    "velocity": (r"1 (?:rad|m)/s", r"is [01] rad/s per", r"Press 1 ", r"4/3 π"),
     "trajectories": (
         r"\d s[²³]|1\.5 for|1\.875 for|½",
         r"after [\d.]+ s|takes [\d.]+ s(?: more)?|LIN [\d.]+ s",
@@ -510,6 +524,7 @@ ANSWERS: dict[tuple[str, str], Callable[[Here], float]] = {
     ("velocity", "A column"): lambda h: float(np.linalg.norm(h.J[:3, 0])),
     ("velocity", "Turning"): lambda h: float(np.linalg.norm(h.J[3:, -1])),
     ("velocity", "Torques from a force"): lambda h: float(effort(h)[np.argmax(np.abs(effort(h)))]),
+    ("velocity", "The ellipsoid"): lambda h: float(semi_axes(h)[0]),
     ("velocity", "A singular configuration"): lambda h: task_rank(h, h.end),
     ("postures", "By hand: the ring"): lambda h: float(
         np.linalg.norm(elbow_end(h, np.concatenate([h.q[:1], [math.pi], h.q[2:]])))
