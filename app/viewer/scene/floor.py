@@ -85,6 +85,7 @@ class Floor:
             position=end,
             scale=0.9,
             anchor="center-left",
+            depth_test=True,
         )
         self.nodes.append(self._bar)
 

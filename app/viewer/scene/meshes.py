@@ -152,7 +152,7 @@ def _drum(r: float, crowd: int, color: Color) -> list[Part]:
     return [
         Part("housing", cylinder(radius, -half, half), color),
         Part("trim", merged([caps, mark]), TRIM_COLOR),
-        Part("axis", _axis(r, -half - 1.5 * r, half + 2.1 * r), color),
+        Part("axis", rod(r, -half - 1.5 * r, half + 2.1 * r), color),
     ]
 
 
@@ -166,7 +166,7 @@ def _collar(r: float, along: int, middle: float, color: Color) -> list[Part]:
     return [
         Part("housing", cylinder(radius, middle - half, middle + half), color),
         Part("trim", merged([*rims, mark]), TRIM_COLOR),
-        Part("axis", _axis(r, min(behind, 0.0), max(behind, 0.0), arrow=along < 0), color),
+        Part("axis", rod(r, min(behind, 0.0), max(behind, 0.0), arrow=along < 0), color),
     ]
 
 
@@ -179,11 +179,11 @@ def _slide(link: Link, r: float, color: Color, grip: float) -> list[Part]:
     return [
         Part("link-bar", box((-bar, -bar, back), (bar, bar, front)), LINK_COLOR),
         Part("housing", box((-1.3 * r, -1.3 * r, -r), (1.3 * r, 1.3 * r, r)), color, fixed_to_parent=True),
-        Part("axis", _axis(r, front, front + 2.4 * r), color),
+        Part("axis", rod(r, front, front + 2.4 * r), color),
     ]
 
 
-def _axis(r: float, low: float, high: float, arrow: bool = True) -> Solid:
+def rod(r: float, low: float, high: float, arrow: bool = True) -> Solid:
     """A thin rod along z; its arrow head shows the positive direction."""
     rod = cylinder(0.13 * r, low, high)
     return merged([rod, cone(0.38 * r, high - 0.2 * r, high + 0.8 * r)]) if arrow else rod

@@ -7,11 +7,12 @@ from typing import Final
 
 from app.viewer.declared.fields import Settings, choice, flag, part
 from app.viewer.panel.rotations import ANGLES, QUATERNIONS, Rotations
-from app.viewer.scene.arm.looks import Look
+from app.viewer.scene.arm.looks import AxesShown, Look
 from kin import Task
 from kin.units import DEFAULT_UNITS, LENGTHS, Length, Units
 
 SCHEMES: Final[dict[str, bool | None]] = {"Like the system": None, "Light": False, "Dark": True}
+JOINT_AXES: Final[dict[str, AxesShown]] = {"On skeletons": True, "On every arm": "every", "Never": False}
 LOOKS: Final[dict[str, Look]] = {"Body": "body", "Skeleton": "skeleton", "Both": "both"}
 AXES: Final = {"Tool axes": False, "Base axes": True}
 TASKS: Final[dict[str, Task]] = {"Full pose": "pose", "Point + approach": "approach", "Point only": "position"}
@@ -55,8 +56,11 @@ class ViewState(Settings):
 
     frames: bool = flag("Link frames", hint="The frame of every DH row: x red, y green, z blue")
     labels: bool = flag("Frame labels", True, hint="The name of each frame, at the tip of its z axis")
-    axes: bool = flag(
-        "Joint axes", True, hint="The axis of each joint of a skeleton; its arrow shows the positive turn"
+    axes: AxesShown = choice(
+        "Joint axes",
+        JOINT_AXES,
+        True,
+        hint="The axis of each joint, through the body of an arm that has one; its arrow shows the positive turn",
     )
     dark: bool | None = choice(
         "Page colours",

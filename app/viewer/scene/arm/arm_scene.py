@@ -14,7 +14,8 @@ import viser
 
 from app.viewer.scene.arm.contact import ContactMark
 from app.viewer.scene.arm.frames import ArmFrames
-from app.viewer.scene.arm.looks import Look
+from app.viewer.scene.arm.joint_axes import axes
+from app.viewer.scene.arm.looks import AxesShown, Look
 from app.viewer.scene.bodies.drawing import Drawing, drawing
 from app.viewer.scene.bodies.nodes import GHOST, DrawnBody, LinkColors
 from app.viewer.scene.bodies.parts import Part
@@ -29,7 +30,7 @@ from kin import Robot, fk
 from kin.transforms import Array, pose_from_position_wxyz, wxyz_from_rotation
 
 # Parts without shadows: these would cost as much as the shadows of the bodies, and are not visible.
-NO_SHADOW = ("trim", "axis", "approach")
+NO_SHADOW = ("trim", "axis", "joint-axis", "approach")
 STILL, NO_TURN = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 SAME = 1e-9  # rad or m: smaller changes are below the precision of a browser's numbers
 GIZMO = 0.26  # length of the gizmo's arrows, in radii of the sphere around the arm
@@ -74,6 +75,7 @@ class ArmScene:
         self.colors = LinkColors()
         self._nodes: list[str] = []  # names of the nodes of the links, base first
         self._axes: list[viser.MeshHandle] = []
+        self._body_axes: list[viser.MeshHandle] = []  # through the drawn body; made when they are first shown
         self._through = False
         self._shown = [math.nan] * robot.n
         self._top: list[viser.SceneNodeHandle] = []
@@ -219,6 +221,9 @@ class ArmScene:
     def use_drawing(self, drawn: Drawing | None) -> None:
         """Draw the body that looks like the real arm in this way; None: there is none."""
         self._drawn.use(drawn, self.colors)
+        for node in self._body_axes:
+            node.remove()
+        self._body_axes = []
         self._skeleton_clear = clearance_of(self.robot, None)
         self._clear = clearance_of(self.robot, drawn)
         turned = self._ghost.wxyz
@@ -254,10 +259,18 @@ class ArmScene:
         """Show or hide the frames' names."""
         self._frames.show_labels(visible)
 
-    def show_axes(self, visible: bool) -> None:
-        """Show or hide the joint axes; a body hides most of them, so only a skeleton shows any."""
+    def show_axes(self, shown: AxesShown) -> None:
+        """Show or hide the joint axes: those of the skeleton, or of a body longer ones that stand out of it."""
+        skeleton = self._bare or self._look == "both"
         for node in self._axes:
-            node.visible = visible and (self._bare or self._look == "both")
+            node.visible = bool(shown) and skeleton
+        through = shown == "every" and not skeleton
+        drawn = self._drawn.drawing
+        if through and drawn is not None and not self._body_axes:
+            for link, part in zip(self._nodes[1:], axes(self.robot, self.body, drawn), strict=True):
+                self._body_axes.append(self._add(link, part, name=f"{part.name}-{self._drawn.count}"))
+        for node in self._body_axes:
+            node.visible = through
 
     def remove(self) -> None:
         """Remove everything from the scene."""

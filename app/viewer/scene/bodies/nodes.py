@@ -58,8 +58,10 @@ class DrawnBody:
         color: of the ghost.
 
     Attributes:
+        drawing: how it is drawn; None if there is none.
         nodes: the meshes of the body; empty if there is none.
         hand: the meshes of the ghost.
+        count: of bodies so far: browsers keep the poses of removed nodes, so names are used once.
     """
 
     def __init__(
@@ -75,7 +77,8 @@ class DrawnBody:
         self._target = target
         self._T_tool_last = inverse(T_last_tool)
         self._color = color
-        self._count = 0  # of bodies so far: browsers keep the poses of removed nodes, so names are used once
+        self.count = 0
+        self.drawing: Drawing | None = None
         self.nodes: list[viser.MeshHandle] = []
         self.hand: list[viser.MeshHandle] = []
 
@@ -84,15 +87,15 @@ class DrawnBody:
         colors.forget(self.nodes)
         for node in (*self.nodes, *self.hand):
             node.remove()
-        self._count += 1
-        self.nodes, self.hand = [], []
+        self.count += 1
+        self.drawing, self.nodes, self.hand = drawing, [], []
         if drawing is None:
             return
         for k, (parent, parts) in enumerate(zip(self._links, drawing.parts, strict=True)):
             for part in parts:
-                self.nodes.append(self._add(parent, part, name=f"{part.name}-{k}-{self._count}"))
+                self.nodes.append(self._add(parent, part, name=f"{part.name}-{k}-{self.count}"))
                 colors.add(k, self.nodes[-1], part.color)
         if drawing.parts[-1]:
             hand = merged([placed(part.mesh, self._T_tool_last) for part in drawing.parts[-1]])
-            ghost = Part(f"hand-{self._count}", hand, self._color)
+            ghost = Part(f"hand-{self.count}", hand, self._color)
             self.hand = [self._add(self._target, ghost, opacity=GHOST, visible=False)]

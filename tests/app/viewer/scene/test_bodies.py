@@ -13,9 +13,13 @@ from scipy.spatial import cKDTree
 
 import kin
 from app.viewer.scene.arm.arm_scene import ArmScene
+from app.viewer.scene.arm.joint_axes import axes
 from app.viewer.scene.bodies.drawing import FOLDER, drawing
+from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.chain import link_poses
+from app.viewer.scene.meshes import body
 from app.viewer.session.choices import LOOKS
+from kin.transforms import rotation_vector
 
 FILES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 Array = np.ndarray
@@ -101,6 +105,58 @@ def test_an_arm_is_drawn_in_three_ways(server: viser.ViserServer) -> None:
     arm.see_through(True)
     arm.show_as("skeleton")
     assert seen("body-") == {False}
+    arm.remove()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_joint_axes_stand_out_of_a_body_along_what_its_joints_move_about(name: str) -> None:
+    robot, rng = kin.get_robot(name), np.random.default_rng(3)
+    drawn = drawing(robot)
+    assert drawn is not None
+    rods = axes(robot, body(robot), drawn)
+    assert [rod.color for rod in rods] == [joint_color(k) for k in range(robot.n)]
+    q = robot.random_q(rng)
+    here = link_poses(robot, q[None])[0]
+    for k, rod in enumerate(rods, 1):
+        ends = np.array([[0.0, 0.0, height, 1.0] for height in rod.mesh.bounds[:, 2]])
+        at = ends @ here[k][:3].T
+        moved = q.copy()
+        moved[k - 1] += 0.3
+        way = ends @ link_poses(robot, moved[None])[0][k][:3].T - at
+        along = (at[1] - at[0]) / np.linalg.norm(at[1] - at[0])
+        assert np.allclose(way, 0.0 if robot.revolute[k - 1] else 0.3 * along, atol=1e-9)
+        T, T_moved = kin.fk(robot, q), kin.fk(robot, moved)
+        if robot.revolute[k - 1]:
+            turn = rotation_vector(T_moved[:3, :3] @ T[:3, :3].T)
+            assert np.allclose(turn, 0.3 * along, atol=1e-9), "the arrow shows the positive turn"
+        for link in (k - 1, k):
+            spheres = drawn.spheres[link]
+            centres = spheres[:, :3] @ here[link][:3, :3].T + here[link][:3, 3]
+            far = np.linalg.norm(at[:, None] - centres, axis=2)
+            assert (far > spheres[:, 3]).all(), f"an end of axis {k} is inside link {link}"
+
+
+def test_joint_axes_are_drawn_on_a_body_where_every_arm_has_them(server: viser.ViserServer) -> None:
+    robot = kin.get_robot("ur5")
+    arm = ArmScene(server.scene, robot, root="/axes")
+
+    def seen() -> dict[str, int]:
+        shown = [key.split("/")[-1] for key, node in nodes_of(server.scene).items() if node.visible]
+        return {start: sum(name.startswith(start) for name in shown) for start in ("axis", "joint-axis")}
+
+    arm.show_axes(True)
+    assert seen() == {"axis": 0, "joint-axis": 0}
+    arm.show_axes("every")
+    assert seen() == {"axis": 0, "joint-axis": 6}
+    arm.show_as("skeleton")
+    arm.show_axes("every")
+    assert seen() == {"axis": 6, "joint-axis": 0}
+    arm.show_as("body")
+    arm.use_drawing(drawing(robot))
+    arm.show_axes("every")
+    assert seen() == {"axis": 0, "joint-axis": 6}, "a new body has its own"
+    arm.show_axes(False)
+    assert seen() == {"axis": 0, "joint-axis": 0}
     arm.remove()
 
 

@@ -458,6 +458,22 @@ def test_fit_shows_arm_program_and_obstacles_but_nothing_far_away(port: int) -> 
         assert np.linalg.norm(shown(tab)[0] - shown(tab)[1]) < closer
 
 
+def test_fit_shows_the_workspace_cloud(port: int) -> None:
+    cloud = {"drawn": True, "n": 20_000, "strategy": "uniform", "axis": "y", "at": 0.0}
+    state = PageState(PIONEER.id, camera=ASIDE, features={"workspace": cloud})
+    points = kin.fk(PIONEER, PIONEER.random_q(np.random.default_rng(4), 500))[:, :3, 3]
+    near = ASIDE[1] + 0.4 * (ASIDE - ASIDE[1])
+    near[2] = ASIDE[2]
+    with FakeBrowser(port, memory=memory(state)) as tab:
+        tab.wait(lambda: any("/workspace-" in name for name in tab.nodes))
+        tab.settle(quiet=0.6)
+        orbit(tab, near)
+        assert not viewpoints.contains(near, DESKTOP, points, 0.0), "seen from here, parts are outside"
+        tab.say("fit-arm")
+        tab.settle(quiet=0.6)
+        assert viewpoints.contains(shown(tab), DESKTOP, points, 0.0)
+
+
 def test_the_camera_returns_from_below_the_floor_and_from_far_aside(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
