@@ -74,6 +74,9 @@ trap 'rm -f "$log"' EXIT
 pytest --reruns 2 -r R -n 2 --dist loadfile --no-loadscope-reorder -m "not slow and browser" $(files_of browser) >"$log" 2>&1 &
 browsing=$!
 failed=0
+# The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Five that
+# begin together would each do so. What cannot be collected is said by the run.
+pytest --collect-only -qq >/dev/null 2>&1 || :
 pytest $twice -n 5 --dist loadfile --no-loadscope-reorder -m "not slow and not browser and not bench" || failed=1
 wait $browsing || failed=1
 cat "$log"

@@ -6,7 +6,9 @@ because of a change, not by chance.
 
 from __future__ import annotations
 
+import gc
 import os
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -46,6 +48,19 @@ LONG = frozenset(
 assert not (moved := [str(file) for file in LONG if not file.exists()]), moved
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Collect without looking for garbage, which takes a third of the time and finds next to none.
+
+    What has been collected stays: later looks leave it out.
+    """
+    gc.disable()
+    found = yield
+    gc.freeze()
+    gc.enable()
+    return found
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: item.path not in LONG)
 
@@ -55,6 +70,16 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     for report in terminalreporter.stats.get("rerun", ()):
         terminalreporter.section(f"run again: {report.nodeid} ({report.when})")
         terminalreporter.line(report.longreprtext)
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Send at once what ``pytest --reruns`` sends before each test from its process to the one that counts.
+
+    Otherwise each of its messages waits until the one before is acknowledged, for 40 ms. Most tests are shorter.
+    """
+    counts = getattr(session.config, "failures_db", None)
+    if (line := getattr(counts, "sock", None)) is not None:
+        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

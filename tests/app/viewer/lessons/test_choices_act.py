@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -71,7 +72,7 @@ CHOICES: dict[tuple[str, str, str], str] = {
 Found = tuple[Robot, tuple[str, str, str], Step, Choice, Leads | None]
 
 
-def choices() -> Iterator[Found]:
+def _choices() -> Iterator[Found]:
     for robot in CLASSICS:
         for lesson in LESSONS:
             for step in lesson.outline(robot, Units()).steps:
@@ -83,7 +84,10 @@ def choices() -> Iterator[Found]:
                     yield robot, (lesson.key, title, "question"), step, step.question, drawn
 
 
-ALL = list(choices())
+@cache
+def choices() -> tuple[Found, ...]:
+    """All of them, found when a test asks first: every process of a run collects this file."""
+    return tuple(_choices())
 
 
 def shown(robot: Robot, name: tuple[str, str, str], step: Step, given: int | None, closed: bool) -> dict[str, Any]:
@@ -97,7 +101,7 @@ def shown(robot: Robot, name: tuple[str, str, str], step: Step, given: int | Non
 
 def test_the_list_of_choices_is_complete() -> None:
     found: dict[tuple[str, str, str], set[str]] = {}
-    for _, name, _, question, leads in ALL:
+    for _, name, _, question, leads in choices():
         kinds = found.setdefault(name, set())
         if leads is not None:
             assert len(leads.options) == len(question.options), name
@@ -109,7 +113,7 @@ def test_the_list_of_choices_is_complete() -> None:
 
 
 def test_the_right_option_is_not_drawn_before_it_is_judged() -> None:
-    for robot, name, step, question, leads in ALL:
+    for robot, name, step, question, leads in choices():
         if leads is None:
             continue
         assert shown(robot, name, step, None, closed=False) == {}
@@ -121,7 +125,7 @@ def test_the_right_option_is_not_drawn_before_it_is_judged() -> None:
 
 
 def test_true_and_wrong_differ_in_colour_and_line() -> None:
-    for robot, name, step, question, leads in ALL:
+    for robot, name, step, question, leads in choices():
         if leads is None:
             continue
         right = question.right()
@@ -150,7 +154,7 @@ def test_true_and_wrong_differ_in_colour_and_line() -> None:
 
 def lead_of(robot_id: str, title: str, kind: str = "question") -> tuple[Robot, Step, Any]:
     robot, _, step, question, leads = next(
-        each for each in ALL if each[0].id == robot_id and each[1][1:] == (title, kind)
+        each for each in choices() if each[0].id == robot_id and each[1][1:] == (title, kind)
     )
     assert leads is not None
     return robot, step, leads.options[question.right()]
@@ -173,7 +177,7 @@ def test_the_right_ones_are_true_of_the_arm() -> None:
             assert np.allclose(np.cross(np.subtract(lead.end, lead.start), way), 0.0, atol=1e-9)
             assert np.dot(np.subtract(lead.end, lead.start), way) > 0.0
         _, _, lead = lead_of(name, "The error", "estimate")
-        step = next(s for r, n, s, *_ in ALL if r.id == name and n[1] == "The error")
+        step = next(s for r, n, s, *_ in choices() if r.id == name and n[1] == "The error")
         assert step.pose is not None
         start = numpy_arm.pose(robot, np.array(step.pose.q))[:3, 3]
         target = np.array(step.pose.drawing["target"]).reshape(4, 4)[:3, 3]  # type: ignore[arg-type]
@@ -182,7 +186,7 @@ def test_the_right_ones_are_true_of_the_arm() -> None:
 
 def test_the_way_of_a_ptp_ends_where_the_line_does_and_leaves_it() -> None:
     robot, _, lead = lead_of("ur5", "Joints or tool")
-    step = next(s for r, n, s, *_ in ALL if r is robot and n[1] == "Joints or tool")
+    step = next(s for r, n, s, *_ in choices() if r is robot and n[1] == "Joints or tool")
     ends = [numpy_arm.pose(robot, np.array(pose.q))[:3, 3] for pose in (step.pose, step.end)]  # type: ignore[union-attr]
     points = np.array(lead.points)
     assert np.allclose(points[[0, -1]], ends, atol=1e-6)
@@ -192,7 +196,7 @@ def test_the_way_of_a_ptp_ends_where_the_line_does_and_leaves_it() -> None:
 
 def test_the_chosen_posture_is_that_of_the_copy_and_holds_the_tool() -> None:
     count = 0
-    for robot, name, _, question, leads in ALL:
+    for robot, name, _, question, leads in choices():
         if name[1] != "The posture of the arm":
             continue
         for option, lead in zip(question.options, leads.options if leads else (), strict=True):
@@ -206,7 +210,7 @@ def test_the_chosen_posture_is_that_of_the_copy_and_holds_the_tool() -> None:
 
 
 def test_a_joint_that_is_said_to_move_is_drawn_along_its_axis() -> None:
-    for robot, name, _, question, leads in ALL:
+    for robot, name, _, question, leads in choices():
         if name[1] != "Who moves" or leads is None:
             continue
         J = numpy_arm.jacobian(robot, robot.q_home)
@@ -218,7 +222,7 @@ def test_a_joint_that_is_said_to_move_is_drawn_along_its_axis() -> None:
 
 
 def test_the_lines_of_an_option_lie_as_it_says() -> None:
-    for robot, name, _, question, leads in ALL:
+    for robot, name, _, question, leads in choices():
         if name[1] != "Joint axes" or leads is None or robot.n < 2:
             continue
         lines = {o.text: lead for o, lead in zip(question.options, leads.options, strict=True)}
