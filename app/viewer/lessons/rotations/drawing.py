@@ -57,18 +57,20 @@ def _frame(key: str, T: Array, length: float, thick: float) -> Node:
 def _rotation(
     facts: RotationsFacts, figure: FigureNodes, length: float, click: tuple[Hashable, ...]
 ) -> list[Node]:
-    """The turned frame, the axes of the three turns, and the axis of the whole rotation."""
+    """The turned frame, and as the settings say the axes of the three turns and of the whole rotation."""
     T = np.eye(4)
     T[:3, :3] = R = facts.R
     turned = _frame("turned", T, length, THICK)
     turned.click = click
     nodes = [turned, label("turned-name", "{1}", 1.12 * length * R[:, 2])]
-    for k, way in enumerate(facts.convention.axes_now(facts.settings.angles)):
+    shown = facts.settings.axes
+    turns = facts.convention.axes_now(facts.settings.angles) if shown in ("all", "turns") else ()
+    for k, way in enumerate(turns):
         # About fixed axes, later turns carry the axis of an earlier one along.
         text = f"{ORDER[k]} {facts.convention.axes[k]}{', carried' if facts.convention.fixed and k < 2 else ''}"
         nodes += figure.axis(f"turn-{k}", np.zeros(3), way, (1.15 + 0.1 * k) * length, text, COLORS[k])
     axis, angle = axis_angle(R)
-    if angle > 1e-6:
+    if angle > 1e-6 and shown in ("all", "whole"):
         nodes += figure.axis("axis", np.zeros(3), axis, 1.5 * length, "axis", PURPLE)
     return nodes
 

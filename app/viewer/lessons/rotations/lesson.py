@@ -82,6 +82,7 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
                     *(self._angle(k) for k in range(3)),
                     Buttons("Turn", turned, TURN_HINT),
                     Html(views.turning_html, (f.convention, at)),
+                    Control("axes"),
                     Html(views.lock_html, (f.convention, s.angles, units)),
                     Html(views.rotation_html, (f.convention, s.angles, units)),
                     Control("typed"),

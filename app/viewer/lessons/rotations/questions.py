@@ -26,7 +26,7 @@ _SAMPLES, LEVEL = 64, 0.1  # configurations; the vertical part of a direction th
 ZYZ = Convention("zyz", False)
 TWO_TURNS = Motion(True, 2, math.pi / 2, True), Motion(True, 0, math.pi / 2, True)
 # The 1st and the 3rd axis coincide.
-LOCKED = {"chained": False, "convention": PAGE.key, "angles": [0.4, math.pi / 2, 0.0]}
+LOCKED = {"chained": False, "convention": PAGE.key, "angles": [0.4, math.pi / 2, 0.0], "axes": "turns"}
 
 
 @lru_cache(maxsize=128)
@@ -101,9 +101,11 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
 def _poses(robot: Robot, start: Configuration, R: Array) -> dict[str, Pose]:
     """What the steps show beside the arm at a configuration ``(n,)``."""
     poses = {
-        "tool": Pose(start, drawing=turned(R, PAGE)),
-        "z-y-z": Pose(start, drawing=turned(R, ZYZ)),
-        "z-y-x": Pose(start, drawing=turned(R, PAGE.twin)),
+        "tool": Pose(start, drawing=turned(R, PAGE, "none")),
+        "tool, its turns": Pose(start, drawing=turned(R, PAGE, "turns")),
+        "tool, its axis": Pose(start, drawing=turned(R, PAGE, "whole")),
+        "z-y-z": Pose(start, drawing=turned(R, ZYZ, "turns")),
+        "z-y-x": Pose(start, drawing=turned(R, PAGE.twin, "turns")),
         "locked": Pose(start, drawing=LOCKED),
         "no turns": Pose(start, drawing={"chained": True, "chain": []}),
         "two turns": Pose(start, drawing={"chained": True, "chain": as_json(TWO_TURNS)}),
@@ -157,9 +159,9 @@ def placed(robot: Robot) -> tuple[Motion, ...]:
     return slide, Motion(True, 0, math.pi / 2, True), slide
 
 
-def turned(R: Array, convention: Convention) -> dict[str, object]:
-    """The drawing of a rotation ``(3, 3)`` beside the arm, with its angles in a convention."""
-    return {"chained": False, "convention": convention.key, "angles": list(convention.angles(R))}
+def turned(R: Array, convention: Convention, axes: str) -> dict[str, object]:
+    """The drawing of a rotation ``(3, 3)`` beside the arm, with its angles in a convention and these axes."""
+    return {"chained": False, "convention": convention.key, "angles": list(convention.angles(R)), "axes": axes}
 
 
 def _vector(values: Array) -> str:

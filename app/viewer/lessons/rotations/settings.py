@@ -18,6 +18,8 @@ MOTIONS = {
 }
 MOST_TURN = 2.0 * math.pi
 SHOWN_HINT = "What is drawn beside the arm"
+AXES = {"All": "all", "Of the three turns": "turns", "Of the whole rotation": "whole", "None": "none"}
+AXES_HINT = "Which axes are drawn through the turned frame"
 CONVENTION_HINT = "Three axes in the order of the turns, about fixed or about moving axes"
 ANGLE_HINT = "Drag, or type a value"
 TYPED_HINT = "3 angles in the order of the turns, a quaternion w x y z, or the 9 numbers of a matrix, row by row"
@@ -46,6 +48,7 @@ class RotationsSettings(Settings):
 
     convention: str = choice("Angles", {c.title: c.key for c in CONVENTIONS}, PAGE.key, hint=CONVENTION_HINT)
     angles: Angles = vector(("α", "β", "γ"), FIRST, ANGLE)
+    axes: str = choice("Axes drawn", AXES, "all", hint=AXES_HINT)
     chained: bool = choice("Show", {"One rotation": False, "Chain of frames": True}, False, hint=SHOWN_HINT)
     chain: tuple[Motion, ...] = kept((), to_json=as_json, from_json=_chain)
     motion: str = choice("Motion", {name: name for name in MOTIONS}, "Turn about z", hint=MOTION_HINT)

@@ -18,6 +18,7 @@ from app.viewer.lessons.rotations.settings import RotationsSettings
 from app.viewer.lessons.rotations.turning import REST, TIME, Turning
 from app.viewer.lessons.rotations.views import turning_html
 from kin.transforms import pose_from_position_wxyz
+from kin.units import Units
 
 ROBOT = STORE.get("ur5")
 
@@ -154,3 +155,43 @@ def test_a_question_about_the_forms_shows_no_turn() -> None:
 def test_the_turn_that_is_shown_is_named() -> None:
     assert "turn 2: β about y′." in turning_html(facts(convention="zyz-moving").convention, 1)
     assert turning_html(facts().convention, None) == turning_html(facts().convention, 3) == ""
+
+
+# The axes that a step speaks of. The frames of the other steps are a chain.
+AXES = {
+    "Columns": "none",
+    "The inverse": "none",
+    "Fixed and moving axes": "turns",
+    "Roll pitch yaw": "turns",
+    "The same in Z-Y-Z": "turns",
+    "Axis and angle": "whole",
+    "Quaternion": "whole",
+    "Gimbal lock": "turns",
+    "T⁻¹": "none",
+}
+NAMES = {"none": [], "turns": ["1st", "2nd", "3rd"], "whole": ["axis"], "all": ["1st", "2nd", "3rd", "axis"]}
+
+
+def named_axes(lesson: RotationsLesson) -> list[str]:
+    """The first words of the labels beside the arm, but for the names of the frames."""
+    (lazy,) = lesson.scene()
+    (beside,) = lazy.view(*lazy.args)
+    labels = [node.props["text"] for node in beside.children if node.kind == "label"]
+    return sorted(text.split()[0] for text in labels if not text.startswith("{"))
+
+
+def test_a_step_draws_the_axes_that_it_speaks_of() -> None:
+    with bare_page(ROBOT) as page:
+        lesson = page.open(RotationsLesson)
+        assert named_axes(lesson) == NAMES["all"]
+        seen = dict[str, str]()
+        for step in RotationsLesson.outline(ROBOT, Units()).steps:
+            assert step.pose is not None
+            for pose in (step.pose, step.end or step.pose):
+                lesson.restore({**lesson.state(), **pose.drawing})
+                if lesson.settings.chained:
+                    assert named_axes(lesson) == [], step.title
+                else:
+                    seen[step.title] = lesson.settings.axes
+                    assert named_axes(lesson) == NAMES[lesson.settings.axes], step.title
+        assert seen == AXES
