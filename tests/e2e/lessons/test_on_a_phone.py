@@ -11,6 +11,8 @@ from playwright.sync_api import expect
 import kin
 from app.viewer.lessons.equations.lesson import EquationsLesson
 from app.viewer.lessons.guide.outline import Choice, Number, Question
+from app.viewer.lessons.inverse.lesson import InverseLesson
+from app.viewer.lessons.postures.lesson import Postures
 from kin.units import Units
 
 pytestmark = pytest.mark.browser
@@ -67,3 +69,46 @@ def test_the_reason_of_a_wrong_answer_is_in_the_window(small: Tab) -> None:
         expect(said).not_to_be_empty()
         expect(said).to_be_in_viewport(ratio=1)
     small.choose("Lesson", "None")
+
+
+def test_the_way_on_from_a_branch_that_ends_is_in_the_window(phone: Tab, no_spoilt_page: None) -> None:
+    """The other shoulder is right, and leads to an elbow that does not reach: the way on is on the screen."""
+    page = phone.page
+    phone.show(PIONEER)
+    phone.choose_lesson(InverseLesson.title)
+    steps, turn = page.locator("[data-guide=steps]"), page.locator(".kb-guide-turn button")
+    expect(steps).to_be_visible()
+    page.locator('.kb-guide-row [data-argument="1"]').tap()
+    expect(steps).to_have_attribute("data-step", "2")
+    page.locator('[data-question="2"] input').fill("-90")
+    page.locator('[data-question="2"] [data-guide-do=fields]').tap()
+    expect(page.locator('[data-feedback="2"]')).to_contain_text("Right")
+    turn.last.tap()
+    expect(steps).to_contain_text("No solution")
+    on = page.locator("[data-guide-do=offer]")
+    expect(on).to_be_in_viewport(ratio=1)
+    on.tap()
+    expect(steps.locator('[data-question="3"]')).to_be_visible()
+    expect(steps).not_to_contain_text("No solution")
+    page.locator('.kb-guide-row [data-argument="0"]').tap()
+    phone.choose("Lesson", "None")
+
+
+def test_what_comes_under_the_finger_does_not_look_pressed(phone: Tab, no_spoilt_page: None) -> None:
+    page = phone.page
+    phone.show(PIONEER)
+    phone.choose_lesson(Postures.title)
+    steps = page.locator("[data-guide=steps]")
+    expect(steps).to_be_visible()
+    page.locator('.kb-guide-row [data-argument="1"]').tap()
+    expect(steps).to_have_attribute("data-step", "2")
+    option = page.locator('[data-question="2"] .kb-option').nth(0)
+    plain = option.evaluate("one => getComputedStyle(one).backgroundColor")
+    box = option.bounding_box()
+    assert box is not None
+    page.touchscreen.tap(box["x"] + 10, box["y"] + 10)
+    expect(page.locator('[data-feedback="2"]')).not_to_be_empty()
+    assert option.evaluate("one => one.matches(':hover')"), "the browser takes the finger for a pointer that stays"
+    assert option.evaluate("one => getComputedStyle(one).backgroundColor") == plain
+    page.locator('.kb-guide-row [data-argument="0"]').tap()
+    phone.choose("Lesson", "None")

@@ -52,6 +52,7 @@ class Guide(Feature):
             "reveal",
             "pose",
             "arm",
+            "offer",
             "restart",
             "again",
             "watch",
@@ -128,6 +129,9 @@ class Guide(Feature):
                 if robot_id := self._offered:
                     self.stage.change_robot(self.stage.store.get(robot_id))
                     return
+            case ("offer", int()):
+                if self._shown is not None:
+                    self._shown.on_offer()
             case ("again", str(question), int()):
                 progress.again(question)
                 self._sheets.clear()
@@ -163,6 +167,7 @@ class Guide(Feature):
             "go": "Step",
             "pose": "Pose of the step",
             "arm": "Robot",
+            "offer": self._lesson.title,
             "reveal": "Answer shown",
             "restart": "Answers cleared",
         }

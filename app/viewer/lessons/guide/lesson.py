@@ -31,6 +31,9 @@ class Lesson(Feature, ABC):
         """The steps are about to be shown, after an answer for example; returns another outline to go on with."""
         return None
 
+    def on_offer(self) -> None:
+        """The button that the step on show offers was pressed."""
+
     @staticmethod
     @abstractmethod
     def outline(robot: Robot, units: Units) -> Outline:

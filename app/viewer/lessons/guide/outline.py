@@ -176,6 +176,7 @@ class Step:
         guessed: how its answer is drawn, as `drawn`.
         answered: a figure of the last answer, which also has the right one once it is on show.
         arm: the id of an arm of the library that shows what the arm on show cannot; "": it can.
+        offer: what a button below the words does, by `Lesson.on_offer`, as its label; "": there is none.
         withheld: facts that nothing in the page shows while the question is open:
             names of `app.viewer.activity.activity.FACTS`.
     """
@@ -194,6 +195,7 @@ class Step:
     guessed: Leads | None = None
     answered: Answered | None = None
     arm: str = ""
+    offer: str = ""
 
 
 @dataclass(frozen=True)

@@ -57,14 +57,6 @@ class InverseFacts(Facts[InverseSettings]):
         """What the questions are about."""
         return _exercise(self.robot, self.settings.q, self.settings.signs)
 
-    @property
-    def way_back(self) -> Branch | None:
-        """The branch to go on with, if the derivation has ended with the step on show, or before."""
-        ended = self.exercise.followed.derivation.failed
-        if ended is None or self.step < self.keys.index(ended.key):
-            return None
-        return self.exercise.way_back
-
     @cached_property
     def psi(self) -> float:
         """The arm angle of the derivation (rad); 0 for arms without one."""

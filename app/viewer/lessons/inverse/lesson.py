@@ -23,10 +23,10 @@ from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Number, Outline
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.guide.progress import Progress
-from app.viewer.lessons.inverse import views, words
+from app.viewer.lessons.inverse import views
 from app.viewer.lessons.inverse.derive import signs_of
 from app.viewer.lessons.inverse.drawing import figure, room
-from app.viewer.lessons.inverse.exercise import Branch, flipped
+from app.viewer.lessons.inverse.exercise import flipped
 from app.viewer.lessons.inverse.facts import InverseFacts
 from app.viewer.lessons.inverse.questions import outline, outline_of
 from app.viewer.lessons.inverse.settings import InverseSettings
@@ -91,10 +91,8 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         opened = dict(zip(f.keys, f.opened, strict=True))
         numbers = f.derived, f.followed, f.keys, f.opened, f.step, units
         inside = sum(branch.available for branch in f.branches)
-        back = f.way_back
         follow = {str(b.number): self.event(self.on_follow, i) for i, b in enumerate(f.branches)}
         return [
-            *([] if back is None else [self._button_back(back)]),
             Html(views.derivation_html, numbers, key="numbers"),
             Html(views.tree_html, (f.derived, f.tree, inside, opened, units), key="tree"),
             *([Control("psi", value=f.psi, of=f.robot.id)] if f.derived.family == "srs7" else []),
@@ -103,11 +101,6 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
             Button("Ask about this pose", self.event(self.on_ask), ASK_HINT, key="ask"),
             Control("all"),
         ]
-
-    def _button_back(self, branch: Branch) -> Button:
-        """The way on, directly below a step at which the derivation has ended."""
-        label, event = words.follow(branch.number), self.event(self.on_follow, branch.number - 1)
-        return Button(label, event, f"Goes on with {branch.name}", key="back")
 
     def scene(self) -> Sequence[Lazy]:
         f = self.read
@@ -157,6 +150,11 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
             progress.use(outline_of(self.look().exercise, self.stage.units))
 
     # Events
+
+    def on_offer(self) -> None:
+        """Go on with the branch that a step offers where the derivation has ended."""
+        if (back := self.look().exercise.way_back) is not None:
+            self.on_follow(back.number - 1)
 
     def on_follow(self, index: int) -> None:
         """Follow another branch."""

@@ -73,9 +73,10 @@ def _step(given: Exercise, key: StepKey, step: Step, units: Units) -> Step:
         return replace(step, text=text, question=asked, end=end, practice=practice, withheld=POSTURES)
     if found is None:
         where = "" if ended is None else f" It ends at the step “{words.title(given.arm, ended.key)}”."
-        return replace(step, text=f"The branch that you follow does not get here.{where}{_way_back(given)}")
+        text = f"The branch that you follow does not get here.{where}"
+        return replace(step, text=text, offer=_way_back(given))
     if found.failure is not None:
-        return replace(step, text=f"{text} {words.failure_text(found, units)}{_way_back(given)}")
+        return replace(step, text=f"{text} {words.failure_text(found, units)}", offer=_way_back(given))
     question, text = _question(given, found, units), f"{text} {words.special_text(given.arm, found)}".rstrip()
     step = replace(step, text=text, question=question, practice=_shown(given, found))
     if question is not None and key == "centre" and given.arm.robot.n == 2:  # the distance of the tool
@@ -87,8 +88,9 @@ def _step(given: Exercise, key: StepKey, step: Step, units: Units) -> Step:
 
 
 def _way_back(given: Exercise) -> str:
+    """The label of the button that goes on where a branch has ended."""
     back = given.way_back
-    return "" if back is None else f" To go on, press “{words.follow(back.number)}” below."
+    return "" if back is None else words.follow(back.number)
 
 
 def _drawn(given: Exercise, key: StepKey) -> Drawn:

@@ -81,7 +81,7 @@ def title(arm: Arm, key: StepKey) -> str:
 
 def follow(number: int) -> str:
     """The label of the button that leads back to a branch."""
-    return f"Follow branch {number}"
+    return f"Go on with branch {number}"
 
 
 def counts(arm: Arm, key: StepKey, units: Units) -> str:
