@@ -399,6 +399,14 @@ def mapped_files() -> list[str]:
     return found
 
 
+def test_the_readme_leads_to_every_page():
+    linked = set(re.findall(r"\]\(((?:docs/)?[\w./-]+\.md)", README))
+    families = {page for page in PAGES if page.startswith("docs/background/")}
+    listed = {f"docs/{name}" for name in re.findall(r"\]\(([\w./-]+\.md)", PAGES["docs/index.md"])}
+    assert set(PAGES) - families - {"README.md"} <= linked
+    assert "docs/connect.md" in listed
+
+
 def test_exercises_and_arms_are_counted_rightly():
     for file in ("README.md", "docs/new.md"):
         text = (ROOT / file).read_text(encoding="utf-8")

@@ -172,7 +172,7 @@ def checked_obstacles(obstacles: object) -> tuple[Obstacle, ...]:
             found.append(each if isinstance(each, Obstacle) else obstacle_from_dict(each))
         except InputError as error:
             where = f"obstacles[{i}]" if error.field == "obstacle" else f"obstacles[{i}].{error.field}"
-            raise InputError(where, error.value, error.expected) from None
+            raise error.renamed(where) from None
     return tuple(found)
 
 

@@ -204,7 +204,7 @@ class Reader:
         robot_id = self.text(data, "id")
         if not re.fullmatch(r"[a-z0-9][a-z0-9-]{0,39}", robot_id):
             raise self.refuse("id", robot_id, "lower-case letters, digits and hyphens, at most 40")
-        units = self.table(data, "units")
+        units = self.table(data, "units", 'length ("m", "cm" or "mm") and angle ("deg" or "rad")')
         self.only_known_fields("units.", units, {"length", "angle"})
         length = self.choice(units, "length", tuple(LENGTHS), "units.")
         self.length = LENGTHS[length]
@@ -309,7 +309,7 @@ class Reader:
     def home(self, data: dict[str, Any], joints: list[Joint]) -> tuple[float, ...]:
         if "home" not in data:
             return tuple(0.5 * sum(j.limits) if j.limits else 0.0 for j in joints)
-        table = self.table(data, "home")
+        table = self.table(data, "home", "q")
         self.only_known_fields("home.", table, {"q"})
         q = table.get("q")
         if not isinstance(q, list) or len(q) != len(joints):
@@ -392,7 +392,7 @@ class Reader:
     def transform(self, data: dict[str, Any], key: str) -> Matrix:
         if key not in data:
             return IDENTITY
-        table = self.table(data, key)
+        table = self.table(data, key, "xyz and rpy, or matrix")
         self.only_known_fields(key + ".", table, {"matrix"} if "matrix" in table else {"xyz", "rpy"})
         if "matrix" in table:
             return self.matrix(table["matrix"], key + ".matrix")
@@ -452,10 +452,10 @@ class Reader:
             raise self.refuse(where + key, value, "a text without halves of characters (surrogates)")
         return value.strip()
 
-    def table(self, data: dict[str, Any], key: str) -> dict[str, Any]:
+    def table(self, data: dict[str, Any], key: str, fields: str) -> dict[str, Any]:
         value = data.get(key)
         if not isinstance(value, dict):
-            raise self.refuse(key, value, f"a table [{key}]")
+            raise self.refuse(key, value, f"a table [{key}] with {fields}")
         return value
 
     def choice(

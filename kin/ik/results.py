@@ -6,13 +6,15 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from kin.ik.details import Details, LimitViolation, Redundancy
+from kin.ik.details import Details, LimitViolation, OutOfReach, Redundancy
 from kin.ik.messages import Explanation, explain, rounded_target
 from kin.solvers.contract import Completeness
 from kin.solvers.singular import Singularity
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS, Units
+
+_SURELY_MISTAKEN = 20.0  # metres out of reach: no arm is that large, so the target was probably millimetres
 
 Cause = Literal[
     "",
@@ -191,8 +193,10 @@ class IKResult(Deferred):
 
     @property
     def reason(self) -> str:
-        """The answer in a sentence, in degrees and millimetres."""
-        return self.explain().text
+        """The answer in a sentence, in degrees and millimetres; of a target too far to be in metres it says so."""
+        text = self.explain().text
+        far = isinstance(self.details, OutOfReach) and self.details.distance > _SURELY_MISTAKEN
+        return f"{text} Targets are in metres." if far else text
 
     def explain(self, units: Units = DEFAULT_UNITS) -> Explanation:
         """The answer in words, in any units.

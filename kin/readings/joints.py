@@ -38,13 +38,42 @@ def moving_motors(robot: Robot, motors: Sequence[Motor] | None = None) -> tuple[
     return moving
 
 
+def of_moving(motors: Sequence[Motor], readings: ArrayLike, field: str = "readings") -> Array:
+    """Readings ``(..., m)`` of the motors that move a joint, from theirs alone or from those of all motors.
+
+    What reads a bus has all of them: LeRobot gives six numbers of an SO-101, the last one of its gripper.
+
+    Raises:
+        InputError: naming `field`, for another number of readings, or what is not finite numbers.
+    """
+    try:
+        values = finite_array(field, readings, (None,))
+    except InputError as error:
+        if error.field != field:
+            raise
+        raise InputError(field, readings, f"finite numbers: {counted(motors)}") from None
+    moving = [k for k, motor in enumerate(motors) if motor.joint]
+    if values.shape[-1] not in (len(moving), len(motors)):
+        raise InputError(field, f"{values.shape[-1]} values", counted(motors))
+    return values if values.shape[-1] == len(moving) else np.ascontiguousarray(values[..., moving])
+
+
+def counted(motors: Sequence[Motor]) -> str:
+    """How many readings these motors have, for an error: of those that move a joint, or of all."""
+    moving = ", ".join(f"{motor.id} {motor.joint}" for motor in motors if motor.joint)
+    others = ", ".join(f"{motor.id} {motor.name}".strip() for motor in motors if not motor.joint)
+    count = sum(bool(motor.joint) for motor in motors)
+    words = f"1 value, of motor {moving}" if count == 1 else f"{count} values, of motors {moving}"
+    return f"{words}, or {len(motors)}, with {others} in its place" if others else words
+
+
 def q_from_readings(robot: Robot | str, readings: ArrayLike) -> Array:
     """The configurations in which the motors of an arm have these readings.
 
     Args:
         robot: the arm, or the id of a built-in one; each of its joints has a motor.
-        readings: ``(..., m)``, one of each motor that moves a joint, in the order of `Robot.motors` and in the
-            motor's own unit.
+        readings: ``(..., m)``, one of each motor that moves a joint, or of every motor, in the order of
+            `Robot.motors` and in the motor's own unit.
 
     Returns:
         ``(..., n)`` joint values, radians (metres): the whole turn inside the limits is chosen. A joint with two
@@ -63,7 +92,7 @@ def q_from_readings(robot: Robot | str, readings: ArrayLike) -> Array:
     """
     robot = robot_of(robot)
     motors = moving_motors(robot)
-    values = finite_array("readings", readings, (len(motors),))
+    values = of_moving(robot.motors, readings)
     names = [motor.joint for motor in motors]
     q = np.empty((*values.shape[:-1], robot.n))
     for j, joint in enumerate(robot.joints):

@@ -22,7 +22,7 @@ from kin.errors import InputError
 from kin.motor import Motor, MotorUnit
 from kin.named import robot_of
 from kin.readings.findings import MotorFinding, MotorMatch
-from kin.readings.joints import moving_motors
+from kin.readings.joints import moving_motors, of_moving
 from kin.readings.words import sentence
 from kin.robot import Robot
 from kin.transforms import Array, finite_array
@@ -48,8 +48,8 @@ def match_motors(
     Args:
         robot: the arm, or the id of a built-in one.
         q: ``(k, n)`` joint values of the poses, radians (metres). `motor_poses` proposes some.
-        readings: ``(k, m)`` in these poses, of each motor that moves a joint, in their order and units. Those that
-            begin again after a turn may have done so.
+        readings: ``(k, m)`` in these poses, of each motor that moves a joint, or of every motor, in their order
+            and units. Those that begin again after a turn may have done so.
         motors: whose signs and zeros are not known; by default those of the arm.
         tolerance: how far from a pose, in radians, the arm may have been put. Of a slide, its share of what the
             slide moves counts, 15 % for 10°.
@@ -71,7 +71,8 @@ def match_motors(
     if not isinstance(tolerance, int | float) or not 0.0 < tolerance < 0.25 * math.pi:
         raise InputError("tolerance", tolerance, "radians above 0 and below π/4")
     moving = moving_motors(robot, motors)
-    poses, values = finite_array("q", q, (None, robot.n)), finite_array("readings", readings, (None, len(moving)))
+    given = robot.motors if motors is None else tuple(motors)
+    poses, values = finite_array("q", q, (None, robot.n)), of_moving(given, readings)
     for name, array in (("q", poses), ("readings", values)):
         if array.ndim != 2 or len(array) < 2 or len(array) != len(poses):
             wanted = f"two poses or more, and readings in each of them: ({max(len(poses), 2)}, {array.shape[-1]})"
@@ -80,7 +81,6 @@ def match_motors(
     found = [look.finding(k) for k in range(len(moving))]
     findings = tuple(replace(each, text=sentence(each)) for each in found)
     solved = {each.motor.id: each.motor for each in findings}
-    given = robot.motors if motors is None else tuple(motors)
     return MotorMatch(findings, tuple(solved.get(motor.id, motor) for motor in given))
 
 

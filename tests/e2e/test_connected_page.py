@@ -47,7 +47,11 @@ def connected(tab: Tab, address: str) -> Iterator[Any]:
     tab.open("Program")
     tab.page.get_by_role("button", name="Connect a program").click()
     code = tab.page.locator("[data-live-code]").inner_text()
-    said = re.search(r'page = kin\.connect\("(\S+)", "(\S+)"\)', tab.page.locator(".kb-live").inner_text())
+    said = re.search(
+        r'^import kin\n+page = kin\.connect\("(\S+)",\s"(\S+)"\)$',
+        tab.page.locator(".kb-live").inner_text(),
+        re.MULTILINE,
+    )
     assert said is not None
     at, typed = said.groups()
     assert (at + "/", typed) == (address, code)

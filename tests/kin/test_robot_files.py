@@ -120,6 +120,7 @@ def test_missing_limits_and_home_get_defaults():
         ('length = "mm"', 'length = "inch"', "units.length", '"cm"'),
         ('angle = "deg"', "angle = 1", "units.angle", '"rad"'),
         ("units = {", "unit = {", "unit", "units"),
+        ('units = { length = "mm", angle = "deg" }', "", "units", 'length ("m", "cm" or "mm") and angle'),
         ("d = 100", 'd = "far"', "rows[0].d", "number"),
         ("d = 100", "d = nan", "rows[0].d", "finite"),
         ("d = 100", "d = inf", "rows[0].d", "finite"),

@@ -278,7 +278,7 @@ def test_a_text_is_never_a_path(tmp_path):
     path = tmp_path / "two.urdf"
     path.write_text(TWO, encoding="utf-8")
     assert kin.load_urdf(path).n == 2
-    with pytest.raises(RobotFileError, match="the text of a URDF"):
+    with pytest.raises(RobotFileError, match=r"the text of a URDF, or the Path of a file: pathlib\.Path"):
         kin.load_urdf(str(path))
 
 

@@ -33,8 +33,8 @@ class MatchRequest(schemas.Body):
         description="Two poses or more: joint values from base to tool, in radians (metres for sliding joints)."
     )
     readings: Annotated[list[Configuration], Field(min_length=2, fail_fast=True)] = Field(
-        description="In each pose the readings of all motors that move a joint, in their order and units. Those "
-        "that begin again after a turn may have done so."
+        description="In each pose the readings of all motors that move a joint, or of every motor, in their order "
+        "and units. Those that begin again after a turn may have done so."
     )
     motors: Motors | None = Field(
         None, description="The motors whose signs and zeros are not known; by default those of the arm."

@@ -24,7 +24,7 @@ from app.shared.problems import FieldError, from_input_error, show
 from app.shared.store import Store
 from kin import InputError, Robot, UnknownRobotError, program_from_dict, q_from_readings
 from kin.collision.obstacles import MOST_OBSTACLES, checked_obstacles
-from kin.readings.joints import moving_motors
+from kin.readings.joints import moving_motors, of_moving
 from kin.transforms import Array
 
 MOST_BYTES = 64 * 1024  # of a message
@@ -135,8 +135,9 @@ class LiveMessage(Body):
     )
     readings: Configuration | None = Field(
         None,
-        description="What the motors of a real arm read, one of each motor that moves a joint, in their order and "
-        "units. The page shows the arm as `measured`, and *Match motors* takes them; null removes them.",
+        description="What the motors of a real arm read, one of each motor that moves a joint, or of every motor, "
+        "in their order and units. The page shows the arm as `measured`, and *Match motors* takes them; null "
+        "removes them.",
     )
     drives: _Name | None = Field(
         None,
@@ -236,13 +237,13 @@ def _read_motors(robot: Robot, readings: list[float] | None) -> dict[str, Any]:
         motors = moving_motors(robot)
     except InputError as error:
         raise invalid(FieldError(field="readings", value=show(readings), expected=error.expected)) from None
-    if len(readings) != len(motors):
-        names = ", ".join(f"{motor.id} {motor.joint}" for motor in motors)
-        expected = f"{len(motors)} values, of the motors {names}"
-        raise invalid(FieldError(field="readings", value=f"{len(readings)} values", expected=expected))
+    try:
+        read = of_moving(robot.motors, readings)
+    except InputError as error:
+        raise invalid(from_input_error(error)) from None
     driven = {motor.joint for motor in motors}
     known = all(joint.name in driven for joint in robot.joints)
-    return {"readings": readings, **({"measured": q_from_readings(robot, readings)} if known else {})}
+    return {"readings": read.tolist(), **({"measured": q_from_readings(robot, read)} if known else {})}
 
 
 def _printable(name: str) -> str:

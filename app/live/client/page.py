@@ -21,8 +21,8 @@ from app.live.client.connection import Connection, Message, RefusedError
 from app.live.client.drawing import Drawing
 from app.live.recording import Bounds, Recording, read, save
 from kin import InputError, KinematicsError, Motion, Obstacle, Program, Robot
-from kin.readings.joints import moving_motors
-from kin.transforms import Array, finite_array, pose_from_position_wxyz
+from kin.readings.joints import moving_motors, of_moving
+from kin.transforms import Array, pose_from_position_wxyz
 
 VALUES: Final = ("q", "target", "result", "contacts", "program")
 RATE: Final = 30.0  # news a second
@@ -149,14 +149,16 @@ class Page:
     def readings(self) -> Array | None:
         """What the motors of a real arm read ``(m,)``, in their order and units, as for `kin.q_from_readings`.
 
+        Those of all motors may be assigned, too: what moves no joint, such as a gripper, is left out.
+
         The page shows the arm as `measured`, and *Match motors* takes them. None: they are not known.
         """
         return None if self._readings is None else self._readings.copy()
 
     @readings.setter
     def readings(self, value: ArrayLike | None) -> None:
-        motors = moving_motors(self._robot)
-        read = None if value is None else finite_array("readings", value, (len(motors),))
+        moving_motors(self._robot)
+        read = None if value is None else of_moving(self._robot.motors, value)
         self._connection.stream(readings=None if read is None else read.tolist())
         self._readings = read
 

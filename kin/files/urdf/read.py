@@ -176,7 +176,8 @@ def _tree(source: Path | str, file: str) -> UrdfTree:
         raise InputError("source", source, "the text of a URDF as str, or the Path of a file")
     if isinstance(source, str):
         if "<" not in source:
-            raise RobotFileError(file or "URDF", "file", source, "the text of a URDF, or the Path of a file")
+            wanted = "the text of a URDF, or the Path of a file: pathlib.Path(…)"
+            raise RobotFileError(file or "URDF", "file", source, wanted)
         return read_tree(source, file or "URDF")
     try:
         content = source.read_bytes()

@@ -47,18 +47,19 @@ def test_paths_and_motions_are_checked(client: TestClient) -> None:
 
 
 @pytest.mark.parametrize(
-    ("obstacle", "field"),
+    ("obstacle", "field", "value"),
     [
-        ({"shape": "cone"}, "obstacles[0].shape"),
-        ({"shape": "box"}, "obstacles[0].size"),
-        ({"shape": "sphere", "radius": -1}, "obstacles[0].radius"),
-        ({"shape": "sphere", "radius": 1, "color": "red"}, "obstacles[0].color"),
+        ({"shape": "cone"}, "obstacles[0].shape", '"cone"'),
+        ({"shape": "box"}, "obstacles[0].size", "None"),
+        ({"shape": "box", "size": [300, 300, 400]}, "obstacles[0].size[0]", "300.0"),
+        ({"shape": "sphere", "radius": -1}, "obstacles[0].radius", "-1.0"),
+        ({"shape": "sphere", "radius": 1, "color": "red"}, "obstacles[0].color", '"red"'),
     ],
 )
-def test_malformed_obstacles_are_refused(client: TestClient, obstacle, field) -> None:
+def test_malformed_obstacles_are_refused(client: TestClient, obstacle, field, value) -> None:
     answer = client.post("/api/v1/robots/ur5/ik", json={"target": TARGET, "obstacles": [obstacle]})
     assert answer.status_code == 422
-    assert field in [each["field"] for each in answer.json()["errors"]]
+    assert (field, value) in [(each["field"], each["value"]) for each in answer.json()["errors"]]
 
 
 def test_inspect_lists_the_bodies(client: TestClient) -> None:

@@ -139,9 +139,10 @@ def test_readings_of_motors_show_the_real_arm_and_match_motors_takes_them(page, 
     with pytest.raises(kin.InputError, match="an arm with motors"):
         arm.readings = [1.0] * 6
     arm.robot = "so101"
-    with pytest.raises(kin.InputError, match="readings"):
-        arm.readings = [1.0] * 6
-    arm.readings = [10.0, -20.0, 30.0, 40.0, -50.0]
+    with pytest.raises(kin.InputError, match="readings: got '7 values'"):
+        arm.readings = [1.0] * 7
+    arm.readings = [10.0, -20.0, 30.0, 40.0, -50.0, 77.0]
+    assert arm.readings.tolist() == [10.0, -20.0, 30.0, 40.0, -50.0]
     page.wait(lambda: "data-live-measured" in page.html)
     page.settle()
     page.set("All motors", "Match motors")

@@ -177,7 +177,7 @@ def test_the_newest_value_wins_and_drawings_are_merged(page, port):
         ({"target": {"position": [0, 0, 1], "wxyz": [0, 0, 0, 0]}}, "target.wxyz", "0", ""),
         ({"measured": [1.0]}, "measured", "1 values", "6 values"),
         ({"readings": [1.0] * 6}, "readings", "1.0", "an arm with motors"),
-        ({"robot": "so101", "readings": [1.0] * 6}, "readings", "6 values", "of the motors 1 shoulder pan, 2"),
+        ({"robot": "so101", "readings": [1.0] * 7}, "readings", "7 values", "or 6, with 6 gripper in its place"),
         ({"readings": ["a"]}, "readings", "a", ""),
         ({"robot": "ur500"}, "robot", "ur500", "one of"),
         ({"robot": {"rows": []}}, "robot", "", ""),

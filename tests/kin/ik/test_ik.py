@@ -236,6 +236,15 @@ def test_the_distance_of_a_point_too_far_is_reported(robot_id, task):
     assert np.isfinite(result.closest.q).all()
 
 
+def test_a_target_in_millimetres_is_answered_with_the_unit_of_targets():
+    target = kin.pose_from_xyz_rpy([400.0, 100.0, 300.0], [np.pi, 0.0, 0.0])
+    assert solve_ik("ur5", target).reason.endswith("the point is too far away. Targets are in metres.")
+    target[:3, 3] *= 0.004
+    assert "Targets are in metres" not in solve_ik("ur5", target).reason
+    target[:3, 3] *= 0.25
+    assert solve_ik("ur5", target).status is Status.SOLVED
+
+
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_dragging_out_of_reach_does_not_make_the_arm_jump(robot_id):
     """Of equally close postures, the one nearest to the present one is chosen in every step."""

@@ -126,6 +126,28 @@ def test_motors_of_python_are_checked():
         kin.q_from_readings(few, [0.0, 1.0])
 
 
+def test_readings_of_every_motor_count_without_those_that_move_no_joint():
+    motors = [Motor("", 9, "gripper"), *SO101.motors[:5], Motor("", 7, "lamp")]
+    arm = replace(SO101, motors=motors)
+    moving = np.array([[10.0, -20.0, 30.0, 40.0, -50.0], [11.0, -21.0, 31.0, 41.0, -51.0]])
+    every = np.hstack([[[70.0], [71.0]], moving, [[1.0], [0.0]]])
+    assert np.array_equal(kin.q_from_readings(arm, every), kin.q_from_readings(arm, moving))
+    with pytest.raises(InputError) as caught:
+        kin.q_from_readings(arm, every[:, :6])
+    assert "6 values" in caught.value.value
+    assert "5 values, of motors 1 shoulder pan, " in caught.value.expected
+    assert caught.value.expected.endswith("5 wrist roll, or 7, with 9 gripper, 7 lamp in its place")
+
+
+def test_ticks_of_a_calibrated_arm_show_where_it_is():
+    """As LeRobot reads an SO-101: six servos, of which the gripper moves no joint."""
+    ranges = [(745, 3398), (822, 3201), (866, 3078), (890, 3224), (0, 4095), (2026, 3500)]
+    arm = replace(SO101, motors=[replace(m, range=r) for m, r in zip(SO101.motors, ranges, strict=True)])
+    ticks = [round((low + high) / 2) + 1024 for low, high in ranges]
+    q = kin.q_from_readings(arm, kin.readings_from_ticks(arm.motors, ticks))
+    assert np.degrees(q) == pytest.approx([90.0] * 5, abs=0.1)  # ticks are whole, and 4095 of them are a turn
+
+
 def test_readings_and_joint_values_are_each_others_inverse():
     rng = np.random.default_rng(5)
     units: list[dict[str, Any]] = [

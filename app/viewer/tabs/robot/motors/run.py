@@ -12,7 +12,7 @@ import kin
 from app.viewer.scene.clearance import clearance
 from kin import InputError, MotorMatch, Obstacle, Robot
 from kin.files.numbers import LARGEST, number_of
-from kin.readings.joints import moving_motors
+from kin.readings.joints import counted, moving_motors, of_moving
 from kin.transforms import Array
 
 COUNT = 3  # poses
@@ -94,14 +94,14 @@ def free(robot: Robot, obstacles: Sequence[Obstacle]) -> Callable[[Array], bool]
 
 
 def readings_of(text: str, robot: Robot) -> tuple[float, ...]:
-    """Readings as they are typed or pasted, one of each motor in their order; raises `InputError`."""
-    motors = moving_motors(robot)
+    """Readings of the motors that move a joint, as they are typed or pasted, or of all; raises `InputError`."""
+    moving_motors(robot)
     words = re.split(r"[\s,;]+", text.replace("−", "-").strip().strip("[]()").strip()) if text.strip() else []
     values = [number_of(word) for word in words] if len(text) <= _LONGEST else []
-    if len(values) != len(motors) or not all(abs(value) < LARGEST for value in values):
-        names = ", ".join(f"{motor.id} {motor.joint}" for motor in motors)
-        some = (
-            "1 number, of motor" if len(motors) == 1 else f"{len(motors)} numbers with spaces between, of motors"
-        )
-        raise InputError("readings", text, f"{some} {names}")
-    return tuple(float(value) for value in np.array(values))
+    try:
+        if not all(abs(value) < LARGEST for value in values):
+            raise InputError("readings", text, f"numbers below {LARGEST:g}")
+        return tuple(of_moving(robot.motors, values).tolist())
+    except InputError:
+        wanted = f"numbers with spaces between: {counted(robot.motors)}"
+        raise InputError("readings", text, wanted) from None

@@ -72,13 +72,16 @@ def test_readings_are_read_as_scripts_print_them(text: str) -> None:
     assert readings_of(text, SO101) == (1.0, 2.0, 3.0, 4.0, 5.5)
 
 
+def test_readings_of_all_motors_are_taken_without_the_gripper() -> None:
+    assert readings_of("1 2 3 4 5.5 77", SO101) == (1.0, 2.0, 3.0, 4.0, 5.5)
+
+
 @pytest.mark.parametrize(
-    "text", ["", "1 2 3 4", "1 2 3 4 5 6", "1 2 3 4 nan", "1 2 3 4 1e9", "a b c d e", "1 " * 9999]
+    "text", ["", "1 2 3 4", "1 2 3 4 5 6 7", "1 2 3 4 nan", "1 2 3 4 1e9", "a b c d e", "1 " * 9999]
 )
 def test_other_readings_are_refused_with_the_order_of_the_motors(text: str) -> None:
-    with pytest.raises(
-        InputError, match="5 numbers with spaces between, of motors 1 shoulder pan, 2 shoulder lift"
-    ):
+    wanted = "numbers with spaces between: 5 values, of motors 1 shoulder pan, .*, or 6, with 6 gripper"
+    with pytest.raises(InputError, match=wanted):
         readings_of(text, SO101)
 
 
@@ -191,7 +194,7 @@ def test_match_motors_shows_poses_and_writes_what_it_finds(port: int) -> None:
             if i == 1:
                 tab.set("Readings", "1 2")
                 tab.set("Poses", "Next pose")
-                tab.wait(lambda: "5 numbers with spaces between" in tab.html)
+                tab.wait(lambda: "numbers with spaces between: 5 values" in tab.html)
             tab.settle()
             tab.set("Readings", " ".join(map(str, values)))
             tab.settle()
