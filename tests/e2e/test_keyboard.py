@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from page import Tab
@@ -32,6 +35,23 @@ REACHED = """() => {
   const seen = style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 2;
   return { seen, what: e.outerHTML.slice(0, 200) };
 }"""
+
+DOCS = Path(__file__).parents[2] / "docs"
+# Each row of the overview: where, keys, action.
+OVERVIEW = """() => [...document.querySelectorAll("#kb-keys tr")].map((row) => [
+  row.closest("table").caption.textContent, ...[...row.cells].map((cell) => cell.textContent),
+])"""
+
+
+def documented() -> list[list[str]]:
+    """The rows of the docs' tables of keys: where, keys, action."""
+    rows, where = [], ""
+    for line in (DOCS / "teaching.md").read_text().split("## Keys")[1].split("On macOS")[0].splitlines()[4:]:
+        if len(cells := [cell.strip() for cell in line.replace("*", "").split("|")[1:-1]]) == 3:
+            where = cells[0] or where
+            rows.append([where[0].upper() + where[1:], *cells[1:]])
+    table = (DOCS / "own-arm.md").read_text().split("| key | in the table |")[1].split("\n\n")[0]
+    return rows + [["The DH table", *found] for found in re.findall(r"^\| (.+) \| (.+) \|$", table, re.MULTILINE)]
 
 
 def walk(tab: Tab) -> None:
@@ -185,3 +205,54 @@ def test_a_target_is_typed_and_moved_by_keys(tab: Tab) -> None:
     text.press("Escape")
     expect(text).to_be_hidden()
     tab.choose("Target must match", "Full pose")
+
+
+def test_the_overview_of_keys_is_that_of_the_docs_and_takes_all_keys_while_it_is_open(
+    tab: Tab, phone: Tab
+) -> None:
+    page, dialog = tab.page, tab.page.get_by_role("dialog", name="Keys")
+    rows = documented()
+    assert len(rows) == 21
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("?")
+    expect(dialog).to_be_visible()
+    assert sorted(page.evaluate(OVERVIEW)) == sorted(rows)
+    for key in ("t", "?", "Tab"):  # none of them reaches the page behind
+        page.keyboard.press(key)
+    expect(page.locator("[data-typed]")).to_be_hidden()
+    page.keyboard.press("Escape")
+    expect(dialog).to_be_hidden()
+    tab.row(ELBOW).locator("input:visible").last.press("?")  # a text that is being typed
+    expect(dialog).to_be_hidden()
+    tab.open("View")
+    for shown in (tab, phone):
+        shown.open("View")
+        window, opener = shown.page, shown.page.get_by_role("button", name="All keys")
+        opener.press("Enter")
+        shut = window.get_by_role("dialog", name="Keys").get_by_role("button", name="Close")
+        box, size = window.locator("#kb-keys").bounding_box(), window.viewport_size
+        assert box is not None
+        assert size is not None
+        assert box["x"] >= 0
+        assert box["y"] >= 0
+        assert box["x"] + box["width"] <= size["width"]
+        assert box["y"] + box["height"] <= size["height"]
+        shown.screenshot("keys" if shown is tab else "keys-phone")
+        shut.click()
+        expect(window.locator("#kb-keys")).to_be_hidden()
+        expect(opener).to_be_focused()
+        shown.open("Move")
+
+
+def test_the_overview_of_keys_is_dark_on_a_dark_page(tab: Tab) -> None:
+    colours = "node => [getComputedStyle(node).backgroundColor, getComputedStyle(node).color]"
+    for dark in (True, False):
+        tab.set_dark(dark)
+        tab.page.get_by_role("button", name="All keys").click()
+        back, ink = (
+            sum(map(int, re.findall(r"\d+", colour)[:3])) / 3
+            for colour in tab.page.locator("#kb-keys").evaluate(colours)
+        )
+        assert (back < 60, ink > 180) == (dark, dark)
+        assert (back > 230, ink < 60) == (not dark, not dark)
+        tab.page.keyboard.press("Escape")

@@ -74,7 +74,7 @@ _SCRIPTS = (
     b"driven",
     b"describe",
 )
-_STYLES = (b"viewer", b"robot", b"program", b"class_tab", b"layout", b"drawer", b"hints")
+_STYLES = (b"viewer", b"robot", b"program", b"class_tab", b"layout", b"drawer", b"hints", b"keys")
 _OURS = b"".join(
     [b'<link rel="stylesheet" href="../static/%s.css">' % name for name in _STYLES]
     + [b'<script src="../static/%s.js"></script>' % name for name in _SCRIPTS]
