@@ -109,7 +109,7 @@ RULES: dict[str, set[str]] = {
         *("app.api", "app.classroom", "app.exercises", "app.live", "app.service", "app.shared", "app.viewer"),
     },
     "app/service/web/rooms": {
-        *("starlette", "jinja2", "segno", "app.api.problems", "app.classroom", "app.service.web.access"),
+        *("kin", "starlette", "jinja2", "segno", "app.api.problems", "app.classroom", "app.service.web.access"),
         *("app.exercises", "app.service.web.rate_limit", "app.service.web.rooms", "app.shared"),
     },
     "app/service/web": {

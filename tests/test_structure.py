@@ -109,6 +109,15 @@ def context_variables(sources: Sources) -> Iterator[str]:
     yield from (path for path, source in sources.items() if path.startswith("kin/") and "ContextVar" in source)
 
 
+def own_numbers(sources: Sources) -> Iterator[str]:
+    """Numbers of the page not written by `kin.units.general`: they may have e-05, or a hyphen as minus sign."""
+    for path, source in sources.items():
+        if path.startswith("app/viewer/meshes/"):  # its process starts without the core
+            continue
+        if path.startswith(("app/viewer/", "app/exercises/")) and re.search(r"\{[^{}]*:\.[1-6]g\}", source):
+            yield path
+
+
 def banned_words(sources: Sources) -> Iterator[str]:
     """Identifiers, comments and docstrings with a word of `BANNED`, as ``path: word``."""
     for path, source in sources.items():
@@ -206,6 +215,7 @@ RULES: dict[Rule, Sources] = {
     untyped_solvers: CODE,
     cut_sentences: CODE,
     context_variables: CODE,
+    own_numbers: CODE,
     banned_words: EVERYTHING,
     import_circles: CODE,
     viser_elsewhere: SCRIPTS,
@@ -242,6 +252,7 @@ BREACHES: list[tuple[Rule, Sources, str]] = [
     (banned_words, {"kin/new.py": "# What is told of it."}, "kin/new.py: told"),
     (banned_words, {"kin/new.py": "def ik_wishes(): ..."}, "kin/new.py: wishes"),
     (banned_words, {"kin/new.py": "class DearAnswers: ..."}, "kin/new.py: dear"),
+    (own_numbers, {"app/viewer/new.py": 'f"{speed:.3g} m/s"'}, "app/viewer/new.py"),
     (viser_elsewhere, {"static/new.js": 'find(".mantine-Slider-root")'}, "static/new.js: mantine-"),
     (viser_elsewhere, {"static/new.js": "find('[role=\"tab\"]')"}, 'static/new.js: role="tab'),
     (viser_elsewhere, {"static/new.js": "Worker.prototype.postMessage = f"}, "static/new.js: .prototype"),
@@ -289,6 +300,7 @@ def test_every_rule_is_shown_to_have_teeth():
         (long_signatures, {"kin/new.py": f"def f({TEN}): ..."}),
         (untyped_solvers, {"app/new.py": "x: Any = getattr(y, 'z')"}),
         (cut_sentences, {"app/new.py": "def f(text):\n    return text.partition('=')[0]"}),
+        (own_numbers, {"app/viewer/new.py": "f'{general(x, 3)} {y:.3f} {code:.9g}'", "kin/new.py": "f'{x:.3g}'"}),
         (viser_elsewhere, {"static/viser_page.js": "new MutationObserver(f); find('.mantine-Slider-root')"}),
         (viser_elsewhere, {"static/new.js": "viserPage.watch(f); viserPage.replaceState(state)"}),
         (banned_words, {"app/new.py": "text = 'as I told you'; retold = calmness = 1"}),

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 from app.exercises.contract import PLAIN_UNITS
 from app.exercises.exercise import Exercise, VariantError
+from kin.units import general
 
 LONGEST = 90  # characters
 
@@ -46,7 +47,7 @@ def answer_in_words(exercise: Exercise, seed: int, answer: str) -> str:
 
 
 def _word(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return general(value, 4) if isinstance(value, float) else str(value)
 
 
 def _short(text: str) -> str:

@@ -20,6 +20,7 @@ import numpy as np
 import kin
 from kin import InputError, Robot
 from kin.files.read import MAX_ROWS
+from kin.units import general
 
 KEY = "own"  # stands for the arm in a link, and begins its id
 MY_ARM = "My arm"
@@ -81,7 +82,7 @@ def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
     robot = kin.robot_from_dict(fields, "your arm")
     if not SMALLEST <= robot.reach <= LARGEST:
         limits = f"lengths a and d (or a tool) that reach {SMALLEST * 1000:g} mm to {LARGEST:g} m"
-        raise InputError("rows", f"a reach of {robot.reach:.3g} m", limits)
+        raise InputError("rows", f"a reach of {general(robot.reach, 3)} m", limits)
     away = float(np.abs(robot.T_world_base[:3, 3]).max())
     if away > LARGEST:
         raise InputError("base.xyz", f"{away:g} m", f"a base at most {LARGEST:g} m from the origin")

@@ -15,7 +15,7 @@ from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 from kin import InputError, Motion
 from kin.transforms import Array
-from kin.units import Units
+from kin.units import Units, general
 
 MOST_SEGMENTS = 12
 _SAMPLES = 200
@@ -47,9 +47,9 @@ class ProgramKind(Kind):
     def asked(self, variant: Variant, units: Units) -> Asked:
         conditions = [f"the tool point within {units.lengths.brief(self.straight)} of the straight line"]
         if longest := variant.number(self.longest):
-            conditions.append(f"at most {longest:.3g} s")
+            conditions.append(f"at most {general(longest, 3)} s")
         if fastest := variant.number(self.fastest):
-            conditions.append(f"the tool point at most {fastest:.3g} m/s")
+            conditions.append(f"the tool point at most {general(fastest, 3)} m/s")
         start = _text(variant, [_segment("ptp", kin.fk(variant.robot, variant.q)[:3, 3])])
         return Asked("program", note=f"Required: {'; '.join(conditions)}.", start=start, goal=variant.pose)
 
@@ -87,18 +87,13 @@ class ProgramKind(Kind):
         ]
         if longest := variant.number(self.longest):
             fits = motion.duration <= longest + 1e-6
-            parts.append(
-                (fits, f"It takes {motion.duration:.2f} s{'' if fits else f'; {longest:.3g} s are allowed'}.")
-            )
+            allowed = "" if fits else f"; {general(longest, 3)} s are allowed"
+            parts.append((fits, f"It takes {motion.duration:.2f} s{allowed}."))
         if fastest := variant.number(self.fastest):
             speed = max(peak.peak for peak in motion.peaks if peak.quantity == "tool_speed")
             fits = speed <= fastest * (1.0 + 1e-3)
-            parts.append(
-                (
-                    fits,
-                    f"The tool point reaches {speed:.3g} m/s{'' if fits else f'; {fastest:.3g} m/s are allowed'}.",
-                )
-            )
+            allowed = "" if fits else f"; {general(fastest, 3)} m/s are allowed"
+            parts.append((fits, f"The tool point reaches {general(speed, 3)} m/s{allowed}."))
         return parts
 
     def answer(self, variant: Variant) -> object:

@@ -17,7 +17,7 @@ from app.exercises.variant import Variant
 from kin import Singularity
 from kin.ik.messages.singularity import CONDITIONS, LOSSES, short
 from kin.transforms import Array
-from kin.units import PLAIN, Units, fixed
+from kin.units import PLAIN, Units, fixed, general
 
 AT = 1e-6  # rad, m or SI: closer than this is at the singularity
 _LOST = 1e-6  # singular value of a lost direction
@@ -93,7 +93,8 @@ class SingularityKind(Kind):
         verb = "turning at 1 rad/s" if variant.robot.revolute[joint] else "sliding at 1 m/s"
         return Verdict(
             False,
-            f"The tool point can move in this direction: joint {joint + 1}, {verb}, moves it by {speed:.3g} m/s.",
+            f"The tool point can move in this direction: joint {joint + 1}, {verb}, "
+            f"moves it by {general(speed, 3)} m/s.",
         )
 
     def answer(self, variant: Variant) -> object:

@@ -231,7 +231,7 @@ def _matrix(text: str, words: list[str], name: str, units: Units) -> Array:
     R = T[:3, :3]
     off = float(np.abs(R.T @ R - np.eye(3)).max())
     if off > _MATRIX_SLACK:
-        detail = f"Its columns must be orthonormal; RᵀR differs from the identity by {off:.2g}."
+        detail = f"Its columns must be orthonormal; RᵀR differs from the identity by {general(off, 2)}."
         raise EntryError("The first three columns are not a rotation", detail)
     U, _, Vt = np.linalg.svd(R)
     T[:3, :3] = U @ Vt

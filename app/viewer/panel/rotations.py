@@ -15,6 +15,7 @@ import numpy as np
 from app.exercises.typed import EntryError
 from kin import pose_from_xyz_rpy
 from kin.transforms import Array, rotation_about, rotation_from_wxyz, rotation_vector, wxyz_from_rotation
+from kin.units import general
 
 _LEVEL = 1e-9  # sine of an angle at which two axes coincide
 _SHORTEST = 1e-9  # of an axis
@@ -91,7 +92,7 @@ def _quaternion(order: str) -> Notation:
     def matrix(given: Sequence[float]) -> Array:
         norm = math.hypot(*given)
         if abs(norm - 1.0) > _NORM_SLACK:
-            raise EntryError("Not a unit quaternion", f"The norm of {order} is {norm:.4g}; valid is 1.")
+            raise EntryError("Not a unit quaternion", f"The norm of {order} is {general(norm, 4)}; valid is 1.")
         return rotation_from_wxyz(np.roll(given, 1 if first else 0))
 
     where = "last" if first else "first"

@@ -35,6 +35,7 @@ def test_right_answers_of_all_exercises_have_words(exercise) -> None:
         ("", ""),
         ('{"a": 1}', "{'a': 1}"),
         ("[[1.23456, 2], 3]", "1.235, 2"),
+        ("[-0.5, 2.5e-7]", "−0.5, 2.5·10⁻⁷"),
         ("9" * 400, None),
         ("-1", "-1"),
         ("null", "None"),

@@ -21,6 +21,7 @@ from app.classroom.results.gains import Gain, Gains, Pair, csv_of_gains, gains, 
 from app.classroom.results.table import Row, csv_of, rows
 from app.classroom.work import Attempt
 from app.service.web.rooms.page import results_page
+from kin.units import fixed
 
 if TYPE_CHECKING:
     from app.classroom.rooms import OpenRoom
@@ -152,7 +153,7 @@ def _compared(row: Gains) -> dict[str, object]:
 def _in_words(one: Gain) -> dict[str, object]:
     scores = ["–" if value is None else f"{100 * value:.0f} %" for value in (one.before, one.after)]
     both = one.before is not None and one.after is not None
-    gain = f"{one.gain:.2f}".replace("-", "−") if one.gain is not None else "all right before" if both else ""
+    gain = fixed(one.gain, 2) if one.gain is not None else "all right before" if both else ""
     return {"before": scores[0], "after": scores[1], "gain": gain, "students": one.students}
 
 

@@ -25,7 +25,7 @@ from app.viewer.lessons.trajectories.motions import (
     ways,
 )
 from kin import Robot
-from kin.units import Units
+from kin.units import Units, general
 
 LONG = 1.5  # ways of the sketch
 POINTS = 41  # of a way that is drawn
@@ -72,15 +72,15 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "acceleration": f"{unit.brief(float(joint.limits[1]))}/s²",
         "long_way": unit.brief(long),
         "sketch_way": unit.brief(sketch.way),
-        "sketch_seconds": f"{sketch.time:.3g}",
+        "sketch_seconds": general(sketch.time, 3),
         "duration": f"{found['cubic'].duration:.2f}",
         "speed_shown": f"{lengths.brief(SPEED)}/s",
         "closest_shown": lengths.brief(OFFSETS[0]),
         "rates": ", ".join(rates),
         "distances": ", ".join(map(lengths.brief, OFFSETS)),
-        "hertz": f"{hertz:.3g}",
+        "hertz": general(hertz, 3),
         "swings_shown": f"{swings:.0f}",
-        "cost": f"{found['S-curve'].duration - found['trapezoidal'].duration:.2g}",
+        "cost": general(found["S-curve"].duration - found["trapezoidal"].duration, 2),
         "link1": lengths.brief(LINKS[0]),
         "link2": lengths.brief(LINKS[1]),
         "half_turn": angles.brief(math.pi),

@@ -12,7 +12,7 @@ from app.viewer.views.templates import render
 from kin import Robot, Task
 from kin.differential.null_space import NullSpace
 from kin.transforms import Array
-from kin.units import Units, fixed, power
+from kin.units import Units, fixed, general, power
 
 FREE = 1e-6  # m; a direction whose force needs less torque per newton needs none
 TASKS: dict[Task, str] = {"pose": "pose", "approach": "point + approach", "position": "point"}
@@ -96,7 +96,7 @@ def line_html(robot: Robot, found: Along, units: Units) -> str:
     curve = Curve(TASKS[found.task], x, (found.least, found.kappa, found.rank))
     at = int(found.least.argmin())
     words = f"Smallest σ_min {fixed(float(found.least[at]), 4)} at {100.0 * found.share[at]:.0f} % of the line, "
-    words += f"κ there {found.kappa[at]:.3g}. {found.end}"
+    words += f"κ there {general(float(found.kappa[at]), 3)}. {found.end}"
     axis = unit.name if by_length else "%"
     return render("velocity/line", chart=chart(rows, (curve,), "along the line", axis), words=words)
 

@@ -6,6 +6,7 @@ from app.exports.motion import FORMATS
 from app.viewer.own_arm import clean
 from kin import InputError, Robot
 from kin.motion import Motion, Program, parse_program
+from kin.units import general
 
 MOTIONS: dict[str, str] = {
     "csv-commented": "CSV",
@@ -29,7 +30,7 @@ def motion_file(motion: Motion, name: object) -> tuple[str, bytes, str]:
     kind = FORMATS[name]
     rate = min(RATE, MOST_SAMPLES / max(motion.duration, 1e-9))
     data = b"".join(kind.pieces(motion, rate))
-    sampled = "" if name == "urscript" else f"{rate:.4g} samples per second. "
+    sampled = "" if name == "urscript" else f"{general(rate, 4)} samples per second. "
     return f"{motion.robot.id}-motion{kind.suffix}", data, sampled
 
 

@@ -12,7 +12,7 @@ from app.viewer.views.templates import render
 from kin import JointConstraints, Robot
 from kin.ik.options import Locks
 from kin.transforms import Array
-from kin.units import Units, grouped
+from kin.units import Units, general, grouped
 from kin.workspace.clouds.measures import measured
 from kin.workspace.region import Region
 
@@ -36,8 +36,8 @@ def rate(points_per_second: float) -> str:
     """A rate with three significant digits."""
     for limit, scale, unit in ((1e6, 1e6, " M"), (1e3, 1e3, " k")):
         if points_per_second >= limit:
-            return f"{points_per_second / scale:.3g}{unit}"
-    return f"{points_per_second:.3g} "
+            return f"{general(points_per_second / scale, 3)}{unit}"
+    return f"{general(points_per_second, 3)} "
 
 
 def locks(locked: Locks | None) -> str:

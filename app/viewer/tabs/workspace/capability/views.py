@@ -64,7 +64,7 @@ def apart(directions: int) -> float:
 
 def value_text(by: By, value: float) -> str:
     """A value as text."""
-    return f"{100.0 * value:.3g} %" if by == "share" else general(value, 3)
+    return f"{general(100.0 * value, 3)} %" if by == "share" else general(value, 3)
 
 
 def legend(found: CapabilityMap, by: By, name: str, least: float) -> str:
@@ -92,8 +92,8 @@ def facts(found: CapabilityMap, locked: Locks | None, complete: bool, units: Uni
         ("directions", f"{found.grid.count}, about {units.angle(apart(found.grid.count))} apart", ""),
         ("reachable", grouped(count), ""),
         ("their volume", general(found.volume, 4), "m³"),
-        ("mean share", f"{100.0 * mean:.3g}", "%"),
-        ("best share", f"{100.0 * float(share.max(initial=0.0)):.3g}", "%"),
+        ("mean share", general(100.0 * mean, 3), "%"),
+        ("best share", general(100.0 * float(share.max(initial=0.0)), 3), "%"),
         ("best manipulability (pose)", general(best, 3), ""),
     )
     note = CERTAINTY[found.grid.method] if complete else "Of the part computed so far."
@@ -109,7 +109,7 @@ def picked(found: CapabilityMap, row: int, units: Units) -> str:
     rows = (
         ("centre x y z", centre, units.lengths.name),
         ("approached from", f"{possible} of {count} directions", ""),
-        ("share", f"{100.0 * possible / count:.3g}", "%"),
+        ("share", general(100.0 * possible / count, 3), "%"),
         ("best manipulability (pose)", general(float(found.manipulability[row]), 3), ""),
     )
     note = "" if possible else "Reachable, but not along any of these directions."
