@@ -21,9 +21,9 @@ from app.viewer.declared.scene import Lazy
 from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.numeric import basins, views
+from app.viewer.lessons.numeric.basins import Picture
 from app.viewer.lessons.numeric.drawing import scene
 from app.viewer.lessons.numeric.facts import Iterated, NumericFacts
-from app.viewer.lessons.numeric.picture import Picture
 from app.viewer.lessons.numeric.questions import outline
 from app.viewer.lessons.numeric.settings import NumericSettings
 from app.viewer.panel.status import Notice

@@ -15,7 +15,7 @@ from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.lessons.guide.lesson import Lesson
-from app.viewer.lessons.velocity import line, section_views, views
+from app.viewer.lessons.velocity import section_views, views
 from app.viewer.lessons.velocity.drawing import force_scale, scene, truncated
 from app.viewer.lessons.velocity.facts import VelocityFacts, scale_of
 from app.viewer.lessons.velocity.jog import BUTTONS, button, step
@@ -83,8 +83,8 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
                 "jacobian", Control("goal"), Control("speed"), Control("runs"), self._null(f),
             ), open=False),
             Folder("Along a line", [
-                Button("Start here", self.event(self.on_line_start), line.START_HINT),
-                Button("Plot the line", self.event(self.on_line_plot), line.PLOT_HINT),
+                Button("Start here", self.event(self.on_line_start), section_views.START_HINT),
+                Button("Plot the line", self.event(self.on_line_plot), section_views.PLOT_HINT),
                 Html(str, (self._plot,)),
             ], open=False),
         ]  # fmt: skip
@@ -158,10 +158,10 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
             self._push([x / force_scale(self.stage.now.robot) for x in place])
 
     def on_line_start(self) -> None:
-        self._start, self._plot = self.stage.now.goal.copy(), section_views.note_html(line.HERE)
+        self._start, self._plot = self.stage.now.goal.copy(), section_views.note_html(section_views.HERE)
 
     def on_line_plot(self) -> None:
-        self._plot = line.plot(self.stage.now, self._start, self.stage.units)
+        self._plot = section_views.plot_html(self.stage.now, self._start, self.stage.units)
 
     def advance(self, now: float) -> float | None:
         if not self.settings.runs:

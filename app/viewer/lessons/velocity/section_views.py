@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.viewer.arm import Arm
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
-from app.viewer.lessons.velocity.along import SHARE, Along
+from app.viewer.lessons.velocity.along import SAME, SHARE, Along, along, ends
 from app.viewer.lessons.velocity.views import axis_name
 from app.viewer.panel.joints import label
 from app.viewer.views.templates import render
-from kin import Robot, Task
+from kin import Robot, Task, fk
 from kin.differential.null_space import NullSpace
 from kin.transforms import Array
 from kin.units import Units, fixed, general, power
@@ -17,6 +18,10 @@ from kin.units import Units, fixed, general, power
 FREE = 1e-6  # m; a direction whose force needs less torque per newton needs none
 TASKS: dict[Task, str] = {"pose": "pose", "approach": "point + approach", "position": "point"}
 CONDITION = "Condition number κ"
+START_HINT = "The line starts at the present configuration; without this, at home"
+PLOT_HINT = "Follows the straight line to the present pose, or to a target that is missed"
+HERE = "The line starts here. Move the arm, or type a target."
+NO_LINE = "Start and end are the same. Press Start here, then move the arm or type a target, and plot."
 
 
 def statics_html(robot: Robot, force: Array, tau: Array, least: Array, cost: float, R: Array) -> str:
@@ -99,6 +104,14 @@ def line_html(robot: Robot, found: Along, units: Units) -> str:
     words += f"κ there {general(float(found.kappa[at]), 3)}. {found.end}"
     axis = unit.name if by_length else "%"
     return render("velocity/line", chart=chart(rows, (curve,), "along the line", axis), words=words)
+
+
+def plot_html(arm: Arm, start: Array | None, units: Units) -> str:
+    """The plot of the line from a configuration ``(n,)``, or from home."""
+    q, end = ends(arm, start)
+    if np.abs(fk(arm.robot, q) - end).max() < SAME:
+        return note_html(NO_LINE)
+    return line_html(arm.robot, along(arm.robot, q, end, arm.task), units)
 
 
 def note_html(text: str) -> str:
