@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+import re
 
 import numpy as np
 import pytest
@@ -86,8 +87,7 @@ def test_dragging_the_gizmo_moves_the_arm_and_reports_out_of_reach(tab: Tab) -> 
     reached[:3, 3] += moved
     tab.drag_arrow(SRS, reached, axis=2, lengths=4.2)
     expect(tab.status).to_have_attribute("data-status", "unreachable")
-    expect(tab.status).to_contain_text("Out of reach by")
-    expect(tab.status).to_contain_text("mm")
+    expect(tab.status).to_contain_text(re.compile(r"by \d+ mm"))
     tab.screenshot("drag-out-of-reach")
 
     tab.page.get_by_role("button", name="Home").click()

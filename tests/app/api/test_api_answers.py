@@ -256,7 +256,7 @@ def test_out_of_reach_is_an_answer(client, robot):
     assert answer["closest"]["in_limits"] is True
     assert answer["distance"] == pytest.approx(answer["closest"]["position_error"])
     assert 5.0 - robot.reach - 1e-9 <= answer["distance"] < 5.0
-    assert "Out of reach" in answer["reason"]
+    assert f"by {1000 * answer['distance']:.1f} mm" in answer["reason"]
 
 
 def test_violated_limits_are_named(client):

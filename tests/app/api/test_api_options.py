@@ -101,7 +101,7 @@ def test_gaps_of_a_path_are_reported(client):
     answer = post(client, PIONEER, "ik/path", targets=[{"position": p} for p in points])
     (gap,) = answer["gaps"]
     assert (gap["index"], gap["status"]) == (1, "unreachable")
-    assert "Out of reach" in gap["reason"]
+    assert f"by {1000 * gap['distance']:.1f} mm" in gap["reason"]
     assert gap["distance"] == pytest.approx(answer["position_error"][1], abs=1e-6)
 
 

@@ -31,6 +31,7 @@ from kin.workspace import STRATEGIES, Measure
 
 ROOT = Path(__file__).parents[3]
 PIONEER = kin.get_robot("pioneer5")
+FAR = kin.solve_ik(PIONEER, [2.0, 0.0, 0.0], task="position").distance
 
 
 def run(capsys, *words):
@@ -254,7 +255,7 @@ def test_blocked_branches_are_printed_with_what_they_need(capsys):
 @pytest.mark.parametrize(
     ("position", "extra", "status", "said"),
     [
-        ((2000, 0, 0), (), "unreachable", "Out of reach"),
+        ((2000, 0, 0), (), "unreachable", f"by {1e3 * FAR:.1f} mm"),
         ((45, 191, 100), ("--approach", 0, 0, 1), "limits", "pivoting wrist"),
         ((45, 191, -211), ("--wxyz", 0, 0.9, 0.4, -0.2), "approximate", "5 joints"),
     ],

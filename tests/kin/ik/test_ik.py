@@ -231,7 +231,7 @@ def test_the_distance_of_a_point_too_far_is_reported(robot_id, task):
     assert result.status is Status.UNREACHABLE
     assert result.distance == pytest.approx(2.0 - rim, abs=2e-4)
     assert "too far away" in result.reason
-    assert result.reason.startswith("Out of reach by")
+    assert f"by {1e3 * result.distance:.1f} mm: " in result.reason
     assert robot.in_limits(result.closest.q)
     assert np.isfinite(result.closest.q).all()
 

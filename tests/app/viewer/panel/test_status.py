@@ -96,11 +96,11 @@ def test_the_result_for_an_open_target_comes_back_after_news() -> None:
     result = kin.solve_ik(kin.get_robot("ur5"), [3.0, 0.0, 0.0], task="position")
     status.show(UNDONE)
     status.settle(result, DEFAULT_UNITS)
-    assert "Out of reach by" in element.content
+    assert 'data-status="unreachable"' in element.content
     # A result is no news: neither time nor another action ends it.
     assert status.due(time.perf_counter() + 10.0 * NEWS) is None
     status.settle(None, DEFAULT_UNITS)
-    assert "Out of reach by" in element.content
+    assert 'data-status="unreachable"' in element.content
 
 
 def test_an_error_stays_until_the_next_action() -> None:

@@ -134,7 +134,7 @@ def test_the_gizmo_is_never_moved_while_held_nor_away_from_an_unreachable_target
         tab.log.clear()
         tab.grab()
         tab.drag(T)
-        tab.wait(lambda: "Out of reach by" in tab.html)
+        tab.wait(lambda: 'data-status="unreachable"' in tab.html)
         tab.settle()
         tab.release()
         tab.settle()
@@ -306,7 +306,7 @@ def test_a_target_at_the_end_of_the_world_is_only_out_of_reach(port: int) -> Non
     with FakeBrowser(port) as tab:
         tab.settle()
         tab.drag(position=(1e5, -1e5, 1e5), wxyz=(1, 0, 0, 0))
-        tab.wait(lambda: "Out of reach by" in tab.html)
+        tab.wait(lambda: 'data-status="unreachable"' in tab.html)
 
 
 def test_an_idle_visitor_costs_no_processor_time(port: int) -> None:

@@ -133,7 +133,7 @@ def test_a_typed_target_is_solved_like_a_dragged_one(port: int) -> None:
         assert "Found 4" in tab.script["reply"][1]
         arrives(tab, T)
         tab.say("target", ["position", "3000 0 300"])
-        tab.wait(lambda: "Out of reach by" in tab.html)
+        tab.wait(lambda: 'data-status="unreachable"' in tab.html)
 
 
 def test_a_point_alone_sets_the_task_and_a_pose_sets_it_back(port: int) -> None:

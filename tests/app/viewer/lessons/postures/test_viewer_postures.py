@@ -87,7 +87,7 @@ def test_the_distance_to_a_missed_target_follows_the_units(length: str) -> None:
     T[0, 3] += 2.0
     result = kin.solve_ik(PUMA, T, q_seed=PUMA.q_home)
     why = remedies.html(result, None, units)
-    assert f"Out of reach by {units.distance(result.distance)}" in why
+    assert f" by {units.distance(result.distance)}" in why
     assert "mm" not in why
     found = remedies.remedies(Request(PUMA, T, kin.IKOptions(task="position"), PUMA.q_home, result), units)
     (move,) = [fix for fix in found if fix is not None and fix.kind == "move"]
