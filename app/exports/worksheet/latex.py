@@ -36,8 +36,8 @@ def latex(sheet: Sheet) -> str:
     values = ", ".join(f"{to_latex(name)} = {to_latex(value)}" for name, value in sheet.values)
     out += ["The joint values are to be found." if sheet.left == "configuration" else f"Joints: {values}."]
     out.append(_table(sheet, sheet.left == "table"))
-    if sheet.left == "nothing":
-        out.append(_matrices(sheet))
+    if sheet.left in ("nothing", "pose"):
+        out.append(_matrices(sheet, sheet.left == "pose"))
     elif sheet.left == "configuration":
         out.append(f"Lengths in {sheet.units.lengths.name}.\n\\[T = {_matrix(sheet, sheet.pose)}\\]")
     out += [_formula(f.title, f.latex) for f in sheet.formulas if not f.solution]
@@ -52,7 +52,7 @@ def latex(sheet: Sheet) -> str:
         if sheet.left == "configuration":
             out.append(f"Joints: {values}.")
         if sheet.left != "nothing":
-            out += [_table(sheet, False), _matrices(sheet)]
+            out += [_table(sheet, False), _matrices(sheet, False)]
         out += [_formula(f.title, f.latex) for f in sheet.formulas if f.solution]
         for number, question in enumerate(sheet.questions, 1):
             out.append(rf"\textbf{{{number}.}} {to_latex(question.solution)}")
@@ -79,7 +79,7 @@ def _table(sheet: Sheet, blank: bool) -> str:
     return "\n".join([*lines, r"\end{tabular}"])
 
 
-def _matrices(sheet: Sheet) -> str:
+def _matrices(sheet: Sheet, blank: bool) -> str:
     note = f"Lengths in {sheet.units.lengths.name}."
     named = [(f"A_{{{i}}}", A) for i, A in enumerate(sheet.matrices, 1)]
     named += [(name, T) for name, _, T in sheet.ends]
@@ -88,7 +88,8 @@ def _matrices(sheet: Sheet) -> str:
     for digit, index in zip("0123456789", "₀₁₂₃₄₅₆₇₈₉", strict=True):
         product = product.replace(index, digit)
     product = " ".join(f"A_{{{name[1:]}}}" if name[0] == "A" else name for name in product.split())
-    return "\n".join([*parts, rf"\[T = {product} = {_matrix(sheet, sheet.pose)}\]"])
+    pose = r"\rule{0pt}{16mm}" if blank else _matrix(sheet, sheet.pose)
+    return "\n".join([*parts, rf"\[T = {product} = {pose}\]"])
 
 
 def _matrix(sheet: Sheet, T: Array) -> str:

@@ -13,8 +13,9 @@ from kin import Robot, fk
 from kin.transforms import Array
 from kin.units import Units, fixed
 
-# The table and the matrices are filled in; or the pose is given, and the configuration is to be found.
-Left = Literal["nothing", "table", "configuration"]
+# The table and the matrices are filled in, or their product alone; or the pose is given, and the configuration is
+# to be found.
+Left = Literal["nothing", "table", "pose", "configuration"]
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 

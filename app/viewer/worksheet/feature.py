@@ -92,7 +92,7 @@ class Worksheets(Feature):
             found.goal,
             parts_of(found),
             lesson.formulas(),
-            lesson.left,
+            lesson.left(stage.now.robot),
         )
 
     def remove(self) -> None:

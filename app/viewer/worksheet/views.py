@@ -17,13 +17,13 @@ def page_html(sheet: Sheet) -> str:
     ends = [(name, sheet.entries(T)) for name, _, T in sheet.ends]
     pose = sheet.entries(sheet.pose)
     empty = [(name, EMPTY) for name, _ in given]
-    matrices = {"nothing": given, "table": empty, "configuration": []}[sheet.left]
+    matrices = {"nothing": given, "table": empty, "pose": given, "configuration": []}[sheet.left]
     return render(
         "sheet/page",
         sheet=sheet,
         picture=Markup(draw(sheet).svg()),
         matrices=[*matrices, *ends],
-        pose=EMPTY if sheet.left == "table" else pose,
+        pose=EMPTY if sheet.left in ("table", "pose") else pose,
         solved=[*given, *ends],
         solved_pose=pose,
         ends=[f"{name}: {words}" for name, words, _ in sheet.ends],

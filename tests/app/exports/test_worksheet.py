@@ -132,7 +132,7 @@ def test_latex_is_balanced(robot, left):
     assert "(6)" in solutions
     assert "(6)" not in questions
     count = len(robot.rows) + len(sheet(robot).ends) + 1
-    asked = {"nothing": count, "table": 0, "configuration": 1}[left]
+    asked = {"nothing": count, "table": 0, "pose": count - 1, "configuration": 1}[left]
     assert questions.count(r"\begin{bmatrix}") == asked
     assert solutions.count(r"\begin{bmatrix}") == (0 if left == "nothing" else count)
 

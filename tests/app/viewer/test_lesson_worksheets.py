@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from collections import Counter
+from dataclasses import replace
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
+from arms import CLASSICS
 
 import kin
 from app.equations import book
@@ -16,17 +19,30 @@ from app.exports.worksheet import Sheet, latex
 from app.viewer.arm import Arm
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.equations import views
+from app.viewer.lessons.guide.outline import WHOLE, Number
 from app.viewer.worksheet.feature import FILES, Worksheets, parts_of
 from app.viewer.worksheet.views import page_html
-from kin.units import DEFAULT_UNITS, Units
+from kin.units import DEFAULT_UNITS, PLAIN, Units
 
 PIONEER = kin.get_robot("pioneer5")
 ARMS = [PIONEER, kin.get_robot("planar2r"), kin.get_robot("redundant7-craig")]
 
 
-def as_sheet(lesson, robot, units=DEFAULT_UNITS):
+NUMBER = re.compile(r"(?<![\w.])[−-]?\d+(?:\.\d+)?(?![\w.]*\d)")
+SMALL = 12  # whole numbers up to it are those of joints and steps
+# Answers that other numbers of a sheet equal on many arms.
+CHANCE = {
+    ("rotations", "c4"): "half a turn is a column of many tables, and a limit of many joints",
+    ("screws", "c4"): "with all joints at zero, it is a length of the table on some arms: which one, is asked",
+    ("screws", "5"): "|v| in the body form is a length of the table on some arms: which one, is asked",
+    ("numeric", "c4"): "one half is an entry of many matrices, and the answer for all arms",
+}
+
+
+def as_sheet(lesson, robot, units=DEFAULT_UNITS, q=None):
     outline = lesson.outline(robot, units)
-    return Sheet(lesson.title, robot, robot.q_home, units, outline.goal, parts_of(outline), (), lesson.left)
+    q = robot.q_home if q is None else q
+    return Sheet(lesson.title, robot, q, units, outline.goal, parts_of(outline), (), lesson.left(robot))
 
 
 def parsed(html):
@@ -52,7 +68,7 @@ def test_every_question_is_asked_and_solved(lesson, robot):
     left = {character for character in latex(sheet) if not character.isascii()}
     assert not left, "app/exports/worksheet/words.py says what they are in LaTeX"
     cells = [cell.text for cell in articles[0].iter("td")]
-    assert (None in cells or "" in cells) == (sheet.left == "table")
+    assert (None in cells or "" in cells) == (sheet.left in ("table", "pose"))
 
 
 @pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
@@ -68,6 +84,46 @@ def test_the_joint_values_are_not_on_the_sheet_that_asks_for_them(robot):
     assert "Joints:" not in first
     assert "A_{1}" not in first
     assert "Joints:" in second
+
+
+def numbers(text):
+    return {float(found.replace("−", "-")) for found in NUMBER.findall(text)}
+
+
+def printed(lesson, robot, outline):
+    """The parts of a sheet, and all numbers beside them, on the page and in LaTeX, at the poses of the lesson."""
+    poses = {step.pose.q for step in outline.steps if step.pose is not None} | {tuple(robot.q_home.tolist())}
+    parts = [f"{part.text} {' '.join(q.prompt for q in part.questions)}" for part in parts_of(outline)]
+    around = set()
+    for q in sorted(poses):
+        sheet = replace(as_sheet(lesson, robot, q=np.array(q)), parts=())
+        first = latex(sheet).split(r"\newpage")[0]
+        plain = re.sub(r"\\begin{tikzpicture}.*\\end{tikzpicture}", " ", first, flags=re.DOTALL)
+        around |= numbers("".join(parsed(page_html(sheet))[0].itertext())) | numbers(re.sub("[{}]", " ", plain))
+    return parts, around
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+def test_a_sheet_prints_nothing_that_it_asks(lesson):
+    """Other numbers may equal an answer by chance, but not on half of the arms that have the question."""
+    hits, asked = Counter(), Counter()
+    for robot in CLASSICS:
+        outline = lesson.outline(robot, DEFAULT_UNITS)
+        parts, around = printed(lesson, robot, outline)
+        for key, question in outline.questions():
+            if not isinstance(question, Number) or (question.unit == PLAIN and question.tolerance == WHOLE):
+                continue
+            answer = question.answer * question.unit.scale
+            near = min(question.tolerance * question.unit.scale, 0.005 * abs(answer))
+            if abs(answer) < 1e-6 or (answer == round(answer) and abs(answer) <= SMALL):
+                continue
+            at = len(outline.steps) if key[0] == "c" else int(key) - 1
+            others = numbers(" ".join(part for k, part in enumerate(parts) if k != at))
+            shown = (around | others) - numbers(f"{parts[at]} {question.prompt}")
+            asked[key] += 1
+            hits[key] += any(abs(x - answer) <= near for x in shown)
+    leaks = {key for key, count in hits.items() if asked[key] > 2 and 2 * count >= asked[key]}
+    assert leaks == {key for name, key in CHANCE if name == lesson.key}, hits
 
 
 def test_the_page_has_the_units_of_the_reader():
@@ -93,7 +149,7 @@ def test_equations_are_on_the_sheet_with_their_corrections_among_the_solutions()
 @pytest.fixture
 def worksheets():
     stage = MagicMock(now=Arm(PIONEER, PIONEER.q_home, PIONEER.q_home), units=DEFAULT_UNITS)
-    lesson = SimpleNamespace(key="dh", formulas=tuple, left="table")
+    lesson = SimpleNamespace(key="dh", formulas=tuple, left=lambda robot: "table")
     made = Worksheets(stage, lesson, MagicMock())
     made.sheet = lambda: Sheet("An arm", PIONEER, np.array(PIONEER.q_home), DEFAULT_UNITS)
     return made

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
 import pytest
 from page import Tab
-from playwright.sync_api import expect
+from playwright.sync_api import Browser, expect
 
+import kin
+from app.exports.worksheet import Sheet
+from app.viewer.lessons import LESSONS
+from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.views.templates import render
+from app.viewer.worksheet.feature import parts_of
+from app.viewer.worksheet.views import page_html
+from kin.units import DEFAULT_UNITS
 
 pytestmark = pytest.mark.browser
+ROOT = Path(__file__).parents[3]
 
 
 def test_the_worksheet_of_a_lesson_is_printed_and_saved(tab: Tab) -> None:
@@ -56,3 +68,66 @@ def test_a_sheet_that_says_not_now_offers_no_print(tab: Tab) -> None:
         expect(sheet.locator("article")).to_have_count(1)
         expect(sheet.get_by_role("button", name="Print")).to_have_count(count)
     sheet.close()
+
+
+# The page as columns of the size of a sheet's text: they are filled by the rules by which pages are.
+COLUMNS = """main { width: %(width)smm; height: %(height)smm; column-width: %(width)smm; }
+main { column-gap: 0; column-fill: auto; }
+.solutions { break-before: column; }"""
+DIVIDED = """() => {
+  const page = document.querySelector('main'), { left, width } = page.getBoundingClientRect();
+  const columns = (node) => {
+    const range = document.createRange();
+    range.selectNodeContents(node);
+    const boxes = [...range.getClientRects()].filter((box) => box.width);
+    return new Set(boxes.map((box) => Math.floor((box.left - left + 1) / width)));
+  };
+  const texts = [...page.querySelectorAll('p, li, h1, h2, th, td, figcaption, .question')];
+  const after = (head) => head.nextElementSibling.firstElementChild ?? head.nextElementSibling;
+  const alone = (head) => Math.max(...columns(head)) < Math.min(...columns(after(head)));
+  const words = (nodes) => nodes.map((node) => node.textContent);
+  return {
+    count: 1 + Math.max(...texts.flatMap((node) => [...columns(node)])),
+    divided: words(texts.filter((node) => columns(node).size > 1)),
+    alone: words([...page.querySelectorAll('h2')].filter(alone)),
+  };
+}"""
+PAPERS = {"A4": (210, 297), "Letter": (215.9, 279.4)}
+MARGINS = (15, 16)  # of @page in static/sheet.css, mm: at the sides, above and below
+CSS = (ROOT / "static" / "sheet.css").read_text()
+
+
+def divided(browser: Browser, pages: Sequence[str], css: str = CSS) -> dict[tuple[int, str], dict[str, object]]:
+    """What is divided between pages of each sheet, on each paper; the count of pages is that of the PDF."""
+    found, page = {}, browser.new_page()
+    page.emulate_media(media="print")
+    for number, html in enumerate(pages):
+        for paper, (width, height) in PAPERS.items():
+            page.set_content(f"<!doctype html><style>{css}</style><main>{html}</main>")
+            printed = page.pdf(format=paper, prefer_css_page_size=False)
+            size = {"width": width - 2 * MARGINS[0], "height": height - 2 * MARGINS[1]}
+            page.add_style_tag(content=COLUMNS % size)
+            found[number, paper] = page.evaluate(DIVIDED)
+            found[number, paper]["pages"] = len(re.findall(rb"/Type\s*/Page\b", printed))
+    page.close()
+    return found
+
+
+def sheet_of(lesson: type[Lesson], robot: kin.Robot) -> str:
+    outline = lesson.outline(robot, DEFAULT_UNITS)
+    parts, left = parts_of(outline), lesson.left(robot)
+    return page_html(Sheet(lesson.title, robot, robot.q_home, DEFAULT_UNITS, outline.goal, parts, (), left))
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+def test_no_page_ends_inside_a_sentence(browser: Browser, lesson: type[Lesson]) -> None:
+    sheets = [sheet_of(lesson, kin.get_robot(name)) for name in ("pioneer5", "planar2r", "redundant7-craig")]
+    for at, found in divided(browser, sheets).items():
+        assert found["divided"] == found["alone"] == [], at
+        assert 2 <= found["count"] == found["pages"], at
+
+
+def test_without_its_rules_a_sheet_is_divided(browser: Browser) -> None:
+    css = re.sub(r"break-(?:inside|after): avoid;", "", CSS)
+    sheets = [sheet_of(lesson, kin.get_robot("ur5")) for lesson in LESSONS]
+    assert any(found["divided"] for found in divided(browser, sheets, css).values())

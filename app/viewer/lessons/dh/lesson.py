@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Hashable, Sequence
 
+from app.exports.worksheet import Left
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Html, Node
 from app.viewer.declared.scene import Lazy
@@ -28,7 +29,7 @@ from app.viewer.lessons.dh.steps import length
 from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.scene.meshes import body
-from kin import InputError
+from kin import InputError, Robot
 
 FRAME = 1 / 30  # s between frames while playing
 MOTION_HINT = "Back and Next: to the end of the previous or next motion"
@@ -40,7 +41,6 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
     key = "dh"
     title = "DH table step by step"
     computes = False
-    left = "table"
     about = "How four motions per row lead from the base to the tool, one after another."
     messages = frozenset({"choose", "check", "show", "back", "restart"})
     outline = staticmethod(outline)
@@ -50,6 +50,10 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
     def __init__(self, stage: Stage) -> None:
         self._camera = BothInView(stage)
         super().__init__(stage)
+
+    @staticmethod
+    def left(robot: Robot) -> Left:
+        return "table"
 
     def started(self) -> None:
         robot = self.stage.now.robot

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.equations import Book, DerivationError, TooManyRowsError, book_later
-from app.exports.worksheet import Formula
+from app.exports.worksheet import Formula, Left
 from app.shared.computations import Subscription
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Control, Folder, Html, Node
@@ -24,6 +24,7 @@ from app.viewer.lessons.equations.questions import outline
 from app.viewer.lessons.equations.settings import EquationsSettings
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel.status import Notice
+from kin import Robot
 
 AFTER_EDIT = 0.5  # s without another change of the visitor's own arm, before its equations are derived
 # Vermilion and bluish green, darkened because the scene applies gamma to lines.
@@ -43,6 +44,10 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
     settings_of, facts_of = EquationsSettings, EquationsFacts
     _derivation: Subscription[Book] | None = None
     _derive_at: float | None = None  # of `time.perf_counter`
+
+    @staticmethod
+    def left(robot: Robot) -> Left:
+        return "pose"
 
     def started(self) -> None:
         robot, own = self.stage.now.robot, self.stage.own

@@ -31,14 +31,14 @@ def outline(robot: Robot, units: Units) -> Outline:
 def facts(robot: Robot, units: Units) -> LessonFacts:
     """What the file declares."""
     T = fk(robot, robot.q_home)
-    a = np.cross(T[:3, 0], T[:3, 1])
-    k, tested = int(np.argmax(np.abs(a))), int(np.argmax(np.abs(T[:3, 0])))
+    n = np.cross(T[:3, 1], T[:3, 2])
+    k = int(np.argmax(np.abs(n)))
     i, j = "xyz"[(k + 1) % 3], "xyz"[(k + 2) % 3]
     entry = int(np.argmax(np.abs(T[:3, 3])))
     hidden = without(robot, entry)
-    product = flipped(T, tested, 0)
+    product = flipped(T, k, 0)
     numbers: dict[str, float | Quantity] = {
-        "largest": float(a[k]),
+        "largest": float(n[k]),
         "found": float(product > NEARLY),
         "entry": entry + 1.0,
         "hidden": float(hidden is not None),
@@ -47,11 +47,11 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     }
     words = {
         "p": "(" + ", ".join(units.lengths.number(v) for v in T[:3, 3].tolist()) + f"){units.lengths.suffix}",
-        **{f"{name}_column": _vector(T[:3, column]) for column, name in enumerate("noa")},
+        **{f"{name}_column": _vector(T[:3, column]) for column, name in ((1, "o"), (2, "a"))},
         "entry_name": f"p{'xyz'[entry]}",
         "component": "xyz"[k],
-        "terms": f"n{i} o{j} − n{j} o{i}",
-        "tested": f"n{'xyz'[tested]}",
+        "terms": f"o{i} a{j} − o{j} a{i}",
+        "tested": f"n{'xyz'[k]}",
         "product": fixed(product, 3),
     }
     there = robot.q_home if hidden is None else hidden

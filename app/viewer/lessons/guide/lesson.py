@@ -21,11 +21,14 @@ class Lesson(Feature, ABC):
     Attributes:
         computes: whether it solves the pose, or has a scene of its own. Links do not open it for visitors who may
             only look.
-        left: what its worksheet leaves to the student besides the questions.
     """
 
     computes: ClassVar[bool] = True
-    left: ClassVar[Left] = "nothing"
+
+    @staticmethod
+    def left(robot: Robot) -> Left:
+        """What its worksheet leaves to the student besides the questions."""
+        return "nothing"
 
     def on_steps(self, progress: Progress) -> Outline | None:
         """The steps are about to be shown, after an answer for example; returns another outline to go on with."""

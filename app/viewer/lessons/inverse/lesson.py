@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 import kin
+from app.exports.worksheet import Left
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Buttons, Control, Html, Node
 from app.viewer.declared.scene import Lazy
@@ -47,7 +48,6 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
 
     key = "inverse"
     title = "Inverse kinematics step by step"
-    left = "configuration"
     about = "From a target to the joint angles by hand, and where each solution comes from."
     outline = staticmethod(outline)
     settings_of, facts_of = InverseSettings, InverseFacts
@@ -58,6 +58,10 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         self._restart = self._drawn = False
         self._arms: dict[Robot, InverseSettings] = {}  # what was asked and followed on other arms
         super().__init__(stage)
+
+    @staticmethod
+    def left(robot: Robot) -> Left:
+        return "configuration"
 
     def started(self) -> None:
         self._robot = self.stage.now.robot

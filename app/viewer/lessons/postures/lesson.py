@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from typing import ClassVar
 
 import kin
+from app.exports.worksheet import Left
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Lazy
@@ -24,6 +25,7 @@ from app.viewer.lessons.postures import remedies
 from app.viewer.lessons.postures.directions import Cone, cone_html, has_cone
 from app.viewer.lessons.postures.facts import PosturesFacts
 from app.viewer.lessons.postures.ghosts import ghosts
+from app.viewer.lessons.postures.planar import is_planar
 from app.viewer.lessons.postures.questions import outline
 from app.viewer.lessons.postures.remedies import Remedy, Request
 from app.viewer.lessons.postures.settings import PosturesSettings
@@ -31,7 +33,7 @@ from app.viewer.lessons.postures.survey import html
 from app.viewer.panel.posture import short
 from app.viewer.panel.status import Notice
 from app.viewer.views.templates import render
-from kin import IKResult
+from kin import IKResult, Robot
 from kin.warmup import ALL
 
 CONE_INTERVAL = 0.2
@@ -53,6 +55,10 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
     settings_of, facts_of = PosturesSettings, PosturesFacts
     undo: ClassVar[dict[str, str]] = {"on_go": "Posture", "on_remedy": "Remedy"}
     pace = 0.1
+
+    @staticmethod
+    def left(robot: Robot) -> Left:
+        return "configuration" if is_planar(robot) else "nothing"
 
     def started(self) -> None:
         self._result: IKResult | None = None

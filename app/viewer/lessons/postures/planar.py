@@ -57,7 +57,7 @@ def facts(robot: Robot, units: Units) -> tuple[dict[str, float], dict[str, str]]
         "l2_shown": length.text(l2),
         "ring_inside": length.text(abs(l1 - l2)),
         "ring_outside": length.text(l1 + l2),
-        "theta2_shown": units.angles.text(float(q[1])),
+        "theta2_sign": "positive" if q[1] > 0.0 else "negative",
         "point": "the tool point" if robot.n == 2 else "axis 3",
         "place": f"({length.number(x)}, {length.number(y)}){length.suffix}",
     }

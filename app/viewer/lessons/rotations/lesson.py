@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from app.exercises.typed import EntryError
+from app.exports.worksheet import Left
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Folder, Html, Node
 from app.viewer.declared.scene import Lazy
@@ -28,6 +29,7 @@ from app.viewer.lessons.rotations.turning import FRAME, Turning
 from app.viewer.lessons.rotations.typed import read_rotation
 from app.viewer.panel.status import Notice
 from app.viewer.scene.meshes import body
+from kin import Robot
 from kin.transforms import Array
 
 ACT_HINT = "Set: take the typed numbers. From tool: the orientation of the tool. To target: turn the target so."
@@ -47,6 +49,10 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
     undo: ClassVar[dict[str, str]] = dict.fromkeys(
         ("on_add", "on_remove", "on_swap", "on_clear"), "Chain of frames"
     )
+
+    @staticmethod
+    def left(robot: Robot) -> Left:
+        return "pose"
 
     def started(self) -> None:
         self._error = ""

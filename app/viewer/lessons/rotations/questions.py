@@ -48,16 +48,17 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     q = example(robot)
     T, start = fk(robot, q), as_configuration(q)
     R, p = T[:3, :3], T[:3, 3]
-    row = int(np.argmax(np.abs(R[:, 2])))
-    between = math.acos(max(-1.0, min(1.0, float(R[row, 2]))))
     i, j = max(((0, 1), (0, 2), (1, 2)), key=lambda at: abs(abs(R[at]) - abs(R[at[::-1]])))
     theta, back = axis_angle(R)[1], inverse(T)[:3, 3]
     k = int(np.argmax(np.abs(back)))
+    row, column = _first_entry(R, k, {(i, j), (j, i), (2, 0), (2, 2)})
+    between = math.acos(max(-1.0, min(1.0, float(R[row, column]))))
     numbers = {
         "upright": np.sort(np.abs(R[:, 2]))[1] < 1e-6,
         "row": row + 1,
-        "entry": R[row, 2],
-        "exchanged": R[2, row],
+        "at": column + 1,
+        "entry": R[row, column],
+        "exchanged": R[column, row],
         "between": between,
         "i": i + 1,
         "j": j + 1,
@@ -78,7 +79,8 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     words = {
         "fixed_axis": "xyz"[row],
         "angle_between": units.angles.text(between, 1),
-        "z_axis": _vector(R[:, 2]),
+        "own_axis": "xyz"[column],
+        "own_vector": _vector(R[:, column]),
         "name_ij": _entry(i, j),
         "name_ji": _entry(j, i),
         "shown_ij": fixed(float(R[i, j])),
@@ -96,6 +98,12 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     values: dict[str, float | Quantity] = {name: float(value) for name, value in numbers.items()}
     found = {**values, "far": Quantity(slide_of(robot), "length")}
     return LessonFacts(found, {}, words, poses, leads=leads(robot, T))
+
+
+def _first_entry(R: Array, k: int, given: set[tuple[int, int]]) -> tuple[int, int]:
+    """Row and column of the largest entry of R ``(3, 3)`` that no other step gives: those, or column `k`."""
+    places = [(i, j) for i in range(3) for j in range(3) if j != k and (i, j) not in given]
+    return max(places, key=lambda at: abs(float(R[at])))
 
 
 def _poses(robot: Robot, start: Configuration, R: Array) -> dict[str, Pose]:

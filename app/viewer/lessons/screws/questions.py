@@ -76,11 +76,12 @@ def _far(robot: Robot, S: Array, units: Units) -> tuple[dict[str, float], dict[s
     """What is asked about the axis that is farthest from the origin; `far` is 0 if there is none."""
     joint = far_joint(S)
     if joint < 0:
-        names = ("far_distance", "far_origin", "far_component", "near")
-        words = ("far_omega", "far_point", "near_axis", "near_v")
+        names = ("far_distance", "far_origin", "far_component", "near_joint", "near")
+        words = ("far_omega", "far_point", "near_axis", "near_omega", "near_v")
         return {"far": 0.0, **dict.fromkeys(names, math.nan)}, dict.fromkeys(words, "")
     omega, v, point = S[:3, joint], S[3:, joint], axes_at(robot, np.zeros(robot.n))[0][joint]
-    nearest = foot(S[:, joint])
+    other = _other_far(S, joint, point)
+    nearest = foot(S[:, other])
     axis = int(np.argmax(np.abs(nearest)))
     place = ", ".join(units.lengths.number(value) for value in point.tolist())
     numbers = {
@@ -88,14 +89,25 @@ def _far(robot: Robot, S: Array, units: Units) -> tuple[dict[str, float], dict[s
         "far_distance": float(np.linalg.norm(v)),
         "far_origin": float(np.linalg.norm(point)),
         "far_component": float(np.abs(v).max()),
+        "near_joint": other + 1.0,
         "near": float(nearest[axis]),
     }
     return numbers, {
         "far_omega": _vector(omega),
         "far_point": f"({place}){units.lengths.suffix}",
         "near_axis": "xyz"[axis],
-        "near_v": _vector(v),
+        "near_omega": _vector(S[:3, other]),
+        "near_v": _vector(S[3:, other]),
     }
+
+
+def _other_far(S: Array, far: int, point: Array) -> int:
+    """Another joint that turns, far from the origin, whose nearest point has no number of `point`; else `far`."""
+    for joint in np.argsort(-np.linalg.norm(S[3:], axis=0)).tolist():
+        nearest = float(np.abs(foot(S[:, joint])).max())
+        if joint != far and nearest > 10.0 * LEAST and (abs(nearest - np.abs(point)) > 0.03 * nearest).all():
+            return int(joint)
+    return far
 
 
 def far_apart(S: Array) -> list[int]:

@@ -353,7 +353,7 @@ def test_equations_numbers(robot: Robot) -> None:
     question = outline.steps[2].question
     assert isinstance(question, Number)
     component = "xyz".index(question.prompt.split()[2][1])
-    assert found["3"] == pytest.approx(T[component, 2], abs=1e-12)
+    assert found["3"] == pytest.approx(T[component, 0], abs=1e-12)
     assert found["c1"] == pytest.approx(0.0, abs=1e-9)
     q = robot.random_q(np.random.default_rng(9), 20)
     with_joint_1 = q.copy()

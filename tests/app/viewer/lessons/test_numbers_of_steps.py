@@ -174,10 +174,13 @@ def rows_of(h: Here, m: Sequence[str]) -> list[float]:
 SENTENCES: dict[str, tuple[Sentence, ...]] = {
     "rotations": (
         (
-            rf"at an angle of {N}° to the fixed ([xyz])",
-            lambda h, m: [*deg(math.acos(h.T["xyz".index(m[1]), 2])), m[1]],
+            rf"tool’s ([xyz]) axis is at an angle of {N}° to the fixed ([xyz])",
+            lambda h, m: [m[0], *deg(math.acos(h.T["xyz".index(m[2]), "xyz".index(m[0])])), m[2]],
         ),
-        (rf"the tool’s z axis, is {TRIPLE}", lambda h, m: h.T[:3, 2].tolist()),
+        (
+            rf"Column {N}, the tool’s ([xyz]) axis, is {TRIPLE}",
+            lambda h, m: [1 + "xyz".index(m[1]), m[1], *h.T[:3, "xyz".index(m[1])]],
+        ),
         (rf"r([₁₂₃])([₁₂₃]) = {N}", lambda h, m: [m[0], m[1], h.T[LOW.index(m[0]) - 1, LOW.index(m[1]) - 1]]),
         (rf"the trace is {N}", lambda h, m: [np.trace(h.T[:3, :3])]),
         (rf"cos(?: θ =|ine is) {N}", lambda h, m: [(np.trace(h.T[:3, :3]) - 1) / 2]),
@@ -213,7 +216,7 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
     "equations": (
         (rf"At home the tool points along {TRIPLE}", lambda h, m: h.T[:3, 2].tolist()),
         (rf"the equations of p give {TRIPLE} mm", lambda h, m: mm(h.T[:3, 3])),
-        (rf"n(?: is the tool’s x axis, here|\s=) {TRIPLE}", lambda h, m: h.T[:3, 0].tolist()),
+        (rf"a = {TRIPLE}", lambda h, m: h.T[:3, 2].tolist()),
         (rf"o(?: is the tool’s y axis, here|\s=) {TRIPLE}", lambda h, m: h.T[:3, 1].tolist()),
     ),
     "inverse": (
@@ -241,8 +244,8 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
         ),
         (rf"come to \(x, y\) = \({N}, {N}\) mm", lambda h, m: mm(elbow_end(h, h.end))),
         (
-            rf"stays at \(x, y\) = \({N}, {N}\) mm. At home, θ₂ is {N}°",
-            lambda h, m: [*mm(elbow_end(h, h.q)), *deg(h.q[1])],
+            rf"stays at \(x, y\) = \({N}, {N}\) mm",
+            lambda h, m: mm(elbow_end(h, h.q)),
         ),
     ),
     "redundancy": ((rf"The arm has {N} joints", lambda h, m: [h.robot.n]),),
@@ -498,7 +501,7 @@ def shortest(h: Here) -> float:
 
 
 ANSWERS: dict[tuple[str, str], Callable[[Here], float]] = {
-    ("rotations", "Columns"): lambda h: entry(h, (int(prompted(h, r"row (\d)")[0]), 3)),
+    ("rotations", "Columns"): lambda h: entry(h, tuple(map(int, prompted(h, r"row (\d) and column (\d)")))),  # type: ignore[arg-type]
     ("rotations", "The inverse"): inverse_entry,
     ("rotations", "Roll pitch yaw"): lambda h: math.atan2(-h.T[2, 0], math.hypot(h.T[0, 0], h.T[1, 0])),
     ("rotations", "The same in Z-Y-Z"): lambda h: math.atan2(math.hypot(h.T[0, 2], h.T[1, 2]), h.T[2, 2]),
@@ -517,7 +520,7 @@ ANSWERS: dict[tuple[str, str], Callable[[Here], float]] = {
     ("screws", "Body form"): body_v,
     ("equations", "The tool point"): lambda h: float(np.linalg.norm(h.T[:3, 3])),
     ("equations", "A column from two others"): lambda h: float(
-        h.T["xyz".index(prompted(h, r"the ([xyz]) component of a")[0]), 2]
+        h.T["xyz".index(prompted(h, r"the ([xyz]) component of n")[0]), 0]
     ),
     ("redundancy", "Joints and conditions"): lambda h: at_rest(h, 6),
     ("redundancy", "Only the point"): lambda h: at_rest(h, 3),
