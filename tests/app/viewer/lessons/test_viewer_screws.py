@@ -156,6 +156,7 @@ def test_the_questions_by_another_way(robot: kin.Robot) -> None:
         assert far.answer == pytest.approx(np.linalg.norm(np.cross(point, z)), abs=1e-12)
         near = asked["c4"]
         assert isinstance(near, Number)
+        point, z = line(int(near.prompt.split("joint ")[1].split(",")[0]) - 1)
         across = point - (point @ z) * z
         assert near.answer == pytest.approx(across["xyz".index(near.prompt.split("its ")[1][0])], abs=1e-12)
     else:

@@ -237,8 +237,9 @@ def test_numbers_of_the_questions(robot: Robot) -> None:
     R, p = T[:3, :3], T[:3, 3]
     turn = Rotation.from_matrix(R)
     found = {k: q.answer for k, q in outline.questions() if isinstance(q, Number)}
-    row = "xyz".index(re.search(r"fixed (\w) axis", outline.steps[0].text)[1])  # type: ignore[index, union-attr]
-    assert found["1"] == pytest.approx(R[row] @ [0.0, 0.0, 1.0])
+    named = re.search(r"tool’s (\w) axis is at an angle of .* to the fixed (\w) axis", outline.steps[0].text)
+    own, fixed = np.eye(3)[["xyz".index(name) for name in named.groups()]]  # type: ignore[union-attr]
+    assert found["1"] == pytest.approx(fixed @ R @ own)
     i, j = (int(v) - 1 for v in re.findall(r"(?:row|column) (\d)", outline.steps[1].question.prompt))  # type: ignore[union-attr]
     assert found["2"] == pytest.approx(np.linalg.inv(R)[i, j])
     roll, pitch, yaw = roll_pitch_yaw(R)
