@@ -1,12 +1,16 @@
 """What a release offered is there in every later one, as docs/stability.md promises.
 
-``tests/data/releases`` has a folder for each release: its surface as ``scripts/surface.py`` writes it, its robot
-files with poses that it computed, and links that its page gave out. A deprecated name still counts as there.
+``tests/data/releases`` has a folder for each release, which ``scripts/release.py`` writes: its surface as
+``scripts/surface.py`` has it, its robot files with poses that it computed, and links that its page gave out. A
+deprecated name still counts as there.
 """
 
 from __future__ import annotations
 
+import datetime
 import json
+import re
+import shutil
 import warnings
 from pathlib import Path
 from typing import Any
@@ -17,9 +21,11 @@ import pytest
 import kin
 from app.shared.store import Store
 from app.viewer.session.state import decode
+from scripts import release as releasing
 from scripts import surface
 
-DATA = Path(__file__).parent / "data" / "releases"
+ROOT = Path(__file__).parents[1]
+DATA = ROOT / "tests" / "data" / "releases"
 RELEASES = sorted(path.name for path in DATA.iterdir())
 ROBOTS = sorted(path.relative_to(DATA).as_posix() for path in DATA.glob("*/robots/*.toml"))
 
@@ -128,8 +134,11 @@ def test_commands_of_a_release_still_have_their_options(now, release):
 @pytest.mark.parametrize("file", ROBOTS)
 def test_a_robot_file_of_a_release_is_the_same_arm(file):
     release, _, name = file.split("/")
-    arm = kin.load_robot(DATA / file)
-    known = read(release, "poses.json")[name.removesuffix(".toml")]
+    assert_same_arm(DATA / file, read(release, "poses.json")[name.removesuffix(".toml")])
+
+
+def assert_same_arm(file: Path, known: dict[str, Any]) -> None:
+    arm = kin.load_robot(file)
     np.testing.assert_allclose(kin.fk(arm, known["q"]), known["T"], rtol=0, atol=1e-12)
     np.testing.assert_allclose(kin.fk(arm.id, known["q"]), known["T"], rtol=0, atol=1e-12)
 
@@ -138,7 +147,10 @@ def test_a_robot_file_of_a_release_is_the_same_arm(file):
     ("release", "case"), [(release, case) for release in RELEASES for case in read(release, "links.json")]
 )
 def test_a_link_of_a_release_still_opens(release, case):
-    showed = read(release, "links.json")[case]
+    assert_opens(read(release, "links.json")[case])
+
+
+def assert_opens(showed: dict[str, Any]) -> None:
     page = decode(showed["link"], Store().robots)
     assert (page.robot, page.task, page.branch, page.lesson) == tuple(
         showed[name] for name in ("robot", "task", "branch", "lesson")
@@ -151,3 +163,72 @@ def test_a_link_of_a_release_still_opens(release, case):
         assert (value is None) == (showed[name] is None), name
         if value is not None:
             np.testing.assert_allclose(value, showed[name], rtol=0, atol=digits, err_msg=name)
+
+
+# How a release is made
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """The files that name the version."""
+    for name, _, _ in releasing.PLACES:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / name, tmp_path / name)
+    return tmp_path
+
+
+def test_a_release_has_its_version_and_date_in_every_place(checkout):
+    before = {name: (checkout / name).read_text(encoding="utf-8") for name, _, _ in releasing.PLACES}
+    releasing.set_version(checkout, "9.8.7", datetime.date(2031, 2, 3))
+    after = {name: (checkout / name).read_text(encoding="utf-8") for name in before}
+    assert after["kin/_version.py"] == '__version__ = "9.8.7"\n'
+    assert "\nARG VERSION=9.8.7\n" in after["Dockerfile"]
+    assert {"version: 9.8.7", "date-released: 2031-02-03"} <= set(after["CITATION.cff"].splitlines())
+    headings = re.findall(r"^## .*", after["CHANGELOG.md"], re.MULTILINE)
+    assert headings[:2] == ["## [Unreleased]", "## [9.8.7] – 2031-02-03"]
+    assert '"Development Status :: 5 - Production/Stable"' in after["pyproject.toml"]
+    for name, text in after.items():
+        same = set(before[name].splitlines()) & set(text.splitlines())
+        assert len(set(before[name].splitlines()) - same) <= 2, f"{name} lost more than its version"
+
+
+@pytest.mark.parametrize(("version", "said"), [("0.2.0", "not newer"), ("0.1.9", "not newer"), ("1.0", "such as")])
+def test_what_is_no_newer_version_is_refused_and_changes_nothing(checkout, version, said):
+    (checkout / "kin/_version.py").write_text('__version__ = "0.2.0"\n', encoding="utf-8")
+    before = {name: (checkout / name).read_bytes() for name, _, _ in releasing.PLACES}
+    with pytest.raises(ValueError, match=said):
+        releasing.set_version(checkout, version, datetime.date(2031, 2, 3))
+    assert before == {name: (checkout / name).read_bytes() for name in before}
+
+
+def test_a_file_without_a_place_for_the_version_is_named(checkout):
+    (checkout / "CITATION.cff").write_text("title: Kinboard\n", encoding="utf-8")
+    old = (checkout / "kin/_version.py").read_bytes()
+    with pytest.raises(ValueError, match=r"CITATION\.cff has 0 places"):
+        releasing.set_version(checkout, "9.8.7", datetime.date(2031, 2, 3))
+    assert (checkout / "kin/_version.py").read_bytes() == old
+
+
+def test_a_release_leaves_what_later_versions_are_held_to(tmp_path, now):
+    (tmp_path / "0.1.0" / "robots").mkdir(parents=True)
+    old = [arm.id for arm in kin.builtin_robots().values() if arm.id not in ("ur5", "gantry", "sawyer")]
+    for name in old:
+        (tmp_path / "0.1.0" / "robots" / f"{name}.toml").touch()
+    folder = releasing.write_evidence(tmp_path, "9.8.7")
+    found = {path.name: json.loads(path.read_text(encoding="utf-8")) for path in folder.glob("*.json")}
+    assert found["surface.json"] == now | {"version": "9.8.7"}
+    assert sorted(found["poses.json"]) == ["gantry", "sawyer", "ur5"]
+    for name, known in found["poses.json"].items():
+        assert np.shape(known["T"]) == (3, 4, 4)
+        assert_same_arm(folder / "robots" / f"{name}.toml", known)
+    assert set(found["links.json"]) >= set(read("0.2.0", "links.json"))
+    for showed in found["links.json"].values():
+        assert_opens(showed)
+
+
+def test_the_page_about_the_new_version_has_one_name_and_is_not_of_an_old_one():
+    title = re.match(r"# New in (\d+)\.(\d+)\n", (ROOT / "docs/new.md").read_text(encoding="utf-8"))
+    name = f"{title[1]}.{title[2]}"
+    assert f"[new in {name}](docs/new.md)" in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"- New in {name}: new.md\n" in (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert (int(title[1]), int(title[2])) >= tuple(int(part) for part in kin.__version__.split(".")[:2])
