@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+import time
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -14,7 +16,7 @@ import kin
 
 sys.path.insert(0, str(Path(__file__).parent))
 from evidence import __main__ as evidence
-from evidence import counting
+from evidence import counting, times
 
 ROOT = Path(__file__).parents[2]
 
@@ -74,3 +76,84 @@ def test_counts_add_up_and_are_printed():
 )
 def test_shares_do_not_round_to_all_or_none(part, whole, text):
     assert evidence.share(part, whole) == text
+
+
+# Times
+
+
+def test_the_times_of_the_page_are_those_of_the_recorded_run():
+    page = evidence.PAGE.read_text(encoding="utf-8")
+    shown = page.split(times.BEGIN)[1].split(times.END)[0]
+    if not times.RECORD.exists():
+        assert shown == "", "figures without a run behind them"
+        return
+    record = json.loads(times.RECORD.read_text(encoding="utf-8"))
+    assert shown == times.section(record)
+    assert times.why_not(record["run"]) == ""
+    assert set(record["rows"]) == {arm.id for arm in times.arms()}
+
+
+@pytest.fixture
+def measured(monkeypatch, tmp_path):
+    """Runs the command on one arm, in turns of a moment; returns its exit code and the page."""
+    page = tmp_path / "evidence.md"
+    page.write_text(f"before\n{times.BEGIN}{times.END}after\n", encoding="utf-8")
+    monkeypatch.setattr(evidence, "PAGE", page)
+    monkeypatch.setattr(times, "RECORD", tmp_path / "times.json")
+    monkeypatch.setattr(times, "arms", lambda: [kin.get_robot("planar2r")])
+    whole = times.run
+    monkeypatch.setattr(times, "run", lambda arms: whole(arms, rounds=3, turn=1e-4))
+
+    def run(*words):
+        monkeypatch.setattr(sys, "argv", ["evidence", "--times", *words])
+        return evidence.main(), page.read_text(encoding="utf-8")
+
+    return run
+
+
+def test_times_of_an_idle_machine_are_recorded_with_its_name(measured, monkeypatch):
+    monkeypatch.setattr(times, "busy_seconds", times.own_seconds)
+    monkeypatch.setattr(times, "commit", lambda: "0123abcd")
+    code, page = measured("--record")
+    record = json.loads(times.RECORD.read_text(encoding="utf-8"))
+    assert code == 0
+    assert page == f"before\n{times.BEGIN}{times.section(record)}{times.END}after\n"
+    about, row = record["run"], record["rows"]["planar2r"]
+    for said in (about["processor"], f"{about['cores']} cores", f"numba {about['numba']}", "commit 0123abcd"):
+        assert said in page
+    assert row["family"] == "pair2"
+    assert 1e-8 < row["pose"] < row["answer"]
+    assert (row["in_batch"] > 0.0, row["batch"] >= 64) == (True, True)
+
+
+@pytest.mark.parametrize(
+    ("busy", "commit", "said"),
+    [(2.0, "0123abcd", "other processes used"), (0.0, "0123abcd+", "kin/ or app/ has changes")],
+)
+def test_times_beside_other_work_or_of_changed_code_are_not_recorded(
+    measured, monkeypatch, capsys, busy, commit, said
+):
+    def busy_seconds():
+        return times.own_seconds() + busy * time.perf_counter()
+
+    monkeypatch.setattr(times, "busy_seconds", busy_seconds)
+    monkeypatch.setattr(times, "commit", lambda: commit)
+    code, page = measured("--record")
+    assert code == 1
+    assert page == f"before\n{times.BEGIN}{times.END}after\n"
+    assert not times.RECORD.exists()
+    assert f"not recorded: {said}" in capsys.readouterr().err
+    assert measured()[0] == 0
+
+
+def test_a_part_is_never_recorded(measured, capsys):
+    with pytest.raises(SystemExit):
+        measured("--record", "--only", "planar2r")
+    assert "without --only" in capsys.readouterr().err
+
+
+def test_processor_time_is_read_as_the_kernel_writes_it(tmp_path):
+    stat = tmp_path / "stat"
+    stat.write_text("cpu  100 20 30 9000 400 5 6 7 0 0\ncpu0 1 2 3\n", encoding="utf-8")
+    assert times.busy_seconds(stat) == 168 / os.sysconf("SC_CLK_TCK")
+    assert times.busy_seconds() > times.own_seconds() > 0.0

@@ -10,6 +10,7 @@ value of the Jacobian below 0.001, are left out: there postures merge. So are ra
 tool in fewer directions than they are: they meet each pose in infinitely many ways.
 
 ``--record`` writes the counts to ``tests/data/evidence.json`` and the table into ``docs/background/evidence.md``.
+``--times`` measures instead how long answers take (`evidence.times`), and records them from an idle machine only.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ import numpy as np
 ROOT = Path(__file__).parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "bench")]
 
+from evidence import times  # noqa: E402
 from evidence.counting import questions, tallies  # noqa: E402
 
 import kin  # noqa: E402
@@ -68,8 +70,13 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the configurations (1)")
     parser.add_argument("--processes", type=int, default=2, help="at a time (2)")
     parser.add_argument("--only", help="kinds whose name contains this text")
+    parser.add_argument("--times", action="store_true", help="measure times, of one arm of each family")
     parser.add_argument("--record", action="store_true", help="write the file and the page")
     arguments = parser.parse_args()
+    if arguments.record and arguments.only:
+        parser.error("--record is for every kind of arm, without --only")
+    if arguments.times:
+        return measure(arguments)
     asked = [each for each in questions(arguments.targets, arguments.seed) if (arguments.only or "") in each.kind]
     rows = {kind: asdict(tally) for kind, tally in tallies(asked, arguments.processes).items()}
     print(table(rows))
@@ -78,11 +85,26 @@ def main() -> int:
     return int(any(row["false"] for row in rows.values()))
 
 
+def measure(arguments: argparse.Namespace) -> int:
+    """Print the times, and record them if the machine was idle; 1 if they should be recorded and are not."""
+    found = times.run(arm for arm in times.arms() if (arguments.only or "") in arm.id)
+    print(times.section(found))
+    fault = times.why_not(found["run"])
+    if fault:
+        print(f"evidence: {'not recorded' if arguments.record else 'not to be quoted'}: {fault}.", file=sys.stderr)
+    if fault or not arguments.record:
+        return int(arguments.record)
+    times.RECORD.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_between(times.BEGIN, times.END, times.section(found))
+    return 0
+
+
 def record(rows: dict[str, dict[str, Any]], arguments: argparse.Namespace) -> None:
     """Keep the run, and put its table into the page."""
     about = {
         "version": kin.__version__,
         "date": datetime.date.today().isoformat(),
+        "commit": times.commit(),
         "python": platform.python_version(),
         "numpy": np.__version__,
         "targets": arguments.targets,
@@ -90,8 +112,13 @@ def record(rows: dict[str, dict[str, Any]], arguments: argparse.Namespace) -> No
     }
     text = json.dumps({"run": about, "rows": rows}, indent=1, ensure_ascii=False)
     RECORD.write_text(text + "\n", encoding="utf-8")
-    before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
-    PAGE.write_text(before + BEGIN + table(rows) + END + rest.split(END)[1], encoding="utf-8")
+    write_between(BEGIN, END, table(rows))
+
+
+def write_between(begin: str, end: str, text: str) -> None:
+    """Replace a part of the page."""
+    before, rest = PAGE.read_text(encoding="utf-8").split(begin)
+    PAGE.write_text(before + begin + text + end + rest.split(end)[1], encoding="utf-8")
 
 
 if __name__ == "__main__":
