@@ -28,14 +28,19 @@ LONG = frozenset(
     TESTS / file
     for file in (
         "test_docs.py",
+        "app/api/test_generated_client.py",
         "app/api/test_schemathesis.py",
+        "app/cli/test_cli.py",
         "app/cli/test_xacro.py",
+        "app/service/test_fault_table.py",
         "app/service/test_faults.py",
         "app/service/test_workers.py",
         "app/viewer/room/test_leaks.py",
         "app/viewer/scene/test_viewer_camera.py",
+        "app/viewer/session/test_state.py",
         "app/viewer/tabs/robot/test_uploads.py",
         "bench/test_load.py",
+        "deploy/test_ways_in.py",
         "e2e/classroom/test_class_lines.py",
         "e2e/lessons/test_accessibility.py",
         "e2e/test_dashboard.py",
@@ -62,7 +67,13 @@ def pytest_collection() -> Iterator[None]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: item.path not in LONG)
+    """Begin with the long files; then files of `kin`, which compute, take turns with those that often wait."""
+    files = list(dict.fromkeys(item.path for item in items))
+    computing = {path for path in files if path.is_relative_to(TESTS / "kin")}
+    place = {}
+    for part in ([path for path in files if (path in computing) == computes] for computes in (True, False)):
+        place |= {path: (path not in LONG, i / len(part)) for i, path in enumerate(part)}
+    items.sort(key=lambda item: place[item.path])
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
