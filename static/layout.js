@@ -12,11 +12,10 @@
   const SAVED = "kinboard-sheet";
   const root = document.documentElement;
 
-  // Factors of the text sizes in the tab View, as in layout.css. A large window is often a projector's.
+  // Factors of the text sizes in the tab View, as in layout.css.
   const TEXT = "kinboard-text-size";
   const SIZES = { Normal: 1, Large: 1.3, Projector: 1.7 };
-  const WIDE = matchMedia("(min-width: 1800px) and (min-height: 800px)");
-  let size = WIDE.matches ? "Large" : "Normal";
+  let size = "Normal";
   try {
     const kept = localStorage.getItem(TEXT);
     if (Object.hasOwn(SIZES, kept)) size = kept;

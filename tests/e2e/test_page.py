@@ -183,16 +183,17 @@ def test_the_panel_is_made_wider_at_its_edge(desktop: Tab) -> None:
 
 
 def test_the_panel_is_as_wide_as_the_window_allows_until_a_width_is_chosen(browser: Browser, address: str) -> None:
-    tab = Tab(browser, address, 1920, 760)  # in a higher window, texts are large
+    tab = Tab(browser, address, 1920, 1080)
     width = "document.querySelector('[data-dock-region=right]').offsetWidth"
     for wide, panel in ((1920, 520), (1440, 440), (1280, 380)):
-        tab.page.set_viewport_size({"width": wide, "height": 760})
+        tab.page.set_viewport_size({"width": wide, "height": 1080})
         tab.page.wait_for_function(f"Math.abs({width} - {panel}) < 3")
+        tab.page.wait_for_function("document.documentElement.dataset.kbText === 'Normal'")
     tab.page.wait_for_function("localStorage.getItem('kinboard-panel-width') === null")
     tab.page.locator("[data-dock-region-resize=right]").focus()
     tab.page.keyboard.press("ArrowLeft")
     tab.page.wait_for_function("Math.abs(Number(localStorage.getItem('kinboard-panel-width')) - 404) < 3")
-    tab.page.set_viewport_size({"width": 1920, "height": 760})
+    tab.page.set_viewport_size({"width": 1920, "height": 1080})
     tab.page.wait_for_timeout(
         600
     )  # nothing may happen: longer than the page waits for a window that is being drawn

@@ -17,7 +17,7 @@ from kin import pose_from_xyz_rpy
 from kin.transforms import Array, rotation_about, rotation_from_wxyz, rotation_vector, wxyz_from_rotation
 from kin.units import general
 
-_LEVEL = 1e-9  # sine of an angle at which two axes coincide
+_LEVEL = 1e-8  # sine of an angle at which two axes coincide; joint values in links have nine decimals
 _SHORTEST = 1e-9  # of an axis
 # A quaternion typed with three decimals is normalised; one that is further off was mistyped.
 _NORM_SLACK = 0.01

@@ -84,7 +84,7 @@ class Floor:
             "",
             position=end,
             scale=0.9,
-            anchor="center-left",
+            anchor="bottom-left",  # it stands on the floor, which would hide a part below
             depth_test=True,
         )
         self.nodes.append(self._bar)

@@ -58,6 +58,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         ],
         [20, 60, 80, 0],
     ),
-    "one-joint": _arm("My arm", "", [_row("joint 1", 0, 150, 300, 0)], [30]),
+    # One length: an arm without any has no size to be drawn in, and `own_arm` refuses it.
+    "one-joint": _arm("My arm", "", [_row("joint 1", 0, 0, 300, 0)]),
 }
 TITLES = {key: data["name"] for key, data in PRESETS.items()} | {"one-joint": "Empty (one joint)"}

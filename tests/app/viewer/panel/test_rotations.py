@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 import kin
 from app.exercises.typed import EntryError
 from app.viewer.panel.entry import read_pose
+from app.viewer.panel.readout import html
 from app.viewer.panel.rotations import ANGLES, QUATERNIONS, Notation, Rotations
 from app.viewer.session.choices import ViewState
 from app.viewer.session.state import PageState, decode, encode
@@ -40,6 +41,18 @@ def test_the_numbers_are_those_of_scipy_and_are_read_back(notation: Notation) ->
         assert len(values) == len(notation.turns) == len(notation.names.split())
         assert np.allclose(SCIPY[notation.title](values).as_matrix(), R, atol=1e-12)
         assert np.allclose(notation.matrix(values), R, atol=1e-12)
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.3, -2.0])
+def test_a_pose_with_coinciding_axes_reads_the_same_after_a_reload(turned: float) -> None:
+    robot = kin.get_robot("puma560")
+    q = robot.q_home + turned * np.eye(robot.n)[0]
+    again = decode(encode(PageState(robot.id, q=q)), (robot,)).q
+    assert again is not None
+    for notations in (Rotations(angles, quaternion) for angles in ANGLES for quaternion in QUATERNIONS):
+        before, after = (html(kin.fk(robot, values), Units(), rotations=notations) for values in (q, again))
+        assert before == after
+    assert abs(ANGLES["rpy"].values(kin.fk(robot, q)[:3, :3])[1] - math.pi / 2) < 1e-9, "roll and yaw coincide"
 
 
 @each_notation

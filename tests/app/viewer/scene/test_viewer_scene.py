@@ -182,7 +182,7 @@ def test_the_floor_names_its_scale_and_the_gizmo_stands_free(server: viser.Viser
         label = get(f"{bar}/length")
         assert np.linalg.norm(label.position - inner) > np.linalg.norm(outer - inner), "beyond this end"  # type: ignore[union-attr]
         assert np.linalg.norm(label.position - outer) < 0.1 * length  # type: ignore[union-attr]
-        assert label.anchor == "center-left", "the text begins here, and leads away from the bar"  # type: ignore[union-attr]
+        assert label.anchor == "bottom-left", "the text stands here on the floor, and leads away from the bar"  # type: ignore[union-attr]
         assert label.depth_test, "solids before it hide it"  # type: ignore[union-attr]
     arm.floor.show(False)
     assert not get(bar).visible  # type: ignore[union-attr]

@@ -166,8 +166,11 @@ def test_a_wrong_text_is_named_by_its_cell(cell, text, words):
     assert words in caught.value.message
 
 
-def test_all_lengths_zero_is_no_arm():
+def test_all_lengths_zero_is_no_arm_and_empty_has_the_one_length_it_needs():
     own = own_arm(PRESETS["one-joint"])
+    (row,) = own.robot.rows
+    assert [value for value in (row.theta, row.d, row.a, row.alpha) if value] == [row.a]
+    assert not own.robot.q_home.any()
     flat = type_in(own.robot, ((0, "d"), "0"), own=own)
     with pytest.raises(EditError, match="expected lengths a and d"):
         type_in(flat.robot, ((0, "a"), "0"), own=flat)
