@@ -31,7 +31,7 @@ from kin.kernels import fk as fk_kernels
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.solvers.contract import Many, One
+from kin.solvers.contract import ClosedForm, Many, One
 from kin.transforms import Array, finite_array, is_plain
 
 _POSE = (4, 4)
@@ -223,13 +223,25 @@ def _nearest(prepared: IKProblem, poses: Array, errors: Array, seeds: Array) -> 
         return q
     exact = np.flatnonzero(errors == 0.0)
     for start in range(0, len(exact), _AT_ONCE):
-        some = exact[start : start + _AT_ONCE]
-        T, near = np.ascontiguousarray(poses[some]), seeds if len(seeds) == 1 else seeds[some]
-        found = np.empty((len(some), q.shape[1]))
-        rows = np.empty((len(some), len(form.branches), q.shape[1]))
+        rows = exact[start : start + _AT_ONCE]
+        # Neighbours need not be copied, which takes as long as a tenth of the rest.
+        some = slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] < len(rows) else rows
+        q[some] = _chosen(prepared, form, poses[some], seeds if len(seeds) == 1 else seeds[some])
+    return q
+
+
+def _chosen(prepared: IKProblem, form: ClosedForm, T: Array, seeds: Array) -> Array:
+    """The best solution of each target ``(k, n)``: the branch that is clearly the nearest, or one of all rows."""
+    q = np.empty((len(T), prepared.robot.n))
+    form.nearest_many(T, seeds, prepared.lower, prepared.upper, q)
+    nearest_rows(prepared.requirement, T, seeds, q[:, None].copy(), q)
+    rest = np.flatnonzero(np.isnan(q[:, 0]))
+    if len(rest):
+        T, near, found = T[rest], seeds if len(seeds) == 1 else seeds[rest], np.empty((len(rest), q.shape[1]))
+        rows = np.empty((len(rest), len(form.branches), q.shape[1]))
         form.solve_many(T, near, prepared.lower, prepared.upper, rows)
         nearest_rows(prepared.requirement, T, near, rows, found)
-        q[some] = found
+        q[rest] = found
     return q
 
 

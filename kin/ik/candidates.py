@@ -285,10 +285,9 @@ def nearest_rows(requirement: Requirement, T: Array, seeds: Array, rows: Array, 
     """
     last = seeds.shape[0] - 1
     for i in range(T.shape[0]):
-        seed = seeds[min(i, last)]
         best, least = -1, math.inf
         for k in range(rows.shape[1]):
-            distance = _squared_distance(requirement, seed, rows[i, k], least)
+            distance = _squared_distance(requirement, seeds, min(i, last), rows, i, k, least)
             if distance < least:
                 best, least = k, distance
         for j in range(q.shape[1]):
@@ -296,46 +295,51 @@ def nearest_rows(requirement: Requirement, T: Array, seeds: Array, rows: Array, 
     at, e = np.empty(T.shape), np.empty(6)
     fk_many(requirement.model, q, at)
     for i in range(T.shape[0]):
-        if not _meets(requirement, at[i], T[i], e):
+        if not _meets(requirement, at, T, i, e):
             for j in range(q.shape[1]):
                 q[i, j] = math.nan
 
 
 @inlined
-def _squared_distance(requirement: Requirement, seed: Array, q: Array, most: float) -> float:
-    """Bring q ``(n,)`` to its best image, in place: its squared distance to the seed.
+def _squared_distance(
+    requirement: Requirement, seeds: Array, which: int, rows: Array, i: int, k: int, most: float
+) -> float:
+    """Bring rows[i, k] ``(n,)`` to its best image, in place: its squared distance to seeds[which].
 
-    Infinity, with q only partly there, if it is `most` or more, outside the limits that count, or NaN.
+    Infinity, with the row only partly there, if it is `most` or more, outside the limits that count, or NaN. Whole
+    arrays are passed since a view costs as much as a joint.
     """
     lower, upper, turns, respect = requirement.lower, requirement.upper, requirement.turns, requirement.respect
     total = 0.0
-    for i in range(q.shape[0]):
-        q[i], outside = image_inside(q[i], seed[i], turns[i], lower[i], upper[i], respect)
-        total += (q[i] - seed[i]) ** 2
+    for j in range(rows.shape[2]):
+        seed = seeds[which, j]
+        value, outside = image_inside(rows[i, k, j], seed, turns[j], lower[j], upper[j], respect)
+        rows[i, k, j] = value
+        total += (value - seed) ** 2
         if not total < most or (respect and outside > 0.0):
             return math.inf
     return total
 
 
 @inlined
-def _meets(requirement: Requirement, at: Array, target: Array, e: Array) -> bool:
-    """Whether a pose meets the task; e ``(6,)`` is scratch."""
+def _meets(requirement: Requirement, at: Array, targets: Array, i: int, e: Array) -> bool:
+    """Whether at[i] ``(4, 4)`` meets the task at targets[i]; e ``(6,)`` is scratch."""
     if requirement.task == MASK:
-        close, turned, _ = residuals(at, target, requirement.task, requirement.mask, e)
+        close, turned, _ = residuals(at[i], targets[i], requirement.task, requirement.mask, e)
         return bool(close <= requirement.position and turned <= requirement.rotation)
     p = 0.0
     for r in range(3):
-        p += (at[r, 3] - target[r, 3]) ** 2
+        p += (at[i, r, 3] - targets[i, r, 3]) ** 2
     if not math.sqrt(p) <= requirement.position:  # as where there is no pose, but NaN
         return False
     chord = 0.0
     for r in range(3):
         for c in range(3):
-            chord += (at[r, c] - target[r, c]) ** 2
+            chord += (at[i, r, c] - targets[i, r, c]) ** 2
     # The angle between them is √(chord / 2), or a little more, and that of their z axes is no larger.
     if chord <= requirement.rotation * requirement.rotation:
         return True
-    return bool(turned_from(at, target, requirement.task) <= requirement.rotation)
+    return bool(turned_from(at[i], targets[i], requirement.task) <= requirement.rotation)
 
 
 @cache

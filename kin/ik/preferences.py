@@ -166,26 +166,28 @@ def _inside(low: Array, high: Array) -> tuple[Array, Array]:
 def _try_all(
     problem: IKProblem, branches: Branches, score: Array, owner: NDArray[np.intp], values: Array
 ) -> Array:
-    """Scores of the values ``(k, m)`` on branches `owner` ``(k,)``; a better one replaces the branch's row."""
+    """Scores of the values ``(k, m)`` on branches `owner` ``(k,)``; a better one replaces the branch's row.
+
+    That of NaN is −∞.
+    """
     assert problem.closed_form is not None  # whose branches these are
-    kernels = problem.closed_form.kernels
-    flat = np.ascontiguousarray(values.reshape(-1))
-    whose = np.repeat(owner, values.shape[1])
-    out = np.empty((len(flat), len(branches.q), problem.robot.n))
+    tried = ~np.isnan(values)
+    flat, whose = values[tried], np.broadcast_to(owner[:, None], values.shape)[tried]
     targets = np.repeat(problem.T[None], len(flat), axis=0)  # writable: kernels are compiled for such arrays
-    kernels.many(kernels.params, targets, flat, problem.seed, out)
-    q, stats = centred(problem, out[np.arange(len(flat)), whose])
-    fits = is_closed(problem, stats) & ~np.isnan(flat)
+    q, stats = centred(problem, problem.closed_form.rows_at(targets, flat, problem.seed, whose))
+    fits = is_closed(problem, stats)
     if problem.respect:
         fits &= stats[:, OVERRUN] == 0.0
-    reached = np.where(fits, scores(problem, q), -math.inf)
-    for i in np.argsort(-reached, kind="stable").tolist():
+    found = np.where(fits, scores(problem, q), -math.inf)
+    for i in np.argsort(-found, kind="stable").tolist():
         row = whose[i]
-        if reached[i] > score[row]:
-            score[row] = reached[i]
+        if found[i] > score[row]:
+            score[row] = found[i]
             branches.q[row], branches.stats[row] = q[i], stats[i]
             branches.values[row, 0] = wrap(flat[i]) if branches.redundancies[0].circular else flat[i]
-    return reached.reshape(values.shape)
+    reached = np.full(values.shape, -math.inf)
+    reached[tried] = found
+    return reached
 
 
 def _improve_row(problem: IKProblem, branches: Branches, score: Array, row: int, k: int) -> None:

@@ -11,6 +11,11 @@ target is then a loop along the rows of S, without jumps and calls, several targ
 
 One target is a block of one, the same operations in the same order: so results of a batch and of single
 targets are bit-identical.
+
+`nearest_each` picks, among the rows of a block, the branch that is nearest to a seed inside the limits, and has
+only that one computed by the careful kernel. Both kernels give the same angles but for rounding, so the choice is
+the same too, unless two branches are equally near, the nearest one is at a limit, or the target is marked: such a
+target is left open.
 """
 
 from __future__ import annotations
@@ -20,13 +25,22 @@ from collections.abc import Callable
 
 import numpy as np
 
-from kin.kernels.compile import inlined, joined
+from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.fk import BLOCK, all_finite_pose
 from kin.kernels.simd import TURN, atan2, rounded, widest, wrapped
+from kin.solvers.common import HIGH, LOW, NEAR
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 _REACH = TOLERANCES.closure_position * 0.1
+# Metres beyond the reach of an elbow or a shoulder up to which the careful kernel decides.
+BEYOND = 10.0 * _REACH
+# Sine of a singular angle, or metres, below which the careful kernel computes: farther off, rows of both kernels
+# differ by far less than `_CLEAR`.
+NEARLY = 1e-6
+# Radians, or square radians, by which a choice among branches must be clear.
+_CLEAR = 1e-6
+_PER_TURN = 1.0 / TURN
 # Rows of S: the first three rows of the pose, the requested value, a family's own from OWN on, and last the mark.
 VALUE, OWN, _MARK = 12, 13, -1
 
@@ -35,6 +49,7 @@ Arc = Callable[[Array, int, int, int], float]
 Angles = Callable[[Arc, Array, Array, int, Array], None]
 Store = Callable[[Array, Array, int, Array], None]
 Careful = Callable[[Array, Array, float, Array, Array], None]
+Alone = Callable[[Array, Array, tuple[float, int], Array, Array, Array], object]
 Entries = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
 
 
@@ -117,6 +132,108 @@ def one(
     return all_finite_pose(T)
 
 
+@joined
+def nearest_each(
+    pairs: Pairs, angles: Angles, store: Store, alone: Alone, layout: tuple[int, int], params: Array, T: Array,
+    around: tuple[Array, Array, Array], out: Array,
+) -> None:  # fmt: skip
+    """out ``(N, n)`` ← of the branches of each target T ``(N, 4, 4)`` the nearest one inside the limits, or NaN.
+
+    All joints turn. NaN where there is none, or where the choice is not clear. around: seeds
+    ``(N, n)``, or ``(1, n)`` for all, and lower and upper limits ``(n,)``.
+
+    Args:
+        alone: ``alone(params, T, (NaN, branch), box, arcs, rows)`` writes ``rows[branch]`` as the careful kernel
+            does, nothing if there is no such branch. Of a target that is not marked it reads no seed and no limit:
+            box ``(4, n)`` is NaN, arcs ``(1, 3)``.
+        layout: how many rows S has, how many columns rows has.
+    """
+    seeds, lower, upper = around
+    n, last = out.shape[1], seeds.shape[0] - 1
+    S, rows, arcs = np.empty((layout[0], BLOCK)), np.empty((8, layout[1])), np.empty((1, 3))
+    box = np.full((4, n), math.nan)
+    found, tiled, cost = np.empty((8, n)), np.empty((3, 8 * n)), np.empty(8 * n)
+    flat = found.reshape(8 * n)
+    laid, inside = -1, False
+    for first in range(0, T.shape[0], BLOCK):
+        count = min(BLOCK, T.shape[0] - first)
+        for b in range(count):
+            for r in range(3):
+                for c in range(4):
+                    S[4 * r + c, b] = T[first + b, r, c]
+            S[VALUE, b] = math.nan
+        pairs(params, seeds[0], count, S)
+        angles(arc, params, seeds[0], count, S)
+        for b in range(count):
+            i = first + b
+            which = min(i, last)
+            if which != laid:
+                laid, inside = which, _tile(seeds[which], lower, upper, tiled)
+            branch = -1
+            if inside and S[_MARK, b] == 0.0:
+                store(params, S, b, found)
+                branch = _nearest_branch(flat, tiled, cost)
+            if branch >= 0:
+                rows[branch, 0] = math.nan
+                alone(params, T[i], (math.nan, branch), box, arcs, rows)
+            for c in range(n):
+                out[i, c] = rows[branch, c] if branch >= 0 else math.nan
+
+
+@jit
+def _tile(seed: Array, lower: Array, upper: Array, around: Array) -> bool:
+    """Rows NEAR, LOW, HIGH of around ``(3, 8 n)`` ← seed and limits ``(n,)``, once for each branch.
+
+    Whether the seed is inside the limits: from outside, the nearest image may be several turns away.
+    """
+    n = seed.shape[0]
+    inside = True
+    for i in range(n):
+        inside = inside and lower[i] <= seed[i] <= upper[i]
+        for k in range(i, 8 * n, n):
+            around[NEAR, k], around[LOW, k], around[HIGH, k] = seed[i], lower[i], upper[i]
+    return inside
+
+
+@jit
+def _nearest_branch(q: Array, around: Array, cost: Array) -> int:
+    """The branch of q ``(8 n,)``, n angles of each, that is nearest to the seed inside the limits; −1 if unclear.
+
+    A branch that does not exist is NaN. Angles are brought to their best images, in place. Those at a limit count
+    as inside, and so no branch is farther than it is taken for; cost ``(8 n,)`` is scratch.
+    """
+    widest()
+    for k in range(cost.shape[0]):
+        near, low, high = around[NEAR, k], around[LOW, k], around[HIGH, k]
+        x = q[k] + TURN * rounded((near - q[k]) * _PER_TURN)
+        x = x + TURN if x < low - _CLEAR else (x - TURN if x > high + _CLEAR else x)
+        outside = (x < low - _CLEAR) | (x > high + _CLEAR)
+        q[k] = x
+        cost[k] = math.inf if outside else (x - near) * (x - near)
+    n = cost.shape[0] // 8
+    best, least, second = -1, math.inf, math.inf
+    for branch in range(8):
+        total = 0.0
+        for k in range(branch * n, branch * n + n):
+            total += cost[k]
+        if total < least:
+            best, least, second = branch, total, least
+        elif total < second:
+            second = total
+    if not second - least > _CLEAR:
+        return -1
+    for k in range(best * n, best * n + n):
+        if q[k] - around[LOW, k] < _CLEAR or around[HIGH, k] - q[k] < _CLEAR:
+            return -1
+    return best
+
+
+@inlined
+def is_wanted(only: int, branch: int, bits: int) -> bool:
+    """Whether a branch is to be computed: `only` is negative, or has the same ones of these bits."""
+    return only < 0 or (only ^ branch) & bits == 0
+
+
 @inlined
 def rows_of(params: Array, first: int) -> Entries:
     """Twelve numbers of params: read before a loop, as it might write there for all LLVM knows."""
@@ -155,8 +272,8 @@ def canonical_of(k: Entries, t: Entries, S: Array, b: int) -> Entries:
 def elbow_of(x: float, y: float, a: float, b: float) -> tuple[float, float, float, bool]:
     """The elbow of a planar arm of links a, b that ends in (x, y): c, s ≥ 0, 1/D²; c is NaN if it does not close.
 
-    The last is whether it is so nearly straight or folded, or ends so near to the first axis, that it needs the
-    careful kernel. See :func:`kin.solvers.planar.two_links`.
+    The last is whether it is so nearly straight or folded, closing or not, or ends so near to the first axis, that
+    it needs the careful kernel. See :func:`kin.solvers.planar.two_links`.
     """
     D2 = x * x + y * y
     most, least = a + b, abs(a - b)
@@ -165,11 +282,13 @@ def elbow_of(x: float, y: float, a: float, b: float) -> tuple[float, float, floa
     near_by = near_by if near_by > 0.0 else 0.0
     nearest = least - _REACH if least > _REACH else 0.0
     reached = ((most + _REACH) ** 2 >= D2) & (nearest * nearest <= D2)  # not if it is NaN
+    closest = least - BEYOND if least > BEYOND else 0.0
+    nearly_reached = ((most + BEYOND) ** 2 >= D2) & (closest * closest <= D2)
     half = 0.5 / (a * b)
     s = half * math.sqrt(far * near_by)
     c = 0.5 * half * (near_by - far)
     close = (far < 1e-14 * near_by) | (near_by < 1e-14 * far) | (1e-8 * most * most > D2)
-    return c if reached else math.nan, s, 1.0 / D2, close & reached
+    return c if reached else math.nan, s, 1.0 / D2, close & nearly_reached
 
 
 @inlined

@@ -16,6 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from kin.kernels.compile import counted, direct
 from kin.robot import Robot
 from kin.solvers.names import Names
@@ -215,6 +218,24 @@ class ClosedForm(ABC):
             lower, upper: ``(n,)`` joint limits, which count.
         """
         raise NotImplementedError(f"{self.name} is quick for no task")
+
+    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """q ``(N, n)`` ← the row of `solve_many` nearest to the seed inside the limits, in less time; or NaN.
+
+        NaN where there is none, or where all rows are needed to choose one. Arguments as for `solve_many`; the
+        angles may be whole turns away from the nearest ones.
+        """
+        q.fill(math.nan)
+
+    def rows_at(self, T: Array, values: Array, near: Array, branches: NDArray[np.intp]) -> Array:
+        """Of the rows of `kernels.many` at targets ``(N, 4, 4)`` and values ``(N,)`` one of each ``(N, n)``.
+
+        Args:
+            branches: ``(N,)`` which one.
+        """
+        out = np.empty((len(T), len(self.branches), len(near)))
+        self.kernels.many(self.kernels.params, T, values, near, out)
+        return out[np.arange(len(T)), branches]
 
     def add_missing(self, T: Array, near: Array, q: Array) -> Completeness:
         """Add to solutions ``(branches, n)`` of the batch kernels what they miss; how complete they are then."""

@@ -173,10 +173,18 @@ class ReversedJoints(ClosedForm):
 
     def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many targets, in the arm's own joint values."""
-        reversed_ = self.signs < 0.0
-        low, high = np.where(reversed_, -upper, lower), np.where(reversed_, -lower, upper)
-        self.form.solve_many(T, seeds * self.signs, low, high, q)
+        self.form.solve_many(T, seeds * self.signs, *self._limits(lower, upper), q)
         q *= self.signs
+
+    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """Of many targets the branch nearest to the seed."""
+        self.form.nearest_many(T, seeds * self.signs, *self._limits(lower, upper), q)
+        q *= self.signs
+
+    def _limits(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Joint limits of the family's arm."""
+        reversed_ = self.signs < 0.0
+        return np.where(reversed_, -upper, lower), np.where(reversed_, -lower, upper)
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration ``(n,)`` is on."""

@@ -167,6 +167,10 @@ class Slide6(Wrist6):
         g = self.geometry
         return float(g.a1 + t[2] * math.cos(t[1]) + g.f * math.sin(t[1]))
 
+    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """None: the quick choice among branches is one of angles."""
+        q.fill(math.nan)
+
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: sides of axis 1 and of axis 2 that W is on, and the sign of θ5."""
         t = self.geometry.sign * q + self.geometry.offset

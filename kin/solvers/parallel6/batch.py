@@ -10,8 +10,21 @@ import math
 
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
-from kin.solvers.blocks import OWN, Arc, Entries, canonical_of, double, each, elbow_of, one, rows_of, single
-from kin.solvers.parallel6.branches import solve
+from kin.solvers.blocks import (
+    BEYOND,
+    OWN,
+    Arc,
+    Entries,
+    canonical_of,
+    double,
+    each,
+    elbow_of,
+    nearest_each,
+    one,
+    rows_of,
+    single,
+)
+from kin.solvers.parallel6.branches import branches, solve
 from kin.solvers.parallel6.geometry import (
     A1,
     A2,
@@ -32,7 +45,6 @@ from kin.solvers.parallel6.geometry import (
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-_REACH = TOLERANCES.closure_position * 0.1
 _SINGULAR = TOLERANCES.singular
 
 _FRONT, _TILT, _SPIN, _SUM, _BEND, _UPPER, _END = (OWN + i for i in (0, 2, 4, 6, 8, 12, 20))
@@ -106,7 +118,7 @@ def _pairs(params: Array, near: Array, count: int, S: Array) -> int:
         r, apart = math.sqrt(r2), abs(y)
         square = (r - apart) * (r + apart)
         root = math.sqrt(square if square > 0.0 else 0.0)
-        root = math.nan if r + _REACH < apart else root
+        root = math.nan if r + BEYOND < apart else root
         scale = 1.0 / r2
         x = left * root
         close0 = _shoulder(M, (x, y, scale), left, lengths, S, 0, b)
@@ -181,3 +193,10 @@ def branches_many(params: Array, T: Array, values: Array, near: Array, out: Arra
     """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
     widest()
     each(_pairs, _angles, _store, _careful, (_ROWS, _PAIRS), params, T, (values, near), out)
+
+
+@jit
+def nearest_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 6)`` ← of each of the poses T the branch nearest to its seed, see `nearest_each`."""
+    widest()
+    nearest_each(_pairs, _angles, _store, branches, (_ROWS, 6), params, T, (seeds, lower, upper), out)

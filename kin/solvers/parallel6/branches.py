@@ -13,7 +13,7 @@ import numpy as np
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
 from kin.kernels.simd import atan2
-from kin.solvers.blocks import Entries, solve_each
+from kin.solvers.blocks import Entries, is_wanted, solve_each
 from kin.solvers.canonical import canonical, signed_box
 from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row, wrap
 from kin.solvers.parallel6.geometry import A1, A2, A3, A4, BESIDE, COS_TWIST, D5, OFFSET, SIGN, SIN_TWIST
@@ -41,6 +41,19 @@ def solve(
     where that is free, NaN to let the seed decide. A seventh column, if out has one, ← 1.0 where θ6 is free.
     """
     clear(out)
+    box, joint_box = np.empty((3, 6)), np.empty((3, 6))
+    signed_box(near, lower, upper, params[SIGN:OFFSET], params[OFFSET : OFFSET + 6], joint_box)
+    for i in range(6):
+        for row in range(3):
+            box[row, i] = joint_box[row, _ORDER[i]]
+    return branches(params, T, (value, -1), box, arcs, out)
+
+
+@jit
+def branches(
+    params: Array, T: Array, wanted: tuple[float, int], box: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
+    """As `solve`, with the box instead of seed and limits; wanted: value, and the only branch to compute or −1."""
     M = canonical(params, T)
     wx, wy, wz = M[3], M[7], M[11]
     y = (params[COS_TWIST] * wz - params[BESIDE]) / params[SIN_TWIST]
@@ -50,18 +63,14 @@ def solve(
     root = math.sqrt(max((r - abs(y)) * (r + abs(y)), 0.0))
     if root < _MERGE * abs(y) or r < _SINGULAR:
         root = 0.0
-    box, joint_box = np.empty((3, 6)), np.empty((3, 6))
-    signed_box(near, lower, upper, params[SIGN:OFFSET], params[OFFSET : OFFSET + 6], joint_box)
-    for i in range(6):
-        for row in range(3):
-            box[row, i] = joint_box[row, _ORDER[i]]
     left = 1.0 if params[BESIDE] >= 0.0 else -1.0
     gap = math.inf
     found = 0
     for right in range(1 if root == 0.0 else 2):
-        side = left if right == 0 else -left
-        miss, found = _shoulder(params, M, side * root, right, value, box, arcs, found, out)
-        gap = min(gap, miss)
+        if is_wanted(wanted[1], 4 * right, 4):
+            side = left if right == 0 else -left
+            miss, found = _shoulder(params, M, side * root, right, wanted, box, arcs, found, out)
+            gap = min(gap, miss)
     if root == 0.0:
         for branch in range(4):
             copy_row(out, branch, branch + 4)
@@ -70,9 +79,11 @@ def solve(
 
 @jit
 def _shoulder(
-    params: Array, M: Entries, x: float, right: int, value: float, box: Array, arcs: Array, found: int, out: Array
-) -> tuple[float, int]:
+    params: Array, M: Entries, x: float, right: int, wanted: tuple[float, int], box: Array, arcs: Array,
+    found: int, out: Array,
+) -> tuple[float, int]:  # fmt: skip
     """out ← the four branches with W at x in the frame that turns with axis 1: (miss, number of arcs)."""
+    value, only = wanted
     r00, r01, r02, wx, r10, r11, r12, wy, r20, r21, r22, wz = M
     ca, sa = params[COS_TWIST], params[SIN_TWIST]
     y = (ca * wz - params[BESIDE]) / sa
@@ -106,9 +117,10 @@ def _shoulder(
     cA, sA = m02 / sine, m12 / sine
     aimed = atan2(m12, m02), atan2(sine, m22), atan2(cA * m10 - sA * m00, cA * m11 - sA * m01)
     for flip in range(2):
-        m = (m00, m01, m02, m10, m11, m12, m22)
-        miss = _arm(params, wrist, m, aimed, 4 * right + flip, slack, box, out)
-        gap = min(gap, miss)
+        if is_wanted(only, flip, 1):
+            m = (m00, m01, m02, m10, m11, m12, m22)
+            miss = _arm(params, wrist, m, aimed, (4 * right + flip, only), slack, box, out)
+            gap = min(gap, miss)
     return gap, found
 
 
@@ -118,17 +130,18 @@ def _arm(
     wrist: tuple[float, float, float],
     m: tuple[float, float, float, float, float, float, float],
     aimed: tuple[float, float, float],
-    branch: int,
+    rows: tuple[int, int],
     slack: float,
     box: Array,
     out: Array,
 ) -> float:
     """out[branch], out[branch + 2] ← elbow up and down of one shoulder and wrist; by how much they miss, metres.
 
-    wrist: θ1, and W in the plane of axes 2, 3, 4; m: entries of the rotation after axis 1, without the third row's
-    first two; aimed: its angles A, B, C with sin B > 0.
+    rows: branch, and the only one to compute or −1. wrist: θ1, and W in the plane of axes 2, 3, 4; m: entries of
+    the rotation after axis 1, without the third row's first two; aimed: its angles A, B, C with sin B > 0.
     """
     t1, u, v = wrist
+    branch, only = rows
     m00, m01, m02, m10, m11, m12, m22 = m
     a2, a3, a4, d5 = params[A2], params[A3], params[A4], params[D5]
     sine = math.sqrt(m02 * m02 + m12 * m12)
@@ -149,6 +162,8 @@ def _arm(
         return miss
     middle, half = atan2(py, px), atan2(k2, k1)
     for down in range(2 if bend > 0.0 else 1):
+        if not is_wanted(only, 2 * down, 2):
+            continue
         up = _elbow_sign(params, branch + 2 * down)
         t2, t3 = middle - up * half, up * bend
         if px * px + py * py < _SINGULAR * _SINGULAR:

@@ -21,7 +21,7 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, bent, eight, flipped, front_or_back, left_or_right, names_of, stance_of
-from kin.solvers.parallel6.batch import branches_many, branches_one
+from kin.solvers.parallel6.batch import branches_many, branches_one, nearest_many
 from kin.solvers.parallel6.branches import solve, solve_many
 from kin.solvers.parallel6.geometry import BASE, COS_TWIST, TOOL, Geometry, geometry_of
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
@@ -111,6 +111,10 @@ class Parallel6(ClosedForm):
     def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many poses."""
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
+
+    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """Of many poses the branch nearest to the seed."""
+        nearest_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the arm's side of axis 1, and the signs of x s3 and of s5."""

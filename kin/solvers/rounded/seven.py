@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kin.axes import size
 from kin.fk import fk, jacobian
@@ -101,6 +102,12 @@ class Rounded7(Rounded):
         if j >= 0:
             arcs = at_every_turn(arcs, float(problem.lower[j]), float(problem.upper[j]))
         return Candidates(rows[:, :7], rows[:, 7:], (arcs,), gap, obstacle, "agreed" if sure else "unknown")
+
+    def rows_at(self, T: Array, values: Array, near: Array, branches: NDArray[np.intp]) -> Array:
+        """One branch at each value, moved onto its target: most of the time goes into moving rows."""
+        rows = self.form.rows_at(T, values, near, branches)
+        move_rows(self.robot.model, self._params, T, self._setting, values, rows[:, None])
+        return rows
 
     def prepare(self, q: Array) -> None:
         """Load or compile every kernel, at a configuration ``(7,)`` inside the limits."""

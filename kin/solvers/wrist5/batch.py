@@ -12,9 +12,21 @@ import numpy as np
 
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest
-from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single
-from kin.solvers.wrist5.branches import solve
-from kin.solvers.wrist5.geometry import A1, A2, BASE, D4, D6, OFFSET, SINGULAR
+from kin.solvers.blocks import (
+    NEARLY,
+    OWN,
+    Arc,
+    double,
+    each,
+    elbow_of,
+    in_base,
+    nearest_each,
+    one,
+    rows_of,
+    single,
+)
+from kin.solvers.wrist5.branches import branches, solve
+from kin.solvers.wrist5.geometry import A1, A2, BASE, D4, D6, OFFSET
 from kin.transforms import Array
 
 # Rows of a block: y of θ1 (front), θ3 (two shoulders), θ2, θ4 and θ5 (shoulder and elbow); x is _PAIRS rows on.
@@ -44,7 +56,7 @@ def _hand(wrist: Pair, elbow: Vector, links: Pair, a: Vector, k: int, b: int, S:
     S[_UPPER + k, b], S[_PAIRS + _UPPER + k, b] = s2, c2
     S[_ROLL + k, b], S[_PAIRS + _ROLL + k, b] = -u2, -u1
     S[_TILT + k, b], S[_PAIRS + _TILT + k, b] = w, c23 * level - s23 * az
-    return w < SINGULAR
+    return w < NEARLY
 
 
 @inlined
@@ -74,7 +86,7 @@ def _pairs(arm: Array, near: Array, count: int, S: Array) -> int:
         S[_FRONT, b], S[_PAIRS + _FRONT, b] = wy, wx
         front = _shoulder((r - a1, h), links, (level, u2, az), 0, b, S)
         back = _shoulder((-r - a1, h), links, (-level, -u2, az), 1, b, S)
-        special = front | back | (r < SINGULAR)
+        special = front | back | (r < NEARLY)
         S[-1, b] = 1.0 if special else 0.0
         found += 1 if special else 0
     return found
@@ -138,3 +150,10 @@ def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) ->
     sin θ5 vanishes.
     """
     return one(_pairs, _angles, _store, _robust, (_ROWS, _PAIRS), arm, T, (value, near), out)
+
+
+@jit
+def nearest_many(arm: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 5)`` ← of each of the poses T the branch nearest to its seed, see `nearest_each`."""
+    widest()
+    nearest_each(_pairs, _angles, _store, branches, (_ROWS, 6), arm, T, (seeds, lower, upper), out)

@@ -9,7 +9,7 @@ import numpy as np
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
 from kin.kernels.simd import atan2
-from kin.solvers.blocks import solve_each
+from kin.solvers.blocks import is_wanted, solve_each
 from kin.solvers.canonical import canonical_box
 from kin.solvers.common import clear, copy_row, merged, wrap
 from kin.solvers.wrist5.geometry import A1, A2, D4, D6, OFFSET, REACH, SINGULAR, wrist_angles
@@ -52,14 +52,29 @@ def solve(
     value: the requested θ1, NaN for a feasible one near the seed. seed, lower, upper ``(5,)``: joint values.
     """
     clear(out)
-    a, box = np.empty(3), np.empty((3, 5))
+    box = np.empty((4, 5))
     canonical_box(arm[OFFSET:A1], seed, lower, upper, box)
+    return branches(arm, T, (value, -1), box, arcs, out)
+
+
+@jit
+def branches(
+    arm: Array, T: Array, wanted: tuple[float, int], box: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
+    """As `solve`, with the box of canonical seed and limits; wanted: value, and the only branch to compute or −1.
+
+    A fourth row of box ``(4, 5)`` is scratch.
+    """
+    value, only = wanted
+    a = box[3]
     wx, wy, h = _wrist_centre(arm, T, a)
     r = math.sqrt(wx * wx + wy * wy)
     on_axis = r < SINGULAR
     gap = math.inf
     found = 0
     for side in range(1 if on_axis else 2):
+        if not is_wanted(only, 4 * side, 4):
+            continue
         shoulder = 1.0 if side == 0 else -1.0
         rho = shoulder * r - arm[A1]
         bend, miss = _elbow(arm, rho, h)
@@ -71,6 +86,8 @@ def solve(
         spread = atan2(arm[D4] * sine, arm[A2] + arm[D4] * cosine)
         for i in range(4 if bend > 0.0 else 2):
             branch = 4 * side + i
+            if not is_wanted(only, branch, 3):
+                continue
             row = out[branch]
             t1 = azimuth
             t2, t3 = (climb - spread, bend) if i < 2 else (climb + spread, -bend)

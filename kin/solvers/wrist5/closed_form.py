@@ -22,7 +22,7 @@ from kin.solvers.contract import (
 from kin.solvers.names import Names, bent, eight, flipped, front_or_back, names_of, stance_of, up_or_down
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
 from kin.solvers.wrist5 import point
-from kin.solvers.wrist5.batch import branches_many, branches_one
+from kin.solvers.wrist5.batch import branches_many, branches_one, nearest_many
 from kin.solvers.wrist5.branches import solve, solve_many
 from kin.solvers.wrist5.geometry import OFFSET, REACH, Geometry
 from kin.tolerances import TOLERANCES
@@ -117,6 +117,10 @@ class Wrist5(ClosedForm):
     def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many poses."""
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
+
+    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """Of many poses the branch nearest to the seed."""
+        nearest_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of the wrist centre's x, of s3 and of s5."""

@@ -11,8 +11,22 @@ from collections.abc import Callable
 
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest
-from kin.solvers.blocks import OWN, Arc, Entries, canonical_of, double, each, elbow_of, one, rows_of, single
-from kin.solvers.wrist6.branches import Rotation, solve
+from kin.solvers.blocks import (
+    BEYOND,
+    NEARLY,
+    OWN,
+    Arc,
+    Entries,
+    canonical_of,
+    double,
+    each,
+    elbow_of,
+    nearest_each,
+    one,
+    rows_of,
+    single,
+)
+from kin.solvers.wrist6.branches import Rotation, branches, solve
 from kin.solvers.wrist6.geometry import (
     A1,
     A2,
@@ -30,11 +44,7 @@ from kin.solvers.wrist6.geometry import (
     TOOL,
     F,
 )
-from kin.tolerances import TOLERANCES
 from kin.transforms import Array
-
-_REACH = TOLERANCES.closure_position * 0.1
-_SINGULAR = TOLERANCES.singular
 
 FRONT, BEND, _UPPER, _ROLL, _TILT, _SPIN, _END = (OWN + i for i in (0, 2, 4, 8, 12, 16, 20))
 PAIRS, ROWS = _END - OWN, _END + _END - OWN + 1
@@ -58,8 +68,8 @@ def shoulder(wx: float, wy: float, beside: float) -> tuple[float, float, bool]:
     r, apart = math.sqrt(r2), abs(beside)
     square = (r - apart) * (r + apart)
     x = math.sqrt(square if square > 0.0 else 0.0)
-    x = math.nan if r + _REACH < apart else x
-    return x, 1.0 / r2, x < _CLOSE * apart + _SINGULAR
+    x = math.nan if r + BEYOND < apart else x
+    return x, 1.0 / r2, x < _CLOSE * apart + NEARLY
 
 
 @inlined
@@ -100,7 +110,7 @@ def arm_pairs(
     S[_ROLL + arm, b], S[PAIRS + _ROLL + arm, b] = m12, m02
     S[_TILT + arm, b], S[PAIRS + _TILT + arm, b] = sine, m22
     S[_SPIN + arm, b], S[PAIRS + _SPIN + arm, b] = m02 * m10 - m12 * m00, m02 * m11 - m12 * m01
-    return sine < _SINGULAR
+    return sine < NEARLY
 
 
 @inlined
@@ -196,3 +206,10 @@ def branches_many(params: Array, T: Array, values: Array, near: Array, out: Arra
     """out ``(N, 8, 6)`` ← all branches of each of the targets T ``(N, 4, 4)``, values ``(N,)`` or ``(1,)``."""
     widest()
     each(_pairs, _angles, store, careful, (ROWS, PAIRS), params, T, (values, near), out)
+
+
+@jit
+def nearest_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 6)`` ← of each of the poses T the branch nearest to its seed, see `nearest_each`."""
+    widest()
+    nearest_each(_pairs, _angles, store, branches, (ROWS, 6), params, T, (seeds, lower, upper), out)

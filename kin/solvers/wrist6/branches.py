@@ -8,7 +8,7 @@ import numpy as np
 
 from kin.kernels.compile import jit
 from kin.kernels.simd import atan2
-from kin.solvers.blocks import Entries, solve_each
+from kin.solvers.blocks import Entries, is_wanted, solve_each
 from kin.solvers.canonical import canonical, signed_box
 from kin.solvers.common import (
     HIGH,
@@ -63,6 +63,16 @@ def solve(
     computed if `arcs` has no rows.
     """
     clear(out)
+    box = np.empty((3, 6))
+    signed_box(near, lower, upper, params[SIGN:OFFSET], params[OFFSET : OFFSET + 6], box)
+    return branches(params, T, (value, -1), box, arcs, out)
+
+
+@jit
+def branches(
+    params: Array, T: Array, wanted: tuple[float, int], box: Array, arcs: Array, out: Array
+) -> tuple[float, int]:
+    """As `solve`, with the box of signed seed and limits; wanted: value, and the only branch to compute or −1."""
     M = canonical(params, T)
     wx, wy = M[3], M[7]
     beside = params[BESIDE]
@@ -74,14 +84,13 @@ def solve(
     if beside != 0.0 and root < _MERGE * abs(beside):
         root = 0.0
     single = free or root == 0.0
-    box = np.empty((3, 6))
-    signed_box(near, lower, upper, params[SIGN:OFFSET], params[OFFSET : OFFSET + 6], box)
     gap = math.inf
     found = 0 if free else -1
     for back in range(1 if single else 2):
-        X = root if back == 0 else -root
-        miss, found = _shoulder(params, M, X, back, value, box, arcs, found, out)
-        gap = min(gap, miss)
+        if is_wanted(wanted[1], 4 * back, 4):
+            X = root if back == 0 else -root
+            miss, found = _shoulder(params, M, X, back, wanted, box, arcs, found, out)
+            gap = min(gap, miss)
     if single:
         for branch in range(4):
             copy_row(out, branch, branch + 4)
@@ -90,12 +99,14 @@ def solve(
 
 @jit
 def _shoulder(
-    params: Array, M: Entries, X: float, back: int, value: float, box: Array, arcs: Array, found: int, out: Array
-) -> tuple[float, int]:
+    params: Array, M: Entries, X: float, back: int, wanted: tuple[float, int], box: Array, arcs: Array,
+    found: int, out: Array,
+) -> tuple[float, int]:  # fmt: skip
     """out ← the four branches with W at (X, L) in the frame that turns with axis 1: (miss, number of arcs).
 
     θ1 is free if `found` is not negative.
     """
+    value, only = wanted
     h, beside, slides = -M[11], params[BESIDE], params[SLIDES] != 0.0
     miss, bend, c3, k1, k2, x = _elbow(params, X - params[A1], h, abs(X))
     if miss > _REACH:
@@ -106,6 +117,8 @@ def _shoulder(
     t1 = atan2(M[7], M[3]) - atan2(beside, X)
     R = _turned(M, X, beside)
     for down in range(2 if bend > 0.0 else 1):
+        if not is_wanted(only, 2 * down, 2):
+            continue
         up = 1.0 if down == (0 if slides else back) else -1.0
         e1, e2 = (up * k1, k2) if slides else (k1, up * k2)
         c2, s2 = x * e1 + h * e2, h * e1 - x * e2

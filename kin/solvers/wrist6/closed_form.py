@@ -33,7 +33,7 @@ from kin.solvers.names import (
     up_or_down,
 )
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, those_within
-from kin.solvers.wrist6.batch import branches_many, branches_one
+from kin.solvers.wrist6.batch import branches_many, branches_one, nearest_many
 from kin.solvers.wrist6.branches import solve, solve_many
 from kin.solvers.wrist6.geometry import BASE, TOOL, Geometry, geometry_of
 from kin.tolerances import TOLERANCES
@@ -133,6 +133,10 @@ class Wrist6(ClosedForm):
     def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many poses."""
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
+
+    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """Of many poses the branch nearest to the seed."""
+        nearest_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of X, of X s3 and of s5."""

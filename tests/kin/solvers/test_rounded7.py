@@ -400,6 +400,18 @@ def test_every_value_of_a_listed_interval_is_found_when_it_is_asked_for(q):
     assert judge.beyond(T, found, 60) == []
 
 
+@pytest.mark.parametrize("name", ["panda 1.5708", "iiwa14 1.57"])
+def test_one_branch_at_each_value_is_that_of_all_branches_bit_for_bit(name):
+    (robot, _), rng = arm_named(name), np.random.default_rng(9)
+    form = closed_form_of(robot)
+    T, values, branches = kin.fk(robot, robot.random_q(rng, 60)), rng.uniform(-2.0, 2.0, 60), np.arange(60) % 8
+    found, every = form.rows_at(T, values, robot.q_home, branches), kin.ik_branches(robot, T, values)
+    assert np.array_equal(found, every[np.arange(60), branches], equal_nan=True)
+    there = ~np.isnan(found[:, 0])
+    assert there.sum() > 15
+    assert np.abs(kin.fk(robot, found[there]) - T[there]).max() < 1e-9
+
+
 @pytest.mark.parametrize("name", ["gen3 1.57", "gen3 1.5708", "xarm7 1.571"])
 def test_intervals_are_inside_the_range_of_a_joint_that_turns_all_the_way(name):
     robot, _ = arm_named(name)

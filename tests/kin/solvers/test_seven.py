@@ -278,10 +278,10 @@ def test_a_pose_beyond_a_limit_says_so(robot):
 
 
 def test_the_ranges_of_a_result_are_those_of_all_branches():
-    """At a value inside them there is a solution, and at one outside there is none."""
+    """At each of 600 values inside them there is a solution, and at one outside there is none."""
     rng = np.random.default_rng(1)
     disagree = further = 0
-    for q in SAWYER.random_q(rng, 6):
+    for q in SAWYER.random_q(rng, 20):
         T = kin.fk(SAWYER, q)
         result = kin.solve_ik(SAWYER, T)
         ranges = result.redundancy[0].intervals
@@ -291,7 +291,7 @@ def test_the_ranges_of_a_result_are_those_of_all_branches():
             disagree += exists != any(low <= value <= high for low, high in ranges)
             further += exists and not any(low <= value <= high for low, high in own)
     assert disagree == 0
-    assert further > 10
+    assert further > 100  # values that the ranges of the best posture alone do not have
 
 
 @pytest.mark.parametrize("row", [8, 20])
