@@ -205,7 +205,8 @@ class General6(ClosedForm):
             return self._beside_curves(T, near, q)
         if known == PROVED:
             return "proved"
-        if known == AGREED and not self._doubtful(q):
+        # Beside a singular wrist all cuts may miss the same two postures: a target close by has them apart.
+        if known == AGREED and not self._doubtful(q) and len(self._near_target(T, _STEPS[0])) == len(rows):
             return "agreed"
         return "agreed" if self._add_nearby(T, q) else "unknown"
 

@@ -13,7 +13,7 @@ import kin
 from kin import Joint, Robot, Status
 from kin.solvers import closed_form_of
 from kin.solvers.contract import POSE, SolverInput
-from kin.solvers.general6.batch import OPEN, PROVED, SOLUTIONS, branches_one, solve_all, solve_cut
+from kin.solvers.general6.batch import AGREED, OPEN, PROVED, SOLUTIONS, branches_one, solve_all, solve_cut
 from kin.solvers.general6.cuts import SIZE
 from kin.solvers.general6.roots import ROOTS, covers_circle
 
@@ -312,6 +312,27 @@ def test_two_postures_beside_a_fold_are_agreed_where_targets_close_by_lead_to_no
     assert len(found) == 8
     assert apart(found, q).min() < 1e-6
     assert min(np.linalg.svd(kin.jacobian(robot, each), compute_uv=False)[-1] for each in found) < 2e-4
+
+
+def test_two_postures_that_every_cut_misses_are_found_from_a_target_close_by():
+    """Beside a singular wrist, θ5 = ±1.4e-5; both cuts find the same six others."""
+    robot = typed(DOOSAN, 3)
+    q = np.array(
+        [
+            -0.926370889048842,
+            -1.5971670753402643,
+            -1.2896098019173872,
+            -3.0344181577557308,
+            1.420662846363033e-05,
+            -2.964900921710099,
+        ]
+    )
+    T, out = kin.fk(robot, q), np.empty((SOLUTIONS, 6))
+    assert solve_all(closed_form_of(robot).kernels.params, T, out) == AGREED
+    assert apart(out[:6], q).min() > 1.0
+    found, known = candidates(robot, T, np.zeros(6))
+    assert (len(found), known) == (8, "unknown")
+    assert apart(found, q).min() < 1e-6
 
 
 def near_folds(robot, count):
