@@ -34,6 +34,17 @@ def nodes_of(scene: Any) -> dict[str, Any]:
     return nodes
 
 
+def state_of(handle: Any) -> Any:
+    """What viser keeps of a control or node: its properties, value, uuid, and whether it was removed."""
+    return handle._impl
+
+
+def controls_of(gui: Any) -> list[tuple[str, Any]]:
+    """The controls that have a label, each with it, the oldest first."""
+    handles = list(gui._gui_input_handle_from_uuid.values())
+    return [(state_of(h).props.label, h) for h in handles if hasattr(state_of(h).props, "label")]
+
+
 class BarePage:
     """The stage of one feature; the arm moves where it is sent, at once.
 
@@ -168,9 +179,9 @@ class BarePage:
     def set(self, label: str, value: object) -> None:
         """Set a control as a visitor does; what it posts waits for `rest`."""
         handle = self.control(label)
-        handle._impl.value = value
+        state_of(handle).value = value
         target = SimpleNamespace(value=value)
-        for call in handle._impl.update_cb:
+        for call in state_of(handle).update_cb:
             asyncio.run(call(SimpleNamespace(client=self.client, target=target)))
 
     def press(self, label: str, option: str | None = None) -> None:
@@ -193,8 +204,7 @@ class BarePage:
 
     def control(self, label: str) -> Any:
         """The handle of the control with this label."""
-        handles = list(self.client.gui._gui_input_handle_from_uuid.values())
-        (found,) = [h for h in handles if getattr(h._impl.props, "label", None) == label]
+        (found,) = [handle for name, handle in controls_of(self.client.gui) if name == label]
         return found
 
     def panel(self) -> list[Any]:
@@ -210,7 +220,7 @@ class BarePage:
         for name, node in nodes.items():
             if (T := _pose(nodes, name)) is None:
                 continue
-            props = {key: _plain(value) for key, value in vars(node._impl.props).items()}
+            props = {key: _plain(value) for key, value in vars(state_of(node).props).items()}
             kind = type(node).__name__
             if kind == "FrameHandle" and not props["show_axes"]:
                 continue
@@ -235,9 +245,9 @@ def _camera() -> SimpleNamespace:
 
 
 def _inside(gui: Any, container: Any) -> Iterator[Any]:
-    children = sorted(container._children.values(), key=lambda child: child._impl.props.order)
+    children = sorted(container._children.values(), key=lambda child: state_of(child).props.order)
     for child in children:
-        props = {k: _plain(v) for k, v in vars(child._impl.props).items()}
+        props = {k: _plain(v) for k, v in vars(state_of(child).props).items()}
         if not props.get("visible", True):
             continue
         for name in ("order", "visible", "_markdown"):
@@ -250,7 +260,7 @@ def _inside(gui: Any, container: Any) -> Iterator[Any]:
             else:
                 yield {"kind": kind, **props, "inside": inner}
         elif kind != "GuiHtmlHandle" or props["content"]:
-            value = getattr(child._impl, "value", None)
+            value = getattr(state_of(child), "value", None)
             yield {"kind": kind, "value": _plain(value) if kind != "GuiButtonGroupHandle" else None, **props}
 
 
@@ -262,9 +272,9 @@ def _pose(nodes: dict[str, Any], name: str) -> Array | None:
         above = nodes.get("/" + "/".join(parts[: k + 1]))
         if above is None:
             continue
-        if not above._impl.visible:
+        if not state_of(above).visible:
             return None
-        T = T @ pose_from_position_wxyz(above._impl.position, above._impl.wxyz)
+        T = T @ pose_from_position_wxyz(state_of(above).position, state_of(above).wxyz)
     return T
 
 

@@ -11,6 +11,7 @@ import typing
 import numpy as np
 import pytest
 import viser
+from bare_page import state_of
 from viser import _assignable_props_api as props
 from viser._messages import GuiUpdateMessage, SetPositionMessage, TransformControlsUpdateMessage
 from viser.infra import _async_message_buffer as buffers
@@ -134,7 +135,7 @@ def test_a_value_is_sent_as_the_setter_sends_it_and_no_callback_is_called(wire, 
             show(handle, given)
             (message,) = messages
             shown.append((type(message), message.updates, type(message.updates["value"]), handle.value))
-            assert message.uuid == handle._impl.uuid
+            assert message.uuid == state_of(handle).uuid
             handle.on_update(lambda _: called.append("callback"))
         assert shown[0] == shown[1]
         show_value(handle, value)
@@ -155,7 +156,7 @@ def test_html_is_sent_as_the_setter_sends_it_and_unchanged_html_is_not(wire, mon
         show(handle, "<b>new</b>")
         show(handle, "<b>new</b>")
         (message,) = messages
-        assert message.uuid == handle._impl.uuid
+        assert message.uuid == state_of(handle).uuid
         shown.append((type(message), message.updates, handle.content))
     assert shown[0] == shown[1]
     handle.remove()
@@ -297,7 +298,7 @@ def test_a_value_that_was_sent_arrives_though_another_is_shown_meanwhile(wire, a
     more = {"min": 0.0, "max": 10.0, "step": 0.1} if add == "add_slider" else {}
     handle = getattr(gui, add)("Value", initial_value=first, **more)
     # Viser calls this between the value and the callbacks; in a page, another thread may come in between.
-    handle._impl.sync_cb = lambda *_: show_value(handle, shown)
+    state_of(handle).sync_cb = lambda *_: show_value(handle, shown)
     got = []
 
     async def changed(event):
@@ -305,7 +306,7 @@ def test_a_value_that_was_sent_arrives_though_another_is_shown_meanwhile(wire, a
 
     handle.on_update(changed)
     gui._resolve_client = lambda _: object()
-    asyncio.run(gui._handle_gui_updates(0, GuiUpdateMessage(handle._impl.uuid, {"value": sent})))
+    asyncio.run(gui._handle_gui_updates(0, GuiUpdateMessage(state_of(handle).uuid, {"value": sent})))
     assert got == [(shown, expected)]
     assert type(got[0][1]) is type(expected)
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from arms import CLASSICS
-from bare_page import STORE, BarePage, bare_page, nodes_of
+from bare_page import STORE, BarePage, bare_page, controls_of, nodes_of
 
 from app.viewer.declared import panel
 from app.viewer.declared.facts import Facts
@@ -197,8 +197,7 @@ def page() -> Iterator[BarePage]:
 
 
 def handles(page: BarePage) -> dict[str, Any]:
-    every = page.client.gui._gui_input_handle_from_uuid.values()
-    return {h._impl.props.label: h for h in every if hasattr(h._impl.props, "label")}
+    return dict(controls_of(page.client.gui))
 
 
 def test_the_panel_shows_what_is_declared_and_controls_survive(page: BarePage) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy_arm
 import pytest
 from arms import CLASSICS
-from bare_page import STORE, bare_page
+from bare_page import STORE, bare_page, state_of
 
 import kin
 from app.viewer.arm import Arm
@@ -142,7 +142,7 @@ def test_a_target_that_is_missed_is_explained_and_its_remedies_go_with_it() -> N
         assert np.linalg.norm(page.now.T_tool[:3, 3] - T[:3, 3]) > 1.0
         assert lesson.facts.result is None
         assert "Nearest reachable pose" not in str(page.panel())
-        assert stale._impl.removed
+        assert state_of(stale).removed
 
 
 # Messages from one list to the next, as many as before this lesson was declared.
