@@ -102,7 +102,7 @@ class LessonChoice:
             self._box = self._gui.add_folder(None)
             with self._box:
                 left = self._left.get((chosen.key, self._stage.now.robot.id))
-                self.guide = Guide(self._stage, chosen, left if steps is None else steps)
+                self.guide = Guide(self._stage, chosen, left if steps is None else steps, after(chosen))
                 self.shown = chosen(self._stage)
                 self.guide.attach(self.shown)
             activity.lesson = chosen.key
@@ -176,6 +176,12 @@ def choices() -> tuple[type[Feature], ...]:
 def lesson_titled(title: object) -> type[Lesson] | None:
     """The lesson with this title; None if there is none."""
     return next((lesson for lesson in LESSONS if lesson.title == title), None)
+
+
+def after(lesson: type[Lesson]) -> str:
+    """The title of the lesson that follows one; "" after the last."""
+    following = LESSONS[LESSONS.index(lesson) + 1 :]
+    return following[0].title if following else ""
 
 
 def lesson_with_key(key: str | None) -> type[Lesson] | None:

@@ -37,6 +37,7 @@ class Guide(Feature):
 
     Args:
         state: how far the visitor is, as `state` returned it; None: at the beginning.
+        following: the title of the lesson that comes after this one; "": none does.
     """
 
     key = "guide"
@@ -54,15 +55,18 @@ class Guide(Feature):
             "arm",
             "offer",
             "restart",
+            "next",
             "again",
             "watch",
             "leave",
         }
     )
 
-    def __init__(self, stage: Stage, lesson: type[Lesson], state: dict[str, object] | None = None) -> None:
+    def __init__(
+        self, stage: Stage, lesson: type[Lesson], state: dict[str, object] | None = None, following: str = ""
+    ) -> None:
         super().__init__(stage)
-        self._lesson = lesson
+        self._lesson, self._following = lesson, following
         self._sheets: dict[str, Sheet] = {}
         self._progress = Progress(self._outline())
         self._earlier: dict[Progress, tuple[earlier.Drawn, ...]] = {}  # what each check asks of earlier lessons
@@ -132,6 +136,10 @@ class Guide(Feature):
             case ("offer", int()):
                 if self._shown is not None:
                     self._shown.on_offer()
+            case ("next", int()):
+                if self._following:
+                    self.stage.post("lesson", self._following)
+                return
             case ("again", str(question), int()):
                 progress.again(question)
                 self._sheets.clear()
@@ -343,7 +351,8 @@ class Guide(Feature):
         update_html(self._goal, views.goal_html(self._lesson.title, progress.outline.goal))
         offered = self.stage.store.get(self._offered).name if self._offered else ""
         sheets = {key: self._sheet(key) for key in open_}
-        update_html(self._steps, views.steps_html(progress, sheets, offered))
+        following = self._following if activity.progress.course is None else ""  # a course has a bar for it
+        update_html(self._steps, views.steps_html(progress, sheets, offered, following))
         forms = {key: progress.question(key).asked() for key in open_ if not progress.is_closed(key)}
         self._draw_ghost([key for key, asked in forms.items() if asked.form == "frame"])
         self._draw_answer()

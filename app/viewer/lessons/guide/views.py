@@ -23,12 +23,13 @@ def goal_html(lesson: str, goal: str) -> str:
     return render("guide/goal", lesson=lesson, goal=goal)
 
 
-def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "") -> str:
+def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "", following: str = "") -> str:
     """The step on show, or the check.
 
     Args:
         sheets: what was entered, by the key of the question.
         arm: the name of the arm that the step offers instead of this one.
+        following: the title of the lesson that is offered after a check that was passed.
     """
     steps, at = progress.outline.steps, progress.at
     marks = []
@@ -53,6 +54,7 @@ def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "") -> s
             earlier=earlier,
             recalled=sum(progress.mark(str(one["key"])) == "right" for one in earlier),
             done=all(question["closed"] for question in asked),
+            following=following if right == count else "",
         )
     step, key, before = steps[at], str(at + 1), f"e{at + 1}"
     closed = step.question is None or progress.is_closed(key)

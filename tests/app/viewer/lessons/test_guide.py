@@ -526,3 +526,35 @@ def test_joint_sliders_in_a_lesson_move_the_arm_and_each_other(server: int) -> N
         tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(ROBOTS[0], q), atol=1e-6))
         tab.set("Lesson", "None")
         tab.wait(lambda: tab.sliders.count("1 rotating base") == 1)
+
+
+def test_a_passed_check_leads_to_the_next_lesson(server: int) -> None:
+    def pass_check(tab: FakeBrowser, index: int) -> None:
+        outline = LESSONS[index].outline(ROBOTS[0], DEGREES)
+        press(tab, ["go", 1], len(outline.steps))
+        tab.wait(lambda: f"0 of {len(outline.check)} right" in tab.html)
+        for number, question in enumerate(outline.check, 1):
+            assert "Next lesson" not in tab.html
+            if isinstance(question, Choice):
+                press(tab, ["answer", f"c{number}", 10 + number], question.right())
+            else:
+                press(tab, ["fields", f"c{number}", 10 + number], question.right_cells())
+            tab.wait(lambda number=number: f"{number} of {len(outline.check)} right" in tab.html)  # type: ignore[misc]
+
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.set("Lesson", LESSONS[0].title)
+        tab.wait(lambda: f'data-lesson="{LESSONS[0].title}"' in tab.html)
+        pass_check(tab, 0)
+        assert f"Next lesson: {LESSONS[1].title}" in tab.html
+        press(tab, ["next", 30], None)
+        tab.wait(lambda: f'data-lesson="{LESSONS[1].title}"' in tab.html)
+        assert tab.value("Lesson") == LESSONS[1].title
+        last = len(LESSONS) - 1
+        tab.set("Lesson", LESSONS[last].title)
+        tab.wait(lambda: f'data-lesson="{LESSONS[last].title}"' in tab.html)
+        pass_check(tab, last)
+        assert "Next lesson" not in tab.html, "none follows"
+        press(tab, ["next", 31], None)
+        tab.settle()
+        assert f'data-lesson="{LESSONS[last].title}"' in tab.html
