@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -17,6 +18,7 @@ from kin.units import Units, fixed
 # to be found.
 Left = Literal["nothing", "table", "pose", "configuration"]
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+_JOINT = re.compile(r"(?<=θ)\d+")
 
 
 @dataclass(frozen=True)
@@ -170,6 +172,11 @@ class Sheet:
         unit = self.units.lengths
         top = [[*(fixed(v, 4) for v in line[:3]), unit.number(line[3])] for line in T[:3].tolist()]
         return [*top, ["0", "0", "0", "1"]]
+
+
+def indexed(text: str) -> str:
+    """A sentence with the numbers of joint variables as indices: θ5 as θ₅."""
+    return _JOINT.sub(lambda number: number[0].translate(SUBSCRIPTS), text)
 
 
 def _variable(kind: str, joint: int) -> str:

@@ -9,6 +9,7 @@ from typing import Literal
 
 import viser
 
+from app.exports.worksheet.sheet import indexed
 from app.viewer.panel.posture import short
 from app.viewer.views.templates import render
 from app.viewer.viser_patches import show_content
@@ -143,7 +144,7 @@ def html(shown: Notice, warning: str = "", waiting: str = "", failure: str = "")
         if shown.title in WELL:
             shown = replace(shown, title=f"{shown.title}, but {TOUCHES if warning else failure}")
     if shown.kind != "error":  # which says what was typed
-        shown = replace(shown, title=typeset(shown.title), detail=typeset(shown.detail))
+        shown = replace(shown, title=indexed(typeset(shown.title)), detail=indexed(typeset(shown.detail)))
     return render(
         "panel/status", notice=shown, warning=typeset(warning), waiting=waiting, symbol=symbol, color=color
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -10,7 +11,7 @@ from app.exercises.variant import Quantity
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import DOWN, UP, bar, direction
 from app.viewer.lessons.guide.outline import Lead, Outline, Pose
-from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.guide.poses import as_configuration, first_clear
 from kin import Robot, fk, jacobian
 from kin.axes import NEARLY
 from kin.differential.task import lifts
@@ -77,15 +78,20 @@ def without(robot: Robot, entry: int) -> Array | None:
     """A configuration ``(n,)`` with one coordinate of the tool point at zero; None: none, or home has it."""
     if abs(fk(robot, robot.q_home)[entry, 3]) <= NEAR:
         return None
+    return first_clear(robot, _at_zero(robot, entry))
+
+
+def _at_zero(robot: Robot, entry: int) -> Iterator[Array]:
+    """Configurations ``(n,)`` with one coordinate of the tool point at zero."""
     for q in (robot.q_home, *robot.random_q(np.random.default_rng(6), _TRIED)):
         for _ in range(_ROUNDS):
             value, row = float(fk(robot, q)[entry, 3]), jacobian(robot, q)[entry]
             if abs(value) < 0.01 * NEAR:
-                return np.asarray(q)
+                yield np.asarray(q)
+                break
             if not (size := float(row @ row)) > 1e-9:
                 break
             q = np.clip(q - value / size * row, robot.lower, robot.upper)
-    return None
 
 
 def _vector(column: Array) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from app.exercises.variant import Quantity
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Outline, Pose
-from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.guide.poses import as_configuration, first_clear
 from app.viewer.lessons.inverse.arm import Arm, arm_of
 from app.viewer.lessons.inverse.sheet import DerivedStep, StepKey
 from kin import Robot, branch_names, fk, solve_ik
@@ -71,7 +71,7 @@ def fewer(robot: Robot) -> tuple[int, Array | None]:
     tried = (stretched, *robot.random_q(np.random.default_rng(8), TRIED))
     if robot.n == 2:  # a planar arm: only the point is asked for
         return most, stretched
-    return most, next((np.asarray(q) for q in tried if 0 < count(q) < most), None)
+    return most, first_clear(robot, (np.asarray(q) for q in tried if 0 < count(q) < most))
 
 
 def title(arm: Arm, key: StepKey) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from app.exports.worksheet.sheet import SUBSCRIPTS
+from app.exports.worksheet.sheet import indexed
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import Configuration, Ghost, Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration, distance
@@ -150,7 +149,7 @@ def beyond(robot: Robot) -> tuple[float, ...]:
 def _meanings(robot: Robot) -> str:
     """What one word of each pair in the names of postures means."""
     said = [f"“{part}”: {meaning}." for part, meaning in list(branch_meanings(robot).items())[::2]]
-    return re.sub(r"(?<=θ)\d+", lambda number: number[0].translate(SUBSCRIPTS), " ".join(said))
+    return indexed(" ".join(said))
 
 
 def _others(known: Solved) -> dict[int, tuple[str, str]]:

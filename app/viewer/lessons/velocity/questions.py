@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
 
+from app.exports.worksheet.sheet import indexed
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import UP, direction, level
 from app.viewer.lessons.guide.outline import Lead, Outline, Pose, SemiAxis
-from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.guide.poses import as_configuration, first_clear
 from app.viewer.lessons.velocity.facts import scale_of
 from app.viewer.lessons.velocity.views import SAMPLE
 from kin import Robot, Singularity, fk, jacobian, singularities
@@ -71,7 +73,7 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "sigma_home": general(_smallest(robot, home), 3),
         "others": " and ".join(f"{general(value, 4)} m/s" for value in semi[1:axes]),
         "product": f"{general(float(semi[:axes].prod()), 4)} {'m²/s²' if axes == 2 else 'm³/s³'}",
-        "singularity": "" if found is None else short(found[1], units),
+        "singularity": "" if found is None else indexed(short(found[1], units)),
     }
     poses = {"home": Pose(as_configuration(home))}
     if found is not None:
@@ -114,7 +116,8 @@ def driven(robot: Robot, flat: float) -> Array | None:
         scan[:, joint] = np.linspace(low, high, SCANNED)
         tried.append(scan[int(np.argmin([_smallest(robot, q) for q in scan]))])
     tried.append(np.clip(0.0, robot.lower, robot.upper))
-    return next((np.asarray(q) for q in tried if robot.in_limits(q) and _smallest(robot, q) < 0.5 * flat), None)
+    there = (np.asarray(q) for q in tried if robot.in_limits(q) and _smallest(robot, q) < 0.5 * flat)
+    return first_clear(robot, there)
 
 
 def _smallest(robot: Robot, q: Array) -> float:
@@ -123,8 +126,18 @@ def _smallest(robot: Robot, q: Array) -> float:
     return float(values[usual_rank(robot, natural_task(robot)) - 1])
 
 
+@lru_cache(maxsize=64)
 def singular(robot: Robot) -> tuple[Array, Singularity] | None:
-    """A singular configuration within the limits, one joint away from home, and what aligns there."""
+    """A singular configuration within the limits, one joint away from home, and what aligns there.
+
+    One at which the arm touches nothing, if there is one.
+    """
+    found = list(_one_joint_away(robot))
+    q = first_clear(robot, (at for at, _ in found))
+    return next(((at, near) for at, near in found if at is q), None)
+
+
+def _one_joint_away(robot: Robot) -> Iterator[tuple[Array, Singularity]]:
     for near in singularities(robot, robot.q_home):
         if len(near.met_at) != 1 or near.kind in ("algorithmic", "jacobian"):
             continue
@@ -132,8 +145,7 @@ def singular(robot: Robot) -> tuple[Array, Singularity] | None:
         q[joint] = value
         within = robot.lower[joint] <= value <= robot.upper[joint]
         if within and rank_of(robot, q) < usual_rank(robot, natural_task(robot)):
-            return q, near
-    return None
+            yield q, near
 
 
 def _axes(robot: Robot, q: Array) -> int:

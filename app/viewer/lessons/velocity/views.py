@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from markupsafe import Markup
 
+from app.exports.worksheet.sheet import indexed
 from app.viewer.views.mathml import ident, sub, text
 from app.viewer.views.mathml import math as formula
 from app.viewer.views.templates import render
@@ -148,11 +149,11 @@ def warning_html(robot: Robot, found: tuple[Singularity, ...], units: Units, dir
     symbol, _, color = LOOKS[state]
     sentences: list[str] = []
     if first is not None and state == "at":
-        sentences = [short(first, units), *directions]
+        sentences = [indexed(short(first, units)), *directions]
     elif first is not None:
         amount = distance(first, units)
         if first.kind == "jacobian":
-            sentences = [f"σ_min = {amount}", short(first, units), *directions[:1]]
+            sentences = [f"σ_min = {amount}", indexed(short(first, units)), *directions[:1]]
         else:
             sentences = [f"Nearest: the {first.kind} singularity, {amount} away", there(first), *directions[:1]]
     # A leading σ stays lower case.
@@ -169,7 +170,7 @@ def others_html(robot: Robot, found: tuple[Singularity, ...], units: Units) -> s
         symbol, word, color = LOOKS[state_of(singularity, robot.reach)]
         if singularity.kind == "algorithmic":
             symbol, word, color = "·", "–", ""
-        meaning = short(singularity, units)
+        meaning = indexed(short(singularity, units))
         if singularity.kind != "jacobian":
             meaning += f": {there(singularity)}"
         name = {"algorithmic": "formula only", "jacobian": "σ_min"}.get(singularity.kind, singularity.kind)

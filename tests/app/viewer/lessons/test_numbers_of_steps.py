@@ -253,7 +253,8 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
         (rf"It is {N} at home", lambda h, m: [smallest_task_value(h)]),
         (rf"Which (?:torque|force) does joint {N} apply", lambda h, m: [1 + int(np.argmax(np.abs(effort(h))))]),
         (rf"A weight of {N} N|\(0, 0, {N}\)|{N} N times", lambda h, m: [10, -10, 10]),
-        (rf"\(θ{N} = {N}°\)", lambda h, m: [None, *deg(h.end[int(m[0]) - 1])]),
+        (rf"axis {N} parallel to axes {N}, {N} and {N}", lambda h, m: parallel_axes(h, [int(x) for x in m])),
+        (rf"\(θ([₁-₇]) = {N}°\)", lambda h, m: [None, *deg(h.end["₁₂₃₄₅₆₇".index(m[0])])]),
         (
             rf"two semi-axes are {N} m/s and {N} m/s long, and the product of all three is {N} m³/s³",
             lambda h, m: [*semi_axes(h)[1:], semi_axes(h).prod()],
@@ -287,6 +288,15 @@ def sliding(h: Here) -> float:
     """By how much the chain that is drawn at the end slides (m)."""
     assert h.step.end is not None
     return float(h.step.end.drawing["chain"][0][2])  # type: ignore[index]
+
+
+def parallel_axes(h: Here, joints: list[int]) -> list[float]:
+    """These joints if their axes are parallel at the end of the step; none of them is right otherwise."""
+    z = numpy_arm.jacobian(h.robot, h.end)[3:, [joint - 1 for joint in joints]].T
+    return [
+        joint if np.linalg.norm(np.cross(z[0], other)) < 1e-9 else -1
+        for joint, other in zip(joints, z, strict=True)
+    ]
 
 
 def semi_axes(h: Here) -> np.ndarray:

@@ -21,12 +21,14 @@ from app.exercises.questions import Question
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.viewer.arm import Arm
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.outline import Choice, Number, Outline, Pose, Step
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.lessons.rotations.lesson import RotationsLesson
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.panel.joints import label
+from app.viewer.scene.clearance import clearance
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, encode
 from kin import Robot
@@ -407,6 +409,22 @@ def test_what_a_question_withholds_ends_with_the_answer() -> None:
     assert progress.withheld == {"ellipsoid"}
     progress.reveal("c2")
     assert progress.withheld == frozenset()
+
+
+@pytest.mark.parametrize("robot", CLASSICS, ids=lambda robot: robot.id)
+def test_the_arm_touches_nothing_in_a_step_or_where_its_answer_leads(robot: Robot) -> None:
+    arm, floor = Arm(robot, robot.q_home, robot.q_home), clearance(robot, skeleton=True)
+    count = 0
+    for lesson in LESSONS:
+        for step in lesson.outline(robot, DEGREES).steps:
+            places = [pose.q for pose in (step.pose, step.end) if pose is not None]
+            if step.question is not None and step.question.asked().form == "posture":
+                places.append(step.question.right())  # type: ignore[arg-type]
+            for q in map(np.array, places):
+                assert floor.at(q) is None, (lesson.key, step.title)
+                assert arm.contacts_at(q) == (), (lesson.key, step.title)
+                count += 1
+    assert count > 30
 
 
 def test_the_poses_of_steps_are_values() -> None:

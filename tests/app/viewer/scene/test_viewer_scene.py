@@ -360,7 +360,7 @@ def test_the_readout_keeps_its_shape_and_shows_no_negative_zero() -> None:
 
 def test_sentences_of_the_status_have_true_minus_signs_and_errors_what_was_typed():
     text = status.html(status.Notice("advice", "Near", "straight (θ3 = -87.3°), 6-joint arm"), "y = -2 mm")
-    assert "θ3 = −87.3°" in text
+    assert "θ₃ = −87.3°" in text
     assert "y = −2 mm" in text
     assert "6-joint" in text
     assert "got -1," in status.html(status.Notice("error", "Invalid input", "seed: got -1, expected 0"))
