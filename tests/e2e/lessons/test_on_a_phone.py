@@ -112,3 +112,24 @@ def test_what_comes_under_the_finger_does_not_look_pressed(phone: Tab, no_spoilt
     assert option.evaluate("one => getComputedStyle(one).backgroundColor") == plain
     page.locator('.kb-guide-row [data-argument="0"]').tap()
     phone.choose("Lesson", "None")
+
+
+def test_what_is_opened_is_shown_below_the_head_of_the_sheet(phone: Tab, no_spoilt_page: None) -> None:
+    page = phone.page
+    phone.show(PIONEER)
+    phone.choose_lesson("Exercises")
+    page.locator(".kb-exercise-list button").first.tap()
+    task = page.locator("[data-exercises=task]")
+    expect(task).to_be_in_viewport()
+    page.wait_for_function(
+        """() => {
+          const head = document.querySelector(".kb-head").getBoundingClientRect();
+          const task = document.querySelector("[data-exercises=task]").getBoundingClientRect();
+          return task.top >= head.bottom - 1 && task.top < head.bottom + 60;
+        }"""
+    )
+    scrolled = page.evaluate(
+        "[...document.querySelectorAll('.mantine-ScrollArea-root')].filter((one) => one.scrollTop).length"
+    )
+    assert scrolled == 0, "the sheet itself"
+    phone.choose("Lesson", "None")
