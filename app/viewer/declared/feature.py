@@ -198,6 +198,8 @@ class DeclaredFeature(Feature, Generic[S, F]):
             case ("do", (str(name), *arguments), int(serial), int()):
                 if self._panel.is_live(serial):
                     getattr(self, name)(*arguments)
+            case ("done", (str(name), *arguments)):
+                getattr(self, name)(*arguments)
             case ("drag", (str(name), *arguments)):
                 assert isinstance(value, tuple)
                 getattr(self, name)(*arguments, *value[:1], value[1:])

@@ -120,6 +120,7 @@ def pause_within(gesture: tuple[object, ...], value: object) -> float:
 
 
 def belongs_before(gesture: tuple[object, ...]) -> bool:
-    """Whether an event of a feature only completes an earlier one. Meshes that have been read are an example."""
+    """Whether an event of a feature only completes an earlier one, as meshes do that have been read, or equations
+    that have been derived."""
     key = gesture[2] if gesture[0] == "feature" else None
-    return isinstance(key, tuple) and key[:1] == ("meshes",)
+    return isinstance(key, tuple) and key[:1] in (("meshes",), ("done",))

@@ -173,7 +173,7 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
             self.on_ready()
         else:
             ready = self.event(self.on_ready)
-            derivation.future.add_done_callback(lambda _: self.post(("do", ready, 0, 0)))
+            derivation.future.add_done_callback(lambda _: self.post(("done", ready)))
 
     def _stop_deriving(self) -> None:
         """Wait no more; unless somebody else waits for the same equations, they are not derived."""

@@ -112,6 +112,27 @@ def test_another_arm_has_its_own_equations(tab: FakeBrowser) -> None:
     assert len(drawn(tab)) == 2
 
 
+def test_equations_that_are_derived_later_belong_to_the_choice_of_the_arm(
+    tab: FakeBrowser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begin = threading.Event()
+
+    def late(robot: kin.Robot) -> object:
+        assert begin.wait(30)
+        return derive(robot)
+
+    monkeypatch.setattr(books, "derive", late)
+    monkeypatch.setattr(books, "_BOOKS", ComputationCache(ThreadPoolExecutor(1), 4))
+    tab.choose(PUMA.name)
+    tab.wait(lambda: "Deriving the equations" in tab.html)
+    begin.set()
+    tab.wait(lambda: "data-equation" in tab.html)
+    tab.settle()
+    assert tab.script["undo"] == "Robot"
+    tab.say("undo")
+    tab.wait(lambda: tab.value("Robot") == PIONEER.name)
+
+
 def test_an_equation_that_there_is_not_is_refused_by_name(tab: FakeBrowser) -> None:
     tab.set("Equation", "E = m c²")
     tab.wait(lambda: "Invalid input" in tab.html)
