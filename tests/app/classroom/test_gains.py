@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import html
 import io
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -168,6 +170,9 @@ def test_the_results_of_a_room_show_both_and_the_gain(service: object) -> None:
     assert "25 % → 70 %" in page
     assert f"g = {(0.7 - 0.25) / (1 - 0.25):.2f}" in page
     assert "1 answered both" in page
+    named = [html.unescape(text) for text in re.findall(r'<b class="of"[^>]*>(.*?)</b>', page)]
+    first, second = ([ALL.get(key).title for key in pair] for pair in PAIRS)  # type: ignore[union-attr]
+    assert named == 2 * [" → ".join(first), " → ".join(second), "All"], "the names that a phone has in each cell"
     assert "<b>Ada" not in page
     answer = teacher.get("/room/gains.csv")
     assert answer.headers["content-type"].startswith("text/csv")

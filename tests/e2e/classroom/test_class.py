@@ -167,6 +167,11 @@ def test_a_class_from_the_landing_page_to_the_csv(members: list[Member], address
     expect(results.locator("tbody tr")).to_have_count(3)
     expect(results.locator("tbody tr").first).to_contain_text("=Bob")
     save_picture(results, "class-results")
+    size = results.viewport_size
+    results.set_viewport_size({"width": 390, "height": 844})
+    assert results.evaluate("document.documentElement.scrollWidth") <= 390
+    assert size is not None
+    results.set_viewport_size(size)
     answer = results.request.get(address + "room/results.csv")
     rows = list(csv.DictReader(io.StringIO(answer.body().decode("utf-8-sig"))))
     assert [(row["alias"], row["exercise"], float(row["score"])) for row in rows] == [
