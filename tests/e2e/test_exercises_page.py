@@ -67,7 +67,10 @@ def test_exercises_by_keyboard_and_mouse(tab: Tab) -> None:
     expect(page.locator("[data-exercises-verdict]")).to_contain_text("Right")
     expect(field).to_have_attribute("readonly", "")
     following = page.locator("[data-exercises=foot] [data-guide-do=open]")
-    following.hover()
+    for _ in range(50):  # until the page has scrolled to the verdict, and no longer away from the pointer
+        following.hover()
+        if following.evaluate("one => getComputedStyle(one).backgroundColor") == "rgb(23, 74, 109)":
+            break
     expect(following).to_have_css("background-color", "rgb(23, 74, 109)")  # white letters stay legible
 
     page.locator("[data-guide-do=list]").click()
