@@ -73,6 +73,7 @@ def test_the_reason_of_a_wrong_answer_is_in_the_window(small: Tab) -> None:
 
 def test_the_way_on_from_a_branch_that_ends_is_in_the_window(phone: Tab, no_spoilt_page: None) -> None:
     """The other shoulder is right, and leads to an elbow that does not reach: the way on is on the screen."""
+    phone.reopen()  # with no answer yet
     page = phone.page
     phone.show(PIONEER)
     phone.choose_lesson(InverseLesson.title)
@@ -90,11 +91,11 @@ def test_the_way_on_from_a_branch_that_ends_is_in_the_window(phone: Tab, no_spoi
     on.tap()
     expect(steps.locator('[data-question="3"]')).to_be_visible()
     expect(steps).not_to_contain_text("No solution")
-    page.locator('.kb-guide-row [data-argument="0"]').tap()
     phone.choose("Lesson", "None")
 
 
 def test_what_comes_under_the_finger_does_not_look_pressed(phone: Tab, no_spoilt_page: None) -> None:
+    phone.reopen()  # with no answer yet
     page = phone.page
     phone.show(PIONEER)
     phone.choose_lesson(Postures.title)
@@ -110,7 +111,6 @@ def test_what_comes_under_the_finger_does_not_look_pressed(phone: Tab, no_spoilt
     expect(page.locator('[data-feedback="2"]')).not_to_be_empty()
     assert option.evaluate("one => one.matches(':hover')"), "the browser takes the finger for a pointer that stays"
     assert option.evaluate("one => getComputedStyle(one).backgroundColor") == plain
-    page.locator('.kb-guide-row [data-argument="0"]').tap()
     phone.choose("Lesson", "None")
 
 
