@@ -121,12 +121,7 @@ class Guide(Feature):
                 if not progress.is_closed(question):
                     self._sheet(question).pick(value, len(asked.labels))
             case ("reveal", str(question), int()):
-                if not progress.is_closed(question):
-                    progress.reveal(question)
-                    self._note(question, right=False)
-                self._sheets.pop(question, None)
-                self._show()
-                self._move_to_end(question)
+                self._reveal(question)
             case ("pose", int()):
                 self._bring()
             case ("arm", int()):
@@ -142,16 +137,12 @@ class Guide(Feature):
                 return
             case ("again", str(question), int()):
                 progress.again(question)
-                self._sheets.clear()
-                self._show()
-                self._bring()
+                self._begin_again()
             case ("restart", int()):
                 progress.restart()
                 self._earlier.pop(progress, None)
                 progress.ask_also({})
-                self._sheets.clear()
-                self._show()
-                self._bring()
+                self._begin_again()
             case _ if key == GHOST and isinstance(value, list | tuple) and len(value) == 2:
                 T = pose_from_position_wxyz(value[0], np.array(value[1]))
                 self._sheet(str(progress.at + 1)).drag(T, self.stage.units)
@@ -285,6 +276,21 @@ class Guide(Feature):
         if verdict.right:
             self._show()
             self._move_to_end(key)
+
+    def _reveal(self, key: str) -> None:
+        """Show the answer to a question."""
+        if not self._progress.is_closed(key):
+            self._progress.reveal(key)
+            self._note(key, right=False)
+        self._sheets.pop(key, None)
+        self._show()
+        self._move_to_end(key)
+
+    def _begin_again(self) -> None:
+        """Show the step with nothing entered, at its pose."""
+        self._sheets.clear()
+        self._show()
+        self._bring()
 
     def _note(self, key: str, right: bool) -> None:
         """An answer was judged or shown: what was missed comes back. An estimate may be wrong."""
