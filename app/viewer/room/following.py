@@ -24,7 +24,7 @@ from kin import Obstacle, Robot
 from kin.transforms import Array
 
 SAME_VIEW = 1e-3  # tolerance of viewpoints, metres
-OWN = (EXERCISES, REVIEW)  # what is everybody's own
+OWN = (EXERCISES, REVIEW, AUTHOR)  # what is everybody's own
 
 
 @lru_cache(maxsize=128)

@@ -15,7 +15,7 @@ from app.classroom.results.keys import result_key
 from app.exercises import Exercises, form, parse_exercise
 from app.viewer.exercises.author import Author
 from app.viewer.room.following import shared
-from app.viewer.session.state import PageState, decode
+from app.viewer.session.state import PageState, decode, encode
 from kin import classic_robots
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -68,6 +68,21 @@ def test_a_draft_is_not_shown_to_followers() -> None:
     assert Exercises().get(OWN.id) is None
     state = PageState(lesson="author", features={"author": {"draft": OWN.source}, "screws": {}})
     assert shared(state, [Author]).features == {}  # type: ignore[list-item]
+
+
+def test_a_teacher_who_writes_an_exercise_leads_into_no_lesson(students: Room) -> None:
+    """What students would see there is that only the teacher writes."""
+    teacher, tab = (
+        students.hub.attend(Ticket(students.room.id), lambda: None),
+        students.student(students.join("Ann")),
+    )
+    shown = encode(PageState(OWN.robot.id, OWN.robot.q_home, lesson="author"))
+    teacher.tell_page(shown)
+    teacher.set_follow(True)
+    tab.wait(lambda: "data-class-bar" in tab.html and "You follow the teacher" in tab.html)
+    tab.settle()
+    assert "the teacher writes the exercises" not in tab.html
+    teacher.leave()
 
 
 def test_a_students_page_takes_no_draft(students: Room) -> None:
