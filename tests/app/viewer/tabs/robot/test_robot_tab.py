@@ -14,13 +14,14 @@ import pytest
 from fake_browser import FakeBrowser
 
 import kin
+from app.shared.answers.inspection import inspect
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
 from app.viewer.own_arm import own_arm, pack
 from app.viewer.scene.meshes import body
 from app.viewer.session.events import SHORT_PAUSE
 from app.viewer.session.state import PageState, decode, encode
-from app.viewer.tabs.robot import files
+from app.viewer.tabs.robot import files, views
 from app.viewer.tabs.robot.files import MOST
 from app.viewer.tabs.robot.presets import PRESETS
 from app.viewer.tabs.robot.texts import IN_LINK, Texts
@@ -395,6 +396,14 @@ def test_every_lesson_follows_an_arm_that_changes(port: int) -> None:
                 assert "Invalid input" not in tab.html, (lesson.key, start)
 
 
+def test_an_arm_of_one_posture_is_not_said_to_have_up_to_one() -> None:
+    said = {robot.id: views.about(inspect(robot), robot, DEFAULT_UNITS) for robot in Store().robots}
+    said["empty"] = views.about(inspect(one := own_arm(PRESETS["one-joint"]).robot), one, DEFAULT_UNITS)
+    assert not [name for name, text in said.items() if "up to 1 " in text]
+    assert ", one posture:" in said["empty"]
+    assert "up to 8 postures" in said["ur5"]
+
+
 def test_the_same_arm_in_the_other_convention(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -402,6 +411,7 @@ def test_the_same_arm_in_the_other_convention(port: int) -> None:
         shown = html.unescape(part(tab, "convert"))
         assert "in the modified (Craig) convention" in shown
         assert "configurations" in shown
+        assert "proof" not in shown, "a check of some configurations is none"
         assert "Tool</b> stays as it is" in shown, "the last row of this arm is fixed and has no length a"
         say(tab, "convert", value="use")
         shows(tab, PIONEER, PIONEER.q_home)
