@@ -104,7 +104,10 @@ def test_the_command_works_with_every_python_that_is_found(dist, tmp_path):
         for each in json.loads(listed.stdout)
         if each["implementation"] == "cpython"
     }
-    supported = [path for version, path in pythons.items() if (3, 11) <= version < (3, 14)]
+    for path in sorted(Path.home().glob(".pyenv/versions/3.*/bin/python3")):  # uv sees those that are switched on
+        version = re.match(r"3\.(\d+)", path.parents[1].name)
+        pythons.setdefault((3, int(version[1])), str(path))
+    supported = [path for version, path in sorted(pythons.items()) if (3, 11) <= version < (3, 14)]
     assert supported
     (wheel,) = dist.iterdir()
     for python in supported:
