@@ -46,7 +46,7 @@ class Standing:
 
     @property
     def rank(self) -> tuple[bool, bool, bool, bool, int]:
-        """Sorts students: who drives something first, then who needs the teacher; who is away, who never came."""
+        """Sorts students: who drives something, then who needs the teacher; last the away and the absent."""
         urgency = URGENCY.index(self.progress or "at it")
         return not self.came, not self.here, not self.driven, not self.hand, urgency
 

@@ -93,8 +93,8 @@ def solve_file(question: Question, source: Path, output: Path, dask: str | None 
         dask: address of a Dask scheduler whose workers solve them; by default threads of this process do.
 
     Raises:
-        InputError: a file of another kind, one that cannot be read or written, a target that is none, an extra
-            that is not installed, or a cluster that does not answer.
+        InputError: the file has another format, or cannot be read or written; a row is no target; an extra is not
+            installed; the cluster does not answer.
     """
     if output.suffix.lower() not in _ENDINGS or not output.parent.is_dir():
         expected = "a file in an existing folder, with a name in " + ", ".join(_ENDINGS)

@@ -23,7 +23,7 @@ from http.client import HTTPConnection, HTTPException, HTTPResponse, HTTPSConnec
 from typing import Any, Self
 from urllib.error import HTTPError
 
-from app.classroom.lti.platforms import Place, is_safe, place_of
+from app.classroom.lti.platforms import HostPort, is_safe, place_of
 
 PATIENCE = 10.0  # s for the whole exchange
 MOST = 256 * 1024  # bytes of an answer
@@ -47,7 +47,7 @@ class PlatformError(Exception):
 
 def ask(
     address: str,
-    trusted: Set[Place],
+    trusted: Set[HostPort],
     body: bytes | None = None,
     headers: Mapping[str, str] | None = None,
     seconds: float = PATIENCE,
@@ -94,7 +94,7 @@ class _PrivateAddressError(OSError):
 class _Line:
     """The connection of one exchange."""
 
-    def __init__(self, trusted: Set[Place], seconds: float) -> None:
+    def __init__(self, trusted: Set[HostPort], seconds: float) -> None:
         self._trusted = trusted
         self._lock = threading.Lock()
         self._held: list[socket.socket] = []  # copies, which stay ours when TLS takes the socket
@@ -117,7 +117,7 @@ class _Line:
         """What sends requests over this line."""
         return urllib.request.build_opener(_NoRedirects, _Http(self), _Https(self))
 
-    def connect(self, where: Place, timeout: float, *_: object) -> socket.socket:
+    def connect(self, where: HostPort, timeout: float, *_: object) -> socket.socket:
         """A connection to an allowed address of this host."""
         host, port = place = where[0].lower(), where[1]
         found = {str(info[4][0]): None for info in socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)}
@@ -191,7 +191,7 @@ def _tls() -> ssl.SSLContext:
     return ssl.create_default_context()
 
 
-def _proxies() -> Set[Place]:
+def _proxies() -> Set[HostPort]:
     """The operator's proxies, which may be in the private network."""
     named = urllib.request.getproxies().values()
     places = {place_of(each if "://" in each else f"http://{each}") for each in named}

@@ -23,7 +23,7 @@ LOCAL = ("127.0.0.1", "::1", "localhost")
 PORTS = {"https": 443, "http": 80}
 _NEVER = frozenset(" \"'<>\\^`{|}")  # in addresses (RFC 3986)
 _HOST = re.compile(r"[a-z0-9_]([a-z0-9_.-]*[a-z0-9_])?|[0-9a-f:.]*:[0-9a-f:.]*", re.ASCII)
-Place = tuple[str, int]  # a host and a port
+HostPort = tuple[str, int]
 
 
 class PlatformFileError(ValueError):
@@ -48,7 +48,7 @@ class Platform:
     keys_url: str
 
     @property
-    def places(self) -> frozenset[Place]:
+    def places(self) -> frozenset[HostPort]:
         """Hosts that the operator names; they may be in a private network."""
         named = map(place_of, (self.issuer, self.login_url, self.token_url, self.keys_url))
         return frozenset(place for place in named if place is not None)
@@ -153,7 +153,7 @@ def _platform(row: Mapping[str, Any], where: str) -> Platform:
     return Platform(**{"name": row["issuer"], **values, "deployments": tuple(row["deployments"])})
 
 
-def place_of(address: str) -> Place | None:
+def place_of(address: str) -> HostPort | None:
     """The host and port of an address with http or https; None if it is none, or contains more than it should."""
     if not (address.isascii() and address.isprintable()) or not _NEVER.isdisjoint(address):
         return None

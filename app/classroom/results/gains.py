@@ -1,15 +1,14 @@
 """Did they learn? What a course asks before and after, and the normalised gain between them.
 
-A course may pair exercises: one before, one after. Of both, a student's first answer counts; later ones have seen
-a verdict, and other numbers do not begin anew. An answer that was shown before any was given scores 0. The
-normalised gain is the share of what was missing that was gained (Hake, 1998)::
+A course may pair exercises: one before, one after. A student's first answer to each counts: later ones follow a
+verdict, also with other numbers. Asking for the answer before giving one scores 0. With scores from 0 to 1, the
+normalised gain is (Hake, 1998)::
 
     g = (after - before) / (1 - before)
 
-It is 1 where nothing is missing any more, 0 where nothing has changed, and negative where something was lost,
-without a bound for a student who knew almost everything before. Where before is 1, nothing was missing, and there
-is no g. The gain of a class is that of its means, over the students who answered both; so those who knew
-everything before are in it, too.
+It is 1 if all that was missing has been gained, 0 if nothing has changed, and negative after a loss. It has no
+lower bound: the more a student knew before, the smaller is the divisor. If before is 1, there is no g. A class has
+the gain of its means over the students who answered both, including those who knew everything before.
 """
 
 from __future__ import annotations

@@ -153,12 +153,12 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         return nodes
 
     @property
-    def _place(self) -> views.Place:
+    def _place(self) -> views.ServerFolder:
         """What can be done with the draft in the folder of the service."""
         if not self.stage.may_save:
-            return views.Place(saved=self.read.is_saved)
+            return views.ServerFolder(saved=self.read.is_saved)
         obstacle = self._exercises.obstacle
-        return views.Place(not obstacle, obstacle, self.read.is_saved, self.read.known is not None)
+        return views.ServerFolder(not obstacle, obstacle, self.read.is_saved, self.read.known is not None)
 
     def scene(self) -> Sequence[Node]:
         variant = self.read.first if self.shown else None

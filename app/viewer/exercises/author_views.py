@@ -33,7 +33,7 @@ class Refusal:
 
 
 @dataclass(frozen=True)
-class Place:
+class ServerFolder:
     """The folder of the service, for a draft.
 
     Attributes:
@@ -61,7 +61,7 @@ def start_html(exercises: Sequence[Exercise], refusal: Refusal) -> str:
     return render("exercises/author_start", topics=topics, kinds=kinds, most=MOST_BYTES, refusal=refusal)
 
 
-def head_html(trial: Trial, refusal: Refusal, place: Place) -> str:
+def head_html(trial: Trial, refusal: Refusal, place: ServerFolder) -> str:
     """Whether the draft is an exercise, and what can be done with it."""
     return render("exercises/author_head", trial=trial, refusal=refusal, ready=not trial.error, place=place)
 

@@ -3,10 +3,9 @@
 Compiling takes seconds. If an event were handled before that, the page would stand still without a reason. So it
 is held, the status card says what is being prepared, and the page can be used meanwhile.
 
-A page that opens with a stored state of such an arm shows another arm until then. Sliders that are moved
-meanwhile, joint values and targets that are typed, what a program sends, and a lesson that is chosen are meant for
-the stored state: they wait too, and are applied to it. What starts from the arm on show, as a jog does, is refused
-in words, and that arm has no arrows to drag.
+A page that opens with a stored state of such an arm shows another arm until then. Meanwhile, sliders, typed joint
+values and targets, messages of a program and the choice of a lesson are meant for the stored state: they wait, and
+are applied to it. A jog starts from the arm on show, so it is refused in words. That arm has no arrows to drag.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from app.exercises.questions import Choice, Number, Question
 from app.viewer.declared.scene import Color, Node, axes, bars, label
 from app.viewer.exercises.drawing import SIZE
 from app.viewer.lessons.figure_shapes import GREEN, VERMILION
-from app.viewer.lessons.guide.outline import Bar, Drawn, Ghost, Lead, Leads, Path, Place, SemiAxis, Step
+from app.viewer.lessons.guide.outline import Bar, Drawn, Ghost, Lead, Leads, Path, SemiAxis, Step, Triad
 from app.viewer.scene.meshes import body
 from app.viewer.skeleton import ghost
 from kin import Robot, fk, link_frames
@@ -77,7 +77,7 @@ def _lead(key: str, robot: Robot, lead: Lead | None, words: str, color: Color, b
             points = np.array(lead.points)
             name = label(f"{key}-words", words, points[len(points) // 2], anchor="bottom-center")
             return [_line(key, robot, points, color, broken), name]
-        case Place():
+        case Triad():
             return _frame(key, np.array(lead.T), lead.length, words, color, broken)
     return []
 

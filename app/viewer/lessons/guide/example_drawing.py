@@ -85,15 +85,15 @@ def facing(out: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
-    """Where the example is drawn: points are moved and scaled so that a sphere around them is another one."""
+class Scaling:
+    """Moves and scales the points of an example so that a sphere around them becomes another one."""
 
     scale: float
     center: Array
     at: Array
 
     @classmethod
-    def of(cls, points: Array, view: View) -> Place:
+    def of(cls, points: Array, view: View) -> Scaling:
         """Points ``(k, 3)`` in the middle of the picture."""
         center, radius = round_points(points)
         return cls(FILLED * view.radius / radius, center, view.center)
@@ -118,7 +118,7 @@ class ExampleDrawing:
         ways = [q for step in example.steps for q in step.way[::10]]
         seen = [self._frames(q)[:, :3, 3] for q in ways]
         marks = [self._mark(mark) for step in example.steps for mark in step.drawn.marks]
-        self._place = Place.of(np.vstack([*seen, *marks]), view)
+        self._place = Scaling.of(np.vstack([*seen, *marks]), view)
         self._figure = FigureNodes(0.8 * self._place.scale * body(robot).size)
         self._radius = FILLED * view.radius
 

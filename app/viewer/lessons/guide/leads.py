@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.viewer.lessons.guide.outline import Bar, Place
+from app.viewer.lessons.guide.outline import Bar, Triad
 from kin import Robot
 from kin.transforms import Array
 
@@ -48,6 +48,6 @@ def up_or_down(robot: Robot, point: Array, way: Array, least: float) -> dict[str
     return {name: direction(robot, point, each) for name, each in found.items()}
 
 
-def place(T: Array, length: float) -> Place:
+def place(T: Array, length: float) -> Triad:
     """A frame at a pose ``(4, 4)``."""
-    return Place(tuple(tuple(map(float, row)) for row in T), length)
+    return Triad(tuple(tuple(map(float, row)) for row in T), length)

@@ -43,11 +43,11 @@ __all__ = [
     "Option",
     "Outline",
     "Path",
-    "Place",
     "Pose",
     "Question",
     "SemiAxis",
     "Step",
+    "Triad",
     "Way",
     "apart",
     "count",
@@ -142,14 +142,14 @@ class Path:
 
 
 @dataclass(frozen=True)
-class Place:
+class Triad:
     """An option that leads a frame to a pose ``(4, 4)``, by rows; its axes are drawn with this length (m)."""
 
     T: tuple[tuple[float, ...], ...]
     length: float
 
 
-Lead = Bar | Ghost | Path | Place
+Lead = Bar | Ghost | Path | Triad
 
 
 @dataclass(frozen=True)

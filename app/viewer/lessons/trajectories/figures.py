@@ -135,7 +135,7 @@ def timed(unit: Unit, way: float, limits: Array) -> Answered:
 
 
 def _trapezoid(time: float, way: float, a: float, unit: Unit) -> tuple[Array, tuple[Array]]:
-    """Corners of the velocity that covers a way in a time, with slope `a` where that is possible."""
+    """Corners of a velocity profile that covers a way in a time, with slope `a` if it can."""
     free = (a * time) ** 2 - 4.0 * a * way
     top = 0.5 * (a * time - free**0.5) if free >= 0.0 else 2.0 * way / time
     ramp = top / a if free >= 0.0 else 0.5 * time

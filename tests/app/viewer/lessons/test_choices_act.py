@@ -20,12 +20,12 @@ from app.exercises.contract import Posed
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.figure_shapes import GREEN, VERMILION
 from app.viewer.lessons.guide.answer_drawing import DASHES, answer_nodes, lead_nodes
-from app.viewer.lessons.guide.outline import Bar, Choice, Ghost, Leads, Number, Path, Place, Step
+from app.viewer.lessons.guide.outline import Bar, Choice, Ghost, Leads, Number, Path, Step, Triad
 from kin import Robot
 from kin.units import Units
 
 LINE, ARM, WAY, FRAME = "a line", "a copy of the arm", "a way", "a frame"
-KINDS = {Bar: LINE, Ghost: ARM, Path: WAY, Place: FRAME}
+KINDS = {Bar: LINE, Ghost: ARM, Path: WAY, Triad: FRAME}
 # Reasons why a choice is not drawn.
 COUNT = "a number of things: none of them is at a place"
 TRUTH = "whether something holds: an arm that shows it is the answer itself"
@@ -147,7 +147,7 @@ def test_true_and_wrong_differ_in_colour_and_line() -> None:
                 lines = [nodes[f"{key}-line"].props["points"] for key in ("wrong", "right")]
                 assert np.linalg.norm(lines[0][1:, 0] - lines[0][:-1, 1], axis=1).min() > 1e-9
                 assert np.allclose(lines[1][1:, 0], lines[1][:-1, 1])
-            case Place():
+            case Triad():
                 assert (one["origin_color"], other["origin_color"]) == (VERMILION, GREEN)
                 assert one["axes_radius"] < other["axes_radius"]
 
