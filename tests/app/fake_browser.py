@@ -61,6 +61,20 @@ def _watched_connect(self: VisitorConnection, visitor: WebSocket) -> None:
         return event
 
     visitor.receive = watched  # type: ignore[method-assign]
+    hear = self.hear
+
+    def watched_hear(take: Callable[[bytes], bool]) -> None:
+        def counted(data: bytes) -> bool:
+            nonlocal received
+            taken = take(data)
+            received += taken
+            if taken:
+                _handled[port] = received
+            return taken
+
+        hear(counted)
+
+    self.hear = watched_hear  # type: ignore[method-assign]
 
 
 Worker.post, Worker._act_once = _watched_post, _watched_act  # type: ignore[method-assign]

@@ -51,7 +51,9 @@ def lower_priority() -> None:
     """
     unpin()
     if sys.platform == "linux":
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
+        thread = threading.get_native_id()
+        own = os.getpriority(os.PRIO_PROCESS, thread)  # who started the process may have lowered it farther
+        os.setpriority(os.PRIO_PROCESS, thread, max(own, NICENESS))
 
 
 def end_process(code: int) -> NoReturn:

@@ -55,6 +55,23 @@ def test_without_it_nothing_changes(as_before):
     assert os.sched_getaffinity(0) == as_before
 
 
+@pytest.mark.parametrize(("own", "then"), [(0, threads.NICENESS), (threads.NICENESS + 5, threads.NICENESS + 5)])
+def test_a_thread_steps_back_and_never_forward(own, then):
+    """Only root may take a niceness back."""
+    found = []
+
+    def act():
+        thread = threading.get_native_id()
+        began = os.getpriority(os.PRIO_PROCESS, thread)
+        os.setpriority(os.PRIO_PROCESS, thread, max(began, own))
+        threads.lower_priority()
+        found.append((began, os.getpriority(os.PRIO_PROCESS, thread)))
+
+    in_thread(act)
+    ((began, after),) = found
+    assert after == max(began, then)
+
+
 FORKED = """
 import atexit, os, sys, tempfile
 from multiprocessing.util import Finalize

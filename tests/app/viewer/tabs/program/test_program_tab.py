@@ -105,7 +105,7 @@ def test_recorded_poses_are_played(tab: FakeBrowser) -> None:
     tab.set(TURN, 100)
     shows(tab, PIONEER, turned(100))
     press(tab, "play")
-    assert clock(tab)["playing"] == "1"
+    tab.wait(lambda: clock(tab)["playing"] == "1")
     tab.wait(lambda: clock(tab)["playing"] == "0")
     assert clock(tab)["time"] == clock(tab)["duration"]
     shows(tab, PIONEER, turned(50))
@@ -116,12 +116,16 @@ def test_recorded_poses_are_played(tab: FakeBrowser) -> None:
 
 def test_the_link_has_the_end_of_a_program_that_was_played(tab: FakeBrowser) -> None:
     record(tab, 10, 170)
+    tab.set(TURN, 100)
+    shows(tab, PIONEER, turned(100))
     press(tab, "play")
+    tab.wait(lambda: clock(tab)["playing"] == "1")
+    tab.kept.clear()
     tab.wait(lambda: clock(tab)["playing"] == "0")
     shows(tab, PIONEER, turned(170))
 
     def kept() -> np.ndarray:
-        q = decode(tab.kept[-1], STORE.robots).q
+        q = decode(tab.kept[-1], STORE.robots).q if tab.kept else None
         return np.zeros(PIONEER.n) if q is None else q
 
     tab.wait(lambda: np.allclose(kept(), turned(170), atol=1e-6))
