@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from app.exercises import Asked, Exercise, Exercises, Variant
+from app.exports.worksheet.sheet import indexed
 from app.viewer.activity.activity import EXERCISES, Activity
 from app.viewer.activity.practice import Mark, Practice, Record
 from app.viewer.exercises.sheet import Sheet
@@ -168,14 +169,14 @@ def foot_html(
         "exercises/foot",
         title=title,
         color=color,
-        detail=detail,
+        detail=indexed(detail),
         parts=parts,
         hints=hints,
         credit=0 if verdict is None or verdict.right else round(100 * verdict.credit),
         more_hints=len(exercise.hints) - record.hints,
         record=record,
         time=_time(record.seconds),
-        solution=exercise.solution(variant, units) if record.closed else "",
+        solution=indexed(unsaid(exercise.solution(variant, units), detail)) if record.closed else "",
         following=following,
         varies=bool(exercise.vary),
         may_reveal=activity.reveals(exercise),
@@ -183,6 +184,12 @@ def foot_html(
         seated=activity.practice.seated and door.counts,
         door=door,
     )
+
+
+def unsaid(solution: str, detail: str) -> str:
+    """What a solution adds to what was said to the answer; all of it if that is not a part of it."""
+    before, found, after = solution.partition(detail) if detail else ("", "", solution)
+    return after.strip() if found else before + after
 
 
 def _time(seconds: int) -> str:

@@ -51,6 +51,7 @@ class Attempt:
         ghost: the row that was typed, if it was wrong.
         wrong: its wrong parameters, or those that could not be read.
         feedback: on the last step.
+        finished: the choices made for each frame, as far as they are known: a link does not have them.
     """
 
     work: Assignment
@@ -59,6 +60,7 @@ class Attempt:
     ghost: Row | None = None
     wrong: tuple[Factor, ...] = ()
     feedback: Feedback | None = None
+    finished: tuple[dict[Part, int], ...] = ()
 
     def __post_init__(self) -> None:
         """Make the choices that are no choice."""
@@ -156,17 +158,23 @@ class Attempt:
         self._accept(Verdict((), row, True), "Filled in")
 
     def back(self) -> None:
-        """Take back the last choice, or the last frame."""
+        """Take back the last choice, or the last row; of a frame from a link, all of it."""
         self._forget_row()
         self.feedback = None
+        if not self._take_choice_back() and self.work.frames:
+            self.work, self.made = self.work.without_last(), dict(self.finished[-1]) if self.finished else {}
+            self.finished = self.finished[:-1]
+            if self.number == 0:  # it has no row
+                self._take_choice_back()
+        self._settle()
+
+    def _take_choice_back(self) -> bool:
+        """Take back the last choice for the next frame that was one; returns whether there is one."""
         offered = self.offered() if not self.work.complete else {}
         own = [part for part in PARTS if part in self.made and len(offered.get(part, ())) > 1]
-        if own:
-            for part in PARTS[PARTS.index(own[-1]) :]:
-                self.made.pop(part, None)
-        elif self.work.frames:
-            self.work, self.made = self.work.without_last(), {}
-        self._settle()
+        for part in PARTS[PARTS.index(own[-1]) :] if own else ():
+            self.made.pop(part, None)
+        return bool(own)
 
     def restart(self) -> None:
         """Begin again."""
@@ -232,7 +240,7 @@ class Attempt:
                 f"Your numbers lead to another frame {number} than the one you chose, and to the same arm: "
                 + (f"x{low(number)} points the other way." if reverse else "this place or direction is free.")
             ]
-        self.work = self.work.with_row(verdict.row)
+        self.work, self.finished = self.work.with_row(verdict.row), (*self.finished, self.made)
         self.made = {}
         self._forget_row()
         self.feedback = Feedback(True, title, tuple(sentences))
@@ -248,6 +256,7 @@ class Attempt:
             if part is not None and part not in self.made and len(self.offered()[part]) == 1:
                 self.made[part] = 0
             elif part is None and self.number == 0:
+                self.finished = (*self.finished, self.made)
                 self.work, self.made = self.work.with_base(self.chosen), {}
             else:
                 return

@@ -185,8 +185,10 @@ def test_back_undoes_one_step_at_a_time(robot: kin.Robot) -> None:
     while not attempt.work.complete:
         attempt.show()
         states.append(attempt.state())
-    for _ in range(3 * len(states)):
+    for before in reversed(states[:-1]):
         attempt.back()
+        assert attempt.state() == before
+    attempt.back()
     assert attempt.state() == states[0]
     to_row(attempt, 2)
     attempt.restart()

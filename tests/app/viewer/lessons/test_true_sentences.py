@@ -1,0 +1,93 @@
+"""Sentences of lessons and exercises that were once untrue or incomplete, against the arms."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import numpy_arm
+import pytest
+from arms import CLASSICS
+
+import kin
+from app.exercises import Exercise, builtin_exercises
+from app.viewer.exercises.views import unsaid
+from app.viewer.lessons import LESSONS
+from app.viewer.lessons.guide.outline import Choice, Step
+from kin import Robot
+from kin.units import Units
+
+OUTLINES = {(lesson.key, robot.id): lesson.outline(robot, Units()) for lesson in LESSONS for robot in CLASSICS}
+
+
+def words(step: Step) -> str:
+    found = [step.text, step.shown, step.practice]
+    for question in (step.estimate, step.question):
+        if question is not None:
+            found += [question.asked().note, question.solution(), getattr(question, "prompt", "")]
+        if isinstance(question, Choice):
+            found += [text for option in question.options for text in (option.text, option.reason)]
+    return " ".join(found)
+
+
+@pytest.mark.parametrize("robot", CLASSICS, ids=lambda robot: robot.id)
+def test_only_an_arm_with_a_sliding_joint_hears_of_one_in_velocity(robot: Robot) -> None:
+    for step in OUTLINES["velocity", robot.id].steps:
+        if step.title in ("A column", "The ellipsoid", "Torques from a force"):
+            said = re.search(r"\bslides?\b|if it slides|\bforce of joint", words(step))
+            assert said is None or not robot.revolute.all(), (step.title, said)
+
+
+def test_a_step_speaks_of_one_joint_by_what_it_does() -> None:
+    for robot in CLASSICS:
+        first = words(OUTLINES["velocity", robot.id].steps[0])
+        assert ("Joint 1 turns at 1 rad/s" in first) == bool(robot.revolute[0]), robot.id
+        assert ("Joint 1 slides at 1 m/s" in first) == (not robot.revolute[0]), robot.id
+
+
+def test_no_step_points_at_what_is_not_there() -> None:
+    for (lesson, arm), outline in OUTLINES.items():
+        for step in outline.steps:
+            assert "the warning" not in words(step).lower(), (lesson, arm, step.title)
+            assert "if it has another one there" not in words(step), (lesson, arm, step.title)
+
+
+def test_the_lengths_that_an_exercise_by_hand_needs_are_in_its_words() -> None:
+    """In which no table is on show: the lengths are those of the arm."""
+    for name in ("two-elbows", "which-joint-moved"):
+        exercise = next(each for each in builtin_exercises() if each.id == name)
+        for seed in range(4):
+            variant = exercise.variant(seed)
+            said = variant.text(exercise.text, Units())
+            for row in variant.robot.rows:
+                assert Units().lengths.brief(row.a) in said, (name, said)
+
+
+def test_a_ptp_through_a_singularity_is_not_slowed_there() -> None:
+    """Of the same joint's way, one part leads through the stretched wrist and the other does not: same time."""
+    step = next(step for step in OUTLINES["trajectories", "ur5"].steps if step.title == "Past a singularity")
+    assert "PTP goes past the axis, or through it, without slowing down" in words(step)
+    robot = kin.get_robot("ur5")
+    middle = robot.q_home.copy()
+    middle[4] = 0.0
+    J = numpy_arm.jacobian(robot, middle)
+    assert np.linalg.svd(J, compute_uv=False)[-1] < 1e-9, "a singularity on the way"
+    times = []
+    for first, last in ((-0.6, 0.6), (0.4, 1.6)):
+        ends = [middle.copy(), middle.copy()]
+        ends[0][4], ends[1][4] = first, last
+        motion = kin.plan_motion(robot, [kin.Ptp(target=kin.JointTarget(tuple(ends[1].tolist())))], ends[0])
+        times.append(motion.duration)
+        rates = np.abs(motion.sample(np.linspace(0.0, motion.duration, 101)).qd[:, 4])
+        assert rates[50] == pytest.approx(rates.max(), rel=1e-6), "fastest in the middle, as any other motion"
+    assert times[0] == pytest.approx(times[1], rel=1e-9)
+
+
+@pytest.mark.parametrize("exercise", builtin_exercises(), ids=lambda exercise: exercise.id)
+def test_why_repeats_nothing_that_right_has_said(exercise: Exercise) -> None:
+    variant = exercise.variant(1)
+    verdict = exercise.judge(variant, exercise.kind.answer(variant), Units())
+    said = unsaid(exercise.solution(variant, Units()), verdict.reason)
+    assert verdict.right
+    assert not verdict.reason or verdict.reason not in said
+    assert said != verdict.reason
