@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
 
 from app.classroom.clock import now
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 LONGEST_PAGE = 16_000  # characters, as `app.viewer.session.state` has it
 LONGEST_NAME = 60  # characters of what a program drives
+NO_OWN: Mapping[str, str] = MappingProxyType({})
 LONGEST_QUESTION, LONGEST_CHOICE, MOST_CHOICES = 200, 80, 8
 
 
@@ -176,12 +178,16 @@ class Attendance:
             self._tell_state(task=None)
         else:
             task = {"exercise": exercise[:200], "at": now(), **({"own": own} if own else {})}
-            self._tell_state(task=task, follow=False, frozen=False)
+            self._send({exercise: own} if own else {}, task=task, follow=False, frozen=False)
 
-    def send_course(self, packed: str) -> None:
-        """Set a packed course for all, which ends the task, following and freezing; empty: there is none."""
+    def send_course(self, packed: str, own: Mapping[str, str] = NO_OWN) -> None:
+        """Set a packed course for all, which ends the task, following and freezing; empty: there is none.
+
+        Args:
+            own: the texts of the exercises that it brings along, by id.
+        """
         if packed:
-            self._tell_state(course=packed, course_at=now(), task=None, follow=False, frozen=False)
+            self._send(own, course=packed, course_at=now(), task=None, follow=False, frozen=False)
         else:
             self._tell_state(course="")
 
@@ -257,6 +263,16 @@ class Attendance:
     def _tell_seat(self, **values: object) -> None:
         self._only_student()
         self._hub.tell(self.ticket, lambda live: live.tell_seat(self.ticket.seat, values))
+
+    def _send(self, own: Mapping[str, str], **values: object) -> None:
+        """Set this for all, and keep the own exercises that come with it."""
+
+        def change(live: LiveRoom) -> None:
+            live.tell_own(own)
+            live.tell_state(values)
+
+        self._only_teacher()
+        self._hub.tell(self.ticket, change)
 
     def _tell_state(self, **values: object) -> None:
         self._only_teacher()

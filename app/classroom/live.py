@@ -16,6 +16,8 @@ from app.classroom.views import Poll, RoomView, SeatView, Shown, Task, Ticket
 AWAY = 7.0  # seconds without a beat after which nobody is assumed to be there
 SILENT_AWAY = 2.5  # the same where a page is connected and silent: the beats of other processes come every 2 s
 REMOVED = "The teacher has removed you."
+MOST_OWN = 40_000  # characters of the texts of own exercises: the state is read with each change of the room
+MOST_VERSIONS = 4  # of one of them
 _UNSEEN = {"beat", "version", "tries"}  # columns that no page shows
 _PAGE = {"page"}
 
@@ -125,6 +127,22 @@ class LiveRoom:
         self.pending.state.update(values)
         self._seen_by_all += 1
 
+    def tell_own(self, own: Mapping[str, str]) -> None:
+        """Keep the texts of exercises that only the teacher has: results name them after another one was sent.
+
+        Of each there is a list of its different texts, the newest at the end. Where older ones were left out, it
+        begins with an empty text. If there are too many, those that were sent longest ago are forgotten.
+        """
+        if not own:
+            return
+        kept: dict[str, list[str]] = dict(self.state.get("own") or {})
+        for key, text in own.items():
+            texts = [*(one for one in kept.pop(key, []) if one != text), text]
+            kept[key] = texts if len(texts) <= MOST_VERSIONS else ["", *texts[1 - MOST_VERSIONS :]]
+        while len(kept) > len(own) and sum(len(one) for texts in kept.values() for one in texts) > MOST_OWN:
+            del kept[next(iter(kept))]
+        self.tell_state({"own": kept})
+
     def tell_seat(self, seat: str, values: dict[str, Any]) -> None:
         """What a student did."""
         if seat in self.seats and not self.seats[seat].row["removed"]:
@@ -192,6 +210,7 @@ class LiveRoom:
             poll=self._poll(present, None if mine is None else mine.row),
             course=state.get("course") or "",
             course_at=float(state.get("course_at") or 0.0),
+            own=() if ticket.seat else tuple(texts[-1] for texts in (state.get("own") or {}).values()),
             teacher_away="" in self.away,
             students=len(present),
             seat=None if mine is None else self._seat(mine.row),

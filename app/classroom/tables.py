@@ -36,7 +36,7 @@ class Room(Base):
 
     Attributes:
         version: grows by one with each change of this row or of a seat.
-        state: what the teacher has set: follow, frozen, task, shown, poll, course, course_at.
+        state: what the teacher has set: follow, frozen, task, shown, poll, course, course_at, own.
         page: the packed state of the teacher's page.
         beat: grows every few seconds while a page of the teacher is connected.
         opener: a number from 1 to 1000 that the address which opened the room shares with many others; 0: none.

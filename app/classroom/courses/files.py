@@ -184,7 +184,7 @@ def _own(fields: Fields, exercises: Exercises, find: Find, seal: Seal | None) ->
         else:
             raise fields.refuse(name, given, "a table with the fields of an exercise")
         try:
-            exercise = _parsed(text, find)
+            exercise = parsed(text, find)
         except ExerciseFileError as error:
             made = fields.refuse(f"{name}.{error.field}", None, error.expected)
             made.value, made.args = (
@@ -200,7 +200,8 @@ def _own(fields: Fields, exercises: Exercises, find: Find, seal: Seal | None) ->
 
 
 @lru_cache(maxsize=256)  # a course is read with each change of it, and its exercises stay the same objects
-def _parsed(text: str, find: Find) -> Exercise:
+def parsed(text: str, find: Find) -> Exercise:
+    """The exercise of a text that a course or a room brings along; raises `ExerciseFileError`."""
     return parse_exercise(text, "course", find)
 
 

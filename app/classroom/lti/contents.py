@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any, Literal
 
-from app.classroom.courses import Courses, to_data
+from app.classroom.courses import Course, Courses, to_data
 from app.classroom.lti.launches import Launch, LaunchRefused
 
 Kind = Literal["exercise", "course"]
@@ -22,6 +22,7 @@ class Content:
         key: the exercise's id, or the course's name (`Courses.named`).
         exercises: of the course; a score is how many of them are solved.
         packed: the course as rooms keep it.
+        own: the texts of the exercises that it brings along, as rooms keep these.
     """
 
     kind: Kind
@@ -29,6 +30,7 @@ class Content:
     title: str
     exercises: tuple[str, ...] = ()
     packed: str = ""
+    own: dict[str, list[str]] = field(default_factory=dict)
 
     @property
     def most(self) -> int:
@@ -57,16 +59,20 @@ class Content:
         """What a new room begins with, as if the teacher had sent it at this time."""
         if self.kind == "exercise":
             return {"task": {"exercise": self.key, "at": at}}
-        return {"course": self.packed, "course_at": at}
+        return {"course": self.packed, "course_at": at, **({"own": self.own} if self.own else {})}
 
 
 def contents_of(courses: Courses) -> list[Content]:
     """The courses of a service and its exercises."""
     found = [
-        Content("course", key, course.title, course.exercises, json.dumps(to_data(course)))
+        Content("course", key, course.title, course.exercises, json.dumps(to_data(course)), _own(course))
         for key, course in courses.named.items()
     ]
     return found + [Content("exercise", one.id, one.title) for one in courses.exercises.all]
+
+
+def _own(course: Course) -> dict[str, list[str]]:
+    return {one.exercise.id: [one.text] for one in course.own}
 
 
 def content_of(launch: Launch, contents: Sequence[Content]) -> Content | None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 from sqlalchemy import Text, cast, func, literal, select, tuple_
@@ -35,18 +35,27 @@ def members_of(database: Database, room: str) -> list[Member]:
     ]
 
 
-def task_of(database: Database, room: str) -> str:
-    """The exercise that is the task of a room, or empty."""
-    with database.read() as connection:
-        state = connection.scalar(select(Room.state).where(Room.id == room)) or {}
-    return str((state.get("task") or {}).get("exercise", ""))
+@dataclass(frozen=True)
+class Sent:
+    """What the teacher has sent to a room.
+
+    Attributes:
+        task: the exercise that is the task, or empty.
+        course: as JSON, or empty.
+        own: the texts of the exercises that only the teacher has, by id: the newest at the end.
+    """
+
+    task: str = ""
+    course: str = ""
+    own: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
-def course_of_room(database: Database, room: str) -> str:
-    """The course that a room follows, as JSON, or empty."""
+def sent_to(database: Database, room: str) -> Sent:
+    """What the teacher has sent to a room."""
     with database.read() as connection:
         state = connection.scalar(select(Room.state).where(Room.id == room)) or {}
-    return str(state.get("course") or "")
+    task = str((state.get("task") or {}).get("exercise", ""))
+    return Sent(task, str(state.get("course") or ""), state.get("own") or {})
 
 
 def pages_of(database: Database, room: str, answers: bool = True, size: int = PAGE) -> Iterator[list[Attempt]]:

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from app.classroom import ClassroomUnavailable, Hub
+from app.classroom.courses import SentExercises
 from app.classroom.results.check import check_code, facts
-from app.classroom.results.store import pages_of
+from app.classroom.results.store import pages_of, sent_to
 from app.classroom.results.table import csv_of
 from app.classroom.tokens import read_code
 from app.classroom.work import Attempt
@@ -52,8 +53,9 @@ def run_results(arguments: Namespace) -> int:
         room = next((each for each in hub.rooms.all() if each.code == wanted), None) if hub.in_use else None
         if room is None:
             raise InputError("room", arguments.room, "the join code of a room; `kinboard room list` shows them")
-        exercises = Exercises(settings.exercises, Store(settings.robots).get)
-        pages, titles = pages_of(hub.database, room.id), {one.id: one.title for one in exercises.all}
+        find, own = Store(settings.robots).get, sent_to(hub.database, room.id).own
+        titles = SentExercises(Exercises(settings.exercises, find), own, find).titles
+        pages = pages_of(hub.database, room.id)
         if arguments.output is None:
             for text in csv_of(pages, titles):
                 print(text, end="")

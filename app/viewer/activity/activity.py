@@ -98,6 +98,7 @@ class Activity:
         sent: the course that the teacher of the room sent.
         draft: the exercise that is written in this page.
         lent: an exercise that the room brings along.
+        kept: on a teacher's page, the own exercises that were sent to the room, perhaps by another page.
         task: the exercise that the teacher of the room sent.
         note: a sentence below the verdict: whether the answer is stored.
         asked: what the open question of a lesson withholds.
@@ -115,6 +116,7 @@ class Activity:
         self.sent: Course | None = None
         self.draft: Exercise | None = None
         self.lent: Exercise | None = None
+        self.kept: tuple[Exercise, ...] = ()
         self.task: Exercise | None = None
         self.note = ""
         self.asked: frozenset[str] = frozenset()
@@ -182,7 +184,7 @@ class Activity:
         """Take in the exercises of courses and of the room, and the one written here."""
         sent, opened = ([one.exercise for one in c.own] if c else [] for c in (self.sent, self.progress.course))
         mine = [] if self.practice.seated else opened  # of a student in a room, none takes the place of the task
-        self.exercises.put([*sent, *mine, *filter(None, (self.lent, self.draft))], weak=opened)
+        self.exercises.put([*sent, *mine, *filter(None, (self.lent, self.draft))], weak=[*self.kept, *opened])
         self.practice.look_again()
 
     # Where exercises are done

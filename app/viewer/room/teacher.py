@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import logging
 from dataclasses import replace
 
 from app.classroom.clock import now
 from app.classroom.courses import Course
 from app.classroom.standing import standing
 from app.classroom.views import RoomView, SeatView, in_one_line
-from app.exercises import Exercise
+from app.exercises import Exercise, ExerciseFileError, parse_exercise
 from app.viewer.feature import Stage
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
@@ -24,6 +25,8 @@ from app.viewer.session.history import RESULT
 from app.viewer.session.state import PageState
 from app.viewer.viser_patches import SceneFilter
 from kin import InputError, Robot
+
+logger = logging.getLogger("kinboard.classroom")
 
 QUESTION = "Elbow up or down?"
 CHOICES = ("Elbow up", "Elbow down")
@@ -62,6 +65,7 @@ class Teacher(Member):
         self._picked = ""  # the student whose details are open
         self._open_tab = 0
         self._chosen: Exercise | None = None  # the exercise in the form of the task
+        self._own: tuple[str, ...] = ()  # the texts of own exercises that were sent
         self._wall: Wall | None = None
         self._reopens = False  # the wall, which was on show before a reload
         self._filter: SceneFilter | None = None  # before all but the wall
@@ -69,6 +73,8 @@ class Teacher(Member):
 
     def take_news(self) -> None:
         room = self.room
+        if room.own != self._own:
+            self._keep(room.own)
         shown = "" if room.shown is None else room.shown.seat
         if self.leader and (room.closed or self._seat(self.leader) is None):
             self._return()
@@ -80,6 +86,19 @@ class Teacher(Member):
                 self.follow(seat.id, seat.page)
         if room.closed and self._wall is not None:
             self._show_wall(False)
+
+    def _keep(self, own: tuple[str, ...]) -> None:
+        """Know the own exercises that were sent to the room, perhaps from another page."""
+        self._own, activity = own, self.page.activity
+        found = []
+        for text in own:
+            try:
+                found.append(parse_exercise(text, "own", self.stage.store.get))
+            except ExerciseFileError as error:  # its arm is gone
+                logger.info("a teacher's page does without an exercise of its room: %s", error)
+        activity.kept = tuple(found)
+        activity.stock()
+        activity.changed()
 
     # Controls
 
@@ -178,7 +197,8 @@ class Teacher(Member):
         if not index.isdecimal() or int(index) >= len(offered):
             raise InputError("course", index, f"0 to {len(offered) - 1}")
         course = offered[int(index)]
-        self.attendance.send_course(json.dumps(self.page.activity.progress.packed(course)))
+        own = {one.exercise.id: one.text for one in course.own}
+        self.attendance.send_course(json.dumps(self.page.activity.progress.packed(course)), own)
         self.page.status.show(Notice("hand", f"Sent: {course.title}", "All follow it by themselves now."))
 
     @property

@@ -16,7 +16,7 @@ from starlette.types import Send
 from app.api.problems import ProblemError
 from app.classroom import COOKIE, ClassroomUnavailable, Hub, Role
 from app.classroom.clock import now
-from app.classroom.courses import Courses
+from app.classroom.courses import Courses, SentExercises
 from app.classroom.results.gains import Gain, Gains, Pair, csv_of_gains, gains, pairs_of
 from app.classroom.results.table import Row, csv_of, rows
 from app.classroom.work import Attempt
@@ -24,6 +24,7 @@ from app.service.web.rooms.page import results_page
 from kin.units import fixed
 
 if TYPE_CHECKING:
+    from app.classroom.results.store import Sent
     from app.classroom.rooms import OpenRoom
 
 logger = logging.getLogger("kinboard.classroom")
@@ -40,17 +41,17 @@ class Results:
     async def show(self, request: Request) -> Response:
         """The table; its script asks for this page again and again."""
         try:
-            room, task, table, attempts, compared = await run_in_threadpool(
+            room, sent, table, attempts, compared = await run_in_threadpool(
                 self._read, request.cookies.get(COOKIE, "")
             )
         except ClassroomUnavailable as error:
             return results_page(request, 503, problem=str(error))
-        shown = await run_in_threadpool(lambda: [self._shown(row) for row in table[:MOST]])
+        shown = await run_in_threadpool(lambda: _rows(self._known(sent), table[:MOST]))
         states = ("stuck", "gave up", "not begun", "at it", "solved", "has not come")
-        counted = [row for row in table if not task or row.exercise == task]
+        counted = [row for row in table if not sent.task or row.exercise == sent.task]
         counts = {state: sum(row.state == state for row in counted) for state in states}
         pairs, found = compared
-        titles = await run_in_threadpool(lambda: self._titles) if pairs else {}
+        titles = await run_in_threadpool(lambda: self._known(sent).titles) if pairs else {}
         return results_page(
             request,
             room=room,
@@ -62,38 +63,18 @@ class Results:
             gains=[_compared(row) for row in found[: MOST + 1]],
         )
 
-    def _shown(self, row: Row) -> dict[str, object]:
-        """A row as the page has it."""
-        exercise, work = self._courses().exercises.get(row.exercise), row.work
-        said = str(work.answer or "")
-        if exercise is not None and work.tries:
-            from app.exercises.said import answer_in_words
-
-            said = answer_in_words(exercise, work.seed, said)
-        return {
-            "alias": row.member.alias,
-            "number": row.member.number,
-            "state": row.state,
-            "title": row.exercise if exercise is None else exercise.title,
-            "tries": work.tries,
-            "score": round(100 * work.score),
-            "time": f"{int(row.seconds) // 60}:{int(row.seconds) % 60:02}",
-            "answer": said,
-            "verdict": work.verdict,
-            "begun": bool(work.numbers),
-        }
-
     async def download(self, request: Request) -> Response:
         """One row per attempt; what has been read is sent before more is."""
-        from app.classroom.results.store import pages_of
+        from app.classroom.results.store import pages_of, sent_to
 
         try:
             room = await run_in_threadpool(self._room, request.cookies.get(COOKIE, ""))
             pages = pages_of(self._hub.database, room.id)
             first: list[Attempt] = await run_in_threadpool(next, pages, [])
+            sent = await run_in_threadpool(sent_to, self._hub.database, room.id)
         except ClassroomUnavailable as error:
             raise ProblemError(503, "busy", str(error)) from None
-        titles = await run_in_threadpool(lambda: self._titles)
+        titles = await run_in_threadpool(lambda: self._known(sent).titles)
         headers = {
             "content-disposition": f'attachment; filename="results-{room.code.lower()}.csv"',
             "cache-control": "no-store",
@@ -114,20 +95,20 @@ class Results:
         text = csv_of_gains(found, pairs)
         return Response(codecs.BOM_UTF8 + text.encode(), media_type="text/csv; charset=utf-8", headers=headers)
 
-    def _read(self, token: str) -> tuple[OpenRoom, str, list[Row], int, tuple[list[Pair], list[Gains]]]:
-        """The room of the teacher's cookie, its task and table, the number of attempts, what its course compares.
+    def _read(self, token: str) -> tuple[OpenRoom, Sent, list[Row], int, tuple[list[Pair], list[Gains]]]:
+        """The room of the teacher's cookie, what it was sent, its table, how many attempts, what is compared.
 
         Raises:
             ProblemError: 403.
         """
-        from app.classroom.results.store import attempts_of, course_of_room, members_of, task_of  # SQLAlchemy
+        from app.classroom.results.store import attempts_of, members_of, sent_to  # SQLAlchemy
 
         room, database = self._room(token), self._hub.database
         attempts = attempts_of(database, room.id, answers=False)
-        task = task_of(database, room.id)
-        members, pairs = members_of(database, room.id), pairs_of(course_of_room(database, room.id))
+        sent = sent_to(database, room.id)
+        members, pairs = members_of(database, room.id), pairs_of(sent.course)
         compared = pairs, gains(members, attempts, pairs) if pairs else []
-        return room, task, rows(members, attempts, task, now()), len(attempts), compared
+        return room, sent, rows(members, attempts, sent.task, now()), len(attempts), compared
 
     def _room(self, token: str) -> OpenRoom:
         """The room of the teacher's cookie; raises 403."""
@@ -139,9 +120,31 @@ class Results:
             )
         return room
 
-    @property
-    def _titles(self) -> dict[str, str]:
-        return {one.id: one.title for one in self._courses().exercises.all}
+    def _known(self, sent: Sent) -> SentExercises:
+        courses = self._courses()
+        return SentExercises(courses.exercises, sent.own, courses.find)
+
+
+def _rows(known: SentExercises, table: Iterable[Row]) -> list[dict[str, object]]:
+    """The rows as the page has them."""
+    found: list[dict[str, object]] = []
+    for row in table:
+        work, said = row.work, str(row.work.answer or "")
+        found.append(
+            {
+                "alias": row.member.alias,
+                "number": row.member.number,
+                "state": row.state,
+                "title": known.title(row.exercise),
+                "tries": work.tries,
+                "score": round(100 * work.score),
+                "time": f"{int(row.seconds) // 60}:{int(row.seconds) % 60:02}",
+                "answer": known.said(row.exercise, work.seed, said) if work.tries else said,
+                "verdict": work.verdict,
+                "begun": bool(work.numbers),
+            }
+        )
+    return found
 
 
 def _compared(row: Gains) -> dict[str, object]:

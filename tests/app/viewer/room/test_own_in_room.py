@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 from students import ALL, UNITS, Room, press
 
-from app.classroom import Ticket
+from app.classroom import NewAttempt, Ticket
 from app.classroom.courses import Course, Seal, to_data
 from app.classroom.results.keys import result_key
 from app.exercises import Exercises, form, parse_exercise
+from app.exercises.said import answer_in_words
 from app.viewer.exercises.author import Author
 from app.viewer.room.following import shared
 from app.viewer.session.state import PageState, decode, encode
@@ -93,3 +94,26 @@ def test_a_students_page_takes_no_draft(students: Room) -> None:
     tab.wait(lambda: "a page of a teacher" in tab.html)
     tab.settle()
     assert gives_away(tab) == []
+
+
+@pytest.mark.parametrize("how", ["course", "task"])
+def test_a_teachers_other_page_knows_what_was_sent(students: Room, how: str) -> None:
+    """On another machine, say: it has not written the exercise."""
+    packed = to_data(Course("Mine").bringing(OWN), Seal(lambda: result_key(students.hub)))
+    teacher, ticket = Ticket(students.room.id), students.join("Ann")
+    writes = students.student(teacher, course={"course": packed, "at": -1})
+    writes.wait(lambda: ">Mine</option>" in writes.html and f'<option value="{OWN.id}"' in writes.html)
+    other = students.student(teacher)
+    other.wait(lambda: 'data-class-bar="teacher"' in other.html)
+    assert OWN.title not in other.html
+    writes.say("feature", ["class", ["fields", how, 1], [[OWN.id if how == "task" else "0"]]])
+    other.wait(lambda: f'<option value="{OWN.id}"' in other.html)
+    if how == "task":
+        other.wait(lambda: f"Now: <b>{OWN.title}</b>" in other.html and "End the task" in other.html)
+    students.hub.rooms.submit(ticket, NewAttempt(OWN.id, 7, ["12", "34"], "Wrong.", 0.0, started=0.0))
+    student = students.hub.attend(ticket, lambda: None)
+    student.tell_task(OWN.id)
+    words = answer_in_words(OWN, 7, '["12", "34"]')
+    assert words not in ("", '["12", "34"]')
+    other.wait(lambda: words in other.html)
+    student.leave()
