@@ -30,6 +30,7 @@
   const mode = { 1: "scene", panel: "panel" }[query.get("embed")] ?? "";
   if (mode) document.documentElement.dataset.kbEmbed = mode;
   let at = history.state?.kinboard ?? 0; // the present entry
+  let silent = shared && !mode && history.state?.kinboard === undefined; // a link that may not say which tab to open
   const loaded = at;
   const trail = []; // the state of each entry, as far as known
   trail[at] = state;
@@ -56,7 +57,8 @@
   }
 
   // The server may write the state with which this page was loaded in other words.
-  const start = () => JSON.parse(document.querySelector("[data-answers]")?.dataset.answers ?? "{}").start ?? "";
+  const answers = () => JSON.parse(document.querySelector("[data-answers]")?.dataset.answers ?? "{}");
+  const start = () => answers().start ?? "";
   let expected = false; // whether the next move in the history is our own
   function goBack() {
     const near = [...trail.keys()].filter((i) => trail[i] === state || (i === loaded && state === start()));
@@ -97,8 +99,13 @@
 
   // The controls appear some time after the state was requested, with the first tab open.
   function openTab(until) {
-    if (!tab || performance.now() > until) return;
-    if (document.querySelector("[data-status]") === null || !viserPage.openTab(tab)) setTimeout(openTab, 100, until);
+    if ((!tab && !silent) || performance.now() > until) return;
+    const ready = document.querySelector("[data-status]") !== null;
+    if (!tab && ready && start()) { // then the one of what it shows
+      silent = false;
+      if (answers().tab) dispatchEvent(new CustomEvent("kinboard-tab", { detail: answers().tab }));
+    }
+    if (!ready || (tab ? !viserPage.openTab(tab) : silent)) setTimeout(openTab, 100, until);
   }
 
   function noteTab(event) {

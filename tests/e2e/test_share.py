@@ -20,7 +20,7 @@ import kin
 from app.viewer.panel.joints import LOCKED
 from app.viewer.scene import camera
 from app.viewer.scene.meshes import body
-from app.viewer.session.state import PageState, decode
+from app.viewer.session.state import PageState, decode, encode
 
 pytestmark = pytest.mark.browser
 
@@ -152,6 +152,25 @@ def orbit(page: Page, right: int, down: int) -> None:
     page.mouse.down()
     page.mouse.move(x + right, y + down, steps=8)
     page.mouse.up()
+
+
+@pytest.mark.parametrize(("said", "opened"), [("", "Learn"), ("&tab=Move", "Move"), ("&tab=Robot", "Robot")])
+def test_a_link_to_a_lesson_opens_it(browser: Browser, address: str, said: str, opened: str) -> None:
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.goto(f"{address}viewer/#s={encode(PageState(PIONEER.id, lesson='dh'))}{said}")
+    expect(page.locator("[data-status]").first).to_be_attached(timeout=4 * WAIT)
+    page.wait_for_function(
+        "JSON.parse(document.querySelector('[data-answers]').dataset.answers).start", timeout=WAIT
+    )
+    expect(page.get_by_role("tab", name=opened, exact=True)).to_have_attribute("aria-selected", "true")
+    wait_for_url(page, "tab")
+    assert parse_qs(urlsplit(page.url).fragment)["tab"] == [opened]
+    page.get_by_role("tab", name="Move", exact=True).click()
+    expect(page.get_by_role("tab", name="Move", exact=True)).to_have_attribute("aria-selected", "true")
+    page.reload()
+    expect(page.locator("[data-status]").first).to_be_attached(timeout=4 * WAIT)
+    expect(page.get_by_role("tab", name="Move", exact=True)).to_have_attribute("aria-selected", "true")
+    page.close()
 
 
 def test_link_reload_and_lost_connection(shared: Tab, proxy: Proxy, browser: Browser) -> None:

@@ -22,6 +22,7 @@ from kin.units import Units
 
 PANEL_WIDTH = 344  # pixels; visitors change it at the panel's edge
 SMALL_WIDTH = 280  # of a small one
+LEARN = "Learn"  # title of the tab for lessons
 
 
 class Panel:
@@ -78,7 +79,7 @@ class Panel:
         self.driven = gui.add_html(render("live/driven", name=""))
         self.hints = gui.add_html("")
         self.sheet = gui.add_html("")
-        self.learn = group.add_tab("Learn")
+        self.learn = group.add_tab(LEARN)
         self.tabs = [group.add_tab(title) for title in tabs]
         for title, tab in zip(tabs, self.tabs, strict=True):
             if title == "Robot":

@@ -60,7 +60,7 @@ class PageScript:
 
     def __init__(self, gui: viser.GuiApi, post: Post) -> None:
         self._last = 0
-        self._answers: dict[str, object] = {"undo": "", "redo": "", "start": "", "reply": Reply(0, "")}
+        self._answers: dict[str, object] = {"undo": "", "redo": "", "start": "", "tab": "", "reply": Reply(0, "")}
         self._shown = gui.add_html(self._html())
         field = gui.add_text(LABEL, "")
 
@@ -90,9 +90,9 @@ class PageScript:
         self._answers |= {"undo": undo, "redo": redo}
         update_html(self._shown, self._html())
 
-    def show_start(self, state: str) -> None:
-        """Tell the page the state with which it starts."""
-        self._answers["start"] = state
+    def show_start(self, state: str, tab: str) -> None:
+        """Tell the page the state with which it starts, and the tab where a link to it opens; empty: the first."""
+        self._answers |= {"start": state, "tab": tab}
         update_html(self._shown, self._html())
 
     def reply(self, reply: Reply) -> None:

@@ -30,7 +30,7 @@ from app.viewer.obstacles.feature import ObstaclesFeature
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
 from app.viewer.panel.joints import JointSliders, lock_notice
-from app.viewer.panel.layout import Panel
+from app.viewer.panel.layout import LEARN, Panel
 from app.viewer.panel.status import READY, Notice, StatusLine
 from app.viewer.panel.theme import configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
@@ -464,7 +464,8 @@ class VisitorPage(ShownArm, Worker):
             if later:
                 stored = self._persistence.stored
                 self._preparing.hold_state(stored, robot_of(self, stored.robot), self.offered)
-            self.panel.script.show_start(self._persistence.begin(self.panel.share))
+            learns = self._persistence.stored.lesson is not None
+            self.panel.script.show_start(self._persistence.begin(self.panel.share), LEARN if learns else "")
         self.client.flush()
 
     def _use_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:
