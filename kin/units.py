@@ -75,6 +75,10 @@ class Unit:
         """The symbol as it follows a number."""
         return self.name if self.name == "°" else f" {self.name}"
 
+    def per_second(self, times: int = 1) -> Unit:
+        """The unit of the first derivative by time, as °/s, or of a further one, as °/s²."""
+        return Unit(f"{self.name}/s{raised(times) if times > 1 else ''}", self.scale, self.finer)
+
     def decimals(self, digits: int) -> int:
         """Decimals as fine as `digits` decimals of a degree or of a millimetre."""
         return digits + self.finer

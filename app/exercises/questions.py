@@ -217,6 +217,7 @@ class Number(Question):
         ways: further right values.
         named: a sentence that tells `answer` from the other ways.
         ordered: whether it helps to know that an answer is too large: not if it is the number of a joint.
+        whole: whether it is a whole number, such as a count.
     """
 
     prompt: str
@@ -229,6 +230,7 @@ class Number(Question):
     ways: tuple[Way, ...] = ()
     named: str = ""
     ordered: bool = True
+    whole: bool = False
 
     def asked(self) -> Asked:
         return Asked("fields", ("",), (self.unit.name,), self.tolerance_text)
@@ -238,7 +240,7 @@ class Number(Question):
 
     def read_text(self, text: str) -> float:
         """A typed answer in radians, metres or SI units; raises `EntryError` with what is valid."""
-        if self.unit == PLAIN and not self._is_count and text.rstrip().endswith("%"):
+        if self.unit == PLAIN and not self.whole and text.rstrip().endswith("%"):
             return read_number(text.rstrip()[:-1], self.unit) / 100.0
         return read_number(text, self.unit)
 
@@ -281,21 +283,21 @@ class Number(Question):
     @property
     def value_text(self) -> str:
         """The right value, in decimals that the tolerance leaves meaningful."""
-        if self._is_count:
+        if self.whole:
             return f"{self.answer:.0f}"
         return self.unit.text(self.answer, self._decimals - self.unit.finer).rstrip()
 
     @property
     def tolerance_text(self) -> str:
         """The accepted error, such as ± 1°."""
-        if self._is_count:
+        if self.whole:
             return "a whole number"
         shown = _rounded_down(self.tolerance * self.unit.scale) / self.unit.scale
         return f"± {self.unit.brief(shown)}".rstrip()
 
     def _what_is_wrong(self, answer: float) -> str:
         """What is wrong with an answer that is no known mistake."""
-        if (self._is_count or not self.ordered) and (answer < 0.0 or abs(answer - round(answer)) > WHOLE):
+        if (self.whole or not self.ordered) and (answer < 0.0 or abs(answer - round(answer)) > WHOLE):
             return "The answer is a whole number, and not negative."
         if relation := self._relation(answer):
             return relation
@@ -308,7 +310,7 @@ class Number(Question):
 
     def slip(self, answer: float) -> str:
         """What the typed number would be right in: another unit, whatever its sign; "" if in none."""
-        if self._is_count or not self.ordered:
+        if self.whole or not self.ordered:
             return ""
         typed_number = answer * self.unit.scale
         for name, scale, words in _other_units(self.unit):
@@ -322,7 +324,7 @@ class Number(Question):
         """How an answer is related to the right value, if it is in a way that mistakes lead to; "" otherwise."""
         if self._near(-answer, self.answer):
             return "The size is right, the sign is not."
-        if self._is_count or not self.ordered:
+        if self.whole or not self.ordered:
             return ""
         if self.unit.is_angle:
             turn = 2.0 * math.pi
@@ -344,17 +346,13 @@ class Number(Question):
         return ""
 
     @property
-    def _is_count(self) -> bool:
-        return self.unit == PLAIN and self.tolerance == WHOLE
-
-    @property
     def _decimals(self) -> int:
-        """Of the unit, as the tolerance leaves them meaningful."""
-        return max(0, -math.floor(math.log10(self.tolerance * self.unit.scale)))
+        """Of the unit, as the tolerance leaves them meaningful; none of a share of zero."""
+        return 0 if self.tolerance == 0.0 else max(0, -math.floor(math.log10(self.tolerance * self.unit.scale)))
 
     def _confirmed(self) -> str:
         """The right value, and whether it is rounded."""
-        if self._is_count:
+        if self.whole:
             return f"The value is {self.value_text}."
         shown = self.answer * self.unit.scale
         exact = math.isclose(shown, round(shown, self._decimals), rel_tol=1e-9, abs_tol=1e-9)
@@ -391,7 +389,7 @@ WHOLE = 0.1  # accepted error of a count
 def count(prompt: str, answer: int, method: str, mistakes: Sequence[tuple[int, str]] = ()) -> Number:
     """A question whose answer is a whole number; mistakes that give the right one are left out."""
     wrong = tuple(Mistake(value, reason) for value, reason in mistakes if value != answer)
-    return Number(prompt, answer, PLAIN, WHOLE, method, wrong)
+    return Number(prompt, answer, PLAIN, WHOLE, method, wrong, whole=True)
 
 
 LEAST = 2e-4  # the finest error that is asked for, in metres and radians: values are shown with 0.1 mm

@@ -7,17 +7,18 @@ import re
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
-from app.exercises.contract import Kind, typed
+from app.exercises.contract import PLAIN_UNITS, Kind, typed
 from app.exercises.expressions import Expression
 from app.exercises.fields import Fields, Words
 from app.exercises.questions import WHOLE, Asked, Mistake, Number, Question, Verdict, apart, share, texts
 from app.exercises.variant import Variant
-from kin.units import PLAIN, Unit, Units
+from kin.units import PLAIN, Unit, Units, general
 
 RATE = "deg/s"  # in the angles of the reader; rad/s is not
 # Units of a file, and what one of them is in radians, metres or SI.
 _DEGREE = math.pi / 180
-_PLAIN = dict.fromkeys(("", "count", "joint"), 1.0)
+COUNTED = ("count", "joint")  # whole numbers
+_PLAIN = dict.fromkeys(("", *COUNTED), 1.0)
 SCALES = {"deg": _DEGREE, "rad": 1.0, "mm": 1e-3, "cm": 1e-2, "m": 1.0, **_PLAIN, RATE: _DEGREE}
 MEASURES = {"deg": "angle", "rad": "angle", "mm": "length", "cm": "length", "m": "length"}
 OTHER = {"m/s": 3, "m/rad": 3, "rad/s": 3, "N": 2, "N·m": 2, "s": 3, "kg": 3, "J": 3}  # decimals
@@ -58,7 +59,7 @@ class NumberKind(Kind):
             raise fields.refuse("labels", list(labels), f"as many labels as values: {len(values)}")
         tolerance = part = 0.0
         given = fields.get("tolerance")
-        if unit in ("count", "joint"):
+        if unit in COUNTED:
             tolerance = WHOLE
         elif isinstance(given, str):
             percent = _PERCENT.fullmatch(given)
@@ -86,7 +87,7 @@ class NumberKind(Kind):
             case "length":
                 return units.lengths
         if self.unit == RATE:
-            return Unit(f"{units.angles.name}/s", units.angles.scale, units.angles.finer)
+            return units.angles.per_second()
         return Unit(self.unit, 1.0, OTHER[self.unit]) if self.unit in OTHER else PLAIN
 
     def _questions(self, variant: Variant, units: Units) -> list[Number]:
@@ -109,6 +110,7 @@ class NumberKind(Kind):
                 tuple(Mistake(float(values[i]), reason, beyond) for values, reason, beyond in wrong),
                 self.whole_turns,
                 ordered=self.unit != "joint",
+                whole=self.unit in COUNTED,
             )
             if self.least is not None:
                 question = apart(question, variant.number(self.least) * SCALES.get(self.unit, 1.0))
@@ -140,6 +142,12 @@ class NumberKind(Kind):
 
     def answer(self, variant: Variant) -> object:
         return [typed(variant.number(value), self._shown_unit(Units())) for value in self.values]
+
+    def verify(self, variant: Variant) -> None:
+        super().verify(variant)
+        for question in self._questions(variant, PLAIN_UNITS):
+            if question.whole and abs(question.answer - round(question.answer)) > 1e-6:
+                raise ValueError(f"the value is {general(question.answer)}: a {self.unit} is a whole number")
 
     def solution(self, variant: Variant, units: Units) -> str:
         questions = self._questions(variant, units)

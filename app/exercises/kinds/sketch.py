@@ -44,8 +44,7 @@ class Sketch:
 
     def unit(self, units: Units) -> Unit:
         """Of velocities, for the reader."""
-        unit = units.of(self.turns)
-        return Unit(f"{unit.name}/s", unit.scale, unit.finer)
+        return units.of(self.turns).per_second()
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ class SketchKind(Kind):
         sketch = self.sketch(variant)
         labels = tuple(f"v({general(t, 3)} s)" for t in sketch.times.tolist())
         unit, base = sketch.unit(units), units.of(sketch.turns)
-        limits = f"at most {unit.brief(sketch.velocity)} and {base.brief(sketch.acceleration)}/s²"
+        limits = f"at most {unit.brief(sketch.velocity)} and {base.per_second(2).brief(sketch.acceleration)}"
         way = f"{base.brief(sketch.way)} ± 2 %, from rest to rest"
         note = f"Straight lines join the values. Required: {way}, {limits}."
         return Asked("fields", labels, (unit.name,) * len(labels), note)
@@ -107,7 +106,7 @@ class SketchKind(Kind):
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
         sketch, v = self.sketch(variant), self._read(variant, given, units)
         unit, base = sketch.unit(units), units.of(sketch.turns)
-        step = float(sketch.times[1])
+        slope, step = base.per_second(2), float(sketch.times[1])
         fastest, steepest = float(np.abs(v).max()), float(np.abs(np.diff(v)).max()) / step
         covered = step * float(v.sum() - 0.5 * (v[0] + v[-1]))
         rest = max(abs(float(v[0])), abs(float(v[-1])))
@@ -119,8 +118,8 @@ class SketchKind(Kind):
             ),
             (
                 steepest <= (1.0 + NEAR) * sketch.acceleration,
-                f"The steepest line is an acceleration of {base.brief(steepest)}/s²; the limit is "
-                f"{base.brief(sketch.acceleration)}/s².",
+                f"The steepest line is an acceleration of {slope.brief(steepest)}; the limit is "
+                f"{slope.brief(sketch.acceleration)}.",
             ),
             (
                 abs(covered - sketch.way) <= NEAR * abs(sketch.way),

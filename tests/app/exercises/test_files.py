@@ -95,6 +95,10 @@ def test_an_exercise_that_makes_no_sense_is_found_by_trying() -> None:
         (changed('q = ["t",', 'q = ["acos(t + 2)",'), r"seed 0: q\[0\]: .*math domain error"),
         (changed("[answer]", '[let]\nv = "J(9, 9)"\n\n[answer]'), r"seed 0: let\.v: .*no entry 9, 9"),
         (changed('q = ["t",', 'q = ["t + 400*deg",'), "q is outside the limits"),
+        (
+            changed('value = "t + u"\nunit = "deg"\ntolerance = 1', 'value = "2.5"\nunit = "count"'),
+            r"the value is 2\.5: a count is a whole number",
+        ),
         (changed('text = "What', 'require = ["t < 0"]\ntext = "What'), "no numbers that meet the conditions"),
     ):
         with pytest.raises(VariantError, match=said):

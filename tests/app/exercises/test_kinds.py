@@ -88,7 +88,7 @@ def test_the_value_is_called_exact_only_if_it_is() -> None:
 
 @pytest.mark.parametrize("typed", [-2.0, 2.5, 0.35])
 def test_a_count_is_whole_and_not_negative(typed: float) -> None:
-    for question in (count("", 2, "Look."), Number("", 2.0, PLAIN, 0.1, "Look.", ordered=False)):
+    for question in (count("", 2, "Look."), Number("", 2.0, PLAIN, 0.1, "Look.", ordered=False, whole=True)):
         assert question.judge(typed).full == "The answer is a whole number, and not negative. Look."
     assert count("", 2, "Look.").judge(3.0).full == "Too large. Look."
 

@@ -184,7 +184,7 @@ method = "The way is the area."
         ("0° 22.5 45°/s 0.7854 rad/s 45 22.5 0", None),
         ("10 22.5 45 45 45 12.5 0", "It begins and ends at rest: the first and the last value are zero."),
         ("0 20 40 60 40 20 0", "The largest velocity is 60 °/s; its limit 50 °/s."),
-        ("0 36 36 36 36 36 0", "The steepest line is an acceleration of 72°/s²; the limit is 50°/s²."),
+        ("0 36 36 36 36 36 0", "The steepest line is an acceleration of 72 °/s²; the limit is 50 °/s²."),
         ("0 20 40 40 40 20 0", "The area under the sketch is 80°; the way is 90°."),
         ("0 -22.5 -45 -45 -45 -22.5 0", "The area under the sketch is −90°; the way is 90°."),
     ],

@@ -19,10 +19,10 @@ from app.exports.worksheet import Sheet, latex
 from app.viewer.arm import Arm
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.equations import views
-from app.viewer.lessons.guide.outline import WHOLE, Number
+from app.viewer.lessons.guide.outline import Number
 from app.viewer.worksheet.feature import FILES, Worksheets, parts_of
 from app.viewer.worksheet.views import page_html
-from kin.units import DEFAULT_UNITS, PLAIN, Units
+from kin.units import DEFAULT_UNITS, Units
 
 PIONEER = kin.get_robot("pioneer5")
 ARMS = [PIONEER, kin.get_robot("planar2r"), kin.get_robot("redundant7-craig")]
@@ -111,7 +111,7 @@ def test_a_sheet_prints_nothing_that_it_asks(lesson):
         outline = lesson.outline(robot, DEFAULT_UNITS)
         parts, around = printed(lesson, robot, outline)
         for key, question in outline.questions():
-            if not isinstance(question, Number) or (question.unit == PLAIN and question.tolerance == WHOLE):
+            if not isinstance(question, Number) or question.whole:
                 continue
             answer = question.answer * question.unit.scale
             near = min(question.tolerance * question.unit.scale, 0.005 * abs(answer))

@@ -13,7 +13,6 @@ from markupsafe import Markup
 
 from app.exercises.questions import (
     LEAST,
-    WHOLE,
     Choice,
     Mistake,
     Number,
@@ -30,7 +29,6 @@ from kin.units import PLAIN
 __all__ = [
     "LEAST",
     "PLAIN",
-    "WHOLE",
     "Bar",
     "Choice",
     "Configuration",

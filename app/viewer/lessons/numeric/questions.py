@@ -67,7 +67,6 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     words = {
         "here": _place(here, units),
         "there": _place(there, units),
-        "part_shown": f"{100.0 * numbers['part']:.0f} %",
         "first_error": power(float(newton.errors[0])),
         "second_error": ", then ".join(power(float(v)) for v in newton.errors[1:3]),
         "newton_error": power(float(newton.errors[-1])),

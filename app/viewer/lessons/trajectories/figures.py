@@ -146,7 +146,7 @@ def _trapezoid(time: float, way: float, a: float, unit: Unit) -> tuple[Array, tu
 def sketched(unit: Unit, asked: Sketched, limits: Array) -> Answered:
     """A sketch of the velocity, and a right one beside one that is wrong once that is on show."""
     v = float(limits[0])
-    rate, right = Unit(f"{unit.name}/s", unit.scale, unit.finer), asked.trapezoid
+    rate, right = unit.per_second(), asked.trapezoid
     times = np.linspace(0.0, asked.time, len(right))
 
     def figure(given: object, fine: bool, closed: bool) -> Markup:

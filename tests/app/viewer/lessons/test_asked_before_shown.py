@@ -6,14 +6,15 @@ import html
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 import pytest
+from arms import CLASSICS
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
-from app.exercises.questions import WHOLE
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -22,7 +23,8 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.outline import Choice, Number, Outline
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.server import ViewerServer
-from kin.units import PLAIN, Units
+from kin import Robot, jacobian
+from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -86,7 +88,7 @@ def press(tab: FakeBrowser, *key: object, value: object = None) -> None:
 def seen(tab: FakeBrowser, outline: Outline, before: set[str]) -> Iterator[tuple[str, Seen]]:
     """Every number that is asked, with what the page shows meanwhile: the lesson, the scene and the read-out."""
     for key, question in outline.questions():
-        if not isinstance(question, Number) or (question.unit == PLAIN and question.tolerance == WHOLE):
+        if not isinstance(question, Number) or question.whole:
             continue
         at = len(outline.steps) if key.startswith("c") else int(key) - 1
         start = len(tab.log)
@@ -159,6 +161,61 @@ def test_what_a_lesson_draws_and_lists_comes_with_the_answer(server: int, key: s
         press(tab, "reveal", "1")
         tab.wait(lambda: all(shown(tab)))
         assert "data-asked" not in tab.html
+
+
+def given_away(robot: Robot, outline: Outline) -> list[tuple[str, str]]:
+    """Questions, and the reason of an estimate that states the answer, also as a share of the reach."""
+    found = []
+    for step in outline.steps:
+        asked, estimate = step.question, step.estimate
+        if not isinstance(estimate, Choice):
+            continue
+        stated = numbers(" ".join((step.text, estimate.prompt, *(option.text for option in estimate.options))))
+        for option in estimate.options:
+            told = numbers(option.reason) - stated
+            if isinstance(asked, Number):
+                shown = float(asked.value_text.removesuffix(asked.unit.suffix.rstrip()).replace("−", "-"))
+                values = {abs(shown), abs(shown) * 1e-3, round(100.0 * abs(asked.answer) / robot.reach)}
+                leak = bool({abs(x) for x in told} & values)
+            elif isinstance(asked, Choice):
+                rights = {re.escape(each.text.rstrip(".")) for each in asked.options if each.right}
+                leak = any(re.search(rf"(?<!\w){right}(?!\w)", option.reason) for right in rights)
+            else:
+                leak = False
+            if leak:
+                found.append((asked.prompt if asked else "", option.reason))
+    return found
+
+
+@pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
+def test_the_reason_of_an_estimate_does_not_answer_the_question_after_it(lesson: Any) -> None:
+    for robot in CLASSICS:
+        assert not given_away(robot, lesson.outline(robot, UNITS)), robot.id
+
+
+def test_a_reason_that_answers_the_question_after_it_is_found() -> None:
+    numeric = next(lesson for lesson in LESSONS if lesson.key == "numeric")
+    outline = numeric.outline(ARMS[1], UNITS)
+    first = outline.steps[0]
+    assert isinstance(first.question, Number)
+    assert isinstance(first.estimate, Choice)
+    share = round(100.0 * first.question.answer / ARMS[1].reach)
+    for reason in (f"It is {share} % of the reach.", f"It is {first.question.value_text}."):
+        options = tuple(replace(option, reason=reason) for option in first.estimate.options)
+        step = replace(first, estimate=replace(first.estimate, options=options))
+        assert given_away(ARMS[1], replace(outline, steps=(step,)))
+
+
+def test_no_self_motion_leaves_the_rank_to_be_asked() -> None:
+    """Whoever has just read that there is no self-motion is not asked how many there are."""
+    redundancy = next(lesson for lesson in LESSONS if lesson.key == "redundancy")
+    for robot in CLASSICS:
+        question = redundancy.outline(robot, UNITS).steps[0].question
+        assert isinstance(question, Number)
+        random = robot.random_q(np.random.default_rng(2), 1)[0]
+        rank = int(np.linalg.matrix_rank(jacobian(robot, random), tol=1e-6))
+        assert ("rank" in question.prompt) == (rank == robot.n), robot.id
+        assert question.answer == (rank if rank == robot.n else robot.n - rank), robot.id
 
 
 def test_an_answer_on_show_is_found(server: int, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,12 +13,15 @@ import pytest
 
 import kin
 from app.exercises.rows import FACTORS, Factor, turns
-from app.viewer.lessons.dh import choices
+from app.viewer.declared.scene import Node
+from app.viewer.lessons.dh import assign_drawing, choices
 from app.viewer.lessons.dh.assign import assign_html, rows_html
 from app.viewer.lessons.dh.assignment import Assignment, read_row
 from app.viewer.lessons.dh.attempt import Attempt, error_of
 from app.viewer.lessons.dh.settings import DHSettings
 from app.viewer.lessons.dh.steps import OTHER
+from app.viewer.lessons.figure_nodes import FigureNodes
+from app.viewer.scene.meshes import body
 from kin.dh.tables import convert_dh
 from kin.units import DEFAULT_UNITS, Units
 
@@ -66,6 +69,47 @@ def test_a_student_who_answers_right_gets_a_table_of_the_arm(robot: kin.Robot) -
     assert error_of(attempt.work) < 1e-9
     page = assign_html(attempt, DEFAULT_UNITS)
     assert "exactly as the arm does" in page
+
+
+def drawn(attempt: Attempt, q: np.ndarray) -> dict[str, Node]:
+    """The nodes of the scene, by key."""
+    nodes = assign_drawing.scene(attempt, q, FigureNodes(body(attempt.work.robot).size), DEFAULT_UNITS)
+    return {node.key: node for node in nodes}
+
+
+def labels(nodes: dict[str, Node]) -> list[str]:
+    return [str(node.props["text"]) for node in nodes.values() if node.kind == "label"]
+
+
+@arms
+def test_the_scene_numbers_the_joints_until_their_axes_are_named(robot: kin.Robot) -> None:
+    attempt = begin(robot)
+    numbered = ", ".join(labels(drawn(attempt, robot.q_home)))
+    assert re.findall(r"joint (\d+)", numbered) == [str(k + 1) for k in range(robot.n)]
+    while not attempt.work.complete:
+        attempt.show()
+    assert not [text for text in labels(drawn(attempt, robot.q_home)) if "joint" in text]
+
+
+@arms
+def test_the_lengths_of_the_row_to_be_typed_are_drawn_without_their_values(robot: kin.Robot) -> None:
+    attempt, q, rows = begin(robot), robot.random_q(np.random.default_rng(4), 1)[0], 0
+    while not attempt.work.complete:
+        if attempt.part is None:
+            nodes, rows = drawn(attempt, q), rows + 1
+            step = np.linalg.inv(attempt.work.frames_at(q)[-1]) @ attempt.work.carried(attempt.chosen, q)
+            x, y, z = step[:3, 3]
+            standard = robot.convention == "standard"
+            sizes = {"d": abs(z) if standard else math.hypot(y, z), "a": math.hypot(x, y) if standard else abs(x)}
+            for factor, size in sizes.items():
+                assert (factor in nodes) == (size > 1e-6), factor
+                if factor in nodes:
+                    start, end = nodes[factor].props["points"][0]
+                    assert np.linalg.norm(end - start) == pytest.approx(size, abs=1e-6)
+                    assert nodes[f"{factor}-label"].props["text"] == f"{attempt.symbol(factor)} = ?"
+            assert not [text for text in labels(nodes) if "=" in text and not text.endswith("= ?")]
+        attempt.show()
+    assert rows == robot.n
 
 
 @arms

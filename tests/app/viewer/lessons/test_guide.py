@@ -49,7 +49,7 @@ from kin import InputError, Robot
 from kin.axes import pairs
 from kin.differential.task import natural_task, usual_rank
 from kin.transforms import Array
-from kin.units import Units
+from kin.units import PLAIN, Unit, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -59,6 +59,7 @@ DEGREES, RADIANS = Units(), Units(degrees=False, length="m")
 PAIRS = [(robot, lesson) for robot in ROBOTS for lesson in LESSONS]
 ANGLE = Number("θ?", math.pi / 2, DEGREES.angles, math.radians(1.0), "Add.", (Mistake(0.0, "Forgot it."),), True)
 LENGTH = Number("d?", -0.2, DEGREES.lengths, 0.001, "Measure.")
+SHOWN = (PLAIN, DEGREES.angles, RADIANS.angles, DEGREES.lengths, RADIANS.lengths, Unit("N·m", 1.0, 2))
 SUM = Choice("1 + 1?", (Option("2", "Counted.", True), Option("3", "One too many.")))
 SMALL = Outline("Count.", (Step("Sums", "Think.", SUM, "It is 2."), Step("Rest", "Look.")), (ANGLE, LENGTH))
 
@@ -118,6 +119,19 @@ def test_solutions_are_shown_as_fine_as_they_are_asked() -> None:
     assert (counted.value_text, counted.tolerance_text) == ("3", "a whole number")
     assert SUM.solution() == "2. Counted."
     assert LENGTH.solution() == "−200 mm. Measure."
+    ratio = Number("r?", 5.3, PLAIN, 0.1, "Divide.")
+    assert (ratio.value_text, ratio.tolerance_text) == ("5.3", "± 0.1"), "no count, though as coarse"
+    assert ratio.read_text("530 %") == pytest.approx(5.3)
+
+
+@pytest.mark.parametrize("unit", SHOWN, ids=lambda unit: unit.name or "plain")
+def test_a_right_answer_on_show_is_right(unit: Unit) -> None:
+    rng = np.random.default_rng(5)
+    for tolerance in (2e-4, 0.01, 0.0999, 0.1, 0.2, 0.45, 0.5, 0.0, 1.0, 9.9, 10.0, 250.0):
+        for value in (0.0,) if tolerance == 0.0 else (*rng.uniform(-1e3, 1e3, 20), 5.3, -0.5, 2.5, 0.0, 1e-9):
+            question = Number("?", value / unit.scale, unit, tolerance / unit.scale, "Compute.")
+            for shown in (question.value_text, question.right_cells()[0][0]):
+                assert question.judge(question.read_text(shown)).right, (tolerance, value, shown)
 
 
 def test_a_question_must_have_a_right_answer() -> None:
@@ -421,12 +435,13 @@ def test_redundancy_numbers(robot: Robot) -> None:
     found = numbers(redundancy.outline(robot, DEGREES))
     q = robot.random_q(np.random.default_rng(11), 5)
     J = kin.jacobian(robot, q)
-    assert found["1"] == robot.n - max(np.linalg.matrix_rank(j, tol=1e-9) for j in J)
+    rank = max(np.linalg.matrix_rank(j, tol=1e-9) for j in J)
+    assert found["1"] == (robot.n - rank or rank), "the rank is asked where no self-motion is"
     assert found["2"] == robot.n - max(np.linalg.matrix_rank(j[:3], tol=1e-9) for j in J)
     z = redundancy.null_vector(robot)
     assert np.linalg.norm(kin.jacobian(robot, robot.q_home) @ z) == pytest.approx(0.0, abs=1e-9)
     assert found["c1"] == pytest.approx(0.0, abs=1e-9)
-    if found["1"]:
+    if robot.n > rank:
         assert np.linalg.norm(z) == pytest.approx(1.0)
         question = redundancy.outline(robot, DEGREES).steps[2].question
         assert isinstance(question, Choice)

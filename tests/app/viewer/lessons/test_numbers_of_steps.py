@@ -267,11 +267,11 @@ SENTENCES: dict[str, tuple[Sentence, ...]] = {
     ),
     "trajectories": (
         (
-            rf"goes {N}° in {N} s, from rest to rest, with at most {N} °/s and {N}°/s²",
+            rf"goes {N}° in {N} s, from rest to rest, with at most {N} °/s and {N} °/s²",
             lambda h, m: [*deg(sketched(h.robot).way), sketched(h.robot).time, *deg(limits_of_first(h.robot))],
         ),
         (
-            rf"goes {N}° from rest to rest with a trapezoidal profile: at most {N} °/s and {N}°/s²",
+            rf"goes {N}° from rest to rest with a trapezoidal profile: at most {N} °/s and {N} °/s²",
             lambda h, m: deg([1.5 * sketched(h.robot).way, *limits_of_first(h.robot)]),
         ),
         (rf"\) goes {N}° from rest", lambda h, m: deg((h.end - h.q)[0])),
@@ -532,7 +532,7 @@ ANSWERS: dict[tuple[str, str], Callable[[Here], float]] = {
     ("equations", "A column from two others"): lambda h: float(
         h.T["xyz".index(prompted(h, r"the ([xyz]) component of n")[0]), 0]
     ),
-    ("redundancy", "Joints and conditions"): lambda h: at_rest(h, 6),
+    ("redundancy", "Joints and conditions"): lambda h: at_rest(h, 6) or int(np.linalg.matrix_rank(h.J)),
     ("redundancy", "Only the point"): lambda h: at_rest(h, 3),
     ("velocity", "A column"): lambda h: float(np.linalg.norm(h.J[:3, 0])),
     ("velocity", "Turning"): lambda h: float(np.linalg.norm(h.J[3:, -1])),

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.classroom.courses import Course, Courses, Item
-from app.exercises import Exercises, Verdict
+from app.exercises import Exercise, Exercises, Verdict
 from app.exercises.lessons import LESSONS as KEYS
 from app.shared.store import Store
 from app.viewer.activity.activity import REVIEW, Activity, GivenUp
@@ -306,6 +306,19 @@ def test_a_course_asks_two_exercises_of_its_lessons_at_its_end() -> None:
     assert again.back == progress.back
     again.restore({**progress.state(), "back": {"swing": "great", "none": "open", first: ["right"]}})
     assert again.back == {}
+
+
+# With other numbers
+
+
+@pytest.mark.parametrize("exercise", ALL.all, ids=lambda exercise: exercise.id)
+def test_what_varies_comes_back_with_other_numbers(exercise: Exercise) -> None:
+    known, seen = exercise.variant(77), [exercise.variant(seed) for seed in range(6)]
+    assert any(one.values != known.values for one in seen) == bool(exercise.vary)
+    asked = {
+        (one.text(exercise.text, Units()), str(exercise.asked(one, Units())), str(one.q)) for one in (known, *seen)
+    }
+    assert len(asked) > 1 or not exercise.vary, "so that what is asked, or the arm on show, is another"
 
 
 # On another arm
