@@ -67,18 +67,17 @@ twice="--reruns 1 -r R"
 files_of() {
   grep -rl "pytest\.mark\.$1\b" tests --include="test_*.py"
 }
-# Two browsers draw; six processes run the other tests beside them, as those of the viewer mostly wait for arms that move.
-# They step back a little behind the browsers, and are nearer to threads that compute in the background (NICENESS in
-# app/shared/threads), which otherwise hardly get a processor beside them. What measures time runs alone.
+# Two browsers draw; five processes run the other tests beside them, as those of the viewer mostly wait for arms that move.
+# What measures time runs alone.
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 pytest --reruns 2 -r R -n 2 --dist loadfile --no-loadscope-reorder -m "not slow and browser" $(files_of browser) >"$log" 2>&1 &
 browsing=$!
 failed=0
-# The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Six that
+# The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Five that
 # begin together would each do so. What cannot be collected is said by the run.
 pytest --collect-only -qq >/dev/null 2>&1 || :
-nice -n 3 pytest $twice -n 6 --dist loadfile --no-loadscope-reorder -m "not slow and not browser and not bench" || failed=1
+pytest $twice -n 5 --dist loadfile --no-loadscope-reorder -m "not slow and not browser and not bench" || failed=1
 wait $browsing || failed=1
 cat "$log"
 pytest $twice -m "not slow and bench" $(files_of bench) || failed=1

@@ -418,9 +418,15 @@ def ask(client, robot):
     post(client, "workspace", {"robot": robot, "n": 10})
 
 
+def objects(kind):
+    """All objects of a kind, also of modules imported while tests were collected (`tests/conftest.py`)."""
+    gc.unfreeze()
+    return [each for each in gc.get_objects() if isinstance(each, kind)]
+
+
 def signatures():
     """How many signatures of kernels are compiled."""
-    return sum(len(each.signatures) for each in gc.get_objects() if isinstance(each, Dispatcher))
+    return sum(len(each.signatures) for each in objects(Dispatcher))
 
 
 def test_an_arm_sent_along_compiles_nothing(client):
@@ -437,8 +443,7 @@ def test_an_arm_sent_along_compiles_nothing(client):
 def test_no_cache_without_bound_keeps_arms(client):
     """Of all caches of functions; those of results have a capacity (`ComputationCache`)."""
     ask(client, next(arms(1)))
-    caches = [each for each in gc.get_objects() if isinstance(each, _lru_cache_wrapper)]
-    ours = [each for each in caches if each.__module__.split(".")[0] in ("kin", "app")]
+    ours = [each for each in objects(_lru_cache_wrapper) if each.__module__.split(".")[0] in ("kin", "app")]
     assert len(ours) > 15
     for each in ours:
         if each.cache_parameters()["maxsize"] is None:
