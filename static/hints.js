@@ -42,6 +42,7 @@
     const seen = picture();
     if (!seen) return null;
     const { area, tool: { x, y }, arrows } = seen;
+    if (!arrows) return null; // hidden
     if (x < area.left || x > area.right || y < area.top || y > area.bottom) return null; // out of the picture
     const [left, top] = [Math.max(x - arrows, area.left), Math.max(y - arrows, area.top)];
     return new DOMRect(left, top, Math.min(x + arrows, area.right) - left, Math.min(y + arrows, area.bottom) - top);

@@ -148,12 +148,25 @@ const viserPage = (() => {
   function hear({ data }) {
     if (!Array.isArray(data?.messages)) return;
     HOOKS.hear++;
+    dropVoidUpdates(data.messages);
     for (const { type: kind, props, updates } of data.messages) {
       const html = kind === "GuiHtmlMessage" ? props.content : kind === "GuiUpdateMessage" ? updates.content : null;
       if (typeof html !== "string") continue;
       for (const [start, act] of htmlWatchers) if (html.startsWith(start)) act(html);
     }
   }
+
+  // viser applies all updates that wait for a frame after all removals that wait for it. In a slow page an update then
+  // finds no component, which is an error in the console. It is void: it is taken from the queue when the removal comes.
+  let queue = null; // messages that viser has received and not applied yet
+  function dropVoidUpdates(received) {
+    if (!queue?.length) return;
+    const removed = new Set(received.filter(({ type: kind }) => kind === "GuiRemoveMessage").map(({ uuid }) => uuid));
+    if (!removed.size) return;
+    const kept = queue.filter(({ type: kind, uuid }) => kind !== "GuiUpdateMessage" || !removed.has(uuid));
+    queue.splice(0, queue.length, ...kept);
+  }
+
   const { postMessage } = Worker.prototype;
   Worker.prototype.postMessage = function (data, ...rest) {
     if (!workers.has(this)) {
@@ -308,12 +321,13 @@ const viserPage = (() => {
   // what it names, and a new one stood elsewhere for a frame. The parent it asks for is here moved to its present place.
 
   const placed = new WeakSet(); // tables of nodes that move what they are asked for
-  function placeParents() {
+  function enterViewer() {
     const canvas = document.querySelector(PARTS.scene);
     let fiber = canvas?.[Object.keys(canvas).find((key) => key.startsWith("__reactFiber$"))]; // what React keeps of it
     while (fiber && !fiber.memoizedProps?.value?.mutable?.current?.nodeRefFromName) fiber = fiber.return;
     const viewer = fiber?.memoizedProps.value.mutable.current;
     if (!viewer || placed.has(viewer.nodeRefFromName)) return;
+    queue = viewer.messageQueue;
     viewer.nodeRefFromName = new Proxy(viewer.nodeRefFromName, {
       get(nodes, name) {
         const node = nodes[name];
@@ -324,7 +338,7 @@ const viserPage = (() => {
     });
     placed.add(viewer.nodeRefFromName);
   }
-  watch(placeParents, { delay: 50 });
+  watch(enterViewer, { delay: 50 });
 
   // Tabs
 

@@ -216,6 +216,20 @@ class FakeBrowser:
         answers: dict[str, Any] = json.loads(html.unescape(shown.split('data-answers="', 1)[1].split('"', 1)[0]))
         return answers
 
+    def updates_without_component(self) -> list[dict[str, Any]]:
+        """Updates of the panel that came before their component, or after its removal."""
+        there: set[str] = set()
+        found = []
+        for message in self.log:
+            kind, uuid = message["type"], message.get("uuid")
+            if kind == "GuiUpdateMessage" and uuid not in there:
+                found.append(message)
+            elif kind == "GuiRemoveMessage":
+                there.discard(str(uuid))
+            elif kind.startswith("Gui") and uuid and "props" in message:
+                there.add(uuid)
+        return found
+
     def choose(self, robot: str) -> None:
         """Choose another robot by its name, and wait until it is shown."""
         if self.value("Robot") == robot:

@@ -95,6 +95,51 @@ def test_scripts_share_one_observer_whose_watchers_do_not_stop_each_other(deskto
         desktop.page.evaluate("viserPage.watch(() => {}, { on: ['data-other'] })")
 
 
+# Messages for one frame, as a slow page has them: an update of a component, and then its removal. The first of
+# them is not of the panel alone, so that viser waits for the frame.
+REMOVED_UNSEEN = """async () => {
+  const uuid = "kb-removed";
+  const tell = (...messages) => {
+    kbWorker.dispatchEvent(new MessageEvent("message", { data: { type: "message_batch", messages } }));
+  };
+  const frame = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  const shown = () => document.body.textContent.includes("kb-removed-text");
+  const update = { type: "GuiUpdateMessage", uuid, updates: { content: "<p>another text</p>" } };
+  const props = { order: 1e6, content: "<p>kb-removed-text</p>", visible: true };
+  tell({ type: "GuiHtmlMessage", uuid, container_uuid: "root", props });
+  for (let k = 0; k < 100 && !shown(); k++) await frame();
+  if (!shown()) throw new Error("the component does not come");
+  tell({ type: "GuiFormSubmitMessage", uuid }, update);
+  tell({ type: "GuiRemoveMessage", uuid });
+  for (let k = 0; k < 100 && shown(); k++) await frame();
+  if (shown()) throw new Error("the component does not go");
+  for (let k = 0; k < 5; k++) await frame();
+}"""
+KEEP_WORKER = """
+{
+  const { postMessage } = Worker.prototype;
+  Worker.prototype.postMessage = function (...sent) {
+    window.kbWorker = this;
+    return postMessage.apply(this, sent);
+  };
+}
+"""
+
+
+class WorkerTab(Tab):
+    """A tab whose connection can be spoken for."""
+
+    scripts = Tab.scripts + KEEP_WORKER
+
+
+def test_updates_of_a_component_that_is_removed_before_the_next_frame_are_dropped(
+    browser: Browser, address: str
+) -> None:
+    tab = WorkerTab(browser, address, 1280, 720)
+    tab.page.evaluate(REMOVED_UNSEEN)
+    tab.close()  # fails with what the console says
+
+
 # What the programs that draw labels have for kbDark.
 SHADES = """() => {
   const gl = document.querySelector("canvas[data-engine]").getContext("webgl2");

@@ -167,7 +167,7 @@ class Number(Spec):
         coarse: the step is one of this digit instead.
         slider: the ends of the slider, if it is not a field.
         within: the limits for a robot, and the ends of its slider, if they are not the same for all.
-        marks: whether the slider shows its ends.
+        marks: whether the ends below the slider are written by us: viser writes a hyphen for a minus.
         named: whether the label ends with the unit.
     """
 

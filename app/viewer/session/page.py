@@ -396,15 +396,15 @@ class VisitorPage(ShownArm, Worker):
     def _show_hints(self) -> None:
         """Tell ``static/hints.js`` where gizmo and arm are in the picture.
 
-        Of the gizmo: its place, and how long its arrows are there. Of the arm: how thick it is there, and the
-        corners of its centre line. Who may only look gets no hints, and a hidden arm none.
+        Of the gizmo: its place, and how long its arrows are there, 0 if it is hidden. Of the arm: how thick it is
+        there, and the corners of its centre line. Who may only look gets no hints, and a hidden arm none.
         """
         place = arm = ""
         if not self._looking and self._alone is None:
             gizmo, shown = self.arm.scene.gizmo, self.arm.scene.body
             line = np.vstack([gizmo.position, shown.mount.foot, center_line(self.arm.robot, self.arm.goal)])
             (x, y, metre), *line = self.camera.places(line).tolist()
-            place = _numbers(x, y, metre * gizmo.scale)
+            place = _numbers(x, y, metre * gizmo.scale if gizmo.visible else 0.0)
             arm = _numbers(metre * THICK * shown.size, *(value for point in line for value in point[:2]))
         update_html(self.panel.hints, render("panel/hints", place=place, arm=arm))
 
@@ -460,10 +460,10 @@ class VisitorPage(ShownArm, Worker):
                     self.tabs.append(tab(self))
             self._persistence.restore(saved)
             self.arm.draw(fresh=False)
-            self._show_hints()
             if later:
                 stored = self._persistence.stored
                 self._preparing.hold_state(stored, robot_of(self, stored.robot), self.offered)
+            self._show_hints()
             learns = self._persistence.stored.lesson is not None
             self.panel.script.show_start(self._persistence.begin(self.panel.share), LEARN if learns else "")
         self.client.flush()

@@ -66,6 +66,7 @@ class InverseSettings(Settings):
         names="arm angle",
         undo="Arm angle",
         named=False,
+        marks=True,
         clip=True,
         link=False,
     )

@@ -79,7 +79,9 @@ class WorkspaceSettings(Settings):
         hint="Diameter of a point",
     )
     axis: Axis | None = choice("Cut", {NONE: None, **AXES}, None, hint=CUT_HINT, renew=True)
-    at: float = slider("Cut at", 0.0, (-FAR, FAR), "length", digits=FINE, clip=True, named=False, hint=AT_HINT)
+    at: float = slider(
+        "Cut at", 0.0, (-FAR, FAR), "length", digits=FINE, clip=True, marks=True, named=False, hint=AT_HINT
+    )
     keep: Keep = choice("Keep", KEEP, "below", hint="Which side of the cut is visible")
     compare: str | None = choice("Compare with", {NONE: None}, None, anything=True, hint=COMPARE_HINT, renew=True)
     sizes: bool = flag("Sizes", hint=SIZES_HINT)

@@ -171,6 +171,20 @@ def test_a_step_is_one_step_of_undo(server: int) -> None:
         tab.wait(lambda: "1. A column" in tab.html and is_at(tab, UR5, q))
 
 
+@pytest.mark.parametrize("lesson", ["Equations", "Redundancy"])
+def test_a_removed_control_gets_no_update(server: int, lesson: str) -> None:
+    with FakeBrowser(server) as tab:
+        tab.settle()
+        tab.open_lesson(lesson)
+        for degrees in (10.0, 20.0):  # while the arm is under way, controls follow it
+            tab.set(label(STORE.robots[0], 0), degrees)
+        before = len(tab.log)
+        tab.set("Lesson", "None")
+        tab.wait(lambda: any(m["type"] == "GuiRemoveMessage" for m in tab.log[before:]))
+        tab.settle()
+        assert tab.updates_without_component() == []
+
+
 def test_a_link_without_a_configuration_opens_at_the_pose_of_the_step(server: int) -> None:
     lesson = next(each for each in LESSONS if each.key == "rotations")
     pose = lesson.outline(UR5, DEGREES).pose_of(0)

@@ -133,6 +133,7 @@ def test_a_link_opens_when_its_arm_is_compiled(port, preparation):
     with FakeBrowser(port, memory=json.dumps({"state": link})) as tab:
         waits_for(tab, "the UR5")
         assert tab.value("Robot") == PIONEER.name
+        assert arrows_of_hints(tab) == 0.0
         compile_parts(preparation, (COLLISIONS, family_of(UR5)))
         tab.settle()
         assert tab.value("Robot") == PIONEER.name, "its lesson needs more"
@@ -141,6 +142,7 @@ def test_a_link_opens_when_its_arm_is_compiled(port, preparation):
         tab.settle()
         assert np.allclose(tab.tool_pose(), kin.fk(UR5, q))
         assert tab.value("Lesson") == "Redundancy"
+        tab.wait(lambda: arrows_of_hints(tab) > 0.0)
 
 
 def test_a_link_to_what_is_compiled_opens_at_once(port):
@@ -158,6 +160,13 @@ def sliders(tab: FakeBrowser, name: str) -> list[str]:
 def has_arrows(tab: FakeBrowser) -> bool:
     """Whether the target of the arm on show can be seen, and dragged."""
     return tab.visible.get(tab.gizmo, True)
+
+
+def arrows_of_hints(tab: FakeBrowser) -> float:
+    """How long the arrows are of which the first hint speaks; 0: it is not shown."""
+    found = re.search(r'data-hints="\S+ \S+ (\S+)"', tab.html)
+    assert found is not None
+    return float(found[1])
 
 
 def program(tab: FakeBrowser, lines: Lines) -> Line:
@@ -245,6 +254,7 @@ def test_the_arm_on_show_can_be_dragged_again_when_another_robot_is_chosen(port,
         tab.set("Robot", PLANAR.name)
         waits_for(tab, f"the {PLANAR.name}")
         tab.wait(lambda: has_arrows(tab))
+        tab.wait(lambda: arrows_of_hints(tab) > 0.0)
 
 
 def test_a_target_typed_before_the_arm_of_a_link_is_compiled_is_solved_with_that_arm(port, preparation):

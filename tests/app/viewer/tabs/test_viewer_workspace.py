@@ -516,6 +516,9 @@ def test_a_cut_hides_points_without_sending_any(tab):
     tab.set("Cut", "across z (level)")
     tab.wait(lambda: "Cut at (mm)" in tab.sliders)
     made = cut.cut_of([PIONEER], "z", PIONEER.q_home)
+    ends = [mark["label"] for mark in tab.gui[tab.element("Cut at (mm)")]["props"]["_marks"]]
+    assert ends == [f"{1000 * made.low:g}".replace("-", "−"), f"{1000 * made.high:g}"]
+    assert ends[0].startswith("−")
     tab.wait(lambda: len(tab.clouds) > made.count and tab.count == N and tab.state == "done")
     tab.settle()
     assert np.array_equal(np.sort(tab.points(), axis=0), np.sort(points, axis=0)), "the same points, each once"
