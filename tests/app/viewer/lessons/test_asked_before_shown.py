@@ -172,11 +172,11 @@ def given_away(robot: Robot, outline: Outline) -> list[tuple[str, str]]:
             continue
         stated = numbers(" ".join((step.text, estimate.prompt, *(option.text for option in estimate.options))))
         for option in estimate.options:
-            told = numbers(option.reason) - stated
+            said = numbers(option.reason) - stated
             if isinstance(asked, Number):
                 shown = float(asked.value_text.removesuffix(asked.unit.suffix.rstrip()).replace("−", "-"))
                 values = {abs(shown), abs(shown) * 1e-3, round(100.0 * abs(asked.answer) / robot.reach)}
-                leak = bool({abs(x) for x in told} & values)
+                leak = bool({abs(x) for x in said} & values)
             elif isinstance(asked, Choice):
                 rights = {re.escape(each.text.rstrip(".")) for each in asked.options if each.right}
                 leak = any(re.search(rf"(?<!\w){right}(?!\w)", option.reason) for right in rights)
@@ -207,7 +207,7 @@ def test_a_reason_that_answers_the_question_after_it_is_found() -> None:
 
 
 def test_no_self_motion_leaves_the_rank_to_be_asked() -> None:
-    """Whoever has just read that there is no self-motion is not asked how many there are."""
+    """The reason of the estimate says that there is no self-motion: how many there are is no question then."""
     redundancy = next(lesson for lesson in LESSONS if lesson.key == "redundancy")
     for robot in CLASSICS:
         question = redundancy.outline(robot, UNITS).steps[0].question
