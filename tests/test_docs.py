@@ -118,7 +118,7 @@ def test_rest_examples_are_answered():
     lines = dict.fromkeys(
         line for block in blocks("sh") for line in block.splitlines() if line.startswith("curl ")
     )
-    client = TestClient(create_app(Settings()))
+    client = TestClient(create_app(Settings(time_budget=120)))
     answers = {}
     for line in lines:
         words = shlex.split(line)
