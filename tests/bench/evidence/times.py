@@ -6,9 +6,7 @@ machine is counted: a run beside other work is printed, but not recorded, and ne
 
 from __future__ import annotations
 
-import gc
 import os
-import statistics
 import subprocess
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -20,6 +18,8 @@ import numpy as np
 
 import kin
 from app.bench.board.words import time_text
+from app.bench.contestants import Contestant
+from app.bench.measure import Turns, measure
 from app.bench.run import machine
 from kin import Robot
 from kin.solvers import family_of
@@ -86,32 +86,18 @@ def measured(arm: Robot, rounds: int = ROUNDS, turn: float = TURN) -> Times:
         family_of(arm),
         median(lambda each: kin.fk(arm, each), q, rounds, turn),
         answer,
-        median(lambda many: kin.solve_ik_many(arm, many), [stack], rounds, turn) / batch,
+        median(lambda many: kin.solve_ik_many(arm, many), [stack], rounds, turn, batch),
         batch,
     )
 
 
-def median(call: Callable[[Any], object], inputs: Sequence[Any], rounds: int, turn: float) -> float:
-    """Seconds of one call: the median of rounds of `turn` seconds, after one over all inputs."""
-    began = time.perf_counter()
-    for each in inputs:
-        call(each)
-    once = (time.perf_counter() - began) / len(inputs)
-    calls = max(1, round(turn / max(once, 1e-7)))
-    found, next_one = [], 0
-    gc.collect()
-    gc.disable()
-    try:
-        for _ in range(rounds):
-            chosen = [inputs[(next_one + k) % len(inputs)] for k in range(calls)]
-            next_one += calls
-            began = time.perf_counter()
-            for each in chosen:
-                call(each)
-            found.append((time.perf_counter() - began) / calls)
-    finally:
-        gc.enable()
-    return statistics.median(found)
+def median(
+    call: Callable[[Any], object], inputs: Sequence[Any], rounds: int, turn: float, per_call: int = 1
+) -> float:
+    """Seconds per target: the median of rounds of `turn` seconds, with `per_call` targets in a call."""
+    entry = Turns(Contestant("", call, [(each,) for each in inputs], list, per_call))
+    measure([entry], rounds, turn)
+    return entry.median
 
 
 def run(chosen: Iterable[Robot], rounds: int = ROUNDS, turn: float = TURN) -> dict[str, Any]:
