@@ -98,10 +98,10 @@ def readings_of(text: str, robot: Robot) -> tuple[float, ...]:
     moving_motors(robot)
     words = re.split(r"[\s,;]+", text.replace("−", "-").strip().strip("[]()").strip()) if text.strip() else []
     values = [number_of(word) for word in words] if len(text) <= _LONGEST else []
+    refusal = InputError("readings", text, f"numbers with spaces between: {counted(robot.motors)}")
+    if not all(abs(value) < LARGEST for value in values):
+        raise refusal
     try:
-        if not all(abs(value) < LARGEST for value in values):
-            raise InputError("readings", text, f"numbers below {LARGEST:g}")
         return tuple(of_moving(robot.motors, values).tolist())
     except InputError:
-        wanted = f"numbers with spaces between: {counted(robot.motors)}"
-        raise InputError("readings", text, wanted) from None
+        raise refusal from None
