@@ -7,10 +7,10 @@ import logging
 from dataclasses import replace
 
 from app.classroom.clock import now
-from app.classroom.courses import Course
+from app.classroom.courses import Course, parsed
 from app.classroom.standing import standing
 from app.classroom.views import RoomView, SeatView, in_one_line
-from app.exercises import Exercise, ExerciseFileError, parse_exercise
+from app.exercises import Exercise, ExerciseFileError
 from app.viewer.feature import Stage
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
@@ -93,7 +93,7 @@ class Teacher(Member):
         found = []
         for text in own:
             try:
-                found.append(parse_exercise(text, "own", self.stage.store.get))
+                found.append(parsed(text, self.stage.store.get))
             except ExerciseFileError as error:  # its arm is gone
                 logger.info("a teacher's page does without an exercise of its room: %s", error)
         activity.kept = tuple(found)
