@@ -121,7 +121,7 @@ class Tab:
         self.page.set_default_timeout(WAIT)
         expect.set_options(timeout=WAIT)
         self.errors: list[str] = []
-        self.spoilt = False  # a test failed here: nobody knows in which state it left the page
+        self.spoilt = False  # a test failed here, or typed at random: nobody knows in which state it left the page
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", self._listen)
         self._arrive()
@@ -187,13 +187,17 @@ class Tab:
         self.open("Learn")
         self.choose("Lesson", title)
 
-    def show_answer(self, lesson: str) -> None:
-        """Once the lesson of this title is on show, have the answer to its step shown, if one is asked for."""
+    def show_answer(self, lesson: str, by_key: bool = False) -> None:
+        """Once the lesson of this title is on show, have the answer to its step shown, if one is asked for.
+
+        None is where an earlier test has had it shown: a page keeps how far one was in a lesson.
+        """
         expect(self.page.locator(f'[data-guide=goal][data-lesson="{lesson}"]')).to_be_visible()
         steps = self.page.locator("[data-guide=steps]")
         expect(steps).to_be_visible()
-        if steps.locator(".kb-reveal").count():
-            steps.locator(".kb-reveal").first.click()
+        reveal = steps.locator(".kb-reveal").first
+        if reveal.count():
+            reveal.press("Enter") if by_key else reveal.click()
         expect(self.page.locator("[data-asked]")).to_have_count(0)
 
     def set_dark(self, dark: bool) -> None:

@@ -97,12 +97,14 @@ def test_a_lesson(tab: Tab) -> None:
     page.get_by_role("tab", name="Learn").press("Enter")
     lesson = tab.row("Lesson").locator("input:visible").first
     lesson.press("Enter")
-    for _ in range(10):
-        if page.locator("[role=option][data-combobox-selected]", has_text="Postures").count():
-            break
+    marked = page.locator("[role=option][data-combobox-selected]")
+    expect(page.get_by_role("option", name="Postures")).to_be_visible()
+    for _ in range(page.get_by_role("option").count()):
         page.keyboard.press("ArrowDown")
+        if marked.inner_text() == "Postures":
+            break
     page.keyboard.press("Enter")
-    page.get_by_role("button", name="Show the answer").press("Enter")  # the question withholds the list
+    tab.show_answer("Postures", by_key=True)  # the question withholds the list
     expect(page.locator("[data-posture]")).to_have_count(8)
     walk(tab)
     here = page.locator("[data-here]")

@@ -65,11 +65,12 @@ async def follow(service: Service, hub: Hub, count: int, seconds: float) -> dict
     teacher, *students = await members(service, hub, count)
     await press(teacher, 1, "follow")
     before, shown = service.seconds(), sum(student.pictures for student in students)
-    began, spent = time.perf_counter(), time.process_time()
+    began, spent, drags = time.perf_counter(), time.process_time(), 0
     teacher.grab()
     for k in range(round(seconds * HZ)):
         await asyncio.sleep(max(0.0, began + k / HZ - time.perf_counter()))
         if teacher.drag():
+            drags += 1
             for student in students:
                 student.watch(teacher)
     wall, own = time.perf_counter() - began, time.process_time() - spent
@@ -83,6 +84,7 @@ async def follow(service: Service, hub: Hub, count: int, seconds: float) -> dict
     waited = [x for student in students for x in student.latencies]
     return {
         "students": count,
+        "drags": drags,
         "pictures": len(waited),
         **latencies(waited),
         "teacher's p95 ms": 1e3 * percentile(teacher.latencies, 95),
