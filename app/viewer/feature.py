@@ -170,8 +170,13 @@ class Stage(Protocol):
         A view chosen by the visitor stays.
         """
 
-    def keep_in_view(self, target: Array | None = None) -> None:
-        """Glide to where the picture contains the arm at its goal, and a target ``(3,)``, if it does not."""
+    def keep_in_view(self, target: Array | None = None, points: Array | None = None) -> None:
+        """Glide to where the picture contains the arm at its goal, and these, if it does not.
+
+        Args:
+            target: a point ``(3,)`` above which a number is written.
+            points: what is drawn besides ``(n, 3)``.
+        """
 
     def toward_camera(self) -> Array:
         """A vector ``(3,)`` in the world frame, from the point the visitor looks at to the camera."""

@@ -106,7 +106,7 @@ class BarePage:
     def fit_view(self, spheres: Any, points: Array | None = None) -> None:
         self.views.append((spheres, points))
 
-    def keep_in_view(self, target: Array | None = None) -> None: ...
+    def keep_in_view(self, target: Array | None = None, points: Array | None = None) -> None: ...
 
     def toward_camera(self) -> Array:
         return np.ones(3)

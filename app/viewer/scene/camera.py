@@ -151,28 +151,28 @@ class VisitorCamera:
         self._camera.max_orbit_distance = max(_REMOTEST * body.radius, 1.5 * _distance(viewpoint))
         self._camera.min_orbit_distance = _NEAREST * body.radius
 
-    def keep(self, points: Array, target: Array | None = None) -> None:
+    def keep(self, points: Array, target: Array | None = None, also: Array | None = None) -> None:
         """If the picture does not contain these origins of the arm's frames ``(n, 3)``, glide until it does.
 
-        It then also contains a target ``(3,)`` or, if that is very far, the beginning of the line to it. The
-        camera glides back from there when the picture of before contains everything again.
+        It then also contains a target ``(3,)`` and the points `also` ``(k, 3)``; of one that is very far, the
+        beginning of the line to it. The camera glides back when the picture of before contains everything again.
         """
         self._points = points
         self.look()
         here = self._viewpoint
         if self._body is None:
             return
+        more = [] if also is None else [self._this_side(point) for point in also]
         if target is not None:
-            out = target - self._body.center
-            far = float(np.linalg.norm(out)) / (_OUTLOOK * self._body.radius)
-            seen = self._body.center + out / max(far, 1.0)
-            points = np.vstack([points, seen, seen + _ABOVE * self._body.radius * UP])
+            seen = self._this_side(target)
+            more += [seen, seen + _ABOVE * self._body.radius * UP]
+        points = np.vstack([points, *more])
         if self._left is not None and self._shows(self._left[0], points):
             self._return(*self._left)
             return
         if self._shows(here, points):
             return
-        left = self._left or (None if target is None else (here, self.chosen))
+        left = self._left or ((here, self.chosen) if more else None)
         sphere = round_both(_together(self._body, self._room), self._arm(points))
         viewpoint = _framed(sphere, here[0] - here[1], self._aspect, here[2])
         if self.chosen is None:
@@ -180,6 +180,13 @@ class VisitorCamera:
         else:
             self._choose(widened(viewpoint, self._aspect))
         self._left = left
+
+    def _this_side(self, point: Array) -> Array:
+        """The point ``(3,)``, or where the line from the arm to it leaves what is shown at most."""
+        assert self._body is not None
+        out = point - self._body.center
+        far = float(np.linalg.norm(out)) / (_OUTLOOK * self._body.radius)
+        return np.asarray(self._body.center + out / max(far, 1.0))
 
     def _return(self, viewpoint: Array, chosen: Array | None) -> None:
         """Glide back to a viewpoint that `keep` has left."""

@@ -208,8 +208,8 @@ class VisitorPage(ShownArm, Worker):
     def fit_view(self, spheres: Sequence[Sphere], points: Array | None = None) -> None:
         self.camera.fit(spheres, points)
 
-    def keep_in_view(self, target: Array | None = None) -> None:
-        self.camera.keep(kin.link_frames(self.now.robot, self.arm.goal)[:, :3, 3], target)
+    def keep_in_view(self, target: Array | None = None, points: Array | None = None) -> None:
+        self.camera.keep(kin.link_frames(self.now.robot, self.arm.goal)[:, :3, 3], target, points)
 
     def toward_camera(self) -> Array:
         return self.camera.toward

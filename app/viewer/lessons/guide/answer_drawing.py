@@ -5,6 +5,8 @@ Wrong answers are vermilion and broken, right ones green and whole.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from app.exercises.contract import Posed
@@ -21,7 +23,9 @@ from kin.transforms import Array, pose_from_position_wxyz
 YOURS = "your answer"
 OPACITY = 0.42  # of a copy of the arm
 THICK, DASHES = 0.6, 9  # of a bar, in the arm's thickness; parts of a broken one
-FARTHEST = 3.0  # reaches of the arm that a bar is long at most; its label has the value
+FARTHEST = 1.2  # reaches of the arm that a wrong bar is long at most; its label has the value
+CUT = "drawn shorter"  # the label of a bar that would be longer
+TIP = 0.12, 0.5  # of a bar that is cut: the length of its head, of the bar's, and its half width, of the head's
 ASIDE = 1.4  # from the broken bar to the whole one, in the arm's thickness
 ROUND, THIN = 48, 0.4  # parts of an ellipse, of which a broken one has every other; its thickness, of a bar's
 
@@ -120,6 +124,17 @@ def _pose_of(given: object) -> Array:
     return pose_from_position_wxyz(values[:3], values[3:])
 
 
+def ends(nodes: Sequence[Node]) -> Array:
+    """The points ``(n, 3)`` that a picture has to contain to show these nodes."""
+    found = [np.zeros((0, 3))]
+    for node in nodes:
+        if "points" in node.props:
+            found.append(np.asarray(node.props["points"], float).reshape(-1, 3))
+        elif node.position is not None:
+            found.append(np.reshape(np.asarray(node.position, float), (1, 3)))
+    return np.concatenate(found)
+
+
 def _is_way(question: Number) -> bool:
     """Whether an answer is a length, or a speed, which is drawn as a way."""
     return question.unit.is_length or question.unit.name == "m/s"
@@ -138,14 +153,24 @@ def _bar(key: str, robot: Robot, bar: Bar, value: float, words: str, color: Colo
     length = float(np.linalg.norm(way))
     if length < 1e-9:
         return []
-    size, most = body(robot).size, FARTHEST * robot.reach
-    direction = way / length
+    size, direction, most = body(robot).size, way / length, max(FARTHEST * robot.reach, length)
+    cut = abs(bar.scale * value) > most
     end = start + min(max(bar.scale * value, -most), most) * direction
     if broken:  # beside the whole one, which has its place between the points
         aside = ASIDE * size * _across(direction)
         start, end = start + aside, end + aside
     ends = np.linspace(start, end, 2 * DASHES if broken else 2).reshape(-1, 2, 3)
+    if cut:
+        ends = np.concatenate([ends, _tip(start, end)])
+        words = f"{words} ({CUT})"
     return [bars(key, ends, color, THICK * size), label(f"{key}-words", words, end, anchor="bottom-center")]
+
+
+def _tip(start: Array, end: Array) -> Array:
+    """The head of an arrow as two lines ``(2, 2, 3)`` that meet at its end: it would go on."""
+    back, wide = TIP[0] * (start - end), TIP[0] * TIP[1] * float(np.linalg.norm(end - start))
+    aside = wide * _across((end - start) / float(np.linalg.norm(end - start)))
+    return np.array([[end, end + back + aside], [end, end + back - aside]])
 
 
 def _ellipsoid(
@@ -156,7 +181,10 @@ def _ellipsoid(
     The bars of a wrong and of the right one are on opposite sides.
     """
     center, size, most = np.array(axis.center), body(robot).size, FARTHEST * robot.reach
-    lengths = np.clip(axis.scale * np.array([*axis.others, value]), -most, most)
+    whole = axis.scale * np.array([*axis.others, value])
+    lengths = np.clip(whole, -most, most)
+    if abs(whole[2]) > most:
+        words = f"{words} ({CUT})"
     semi = lengths[:, None] * np.array(axis.axes)
     angles = np.linspace(0.0, 2.0 * np.pi, ROUND + 1)
     found = []

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from app.viewer.exercises.drawing import GHOST, Drawing
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import earlier, views
-from app.viewer.lessons.guide.answer_drawing import answer_nodes, lead_nodes
+from app.viewer.lessons.guide.answer_drawing import answer_nodes, ends, lead_nodes
 from app.viewer.lessons.guide.content import written_example
 from app.viewer.lessons.guide.example_view import ExampleView
 from app.viewer.lessons.guide.lesson import Lesson
@@ -73,6 +74,8 @@ class Guide(Feature):
         self._arms: dict[Robot, Progress] = {stage.now.robot: self._progress}  # what was answered on each
         self._drawing = Drawing(stage.client.scene, self.post)
         self._copies = SceneView(stage.client.scene, "answer", self.post)
+        self._answer_ends = np.zeros((0, 3))  # what the picture has to contain to show the last answer
+        self._target: Array | None = None  # of the step on show, of which the picture has to contain it
         gui = stage.client.gui
         self._goal = gui.add_html("")
         self._example = ExampleView(stage, written_example(lesson.key))
@@ -338,7 +341,8 @@ class Guide(Feature):
             self._shown.restore(dict(pose.drawing))
         if pose.target is not None:
             self.stage.set_target(pose_from_position_wxyz(pose.target[:3], np.array(pose.target[3:])))
-        self.stage.keep_in_view(None if pose.target is None else np.array(pose.target[:3]))
+        self._target = None if pose.target is None else np.array(pose.target[:3])
+        self.stage.keep_in_view(self._target, self._answer_ends)
 
     def _show(self) -> None:
         if self._shown is not None and (outline := self._shown.on_steps(self._progress)) is not None:
@@ -389,6 +393,20 @@ class Guide(Feature):
                 given, closed = progress.given.get(before), progress.is_closed(before)
                 nodes = lead_nodes(robot, step.estimate, step.guessed, given, closed)
         self._copies.show(nodes)
+        found = np.concatenate([ends(nodes), self._ghost_room()])
+        if not np.array_equal(found, self._answer_ends):
+            self._answer_ends = found
+            self.stage.keep_in_view(self._target, found)
+
+    def _ghost_room(self) -> Array:
+        """The corners ``(n, 3)`` of a cube with the frame that is asked for: they tell how far, not which way."""
+        progress = self._progress
+        key, steps = str(progress.at + 1), progress.outline.steps
+        question = steps[progress.at].question if progress.at < len(steps) else None
+        if question is None or question.asked().form != "frame" or progress.is_closed(key):
+            return np.zeros((0, 3))
+        right: Any = question.right()
+        return float(np.abs(right[:3]).max()) * np.array(list(product((-1.0, 1.0), repeat=3)))
 
     def _show_joints(self, on: bool) -> None:
         if on == (self._joints is not None):

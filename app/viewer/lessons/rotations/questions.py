@@ -125,7 +125,7 @@ def _poses(robot: Robot, start: Configuration, R: Array) -> dict[str, Pose]:
 
 
 def leads(robot: Robot, T: Array) -> dict[str, Lead | None]:
-    """Where options lead: beside the arm, where the lesson draws its frames, and at the tool ``(4, 4)``."""
+    """Where options lead, beside the arm: there the lesson draws its frames. `T` is the tool's pose ``(4, 4)``."""
     length, beside = LENGTH * body(robot).radius, np.eye(4)
     beside[:3, 3] = anchor(robot)
     alpha, beta, gamma = PAGE.twin.angles(T[:3, :3])
@@ -140,7 +140,7 @@ def leads(robot: Robot, T: Array) -> dict[str, Lead | None]:
     }
     ways = {"minus y": (0.0, -1.0, 0.0), "plus x": (1.0, 0.0, 0.0), "minus x": (-1.0, 0.0, 0.0)}
     return {
-        **up_or_down(robot, T[:3, 3], T[:3, 2], LEVEL),
+        **up_or_down(robot, anchor(robot), T[:3, 2], LEVEL),
         **{name: direction(robot, anchor(robot), np.array(way)) for name, way in ways.items()},
         **{name: place(beside @ F, length) for name, F in frames.items()},
     }

@@ -21,8 +21,9 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons import LESSONS
-from app.viewer.lessons.guide.answer_drawing import DASHES, FARTHEST, answer_nodes
+from app.viewer.lessons.guide.answer_drawing import CUT, DASHES, FARTHEST, answer_nodes
 from app.viewer.lessons.guide.outline import Bar, Drawn, Number, SemiAxis, Step
+from app.viewer.scene.viewpoints import contains
 from app.viewer.server import ViewerServer
 from kin.units import Units
 
@@ -140,6 +141,33 @@ def test_answers_of_any_size_stay_in_the_picture(lesson: str, title: str, given:
         assert np.isfinite(points).all()
         assert np.abs(points).max() < (FARTHEST + 1) * UR5.reach
     assert "your answer" in words.props["text"]
+    assert (CUT in words.props["text"]) == (given != 0.0), "a length that is drawn shorter says so"
+
+
+def test_right_answers_have_their_whole_length() -> None:
+    count = 0
+    for robot, name, step in steps():
+        for node in answer_nodes(robot, step, None, closed=True):
+            if node.key == "right-words":
+                assert CUT not in node.props["text"], (robot.id, name)
+                count += 1
+    assert count > 60
+
+
+def test_a_bar_that_is_cut_ends_in_the_head_of_an_arrow() -> None:
+    outline = next(each for each in LESSONS if each.key == "equations").outline(UR5, Units())
+    step = next(each for each in outline.steps if each.title == "The tool point")
+    for given in (50.0, -50.0):
+        bar, words = answer_nodes(UR5, step, given, closed=False)
+        *shaft, one, other = bar.props["points"]
+        assert len(shaft) == DASHES
+        end = shaft[-1][1]
+        assert np.allclose([one[0], other[0]], [end, end]), "both lines of the head begin at the end of the bar"
+        assert np.allclose(words.position, end, atol=1e-6)
+        back = shaft[0][0] - end
+        for side in (one[1] - end, other[1] - end):
+            assert back @ side > 0.8 * np.linalg.norm(back) * np.linalg.norm(side)
+        assert np.linalg.norm(one[1] - other[1]) > 1e-3
 
 
 def ellipsoids() -> Iterator[tuple[kin.Robot, Step]]:
@@ -218,3 +246,30 @@ def test_a_typed_length_is_drawn_and_the_right_one_only_when_it_is_on_show(serve
         tab.wait(lambda: {"wrong", "right"} <= nodes(tab))
         tab.say("feature", ["guide", ["go", 3], 1])
         tab.wait(lambda: not nodes(tab) & {"wrong", "right"})
+
+
+def picture(tab: FakeBrowser) -> np.ndarray:
+    return np.array([tab.camera[name] for name in ("position", "look_at", "up_direction")], float)
+
+
+def test_the_camera_moves_back_until_it_shows_where_an_answer_leads_and_comes_back(server: int) -> None:
+    with FakeBrowser(server, 956, 720) as tab:
+        tab.settle()
+        tab.choose(UR5.name)
+        tab.set("Lesson", "Velocity")
+        tab.wait(lambda: "1. A column" in tab.html)
+        tab.settle()
+        tab.look()
+        before = picture(tab)
+        tab.say("feature", ["guide", ["answer", "e1", 1], 0])
+        tab.wait(lambda: any("your answer" in str(m["props"].get("text")) for m in tab.nodes.values()))
+        tab.settle()
+        found = [m for name, m in tab.nodes.items() if name.startswith("/answer-") and "points" in m["props"]]
+        points = np.array(found[0]["props"]["points"], float).reshape(-1, 3)
+        top = points[np.argmax(points[:, 2])]
+        assert not contains(before, 956 / 720, top[None], 0.0), "up to here, it would leave the picture"
+        tab.wait(lambda: contains(picture(tab), 956 / 720, points, 0.0))
+        tab.settle()
+        tab.look()
+        tab.say("feature", ["guide", ["answer", "e1", 2], 1])
+        tab.wait(lambda: np.allclose(picture(tab), before, atol=1e-6))

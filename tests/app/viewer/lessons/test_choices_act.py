@@ -21,6 +21,7 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.figure_shapes import GREEN, VERMILION
 from app.viewer.lessons.guide.answer_drawing import DASHES, answer_nodes, lead_nodes
 from app.viewer.lessons.guide.outline import Bar, Choice, Ghost, Leads, Number, Path, Step, Triad
+from app.viewer.lessons.rotations.drawing import anchor
 from kin import Robot
 from kin.units import Units
 
@@ -240,6 +241,18 @@ def test_the_lines_of_an_option_lie_as_it_says() -> None:
         ):
             if text != right or expected in (0.0, 1.0):
                 assert cosine[text] == pytest.approx(expected, abs=2e-3), (robot.id, text, right)
+
+
+def test_the_way_of_the_turned_frame_is_drawn_where_it_stands() -> None:
+    lesson = next(each for each in LESSONS if each.key == "rotations")
+    for robot in CLASSICS:
+        step = lesson.outline(robot, Units()).steps[0]
+        assert step.estimate is not None
+        assert "beside the arm" in step.estimate.prompt
+        assert step.guessed is not None
+        for lead in step.guessed.options:
+            assert isinstance(lead, Bar)
+            assert np.allclose(lead.start, anchor(robot)), robot.id
 
 
 def test_a_placed_frame_stands_beside_the_right_one_when_it_is_judged() -> None:

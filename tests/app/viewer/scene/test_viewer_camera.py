@@ -336,6 +336,22 @@ def test_the_camera_comes_back_when_the_target_is_near_again(chosen: bool) -> No
     assert np.allclose(there(), front), "the visitor has looked from elsewhere since"
 
 
+def test_the_camera_shows_what_is_drawn_beside_the_arm_and_its_target() -> None:
+    lens, of_visitor = a_camera()
+    origins = frames(PIONEER, PIONEER.q_home)
+    of_visitor.aim(body(PIONEER), origins)
+    before = lens.position
+    drawn = np.array([[0.0, 0.0, 1.5], [0.0, 0.9, 0.0]])
+    target = np.array([[-1.2, 0.0, 0.0]])
+    of_visitor.keep(origins, target[0], drawn)
+    of_visitor.tick(math.inf)
+    there = np.stack([lens.position, lens.look_at, lens.up_direction])
+    assert viewpoints.contains(there, 956 / 720, np.vstack([origins, target, drawn]), 0.0)
+    of_visitor.keep(origins, None, np.zeros((0, 3)))
+    of_visitor.tick(math.inf)
+    assert np.allclose(lens.position, before), "nothing is drawn any more"
+
+
 def test_the_default_view_shows_the_arrows_at_the_tool() -> None:
     lens, of_visitor = a_camera()
     rng = np.random.default_rng(5)
