@@ -274,6 +274,7 @@
     place();
   });
   function follow() {
+    if (NARROW.matches) root.style.setProperty("--kb-card", `${card()?.offsetHeight ?? 0}px`);
     mark();
     markEdge();
     markSize();

@@ -118,6 +118,25 @@ class Outbox(AsyncMessageBuffer):
 
     # Any thread
 
+    def push(self, message: Message) -> None:
+        """Put a message into the buffer; a control that no page has heard of yet is forgotten when it is removed.
+
+        viser sends such a removal, and the page warns that it does not know the control.
+        """
+        if type(message) is messages.GuiRemoveMessage and self._forget(message):
+            return
+        super().push(message)
+
+    def _forget(self, removal: messages.GuiRemoveMessage) -> bool:
+        """Drop what waits for a control, if it is not made yet: each is made once, with its uuid."""
+        with self.buffer_lock:
+            number = self.id_from_redundancy_key.get(removal.redundancy_key())
+            if number is None or self.message_from_id[number].lifecycle_phase != "create":
+                return False
+            for waiting in (number, *self.ids_from_entity_state_key.get(("gui", removal.uuid), ())):
+                self.pop_message_locked(waiting)
+        return True
+
     def _pushed(self) -> None:
         if self.done or (self.message_from_id and not self.atomic_counter):
             self._ask(self._send_soon)
@@ -305,7 +324,7 @@ def missing_names() -> list[str]:
     fields = AsyncMessageBuffer.__dataclass_fields__
     wanted = (
         *("event_loop", "message_event", "flush_event", "message_from_id", "buffer_lock", "atomic_counter"),
-        *("max_window_size", "window_duration_sec", "done"),
+        *("max_window_size", "window_duration_sec", "done", "id_from_redundancy_key", "ids_from_entity_state_key"),
     )
     found = [f"AsyncMessageBuffer.{name}" for name in wanted if name not in fields]
     methods = ("push", "atomic_start", "atomic_end", "flush", "set_done", "pop_message_locked")
@@ -316,6 +335,7 @@ def missing_names() -> list[str]:
         messages.SetOrientationMessage: ("name", "wxyz", "owner"),
         messages.SetPositionMessage: ("name", "position", "owner"),
         messages.GuiUpdateMessage: ("uuid", "updates"),
+        messages.GuiRemoveMessage: ("uuid",),
         messages.SceneNodeUpdateMessage: ("name", "updates", "owner"),
     }
     for kind, names in kinds.items():

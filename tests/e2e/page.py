@@ -79,7 +79,6 @@ EXPECTED = (
     "THREE.Clock: This module has been deprecated",  # viser uses it
     "KHR_parallel_shader_compile extension not supported",  # by software rendering
     "GL Driver Message",  # of software rendering, where a picture is read
-    "(OK) Tried to remove non-existent component",  # viser, in a page that is loaded while controls are replaced
 )
 
 # For half a second and five looks: a page that is held up may be looked at twice before it acts on anything.

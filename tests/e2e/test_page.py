@@ -201,6 +201,28 @@ def test_the_panel_is_as_wide_as_the_window_allows_until_a_width_is_chosen(brows
     tab.close()
 
 
+# Fields of tables whose number is longer than the field, with both widths in pixels.
+CUT = """() => [...document.querySelectorAll("[data-arm] table input:not(.kb-arm-text)")].map((cell) => {
+  const { font, paddingLeft, paddingRight } = getComputedStyle(cell), text = cell.value || cell.placeholder;
+  const pen = document.createElement("canvas").getContext("2d");
+  pen.font = font;
+  const room = cell.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight);
+  return [text, pen.measureText(text).width, room];
+}).filter(([, needed, room]) => needed > room)"""
+
+
+@pytest.mark.parametrize(("robot", "longest"), [("panda", "−166.003062"), ("ur5", "−392.25")])
+def test_no_number_of_an_arm_s_tables_is_cut(desktop: Tab, robot: str, longest: str) -> None:
+    desktop.select(kin.get_robot(robot))
+    desktop.open("Robot")
+    for width, height in ((1920, 1080), (1440, 900), (1280, 720)):
+        with desktop.sized(width, height):
+            cells = desktop.page.locator('[data-arm="table"] input')
+            assert longest in cells.evaluate_all("cells => cells.map((cell) => cell.value)")
+            desktop.page.wait_for_function(f"({CUT})().length === 0", timeout=5000)
+    desktop.select(kin.get_robot("pioneer5"))
+
+
 def test_the_menu_of_robots_shows_their_pictures_and_makers(desktop: Tab) -> None:
     page = desktop.page
     desktop.row("Robot").locator("input:visible").first.click()
@@ -213,6 +235,19 @@ def test_the_menu_of_robots_shows_their_pictures_and_makers(desktop: Tab) -> Non
     expect(option).to_be_hidden()
 
 
+# A phone's status card gets a long text.
+LENGTHEN = """() => {
+  const text = document.createElement("span");
+  text.dataset.lengthened = "";
+  text.textContent = "a long text ".repeat(20);
+  document.querySelector("[data-status] .kb-callout-text").append(text);
+}"""
+AXES_BELOW_CARD = """() => {
+  const high = document.querySelector("[data-status]").offsetHeight;
+  return high > 90 && document.querySelector("#kb-axes").getBoundingClientRect().top >= high;
+}"""
+
+
 def test_axes_in_a_corner_point_as_those_of_the_world(desktop: Tab, phone: Tab) -> None:
     page = desktop.page
     desktop.open("View")
@@ -223,6 +258,8 @@ def test_axes_in_a_corner_point_as_those_of_the_world(desktop: Tab, phone: Tab) 
         ends = 36.0 + 25.0 * np.column_stack([right / np.linalg.norm(right), down / np.linalg.norm(down)])
         page.wait_for_function(AXES_END_AT, arg=ends.tolist())
     page.get_by_role("button", name="Reset view").click()
+    phone.page.evaluate(f"({LENGTHEN})()")
+    phone.page.wait_for_function(f"({AXES_BELOW_CARD})()")
     for tab in (desktop, phone):
         axes, scene = (tab.page.locator(part).bounding_box() for part in ("#kb-axes", "canvas[data-engine]"))
         assert axes is not None
@@ -231,12 +268,13 @@ def test_axes_in_a_corner_point_as_those_of_the_world(desktop: Tab, phone: Tab) 
         assert axes["x"] + axes["width"] <= scene["x"] + scene["width"]
         assert scene["y"] <= axes["y"]
         assert axes["y"] + axes["height"] <= scene["y"] + scene["height"]
-        for part in ("#kb-tools", "[data-status]")[: 1 if tab is phone else 2]:  # a phone's card may be long
+        for part in ("#kb-tools", "[data-status]"):
             other = tab.page.locator(part).bounding_box()
             assert other is not None
             across = min(axes["x"] + axes["width"], other["x"] + other["width"]) - max(axes["x"], other["x"])
             down = min(axes["y"] + axes["height"], other["y"] + other["height"]) - max(axes["y"], other["y"])
             assert across <= 0.0 or down <= 0.0, f"the axes cover {part}"
+    phone.page.evaluate("document.querySelector('[data-lengthened]').remove()")
 
 
 def test_the_size_of_the_text_is_chosen_and_kept(desktop: Tab) -> None:

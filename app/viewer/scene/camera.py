@@ -28,7 +28,6 @@ from app.viewer.scene.viewpoints import (
     contains,
     distance_to_see,
     places,
-    rightward,
 )
 from kin.transforms import Array
 
@@ -120,6 +119,7 @@ class VisitorCamera:
         self._glide: tuple[Array, float] | None = None  # start of the way to `_aimed`, and when it began
         # The viewpoint that `keep` has left, and `chosen` there; None: it has not, or the visitor has moved since.
         self._left: tuple[Array, Array | None] | None = None
+        self._target: Array | None = None  # the last one that `keep` was asked to show
         self._camera.on_update(self._on_update)
 
     def aim(self, body: Body, points: Array | None = None, glide: bool = False) -> None:
@@ -157,7 +157,7 @@ class VisitorCamera:
         It then also contains a target ``(3,)`` and the points `also` ``(k, 3)``; of one that is very far, the
         beginning of the line to it. The camera glides back when the picture of before contains everything again.
         """
-        self._points = points
+        self._points, self._target = points, target
         self.look()
         here = self._viewpoint
         if self._body is None:
@@ -240,10 +240,6 @@ class VisitorCamera:
         out: Array = self._viewpoint[0] - self._viewpoint[1]
         return out
 
-    def rightward(self, start: Array, end: Array) -> bool:
-        """Whether the end ``(3,)`` of a segment will be to the right of its start in the picture."""
-        return rightward(self._viewpoint, start, end)
-
     def fit(self, spheres: Sequence[Sphere], points: Array | None = None) -> None:
         """Make the default view show these spheres and points ``(n, 3)`` as well; a `chosen` view stays."""
         before = len(self._room) + len(self._extra)
@@ -261,10 +257,13 @@ class VisitorCamera:
         if self._body is None or not self._reshaped:
             return
         self.look()
-        if self.chosen is None:
-            self.aim(self._body)
-        else:
+        if self.chosen is not None:
             self.restore(self.chosen)
+            return
+        target = None if self._left is None else self._target  # still in the picture
+        self.aim(self._body)
+        if target is not None:
+            self.keep(self._points, target)
 
     def look(self) -> None:
         """Update `chosen`."""

@@ -26,6 +26,7 @@ WIDTH = 10.0  # of the grid, in radii of the sphere around the arm; it fades out
 SCALES = (0.1, 0.2, 0.5, 1.0)  # lengths of the scale bar, m
 SHADOW_PIXELS = 96
 BESIDE = 0.06  # distance of the length from the end of the bar, in lengths of the bar
+CLEAR = 1.5  # least distance of that end from the tool in the picture, in lengths of the tool's arrows
 
 
 class Floor:
@@ -84,7 +85,7 @@ class Floor:
             "",
             position=end,
             scale=0.9,
-            anchor="bottom-left",  # it stands on the floor, which would hide a part below
+            anchor="bottom-left",  # the floor would hide a part below
             depth_test=True,
         )
         self.nodes.append(self._bar)
@@ -105,14 +106,21 @@ class Floor:
         """Name the length of the scale bar in these units."""
         self._label.text = units.lengths.brief(self.scale)
 
-    def turn_label(self, rightward: bool) -> None:
-        """Put the length beside the right end of the bar in the picture, where it never covers the bar.
+    def turn_label(self, seen: Array, arrows: float) -> None:
+        """Put the length beside the bar: at its right end in the picture, unless the tool's arrows are.
 
-        `rightward`: whether the right end is the second of `ends`.
+        It never covers the bar.
+
+        Args:
+            seen: where both `ends` and the tool are in the picture, `VisitorCamera.places`.
+            arrows: length of the arrows at the tool, m.
         """
-        start, end = self.ends
-        beside = BESIDE * (end - start)
-        assign(self._label, end + beside if rightward else start - beside)
+        left, right = (0, 1) if seen[1, 0] >= seen[0, 0] else (1, 0)
+        away = np.linalg.norm(seen[:2, :2] - seen[2, :2], axis=1)
+        aside = away[right] < CLEAR * arrows * seen[2, 2] and away[left] > away[right]
+        at, other = (left, right) if aside else (right, left)
+        self._label.anchor = "bottom-right" if aside else "bottom-left"  # the text leads away from the bar
+        assign(self._label, self.ends[at] + BESIDE * (self.ends[at] - self.ends[other]))
 
 
 @cache

@@ -58,13 +58,6 @@ def places(viewpoint: Array, aspect: float, points: Array) -> Array:
     return found
 
 
-def rightward(viewpoint: Array, start: Array, end: Array) -> bool:
-    """Whether in the picture the end ``(3,)`` of a segment is not to the left of its start."""
-    seen = _seen(viewpoint, np.array([start, end]))
-    across = seen[:, 0] / np.maximum(seen[:, 2], 1e-9)
-    return bool(across[1] >= across[0])
-
-
 def _seen(viewpoint: Array, points: Array) -> Array:
     """Points ``(n, 3)`` in the camera's frame: to the right, up, and forward."""
     position, look_at, up = viewpoint

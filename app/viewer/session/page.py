@@ -380,6 +380,7 @@ class VisitorPage(ShownArm, Worker):
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
             self._save()
             self._show_hints()
+            self.place_scale()
 
     def _save(self) -> None:
         self._guard(lambda: self._persistence.save(self._actions.history.take_key()))
@@ -479,8 +480,13 @@ class VisitorPage(ShownArm, Worker):
         self.looks.apply()
         self.arm.scene.size_gizmo(self.camera.small)
         self.camera.aim(self.arm.scene.body, kin.link_frames(robot, self.arm.goal)[:, :3, 3], glide)
-        floor = self.arm.scene.floor
-        floor.turn_label(self.camera.rightward(*floor.ends))
+        self.place_scale()
+
+    def place_scale(self) -> None:
+        """Write the length of the floor's scale bar where it covers nothing, as camera and tool are now."""
+        scene = self.arm.scene
+        seen = self.camera.places(np.array([*scene.floor.ends, scene.gizmo_pose[:3, 3]]))
+        scene.floor.turn_label(seen, scene.gizmo.scale)
 
     def _make_sliders(self) -> JointSliders:
         folders = [self.panel.joints] if self._more_joints is None else [self.panel.joints, self._more_joints]

@@ -65,3 +65,6 @@ class Page(Stage, Protocol):
 
     def set_branch(self, branch: str) -> None:
         """Request a branch from the next target on."""
+
+    def place_scale(self) -> None:
+        """Write the length of the floor's scale bar where it covers nothing, as camera and tool are now."""

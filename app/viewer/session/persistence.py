@@ -128,6 +128,8 @@ class Persistence:
             self._guard(page.lessons.begin)  # such a link leaves arm and drawing to the step
         if camera is not None:  # after the lessons, which may move it too
             self._guard(lambda: page.camera.restore(camera))
+        elif page.now.target is not None:  # it may be far out of reach
+            page.keep_in_view(page.now.target[:3, 3])
         notice = link_notice(saved)
         if notice is not None:
             page.notify(notice)

@@ -244,6 +244,35 @@ def test_what_a_line_takes_at_once_wakes_no_task_and_keeps_its_order(sending: Se
     sending.wait([["/0"], ["/1"], ["/2"], ["/3", "/4"]])
 
 
+def made(uuid: str) -> messages.GuiHtmlMessage:
+    return messages.GuiHtmlMessage(uuid, "root", messages.GuiHtmlProps(order=0.0, content="", visible=True))
+
+
+def test_a_control_that_is_removed_before_it_leaves_is_never_spoken_of(sending: Sending) -> None:
+    def sent(frames: int) -> list[tuple[str, str]]:
+        sending.box.flush()
+        end = time.monotonic() + WAIT
+        while len(sending.line.frames) < frames:
+            assert time.monotonic() < end, sending.line.frames
+            time.sleep(0.005)
+        return [(each["type"], each["uuid"]) for each in content(sending.line.frames[-1])["messages"]]
+
+    with sending.box.hold():
+        sending.box.push(made("known"))
+        sending.box.push(made("stays"))
+    assert sent(1) == [("GuiHtmlMessage", "known"), ("GuiHtmlMessage", "stays")]
+    with sending.box.hold():
+        sending.box.push(made("unseen"))
+        sending.box.push(messages.GuiUpdateMessage("unseen", {"content": "1"}))
+        sending.box.push(messages.GuiUpdateMessage("unseen", {"visible": False}))
+        sending.box.push(messages.GuiUpdateMessage("stays", {"content": "2"}))
+        sending.box.push(messages.GuiUpdateMessage("known", {"content": "3"}))
+        sending.box.push(messages.GuiRemoveMessage("unseen"))
+        sending.box.push(messages.GuiRemoveMessage("known"))
+    assert sent(2) == [("GuiUpdateMessage", "stays"), ("GuiRemoveMessage", "known")]
+    assert sending.box.ids_from_entity_state_key == sending.box.id_from_redundancy_key == {}
+
+
 def test_an_error_while_packing_ends_the_sender(sending: Sending) -> None:
     def broken(_: object) -> bytes:
         raise ZeroDivisionError("while packing")

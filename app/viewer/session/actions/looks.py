@@ -48,9 +48,8 @@ class LookControls:
         self._on_look(None)
 
     def _on_look(self, _: object) -> None:
-        scene, camera = self._page.arm.scene, self._page.camera
-        scene.size_gizmo(camera.small)
-        scene.floor.turn_label(camera.rightward(*scene.floor.ends))
+        self._page.arm.scene.size_gizmo(self._page.camera.small)
+        self._page.place_scale()
 
     def _look_from(self, side: object, _: object = None) -> None:
         if side not in SIDES:

@@ -32,7 +32,7 @@ from kin import Joint, Robot
 from kin.dh import SAMPLES, largest_difference
 from kin.files.read import PER
 from kin.robot import MOUNTINGS
-from kin.units import Unit, Units, power
+from kin.units import Unit, Units, general, power
 
 FILE, LINK = "your own file", "a link"  # what an arm was made from, besides examples and robots
 MOST_TIPS = 50  # links of a URDF to choose from
@@ -103,7 +103,7 @@ def motion(robot: Robot, units: Units, texts: Texts) -> str:
         for column in MOTION:
             value = float(robot.q_home[joint]) if column == "home" else getattr(row, column)
             cell = (index, column)
-            hint = "" if value is not None else text_of(float(getattr(limits, column)[joint]), units.of(angle))
+            hint = general(float(getattr(limits, column)[joint]) * units.of(angle).scale) if value is None else ""
             shown = "" if value is None else _text(cell, value, units, angle, texts)
             cells.append({"key": f"{index} {column}", "value": shown, "hint": hint, "label": name_of(cell)})
         rows.append({"number": index + 1, "title": row.name, "cells": cells})

@@ -137,10 +137,12 @@ def test_the_camera_is_stored_when_it_stops_and_restored(port: int) -> None:
         orbit(tab, ASIDE)
         assert np.abs(rest(tab).camera - ASIDE).max() < 1e-9
         seen = {m["type"] for m in tab.log[sent:]}
-        assert seen == {"LocalStorageSetItemMessage", "GuiUpdateMessage", "SetPositionMessage"}
+        assert seen == {"LocalStorageSetItemMessage", "GuiUpdateMessage", "SceneNodeUpdateMessage"}
         (bar,) = (name for name in tab.nodes if name.endswith("-scale/length"))
-        moved = [m["name"] for m in tab.log[sent:] if m["type"] == "SetPositionMessage"]
-        assert moved == [bar], "the bar's other end is on the right"
+        changed = [(m["name"], m["updates"]) for m in tab.log[sent:] if m["type"] == "SceneNodeUpdateMessage"]
+        assert changed == [(bar, {"anchor": "bottom-left"})], (
+            "the bar's left end, beside which it is, is on the right"
+        )
         text = tab.kept[-1]
     with FakeBrowser(port, memory=memory(text)) as tab:
         tab.settle()
@@ -244,6 +246,23 @@ def test_an_address_without_a_camera_has_the_default_view(port: int) -> None:
     with FakeBrowser(port, 390, 844, memory=memory(PageState("ur5", UR5.q_home))) as tab:
         tab.settle()
         assert np.allclose(shown(tab), default(UR5, PHONE))
+
+
+@pytest.mark.parametrize("far", [0.5, 0.8])
+def test_a_link_to_a_target_out_of_reach_shows_arm_and_target_on_a_phone(port: int, far: float) -> None:
+    T = kin.fk(PIONEER, PIONEER.q_home)
+    T[:3, 3] = far, -far, 0.2
+    needed = np.vstack([frames(PIONEER, PIONEER.q_home), T[:3, 3]])
+    assert not viewpoints.contains(default(PIONEER, PHONE), PHONE, needed, 0.0)
+    with FakeBrowser(port, 390, 844, memory=memory(PageState("pioneer5", PIONEER.q_home, target=T))) as tab:
+        tab.wait(lambda: viewpoints.contains(shown(tab), PHONE, needed, 0.0))
+        tab.settle()
+        upright = shown(tab)
+        tab.look()
+        tab.look(image_width=844, image_height=390)
+        tab.settle()
+        assert viewpoints.contains(shown(tab), 844 / 390, needed, 0.0), "the phone was turned"
+        assert np.linalg.norm(shown(tab)[0] - shown(tab)[1]) < np.linalg.norm(upright[0] - upright[1])
 
 
 def a_camera() -> tuple[SimpleNamespace, camera.VisitorCamera]:

@@ -177,12 +177,18 @@ def test_the_floor_names_its_scale_and_the_gizmo_stands_free(server: viser.Viser
         assert get(f"{bar}/length").text == text  # type: ignore[union-attr]
     assert length == pytest.approx(0.2)
     start, end = arm.floor.ends
-    for rightward, inner, outer in ((False, end, start), (True, start, end)):
-        arm.floor.turn_label(rightward)
+    # Both ends and the tool in the picture, the end that has the text, and where the text leads away from the bar.
+    for x, tool, inner, outer, anchor in (
+        ((0.2, -0.2), 3.0, end, start, "bottom-left"),
+        ((-0.2, 0.2), 3.0, start, end, "bottom-left"),
+        ((-0.2, 0.2), 0.4, end, start, "bottom-right"),
+        ((-0.2, 0.2), -0.1, start, end, "bottom-left"),
+    ):
+        arm.floor.turn_label(np.array([[x[0], 0.0, 1.0], [x[1], 0.0, 1.0], [tool, 0.1, 1.0]]), 0.3)
         label = get(f"{bar}/length")
         assert np.linalg.norm(label.position - inner) > np.linalg.norm(outer - inner), "beyond this end"  # type: ignore[union-attr]
         assert np.linalg.norm(label.position - outer) < 0.1 * length  # type: ignore[union-attr]
-        assert label.anchor == "bottom-left", "the text stands here on the floor, and leads away from the bar"  # type: ignore[union-attr]
+        assert label.anchor == anchor, "it stands here on the floor"  # type: ignore[union-attr]
         assert label.depth_test, "solids before it hide it"  # type: ignore[union-attr]
     arm.floor.show(False)
     assert not get(bar).visible  # type: ignore[union-attr]

@@ -19,7 +19,6 @@ from app.viewer.scene.viewpoints import (
     contains,
     distance_to_see,
     places,
-    rightward,
 )
 
 POINT = arrays(float, 3, elements=st.floats(-3.0, 3.0))
@@ -85,12 +84,3 @@ def test_a_place_in_the_picture_is_measured_from_its_middle(aspect: float) -> No
     assert np.allclose(found[:3, :2], [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     assert np.allclose(found[:3, 2] * narrow, 1.0)
     assert np.abs(found[3, :2]).max() > 10.0, "behind the camera"
-
-
-@given(POINT, POINT, st.floats(0.0, 2.0 * math.pi), st.floats(-0.4, 1.5))
-def test_rightward_is_what_the_picture_shows(start: np.ndarray, end: np.ndarray, turn: float, rise: float) -> None:
-    out = (math.cos(turn) * math.cos(rise), math.sin(turn) * math.cos(rise), math.sin(rise))
-    viewpoint = from_side(out, 9.0)
-    left, right = places(viewpoint, 1.5, np.array([start, end]))[:, 0]
-    if abs(right - left) > 1e-9:
-        assert rightward(viewpoint, start, end) == (right > left)
