@@ -232,9 +232,9 @@ def _nearest(prepared: IKProblem, poses: Array, errors: Array, seeds: Array) -> 
 
 def _chosen(prepared: IKProblem, form: ClosedForm, T: Array, seeds: Array) -> Array:
     """The best solution of each target ``(k, n)``: the branch that is clearly the nearest, or one of all rows."""
-    q = np.empty((len(T), prepared.robot.n))
-    form.nearest_many(T, seeds, prepared.lower, prepared.upper, q)
-    nearest_rows(prepared.requirement, T, seeds, q[:, None].copy(), q)
+    q = np.full((len(T), prepared.robot.n), math.nan)
+    if form.nearest_many(T, seeds, prepared.lower, prepared.upper, q):
+        nearest_rows(prepared.requirement, T, seeds, q[:, None].copy(), q)
     rest = np.flatnonzero(np.isnan(q[:, 0]))
     if len(rest):
         T, near, found = T[rest], seeds if len(seeds) == 1 else seeds[rest], np.empty((len(rest), q.shape[1]))

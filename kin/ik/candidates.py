@@ -277,27 +277,39 @@ def measure_and_sort(requirement: Requirement, target: Array, near: Array, seed:
 
 @jit
 def nearest_rows(requirement: Requirement, T: Array, seeds: Array, rows: Array, q: Array) -> None:
-    """q ``(N, n)`` ← of the rows ``(N, k, n)`` of each target the one that `measure_and_sort` puts first.
+    """q ``(N, n)`` ← of the rows ``(N, k, n)`` of each target the one that `measure_and_sort` puts first, or NaN.
 
-    NaN where there is none, and where the first one inside the limits does not meet the task. seeds ``(N, n)``, or
-    ``(1, n)`` for all; rows are brought to their best images, but for those that are too far before their last
-    joint.
+    seeds ``(N, n)``, or ``(1, n)`` for all. Rows are brought to their best images, but for those that are too far
+    before their last joint; those that are nearer than the answer and do not meet the task become NaN.
     """
     last = seeds.shape[0] - 1
+    chosen = np.empty(T.shape[0], dtype=np.int64)
     for i in range(T.shape[0]):
-        best, least = -1, math.inf
-        for k in range(rows.shape[1]):
-            distance = _squared_distance(requirement, seeds, min(i, last), rows, i, k, least)
-            if distance < least:
-                best, least = k, distance
-        for j in range(q.shape[1]):
-            q[i, j] = rows[i, best, j] if best >= 0 else math.nan
+        chosen[i] = _nearest_row(requirement, seeds, min(i, last), rows, i, q)
     at, e = np.empty(T.shape), np.empty(6)
     fk_many(requirement.model, q, at)
     for i in range(T.shape[0]):
-        if not _meets(requirement, at, T, i, e):
-            for j in range(q.shape[1]):
-                q[i, j] = math.nan
+        while chosen[i] >= 0 and not _meets(requirement, at, T, i, e):
+            rows[i, chosen[i], 0] = math.nan
+            chosen[i] = _nearest_row(requirement, seeds, min(i, last), rows, i, q)
+            fk_into(requirement.model, q[i], at[i])
+
+
+@inlined
+def _nearest_row(requirement: Requirement, seeds: Array, which: int, rows: Array, i: int, q: Array) -> int:
+    """q[i] ``(n,)`` ← the row of rows[i] ``(k, n)`` nearest to seeds[which] inside the limits, or NaN.
+
+    Returns which row it is, −1 if there is none.
+    """
+    best, least = -1, math.inf
+    for k in range(rows.shape[1]):
+        distance = _squared_distance(requirement, seeds, which, rows, i, k, least)
+        # Not of the squares: `measure_and_sort` takes the first of rows whose rounded distances are equal.
+        if math.sqrt(distance) < math.sqrt(least):
+            best, least = k, distance
+    for j in range(q.shape[1]):
+        q[i, j] = rows[i, best, j] if best >= 0 else math.nan
+    return best
 
 
 @inlined

@@ -211,7 +211,7 @@ class ClosedForm(ABC):
         """q ``(N, branches, n)`` ← what `solve` finds of many targets ``(N, 4, 4)``, with no value requested.
 
         Bit-identical, in one compiled call. They are of a `quick` task. Rows may be NaN that are farther from the
-        seed than another one inside the limits.
+        seed than another one inside the limits, and all rows of a target where `solve` may miss some.
 
         Args:
             seeds: one for each target ``(N, n)``, or one for all ``(1, n)``.
@@ -219,13 +219,14 @@ class ClosedForm(ABC):
         """
         raise NotImplementedError(f"{self.name} is quick for no task")
 
-    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """q ``(N, n)`` ← the row of `solve_many` nearest to the seed inside the limits, in less time; or NaN.
 
         NaN where there is none, or where all rows are needed to choose one. Arguments as for `solve_many`; the
-        angles may be whole turns away from the nearest ones.
+        angles may be whole turns away from the nearest ones. False, and q as it was, for a family without a
+        kernel that takes less time.
         """
-        q.fill(math.nan)
+        return False
 
     def rows_at(self, T: Array, values: Array, near: Array, branches: NDArray[np.intp]) -> Array:
         """Of the rows of `kernels.many` at targets ``(N, 4, 4)`` and values ``(N,)`` one of each ``(N, n)``.

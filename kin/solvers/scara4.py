@@ -24,7 +24,7 @@ from kin.axes import frame_of, is_along, is_zero, lines_of, perpendicular_to
 from kin.kernels.compile import inlined, jit, joined
 from kin.kernels.simd import widest, wrapped
 from kin.robot import Robot
-from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single
+from kin.solvers.blocks import OWN, Arc, double, each, elbow_of, in_base, one, rows_of, single, solve_each
 from kin.solvers.canonical import pose_params, signed_box
 from kin.solvers.common import HIGH, LOW, NEAR, UNBOUNDED, clear, copy_row, split_sum, wrap
 from kin.solvers.contract import (
@@ -128,14 +128,15 @@ def _box(params: Array, near: Array, lower: Array, upper: Array) -> Array:
 
 @jit
 def _branches(
-    params: Array, T: Array, task: int, value: float, near: Array, lower: Array, upper: Array, arcs: Array,
+    params: Array, T: Array, request: tuple[int, float], near: Array, lower: Array, upper: Array, arcs: Array,
     out: Array,
 ) -> tuple[float, int]:  # fmt: skip
     """out ``(2, n)`` ← both branches: (gap in metres, number of arcs of ψ).
 
-    ψ is free for a point, and for an approach direction along the axes. It is then `value`, or near the seed's if
-    that is NaN, and out has one column more for it.
+    request: the task, and a value of ψ, which is free for a point, and for an approach direction along the axes.
+    It is then that value, or near the seed's if that is NaN, and out has one column more for it.
     """
+    task, value = request
     clear(out)
     x, y, z, psi = held(params, T, task)
     a, b, p, q = params[_A], params[_B], params[TOOL_X], params[TOOL_Y]
@@ -243,7 +244,7 @@ def _store(params: Array, S: Array, b: int, out: Array) -> None:
 @jit
 def _careful(params: Array, T: Array, value: float, near: Array, out: Array) -> None:
     """out ``(2, n)`` ← the branches by `_branches`, which also handles singular targets."""
-    _branches(params, T, POSE, value, near, params[_LOW:_HIGH], params[_HIGH:_UPRIGHT], out[:0], out)
+    _branches(params, T, (POSE, value), near, params[_LOW:_HIGH], params[_HIGH:_UPRIGHT], out[:0], out)
 
 
 @jit
@@ -259,10 +260,19 @@ def branches_many(params: Array, T: Array, values: Array, near: Array, out: Arra
     each(_pairs, _angles, _store, _careful, (_ROWS, _PAIRS), params, T, (values, near), out)
 
 
+@jit
+def _solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 2, n)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `_branches` finds them.
+
+    seeds ``(N, n)``, or ``(1, n)`` for all; lower, upper ``(n,)``: joint limits.
+    """
+    solve_each(_branches, (POSE, math.nan), (0, out.shape[2]), params, T, seeds, (lower, upper), out)
+
+
 class Scara4(ClosedForm):
     """The closed form of a SCARA or planar arm."""
 
-    name, title = NAME, TITLE
+    name, title, quick = NAME, TITLE, (POSE,)
 
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
@@ -295,11 +305,15 @@ class Scara4(ClosedForm):
         out, arcs = np.empty((2, n + free)), np.empty((64, 3))
         value = problem.values[0] if free else math.nan
         p = problem
-        gap, count = _branches(g.params, p.T, p.task, value, p.seed, p.lower, p.upper, arcs, out)
+        gap, count = _branches(g.params, p.T, (p.task, value), p.seed, p.lower, p.upper, arcs, out)
         exists = bool((~np.isnan(out[:, 0])).any())
         obstacle = None if exists else Obstacle("last axis beyond the links' reach")
         ranges = (arcs[:count],) if free else ()
         return Candidates(out[:, :n], out[:, n:], ranges, 0.0 if exists else max(gap, 0.0), obstacle)
+
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """Both branches of many poses."""
+        _solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def _elbow(self, q: Array) -> float:
         """θ2: 0 where the arm is straight."""

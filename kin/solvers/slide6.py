@@ -167,9 +167,9 @@ class Slide6(Wrist6):
         g = self.geometry
         return float(g.a1 + t[2] * math.cos(t[1]) + g.f * math.sin(t[1]))
 
-    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """None: the quick choice among branches is one of angles."""
-        q.fill(math.nan)
+        return False
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: sides of axis 1 and of axis 2 that W is on, and the sign of θ5."""

@@ -24,6 +24,7 @@ from kin.fk import jacobian
 from kin.kernels.compile import jit
 from kin.kernels.jacobian import jacobian_into
 from kin.robot import Robot
+from kin.solvers.blocks import solve_each
 from kin.solvers.common import clear, wrap
 from kin.solvers.contract import (
     APPROACH,
@@ -42,8 +43,8 @@ NAME = "slides2"
 TITLE = "closed form, one turning and two sliding joints"
 _FLAT = 1e-14  # square of the sine between two slides that count as parallel
 _THIRD = 2.0 * math.pi / 3.0
-# Layout of the parameters: the indices of the turning and of the sliding joints, the arm's model.
-TURN_AT, SLIDES, MODEL = 0, 1, 3
+# Layout of the parameters: the indices of the turning and of the sliding joints, the arm's reach and its model.
+TURN_AT, SLIDES, REACH, MODEL = 0, 1, 3, 4
 
 
 def match(robot: Robot) -> Slides2 | None:
@@ -51,8 +52,13 @@ def match(robot: Robot) -> Slides2 | None:
     if robot.n != 3 or robot.revolute.sum() != 1:
         return None
     J = jacobian(robot, np.random.default_rng(5).uniform(-1.0, 1.0, (4, 3)))[:, :3]
-    J[..., robot.revolute] /= robot.reach if math.isfinite(robot.reach) else 1.0
+    J[..., robot.revolute] /= _reach(robot)
     return Slides2(robot) if np.linalg.matrix_rank(J, rtol=REGULAR).max() == 3 else None
+
+
+def _reach(robot: Robot) -> float:
+    """What lengths are shares of, metres."""
+    return float(robot.reach) if math.isfinite(robot.reach) else 1.0
 
 
 @jit
@@ -119,16 +125,53 @@ def branches_many(params: Array, T: Array, values: Array, near: Array, out: Arra
         branches_one(params, T[k], values[0], near, out[k])
 
 
+@jit
+def _surely_regular(params: Array, q: Array) -> bool:
+    """Whether each row of q ``(2, 3)`` that is not NaN is far from singular, by a bound that takes little time.
+
+    The smallest of three singular values is their product over that of the two others, which is less than half
+    the sum of all squares.
+    """
+    J, P, lines = np.empty((6, 3)), np.empty((4, 4)), np.empty((3, 7))
+    for row in range(q.shape[0]):
+        if math.isnan(q[row, 0]):
+            continue
+        jacobian_into(params[MODEL:], q[row], J, P, lines)
+        squares = 0.0
+        for i in range(3):
+            J[i, int(params[TURN_AT])] /= params[REACH]
+            squares += dot(J[i], J[i])
+        if abs(triple(J[0], J[1], J[2])) <= REGULAR * squares:
+            return False
+    return True
+
+
+@jit
+def _regular(
+    params: Array, T: Array, request: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> None:
+    """`configurations`, NaN where one of them may be singular."""
+    configurations(params, T, near, out)
+    if not _surely_regular(params, out):
+        clear(out)
+
+
+@jit
+def _solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 2, 3)`` ← what `_regular` finds of each target T ``(N, 4, 4)``, seeds ``(N, 3)`` or ``(1, 3)``."""
+    solve_each(_regular, math.nan, (0, 3), params, T, seeds, (lower, upper), out)
+
+
 class Slides2(SlidesForm):
     """The closed form of an arm with one turning and two sliding joints."""
 
-    name, title = NAME, TITLE
+    name, title, quick = NAME, TITLE, (POSE, APPROACH, POSITION)
     reason = "one of three joints turns and two slide"
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         order = np.concatenate([np.flatnonzero(robot.revolute), np.flatnonzero(~robot.revolute)])
-        params = np.concatenate([order, robot.model]).astype(np.float64)
+        params = np.concatenate([order, [_reach(robot)], robot.model]).astype(np.float64)
         self.kernels = BatchKernels(params, branches_one, branches_many)
 
     def handles(self, task: int) -> bool:
@@ -141,13 +184,17 @@ class Slides2(SlidesForm):
         configurations(self.kernels.params, np.ascontiguousarray(problem.T), problem.seed, q)
         there = ~np.isnan(q[:, 0])
         obstacle = None if there.any() else Obstacle("point")
-        flat = bool((self._smallest(q[there]) < REGULAR).any())
-        return Candidates(q, np.empty((2, 0)), (), 0.0, obstacle, "agreed" if flat else "proved")
+        regular = _surely_regular(self.kernels.params, q) or not (self._smallest(q[there]) < REGULAR).any()
+        return Candidates(q, np.empty((2, 0)), (), 0.0, obstacle, "proved" if regular else "agreed")
+
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """Both configurations of many targets."""
+        _solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def _smallest(self, q: Array) -> Array:
         """The smallest singular value of the Jacobian of the point ``(k,)``, lengths in shares of the reach."""
         J = jacobian(self.robot, q)[:, :3]
-        J[..., self.robot.revolute] /= self.robot.reach if math.isfinite(self.robot.reach) else 1.0
+        J[..., self.robot.revolute] /= _reach(self.robot)
         return np.asarray(np.linalg.svd(J, compute_uv=False)[:, -1])
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:

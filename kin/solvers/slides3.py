@@ -26,6 +26,7 @@ from kin.fk import fk, jacobian
 from kin.kernels.compile import jit
 from kin.kernels.jacobian import jacobian_into
 from kin.robot import Robot
+from kin.solvers.blocks import solve_each
 from kin.solvers.common import clear, wrap
 from kin.solvers.contract import (
     POSE,
@@ -167,10 +168,25 @@ def branches_many(params: Array, T: Array, values: Array, near: Array, out: Arra
         branches_one(params, T[k], values[0], near, out[k])
 
 
+@jit
+def _all(
+    params: Array, T: Array, request: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> None:
+    """`configurations`, NaN where others may exist."""
+    if not configurations(params, T, near, out):
+        clear(out)
+
+
+@jit
+def _solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 2, 6)`` ← what `_all` finds of each pose T ``(N, 4, 4)``, seeds ``(N, 6)`` or ``(1, 6)``."""
+    solve_each(_all, math.nan, (0, 6), params, T, seeds, (lower, upper), out)
+
+
 class Slides3(SlidesForm):
     """The closed form of an arm with three turning and three sliding joints."""
 
-    name, title = NAME, TITLE
+    name, title, quick = NAME, TITLE, (POSE,)
     reason = "three joints turn and three slide"
 
     def __init__(self, robot: Robot) -> None:
@@ -190,6 +206,10 @@ class Slides3(SlidesForm):
         q = np.empty((2, 6))
         known = self.add_missing(problem.T, problem.seed, q)
         return Candidates(q, np.empty((2, 0)), (), completeness=known)
+
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """Both configurations of many poses."""
+        _solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def add_missing(self, T: Array, near: Array, q: Array) -> Completeness:
         """q ``(2, 6)`` ← all configurations; more may exist where the slides lie in one plane."""

@@ -24,14 +24,13 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, bent, names_of
-from kin.solvers.pair2.configurations import GONE, OFF, OPEN, REACH, branches_many, branches_one, configurations
+from kin.solvers.pair2.configurations import OFF, OPEN, branches_many, branches_one, solve, solve_many
 from kin.solvers.pair2.geometry import Geometry, geometry_of, straight
 from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "pair2"
-_ALIKE = 100.0
 _TASKS = (POSE, APPROACH, POSITION)
 _THETA1 = RedundancyParameter("theta1", "θ1", joint=0, rare=True)
 
@@ -64,6 +63,7 @@ class Pair2(ClosedForm):
         # Parallel axes: an elbow, which has two sides. Otherwise the values of joint 2 have no names.
         self.named = geometry.rows == 1 or (all(geometry.turns) and is_zero(*geometry.wave[:, 0, 2]))
         self.branches, self.meanings = self.names(robot, np.ones(robot.n))
+        self.quick = () if self.redundancies(POSE) else (POSE,)
 
     def names(self, robot: Robot, sense: Array) -> Names:
         """The sign of joint 2 where the axes are parallel."""
@@ -106,12 +106,9 @@ class Pair2(ClosedForm):
         """All configurations that meet what the arm can meet of the target."""
         p, g = problem, self.geometry
         q, notes = np.empty((g.rows, self.robot.n)), np.empty((g.rows, 2))
-        configurations(self.kernels.params, p.T, p.task, p.seed, GONE * g.scale, q, notes)
-        off = notes[:, OFF]
-        # With rounded numbers all rows miss the point about alike: one that misses it by far more is none.
-        q[off > max(REACH, _ALIKE * float(off.min()))] = math.nan
+        solve(self.kernels.params, p.T, p.task, p.seed, q, notes)
         missing = bool(np.isnan(q).all())
-        gap, obstacle = (float(off.min()), Obstacle("point")) if missing else (0.0, None)
+        gap, obstacle = (float(notes[:, OFF].min()), Obstacle("point")) if missing else (0.0, None)
         if not self.redundancies(p.task):
             return Candidates(q, np.empty((len(q), 0)), (), gap, obstacle)
         if not self._rank[p.task][1]:
@@ -120,6 +117,10 @@ class Pair2(ClosedForm):
         q[1:] = math.nan
         arcs = free_last(p, q)
         return Candidates(q, q[:, -1:].copy(), (arcs,), gap, obstacle)
+
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """The configurations of many poses."""
+        solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def branch_of(self, q: Array) -> int:
         """The side of the elbow, or the row of q ``(n,)`` among all configurations of its pose."""

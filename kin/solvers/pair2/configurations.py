@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.solvers.blocks import solve_each
 from kin.solvers.common import wrap
-from kin.solvers.contract import POSITION
+from kin.solvers.contract import POSE, POSITION
 from kin.solvers.pair2.geometry import (
     FIXED,
     JOINTS,
@@ -33,6 +34,7 @@ GONE = 1e-2  # of the arm's size: a point that is missed by more is not reached,
 REACH = TOLERANCES.closure_position * 0.1  # metres, the same for an exact point
 _FLOOR = 4e-16  # of the squared length of the derivatives: a floor where they are singular
 _TINY = TOLERANCES.singular
+_ALIKE = 100.0
 OFF, OPEN = 0, 1  # columns of what is notes of a configuration
 
 
@@ -187,6 +189,35 @@ def _polish(params: Array, q: Array, seen: Array, task: int, v: Array, J: Array)
     for r in range(3):
         total += (v[0, r] - seen[0, r]) ** 2
     return float(math.sqrt(total) * scale)
+
+
+@jit
+def solve(params: Array, T: Array, task: int, near: Array, out: Array, notes: Array) -> None:
+    """out ``(rows, n)`` ← the configurations that meet the point of a target as nearly as the arm can.
+
+    NaN where there is none; notes as in `configurations`. With rounded numbers all rows miss the point about
+    alike: one that misses it by far more is none.
+    """
+    configurations(params, T, task, near, GONE * params[SCALE], out, notes)
+    least = notes[:, OFF].min()
+    for row in range(out.shape[0]):
+        if notes[row, OFF] > max(REACH, _ALIKE * least):
+            for i in range(out.shape[1]):
+                out[row, i] = math.nan
+
+
+@jit
+def _solve_pose(
+    params: Array, T: Array, request: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
+) -> None:
+    """`solve` for a pose."""
+    solve(params, T, POSE, near, out, np.empty((out.shape[0], 2)))
+
+
+@jit
+def solve_many(params: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, rows, n)`` ← what `solve` finds of each pose T ``(N, 4, 4)``, seeds ``(N, n)`` or ``(1, n)``."""
+    solve_each(_solve_pose, math.nan, (0, out.shape[2]), params, T, seeds, (lower, upper), out)
 
 
 @jit

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from kin.kernels.compile import jit
+from kin.solvers.blocks import solve_each
 from kin.solvers.canonical import canonical_pose, signed_box
 from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, split_sum, wrap
 from kin.solvers.contract import POSE, POSITION
@@ -87,13 +88,15 @@ def _put(arm: Array, t1: float, t5: float, angles: Array, row: Array) -> None:
 
 @jit
 def solve(
-    arm: Array, T: Array, task: int, psi: float, near: Array, lower: Array, upper: Array, arcs: Array, out: Array
-) -> tuple[float, int]:
+    arm: Array, T: Array, request: tuple[int, float], near: Array, lower: Array, upper: Array, arcs: Array,
+    out: Array,
+) -> tuple[float, int]:  # fmt: skip
     """out ``(4, n + 1)`` ← the branches and ψ: (gap in metres, number of arcs of ψ).
 
-    For a point alone, ψ is the given one or, if that is NaN, a feasible one near the seed's. Joint 5 is at 0
-    unless the task is a pose.
+    request: the task, and ψ for a point alone; if that is NaN, ψ is a feasible one near the seed's. Joint 5 is at
+    0 unless the task is a pose.
     """
+    task, psi = request
     clear(out)
     n = near.shape[0]
     M, box, planar, angles = np.empty((3, 4)), np.zeros((3, 5)), np.zeros((3, 4)), np.empty(4)
@@ -159,7 +162,7 @@ def branches_one(arm: Array, T: Array, value: float, near: Array, out: Array) ->
                 return False
     n = near.shape[0]
     rows, arcs = np.empty((ROWS, n + 1)), np.empty((0, 3))
-    solve(arm, T, POSE, math.nan, near, arm[LEAST : LEAST + n], arm[MOST : MOST + n], arcs, rows)
+    solve(arm, T, (POSE, math.nan), near, arm[LEAST : LEAST + n], arm[MOST : MOST + n], arcs, rows)
     for k in range(ROWS):
         for i in range(n):
             out[k, i] = rows[k, i]
@@ -171,3 +174,12 @@ def branches_many(arm: Array, T: Array, values: Array, near: Array, out: Array) 
     """out ``(N, 4, n)`` ← all branches of each of the targets T ``(N, 4, 4)``."""
     for k in range(T.shape[0]):
         branches_one(arm, T[k], values[0], near, out[k])
+
+
+@jit
+def solve_many(arm: Array, T: Array, seeds: Array, lower: Array, upper: Array, out: Array) -> None:
+    """out ``(N, 4, n)`` ← the branches of each of the poses T ``(N, 4, 4)`` as `solve` finds them.
+
+    seeds ``(N, n)``, or ``(1, n)`` for all; lower, upper ``(n,)``: joint limits.
+    """
+    solve_each(solve, (POSE, math.nan), (0, out.shape[2] + 1), arm, T, seeds, (lower, upper), out)

@@ -21,7 +21,7 @@ from kin.solvers.contract import (
     SolverInput,
 )
 from kin.solvers.names import Names, bent, front_or_back, names_of, stance_of
-from kin.solvers.parallel5.branches import ROWS, branches_many, branches_one, solve
+from kin.solvers.parallel5.branches import ROWS, branches_many, branches_one, solve, solve_many
 from kin.solvers.parallel5.geometry import BASE, TOOL_Z, TURNED, Geometry, geometry_of
 from kin.solvers.singular import Condition, JointValue, Singularity, elbow_at, off_line, those_within
 from kin.transforms import Array
@@ -40,7 +40,7 @@ def match(robot: Robot) -> Parallel5 | None:
 class Parallel5(ClosedForm):
     """The closed form of an arm with three parallel axes and at most a roll."""
 
-    name = NAME
+    name, quick = NAME, (POSE,)
 
     def __init__(self, geometry: Geometry, robot: Robot) -> None:
         g = self.geometry = geometry
@@ -87,7 +87,7 @@ class Parallel5(ClosedForm):
         out, arcs = np.empty((ROWS, n + 1)), np.empty((256, 3))
         free = self._frees_psi(p.task)
         psi, task = (p.values[0], POSITION) if free else (math.nan, p.task)
-        gap, count = solve(self.geometry.params, p.T, task, psi, p.seed, p.lower, p.upper, arcs, out)
+        gap, count = solve(self.geometry.params, p.T, (task, psi), p.seed, p.lower, p.upper, arcs, out)
         q = out[:, :n]
         columns, ranges = [], []
         if free:
@@ -100,6 +100,10 @@ class Parallel5(ClosedForm):
         missing = bool(np.isnan(q[:, 0]).all())
         obstacle = Obstacle("last axis beyond the links' reach") if missing else None
         return Candidates(q, values, tuple(ranges), max(gap, 0.0) if missing else 0.0, obstacle)
+
+    def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+        """The branches of many poses."""
+        solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
     def _x(self, t: Array) -> float:
         """How far C is before axis 1 in the arm's own plane, metres."""

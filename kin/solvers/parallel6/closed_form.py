@@ -112,9 +112,10 @@ class Parallel6(ClosedForm):
         """The branches of many poses."""
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
 
-    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
+    def nearest_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> bool:
         """Of many poses the branch nearest to the seed."""
         nearest_many(self.kernels.params, T, seeds, lower, upper, q)
+        return True
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the arm's side of axis 1, and the signs of x s3 and of s5."""

@@ -435,6 +435,7 @@ def test_a_stack_given_to_solve_ik_is_refused_with_what_takes_it():
     [
         *("pioneer5", "puma560", "ur5", "irb120", "stanford", "scara"),
         *("iiwa14", "redundant7", "redundant7-craig", "panda"),
+        *("planar2r", "planar3r", "so100", "wx250", "gantry", "rpp"),
     ],
 )
 @pytest.mark.parametrize("more", [{}, {"respect_limits": False}, {"locked": True}], ids=["limits", "none", "lock"])
@@ -449,7 +450,7 @@ def test_the_best_of_many_is_that_of_one_bit_for_bit(name, more):
     seeds[1::2] = q[1::2] + 0.05  # the other elbow is then too far to be the nearest, and left out
     T[7, :3, 3] = 9.0
     if more == {"locked": True}:
-        more = {"locked": [0.2, *[None] * (robot.n - 1)]}
+        more = {"locked": [0.6 if name == "gantry" else 0.2, *[None] * (robot.n - 1)]}
     found = kin.solve_ik_many(robot, T, q_seed=seeds, **more)
     for i, (each, seed) in enumerate(zip(T, seeds, strict=True)):
         alone = kin.solve_ik(robot, each, q_seed=seed, **more)
@@ -457,6 +458,55 @@ def test_the_best_of_many_is_that_of_one_bit_for_bit(name, more):
         expected = alone.solutions[0].q if alone.status is kin.Status.SOLVED else np.full(robot.n, math.nan)
         assert np.array_equal(found.q[i], expected, equal_nan=True)
         assert repr(found[i]) == repr(alone)
+
+
+@pytest.mark.parametrize(
+    ("name", "task", "turned"),
+    [("planar2r", "pose", False), ("so100", "pose", True), ("rpp", "position", True), ("rpp", "approach", True)],
+)
+def test_few_joints_meet_what_they_can_in_a_batch_as_alone(name, task, turned):
+    """The branch nearest to the seed need not meet the whole task where another one does."""
+    robot, rng = kin.get_robot(name), np.random.default_rng(8)
+    q, seeds = robot.random_q(rng, 40), robot.random_q(rng, 40)
+    T = kin.fk(robot, q)
+    if turned:
+        T[::2, :3, :3] = T[::2, :3, :3] @ kin.pose_from_xyz_rpy(np.zeros(3), [0.3, -0.2, 0.1])[:3, :3]
+    found = kin.solve_ik_many(robot, T, q_seed=seeds, task=task)
+    nearest = 0
+    for i, (each, seed) in enumerate(zip(T, seeds, strict=True)):
+        alone = kin.solve_ik(robot, each, q_seed=seed, task=task)
+        assert found.status[i] is alone.status
+        expected = alone.solutions[0].q if alone.status is kin.Status.SOLVED else np.full(robot.n, math.nan)
+        assert np.array_equal(found.q[i], expected, equal_nan=True)
+        rows = kin.ik_branches(robot, each)
+        rows = rows[~np.isnan(rows[:, 0])]
+        nearest += len(rows) == 0 or np.allclose(rows[np.argmin(np.linalg.norm(rows - seed, axis=1))], found.q[i])
+    assert found.solved.sum() >= 20
+    if name == "planar2r":
+        assert nearest < 30  # elsewhere the other elbow is nearer, and turns the tool another way
+
+
+def test_of_two_rows_that_are_equally_near_but_for_rounding_the_first_is_taken():
+    """Their squared distances to the seed differ in the last digit, their distances do not."""
+    robot, seed = kin.get_robot("planar2r"), np.array([-0.0, math.pi / 2])
+    T = kin.fk(robot, [-1.5707963267953369, 3.1415778224127107])
+    prepared, rows = problem.prepare(robot, kin.IKOptions()), np.empty((1, 2, 2))
+    closed_form_of(robot).solve_many(T[None], seed[None], prepared.lower, prepared.upper, rows)
+    squares = ((rows[0] - seed) ** 2).sum(axis=1)
+    assert squares[1] < squares[0]
+    assert math.sqrt(squares[1]) == math.sqrt(squares[0])
+    assert np.array_equal(
+        kin.solve_ik_many(robot, T[None], q_seed=seed).q[0], kin.solve_ik(robot, T, q_seed=seed).best.q
+    )
+
+
+@pytest.mark.parametrize("name", ["planar2r", "planar3r", "so100", "gantry", "rpp"])
+def test_regular_targets_of_few_joints_take_no_results(name, monkeypatch):
+    """All best solutions are from the compiled pass."""
+    monkeypatch.setattr(batch, "answer", None)
+    robot, rng = kin.get_robot(name), np.random.default_rng(9)
+    q, seeds = robot.random_q(rng, 300), robot.random_q(rng, 300)
+    assert kin.solve_ik_many(robot, kin.fk(robot, q), q_seed=seeds).solved.all()
 
 
 QUICK = [

@@ -10,6 +10,8 @@ import pytest
 from sliding import RIGHT, apart, arm, check_postures, random_arm
 
 import kin
+from kin.ik import IKOptions
+from kin.ik.table import Table
 from kin.solvers import closed_form_of
 from kin.solvers.general6.orders import readings
 
@@ -17,6 +19,7 @@ ORDERS = ["".join(o) for o in itertools.product("PR", repeat=6) if o.count("P") 
 FEWER = ["".join(o) for n in (3, 4, 5) for o in itertools.product("PR", repeat=n) if 1 <= o.count("P") <= 3]
 WRIST = [(0, 0.1, 0, -RIGHT), (0, 0, 0, RIGHT), (0, 0.1, 0, 0)]
 LIFT, REACH = (0, 0.3, 0, 0), (0, 0.2, 0, 0)
+CROSSED = [(0, 0.1, 0, 0.7), (0, 0.1, 0.2, -0.7)]  # with joint 2 at 0, joint 3 is parallel to joint 1
 # Arms of textbooks: kinds, table, task, family.
 TEXTBOOK = {
     "cylinder": ("RPP", [LIFT, (0, 0, 0, -RIGHT), REACH], "position", "slides2"),
@@ -112,6 +115,27 @@ def test_a_slide_of_any_length_is_found():
     q = np.array([0.3, -0.5, 6.5, 0.4, 0.9, -1.2])
     result = kin.solve_ik(robot, kin.fk(robot, q), respect_limits=False)
     assert min(apart(robot, s.q, q) for s in result.solutions) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("kinds", "rows", "off", "known"),
+    [
+        ("PRP", [*CROSSED, REACH], 1e-5, "agreed"),
+        ("PRPPRR", [*CROSSED, (0, 0, 0, 1.2), (0, 0, 0, 0.9), *WRIST[:2]], 1e-9, "unknown"),
+    ],
+    ids=["one joint turns", "three joints turn"],
+)
+def test_targets_that_may_have_more_postures_are_left_to_results(kinds, rows, off, known):
+    """With joint 2 beside 0 two slides are nearly parallel."""
+    robot = arm(kinds, rows)
+    q = robot.random_q(np.random.default_rng(6), 12)
+    q[:6, 1] = off
+    table = Table.of(robot, kin.fk(robot, q), IKOptions(task="position" if robot.n == 3 else "pose"), q)
+    assert (table.kinds[:6] == -1).all()
+    assert (table.kinds[6:] >= 0).sum() >= 4
+    found = [table.result(i).completeness for i in range(12)]
+    assert known in found[:6]
+    assert all(found[i] == "proved" for i in np.flatnonzero(table.kinds >= 0))
 
 
 @pytest.mark.parametrize("kinds", ["RRPRRR", "RPRPRR", "PRRPRR", "PRP"])
