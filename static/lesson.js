@@ -118,8 +118,9 @@
     if (!steps || !goal) { if (document.querySelector("[data-hints]")) step ||= "none"; return; }
     const [lesson, before] = [goal.dataset.lesson, step];
     step = `${lesson} ${steps.dataset.step}`;
-    if (step === before || before === "" || head) return;
-    const from = before.startsWith(`${lesson} `) ? steps : goal;
+    const goesOn = before.startsWith(`${lesson} `);
+    if (step === before || before === "" || (head && !goesOn)) return;
+    const from = goesOn ? steps : goal;
     const { top, bottom } = viserPage.panel().getBoundingClientRect();
     const at = from.getBoundingClientRect().top;
     if (document.documentElement.hasAttribute("data-kb-narrow") || at < top || at > (top + bottom) / 2) {

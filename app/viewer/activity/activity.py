@@ -170,10 +170,10 @@ class Activity:
         courses = filter(None, (self.progress.course, self.sent))
         return all(course.answers or exercise.id not in course.exercises for course in courses)
 
-    def leads(self, exercise: Exercise) -> bool:
-        """Whether the course says what comes after an exercise."""
+    def leads(self, kind: str, key: str) -> bool:
+        """Whether the course says what comes after a lesson or an exercise, as `Item` has its kind and key."""
         item = self.progress.item
-        return item is not None and item.kind == "exercise" and item.key == exercise.id
+        return item is not None and (item.kind, item.key) == (kind, key)
 
     def leave_item(self) -> None:
         """Something else is opened above which the bar of the course must not stand; the course stays open."""

@@ -89,15 +89,20 @@ class Progress:
         return self._now.items[index]
 
     def next(self) -> Item | None:
-        """Go on; None after the last item: back to the list."""
+        """Go on, from the list to the first item that is not done; None after the last item: back to the list."""
         if self.at is None:
-            self.at = -1
-        elif self._now.items[self.at].kind == "lesson":
+            return self.go(self.first_open())
+        if self._now.items[self.at].kind == "lesson":
             self.seen.add(self.at)
-        if self.at + 1 >= len(self._now.items):
+        if self.is_last:
             self.at = None
             return None
         return self.go(self.at + 1)
+
+    @property
+    def is_last(self) -> bool:
+        """Whether nothing comes after the item on show."""
+        return self.at == len(self._now.items) - 1
 
     def mark(self, index: int) -> Mark:
         """What has become of an item."""
@@ -153,9 +158,9 @@ class Progress:
             self.back[exercise_id] = mark
 
     def first_open(self) -> int:
-        """The first item that is not done; the first one if all are."""
+        """The first item that was not begun; then the first that is not done; the first one if all are."""
         marks = [self.mark(i) for i in range(len(self._now.items))]
-        return next((i for i, mark in enumerate(marks) if mark in ("open", "wrong")), 0)
+        return next((marks.index(mark) for mark in ("open", "wrong") if mark in marks), 0)
 
     def outcome(self) -> Outcome:
         """What the exercises of the course gave."""

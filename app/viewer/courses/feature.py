@@ -287,7 +287,8 @@ class CourseFeature(Feature):
             update_html(self._page, views.chooser_html(self._courses, self._view, self._progress.seated))
         else:
             self._ask_back()
-            update_html(self._page, views.course_html(self._progress, self.stage.activity.exercises, self._view))
+            known, courses = self.stage.activity.exercises, self._courses.all
+            update_html(self._page, views.course_html(self._progress, known, courses, self._view))
 
     def _ask_back(self) -> None:
         activity = self.stage.activity

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from markupsafe import Markup
 
-from app.classroom.courses import Courses, Item
+from app.classroom.courses import Course, Courses, Item
 from app.classroom.courses.course import LONGEST, MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import Outcome
@@ -19,6 +20,7 @@ from app.viewer.lessons import LESSONS
 from app.viewer.panel.share import box_html
 from app.viewer.views.templates import render
 
+DONE: frozenset[Mark] = frozenset({"right", "shown"})
 # Symbol, words and colour of what has become of a lesson.
 LESSON_MARKS: dict[Mark, tuple[str, str, str]] = {
     "open": ("", "not begun", ""),
@@ -64,6 +66,7 @@ def bar_html(progress: Progress, known: Exercises) -> str:
         note=item.note,
         marks=_marks(progress),
         at=at,
+        done=progress.mark(at) in DONE,
     )
 
 
@@ -79,8 +82,8 @@ def chooser_html(courses: Courses, view: CourseView, seated: bool) -> str:
     )
 
 
-def course_html(progress: Progress, known: Exercises, view: CourseView) -> str:
-    """The list of an open course, or its editor."""
+def course_html(progress: Progress, known: Exercises, courses: Sequence[Course], view: CourseView) -> str:
+    """The list of an open course, or its editor; `courses` are those of the service."""
     course = progress.course
     assert course is not None
     rows: list[dict[str, Any]] = [
@@ -131,6 +134,8 @@ def course_html(progress: Progress, known: Exercises, view: CourseView) -> str:
         code=code,
         alias=progress.alias,
         begun=any(row["mark"]["symbol"] for row in rows),
+        complete=all(progress.mark(i) in DONE for i in range(len(rows))),
+        following=_following(courses, course),
         outcome=progress.outcome(),
         seated=progress.seated,
         back=[
@@ -151,6 +156,12 @@ def said(outcome: Outcome | None, courses: Courses) -> str:
         f"{outcome.alias} · {title}: {outcome.score} %, {outcome.solved} of {outcome.count} exercises solved with "
         f"{tries}, {outcome.day:%Y-%m-%d}."
     )
+
+
+def _following(courses: Sequence[Course], course: Course) -> tuple[int, str] | None:
+    """The index and title of the service's next course; None: it has none, or this is none of its courses."""
+    after = courses.index(course) + 1 if course in courses else len(courses)
+    return (after, courses[after].title) if after < len(courses) else None
 
 
 def _title(known: Exercises, item: Item) -> str:

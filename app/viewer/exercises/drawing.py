@@ -71,7 +71,11 @@ class Drawing:
             origin_radius=0.15 * size,
             origin_color=_COLOR,
         )
-        self._nodes += [handle, frame, self._scene.add_label(f"{name}/label", "your ghost")]
+        self._nodes += [
+            handle,
+            frame,
+            self._scene.add_label(f"{name}/label", "your ghost", position=(0.0, 0.0, 1.9 * size)),
+        ]
         self._ghost = handle
 
         @handle.on_update

@@ -236,6 +236,7 @@ class Practising(Feature):
     def _undraw(self) -> None:
         self._drawing.clear()
         self.stage.fit_view(())
+        self.stage.keep_in_view()
 
     @property
     def _asked(self) -> Asked:
@@ -285,8 +286,10 @@ class Practising(Feature):
 
     def _following(self, exercise: Exercise) -> views.Following | None:
         """What comes after an exercise that is done."""
-        after = None if self.stage.activity.leads(exercise) else self._practice.after(exercise)
-        return None if after is None else views.Following(after.id, "Next exercise")
+        if self.stage.activity.leads("exercise", exercise.id):
+            return views.Following.in_course(self.stage.activity.progress)
+        after = self._practice.after(exercise)
+        return None if after is None else views.Following("Next exercise", "open", after.id)
 
     def _list(self) -> str:
         """What is on show while no exercise is."""

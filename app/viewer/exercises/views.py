@@ -9,6 +9,7 @@ from app.exercises import Asked, Exercise, Exercises, Variant
 from app.exports.worksheet.sheet import indexed
 from app.viewer.activity.activity import EXERCISES, Activity
 from app.viewer.activity.practice import Mark, Practice, Record
+from app.viewer.activity.progress import Progress
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.views.templates import render
 from kin.units import Units
@@ -136,10 +137,24 @@ def question_html(asked: Asked, sheet: Sheet, closed: bool, door: Door = DOOR) -
 
 @dataclass(frozen=True)
 class Following:
-    """What a button opens when an exercise is done: a key, and the words on the button."""
+    """A button that leads on when something is done.
 
-    key: str
+    Attributes:
+        words: what is written on it.
+        do: what it asks for.
+        key: of the exercise that it opens; "": it opens none.
+        feature: who is asked; "": whose block it is in.
+    """
+
     words: str
+    do: str
+    key: str = ""
+    feature: str = ""
+
+    @classmethod
+    def in_course(cls, progress: Progress) -> Following:
+        """The button of the item on show."""
+        return cls("Finish the course" if progress.is_last else "Next in the course", "next", feature="course")
 
 
 def foot_html(
@@ -188,6 +203,9 @@ def foot_html(
 
 def unsaid(solution: str, detail: str) -> str:
     """What a solution adds to what was said to the answer; all of it if that is not a part of it."""
+    answer, found, rest = solution.partition(". ")
+    if found and detail.endswith(f" {answer}."):
+        return rest
     before, found, after = solution.partition(detail) if detail else ("", "", solution)
     return after.strip() if found else before + after
 

@@ -125,7 +125,7 @@ class Reviewing(Practising):
 
     def _following(self, exercise: Exercise) -> Following | None:
         due = self._due
-        return None if due is None else Following(due.key, "Next")
+        return None if due is None else Following("Next", "open", due.key)
 
     def _list(self) -> str:
         activity = self.stage.activity

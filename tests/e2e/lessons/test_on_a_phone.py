@@ -133,3 +133,28 @@ def test_what_is_opened_is_shown_below_the_head_of_the_sheet(phone: Tab, no_spoi
     )
     assert scrolled == 0, "the sheet itself"
     phone.choose("Lesson", "None")
+
+
+def test_a_course_leads_on_from_where_the_answer_is(phone: Tab, no_spoilt_page: None) -> None:
+    phone.reopen()  # with no answer yet
+    page = phone.page
+    phone.open("Learn")
+    phone.choose("Lesson", "Courses")
+    page.get_by_role("button", name="First steps").first.tap()
+    page.get_by_role("button", name="Start", exact=True).tap()
+    expect(page.locator("[data-exercise=which-joint-goes-down]")).to_be_visible()
+    page.locator("[data-exercises=question] [data-guide-do=answer]").nth(2).tap()
+    expect(page.locator("[data-exercises-verdict]")).to_contain_text("Right")
+    page.get_by_role("button", name="Next in the course").tap()
+    task = page.locator("[data-exercise=which-joint-has-moved], [data-exercise=which-joint-moved]")
+    expect(task).to_be_visible()
+    expect(page.locator("[data-course=bar]").get_by_text("2 of 12")).to_be_in_viewport(ratio=1)
+
+    page.locator("[data-course=bar] [data-guide-do=next]").tap()
+    steps = page.locator("[data-guide=steps]")
+    expect(steps).to_have_attribute("data-step", "1")
+    expect(page.locator("[data-course=bar]").get_by_text("3 of 12")).to_be_in_viewport(ratio=1)
+    page.locator(".kb-guide-turn button").last.tap()  # below the step
+    expect(steps).to_have_attribute("data-step", "2")
+    expect(steps.get_by_role("heading").first).to_be_in_viewport(ratio=1)
+    phone.choose("Lesson", "None")

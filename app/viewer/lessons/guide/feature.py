@@ -16,6 +16,7 @@ from app.exercises.typed import EntryError
 from app.viewer.declared.scene import Node, SceneView
 from app.viewer.exercises.drawing import GHOST, Drawing
 from app.viewer.exercises.sheet import Sheet
+from app.viewer.exercises.views import Following
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import earlier, views
 from app.viewer.lessons.guide.answer_drawing import answer_nodes, ends, lead_nodes
@@ -344,6 +345,15 @@ class Guide(Feature):
         self._target = None if pose.target is None else np.array(pose.target[:3])
         self.stage.keep_in_view(self._target, self._answer_ends)
 
+    def _leading_on(self) -> Following | None:
+        """The button to what comes after the lesson."""
+        activity = self.stage.activity
+        if activity.leads("lesson", self._lesson.key):
+            return Following.in_course(activity.progress)
+        if self._following and activity.progress.course is None:
+            return Following(f"Next lesson: {self._following}", "next")
+        return None
+
     def _show(self) -> None:
         if self._shown is not None and (outline := self._shown.on_steps(self._progress)) is not None:
             self._progress.use(outline)
@@ -361,8 +371,7 @@ class Guide(Feature):
         update_html(self._goal, views.goal_html(self._lesson.title, progress.outline.goal))
         offered = self.stage.store.get(self._offered).name if self._offered else ""
         sheets = {key: self._sheet(key) for key in open_}
-        following = self._following if activity.progress.course is None else ""  # a course has a bar for it
-        update_html(self._steps, views.steps_html(progress, sheets, offered, following))
+        update_html(self._steps, views.steps_html(progress, sheets, offered, self._leading_on()))
         forms = {key: progress.question(key).asked() for key in open_ if not progress.is_closed(key)}
         self._draw_ghost([key for key, asked in forms.items() if asked.form == "frame"])
         self._draw_answer()

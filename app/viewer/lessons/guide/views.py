@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.exercises.questions import Choice
 from app.viewer.exercises.sheet import Sheet
-from app.viewer.exercises.views import entry_of
+from app.viewer.exercises.views import Following, entry_of
 from app.viewer.lessons.guide.outline import Question
 from app.viewer.lessons.guide.progress import Mark, Progress
 from app.viewer.views.templates import render
@@ -23,13 +23,15 @@ def goal_html(lesson: str, goal: str) -> str:
     return render("guide/goal", lesson=lesson, goal=goal)
 
 
-def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "", following: str = "") -> str:
+def steps_html(
+    progress: Progress, sheets: dict[str, Sheet], arm: str = "", following: Following | None = None
+) -> str:
     """The step on show, or the check.
 
     Args:
         sheets: what was entered, by the key of the question.
         arm: the name of the arm that the step offers instead of this one.
-        following: the title of the lesson that is offered after a check that was passed.
+        following: the button that leads on after a check that was passed.
     """
     steps, at = progress.outline.steps, progress.at
     marks = []
@@ -54,7 +56,7 @@ def steps_html(progress: Progress, sheets: dict[str, Sheet], arm: str = "", foll
             earlier=earlier,
             recalled=sum(progress.mark(str(one["key"])) == "right" for one in earlier),
             done=all(question["closed"] for question in asked),
-            following=following if right == count else "",
+            following=following if right == count else None,
         )
     step, key, before = steps[at], str(at + 1), f"e{at + 1}"
     closed = step.question is None or progress.is_closed(key)

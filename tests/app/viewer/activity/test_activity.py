@@ -109,9 +109,9 @@ def test_a_course_has_numbers_of_its_own_and_everybody_hears_of_it(activity: Act
     activity.enter_course()
     assert (activity.practice.seed_of(OTHER) != before, len(changes)) == (True, 1)
     activity.progress.go(0)
-    assert (activity.leads(OTHER), activity.leads(TABLE)) == (True, False)
+    assert (activity.leads("exercise", OTHER.id), activity.leads("exercise", TABLE.id)) == (True, False)
     activity.leave_item()
-    assert (activity.leads(OTHER), len(changes)) == (False, 2)
+    assert (activity.leads("exercise", OTHER.id), len(changes)) == (False, 2)
     assert activity.offered[0] == activity.progress.course
     activity.progress.course = None
     activity.enter_course()

@@ -22,6 +22,8 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.activity.context import ExerciseContext
 from app.viewer.activity.practice import Practice
+from app.viewer.activity.progress import Progress
+from app.viewer.courses.views import CourseView, course_html
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Number
@@ -118,17 +120,26 @@ def test_a_student_follows_a_course_to_a_result_code(server: int, settings: Sett
         tab.wait(lambda: "2 of 3" in block(tab, "bar") and 'data-exercise="which-joint-goes-down"' in tab.html)
         assert "Show the answer" not in tab.html
         press(tab, "exercises", ["reveal", 3])
+        assert "kb-exercise-answer" not in block(tab, "bar"), "nothing invites to go on without an answer"
         press(tab, "exercises", ["answer", 4], 2)
         tab.wait(lambda: "✓ Right" in shown(tab))
         assert "Next exercise" not in tab.html, "the course says what comes next"
+        assert re.search(r'data-guide-do="next" data-feature="course">Next in the course<', tab.html)
+        tab.wait(lambda: "kb-exercise-answer" in block(tab, "bar"))
         press(tab, "course", ["back", 5])
         tab.wait(lambda: "1 of 3" in block(tab, "bar") and "1. A column" in tab.html)
         press(tab, "course", ["list", 6])
         tab.wait(lambda: "1 of 3 done" in block(tab, "follow") and not block(tab, "bar"))
         assert "read, its check is not passed" in block(tab, "follow"), "its pages were only turned"
+        assert "Continue" in block(tab, "follow")
+        press(tab, "course", ["next", 60])
+        tab.wait(lambda: "3 of 3" in block(tab, "bar") and 'data-exercise="row-distance"' in tab.html)  # not begun
+        press(tab, "course", ["list", 61])
+        tab.wait(lambda: bool(block(tab, "follow")) and not block(tab, "bar"))
         press(tab, "course", ["go", 7], 0)
         tab.wait(lambda: "1. A column" in tab.html)
         pass_check(tab, VelocityLesson, get_robot("scara"))
+        tab.wait(lambda: 'data-feature="course">Next in the course<' in tab.html)
         press(tab, "course", ["list", 8])
         tab.wait(lambda: "2 of 3 done" in block(tab, "follow") and "check passed" in block(tab, "follow"))
         press(tab, "course", ["fields", "alias", 9], [["  "]])
@@ -157,6 +168,27 @@ def test_a_student_follows_a_course_to_a_result_code(server: int, settings: Sett
         changed = letters[:-1] + ("A" if letters[-1] != "A" else "B")
         press(tab, "course", ["fields", "check", 4], [[changed]])
         tab.wait(lambda: "Not accepted" in block(tab, "choose"))
+
+
+def test_a_course_that_is_done_leads_to_the_next_one() -> None:
+    courses = Courses(ALL)
+    practice = Practice(ALL)
+    progress = Progress(courses, practice, lambda: b"secret")
+    for number, course in enumerate(courses.all, 1):
+        progress.open(course)
+        for item in course.items:
+            text = course_html(progress, ALL, courses.all, CourseView())
+            assert "every step" not in text
+            if item.kind == "lesson":
+                progress.take_lesson(item.key, item.robot)
+            else:
+                practice.take(ALL.all[[one.id for one in ALL.all].index(item.key)], Verdict(True, "Yes."), 1.0)
+        text = course_html(progress, ALL, courses.all, CourseView())
+        assert "You have done every step of this course." in text
+        assert "Continue" not in text
+        following = [one.title for one in courses.all[number : number + 1]]
+        assert re.findall(r'data-guide-do="pick" data-argument="\d">Next course: ([^<]+)<', text) == following
+        assert not following or f'data-guide-do="pick" data-argument="{number}"' in text
 
 
 def test_lessons_of_the_built_in_courses_open_on_an_arm_that_shows_what_they_teach() -> None:

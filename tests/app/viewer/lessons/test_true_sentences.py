@@ -91,3 +91,5 @@ def test_why_repeats_nothing_that_right_has_said(exercise: Exercise) -> None:
     assert verdict.right
     assert not verdict.reason or verdict.reason not in said
     assert said != verdict.reason
+    answer, more, _ = exercise.solution(variant, Units()).partition(". ")
+    assert not (more and verdict.reason.endswith(f" {answer}.") and said.startswith(answer))
