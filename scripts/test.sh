@@ -56,7 +56,6 @@ install_kinboard "[test]"
 ruff check .
 ruff format --check .
 sh scripts/lint.sh
-mypy
 wait $programs
 # If the second installation replaced a library in use, a compiling process may have failed: once more then.
 wait $compiling && wait $backwards || compile_kernels
@@ -67,10 +66,14 @@ twice="--reruns 1 -r R"
 files_of() {
   grep -rl "pytest\.mark\.$1\b" tests --include="test_*.py"
 }
-# Two browsers draw; five processes run the other tests beside them, as those of the viewer mostly wait for arms that move.
+# Two browsers draw; beside them five processes run the other tests, as those of the viewer mostly wait for arms that move,
+# and mypy reads the types.
 # What measures time runs alone.
 log=$(mktemp)
-trap 'rm -f "$log"' EXIT
+types=$(mktemp)
+trap 'rm -f "$log" "$types"' EXIT
+mypy >"$types" 2>&1 &
+typing=$!
 pytest --reruns 2 -r R -n 2 --dist loadfile --no-loadscope-reorder -m "not slow and browser" $(files_of browser) >"$log" 2>&1 &
 browsing=$!
 failed=0
@@ -79,6 +82,7 @@ failed=0
 pytest --collect-only -qq >/dev/null 2>&1 || :
 pytest $twice -n 5 --dist loadfile --no-loadscope-reorder -m "not slow and not browser and not bench" || failed=1
 wait $browsing || failed=1
-cat "$log"
+wait $typing || failed=1
+cat "$log" "$types"
 pytest $twice -m "not slow and bench" $(files_of bench) || failed=1
 exit $failed
