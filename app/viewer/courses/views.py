@@ -86,28 +86,7 @@ def course_html(progress: Progress, known: Exercises, courses: Sequence[Course],
     """The list of an open course, or its editor; `courses` are those of the service."""
     course = progress.course
     assert course is not None
-    rows: list[dict[str, Any]] = [
-        {
-            "index": i,
-            "kind": item.kind,
-            "title": _title(known, item),
-            "own": item.title,
-            "note": item.note,
-            "mark": mark,
-            "name": course.items[i].key,
-        }
-        for i, (item, mark) in enumerate(zip(course.items, _marks(progress), strict=True))
-    ]
-    partner = dict(zip(course.after, course.before, strict=True))
-    taken = {*course.before, *course.after}
-    for i, row in enumerate(rows):
-        row["before"] = partner.get(str(row["name"]), "")
-        row["earlier"] = [
-            (one["name"], f"{j + 1}. {one['title']}")
-            for j, one in enumerate(rows[:i])
-            if one["kind"] == "exercise" and (one["name"] not in taken or one["name"] == row["before"])
-        ]
-        row["free"] = row["kind"] == "exercise" and row["name"] not in course.before
+    rows = _rows(progress, known)
     done = sum(row["mark"]["color"] == "green" for row in rows)
     link = Markup(box_html(view.link, "Copy link", wrap=True)) if view.link else ""
     if view.editing:
@@ -156,6 +135,35 @@ def said(outcome: Outcome | None, courses: Courses) -> str:
         f"{outcome.alias} · {title}: {outcome.score} %, {outcome.solved} of {outcome.count} exercises solved with "
         f"{tries}, {outcome.day:%Y-%m-%d}."
     )
+
+
+def _rows(progress: Progress, known: Exercises) -> list[dict[str, Any]]:
+    """The items of a course, and for the editor what each may be compared with."""
+    course = progress.course
+    assert course is not None
+    rows: list[dict[str, Any]] = [
+        {
+            "index": i,
+            "kind": item.kind,
+            "title": _title(known, item),
+            "own": item.title,
+            "note": item.note,
+            "mark": mark,
+            "name": course.items[i].key,
+        }
+        for i, (item, mark) in enumerate(zip(course.items, _marks(progress), strict=True))
+    ]
+    partner = dict(zip(course.after, course.before, strict=True))
+    taken = {*course.before, *course.after}
+    for i, row in enumerate(rows):
+        row["before"] = partner.get(str(row["name"]), "")
+        row["earlier"] = [
+            (one["name"], f"{j + 1}. {one['title']}")
+            for j, one in enumerate(rows[:i])
+            if one["kind"] == "exercise" and (one["name"] not in taken or one["name"] == row["before"])
+        ]
+        row["free"] = row["kind"] == "exercise" and row["name"] not in course.before
+    return rows
 
 
 def _following(courses: Sequence[Course], course: Course) -> tuple[int, str] | None:
