@@ -252,7 +252,7 @@
     if (target.closest("[data-typed-send]")) sendForm();
     if (target.closest("[data-typed-close]")) closeForm();
     const opener = target.closest("[data-type]");
-    if (!opener || !getSelection().isCollapsed) return;
+    if (!opener || (opener.localName === "tr" && !getSelection().isCollapsed)) return; // its numbers are being marked
     if (opener.ariaExpanded === "true") closeForm();
     else openForm(opener.dataset.type);
   });

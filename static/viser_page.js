@@ -32,7 +32,8 @@ const viserPage = (() => {
   };
   // What viser calls, and how often it has since this page was loaded.
   const HOOKS = {
-    readItem: 0, writeItem: 0, replaceAddress: 0, sendToWorker: 0, reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0, findParent: 0,
+    readItem: 0, writeItem: 0, replaceAddress: 0, change: 0, sendToWorker: 0, reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0,
+    findParent: 0,
   };
 
   // WebKit on Linux names the locale C as a language. viser's script would end there: no Intl knows it.
@@ -114,6 +115,35 @@ const viserPage = (() => {
   const replaceState = history.replaceState.bind(history);
   let restoreAddress = () => {};
   history.replaceState = () => { HOOKS.replaceAddress++; restoreAddress(); };
+
+  // Changes of controls. After one that is sent, viser keeps the next for 50 ms, and longer in a busy page: the newest of a
+  // whole tab. So of three controls pressed at once the second was lost, though the page showed its new value, and what
+  // waited in one tab was passed by what was sent from another, as a slider was by Undo. Here a change that waits is sent
+  // before anything else. viser's sender is within its script, which is mended as it is put into the page.
+
+  let newest = null; // the change that was made last, and what sends it if it still waits: { change, sendIt }
+  /** viser is about to send a change, or to let it wait. */
+  function pass(change, sendIt) {
+    if (change.type !== "GuiUpdateMessage") return;
+    HOOKS.change++;
+    if (newest && change !== newest.change && !supersedes(change, newest.change)) newest.sendIt();
+    newest = { change, sendIt };
+  }
+  /** Whether a change makes an earlier one void: of a slider, or of the field that has the last messages. Each press of a
+   *  button counts. */
+  function supersedes({ uuid, updates: { value } }, earlier) {
+    return uuid === earlier.uuid && (typeof value === "number" || Array.isArray(value) || value === filled);
+  }
+  const SENDER = /\.sendMessage!==null&&\(([\w$]+)=([\w$]+),[\w$]+\?\(([\w$]+)\.sendMessage\(\2\),([\w$]+)=!1,/;
+  const mendSender = (script) => script.replace(SENDER, (found, latest, change, page, waits) =>
+    found.replace("(", () => `(viserPage.pass(${change},()=>{${waits}&&(${waits}=!1,${page}.sendMessage?.(${latest}))}),`));
+  const { get: readText, set: writeText } = Object.getOwnPropertyDescriptor(Node.prototype, "textContent");
+  Object.defineProperty(HTMLScriptElement.prototype, "textContent", {
+    configurable: true,
+    enumerable: true,
+    get: readText,
+    set(text) { writeText.call(this, mendSender(text)); },
+  });
 
   // Messages to the server travel in a hidden field of viser's; app/viewer/panel/script.py describes them.
 
@@ -482,6 +512,8 @@ const viserPage = (() => {
     watchHtml: (start, act) => { htmlWatchers.set(start, act); },
     /** Call `act` when the value of a slider changes; `thumb` is what `thumbOf` returns. */
     watchValue: (thumb, act) => { valueWatchers.set(thumb, act); },
+
+    pass, // for viser's own script
 
     /** Serve items of the storage: name → () => text, and name → (text) => …, for viser's calls alone. */
     serveItems: (reading, writing) => { readable = reading; writable = writing; },

@@ -120,7 +120,7 @@ class Tab:
         self.page.set_default_timeout(WAIT)
         expect.set_options(timeout=WAIT)
         self.errors: list[str] = []
-        self.spoilt = False  # a test failed here, or typed at random: nobody knows in which state it left the page
+        self.spoilt = False  # a test failed here, typed at random, or left what others do not expect
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("console", self._listen)
         self._arrive()

@@ -170,6 +170,8 @@ def test_slider_keys_undo_and_the_browsers_back(tab: Tab) -> None:
 
 def test_a_target_is_typed_and_moved_by_keys(tab: Tab) -> None:
     page = tab.page
+    page.get_by_text("Locked", exact=True).dblclick()
+    assert page.evaluate("String(getSelection()).trim()"), "a word is marked, as for copying"
     page.get_by_role("button", name="Type a target").click()
     text = page.locator("[data-typed] textarea")
     expect(text).to_be_focused()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from page import Tab
 from playwright.sync_api import Browser, expect
@@ -11,6 +13,7 @@ from app.viewer.panel.theme import SYSTEM_IS_DARK
 
 pytestmark = pytest.mark.browser
 
+PIONEER = kin.get_robot("pioneer5")
 TITLES = ["Learn", "Robot", "Workspace", "Program", "View", "Move"]
 # Looks for parts, name → selector, after each change of the page, and returns the names that were never found.
 WALK = """async ([parts, titles]) => {
@@ -138,6 +141,41 @@ def test_updates_of_a_component_that_is_removed_before_the_next_frame_are_droppe
     tab = WorkerTab(browser, address, 1280, 720)
     tab.page.evaluate(REMOVED_UNSEEN)
     tab.close()  # fails with what the console says
+
+
+# Within one task of the page, as where it is busy and several clicks wait: no timer of viser's ends in between.
+AT_ONCE = """async (acts) => {
+  const thumb = document.querySelector("[role=slider][aria-label^='1 rotating base']");
+  const event = (key) => new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true });
+  const locks = [...document.querySelectorAll("[role=group][aria-label=Locked] button")];
+  for (const act of acts) {
+    if (act === "undo") document.querySelector("[data-send=undo]").click();
+    else if (act === "right") thumb.dispatchEvent(event("ArrowRight"));
+    else locks[act].click();
+    for (let k = 0; k < 20; k++) await null; // React draws
+  }
+}"""
+
+
+def test_controls_pressed_within_one_moment_are_all_heard(tab: Tab) -> None:
+    tab.page.evaluate(AT_ONCE, [0, 1, 2, 3])
+    expect(tab.status).to_contain_text("Joints 1, 2, 3, 4 locked")
+    tab.page.get_by_role("button", name="Unlock all").click()
+    expect(tab.status).to_contain_text("No joint is locked")
+
+
+def test_undo_is_not_passed_by_the_slider_that_was_moved_before_it(tab: Tab) -> None:
+    field = tab.row("1 rotating base").locator("input:visible").last
+    tab.page.evaluate(AT_ONCE, ["right", "right", "right"])
+    tab.wait_for_link(PIONEER, 0, 93)
+    expect(field).to_have_value("93")
+    tab.type_number("1 rotating base", "120")
+    tab.wait_for_link(PIONEER, 0, 120)
+    tab.page.evaluate(AT_ONCE, ["right", "right", "right", "undo"])
+    expect(tab.page.locator("[data-send=redo]")).to_have_attribute("title", re.compile("Redo: Joint 1"))
+    tab.rest()
+    expect(field).to_have_value("120")
+    expect(tab.page.locator("[data-send=redo]")).to_have_attribute("title", re.compile("Redo: Joint 1"))
 
 
 # What the programs that draw labels have for kbDark.
