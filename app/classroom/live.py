@@ -210,7 +210,7 @@ class LiveRoom:
             poll=self._poll(present, None if mine is None else mine.row),
             course=state.get("course") or "",
             course_at=float(state.get("course_at") or 0.0),
-            own=() if ticket.seat else tuple(texts[-1] for texts in (state.get("own") or {}).values()),
+            own={} if ticket.seat else {key: tuple(texts) for key, texts in (state.get("own") or {}).items()},
             teacher_away="" in self.away,
             students=len(present),
             seat=None if mine is None else self._seat(mine.row),

@@ -147,7 +147,8 @@ class RoomView:
         frozen: whether students may not move their arms.
         course: the packed course, or empty.
         course_at: when it was sent, in seconds since 1970; the same course sent again opens again.
-        own: the texts of the exercises that the teacher wrote and sent; empty for students.
+        own: the texts of the exercises that the teacher wrote and sent, by id, the newest at the end; empty for
+            students.
         teacher_away: whether no page of the teacher is connected: the class is paused.
         students: number of seats.
         seat: the own seat; None for the teacher.
@@ -169,7 +170,7 @@ class RoomView:
     poll: Poll | None = None
     course: str = ""
     course_at: float = 0.0
-    own: tuple[str, ...] = ()
+    own: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     teacher_away: bool = False
     students: int = 0
     seat: SeatView | None = None

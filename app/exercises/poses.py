@@ -86,10 +86,13 @@ def point_text(point: Array, units: Units) -> str:
 
 def pose_text(T: Array, units: Units) -> str:
     """Where a frame is, and where its axes point."""
-    columns = ", ".join(
-        f"{axis} = ({', '.join(fixed(float(v), 2) for v in T[:3, j])})" for j, axis in enumerate(AXES)
-    )
-    return f"{point_text(T[:3, 3], units)}; its axes: {columns}"
+    return f"{point_text(T[:3, 3], units)}; {axes_text(T)}"
+
+
+def axes_text(T: Array) -> str:
+    """Where the axes of a frame point."""
+    columns = (f"{axis} = ({', '.join(fixed(float(v), 2) for v in T[:3, j])})" for j, axis in enumerate(AXES))
+    return f"its axes: {', '.join(columns)}"
 
 
 def joints_text(variant: Variant, q: Array, units: Units) -> str:

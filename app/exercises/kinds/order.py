@@ -11,7 +11,7 @@ import numpy as np
 
 from app.exercises.contract import Kind
 from app.exercises.fields import Fields
-from app.exercises.poses import Elementary, errors, pose_text, product
+from app.exercises.poses import Elementary, axes_text, errors, pose_text, product
 from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 from kin import InputError
@@ -63,7 +63,8 @@ class OrderKind(Kind):
         labels = tuple(self.motions[i].text(variant, units) for i in self._places(variant))
         axes = "the axes of the base" if self.fixed_axes else "the frame’s own axes at that moment"
         goal = self._product(variant, range(len(self.motions)))
-        note = f"Motions are about {axes}; the first one is done first. At the end: {pose_text(goal, units)}."
+        end = axes_text(goal) if all(motion.turns for motion in self.motions) else pose_text(goal, units)
+        note = f"Motions are about {axes}; the first one is done first. At the end: {end}."
         return Asked("order", labels, note=note, goal=goal)
 
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import logging
+from collections.abc import Mapping
 from dataclasses import replace
 
 from app.classroom.clock import now
-from app.classroom.courses import Course, parsed
+from app.classroom.courses import Course, SentExercises, parsed
 from app.classroom.standing import standing
 from app.classroom.views import RoomView, SeatView, in_one_line
 from app.exercises import Exercise, ExerciseFileError
@@ -65,7 +66,7 @@ class Teacher(Member):
         self._picked = ""  # the student whose details are open
         self._open_tab = 0
         self._chosen: Exercise | None = None  # the exercise in the form of the task
-        self._own: tuple[str, ...] = ()  # the texts of own exercises that were sent
+        self._own: Mapping[str, tuple[str, ...]] = {}  # the texts of own exercises that were sent, by id
         self._wall: Wall | None = None
         self._reopens = False  # the wall, which was on show before a reload
         self._filter: SceneFilter | None = None  # before all but the wall
@@ -87,11 +88,11 @@ class Teacher(Member):
         if room.closed and self._wall is not None:
             self._show_wall(False)
 
-    def _keep(self, own: tuple[str, ...]) -> None:
-        """Know the own exercises that were sent to the room, perhaps from another page."""
+    def _keep(self, own: Mapping[str, tuple[str, ...]]) -> None:
+        """Know the own exercises that were sent to the room as they are now, perhaps from another page."""
         self._own, activity = own, self.page.activity
         found = []
-        for text in own:
+        for *_, text in own.values():
             try:
                 found.append(parsed(text, self.stage.store.get))
             except ExerciseFileError as error:  # its arm is gone
@@ -342,9 +343,11 @@ class Teacher(Member):
         update_html(self._tools, views.tools_html(room, self._wall is not None, self.is_armed("sweep")))
         seat = self._seat(self._picked)
         armed = self.is_armed(("remove", self._picked))
-        above, below = views.list_html(room, self._picked, exercises)
+        courses = self.page.activity.courses
+        sent = SentExercises(courses.exercises, room.own, courses.find)
+        above, below = views.list_html(room, self._picked, exercises, sent)
         update_html(self._list, above)
-        update_html(self._one, views.seat_html(room, seat, self.leader, armed, exercises))
+        update_html(self._one, views.seat_html(room, seat, self.leader, armed, exercises, sent))
         update_html(self._rest, below)
         update_html(self._task, views.task_html(room, task, exercises, self._chosen, self.page.units))
         update_html(self._course, views.course_html(room, self._offered, task))

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
-from app.classroom.courses import Course
+from app.classroom.courses import Course, SentExercises
 from app.classroom.standing import Presence, Standing, standing
 from app.classroom.tokens import show_code
 from app.classroom.views import Poll, RoomView, SeatView
 from app.classroom.work import URGENCY, Progress
 from app.exercises import Exercise, Exercises, VariantError
-from app.exercises.said import answer_in_words
 from app.viewer.room.submissions import Submissions
 from app.viewer.room.wall import MOST
 from app.viewer.views.templates import render
@@ -190,7 +189,9 @@ def tools_html(room: RoomView, wall: bool, armed: bool) -> str:
     )
 
 
-def seat_html(room: RoomView, seat: SeatView | None, looked: str, armed: bool, exercises: Exercises) -> str:
+def seat_html(
+    room: RoomView, seat: SeatView | None, looked: str, armed: bool, exercises: Exercises, sent: SentExercises
+) -> str:
     """One student, and what can be done."""
     if seat is None or room.closed:
         return ""
@@ -203,20 +204,20 @@ def seat_html(room: RoomView, seat: SeatView | None, looked: str, armed: bool, e
         shown=shown,
         armed=armed,
         named=bool(shown and room.shown and room.shown.alias),
-        row=_row(seat, room, exercises),
+        row=_row(seat, room, exercises, sent),
     )
 
 
-def list_html(room: RoomView, picked: str, exercises: Exercises) -> tuple[str, str]:
+def list_html(room: RoomView, picked: str, exercises: Exercises, sent: SentExercises) -> tuple[str, str]:
     """All students, who needs the teacher first: down to the picked one, whose card follows, and the rest."""
     members = sorted(room.seats, key=lambda seat: (standing(seat, room).rank, seat.hand))
     place = next((i + 1 for i, seat in enumerate(members) if seat.id == picked), len(members))
-    rows = [_row(seat, room, exercises) for seat in members]
+    rows = [_row(seat, room, exercises, sent) for seat in members]
     above = render("room/students", rows=rows[:place], picked=picked, empty=not members)
     return above, render("room/students", rows=rows[place:], picked="", empty=False) if rows[place:] else ""
 
 
-def _row(seat: SeatView, room: RoomView, exercises: Exercises) -> dict[str, object]:
+def _row(seat: SeatView, room: RoomView, exercises: Exercises, sent: SentExercises) -> dict[str, object]:
     """One student in the list."""
     found = standing(seat, room)
     symbol, color = PROGRESS[found.progress] if found.progress else ("", "")
@@ -231,15 +232,9 @@ def _row(seat: SeatView, room: RoomView, exercises: Exercises) -> dict[str, obje
         "color": color,
         "away": not found.here,
         "words": " · ".join(_words(seat, room, found, exercises)),
-        "answer": said(found, exercises) if wrong else "",
+        "answer": sent.said(found.exercise, found.work.seed, str(found.work.answer or "")) if wrong else "",
         "verdict": found.work.verdict if wrong else "",
     }
-
-
-def said(found: Standing, exercises: Exercises) -> str:
-    """The last answer of a student, in words."""
-    exercise, answer = exercises.get(found.exercise), str(found.work.answer or "")
-    return answer if exercise is None else answer_in_words(exercise, found.work.seed, answer)
 
 
 def _words(seat: SeatView, room: RoomView, found: Standing, exercises: Exercises) -> list[str]:

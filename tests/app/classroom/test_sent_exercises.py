@@ -141,9 +141,9 @@ def test_results_name_what_the_teacher_wrote(school: School, how: str, capsys: p
 def test_students_get_none_of_it(school: School) -> None:
     send(school, "course", own())
     student = school.hub.attend(school.ann, lambda: None)
-    assert student.room.own == ()
+    assert student.room.own == {}
     assert "It turns" not in repr(student.room)
-    assert school.page.room.own == (own(),)
+    assert school.page.room.own == {"my-own": (own(),)}
     student.leave()
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from app.exercises.rows import Factor, turns
 from app.exercises.variant import Quantity
 from app.viewer.lessons.axes import axes_at
+from app.viewer.lessons.dh.axes_drawing import axis_names
 from app.viewer.lessons.dh.steps import MOVED, amount, axis_name, expression, low, symbol, value
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import DOWN, UP, direction, level, line
@@ -74,6 +75,10 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "moved": amount("theta" if robot.revolute[0] else "d", taken, units),
         "last_axis": axis_name(robot, robot.joint_rows[-1], "theta"),
     }
+    names = axis_names(robot)
+    for name, joint in (("pair", pair), ("end", end)):
+        words[f"axes_{name}"] = " and ".join(names[joint - 1 : joint + 1])
+        words[f"between_{name}"] = _between(robot, joint - 1, units)
     for more_numbers, more_words in (_wrong_sign(robot, units), _offset(robot, units)):
         numbers |= more_numbers
         words |= more_words
@@ -154,6 +159,17 @@ def relation(robot: Robot, joint: int) -> str:
     if pair.intersect or slides:
         return "perpendicular" if pair.perpendicular else "meet"
     return "skew"
+
+
+def _between(robot: Robot, joint: int, units: Units) -> str:
+    """The angle and the distance between the axes of a joint, which counts from 0, and the next one."""
+    if robot.n < 2:
+        return "It is the same line."
+    pair = pairs(robot)[joint]
+    angle = units.angles.text(pair.angle)
+    if math.isnan(pair.distance):
+        return f"The angle between them is {angle}."
+    return f"The angle between them is {angle}, and their distance {units.lengths.text(pair.distance)}."
 
 
 def _radius(robot: Robot) -> float:

@@ -68,7 +68,11 @@ def _step(given: Exercise, key: StepKey, step: Step, units: Units) -> Step:
         )
     if key == "joints":
         end = Pose(as_configuration(branch.q)) if branch.available and branch.q is not None else None
-        practice = f"The numbers below lead to the branch {branch.name}. Choose another one with Follow."
+        practice = f"The numbers below are those of the branch {branch.name}."
+        if ended is not None:
+            where = words.title(given.arm, ended.key)
+            practice = f"The branch that you follow, {branch.name}, ends at the step “{where}”."
+        practice += " Choose another one with Follow."
         asked = _limits(given)
         return replace(step, text=text, question=asked, end=end, practice=practice, withheld=POSTURES)
     if found is None:
@@ -267,7 +271,7 @@ def _limits(given: Exercise) -> Number:
     return count(
         "How many branches of this target are within the joint limits?",
         inside,
-        f"Compare the joint values of each branch with the limits: {inside} of {len(given.branches)}.",
+        "Those branches count whose joint values are all real and within the joint limits.",
         [
             (real, "That many have real solutions, but joint limits exclude some of them."),
             (len(given.branches), "That is the number of all choices of signs."),

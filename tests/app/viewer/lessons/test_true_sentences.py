@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import numpy_arm
@@ -13,7 +14,10 @@ import kin
 from app.exercises import Exercise, builtin_exercises
 from app.viewer.exercises.views import unsaid
 from app.viewer.lessons import LESSONS
-from app.viewer.lessons.guide.outline import Choice, Step
+from app.viewer.lessons.guide.outline import Choice, Number, Step
+from app.viewer.lessons.inverse.arm import arm_of
+from app.viewer.lessons.inverse.exercise import example, exercise
+from app.viewer.lessons.inverse.questions import outline_of
 from kin import Robot
 from kin.units import Units
 
@@ -93,3 +97,59 @@ def test_why_repeats_nothing_that_right_has_said(exercise: Exercise) -> None:
     assert said != verdict.reason
     answer, more, _ = exercise.solution(variant, Units()).partition(". ")
     assert not (more and verdict.reason.endswith(f" {answer}.") and said.startswith(answer))
+
+
+def axes(robot: Robot) -> list[tuple[np.ndarray, np.ndarray]]:
+    """A point of each joint axis, and its direction, at home."""
+    frames = [np.array(robot.base), *numpy_arm.frames(robot, robot.q_home)]
+    last = 0 if robot.convention == "standard" else 1  # joint i turns about z before its row, or after it
+    rows = [i for i, row in enumerate(robot.rows) if row.kind != "fixed"]
+    return [(frames[i + last][:3, 3], frames[i + last][:3, 2]) for i in rows]
+
+
+def test_the_axes_of_two_joints_have_the_names_of_the_scene_and_lie_as_the_answer_says() -> None:
+    for robot in CLASSICS:
+        if robot.n < 2:
+            continue
+        outline, lines = OUTLINES["dh", robot.id], axes(robot)
+        for question in (*(step.question for step in outline.steps), *outline.check):
+            if not isinstance(question, Choice) or not question.prompt.startswith("How do the axes of joints"):
+                continue
+            one, other = map(int, re.findall(r"joints (\d+) and (\d+)", question.prompt)[0])
+            first = 1 if robot.convention == "modified" else 0
+            names = [f"z{'₀₁₂₃₄₅₆₇₈'[joint - 1 + first]}" for joint in (one, other)]
+            assert " and ".join(names) in question.prompt, robot.id
+            (p, z), (r, w) = lines[one - 1], lines[other - 1]
+            reason = next(option.reason for option in question.options if option.right)
+            angle = np.degrees(np.arctan2(np.linalg.norm(np.cross(z, w)), abs(z @ w)))
+            assert float(re.findall(r"between them is ([\d.]+)°", reason)[0]) == pytest.approx(angle, abs=0.051)
+            if robot.revolute[[one - 1, other - 1]].all():
+                n = np.cross(z, w)
+                sine = np.linalg.norm(n)
+                far = abs((r - p) @ n) / sine if sine > 1e-6 else np.linalg.norm(np.cross(r - p, z))
+                stated = float(re.findall(r"distance ([\d.]+) mm", reason)[0])
+                assert stated == pytest.approx(1e3 * far, abs=0.051), robot.id
+
+
+def test_a_branch_that_ends_is_not_said_to_lead_anywhere() -> None:
+    robot = kin.get_robot("pioneer5")
+    arm = arm_of(robot)
+    assert arm is not None
+    given = exercise(arm, example(arm))
+    assert 0 < sum(branch.q is None for branch in given.branches) < len(given.branches)
+    for branch in given.branches:
+        steps = outline_of(replace(given, signs=branch.derivation.signs), Units()).steps
+        step = next(each for each in steps if each.title == "All branches")
+        assert ("ends at the step" in step.practice) == (branch.q is None), branch.name
+        assert isinstance(step.question, Number)
+        assert not re.search(r"\d", step.question.method), "the second miss does not say how many"
+
+
+def test_an_arm_that_is_offered_is_given_a_reason() -> None:
+    count = 0
+    for robot in CLASSICS:
+        step = OUTLINES["inverse", robot.id].steps[-1]
+        assert step.title == "Fewer solutions"
+        assert ("Another arm shows it." in step.practice) == bool(step.arm) == (step.question is None)
+        count += bool(step.arm)
+    assert count
