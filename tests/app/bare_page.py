@@ -61,6 +61,7 @@ class BarePage:
         self.legend, self.driven, self.translucent = "", "", False
         self.notices: list[Any] = []
         self.views: list[tuple[Any, ...]] = []
+        self.kept: list[Array] = []  # points that the picture was to contain
         self.events: list[tuple[Hashable, object]] = []
         self.feature: Feature | None = None
         self.targets: list[Array] = []
@@ -106,7 +107,8 @@ class BarePage:
     def fit_view(self, spheres: Any, points: Array | None = None) -> None:
         self.views.append((spheres, points))
 
-    def keep_in_view(self, target: Array | None = None, points: Array | None = None) -> None: ...
+    def keep_in_view(self, target: Array | None = None, points: Array | None = None) -> None:
+        self.kept.append(np.zeros((0, 3)) if points is None else points)
 
     def toward_camera(self) -> Array:
         return np.ones(3)

@@ -114,6 +114,17 @@ def handle(key: str, position: Vector, scale: float, drag: tuple[Hashable, ...])
     return Node("transform_controls", key, {**props, "depth_test": False}, position, drag=drag)
 
 
+def ends(nodes: Sequence[Node]) -> Array:
+    """The points ``(n, 3)`` that a picture has to contain to show these nodes, without their children."""
+    found = [np.zeros((0, 3))]
+    for node in nodes:
+        if "points" in node.props:
+            found.append(np.asarray(node.props["points"], float).reshape(-1, 3))
+        elif node.position is not None:
+            found.append(np.reshape(np.asarray(node.position, float), (1, 3)))
+    return np.concatenate(found)
+
+
 def arrow_color(color: Color) -> Color:
     """The colour to send for arrows that look like a mesh of `color`: the scene applies gamma to arrows."""
     red, green, blue = (round(255 * ((v / 255 + 0.055) / 1.055) ** 2.4) for v in color)

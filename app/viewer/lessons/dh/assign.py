@@ -14,7 +14,7 @@ from app.viewer.lessons.dh.attempt import Attempt, error_of, table_robot
 from app.viewer.lessons.dh.steps import ORDERS, low
 from app.viewer.views.templates import render
 from kin.transforms import Array
-from kin.units import Units
+from kin.units import Units, fixed
 
 PROMPTS: dict[choices.Part, str] = {
     "axis": "Which line is z{i}?",
@@ -82,6 +82,21 @@ def rows_html(work: Assignment, q: Array, units: Units, asked: bool = False) -> 
     robot = table_robot(work)
     senses = [work.sense(joint) for joint in range(robot.n)]
     return views.table_html(robot, q[: robot.n], None, units, "Your rows", senses, asked)
+
+
+def measured_html(attempt: Attempt, q: Array, units: Units) -> str:
+    """What the row that is asked for is computed from: both of its frames at a configuration ``(n,)``."""
+    work, number = attempt.work, attempt.number
+    if work.complete or attempt.part is not None or not work.frames:
+        return ""
+    rows = []
+    frames = work.frames_at(q)[-1], work.carried(attempt.chosen, q)
+    for i, T in zip((number - 1, number), frames, strict=True):
+        rows.append({"name": f"origin {i}", "cells": [units.lengths.number(x) for x in T[:3, 3].tolist()]})
+        for axis in (0, 2):
+            name, cells = f"{'xyz'[axis]}{low(i)}", [fixed(x, 4) for x in T[:3, axis].tolist()]
+            rows.append({"name": name, "cells": cells})
+    return render("dh/measured", unit=units.lengths.name, rows=rows)
 
 
 def _fields(attempt: Attempt, units: Units) -> list[dict[str, object]]:

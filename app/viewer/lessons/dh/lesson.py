@@ -17,7 +17,7 @@ from app.viewer.declared.scene import Lazy
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.feature import Stage
 from app.viewer.lessons.dh import assign_drawing, drawing, views
-from app.viewer.lessons.dh.assign import assign_html, rows_html
+from app.viewer.lessons.dh.assign import assign_html, measured_html, rows_html
 from app.viewer.lessons.dh.attempt import Attempt
 from app.viewer.lessons.dh.axes_drawing import axis_names, joint_axes, room
 from app.viewer.lessons.dh.both import BothInView
@@ -86,7 +86,9 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
         if s.assign is not None:
             block = Html(assign_html, (s.assign, units), key="block")
             # Apart from the fields: it changes while the arm moves, and what is being typed must stay.
-            return [first, block, Html(rows_html, (s.assign.work, f.q, units, asked), key="rows"), nine]
+            measured = () if asked else (Html(measured_html, (s.assign, f.q, units), key="measured"),)
+            rows = Html(rows_html, (s.assign.work, f.q, units, asked), key="rows")
+            return [first, block, *measured, rows, nine]
         motions = {
             name: self.event(getattr(self, f"on_{name.lower()}")) for name in ("Back", "Play", "Pause", "Next")
         }

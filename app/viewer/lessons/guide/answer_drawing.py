@@ -5,8 +5,6 @@ Wrong answers are vermilion and broken, right ones green and whole.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from app.exercises.contract import Posed
@@ -122,17 +120,6 @@ def _frame_nodes(robot: Robot, question: Posed, given: object, closed: bool) -> 
 def _pose_of(given: object) -> Array:
     values = np.array(given, dtype=float)
     return pose_from_position_wxyz(values[:3], values[3:])
-
-
-def ends(nodes: Sequence[Node]) -> Array:
-    """The points ``(n, 3)`` that a picture has to contain to show these nodes."""
-    found = [np.zeros((0, 3))]
-    for node in nodes:
-        if "points" in node.props:
-            found.append(np.asarray(node.props["points"], float).reshape(-1, 3))
-        elif node.position is not None:
-            found.append(np.reshape(np.asarray(node.position, float), (1, 3)))
-    return np.concatenate(found)
 
 
 def _is_way(question: Number) -> bool:

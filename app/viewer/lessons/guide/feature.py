@@ -13,13 +13,13 @@ import numpy as np
 import viser
 
 from app.exercises.typed import EntryError
-from app.viewer.declared.scene import Node, SceneView
+from app.viewer.declared.scene import Node, SceneView, ends
 from app.viewer.exercises.drawing import GHOST, Drawing
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.exercises.views import Following
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import earlier, views
-from app.viewer.lessons.guide.answer_drawing import answer_nodes, ends, lead_nodes
+from app.viewer.lessons.guide.answer_drawing import answer_nodes, lead_nodes
 from app.viewer.lessons.guide.content import written_example
 from app.viewer.lessons.guide.example_view import ExampleView
 from app.viewer.lessons.guide.lesson import Lesson

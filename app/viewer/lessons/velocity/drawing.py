@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.viewer.declared.scene import Color, Lazy, Node, arrows, frame, handle, label, lines, mesh
+from app.viewer.declared.scene import Color, Lazy, Node, arrows, ends, frame, handle, label, lines, mesh
 from app.viewer.lessons.velocity.facts import VelocityFacts, scale_of
 from app.viewer.lessons.velocity.views import COLORS, COLUMN, LOST, SAMPLE, SLOW, label_texts
 from app.viewer.scene.arm.arm_scene import GIZMO
@@ -117,6 +117,12 @@ def _lost(facts: VelocityFacts) -> list[Node]:
         turn, at = wxyz_along(twist[3:]), _ring_place(twist, r)
         parts.append(mesh(f"lost-turn-{k}", ring_arrow(True), color, LOST_RING * r, position=at, wxyz=turn))
     return parts
+
+
+def lost_ends(facts: VelocityFacts) -> Array:
+    """Where the arrows of lost directions end ``(n, 3)``."""
+    found = ends(_lost(facts))
+    return found + facts.T[:3, 3] if len(found) else found
 
 
 def _arrows(key: str, points: list[list[Array]], color: Color, r: float) -> Node:

@@ -16,7 +16,7 @@ from app.viewer.declared.panel import Button, Buttons, Control, Folder, Html, No
 from app.viewer.declared.scene import Node as SceneNode
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.velocity import section_views, views
-from app.viewer.lessons.velocity.drawing import force_scale, scene, truncated
+from app.viewer.lessons.velocity.drawing import force_scale, lost_ends, scene, truncated
 from app.viewer.lessons.velocity.facts import VelocityFacts, scale_of
 from app.viewer.lessons.velocity.jog import BUTTONS, button, step
 from app.viewer.lessons.velocity.null_motion import FRAME, NullMotion
@@ -45,6 +45,14 @@ class VelocityLesson(DeclaredFeature[VelocitySettings, VelocityFacts], Lesson):
         self._start: Array | None = None
         self._plot = ""
         self._motion: NullMotion | None = None
+        self._lost = np.zeros((0, 3))  # the ends of the arrows of lost directions
+
+    def refresh(self) -> None:
+        super().refresh()
+        found = np.zeros((0, 3)) if self.hides("singularities") else lost_ends(self.read)
+        if len(found) != len(self._lost) or not np.allclose(found, self._lost):
+            self._lost = found
+            self.stage.keep_in_view(None, found)
 
     # What is shown
 

@@ -24,7 +24,7 @@ from kin.units import Units, general
 
 LOAD, SLOW = 10.0, 1e-3  # N, m/s
 SAMPLES, SCANNED = 32, 73  # configurations at random, and along the range of a joint
-FLAT, CLEAR = 0.04, 2.0  # of the largest σ that was found: what counts as none; home has more than twice as much
+FLAT, CLEAR = 0.06, 2.0  # of the largest σ that was found: what counts as none; home has more than twice as much
 
 
 def outline(robot: Robot, units: Units) -> Outline:

@@ -15,7 +15,7 @@ import kin
 from app.exercises.rows import FACTORS, Factor, turns
 from app.viewer.declared.scene import Node
 from app.viewer.lessons.dh import assign_drawing, choices
-from app.viewer.lessons.dh.assign import assign_html, rows_html
+from app.viewer.lessons.dh.assign import assign_html, measured_html, rows_html
 from app.viewer.lessons.dh.assignment import Assignment, read_row
 from app.viewer.lessons.dh.attempt import Attempt, error_of
 from app.viewer.lessons.dh.settings import DHSettings
@@ -110,6 +110,37 @@ def test_the_lengths_of_the_row_to_be_typed_are_drawn_without_their_values(robot
             assert not [text for text in labels(nodes) if "=" in text and not text.endswith("= ?")]
         attempt.show()
     assert rows == robot.n
+
+
+@pytest.mark.parametrize("units", [DEFAULT_UNITS, IN_M], ids=["mm", "m"])
+@arms
+def test_a_row_can_be_computed_from_the_numbers_beside_it(robot: kin.Robot, units: Units) -> None:
+    """By the definitions of the four parameters, from what is printed, at any pose."""
+    attempt, q, rows = begin(robot), robot.random_q(np.random.default_rng(11), 1)[0], 0
+    while not attempt.work.complete:
+        html = measured_html(attempt, q, units)
+        assert (html == "") == (attempt.part is not None)
+        if attempt.part is not None:
+            attempt.show()
+            continue
+        lines = [[*row.itertext()] for row in ET.fromstring(html).iter("tr")][1:]
+        (p, x, z), (r, u, w) = (
+            [np.array([float(cell.replace("−", "-")) for cell in line[-3:]]) for line in lines[i : i + 3]]
+            for i in (0, 3)
+        )
+        about_z, along_x = (z, u) if robot.convention == "standard" else (w, x)
+        typed = {
+            "theta": units.angles.scale * math.atan2(about_z @ np.cross(x, u), x @ u),
+            "d": (r - p) @ about_z,
+            "a": (r - p) @ along_x,
+            "alpha": units.angles.scale * math.atan2(along_x @ np.cross(z, w), z @ w),
+        }
+        attempt.check({factor: f"{value:.9f}" for factor, value in typed.items()}, q, units)
+        assert attempt.feedback is not None
+        assert attempt.feedback.right, (rows, typed, attempt.feedback)
+        rows += 1
+    assert rows == robot.n
+    assert measured_html(attempt, q, units) == ""
 
 
 @arms

@@ -71,6 +71,27 @@ def test_every_lesson_has_another_verb_or_offers_an_arm_for_it(robot: Robot) -> 
         assert VERBS[step.question.kind.name] == verb
 
 
+SLIDER = 149  # pixels of a joint's slider in a window of 1280 px
+
+
+@pytest.mark.parametrize("robot", CLASSICS, ids=lambda robot: robot.id)
+def test_a_singularity_can_be_reached_by_dragging_a_slider(robot: Robot) -> None:
+    """Whatever pixel of the slider is nearest to where the step leads, it is near enough."""
+    outline = next(each for each in LESSONS if each.key == "velocity").outline(robot, UNITS)
+    step = next(each for each in outline.steps if each.title == "Drive to a singularity")
+    assert isinstance(step.question, Posed)
+    there = np.array(step.question.right())
+    moved = np.flatnonzero(np.abs(there - robot.q_home) > 1e-6)
+    if robot.id == "planar3r":
+        assert len(moved) > 1, "no joint of it does it alone"
+        return
+    [joint] = moved
+    pixel = float(robot.upper[joint] - robot.lower[joint]) / SLIDER
+    for off in (-0.5, 0.5):
+        q = np.clip(there + off * pixel * np.eye(robot.n)[joint], robot.lower, robot.upper)
+        assert step.question.judge(q.tolist()).right, robot.id
+
+
 def test_lessons_count_their_verbs() -> None:
     """How large, which, and at least one more in every lesson."""
     assert {lesson.key for lesson in LESSONS} == ASKED.keys()

@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator
 
 import numpy as np
+import numpy_arm
 import pytest
 from arms import CLASSICS
 from bare_page import bare_page
@@ -24,6 +25,7 @@ from app.viewer.lessons.velocity.drawing import ring_arrow, sides, wxyz_along
 from app.viewer.lessons.velocity.jog import BUTTONS, button, moved, step
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.lessons.velocity.views import NEAR, nice, real, state_of
+from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
 from kin.differential.ellipsoids import axes_of, condition, lost, part_of, semi_axes, task_rates
 from kin.differential.task import natural_task, task_jacobian, usual_rank
@@ -477,6 +479,29 @@ def test_a_shared_state_is_restored_and_an_invalid_one_is_ignored() -> None:
         lesson.restore(first)
         lesson.restore({"ellipsoid": "none"})
         assert lesson.state()["ellipsoid"] == "none"
+        lesson.remove()
+
+
+def test_the_picture_is_to_have_the_arrows_of_lost_directions() -> None:
+    robot = STORE.get("ur5")
+    with bare_page(robot) as page:
+        lesson = page.open(VelocityLesson)
+        page.rest()
+        page.kept.clear()
+        q = robot.q_home.copy()
+        q[4] = 0.0
+        page.move_to(q)
+        page.rest()
+        J, tool = numpy_arm.jacobian(robot, q), numpy_arm.pose(robot, q)[:3, 3]
+        lost = np.linalg.svd(J)[0][:, -1]
+        aside = page.kept[-1] - tool
+        far = np.linalg.norm(aside, axis=1)
+        assert far.max() > 0.3 * body(robot).radius, "arrows end beyond those of the gizmo"
+        along = np.abs(aside @ lost[:3]) / np.linalg.norm(lost[:3])
+        assert np.isclose(along, far, rtol=1e-3).sum() >= 2, "the way that is lost, to both sides"
+        page.move_to(robot.q_home)
+        page.rest()
+        assert len(page.kept[-1]) == 0
         lesson.remove()
 
 
