@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, Literal, get_args
 
@@ -121,7 +121,7 @@ class Capsule:
     assumed: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Robot:
     """A serial arm: immutable, hashable, compared by value. Derived arrays are cached and read-only.
 
@@ -156,13 +156,18 @@ class Robot:
     maker: str = ""
     payload: float | None = None
     mass: float | None = None
-    base: Matrix = field(default=IDENTITY, repr=False)
-    tool: Matrix = field(default=IDENTITY, repr=False)
-    capsules: tuple[Capsule, ...] = field(default=(), repr=False)
-    capsules_source: str = field(default="", repr=False)
+    base: Matrix = IDENTITY
+    tool: Matrix = IDENTITY
+    capsules: tuple[Capsule, ...] = ()
+    capsules_source: str = ""
     mounting: Mounting | None = None
     floor: float | None = None
-    motors: tuple[Motor, ...] = field(default=(), repr=False)
+    motors: tuple[Motor, ...] = ()
+
+    def __repr__(self) -> str:
+        """Id, name and joints in one line; `kin.robot_to_toml` writes out the table."""
+        joints = ", ".join(joint.name for joint in self.joints)
+        return f"Robot({self.id!r}, {self.name!r}, {self.n} joint{'s' if self.n > 1 else ''}: {joints})"
 
     def __post_init__(self) -> None:
         """Check the fields; lists become tuples, and arrays become nested tuples."""

@@ -135,3 +135,11 @@ def test_results_print_as_one_line():
     assert repr(result.solutions[0]).startswith("IKSolution([")
     assert result.solutions[0].branch in repr(result.solutions[0])
     assert "\n" not in repr(result)
+
+
+def test_a_robot_prints_as_one_line() -> None:
+    text = "Robot('ur5', 'UR5', 6 joints: base, shoulder, elbow, wrist 1, wrist 2, wrist 3)"
+    assert repr(kin.get_robot("ur5")) == text
+    for robot in kin.builtin_robots().values():
+        assert "\n" not in repr(robot)
+        assert len(repr(robot)) < 250
