@@ -18,16 +18,16 @@ from kin.ik.candidates import DISTANCE, OVERRUN
 from kin.ik.details import NotOnBranch, Solved
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKResult, Status
-from kin.solvers.contract import APPROACH, POSE, POSITION
+from kin.solvers.contract import APPROACH, POSE, POSITION, Candidates
 from kin.transforms import Array
 
 _SUSPICIOUS = 1e3  # times the rounding: where the formulas of a rounded table may miss postures
 
 
-def answer(problem: IKProblem) -> IKResult:
-    """The answer to a checked problem."""
+def answer(problem: IKProblem, found: Candidates | None = None) -> IKResult:
+    """The answer to a checked problem; found: what its closed form finds for it, if it has been asked."""
     if not problem.options.avoids:
-        return _answer(problem)
+        return _answer(problem, found)
     most = problem.options.max_solutions
     return avoidance.checked(problem, _answer(avoidance.with_all_solutions(problem)), most)
 
@@ -43,8 +43,8 @@ def answer_at_once(problem: IKProblem) -> IKResult | None:
     return _solved(problem, branches, branches.good) if branches is not None and branches.order else None
 
 
-def _answer(problem: IKProblem) -> IKResult:
-    branches = solve_branches(problem, problem.T, problem.code)
+def _answer(problem: IKProblem, found: Candidates | None = None) -> IKResult:
+    branches = solve_branches(problem, problem.T, problem.code, found=found)
     if branches is None:
         return _numeric(problem)
     if branches.order and problem.branches is None:

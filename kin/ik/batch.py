@@ -1,8 +1,8 @@
 """Calls for many targets.
 
 `solve_ik_many` answers each target of a stack as :func:`kin.solve_ik` does: limits, ranges, order, a sentence. The
-best solutions come from one compiled pass where the arm's family has one; results and sentences are made when they
-are asked for.
+best solutions are chosen by one compiled pass, which computes the branches too where the arm's family has a kernel
+for many; results and sentences are made when they are asked for.
 `ik_branches` returns joint values at the rate of a control loop, or for a million targets: all branches of a
 closed form as a plain array, without limits, order or verification. It calls the batch kernels of the arm's closed
 form (`kin.solvers.contract.BatchKernels`).
@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple, overload
 
@@ -23,6 +24,7 @@ from kin.collision import Obstacle
 from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.answers import answer
+from kin.ik.branches import candidates_of
 from kin.ik.candidates import nearest_rows
 from kin.ik.options import Frame, IKOptions, Images, Limits, Locks, Preference, Solver, Values, WiderLimits
 from kin.ik.problem import FAR, IKProblem, listed, never_cancel, prepare, read_poses, read_seed
@@ -31,7 +33,7 @@ from kin.kernels import fk as fk_kernels
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers import closed_form_of
-from kin.solvers.contract import ClosedForm, Many, One
+from kin.solvers.contract import Candidates, ClosedForm, Many, One
 from kin.transforms import Array, finite_array, is_plain
 
 _POSE = (4, 4)
@@ -51,9 +53,9 @@ class IKResults(Sequence[IKResult]):
         status: of each answer.
     """
 
-    def __init__(self, problem_at: Callable[[int], IKProblem], q: Array) -> None:
-        """The answers to the problems of `problem_at`; rows of q ``(k, n)`` that are NaN are solved here."""
-        self._problem_at, self.q = problem_at, q
+    def __init__(self, answer_at: Callable[[int], IKResult], q: Array) -> None:
+        """The answers of `answer_at`, with the best solutions q ``(k, n)``; rows that are NaN are solved here."""
+        self._answer_at, self.q = answer_at, q
         self._made: dict[int, IKResult] = {}
         for i in np.flatnonzero(np.isnan(q[:, 0])).tolist():
             if self[i].status is Status.SOLVED:
@@ -78,7 +80,7 @@ class IKResults(Sequence[IKResult]):
         index = range(len(self))[index]
         found = self._made.get(index)
         if found is None:
-            found = self._made[index] = answer(self._problem_at(index))
+            found = self._made[index] = self._answer_at(index)
         return found
 
     def __len__(self) -> int:
@@ -190,7 +192,7 @@ def solve_many(
 
     Args:
         rounding: ``(k,)`` for each target, as in `kin.ik.solve`.
-        stop: called before each target that takes more than the compiled pass; raises to cancel.
+        stop: called before each target that takes more than a compiled pass; raises to cancel.
 
     Raises:
         InputError: a malformed target (named ``targets[i]``) or seed, or an option that does not fit the arm.
@@ -200,34 +202,69 @@ def solve_many(
     if rounding is not None:
         errors += rounding
     seeds = prepared.seed[None] if q_seed is None else _seeds(robot, q_seed, len(targets))
-    last = len(seeds) - 1
-
-    def problem_at(i: int) -> IKProblem:
-        stop()
-        return prepared.at(poses[i], float(errors[i]), seeds[min(i, last)])
-
-    return IKResults(problem_at, _nearest(prepared, poses, errors, seeds))
+    stack = _Stack(prepared, poses, errors, seeds, stop)
+    return IKResults(stack.answer, stack.nearest())
 
 
-def _nearest(prepared: IKProblem, poses: Array, errors: Array, seeds: Array) -> Array:
-    """The best solution of each target ``(k, n)``, NaN where it takes more than one compiled pass to find it.
+@dataclass(frozen=True, eq=False)
+class _Stack:
+    """Targets ``(k, 4, 4)`` of one prepared problem, their rounding ``(k,)`` and their seeds ``(k or 1, n)``.
 
-    The pass serves tasks for which the arm's family has a kernel for many, inside the limits, with all branches,
-    nearest to the seed first.
+    Attributes:
+        found: of targets, what their closed form found, until their answers are made.
     """
-    q = np.full((len(poses), prepared.robot.n), math.nan)
-    options, form = prepared.options, prepared.closed_form
-    plain = options.prefer == options.images == "nearest" and options.respect_limits and not options.avoids
-    chosen = prepared.branches is not None or prepared.requested
-    if form is None or prepared.code not in form.quick or not plain or chosen:
+
+    prepared: IKProblem
+    poses: Array
+    errors: Array
+    seeds: Array
+    stop: Callable[[], None]
+    found: dict[int, Candidates] = field(default_factory=dict)
+
+    def problem(self, i: int) -> IKProblem:
+        """The problem of target i."""
+        self.stop()
+        return self.prepared.at(self.poses[i], float(self.errors[i]), self.seeds[min(i, len(self.seeds) - 1)])
+
+    def answer(self, i: int) -> IKResult:
+        """The answer to target i."""
+        return answer(self.problem(i), self.found.pop(i, None))
+
+    def nearest(self) -> Array:
+        """The best solution of each target ``(k, n)``, NaN where it takes more than its branches to find it.
+
+        That is so without a closed form for the task, and where options choose among solutions otherwise than by
+        their distance to the seed.
+        """
+        prepared, options, form = self.prepared, self.prepared.options, self.prepared.closed_form
+        q = np.full((len(self.poses), prepared.robot.n), math.nan)
+        plain = options.prefer == options.images == "nearest" and not options.avoids and prepared.branches is None
+        if form is None or not form.handles(prepared.code) or not plain:
+            return q
+        quick = prepared.code in form.quick and options.respect_limits and not prepared.requested
+        exact = np.flatnonzero(self.errors == 0.0)
+        for start in range(0, len(exact), _AT_ONCE):
+            rows = exact[start : start + _AT_ONCE]
+            # Neighbours need not be copied, which takes as long as a tenth of the rest.
+            some = slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] < len(rows) else rows
+            seeds = self.seeds if len(self.seeds) == 1 else self.seeds[some]
+            q[some] = (
+                _chosen(prepared, form, self.poses[some], seeds)
+                if quick
+                else self._chosen_one_by_one(rows.tolist(), self.poses[some], seeds)
+            )
         return q
-    exact = np.flatnonzero(errors == 0.0)
-    for start in range(0, len(exact), _AT_ONCE):
-        rows = exact[start : start + _AT_ONCE]
-        # Neighbours need not be copied, which takes as long as a tenth of the rest.
-        some = slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] < len(rows) else rows
-        q[some] = _chosen(prepared, form, poses[some], seeds if len(seeds) == 1 else seeds[some])
-    return q
+
+    def _chosen_one_by_one(self, rows: list[int], T: Array, seeds: Array) -> Array:
+        """The best solutions ``(k, n)`` of some targets, whose branches are computed one target at a time."""
+        for i in rows:
+            problem = self.problem(i)
+            found = candidates_of(problem, problem.T, problem.code)
+            assert found is not None  # since the closed form handles the task
+            self.found[i] = found
+        q = np.empty((len(rows), self.prepared.robot.n))
+        nearest_rows(self.prepared.requirement, T, seeds, np.stack([self.found[i].q for i in rows]), q)
+        return q
 
 
 def _chosen(prepared: IKProblem, form: ClosedForm, T: Array, seeds: Array) -> Array:

@@ -14,7 +14,14 @@ from kin.ik.candidates import Rows, accept, measure_rows, ranges, unchecked
 from kin.ik.details import JointKind, LimitViolation, Redundancy
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKSolution
-from kin.solvers.contract import APPROACH, Completeness, Obstacle, RedundancyParameter, SolverInput
+from kin.solvers.contract import (
+    APPROACH,
+    Candidates,
+    Completeness,
+    Obstacle,
+    RedundancyParameter,
+    SolverInput,
+)
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -59,13 +66,40 @@ def is_closed(problem: IKProblem, stats: Array) -> Flags:
 
 
 def solve_branches(
-    problem: IKProblem, T: Array, code: int, seed: Array | None = None, values: tuple[float, ...] | None = None
-) -> Branches | None:
+    problem: IKProblem, T: Array, code: int, seed: Array | None = None, values: tuple[float, ...] | None = None,
+    found: Candidates | None = None,
+) -> Branches | None:  # fmt: skip
     """The branches of the arm's closed form for target `T` ``(4, 4)``, None if it has none for this task.
 
     Args:
         problem: limits, seed, and the target and task that the rows are measured against.
-        T: target of the closed form; the errors are measured against the problem's own.
+        T, code, seed, values: as for `candidates_of`; the errors are measured against the problem's own target.
+        found: what `candidates_of` gives for them, if it has been asked.
+    """
+    closed_form = problem.closed_form
+    if found is None:
+        found = candidates_of(problem, T, code, seed, values)
+    if found is None or closed_form is None:
+        return None
+    redundancies = problem.redundancies if code == problem.code else closed_form.redundancies(code)
+    q = found.q.copy()
+    k = len(q)
+    rows = Rows(q, _empty((k, 5)), _empty(k, _BOOL), _empty(k, _BOOL), _empty(k, _WHOLE))
+    count = unchecked()(problem.requirement, problem.T, problem.seed if seed is None else seed, problem.seed, rows)
+    return Branches(
+        q, rows.stats, rows.closed, rows.good, rows.order[:count].tolist(), redundancies, found.values,
+        list(found.arcs), found.gap, found.obstacle, found.completeness, found.further,
+    )  # fmt: skip
+
+
+def candidates_of(
+    problem: IKProblem, T: Array, code: int, seed: Array | None = None, values: tuple[float, ...] | None = None
+) -> Candidates | None:
+    """What the arm's closed form finds for target `T` ``(4, 4)``, None if it has none for this task.
+
+    Args:
+        problem: the limits, and whatever is not given.
+        T: target of the closed form.
         code: task of the closed form.
         seed: another seed than the problem's.
         values: other values of the redundancy parameters than the problem's, NaN to let them be chosen.
@@ -82,15 +116,7 @@ def solve_branches(
         x = fk(problem.robot, seed)[:3, 0]
         roll = math.atan2(float(T[:3, 1] @ x), float(T[:3, 0] @ x))
     lower, upper = limits_of(problem)
-    found = closed_form.solve(SolverInput(T, code, values, problem.respect, seed, lower, upper, roll))
-    q = found.q.copy()
-    k = len(q)
-    rows = Rows(q, _empty((k, 5)), _empty(k, _BOOL), _empty(k, _BOOL), _empty(k, _WHOLE))
-    count = unchecked()(problem.requirement, problem.T, seed, problem.seed, rows)
-    return Branches(
-        q, rows.stats, rows.closed, rows.good, rows.order[:count].tolist(), redundancies, found.values,
-        list(found.arcs), found.gap, found.obstacle, found.completeness, found.further,
-    )  # fmt: skip
+    return closed_form.solve(SolverInput(T, code, values, problem.respect, seed, lower, upper, roll))
 
 
 def limits_of(problem: IKProblem) -> tuple[Array, Array]:

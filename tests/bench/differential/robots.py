@@ -7,15 +7,18 @@ from typing import Any
 
 from arms import CLASSICS, GEN3, SAWYER, XARM7, reversed_at
 
+import kin
+
 # More for arms whose intervals are found by a search; the general solver takes a hundred times longer than others.
 _SHARES = {"panda": 3.0, "gen3": 2.0, "xarm7": 2.0, "sawyer": 0.1}
 
 
 def all_robots() -> dict[str, Any]:
-    """Every built-in arm, arms of other makers, and arms whose tables count some joints the other way."""
+    """Every classic arm, one of each further family, and arms whose tables count some joints the other way."""
     built_in = {robot.id: robot for robot in CLASSICS}
     others = (GEN3, XARM7, SAWYER, reversed_at(built_in["ur5"], (1, 3)), reversed_at(built_in["panda"], (0, 3, 5)))
-    return dict(built_in) | {robot.id: robot for robot in others}
+    few = map(kin.get_robot, ("so100", "gantry", "rpp", "rrp", "gofa"))
+    return dict(built_in) | {robot.id: robot for robot in (*others, *few)}
 
 
 def shares(count: int, only: Sequence[str] = ()) -> list[tuple[Any, int]]:

@@ -435,7 +435,7 @@ def test_a_stack_given_to_solve_ik_is_refused_with_what_takes_it():
     [
         *("pioneer5", "puma560", "ur5", "irb120", "stanford", "scara"),
         *("iiwa14", "redundant7", "redundant7-craig", "panda"),
-        *("planar2r", "planar3r", "so100", "wx250", "gantry", "rpp"),
+        *("planar2r", "planar3r", "so100", "wx250", "gantry", "rpp", "rrp", "gofa"),
     ],
 )
 @pytest.mark.parametrize("more", [{}, {"respect_limits": False}, {"locked": True}], ids=["limits", "none", "lock"])
@@ -484,6 +484,38 @@ def test_few_joints_meet_what_they_can_in_a_batch_as_alone(name, task, turned):
     assert found.solved.sum() >= 20
     if name == "planar2r":
         assert nearest < 30  # elsewhere the other elbow is nearer, and turns the tool another way
+
+
+@pytest.mark.parametrize(
+    ("name", "more"),
+    [
+        ("panda", {}),
+        ("panda", {"redundancy": {"theta7": 0.4}}),
+        ("iiwa14", {"redundancy": {"psi": 0.5}}),
+        ("ur5", {"task": "approach"}),
+        ("so100", {"respect_limits": False}),
+        ("planar3r", {"task": "position"}),
+        ("gofa", {}),
+    ],
+    ids=str,
+)
+def test_branches_that_are_computed_one_target_at_a_time_are_computed_once(name, more, monkeypatch):
+    """For the best solution and for the whole answer, which are those of a single call."""
+    robot, rng = kin.get_robot(name), np.random.default_rng(10)
+    T, seeds = kin.fk(robot, robot.random_q(rng, 12)), robot.random_q(rng, 12)
+    alone = [kin.solve_ik(robot, each, q_seed=seed, **more) for each, seed in zip(T, seeds, strict=True)]
+    form, asked = closed_form_of(robot), []
+    solve = type(form).solve
+    monkeypatch.setattr(type(form), "solve", lambda form, given: asked.append(given.T) or solve(form, given))
+    found = kin.solve_ik_many(robot, T, q_seed=seeds, **more)
+    solved = [i for i, result in enumerate(alone) if result.status is kin.Status.SOLVED]
+    assert len(solved) >= 6
+    for i in solved:
+        assert np.array_equal(found.q[i], alone[i].best.q)
+        assert repr(found[i]) == repr(alone[i])
+        assert found[i].redundancy == alone[i].redundancy
+        assert [s.q.tolist() for s in found[i].solutions] == [s.q.tolist() for s in alone[i].solutions]
+        assert sum(np.allclose(each, T[i], atol=1e-9) for each in asked) == 1
 
 
 def test_of_two_rows_that_are_equally_near_but_for_rounding_the_first_is_taken():
@@ -575,7 +607,7 @@ def test_a_choice_that_is_not_clear_is_left_open():
 
 def test_results_are_made_when_they_are_asked_for(monkeypatch):
     made = []
-    monkeypatch.setattr(batch, "answer", lambda given: made.append(given) or answer(given))
+    monkeypatch.setattr(batch, "answer", lambda *given: made.append(given) or answer(*given))
     robot = kin.get_robot("ur5")
     T = targets(robot, 5)
     T[3, :3, 3] = 9.0
