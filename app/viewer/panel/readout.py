@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Collection, Sequence
+from functools import lru_cache
+from itertools import chain
 
 import viser
+from markupsafe import Markup
 
 from app.viewer.frames import TITLES, Frames
 from app.viewer.panel import update_html
@@ -16,6 +19,8 @@ from app.viewer.viser_patches import show_content
 from kin.frames import WORLD
 from kin.transforms import Array
 from kin.units import Unit, Units, fixed
+
+_NUMBER = Markup("<number>")  # for the place of a number: what is escaped has no "<"
 
 
 def html(
@@ -41,11 +46,22 @@ def html(
         ("quaternion", rotations.quaternion.names, rotations.quaternion.definition, ""),
     )
     tool = _parts(T_frame_tool, units, rotations)
-    target: Sequence[Sequence[str]] = (
-        ((),) * 3 if T_frame_target is None else _parts(T_frame_target, units, rotations)
-    )
+    if T_frame_target is None:
+        texts = _between(titles, tuple(map(len, tool)), frozenset(withheld))
+        shown = [numbers for title, numbers in zip(titles, tool, strict=True) if title[0] not in withheld]
+        return "".join(chain.from_iterable(zip(texts, [*chain(*shown), ""], strict=True)))
+    target = _parts(T_frame_target, units, rotations)
     rows = [(*title, numbers, wanted) for title, numbers, wanted in zip(titles, tool, target, strict=True)]
-    return render("panel/readout", rows=rows, frame=frame, withheld=withheld)
+    return render("panel/readout", rows=rows, withheld=withheld)
+
+
+@lru_cache(maxsize=64)
+def _between(
+    titles: Sequence[tuple[str, ...]], counts: tuple[int, ...], withheld: frozenset[str]
+) -> tuple[str, ...]:
+    """The texts before, between and after the numbers of the table, which is written many times a second."""
+    rows = [(*title, [_NUMBER] * count, ()) for title, count in zip(titles, counts, strict=True)]
+    return tuple(render("panel/readout", rows=rows, withheld=withheld).split(_NUMBER))
 
 
 def _parts(T: Array, units: Units, rotations: Rotations) -> tuple[list[str], list[str], list[str]]:

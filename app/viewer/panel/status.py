@@ -182,7 +182,7 @@ class StatusLine:
         self._result = None
         self._over = False
         self._news_since = time.perf_counter()
-        if shown != self._shown:
+        if shown is not self._shown and shown != self._shown:
             self._shown = shown
             self._write()
 

@@ -384,7 +384,7 @@ class ArmController:
             self.scene.show_gap(T[:3, 3], None)
         else:
             target = self.target[:3, 3]
-            missed = float(np.linalg.norm(T[:3, 3] - target)) > _GAP and not self._reached
+            missed = not self._reached and float(np.linalg.norm(T[:3, 3] - target)) > _GAP
             self.scene.show_gap(T[:3, 3], target if missed else None)
 
     def leave(self) -> None:
