@@ -7,6 +7,8 @@
   const ITEM = "viser-user:kinboard";
   const REPLACE = `${ITEM}-replace`; // the same state from another viewpoint
   const RETURN = `${ITEM}-return`; // a state that has an entry
+  const LAST = `${ITEM}-last`; // the same state, for the next page of this browser
+  const LEFT_OFF = "kinboard-left-off";
   const STATE = "kinboard-state";
   const TAB = "kinboard-tab";
   const embedded = window !== window.top; // whose history belongs to the outer page
@@ -18,6 +20,13 @@
   const fragment = new URLSearchParams(location.hash.slice(1));
   const shared = fragment.has("s");
   let state = fragment.get("s") ?? recall(STATE) ?? "";
+  let leftOff = ""; // where the last page with a lesson was, if this one begins anew
+  try { if (!state && !embedded) leftOff = localStorage.getItem(LEFT_OFF) ?? ""; } catch { /* see above */ }
+  document.documentElement.toggleAttribute("data-kb-left-off", leftOff !== "");
+  const leave = (value) => { try { if (!embedded) localStorage.setItem(LEFT_OFF, value); } catch { /* see above */ } };
+  addEventListener("click", (event) => {
+    if (event.target.closest?.("[data-left-off]")) location.hash = `s=${leftOff}&tab=Learn`; // which loads the page anew
+  });
   let tab = fragment.get("tab") ?? (shared ? "" : recall(TAB)) ?? "";
   if (shared) { keep(STATE, state); keep(TAB, tab); }
 
@@ -95,7 +104,7 @@
     });
   }
   const write = (then) => (value) => { state = value; keep(STATE, state); then(); };
-  viserPage.serveItems({ [ITEM]: read }, { [ITEM]: write(add), [REPLACE]: write(show), [RETURN]: write(goBack) });
+  viserPage.serveItems({ [ITEM]: read }, { [ITEM]: write(add), [REPLACE]: write(show), [RETURN]: write(goBack), [LAST]: leave });
 
   // The controls appear some time after the state was requested, with the first tab open.
   function openTab(until) {

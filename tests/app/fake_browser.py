@@ -20,6 +20,7 @@ from websockets.sync.client import connect
 from app.service.web.viewer_proxy import VisitorConnection
 from app.viewer.panel.script import LABEL
 from app.viewer.session.persistence import SAVE_AFTER
+from app.viewer.session.state import KEY_LAST
 from app.viewer.session.worker.worker import Worker
 from kin.transforms import pose_from_position_wxyz, wxyz_from_rotation
 
@@ -90,8 +91,9 @@ class FakeBrowser:
     """One visitor of a local port or of any URL, which may need more `options` to connect.
 
     `read` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`. `memory` is the content
-    of the page's storage, `kept` what the service has stored there. `said` has the last messages of the page's own
-    script. `camera` is where the service has moved it; unlike a real page, this one reports it only with `look`.
+    of the page's storage, `kept` what the service has stored there, and `left_off` what it has stored for the next
+    page of the browser. `said` has the last messages of the page's own script. `camera` is where the service has
+    moved it; unlike a real page, this one reports it only with `look`.
     """
 
     def __init__(
@@ -106,6 +108,7 @@ class FakeBrowser:
         self.memory = memory
         self.said: list[list[Any]] = []
         self.kept: list[str] = []
+        self.left_off: list[str] = []
         self._socket = connect(
             where if isinstance(where, str) else f"ws://127.0.0.1:{where}{path}",
             subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
@@ -360,7 +363,7 @@ class FakeBrowser:
                         "LocalStorageGetItemResponseMessage", request_uuid=uuid, value=self.memory, error=None
                     )
             case "LocalStorageSetItemMessage":
-                self.kept.append(m["value"])
+                (self.left_off if m["key"].endswith(KEY_LAST) else self.kept).append(m["value"])
             case "SetCameraPositionMessage":
                 self.camera["position"] = m["position"]
             case "SetCameraLookAtMessage":

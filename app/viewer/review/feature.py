@@ -152,7 +152,8 @@ class Reviewing(Practising):
         if self._arrived and not here:
             self._asked_in = ""
         self._arrived = here
-        update_html(self._row, views.row_html(self.title, counts) if activity.lesson is None else "")
+        row = views.row_html(self.title, counts, activity.practice.seated) if activity.lesson is None else ""
+        update_html(self._row, row)
         update_html(self._bar, views.bar_html(counts) if here else "")
 
     def state(self) -> dict[str, object]:

@@ -40,9 +40,13 @@ def when(days: int) -> str:
     return "tomorrow" if days == 1 else f"in {days} days"
 
 
-def row_html(title: str, counts: Counts) -> str:
-    """The row in the overview of the tab."""
-    return render("review/row", title=title, counts=counts)
+def row_html(title: str, counts: Counts, seated: bool) -> str:
+    """The row in the overview of the tab, below what leads back to where the browser was left.
+
+    Args:
+        seated: as in `list_html`; its seat knows how far it is.
+    """
+    return render("review/row", title=title, counts=counts, seated=seated)
 
 
 def bar_html(counts: Counts) -> str:

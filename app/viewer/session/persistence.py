@@ -22,6 +22,7 @@ from app.viewer.session.lessons import lesson_with_key
 from app.viewer.session.parts import Page
 from app.viewer.session.state import (
     KEY,
+    KEY_LAST,
     KEY_REPLACE,
     KEY_RETURN,
     PageState,
@@ -172,6 +173,8 @@ class Persistence:
             replaces = self.led or (key != KEY_RETURN and same(state, self._state))
             self._saved, self._state = text, state
             self._page.client.local_storage.set_item(KEY_REPLACE if replaces else key, text)
+            if state.lesson is not None and not self._page.activity.practice.seated:
+                self._page.client.local_storage.set_item(KEY_LAST, text)
             self._update_share()
             self._page.client.flush()
 

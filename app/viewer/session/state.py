@@ -39,8 +39,9 @@ from kin.units import DEFAULT_UNITS, LENGTHS, Units
 
 VERSION = 1
 # Of the item in the page's storage. For a state under `KEY`, the page adds an entry to the browser's history;
-# under the others, it replaces the present entry (another viewpoint) or returns to the entry with this state.
+# under the next two, it replaces the present entry (another viewpoint) or returns to the entry with this state.
 KEY, KEY_REPLACE, KEY_RETURN = "kinboard", "kinboard-replace", "kinboard-return"
+KEY_LAST = "kinboard-last"  # the browser's next page offers it
 MAX_TEXT = 16_000  # characters; the bridge refuses messages of 64 KiB
 LONG = 2000  # characters; longer texts are compressed
 COMPRESSED = "z"  # begins a compressed text; base64 of JSON never begins with it

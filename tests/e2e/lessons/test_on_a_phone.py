@@ -158,3 +158,31 @@ def test_a_course_leads_on_from_where_the_answer_is(phone: Tab, no_spoilt_page: 
     expect(steps).to_have_attribute("data-step", "2")
     expect(steps.get_by_role("heading").first).to_be_in_viewport(ratio=1)
     phone.choose("Lesson", "None")
+
+
+def test_a_closed_page_is_continued_in_the_next_one(phone: Tab, no_spoilt_page: None) -> None:
+    phone.reopen()
+    page = phone.page
+    left_off = "Continue where you left off"
+    phone.open("Learn")
+    expect(page.locator("[data-review=row]")).to_be_visible()
+    expect(page.get_by_role("button", name=left_off)).to_be_hidden()  # a browser that was nowhere yet
+    phone.choose("Lesson", "Courses")
+    page.get_by_role("button", name="First steps").first.tap()
+    page.get_by_role("button", name="Start", exact=True).tap()
+    page.locator("[data-exercises=question] [data-guide-do=answer]").nth(2).tap()
+    page.get_by_role("button", name="Next in the course").tap()
+    expect(page.locator("[data-course=bar]").get_by_text("2 of 12")).to_be_visible()
+    page.wait_for_function(
+        "localStorage.getItem('kinboard-left-off') === sessionStorage.getItem('kinboard-state')"
+    )
+
+    address = page.url.partition("#")[0]
+    page.evaluate("sessionStorage.clear()")  # as in another tab
+    page.goto("about:blank")
+    page.goto(address)
+    page.get_by_role("tab", name="Learn").tap()
+    page.get_by_role("button", name=left_off).tap()
+    expect(page.locator("[data-course=bar]").get_by_text("2 of 12")).to_be_visible()
+    expect(page.locator(".kb-course-steps .kb-green")).to_have_count(1)
+    phone.reopen()

@@ -321,6 +321,8 @@ def test_a_lead_pauses_the_exercise_of_a_course_and_returns_to_it(room: Class) -
     for tab in (student, again):
         tab.wait(lambda tab=tab: f'data-exercise="{EXERCISE}"' in tab.html)
         assert 'data-course="bar"' in tab.html
+        assert "data-left-off" not in tab.html
+        assert tab.left_off == [], "nothing of a seat is left for the next student of the browser"
 
     # Who has stopped following and opened something else keeps that.
     mode(student, "free")

@@ -184,6 +184,17 @@ def test_a_limit_is_named_by_joint_number(port: int) -> None:
         assert f"Outside the limits: joint {expected.violations[0].joint + 1}" in tab.html
 
 
+def test_an_open_lesson_is_kept_for_the_next_page_of_the_browser(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        tab.set("1 rotating base", 80.0)
+        tab.wait(lambda: bool(tab.kept))
+        assert tab.left_off == [], "an arm alone is quickly there again"
+        tab.set("Lesson", "Exercises")
+        tab.wait(lambda: bool(tab.left_off))
+        assert tab.left_off == tab.kept[-1:]
+
+
 def test_home_random_and_units(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
