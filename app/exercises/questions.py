@@ -306,11 +306,11 @@ class Number(Question):
         size = "large" if abs(answer) > abs(self.answer) else "small"
         if answer * self.answer < 0.0:
             return f"The sign is not right, and the size is too {size}."
-        return f"{'The size is too' if self.answer < 0.0 else 'Too'} {size}."
+        return f"{'The size is too' if min(self.answer, answer) < 0.0 else 'Too'} {size}."
 
     def slip(self, answer: float) -> str:
         """What the typed number would be right in: another unit, whatever its sign; "" if in none."""
-        if self.whole or not self.ordered:
+        if self.whole or not self.ordered or self._is_about_zero:
             return ""
         typed_number = answer * self.unit.scale
         for name, scale, words in _other_units(self.unit):
@@ -341,9 +341,14 @@ class Number(Question):
             if abs(self.answer) > self.tolerance and self._near(math.copysign(other, self.answer), self.answer):
                 return "The squares of this and of the right value add up to 1: were sine and cosine exchanged?"
         for factor, words in ((2.0, "half"), (0.5, "twice")):
-            if answer and self._near(factor * answer, self.answer):
+            if answer and not self._is_about_zero and self._near(factor * answer, self.answer):
                 return f"This is {words} the right value."
         return ""
+
+    @property
+    def _is_about_zero(self) -> bool:
+        """Whether the tolerance leaves no scale: a small number is near the right one in any unit."""
+        return abs(self.answer) <= 2.0 * self.tolerance
 
     @property
     def _decimals(self) -> int:

@@ -114,6 +114,24 @@ def test_the_mistake_is_named_before_the_way(question: Number, typed: str, said:
     assert WAY not in verdict.reason
 
 
+@pytest.mark.parametrize(
+    ("question", "typed", "said"),
+    [
+        (Number("?", 0.0, PLAIN, 0.01, WAY), "1", "Too large."),
+        (Number("?", 0.0, PLAIN, 0.01, WAY), "0.015", "Too large."),
+        (Number("?", 0.0, PLAIN, 0.01, WAY), "-1", "The size is too large."),
+        (Number("?", 0.0, SPEED, 0.001, WAY), "1", "Too large."),
+        (Number("?", 0.001, SPEED, 0.001, WAY), "1.5", "Too large."),
+    ],
+)
+def test_beside_zero_no_number_is_right_in_another_unit_or_twice_too_large(
+    question: Number, typed: str, said: str
+) -> None:
+    verdict = question.judge(question.read_text(typed))
+    assert not verdict.right
+    assert verdict.reason == said
+
+
 def test_a_known_mistake_goes_before_a_relation() -> None:
     question = asked(THIRTY, DEGREES, mistakes=(Mistake(math.radians(60.0), "That is the angle to y."),))
     assert question.judge(math.radians(60.0)).reason == "That is the angle to y."

@@ -12,7 +12,7 @@ from app.exports.worksheet.sheet import indexed
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import UP, direction, level
 from app.viewer.lessons.guide.outline import Lead, Outline, Pose, SemiAxis
-from app.viewer.lessons.guide.poses import as_configuration, first_clear
+from app.viewer.lessons.guide.poses import as_configuration, first_clear, moved
 from app.viewer.lessons.velocity.facts import scale_of
 from app.viewer.lessons.velocity.views import SAMPLE
 from kin import Robot, Singularity, fk, jacobian, singularities
@@ -24,6 +24,7 @@ from kin.units import Units, general
 
 LOAD, SLOW = 10.0, 1e-3  # N, m/s
 SAMPLES, SCANNED = 32, 73  # configurations at random, and along the range of a joint
+BENT, BENT_SLIDE, ANOTHER = (0.6, -0.6, 1.0), 0.2, 0.1  # rad, of the reach, and of the longest semi-axis
 FLAT, CLEAR = 0.06, 2.0  # of the largest σ that was found: what counts as none; home has more than twice as much
 
 
@@ -36,8 +37,9 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     """What the file declares; joints count from 1."""
     home, J = robot.q_home, jacobian(robot, robot.q_home)
     heavy = int(np.argmax([abs(torque(J, k)) for k in range(robot.n)]))
-    U, semi, _ = np.linalg.svd(J[:3])
-    axes = _axes(robot, home)
+    semi = np.linalg.svd(J[:3], compute_uv=False)
+    axes, there_asked = _axes(robot, home), bent(robot)
+    U_asked, asked, _ = np.linalg.svd(jacobian(robot, there_asked)[:3])
     found = singular(robot)
     flat = FLAT * max(_smallest(robot, q) for q in robot.random_q(np.random.default_rng(4), SAMPLES))
     there = driven(robot, flat)
@@ -54,7 +56,8 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
         "fastest": float(semi[0]),
         "slowest": float(semi[axes - 1]),
         "axes": float(axes),
-        "round": float(semi[:axes].prod() ** (1.0 / axes)),
+        "asked": float(asked[0]),
+        "round": float(asked[:axes].prod() ** (1.0 / axes)),
         "singular": float(found is not None),
         "metre": SAMPLE / scale_of(robot, "velocity"),
         "flattened": float(found is not None and _axes(robot, found[0]) < _axes(robot, home)),
@@ -71,23 +74,45 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     lead = leads(robot, J)
     words = {
         "sigma_home": general(_smallest(robot, home), 3),
-        "others": " and ".join(f"{general(value, 4)} m/s" for value in semi[1:axes]),
-        "product": f"{general(float(semi[:axes].prod()), 4)} {'m²/s²' if axes == 2 else 'm³/s³'}",
+        "others": " and ".join(f"{general(value, 4)} m/s" for value in asked[1:axes]),
+        "product": f"{general(float(asked[:axes].prod()), 4)} {'m²/s²' if axes == 2 else 'm³/s³'}",
         "singularity": "" if found is None else indexed(short(found[1], units)),
     }
-    poses = {"home": Pose(as_configuration(home))}
+    poses = {"home": Pose(as_configuration(home)), "bent": Pose(as_configuration(there_asked))}
     if found is not None:
         poses["singularity"] = Pose(as_configuration(found[0]))
-    drawn = {"fastest": semi_axis(robot, U, semi, axes)}
+    drawn = {"fastest": semi_axis(robot, there_asked, U_asked, asked, axes)}
     return LessonFacts(numbers, functions, words, poses, leads=lead, semi_axes=drawn)
 
 
-def semi_axis(robot: Robot, U: Array, semi: Array, axes: int) -> SemiAxis:
-    """The longest semi-axis of the velocity ellipsoid at home, and the others."""
+@lru_cache(maxsize=64)
+def bent(robot: Robot) -> Array:
+    """Home with one joint moved, so that the longest semi-axis is clearly another one ``(n,)``.
+
+    At home the ellipsoid is on show before it is asked about. Where all joints slide it is always the same.
+    """
+    at_home, tried = _longest(robot, robot.q_home), list[Array]()
+    for joint in range(robot.n):
+        for amount in BENT if robot.revolute[joint] else [BENT_SLIDE * robot.reach]:
+            q, _ = moved(robot, joint, amount)
+            changed = abs(_longest(robot, q) - at_home) > ANOTHER * at_home
+            if changed and _axes(robot, q) == _axes(robot, robot.q_home):
+                tried.append(q)
+    found = first_clear(robot, tried)
+    return robot.q_home if found is None else found
+
+
+def _longest(robot: Robot, q: Array) -> float:
+    """The longest semi-axis of the velocity ellipsoid of the tool point at q ``(n,)``, m/s."""
+    return float(np.linalg.norm(jacobian(robot, q)[:3], 2))
+
+
+def semi_axis(robot: Robot, q: Array, U: Array, semi: Array, axes: int) -> SemiAxis:
+    """The longest semi-axis of the velocity ellipsoid at q ``(n,)``, and the others."""
     others = [float(semi[k]) if k < axes else 0.0 for k in (1, 2)]
     ways = tuple(tuple(U[:, k].tolist()) for k in (1, 2, 0))
     scale = SAMPLE / scale_of(robot, "velocity")
-    center = tuple(fk(robot, robot.q_home)[:3, 3].tolist())
+    center = tuple(fk(robot, q)[:3, 3].tolist())
     return SemiAxis(center, ways, (others[0], others[1]), scale)
 
 

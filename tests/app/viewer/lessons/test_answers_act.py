@@ -181,7 +181,8 @@ def test_the_right_ellipsoid_is_that_of_the_tools_velocities() -> None:
     for robot, step in ellipsoids():
         assert isinstance(step.question, Number)
         assert isinstance(step.drawn, SemiAxis)
-        J, tool = (part(robot, robot.q_home) for part in (numpy_arm.jacobian, numpy_arm.pose))
+        assert step.pose is not None
+        J, tool = (part(robot, np.array(step.pose.q)) for part in (numpy_arm.jacobian, numpy_arm.pose))
         nodes = {node.key: node for node in answer_nodes(robot, step, None, closed=True)}
         assert nodes.keys() == {"right", "right-round", "right-words"}
         for key in ("right-round", "right"):
@@ -192,6 +193,19 @@ def test_the_right_ellipsoid_is_that_of_the_tools_velocities() -> None:
             assert np.allclose(size, 1.0 if key == "right-round" else [0.0, 1.0], atol=1e-4), robot.id
         start, end = nodes["right"].props["points"][0]
         assert np.linalg.norm(end - start) / step.drawn.scale == pytest.approx(step.question.answer, rel=1e-4)
+
+
+def test_the_semi_axis_that_is_asked_for_is_none_that_was_on_show_before() -> None:
+    """In the steps before, the ellipsoid at home has its three lengths beside it."""
+    for robot, step in ellipsoids():
+        assert isinstance(step.question, Number)
+        assert step.pose is not None
+        if step.pose.q == tuple(robot.q_home):
+            assert not robot.revolute.all(), "a joint that slides is the fastest in every pose"
+            continue
+        at_home = np.linalg.svd(numpy_arm.jacobian(robot, robot.q_home)[:3], compute_uv=False)
+        for length in at_home:
+            assert not step.question.judge(float(length)).right, (robot.id, length)
 
 
 def test_a_typed_semi_axis_differs_in_colour_line_and_length() -> None:
