@@ -38,7 +38,7 @@ def answer_nodes(robot: Robot, step: Step, given: object, closed: bool) -> list[
         case Bar() | SemiAxis() if isinstance(step.question, Number) and _is_way(step.question):
             question, nodes = step.question, list[Node]()
             if isinstance(given, float | int) and not question.judge(float(given)).right:
-                words = f"{YOURS}: {question.unit.brief(float(given))}"
+                words = f"{YOURS}: {question.unit.brief(float(given), 6)}"
                 nodes += _length("wrong", robot, step.drawn, float(given), words, VERMILION, broken=True)
             if closed:
                 words = f"right: {question.value_text}"
@@ -146,11 +146,11 @@ def _bar(key: str, robot: Robot, bar: Bar, value: float, words: str, color: Colo
     if broken:  # beside the whole one, which has its place between the points
         aside = ASIDE * size * _across(direction)
         start, end = start + aside, end + aside
-    ends = np.linspace(start, end, 2 * DASHES if broken else 2).reshape(-1, 2, 3)
-    if cut:
-        ends = np.concatenate([ends, _tip(start, end)])
+    ends, place = np.linspace(start, end, 2 * DASHES if broken else 2).reshape(-1, 2, 3), end
+    if cut:  # long words at the end would leave the picture
+        ends, place = np.concatenate([ends, _tip(start, end)]), (start + end) / 2.0
         words = f"{words} ({CUT})"
-    return [bars(key, ends, color, THICK * size), label(f"{key}-words", words, end, anchor="bottom-center")]
+    return [bars(key, ends, color, THICK * size), label(f"{key}-words", words, place, anchor="bottom-center")]
 
 
 def _tip(start: Array, end: Array) -> Array:

@@ -12,7 +12,7 @@ from app.exports.worksheet.sheet import indexed
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import UP, direction, level
 from app.viewer.lessons.guide.outline import Lead, Outline, Pose, SemiAxis
-from app.viewer.lessons.guide.poses import as_configuration, first_clear, moved
+from app.viewer.lessons.guide.poses import as_configuration, distance, first_clear, moved
 from app.viewer.lessons.velocity.facts import scale_of
 from app.viewer.lessons.velocity.views import SAMPLE
 from kin import Robot, Singularity, fk, jacobian, singularities
@@ -98,6 +98,8 @@ def bent(robot: Robot) -> Array:
             changed = abs(_longest(robot, q) - at_home) > ANOTHER * at_home
             if changed and _axes(robot, q) == _axes(robot, robot.q_home):
                 tried.append(q)
+    # The farther out the tool is, the less of the arm is in front of the ellipsoid.
+    tried.sort(key=lambda q: -distance(robot.T_world_base, fk(robot, q)))
     found = first_clear(robot, tried)
     return robot.q_home if found is None else found
 

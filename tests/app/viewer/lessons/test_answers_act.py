@@ -118,7 +118,7 @@ def test_true_and_wrong_differ_in_colour_line_and_length() -> None:
     assert answer_nodes(UR5, step, None, closed=False) == []
     shown = {node.key: node for node in answer_nodes(UR5, step, wrong, closed=False)}
     assert shown.keys() == {"wrong", "wrong-words"}, "the right one is not given away"
-    assert shown["wrong-words"].props["text"] == f"your answer: {step.question.unit.brief(wrong)}"
+    assert shown["wrong-words"].props["text"] == f"your answer: {step.question.unit.brief(wrong, 6)}"
     assert [node.key for node in answer_nodes(UR5, step, right, closed=True)] == ["right", "right-words"]
     both = {node.key: node for node in answer_nodes(UR5, step, wrong, closed=True)}
     assert len(both) == 4
@@ -163,7 +163,9 @@ def test_a_bar_that_is_cut_ends_in_the_head_of_an_arrow() -> None:
         assert len(shaft) == DASHES
         end = shaft[-1][1]
         assert np.allclose([one[0], other[0]], [end, end]), "both lines of the head begin at the end of the bar"
-        assert np.allclose(words.position, end, atol=1e-6)
+        assert np.allclose(words.position, (shaft[0][0] + end) / 2.0, atol=1e-6), (
+            "in the picture, however long it is"
+        )
         back = shaft[0][0] - end
         for side in (one[1] - end, other[1] - end):
             assert back @ side > 0.8 * np.linalg.norm(back) * np.linalg.norm(side)
