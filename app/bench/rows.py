@@ -131,6 +131,13 @@ ROWS: tuple[Row, ...] = (
         "solve-ur5-batch", "an answer inside the limits, verified, batch, per target", "ur5", "answer", batch=True
     ),
     Row(
+        "solve-scorbot-batch",
+        "an answer inside the limits, verified, batch, per target",
+        "scorbot",
+        "answer",
+        batch=True,
+    ),
+    Row(
         "solve-redundant7-craig-batch",
         "an answer inside the limits, verified, batch, per target",
         "redundant7-craig",
