@@ -286,6 +286,10 @@ def test_the_landing_page(browser: Browser, address: str, name: str, width: int,
         page.get_by_role("link", name="Your arm").click()
         expect(viewer.get_by_role("tab", name="Robot")).to_have_attribute("aria-selected", "true", timeout=WAIT)
         expect(viewer.locator("input[value='UR5']").first).to_be_visible(timeout=WAIT)
+    if name == "phone":
+        page.get_by_role("link", name="lessons and courses").click()
+        expect(page.get_by_role("tab", name="Learn")).to_have_attribute("aria-selected", "true", timeout=WAIT)
+        expect(page.get_by_role("button", name="Courses")).to_be_visible()
     assert errors == []
     page.close()
 
