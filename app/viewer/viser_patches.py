@@ -57,8 +57,11 @@ def assign(
     node: viser.SceneNodeHandle,
     position: Array | Sequence[float] | None = None,
     wxyz: Array | Sequence[float] | None = None,
+    again: bool = False,
 ) -> None:
-    """Set a node's position ``(3,)`` and quaternion ``(4,)`` in its parent's frame; unchanged values are not sent.
+    """Set a node's position ``(3,)`` and quaternion ``(4,)`` in its parent's frame.
+
+    Unchanged values are sent only `again` if that is asked for.
 
     Raises:
         RuntimeError: the node has been removed.
@@ -66,11 +69,11 @@ def assign(
     state = node._impl
     if state.removed:
         raise RuntimeError(f"{state.name} was removed and cannot be posed")
-    if position is not None and (place := _floats(position)) != state.position.tolist():
+    if position is not None and ((place := _floats(position)) != state.position.tolist() or again):
         state.position[:] = place
         x, y, z = place
         state.api._queue_scene_message(messages.SetPositionMessage(state.name, (x, y, z)))
-    if wxyz is not None and (turn := _floats(wxyz)) != state.wxyz.tolist():
+    if wxyz is not None and ((turn := _floats(wxyz)) != state.wxyz.tolist() or again):
         state.wxyz[:] = turn
         w, x, y, z = turn
         state.api._queue_scene_message(messages.SetOrientationMessage(state.name, (w, x, y, z)))

@@ -92,6 +92,7 @@ class ArmController:
         self.locks: tuple[bool, ...] = ()
         self.target: Array | None = None
         self.dragging = False
+        self._pulled = False  # since `show_gizmo_again`
         self.playing = False
         self.snap = False
         self.avoid = False
@@ -296,7 +297,7 @@ class ArmController:
     def pull(self, pull: gizmo.Pull) -> None:
         """Process one event of the gizmo, or of a ring attached to it."""
         phase, position, wxyz, ring = pull
-        self.dragging = phase != "end"
+        self._pulled, self.dragging = True, phase != "end"
         target = self.scene.pulled(position, wxyz, ring)
         if phase == "start":
             self._drag_start = (
@@ -386,6 +387,15 @@ class ArmController:
             target = self.target[:3, 3]
             missed = not self._reached and float(np.linalg.norm(T[:3, 3] - target)) > _GAP
             self.scene.show_gap(T[:3, 3], target if missed else None)
+
+    def show_gizmo_again(self) -> None:
+        """Send the gizmo's pose once more after a drag, now that the visitor rests.
+
+        The page shows what came last, and a pose of ours may have come to it after the poses of the drag.
+        """
+        if self._pulled and not self.dragging:
+            self._pulled = False
+            self.scene.place_gizmo(kin.fk(self.robot, self.q) if self.target is None else self.target, again=True)
 
     def leave(self) -> None:
         """The visitor has disconnected: stop counting as a moving arm."""

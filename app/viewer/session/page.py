@@ -380,6 +380,8 @@ class VisitorPage(ShownArm, Worker):
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
             self._save()
             self._show_hints()
+            self.sliders.show_crossed(self.arm.goal)
+            self.arm.show_gizmo_again()
             self.place_scale()
 
     def _save(self) -> None:

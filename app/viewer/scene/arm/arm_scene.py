@@ -121,21 +121,21 @@ class ArmScene:
             else:
                 assign(node, wxyz=turn(link.wxyz, value))
 
-    def place_gizmo(self, T_base_tool: Array) -> None:
-        """Move the gizmo. Never call this while the visitor holds it."""
+    def place_gizmo(self, T_base_tool: Array, again: bool = False) -> None:
+        """Move the gizmo. Never call this while the visitor holds it. `again`: send its pose, changed or not."""
         wxyz = wxyz_from_rotation(T_base_tool[:3, :3])
         if self.gizmo_in_base:
             self._R_gizmo_target = T_base_tool[:3, :3].copy()
-            assign(self.gizmo, T_base_tool[:3, 3], NO_TURN)
+            assign(self.gizmo, T_base_tool[:3, 3], NO_TURN, again)
             turned = tuple(wxyz.tolist())
         else:
             self._R_gizmo_target = np.eye(3)
-            assign(self.gizmo, T_base_tool[:3, 3], wxyz)
+            assign(self.gizmo, T_base_tool[:3, 3], wxyz, again)
             turned = NO_TURN
         for ghost in (self._ghost, *self._drawn.hand):
             assign(ghost, wxyz=turned)
         for ring in self._rings:
-            assign(ring, STILL, NO_TURN)
+            assign(ring, STILL, NO_TURN, again)
 
     def pulled(self, position: Sequence[float], wxyz: Sequence[float], ring: bool) -> Array:
         """The target ``(4, 4)`` for a pose of the gizmo or, in the gizmo's frame, of one of its rings."""
