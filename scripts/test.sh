@@ -66,23 +66,19 @@ twice="--reruns 1 -r R"
 files_of() {
   grep -rl "pytest\.mark\.$1\b" tests --include="test_*.py"
 }
-# Two browsers draw; beside them five processes run the other tests, as those of the viewer mostly wait for arms that move,
-# and mypy reads the types.
-# What measures time runs alone.
-log=$(mktemp)
+# Pages draw for as long as they wait: beside other work, browsers take twice as much of the processors. They come first,
+# then what computes, in four processes, as many tests wait for arms that move; then alone what measures time.
+failed=0
+pytest --reruns 2 -r R -n 3 --dist loadfile --no-loadscope-reorder -m "not slow and browser" $(files_of browser) || failed=1
 types=$(mktemp)
-trap 'rm -f "$log" "$types"' EXIT
+trap 'rm -f "$types"' EXIT
 mypy >"$types" 2>&1 &
 typing=$!
-pytest --reruns 2 -r R -n 2 --dist loadfile --no-loadscope-reorder -m "not slow and browser" $(files_of browser) >"$log" 2>&1 &
-browsing=$!
-failed=0
-# The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Five that
+# The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Four that
 # begin together would each do so. What cannot be collected is said by the run.
 pytest --collect-only -qq >/dev/null 2>&1 || :
-pytest $twice -n 5 --dist loadfile --no-loadscope-reorder -m "not slow and not browser and not bench" || failed=1
-wait $browsing || failed=1
+pytest $twice -n 4 --dist loadfile --no-loadscope-reorder -m "not slow and not browser and not bench" || failed=1
 wait $typing || failed=1
-cat "$log" "$types"
+cat "$types"
 pytest $twice -m "not slow and bench" $(files_of bench) || failed=1
 exit $failed
