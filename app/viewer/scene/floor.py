@@ -109,7 +109,8 @@ class Floor:
     def turn_label(self, seen: Array, arrows: float) -> None:
         """Put the length beside the bar: at its right end in the picture, unless the tool's arrows are.
 
-        It never covers the bar.
+        It never covers the bar. Over a bar that rises to the right it begins as far to the right as it can: on a
+        phone, the buttons of the camera are to the left.
 
         Args:
             seen: where both `ends` and the tool are in the picture, `VisitorCamera.places`.
@@ -120,7 +121,9 @@ class Floor:
         aside = away[right] < CLEAR * arrows * seen[2, 2] and away[left] > away[right]
         at, other = (left, right) if aside else (right, left)
         self._label.anchor = "bottom-right" if aside else "bottom-left"  # the text leads away from the bar
-        assign(self._label, self.ends[at] + BESIDE * (self.ends[at] - self.ends[other]))
+        over = aside and seen[right, 1] > seen[left, 1]
+        beyond = -0.5 if over else BESIDE
+        assign(self._label, self.ends[at] + beyond * (self.ends[at] - self.ends[other]))
 
 
 @cache

@@ -190,6 +190,10 @@ def test_the_floor_names_its_scale_and_the_gizmo_stands_free(server: viser.Viser
         assert np.linalg.norm(label.position - outer) < 0.1 * length  # type: ignore[union-attr]
         assert label.anchor == anchor, "it stands here on the floor"  # type: ignore[union-attr]
         assert label.depth_test, "solids before it hide it"  # type: ignore[union-attr]
+    rising = np.array([[-0.2, -0.1, 1.0], [0.2, 0.1, 1.0], [0.4, 0.1, 1.0]])
+    arm.floor.turn_label(rising, 0.3)
+    assert label.anchor == "bottom-right"
+    assert np.allclose(label.position, (start + end) / 2), "the bar is below the text, right of its left end"
     arm.floor.show(False)
     assert not get(bar).visible  # type: ignore[union-attr]
     arm.show_frames(True)
