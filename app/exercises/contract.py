@@ -62,6 +62,10 @@ class Kind(ABC):
             EntryError: a typed number cannot be read.
         """
 
+    def in_stages(self, variant: Variant, given: object, units: Units) -> Verdict:
+        """The same verdict; if its `way` says how to find the answer, its `reason` says only what is wrong."""
+        return self.judge(variant, given, units)
+
     @abstractmethod
     def answer(self, variant: Variant) -> object:
         """A right answer, in the form of `judge`'s, in `PLAIN_UNITS`."""
@@ -108,7 +112,7 @@ class Posed(Question):
         return True
 
     def judge(self, answer: Any) -> Verdict:
-        return self.kind.judge(self.variant, answer, self.units)
+        return self.kind.in_stages(self.variant, answer, self.units)
 
     def right(self) -> object:
         return _named(self.kind.answer(self.variant), self.kind.asked(self.variant, PLAIN_UNITS))

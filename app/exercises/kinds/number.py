@@ -128,17 +128,26 @@ class NumberKind(Kind):
         )
 
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
+        verdict = self.in_stages(variant, given, units)
+        if verdict.way and verdict.parts:
+            return Verdict.of(verdict.parts)
+        return replace(verdict, reason=verdict.full, way="")
+
+    def in_stages(self, variant: Variant, given: object, units: Units) -> Verdict:
         questions = self._questions(variant, units)
         typed_texts = texts(given, len(questions), "the numbers in the order asked")
         values = [question.read_text(text) for question, text in zip(questions, typed_texts, strict=True)]
         found = [question.judge(value) for question, value in zip(questions, values, strict=True)]
         if len(questions) == 1:
-            return Verdict(found[0].right, found[0].full)
+            return found[0]
         parts = [(one.right, f"{label}: {one.full}") for label, one in zip(self.labels, found, strict=True)]
         verdict = Verdict.of(parts, "All parts are right.")
-        if not verdict.right and (swap := _swapped(questions, values, self.labels)):
-            return Verdict(False, swap, verdict.credit, verdict.parts)
-        return verdict
+        if verdict.right:
+            return verdict
+        if swap := _swapped(questions, values, self.labels):
+            return replace(verdict, reason=swap)
+        label, wrong = next(pair for pair in zip(self.labels, found, strict=True) if not pair[1].right)
+        return replace(verdict, reason=f"{label}: {wrong.reason or 'This is not right.'}", way=wrong.way)
 
     def answer(self, variant: Variant) -> object:
         return [typed(variant.number(value), self._shown_unit(Units())) for value in self.values]

@@ -73,6 +73,22 @@ def test_vectors_get_credit_for_each_component() -> None:
     assert judged(POINT, ["200", "100", "300"]).reason == "y: The size is right, the sign is not. Add."
 
 
+@pytest.mark.parametrize(
+    ("asked", "typed", "what"),
+    [
+        (ANGLE, ["31.2"], "Too large."),
+        (POINT, ["200", "100", "300"], "y: The size is right, the sign is not."),
+    ],
+)
+def test_a_lesson_has_the_way_apart_from_what_is_wrong(
+    asked: tuple[Exercise, Variant], typed: list[str], what: str
+) -> None:
+    exercise, variant = asked
+    staged, at_once = exercise.kind.in_stages(variant, typed, UNITS), judged(asked, typed)
+    assert (staged.reason, staged.way) == (what, "Add.")
+    assert at_once == replace(staged, reason=f"{what} Add.", way="")
+
+
 def test_the_value_is_called_exact_only_if_it_is() -> None:
     def number(answer: float, tolerance: float, unit: Unit = UNITS.lengths) -> Number:
         return Number("", answer, unit, tolerance, "Add.")

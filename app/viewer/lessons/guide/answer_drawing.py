@@ -95,10 +95,13 @@ def _line(key: str, robot: Robot, points: Array, color: Color, broken: bool) -> 
 
 
 def _frame(key: str, T: Array, length: float, words: str, color: Color, broken: bool) -> list[Node]:
-    """The axes of a frame, thin if they are broken, with an origin of this colour."""
+    """The axes of a frame, thin if they are broken, with an origin of this colour.
+
+    Its words are at its y axis: the name of a frame that is on show there is at z or x.
+    """
     radius = (0.02 if broken else 0.05) * length
     node = axes(key, T, length, radius, origin_color=color, origin_radius=3.0 * radius)
-    return [node, label(f"{key}-words", words, T[:3, 3] + 1.15 * length * T[:3, 2], anchor="bottom-center")]
+    return [node, label(f"{key}-words", words, T[:3, 3] + 1.15 * length * T[:3, 1], anchor="bottom-center")]
 
 
 def _frame_nodes(robot: Robot, question: Posed, given: object, closed: bool) -> list[Node]:

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 import kin
+from app.exports.worksheet.sheet import indexed
 from app.viewer.panel.posture import short
 from app.viewer.panel.status import LOOKS, notice
 from app.viewer.views.templates import render
@@ -156,4 +157,6 @@ def html(result: IKResult | None, branch: str | None, units: Units) -> str:
     if branch not in (None, "seed") and result is not None:
         detail = f"{detail} Requested posture: {short(branch)}."
     status = "" if result is None else result.status
-    return render("postures/why", status=status, symbol=symbol, color=color, title=title, detail=detail.strip())
+    return render(
+        "postures/why", status=status, symbol=symbol, color=color, title=title, detail=indexed(detail.strip())
+    )

@@ -20,6 +20,7 @@ from kin.transforms import Array
 # In radii of the arm.
 ASIDE, LENGTH, ROOM = 1.15, 0.42, 0.62
 THICK, THIN = 0.045, 0.02  # of an axis, as shares of its length
+BESIDE = 0.97  # cosine up to which two directions leave room for the names at their ends
 ORDER = ("1st", "2nd", "3rd")
 COLORS = BLUE, GREEN, AMBER
 
@@ -62,9 +63,10 @@ def _rotation(
     T[:3, :3] = R = facts.R
     turned = _frame("turned", T, length, THICK)
     turned.click = click
-    nodes = [turned, label("turned-name", "{1}", 1.12 * length * R[:, 2])]
     shown = facts.settings.axes
     turns = facts.convention.axes_now(facts.settings.angles) if shown in ("all", "turns") else ()
+    tip = 0 if any(abs(way @ R[:, 2]) > BESIDE for way in turns) else 2  # an axis of a turn has its name there
+    nodes = [turned, label("turned-name", "{1}", 1.12 * length * R[:, tip])]
     for k, way in enumerate(turns):
         # About fixed axes, later turns carry the axis of an earlier one along.
         text = f"{ORDER[k]} {facts.convention.axes[k]}{', carried' if facts.convention.fixed and k < 2 else ''}"

@@ -19,6 +19,7 @@ TURNED = math.radians(40.0)
 UPRIGHT = 0.999  # of the vertical part of a direction
 SPACE = {"form": "space", "axes": "zero"}
 MOST_SORTED, APART = 4, 0.04  # joints that are sorted, and how different they are, in the largest |v|
+BESIDE = 0.02  # of the reach: how far from its axis the tool point is clearly beside it
 _INDICES = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 
 
@@ -32,14 +33,16 @@ def facts(robot: Robot, units: Units) -> LessonFacts:
     found, n = screws(robot), robot.n
     seen = next((i for i in range(n - 1, -1, -1) if robot.revolute[i]), 0)
     direction = (found.S[:3] if robot.revolute[seen] else found.S[3:])[:, seen]
-    axis = int(np.argmax(np.abs(direction)))
+    axis, body = int(np.argmax(np.abs(direction))), off_tool(robot, found.B)
     numbers = {
         "seen": seen + 1.0,
         "component": float(direction[axis]),
         "slides": next((i + 1.0 for i in range(n) if not robot.revolute[i]), 0.0),
         "last": float(n),
         "upright": float((np.abs(np.where(robot.revolute, found.S[2], found.S[5])) > UPRIGHT).sum()),
-        "body": float(np.linalg.norm(found.B[3:, -1])),
+        "body_joint": body + 1.0,
+        "body": float(np.linalg.norm(found.B[3:, body])),
+        "space": float(np.linalg.norm(found.S[3:, body])),
     }
     words = {"axis": "xyz"[axis], "last_low": str(n).translate(_INDICES)}
     far_numbers, far_words = _far(robot, found.S, units)
@@ -118,6 +121,12 @@ def far_apart(S: Array) -> list[int]:
         if all(abs(size[k] - size[other]) > APART * size.max() for other in chosen):
             chosen.append(k)
     return chosen[:MOST_SORTED] if len(chosen) > 1 else []
+
+
+def off_tool(robot: Robot, B: Array) -> int:
+    """The last joint that turns about an axis beside the tool point; the last one if there is none."""
+    beside = robot.revolute & (np.linalg.norm(B[3:], axis=0) > BESIDE * robot.reach)
+    return int(np.flatnonzero(beside)[-1]) if beside.any() else robot.n - 1
 
 
 def _vector(values: Array) -> str:

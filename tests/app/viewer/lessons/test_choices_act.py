@@ -268,6 +268,8 @@ def test_a_placed_frame_stands_beside_the_right_one_when_it_is_judged() -> None:
     assert after.keys() == {"wrong", "wrong-words", "right", "right-words", "between"}
     far = step.question.variant.values["far"].value
     assert np.allclose(after["right"].position, [0.0, -far, far])
+    up = np.array(after["right-words"].position) - after["right"].position
+    assert np.allclose(up / np.linalg.norm(up), [0.0, 0.0, 1.0]), "along its y axis: its z has the frame's name"
     assert answer_nodes(robot, step, "nonsense", closed=False) == []
 
 

@@ -480,7 +480,8 @@ def at_rest(h: Here, rows: int) -> float:
 
 
 def body_v(h: Here) -> float:
-    return float(np.linalg.norm(numpy_arm.jacobian(h.robot, np.zeros(h.robot.n))[:3, -1]))
+    joint = int(prompted(h, r"v of joint (\d+)")[0])
+    return float(np.linalg.norm(numpy_arm.jacobian(h.robot, np.zeros(h.robot.n))[:3, joint - 1]))
 
 
 def component(h: Here) -> float:

@@ -19,6 +19,7 @@ from app.viewer.activity.context import ExerciseContext
 from app.viewer.activity.review import INTERVALS, MOST_MISSED, Missed, Review, question_key
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide import earlier
+from app.viewer.lessons.guide.progress import Progress
 from app.viewer.review.arms import other_arm
 from app.viewer.review.views import Counts
 from kin.solvers import family_of
@@ -262,6 +263,27 @@ def test_a_check_asks_two_exercises_of_earlier_lessons(lesson: str) -> None:
             assert question.asked().form in ("fields", "options", "order")
             assert question.judge(question.right()).right
             assert "scene" not in question.prompt
+
+
+@pytest.mark.parametrize(
+    ("exercise", "typed", "way"),
+    [
+        ("row-distance", (["1 mm"], ["2 mm"]), "√(d² + a²)"),
+        ("other-way-round", (["1 mm", "1 mm"], ["2 mm", "2 mm"]), "−Rᵀ p"),
+    ],
+)
+def test_a_check_says_the_way_to_an_earlier_item_at_the_second_miss(
+    exercise: str, typed: tuple[list[str], list[str]], way: str
+) -> None:
+    progress = Progress(LESSONS[-1].outline(STORE.get("ur5"), Units()))
+    progress.ask_also(earlier.questions(((exercise, 7),), ALL, Units()))
+    said = []
+    for answer in typed:
+        assert not progress.answer("r1", answer).right
+        said.append(progress.feedback("r1"))
+    assert said[0].endswith("small.")
+    assert way not in said[0]
+    assert way in said[1]
 
 
 def test_what_was_missed_is_asked_first() -> None:

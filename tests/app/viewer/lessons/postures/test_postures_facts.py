@@ -133,6 +133,7 @@ def test_a_target_that_is_missed_is_explained_and_its_remedies_go_with_it() -> N
         lesson.on_result(kin.solve_ik(robot, T, q_seed=robot.q_home))
         page.rest()
         assert "Why not?" in str(page.panel())
+        assert "(θ₃ = " in str(page.panel()), "with an index, as in the status line"
         labels = [fix.label for fix in lesson.facts.offers]
         assert labels == ["Nearest reachable pose"]
         stale = page.control("Nearest reachable pose")

@@ -195,3 +195,17 @@ def test_a_step_draws_the_axes_that_it_speaks_of() -> None:
                     seen[step.title] = lesson.settings.axes
                     assert named_axes(lesson) == NAMES[lesson.settings.axes], step.title
         assert seen == AXES
+
+
+def test_the_name_of_the_turned_frame_is_not_where_an_axis_of_a_turn_has_its_name() -> None:
+    with bare_page(ROBOT) as page:
+        lesson = page.open(RotationsLesson)
+        for convention in CONVENTIONS:
+            lesson.restore({**lesson.state(), "convention": convention.key, "axes": "turns"})
+            (lazy,) = lesson.scene()
+            (beside,) = lazy.view(*lazy.args)
+            at = {node.props["text"]: np.array(node.position) for node in beside.children if node.kind == "label"}
+            ways = {text: place / np.linalg.norm(place) for text, place in at.items()}
+            assert lesson.settings.convention == convention.key
+            for text, way in ways.items():
+                assert text[0] not in "123" or way @ ways["{1}"] < 0.99, (convention.key, text)
