@@ -6,6 +6,7 @@
   const PAUSE = 40; // ms after a key until a cell is sent
   const REST = 400; // the same where the arm on show has meshes: some megabytes are sent for each change
   const PATIENCE = 3000; // ms for an answer, then the next message is sent
+  const MOMENT = 100; // ms by which the answer to a new row may come before the table
   const LEFT = 400; // ms without focus until the table is written again, so that a click on a button finds it
 
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
@@ -74,29 +75,35 @@
     if (!choice) return;
     flush();
     const key = keyOf(choice.dataset.cell);
+    if (key[0] === "start") adding = 0; // the other arm has rows of its own
     send(key, key[0] === "cell" ? [revision(), choice.value] : choice.value);
   });
 
   // The row for the buttons below the table
 
-  let here = 0;
+  let here = 0; // may be a row that is still to come
+  let adding = 0; // rows that are still to come
+  addEventListener("kinboard-connect", () => { adding = 0; });
   function mark() {
     const rows = [...document.querySelectorAll("[data-arm] tr[data-row]")];
     if (!rows.length) return;
-    here = Math.min(here, rows.length - 1);
-    rows.forEach((row, i) => row.classList.toggle("kb-here", i === here));
+    if (!adding) here = Math.min(here, rows.length - 1);
+    const at = Math.min(here, rows.length - 1);
+    rows.forEach((row, i) => row.classList.toggle("kb-here", i === at));
     const label = document.querySelector("[data-arm-here]");
-    if (label.textContent !== `Row ${here + 1}`) label.textContent = `Row ${here + 1}`;
-    const able = { up: here > 0, down: here < rows.length - 1, remove: rows.length > 1, add: true };
+    if (label.textContent !== `Row ${at + 1}`) label.textContent = `Row ${at + 1}`;
+    const able = { up: at > 0, down: at < rows.length - 1, remove: rows.length > 1, add: true };
     for (const [name, yes] of Object.entries(able)) {
       const button = part("table").querySelector(`[data-arm-do="${name}"]`);
       if (button.ariaDisabled !== String(!yes)) button.ariaDisabled = String(!yes);
     }
   }
 
+  function added() { adding = Math.max(0, adding - 1); mark(); }
   function change(action) {
     flush();
-    send(["row", action, here], null);
+    if (action === "add") adding++;
+    send(["row", action, here], null, action === "add" ? () => setTimeout(added, MOMENT) : null);
     here += { add: 1, up: -1, down: 1 }[action] ?? 0;
     focus = focus?.replace(/^(\[data-cell=")\d+/, `$1${here}`) ?? null;
   }
@@ -116,8 +123,9 @@
     const argument = button?.dataset.argument === undefined ? "" : `[data-argument="${button.dataset.argument}"]`;
     const name = cell ? `[data-cell="${cell.dataset.cell}"]`
       : button ? `[data-arm-do="${button.dataset.armDo}"]${argument}` : null;
-    clearTimeout(left);
     gone = false;
+    if (button && name === focus) return; // `restore` gave it back: that is no field that was left
+    clearTimeout(left);
     if (cell?.matches("input") && name !== focus) cell.select();
     if (focus && name !== focus) { flush(); viserPage.send("released"); }
     if (focus && !cell) left = setTimeout(leave, LEFT);
@@ -242,11 +250,12 @@
   });
 
   // A file with several ends or robots asks which. That stands below the table, far from where a file was dropped.
-  let asked = false;
+  let asked = null; // the file whose choice was shown
   function showChoice() {
     const choice = document.querySelector('select:is([data-cell="tip"], [data-cell="urdf"])');
-    if (choice && !asked) requestAnimationFrame(() => choice.scrollIntoView({ block: "center" }));
-    asked = choice !== null;
+    const file = choice?.dataset.file ?? null;
+    if (choice && file !== asked) requestAnimationFrame(() => choice.scrollIntoView({ block: "center" }));
+    asked = file;
   }
 
   viserPage.watch(showChoice);
