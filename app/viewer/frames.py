@@ -134,21 +134,25 @@ class FrameAxes:
         self._shown: object = None
         self._count = 0
 
-    def show(self, frames: Frames, robot: Robot, size: float) -> None:
-        """Draw the frames of a page with axes of this length (m)."""
+    def show(self, frames: Frames, robot: Robot, size: float, aside: Array) -> None:
+        """Draw the frames of a page with axes of this length (m); `aside` is that of `mounting.Mount`."""
         poses = dict(frames.poses)
         if not np.array_equal(robot.T_world_base, np.eye(4)):
             poses[WORLD] = np.eye(4)
-        wanted = (frames.workpieces, WORLD in poses, size)
+        wanted = (frames.workpieces, WORLD in poses, size, tuple(aside.tolist()))
         if wanted == self._shown:
             return
         self._shown = wanted
         for node in self._nodes:
             node.remove()
         self._count += 1  # the browser keeps the pose of a removed node for the next one of its name
-        self._nodes = [self._add(f"/frame-{self._count}-{i}", *item, size) for i, item in enumerate(poses.items())]
+        beside = {WORLD: aside}  # the arm may be mounted there; workpieces are where the visitor has put them
+        self._nodes = [
+            self._add(f"/frame-{self._count}-{i}", name, T, size, beside.get(name, np.zeros(3)))
+            for i, (name, T) in enumerate(poses.items())
+        ]
 
-    def _add(self, root: str, name: str, T: Array, size: float) -> viser.FrameHandle:
+    def _add(self, root: str, name: str, T: Array, size: float, aside: Array) -> viser.FrameHandle:
         node = self._scene.add_frame(
             root,
             axes_length=size,
@@ -156,6 +160,6 @@ class FrameAxes:
             position=T[:3, 3],
             wxyz=wxyz_from_rotation(T[:3, :3]),
         )
-        place = (0.0, 0.0, 1.15 * size)
+        place = np.array([0.0, 0.0, 1.15 * size]) + T[:3, :3].T @ aside
         add_label(self._scene, f"{root}/name", name, position=place, anchor="bottom-center", depth_test=True)
         return node

@@ -71,9 +71,9 @@ class Floor:
                     f"{root}-shadow", shadow, wide, wide, position=at, cast_shadow=False, receive_shadow=False
                 )
             )
-        # The bar lies along x, in front of the arm in the default view.
-        begin = np.array([x + 0.1 * body.radius, y + 0.42 * body.radius, above])
-        end, tick = begin + np.array([self.scale, 0.0, 0.0]), np.array([0.0, 0.03 * body.radius, 0.0])
+        begin, along, across = _bar(body, base, self.scale)
+        begin[2] = above
+        end, tick = begin + self.scale * along, 0.03 * body.radius * across
         bar = np.array([[begin, end], [begin - tick, begin + tick], [end - tick, end + tick]], np.float32)
         self.ends: tuple[Array, Array] = (begin, end)
         self._bar = scene.add_line_segments(
@@ -124,6 +124,20 @@ class Floor:
         over = aside and seen[right, 1] > seen[left, 1]
         beyond = -0.5 if over else BESIDE
         assign(self._label, self.ends[at] + beyond * (self.ends[at] - self.ends[other]))
+
+
+def _bar(body: Body, base: Array, length: float) -> tuple[Array, Array, Array]:
+    """One end ``(3,)`` of the scale bar, for whatever height, and the directions ``(3,)`` along and across it.
+
+    It lies along x, in front of the arm in the default view. Below an arm that hangs, it is near the edge of the
+    picture, so it is moved to the middle. Before a wall it lies along the wall, which then hides nothing of it.
+    """
+    along, across, radius = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), body.radius
+    if body.mount.kind == "wall":
+        along, across = body.mount.frame[:3, 1], body.mount.frame[:3, 2]
+        return base + 0.45 * radius * across - 0.5 * length * along, along, across
+    aside = -0.5 * length if body.mount.kind == "ceiling" else 0.1 * radius
+    return base + aside * along + 0.42 * radius * across, along, across
 
 
 @cache

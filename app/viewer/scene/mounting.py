@@ -69,6 +69,8 @@ class Mount:
         blocks: its solids, in this frame.
         part: their mesh in the world frame.
         foot: where it stands ``(3,)``, or what is below the base; a very deep floor is nearer here.
+        aside: from a point beside the base to where its name is written ``(3,)``: far enough from the surface that
+            it does not cut the text.
     """
 
     kind: Mounting
@@ -78,6 +80,7 @@ class Mount:
     blocks: tuple[Block, ...]
     part: Part
     foot: Array
+    aside: Array
 
     @property
     def stands(self) -> bool:
@@ -117,7 +120,9 @@ def mount_of(robot: Robot, size: float) -> Mount:
         plate = cylinder(PLATE * size, -0.9 * size, 0.0)
         column = [placed(_solid(block), frame) for block in blocks[1:]]
         mesh, blocks = merged([placed(plate, robot.T_world_base), *column]), ()
-    return Mount(kind, holder, floor, frame, blocks, Part("pedestal", mesh, COLOR), foot)
+    # A pedestal is clear of its names, and a ceiling is seen from above, where it hides them whole.
+    aside = size * frame[:3, 2] if kind in ("floor", "table", "wall") else np.zeros(3)
+    return Mount(kind, holder, floor, frame, blocks, Part("pedestal", mesh, COLOR), foot, aside)
 
 
 def _blocks(kind: Mounting, size: float, reach: float, height: float) -> tuple[Holder, tuple[Block, ...]]:

@@ -71,7 +71,8 @@ class Numbers:
     def use_frames(self) -> None:
         """The page has other frames, or another arm."""
         arm = self._page.arm
-        self._axes.show(self._page.frames, arm.robot, FRAME_AXES * arm.scene.body.radius)
+        shown = arm.scene.body
+        self._axes.show(self._page.frames, arm.robot, FRAME_AXES * shown.radius, shown.mount.aside)
         self._page.panel.readout.show_frames(self._page.frames)
         self._pose_due = True
 

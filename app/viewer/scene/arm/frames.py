@@ -42,9 +42,10 @@ class ArmFrames:
             wxyz=wxyz_from_rotation(T[:3, :3]),
         )
         self.base_up: viser.SceneNodeHandle
-        for tip, letter in zip(1.15 * length * np.eye(3), "xyz", strict=True):
+        places = 1.15 * length * np.eye(3) + T[:3, :3].T @ body.mount.aside
+        for place, letter in zip(places, "xyz", strict=True):
             name = f"{self.base.name}/{letter}"
-            self.base_up = add_label(scene, name, letter, position=tip, anchor="center-center", depth_test=True)
+            self.base_up = add_label(scene, name, letter, position=place, anchor="center-center", depth_test=True)
 
     def add(self, parent: str, row: int, T: Array) -> None:
         """Add the frame of a DH row, at the pose ``(4, 4)`` in its parent; row −1 is the base frame."""

@@ -6,12 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import viser
 
 import kin
+from app.viewer.frames import FrameAxes, Frames
 from app.viewer.obstacles import placed
+from app.viewer.scene.arm.arm_scene import ArmScene
+from app.viewer.scene.camera import view
 from app.viewer.scene.clearance import clearance
 from app.viewer.scene.meshes import body
 from app.viewer.scene.mounting import turn_of
+from app.viewer.scene.viewpoints import UP, contains
 from kin.robot import MOUNTINGS
 
 UR5 = kin.get_robot("ur5")
@@ -113,3 +118,40 @@ def test_new_bodies_stand_on_the_floor_or_on_the_table_of_the_arm(kind: str, sha
     bottom = each.xyz[2] - (2.0 * half if shape == "table" else half)
     on_it = kind == "table" and shape != "table" and max(map(abs, each.xyz[:2])) < mount.part.mesh.bounds[1, 0]
     assert bottom == pytest.approx(HEIGHT - 0.3 * body(robot).size if on_it else 0.75, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", MOUNTINGS)
+def test_the_scale_bar_is_in_the_picture_and_before_a_wall(server: viser.ViserServer, kind: str) -> None:
+    robot = mounted(kind)
+    arm = ArmScene(server.scene, robot, root=f"/bar-{kind}")
+    made, ends = arm.body, np.array(arm.floor.ends)
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(arm.floor.scale)
+    assert ends[:, 2] == pytest.approx(made.mount.floor, abs=0.1 * made.size)
+    for aspect in (16 / 9, 900 / 720, 1.0):
+        viewpoint = np.stack([*view(made, aspect), UP])
+        assert contains(viewpoint, aspect, ends, 0.02 * made.radius)
+    if kind == "wall":
+        before = (ends - made.mount.frame[:3, 3]) @ made.mount.frame[:3, 2]
+        assert before == pytest.approx(before[0]), "along the wall"
+        assert before[0] > 0.4 * made.radius, "and so far before it that the wall does not cut the length"
+    arm.remove()
+
+
+@pytest.mark.parametrize("kind", MOUNTINGS)
+def test_names_beside_the_base_stand_off_the_surface(server: viser.ViserServer, kind: str) -> None:
+    robot = mounted(kind)
+    arm = ArmScene(server.scene, robot, root=f"/names-{kind}")
+    get, made = server.scene.get_handle_by_name, arm.body
+    out, off = robot.T_world_base[:3, 2], made.size if kind in ("floor", "table", "wall") else 0.0
+    for letter in "xy":
+        label = get(f"/names-{kind}/base/{letter}")
+        assert isinstance(label, viser.LabelHandle)
+        assert robot.T_world_base[:3, :3] @ label.position @ out == pytest.approx(off), "before it, not in it"
+    axes = FrameAxes(server.scene)
+    axes.show(Frames(), robot, 0.2, made.mount.aside)
+    label = get("/frame-1-0/name")
+    assert isinstance(label, viser.LabelHandle)
+    assert label.text == "world"
+    assert label.position - [0.0, 0.0, 0.23] == pytest.approx(off * out)
+    axes.show(Frames(), UR5, 0.2, np.zeros(3))
+    arm.remove()
