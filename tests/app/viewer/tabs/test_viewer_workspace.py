@@ -238,6 +238,16 @@ def test_the_drawn_cloud_is_inside_the_drawn_boundary():
     assert f'cx="{x:.1f}" cy="{y:.1f}"' in plot.tool_html(frame, 0.2, 0.05)
 
 
+def test_the_plot_of_an_arm_in_a_plane_has_room_for_the_title_of_its_axis():
+    found = kin.workspace_section(kin.get_robot("planar2r"), resolution=32)
+    height = np.concatenate(found.curves)[:, 1]
+    frame = plot.frame_of(found)
+    assert np.ptp(height) < 1e-5
+    assert frame.bottom - frame.top == pytest.approx(plot.SHORTEST)
+    assert sum(frame.y) / 2 == pytest.approx(height.mean(), abs=1e-5), "the section is in the middle"
+    assert frame.right == pytest.approx(plot.WIDTH - plot.RIGHT), "and as wide as before"
+
+
 def test_an_arm_with_a_prismatic_first_joint_has_no_section():
     rows = (Joint("slide", kind="prismatic", limits=(0.0, 1.0)), Joint("turn", a=0.5, limits=(-1.0, 1.0)))
     slider = replace(PIONEER, rows=rows, home=(0.0, 0.0))

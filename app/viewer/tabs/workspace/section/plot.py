@@ -22,6 +22,7 @@ from kin.workspace import SectionArc
 
 CLOUD = (0, 114, 178)
 WIDTH, TALLEST = 320.0, 500.0
+SHORTEST = 88.0  # of the plot itself: that of an arm in a plane is flat, and the vertical axis has a title
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 12.0, 10.0, 36.0
 CELLS = 112  # along the longer side
 AXES = AxisStyle(
@@ -41,7 +42,8 @@ def frame_of(section: Section) -> Plot:
     margin = 0.04 * max(right, high - low)
     r, z = (0.0, float(right + margin)), (float(low - margin), float(high + margin))
     scale = min((WIDTH - LEFT - RIGHT) / r[1], (TALLEST - TOP - BOTTOM) / (z[1] - z[0]))
-    return Plot(LEFT, TOP, scale, r, z)
+    missing = max(0.0, SHORTEST / scale - (z[1] - z[0])) / 2.0
+    return Plot(LEFT, TOP, scale, r, (z[0] - missing, z[1] + missing))
 
 
 class Density:
