@@ -154,6 +154,7 @@
   const usual = () => Math.min(Math.round(SIZES[root.dataset.kbText] * standard()), innerWidth / 2);
 
   let fresh = !(wished >= LEAST); // nobody has chosen a width in this browser
+  let byHand = false; // the visitor has moved the edge: what follows the window is nobody's choice, even if the window is wider again
 
   function keepWidth() {
     const docked = viserPage.region();
@@ -171,18 +172,24 @@
       if (Math.abs(change) > 1) requestAnimationFrame(() => viserPage.widen(change));
       return;
     }
+    if (!byHand) return;
     try {
       if (Math.abs(width - usual()) < 2) localStorage.removeItem(WIDTH);
       else localStorage.setItem(WIDTH, String(width));
     } catch { /* see above */ }
   }
+  addEventListener("pointerdown", (event) => {
+    byHand ||= event.isTrusted && event.target instanceof Node && viserPage.region()?.edge.contains(event.target);
+  }, true);
   let follows = 0; // a window that is being made wider sends many events
   addEventListener("resize", () => {
     clearTimeout(follows);
     if (NARROW.matches || root.dataset.kbEmbed || chosen()) return;
     follows = setTimeout(() => {
       const width = viserPage.region()?.node.offsetWidth ?? 0;
-      if (width >= LEAST && Math.abs(usual() - width) > 1) viserPage.widen(usual() - width);
+      if (chosen() || width < LEAST || Math.abs(usual() - width) <= 1) return; // the edge's own moves resize the scene
+      byHand = false;
+      viserPage.widen(usual() - width);
     }, 150);
   });
 
@@ -192,6 +199,7 @@
     const width = viserPage.region()?.node.offsetWidth ?? 0;
     const [factor, kept] = [SIZES[name] / SIZES[size], chosen()];
     size = name;
+    byHand ||= kept; // the chosen width grows with the text
     try { localStorage.setItem(TEXT, size); } catch { /* see above */ }
     place();
     markSize();
@@ -235,6 +243,7 @@
       if (way < 0) return;
       event.preventDefault();
       event.stopPropagation();
+      byHand = true;
       viserPage.widen((way === 0 ? outwards : -outwards) * STRIDE);
     });
     new ResizeObserver(keepWidth).observe(node);
