@@ -167,6 +167,7 @@ def test_a_link_to_a_lesson_opens_it(browser: Browser, address: str, said: str, 
     assert parse_qs(urlsplit(page.url).fragment)["tab"] == [opened]
     page.get_by_role("tab", name="Move", exact=True).click()
     expect(page.get_by_role("tab", name="Move", exact=True)).to_have_attribute("aria-selected", "true")
+    page.wait_for_function("location.hash.includes('tab=Move')")  # the link has what was turned to
     page.reload()
     expect(page.locator("[data-status]").first).to_be_attached(timeout=4 * WAIT)
     expect(page.get_by_role("tab", name="Move", exact=True)).to_have_attribute("aria-selected", "true")
