@@ -51,7 +51,7 @@ make_venv() {
   "$python" -m venv "$root/.venv" || fail "$python could not make $root/.venv"
 }
 
-# uv needs a tenth of pip's time. It knows nothing of an index that pip is set up for, and fails at once without a network.
+# uv needs a sixth of pip's time. It knows nothing of an index that pip is set up for.
 uv_install() {
   python="$root/.venv/bin/python"
   ! "$python" -m pip config list | grep -q "\.index-url=" || return 1
