@@ -29,7 +29,7 @@ from kin.transforms import Array
 
 _INSET = TOLERANCES.interval_inset
 LOW_END, HIGH_END, INSIDE = range(3)  # postures of an interval
-_AT = 1e-9  # rad: a row is at a value
+_STRIDES, _SHORTEST = 40, 1e-3  # steps along the curve, and the least share of the way that one is tried with
 
 
 @jit
@@ -49,6 +49,26 @@ def move_row(task: Task, value: float, most: float, y: Array, p: Point) -> bool:
     """
     start = y.copy()
     return settle(task, value, 0.0, y, p) and _away(y, start) < most
+
+
+@jit
+def _reach(task: Task, value: float, sense: float, y: Array, p: Point) -> bool:
+    """As `settle`, in shorter steps along the curve where one is too long for Newton's method.
+
+    Beside a fold postures move by the root of what the parameter does.
+    """
+    last, share = y.copy(), 1.0
+    for _ in range(_STRIDES):
+        goal = value if share == 1.0 else y[task.joint] + share * (value - y[task.joint])
+        if settle(task, goal, sense, y, p):
+            if share == 1.0:
+                return True
+            last[:], share = y, 1.0
+        elif task.joint < 0 or share < _SHORTEST:
+            return False
+        else:
+            y[:], share = last, 0.5 * share
+    return False
 
 
 @jit
@@ -98,7 +118,7 @@ def _row_in(
             y[c] = start[c]
         if task.joint >= 0:  # an interval is known at one whole turn, its postures may be at another
             y[task.joint] = value - wrap(value - y[task.joint])
-        if settle(task, value, sense, y, p) and is_inside(lower, upper, y, task.joint):
+        if _reach(task, value, sense, y, p) and is_inside(lower, upper, y, task.joint):
             return True
     return False
 

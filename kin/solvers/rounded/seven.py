@@ -40,6 +40,7 @@ _ENDS, _MIDDLE = np.array([0.0, 1.0]), np.array([0.5])  # shares of an interval
 _SHARES = np.array([0.5, 0.02, 0.98])  # where curves are begun
 _ALIKE = 1e-7  # rad: intervals with ends this close are one
 _ASIDE, _BESIDE = 3.0, 50.0  # times the root of the rounding, and the rounding: from a fold
+_BESIDE_VALUE = np.outer(4.0 ** np.arange(-1, 5), (-1.0, 1.0)).ravel()  # times the rounding: where rows are begun
 _CLEAR = 0.5  # of the distance of the next row: closer than that, a posture is of the branch of the nearest row
 _SAME = 1e-8  # rad: postures this close are one
 _FREE = (math.nan,)
@@ -85,15 +86,15 @@ class Rounded7(Rounded):
         if requested:
             moved = np.ascontiguousarray(rows[:, :7])
             self._move_rows(p, setting, moved)
+            self._part(p, setting, moved)
             rows[:, :7], rows[:, 7] = moved, np.where(np.isnan(moved[:, 0]), math.nan, p.values[0])
             self._add_from_intervals(p, setting, limits, (arcs, places), rows)
-            missed = np.isnan(rows[:, 0])
+            missed, known = np.isnan(rows[:, 0]), known | _branches_of(arcs[_have(arcs, p.values[0])])
         else:
             bits = _choose()(self.robot.model, p.T, setting, limits, arcs, places, rows)
             missed = (bits >> np.arange(8)) & 1 > 0
-            within = np.zeros(8, dtype=bool)
-            within[arcs[:, 0].astype(int)] = True  # a row outside the limits may be lost
-            known = within if p.respect_limits else known | within
+            within = _branches_of(arcs)
+            known = within if p.respect_limits else known | within  # a row outside the limits may be lost
         sure &= not (missed & known).any() and _are_apart(rows[:, :7])
         gap, obstacle = 0.0, None
         if np.isnan(rows[:, 0]).all():
@@ -220,24 +221,43 @@ class Rounded7(Rounded):
         """Move rows ``(8, 7)`` onto the target at the requested value, in place."""
         move_rows(self.robot.model, self._params, p.T[None], setting, np.array(p.values[:1]), rows[None])
 
+    def _part(self, p: SolverInput, setting: Array, rows: Array) -> None:
+        """Rows ``(8, 7)`` at the requested value that two branches share, each moved to its own posture, in place.
+
+        Between the folds of the two tables the arm that was meant has one row for the two branches, and the typed
+        table has two: each is begun where the arm that was meant has two, on either side of that value.
+        """
+        shared = _merged(rows)
+        if self._joint < 0 or not shared.any():
+            return
+        for starts in self._all_at(p, p.values[0] + self.off * _BESIDE_VALUE):
+            starts[~shared | _merged(starts)] = math.nan
+            self._move_rows(p, setting, starts)
+            own = shared & ~_merged(starts) & ~np.isnan(starts[:, 0])
+            if own.sum() > 1:
+                rows[own] = starts[own]
+                shared = _merged(rows)
+            if not shared.any():
+                return
+
     def _add_from_intervals(
         self, p: SolverInput, setting: Array, limits: Array, intervals: tuple[Array, Array], rows: Array
     ) -> None:
-        """Rows ``(8, 8)`` at the requested value that are missing, from intervals that have it, in place.
+        """Rows ``(8, 8)`` at the requested value that are missing or shared, from intervals with it, in place.
 
         Beside a fold the typed table's row may be farther from that of the arm that was meant than a row may move.
         """
         arcs, places = intervals
-        missing = np.isnan(rows[:, 0])
-        if not missing.any() or not len(arcs):
+        sought = np.isnan(rows[:, 0]) | _merged(rows[:, :7])
+        if not sought.any() or not len(arcs):
             return
-        here = missing[arcs[:, 0].astype(int)]
-        here &= (p.values[0] - arcs[:, 1]) % TURN <= arcs[:, 2] - arcs[:, 1]
+        here = sought[arcs[:, 0].astype(int)] & _have(arcs, p.values[0])
         if here.any():
             spans, found = arcs[here], np.full((8, 8), math.nan)
             spans[:, 1:] = p.values[0]
             _choose()(self.robot.model, p.T, setting, limits, spans, places[here], found)
-            rows[missing] = found[missing]
+            there = ~np.isnan(found[:, 0])
+            rows[there] = found[there]
 
     def _single(self, p: SolverInput, setting: Array) -> tuple[Array, Array]:
         """The intervals of a joint that has one value only, and their postures."""
@@ -391,6 +411,18 @@ def _merged(rows: Array) -> Flags:
     """Which of the rows ``(8, 7)`` are the posture of another branch, too."""
     away = np.abs(rows[:, None] - rows).max(axis=2)
     return np.asarray((away < _SAME).sum(axis=1) > 1)
+
+
+def _have(arcs: Array, value: float) -> Flags:
+    """Which intervals ``(m, 3)`` have a value, at some whole turn."""
+    return np.asarray((value - arcs[:, 1]) % TURN <= arcs[:, 2] - arcs[:, 1])
+
+
+def _branches_of(arcs: Array) -> Flags:
+    """Which of the eight branches have an interval ``(m, 3)``."""
+    found = np.zeros(8, dtype=bool)
+    found[arcs[:, 0].astype(int)] = True
+    return found
 
 
 def _is_known(arcs: list[tuple[float, float, float]], branch: float, value: float) -> bool:

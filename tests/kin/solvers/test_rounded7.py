@@ -258,6 +258,39 @@ def test_the_example_has_the_branches_and_the_interval_of_the_exact_arm():
     assert interval == pytest.approx(exact.redundancy[0].intervals[0], abs=1e-6)
 
 
+@pytest.mark.parametrize("respect_limits", [True, False])
+def test_between_the_folds_of_the_two_tables_both_postures_at_a_value_are_found(respect_limits):
+    robot = typed(PANDA, 1.57)  # the exact arm's fold is at 0.50229, the typed table's at 0.502419
+    T = kin.fk(robot, (-1.80932, -0.85776, -0.03083, -1.0881, 1.46089, 2.70858, -0.9246))
+    folds = [i.redundancy[0].intervals[-1][1] for i in kin.solve_ik(robot, T).solutions if "back" in i.branch]
+    assert folds[0] == pytest.approx(folds[1], abs=1e-9)
+    apart = []
+    for value in folds[0] - np.geomspace(1e-3, 1e-7, 9):
+        found = kin.solve_ik(robot, T, redundancy=value, respect_limits=respect_limits)
+        assert found.complete
+        back = {s.branch.rpartition(" ")[2]: s.q for s in found.solutions if "back" in s.branch}
+        apart.append(back["negative"][0] - back["positive"][0])
+    # Beside a fold two postures are apart by the root of the distance.
+    assert apart[::2] == pytest.approx(apart[0] * 10.0 ** -np.arange(0.0, 2.5, 0.5), rel=0.05)
+
+
+def test_a_short_interval_between_two_folds_has_every_branch_at_each_value():
+    robot, _ = arm_named("xarm7 1.571")
+    q = (-3.76229, -0.52417, -6.23626, 3.22697, -4.34217, -0.39924, 4.77939)
+    T = kin.fk(robot, q)  # on 2.4 mrad of θ7 the elbow turns by more than a radian
+    (span,) = {
+        (round(low, 6), round(high, 6))
+        for s in kin.solve_ik(robot, T).solutions
+        for low, high in s.redundancy[0].intervals
+        if high - low < 0.01 and low < 0.0
+    }
+    assert span == pytest.approx((-1.506149, -1.503710), abs=2e-6)
+    for share in (1e-3, 1e-2, 0.1, 0.5, 0.9, 0.99, 0.999):
+        found = kin.solve_ik(robot, T, redundancy=span[0] + share * (span[1] - span[0]))
+        assert found.complete
+        assert {s.branch for s in found.solutions} == set(kin.branch_names(robot))
+
+
 @pytest.mark.parametrize("name", ["panda 1.5708", "panda 1.571", "xarm7-urdf 1.5708", "gen72-urdf 1.5708"])
 def test_the_generating_configuration_is_found_with_the_given_joint_locked(name):
     robot, _ = arm_named(name)
