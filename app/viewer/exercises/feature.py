@@ -329,6 +329,7 @@ class Practising(Feature):
         else:
             self._shown = replace(practice.record(exercise))
             variant, closed = self._variant, self._shown.closed
+            led = activity.leads("exercise", exercise.id)
             contents = [
                 views.task_html(
                     exercise,
@@ -337,7 +338,7 @@ class Practising(Feature):
                     self.stage.now.robot == exercise.robot,
                     self._shown.variant,
                     activity.exercises.is_own(exercise.id) and not practice.seated,
-                    self.door,
+                    replace(self.door, back="") if led else self.door,
                 ),
                 views.question_html(self._asked, self._sheet, closed, self.door),
                 views.foot_html(

@@ -55,7 +55,7 @@ class Door:
 
     Attributes:
         feature: the key of what gets its events.
-        back: what the button that leads back says.
+        back: what the button that leads back says; "": there is none, as the bar above has one.
         counts: whether the marks count: a room stores the answers, and there may be other numbers.
     """
 

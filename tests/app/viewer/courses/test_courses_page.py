@@ -119,6 +119,7 @@ def test_a_student_follows_a_course_to_a_result_code(server: int, settings: Sett
         press(tab, "course", ["next", 2])
         tab.wait(lambda: "2 of 3" in block(tab, "bar") and 'data-exercise="which-joint-goes-down"' in tab.html)
         assert "Show the answer" not in tab.html
+        assert "All exercises" not in tab.html, "the bar leads back to the course"
         press(tab, "exercises", ["reveal", 3])
         assert "kb-exercise-answer" not in block(tab, "bar"), "nothing invites to go on without an answer"
         press(tab, "exercises", ["answer", 4], 2)
