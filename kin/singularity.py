@@ -1,9 +1,9 @@
 """How near a configuration is to losing a direction of motion.
 
 At a singularity the joints together cannot move the tool in some direction, and near one a slow motion of the tool
-takes fast joints. For arms with a closed form the singular sets are known exactly: each is reported with what
-aligns there and how far away it is, as an angle or a length. For any other arm one number stands for all of them:
-the smallest singular value of the Jacobian, the least tool speed per unit of joint speed.
+takes fast joints. For most families with a closed form the singular sets are known exactly: each is reported with
+what aligns there and how far away it is, as an angle or a length. For any other arm one number stands for all of
+them: the smallest singular value of the Jacobian, the least tool speed per unit of joint speed.
 """
 
 from __future__ import annotations

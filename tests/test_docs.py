@@ -195,6 +195,21 @@ def test_the_built_in_arms_are_named():
     assert f"**{len(kin.builtin_robots())} arms**" in README
 
 
+def test_the_page_of_a_solver_names_built_in_arms_that_it_solves():
+    solved: dict[str, set[str]] = {}
+    for robot_id, solver in re.findall(
+        r"^\| !.*\| `([\w-]+)` \| \d .*\| `(\w+)` \|$", PAGES["docs/arms.md"], re.MULTILINE
+    ):
+        solved.setdefault(solver, set()).add(robot_id)
+    assert sum(map(len, solved.values())) == len(kin.builtin_robots())
+    pages = {name: PAGES[f"docs/background/{name}.md"].splitlines()[2] for name in solved}
+    named = {name: set(re.findall(r"`([\w-]+)`", line.partition(" · ")[2])) for name, line in pages.items()}
+    assert all(named[name] <= solved[name] for name in solved)
+    assert {name for name in solved if named[name] != solved[name]} == {n for n in pages if "[others]" in pages[n]}
+    without = {page for page, text in PAGES.items() if "· no built-in arm" in text}
+    assert not without & {f"docs/background/{name}.md" for name in solved}
+
+
 def test_the_page_of_arms_is_the_one_that_its_script_writes():
     done = subprocess.run(
         [sys.executable, "-c", "from scripts.arms_page import page; print(page(), end='')"],
