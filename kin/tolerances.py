@@ -16,7 +16,8 @@ class Tolerances:
         merge: configurations closer than this in every joint are duplicates. Double roots of acos and sqrt
             split by the square root of the rounding error, hence the value far above machine epsilon.
         geometry: lengths and twists this close to the pattern of a solver family match it.
-        rotation_matrix: largest deviation of RᵀR from I in a target; beyond it the target is rejected.
+        rotation_matrix: largest deviation of RᵀR from I in a pose; beyond it a pose is rejected, and a target made
+            orthonormal if it may have been rounded (`kin.ik.problem`).
         singular: sine below which a closed form cannot determine an angle and takes it from the seed.
         at_singularity: distance to a singularity (radians, metres) below which a solution is reported as singular.
         near_miss: a candidate that misses its target or its limits by less than this in all (metres and radians

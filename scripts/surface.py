@@ -1,7 +1,7 @@
 """Write down what programs of others rely on: the names of `kin`, the REST interface, the command line.
 
-``python scripts/surface.py`` prints it as JSON. Each release keeps its own in ``tests/data/surface``, and
-``tests/test_surface.py`` holds every later version to the newest of them.
+``python scripts/surface.py`` prints it as JSON. Each release keeps its own in ``tests/data/releases``, and
+``tests/test_releases.py`` holds every later version to them.
 
 A parameter is written as in a signature: ``*`` before those that go by keyword only, ``=`` behind one that may be
 left out. A field of a request is ``target.position``, one of each item of a list ``solutions[].q``; a ``!`` behind

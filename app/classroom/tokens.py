@@ -18,7 +18,7 @@ from app.classroom.views import Ticket
 COOKIE = "kinboard_room"
 # Without what looks alike: 0 O, 1 I L, 2 Z, 5 S, 8 B, U V.
 LETTERS = "ACDEFGHJKMNPQRTWXY34679"
-CODE_LENGTH = 8  # 23**8 = 78 thousand million
+CODE_LENGTH = 8  # 23**8 = 78 billion
 _CODE_GROUP = 4
 LONGEST_TOKEN = 300
 OPENERS = 1000  # numbers for those who open rooms
