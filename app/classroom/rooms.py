@@ -351,6 +351,9 @@ _ERASED: dict[str, object] = {
     "task": "",
     "tries": 0,
     "voted": "",
+    "vote": 0,
+    "gone": False,
+    "driven": "",
 }
 
 

@@ -109,6 +109,11 @@ def test_who_is_removed_or_renamed_is_erased(hub, tmp_path) -> None:
     with hub.database.write() as connection:
         row = {"id": "x", "seat_id": seats[0].seat, "issuer": "i", "client_id": "c", "subject": "subject 61526"}
         connection.execute(insert(LtiSeat).values(**row, address="", exercise=""))
+    page = hub.attend(seats[0], nothing)
+    until(lambda: page.room.seat is not None)
+    page.tell_driven("SO-101 of bench 41877")
+    until(lambda: left(tmp_path, "SO-101 of bench 41877"))
+    page.leave()
     hub.rooms.rename_seat(room.id, seats[1].seat, "E.")
     assert left(tmp_path, SECRETS[1]) == set()
     with reader(tmp_path):
@@ -116,7 +121,7 @@ def test_who_is_removed_or_renamed_is_erased(hub, tmp_path) -> None:
         assert left(tmp_path, SECRETS[0]) == {SECRETS[0]}
     assert hub.rooms.erase()
     assert left(tmp_path) == {SECRETS[3]}, "the title stays"
-    assert left(tmp_path, "subject 61526") == set()
+    assert left(tmp_path, "subject 61526", "SO-101 of bench 41877") == set()
     again = hub.rooms.join(room.code, SECRETS[0])
     hub.rooms.join(room.code, "A.", again)
     hub.rooms.sweep()
