@@ -143,6 +143,7 @@ def test_a_student_follows_a_course_to_a_result_code(server: int, settings: Sett
         tab.wait(lambda: 'data-feature="course">Next in the course<' in tab.html)
         press(tab, "course", ["list", 8])
         tab.wait(lambda: "2 of 3 done" in block(tab, "follow") and "check passed" in block(tab, "follow"))
+        assert re.search('autocomplete="nickname"[^>]* data-cell="alias"', block(tab, "follow"))
         press(tab, "course", ["fields", "alias", 9], [["  "]])
         tab.wait(lambda: "1 to 32 characters" in block(tab, "follow"))
         press(tab, "course", ["fields", "alias", 10], [["Ada <b>"]])
