@@ -28,7 +28,7 @@ This page is written by `scripts/arms_page.py`.
 """
 LEAD = {
     "Classics": "The arms of textbooks and lessons.",
-    "Library": "By maker. Joint values are those of the maker's own description.",
+    "Library": "By maker; textbook layouts come last. Joint values are those of the maker's own description.",
 }
 
 
