@@ -39,7 +39,7 @@ _MOVED, _MOVED_BY = 0.1, 100.0  # rad, or times the rounding: a row that moves f
 _ENDS, _MIDDLE = np.array([0.0, 1.0]), np.array([0.5])  # shares of an interval
 _SHARES = np.array([0.5, 0.02, 0.98])  # where curves are begun
 _ALIKE = 1e-7  # rad: intervals with ends this close are one
-_ASIDE, _BESIDE = 3.0, 50.0  # times the root of the rounding, and the rounding: from a fold
+_ASIDE, _BESIDE = 3.0, 10.0  # times the root of the rounding, and the rounding: from a fold
 _BESIDE_VALUE = np.outer(4.0 ** np.arange(-1, 5), (-1.0, 1.0)).ravel()  # times the rounding: where rows are begun
 _CLEAR = 0.5  # of the distance of the next row: closer than that, a posture is of the branch of the nearest row
 _SAME = 1e-8  # rad: postures this close are one
@@ -312,7 +312,8 @@ class Rounded7(Rounded):
                         places.append(posture.copy())
             certain &= not lost[len(begun) :].any()
             certain &= all(_is_known(arcs, *owners[begun[i]]) for i in np.flatnonzero(lost[: len(begun)]).tolist())
-        return np.array(arcs).reshape(-1, 3), np.array(places).reshape(-1, 3, 7), certain
+        found_arcs = np.array(arcs).reshape(-1, 3)
+        return found_arcs, np.array(places).reshape(-1, 3, 7), certain and not _overlap(found_arcs)
 
     def _beside_folds(self, starts: Array, merged: Flags) -> Array:
         """Postures ``(k, 7)``, and two more for each where branches have merged: to either side of that fold."""
@@ -327,7 +328,8 @@ class Rounded7(Rounded):
         """The branches of pieces with these values ``(k, 3)`` and postures ``(k, 3, 7)``; whether all are clear.
 
         That of a piece is the one of the nearest row of the arm that was meant, where the next one is farthest
-        away: at a fold two branches meet, and the signs that name them may differ between the two tables.
+        away: at a fold two branches meet, and the signs that name them may differ between the two tables. If all
+        its postures are beside rows of two branches that have merged, the one farthest from there names it.
         """
         k = np.arange(len(values))
         rows = self._all_at(p, values.ravel()).reshape(-1, 3, 8, 7)
@@ -339,12 +341,13 @@ class Rounded7(Rounded):
         share = np.divide(nearest, np.maximum(next_one, 1e-300), out=np.full(nearest.shape, math.inf), where=known)
         best = share.argmin(axis=1)
         branches, clear = first[k, best].tolist(), share[k, best] < _CLEAR
+        merged = known & (next_one - nearest < _SAME)
         for i in np.flatnonzero(~clear).tolist():
-            if known[i].any():
-                own, off = self.branch_of(postures[i, best[i]]), nearest[i, best[i]]
-                if next_one[i, best[i]] - off < _SAME and off > _BESIDE * self.off:
-                    branches[i], clear[i] = own, True  # of branches that have merged, its signs tell which
-                clear[i] = branches[i] == own
+            if merged[i].any():  # the signs of a posture tell which, far enough from the fold
+                b = int(np.where(merged[i], nearest[i], -1.0).argmax())
+                branches[i], clear[i] = self.branch_of(postures[i, b]), nearest[i, b] > _BESIDE * self.off
+            elif known[i].any():
+                clear[i] = branches[i] == self.branch_of(postures[i, best[i]])
             else:
                 branches[i] = self.branch_of(postures[i, 2])
         return branches, bool(clear.all())
@@ -416,6 +419,14 @@ def _merged(rows: Array) -> Flags:
 def _have(arcs: Array, value: float) -> Flags:
     """Which intervals ``(m, 3)`` have a value, at some whole turn."""
     return np.asarray((value - arcs[:, 1]) % TURN <= arcs[:, 2] - arcs[:, 1])
+
+
+def _overlap(arcs: Array) -> bool:
+    """Whether a branch has a value in two of the intervals ``(m, 3)``: then one of them is another branch's."""
+    branch, low, high = arcs.T
+    both = (branch[:, None] == branch) & ((low[:, None] - low) % TURN < (high - low - _ALIKE))
+    np.fill_diagonal(both, False)
+    return bool(both.any())
 
 
 def _branches_of(arcs: Array) -> Flags:

@@ -274,6 +274,18 @@ def test_between_the_folds_of_the_two_tables_both_postures_at_a_value_are_found(
     assert apart[::2] == pytest.approx(apart[0] * 10.0 ** -np.arange(0.0, 2.5, 0.5), rel=0.05)
 
 
+def test_intervals_whose_postures_are_all_beside_folds_belong_to_their_branches():
+    robot, _ = arm_named("gen3 1.57")
+    T = kin.fk(robot, (1.51258, -0.24395, -2.48770, -0.26665, -1.54266, 2.22576, 1.43931))
+    found = kin.solve_ik(robot, T)
+    assert found.complete
+    for solution in found.solutions:
+        for low, high in solution.redundancy[0].intervals:
+            for value in np.linspace(low, high, 7)[1:-1].tolist():
+                there = kin.solve_ik(robot, T, redundancy=value, branch=solution.branch)
+                assert there.status is Status.SOLVED, (solution.branch, value)
+
+
 def test_a_short_interval_between_two_folds_has_every_branch_at_each_value():
     robot, _ = arm_named("xarm7 1.571")
     q = (-3.76229, -0.52417, -6.23626, 3.22697, -4.34217, -0.39924, 4.77939)
