@@ -95,7 +95,9 @@ class Settings(BaseSettings):
     map_time: float = Field(
         600.0, ge=1, le=86400, description="Seconds that one capability map of the viewer may be computed."
     )
-    token: SecretStr | None = Field(None, min_length=8, description="Access token. Unset: no authentication.")
+    token: SecretStr | None = Field(
+        None, min_length=8, description="Access token, of at least 8 characters. Unset: no authentication."
+    )
     read_only: bool = Field(False, description="Visitors without the access token may look but not move anything.")
     rate_limit: float = Field(
         0.0,

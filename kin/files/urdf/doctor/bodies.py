@@ -200,7 +200,7 @@ def _check_tensor(notes: FindingLog, tensor: Element, place: str, mass: float, r
         words = (
             f"With {general(mass)} kg its inertia is that of a mass {radius} m away, more than the arm reaches."
         )
-        mend = "State the moments in kg·m²; those of a file in g·mm² are a thousand million times as large."
+        mend = "State the moments in kg·m²; those of a file in g·mm² are 10⁹ times as large."
         notes.add(tensor, place, "inertia", "suspicious", words, mend)
 
 
