@@ -48,7 +48,7 @@ def find_way(
     goal: ArrayLike,
     *,
     obstacles: Sequence[Obstacle] = (),
-    avoid_self_collision: bool = True,
+    avoid_self_collision: bool = False,
     seed: int = 0,
     time_limit: float = 5.0,
     progress: Callable[[float], None] | None = None,

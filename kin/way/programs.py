@@ -25,7 +25,7 @@ _ROUNDS = 60
 def way_program(
     way: Way,
     obstacles: Sequence[Obstacle] = (),
-    avoid_self_collision: bool = True,
+    avoid_self_collision: bool = False,
     stop: Callable[[], None] = never_cancel,
     like: Ptp | None = None,
 ) -> Motion:

@@ -170,7 +170,7 @@ WAYS = {
 @pytest.mark.parametrize("code", WAYS)
 def test_a_way_that_cannot_be_is_an_answer_and_no_program_is_written(client, run, tmp_path, code):
     start, goal, body, words = WAYS[code]
-    way = find_way(UR5, start, goal, obstacles=obstacles([body]))
+    way = find_way(UR5, start, goal, obstacles=obstacles([body]), avoid_self_collision=True)
     assert (way.found, way.cause.code) == (False, code)
     assert way.reason.startswith(words)
     asked = {"q_start": start, "q_goal": goal, "obstacles": [body], "avoid_self_collision": True}

@@ -31,7 +31,7 @@ def test_a_scene_needs_a_way_around(scene: Scene) -> None:
 def test_a_way_in_a_scene_is_free_and_no_shorter_than_straight() -> None:
     scene = SCENES[0]
     start, goal = ends(UR5, scene)  # type: ignore[misc]  # the test above
-    way = find_way(UR5, start, goal, obstacles=scene.obstacles, time_limit=60.0)
+    way = find_way(UR5, start, goal, obstacles=scene.obstacles, avoid_self_collision=True, time_limit=60.0)
     assert way.q is not None
     fine = np.concatenate([np.linspace(a, b, 200) for a, b in zip(way.q[:-1], way.q[1:], strict=True)])
     assert kin.clearance(UR5, fine, scene.obstacles).min() > -1e-9

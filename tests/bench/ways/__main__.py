@@ -96,7 +96,9 @@ def is_free(space: Space, q: np.ndarray) -> bool:
 
 def ours(robot: kin.Robot, scene: Scene, start: np.ndarray, goal: np.ndarray, seed: int, seconds: float) -> Found:
     """`kin.way.find_way`."""
-    way = find_way(robot, start, goal, obstacles=scene.obstacles, seed=seed, time_limit=seconds)
+    way = find_way(
+        robot, start, goal, obstacles=scene.obstacles, avoid_self_collision=True, seed=seed, time_limit=seconds
+    )
     return Found(
         way.seconds, way.length if way.found else np.nan, way.q is None or is_free(space_of(robot, scene), way.q)
     )
