@@ -118,8 +118,7 @@ def test_a_student_follows_a_course_to_a_result_code(server: int, settings: Sett
         assert tab.value("Robot") == get_robot("scara").name
         press(tab, "course", ["next", 2])
         tab.wait(lambda: "2 of 3" in block(tab, "bar") and 'data-exercise="which-joint-goes-down"' in tab.html)
-        assert "Show the answer" not in tab.html
-        assert "All exercises" not in tab.html, "the bar leads back to the course"
+        assert not re.search("Show the answer|All exercises", tab.html), "the bar leads back to the course"
         press(tab, "exercises", ["reveal", 3])
         assert "kb-exercise-answer" not in block(tab, "bar"), "nothing invites to go on without an answer"
         press(tab, "exercises", ["answer", 4], 2)
@@ -142,8 +141,7 @@ def test_a_student_follows_a_course_to_a_result_code(server: int, settings: Sett
         pass_check(tab, VelocityLesson, get_robot("scara"))
         tab.wait(lambda: 'data-feature="course">Next in the course<' in tab.html)
         press(tab, "course", ["list", 8])
-        tab.wait(lambda: "2 of 3 done" in block(tab, "follow") and "check passed" in block(tab, "follow"))
-        assert re.search('autocomplete="nickname"[^>]* data-cell="alias"', block(tab, "follow"))
+        tab.wait(lambda: all(block(tab, "follow").count(s) for s in ("2 of 3 done", "check passed", "nickname")))
         press(tab, "course", ["fields", "alias", 9], [["  "]])
         tab.wait(lambda: "1 to 32 characters" in block(tab, "follow"))
         press(tab, "course", ["fields", "alias", 10], [["Ada <b>"]])
