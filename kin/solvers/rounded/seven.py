@@ -341,7 +341,7 @@ class Rounded7(Rounded):
         share = np.divide(nearest, np.maximum(next_one, 1e-300), out=np.full(nearest.shape, math.inf), where=known)
         best = share.argmin(axis=1)
         branches, clear = first[k, best].tolist(), share[k, best] < _CLEAR
-        merged = known & (next_one - nearest < _SAME)
+        merged = known & (next_one < nearest + _SAME)
         for i in np.flatnonzero(~clear).tolist():
             if merged[i].any():  # the signs of a posture tell which, far enough from the fold
                 b = int(np.where(merged[i], nearest[i], -1.0).argmax())
