@@ -171,7 +171,9 @@ class Judge:
         else:
             own = others = list(result.solutions)
             asked = {"psi": self.arm_angle(q)}
-            own = [s for s in own if s.branch == branch and self._holds(s, asked["psi"], 100.0 * self.form.off)]
+            # The straighter the elbow, the less its direction says: ψ of the family and of the table differ more.
+            slack = max(100.0, 3.0 / abs(math.sin(q[3]))) * self.form.off
+            own = [s for s in own if s.branch == branch and self._holds(s, asked["psi"], slack)]
             if own:
                 return True
         if not others or not asked:
