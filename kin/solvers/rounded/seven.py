@@ -95,7 +95,7 @@ class Rounded7(Rounded):
             missed = (bits >> np.arange(8)) & 1 > 0
             within = _branches_of(arcs)
             known = within if p.respect_limits else known | within  # a row outside the limits may be lost
-        sure &= not (missed & known).any() and _are_apart(rows[:, :7])
+        sure &= not (missed & known).any() and not _merged(rows[:, :7]).any()
         gap, obstacle = 0.0, None
         if np.isnan(rows[:, 0]).all():
             none = self.form.solve(p)
@@ -177,19 +177,20 @@ class Rounded7(Rounded):
         )
         outer, inner = self._joined(wide.arcs[0]), self._joined(narrow.arcs[0])
         arcs, sure, places = np.empty(outer.shape), np.empty(8), np.empty((len(outer), 3, 7))
+        merged = _merged(wide.q)
         known = np.concatenate([outer, inner])
         ends = self._postures(p, known, _ENDS)
         _ends()(self.robot.model, p.T, setting, limits, known, ends, places, arcs, sure)
         certain = True
         if not sure.all():
             moved = arcs, places, sure
-            arcs, places, certain = self._traced(p, setting, limits, outer, inner, _merged(wide.q), moved)
+            arcs, places, certain = self._traced(p, setting, limits, outer, inner, merged, moved)
         inside = np.isnan(places[:, 2, 0])
         if inside.any():
             places[inside, 2] = self._postures(p, arcs[inside], _MIDDLE)[:, 0]
         rows = np.empty((8, 8))
         rows[:, :7], rows[:, 7:] = wide.q, wide.values
-        rows[_merged(wide.q)] = math.nan  # of two branches, which only its intervals tell apart
+        rows[merged] = math.nan  # of two branches, which only its intervals tell apart
         return arcs, places, rows, ~np.isnan(narrow.q[:, 0]), certain
 
     def _joined(self, arcs: Array) -> Array:
@@ -404,15 +405,9 @@ class _Found:
         return count, np.isnan(starts[:, 0])
 
 
-def _are_apart(rows: Array) -> bool:
-    """Whether no posture is given to two branches, of rows ``(8, 7)`` that are NaN where a branch has none."""
-    away = np.abs(rolled.wrapped(rows[:, None] - rows)).max(axis=2)
-    return int((away < _SAME).sum()) == int(np.isfinite(rows[:, 0]).sum())
-
-
 def _merged(rows: Array) -> Flags:
-    """Which of the rows ``(8, 7)`` are the posture of another branch, too."""
-    away = np.abs(rows[:, None] - rows).max(axis=2)
+    """Which of the rows ``(8, 7)``, NaN where a branch has none, are the posture of another branch, too."""
+    away = np.abs(rolled.wrapped(rows[:, None] - rows)).max(axis=2)
     return np.asarray((away < _SAME).sum(axis=1) > 1)
 
 
