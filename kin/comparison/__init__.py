@@ -268,14 +268,14 @@ def _largest(a: Robot, b: Robot, mapping: Mapping) -> tuple[Array, float, float]
     q = a.random_q(rng, _SAMPLES)
     position, rotation, both = measured(q)
     most = [float(position.max()), float(rotation.max())]
-    best = q[np.argsort(both)[-_CLIMBS:]]
+    best = q[np.argsort(both, kind="stable")[-_CLIMBS:]]
     width = np.where(np.isfinite(a.upper - a.lower), a.upper - a.lower, 2.0 * math.pi)
     for share in (0.2, 0.1, 0.05, 0.02):
         around = best[:, None] + share * width * rng.uniform(-1.0, 1.0, (len(best), 24, a.n))
         q = np.concatenate([best, a.clip(around.reshape(-1, a.n))])
         position, rotation, both = measured(q)
         most = [max(most[0], float(position.max())), max(most[1], float(rotation.max()))]
-        best = q[np.argsort(both)[-_CLIMBS:]]
+        best = q[np.argsort(both, kind="stable")[-_CLIMBS:]]
     return best[-1], most[0], most[1]
 
 

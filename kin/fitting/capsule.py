@@ -72,7 +72,9 @@ def smallest(balls: Array) -> Segment:
     found, axes = _by_direction(core, MANY, ROUNDS)
     size = float(np.ptp(core[:, :3], axis=0).max()) + float(core[:, 3].max())
     rng = np.random.default_rng(0)
-    improved = [_improved(core, axes[i], float(found[i]), size, rng) for i in np.argsort(found)[:BEST]]
+    improved = [
+        _improved(core, axes[i], float(found[i]), size, rng) for i in np.argsort(found, kind="stable")[:BEST]
+    ]
     _, axis = min(improved, key=lambda each: each[0])
     return rounded(balls, axis, size)
 

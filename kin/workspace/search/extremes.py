@@ -58,7 +58,9 @@ def _extreme(region: Region, f: Array, measure: Callable[[Array], Array]) -> Ext
     sample_configurations(region.arm, joint_streams(0, region.movable, quasi=True), 0, q)
     p = fk_positions(region.robot, q) - f[9:12]
     heights = 0.5 * np.einsum("ki,ij,kj->k", p, f[:9].reshape(3, 3), p) + p @ f[12:]
-    best = np.argpartition(heights, _BEST)[:_BEST]
+    low = np.flatnonzero(heights <= np.partition(heights, _BEST - 1)[_BEST - 1])
+    # Equal heights keep their order: a partition alone picks other ones on another processor.
+    best = low[np.argsort(heights[low], kind="stable")[:_BEST]]
     q = np.concatenate([q[np.sort(best)], q[:_SPREAD]])
     ends = np.empty(len(q))
     minimise_each(region.arm, f, q, ends)

@@ -166,16 +166,21 @@ def alike(one, other):
     return one == other
 
 
+def checked(response):
+    assert response.status_code == 200, response.text
+    return response.json()
+
+
 def answered(client, path, operation):
     """The answer to `SHORT` or to the first example of an operation."""
     method, address, body = SHORT.get(operation["operationId"], ("post", path.removeprefix("/api/v1"), None))
     if method == "get":
-        answer = client.get(f"/api/v1{address}").json()
+        answer = checked(client.get(f"/api/v1{address}"))
         return {"robots": answer["robots"][:1]} if "robots" in answer else answer
     if body is None:
         (body, *_) = operation["requestBody"]["content"]["application/json"]["examples"].values()
         body = body["value"]
-    return client.post(f"/api/v1{address.replace('{robot_id}', 'pioneer5')}", json=body).json()
+    return checked(client.post(f"/api/v1{address.replace('{robot_id}', 'pioneer5')}", json=body))
 
 
 def test_answers_have_examples_that_are_answered(client, document, request):

@@ -16,6 +16,8 @@ from kin.fk import fk_positions
 from kin.robot import Joint, Robot
 from kin.workspace import MEASURES, STRATEGIES
 from kin.workspace.region import Region
+from kin.workspace.sampling.kernels import sample_configurations
+from kin.workspace.sampling.streams import joint_streams
 from kin.workspace.search.cells import cell_map
 from kin.workspace.search.probes import ALIKE, TRIES, probe_cells
 from kin.workspace.volume import from_probes
@@ -378,6 +380,15 @@ def test_a_gantry_is_a_box():
     assert found.volume.value == pytest.approx(0.125, abs=1e-4)
     assert abs(found.surface.value - 1.75) < 3.0 * found.surface.error
     assert kin.workspace_section(GANTRY, ([0, 0, 0.3], [0, 0, 1])).area == pytest.approx(0.125, abs=1e-6)
+
+
+def test_a_height_that_all_configurations_have_is_told_at_the_first_one():
+    """A partition of equal numbers differs from processor to processor."""
+    region = Region.of(PLANAR)
+    first = np.empty((1, 2))
+    sample_configurations(region.arm, joint_streams(0, region.movable, quasi=True), 0, first)
+    found = kin.workspace_facts(PLANAR, volume=False)
+    assert found.z.least.q.tolist() == found.z.largest.q.tolist() == first[0].tolist()
 
 
 def test_a_planar_arm_is_a_ring():

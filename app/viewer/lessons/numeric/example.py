@@ -38,7 +38,7 @@ def example(robot: Robot) -> Example:
     match = usual_match(robot)
     probe = Problem(robot, fk(robot, robot.q_home), match)
     smallest = np.linalg.svd(probe.jacobian(q), compute_uv=False)[:, -1]
-    best, space = q[np.argsort(-smallest)], clearance(robot, skeleton=True)
+    best, space = q[np.argsort(-smallest, kind="stable")], clearance(robot, skeleton=True)
     for aim in best:
         found = _near(robot, aim, match)
         ends = found.start, found.newton.q[-1]

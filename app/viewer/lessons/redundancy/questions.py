@@ -33,7 +33,7 @@ def facts(robot: Robot) -> LessonFacts:
     """What the file declares; joints count from 1."""
     free, z = free_motions(robot, "pose"), null_vector(robot)
     size = np.abs(z)
-    slow = [k for k in np.argsort(size).tolist() if size[k] < size.max() - STILL]
+    slow = [k for k in np.argsort(size, kind="stable").tolist() if size[k] < size.max() - STILL]
     slow = slow[:2] + slow[2:][-1:]
     fast = [k for k in range(robot.n) if size[k] >= size.max() - STILL][:2]
     joint, led, there = self_moved(robot)
@@ -86,7 +86,7 @@ def self_moved(robot: Robot) -> tuple[int, float, Array]:
     if not z.any() or free_motions(robot, "pose") == 0:
         return -1, 0.0, home
     for way in WAYS:
-        for joint in np.argsort(-z).tolist():
+        for joint in np.argsort(-z, kind="stable").tolist():
             if not robot.revolute[joint] or z[joint] < STILL:
                 continue
             for end in (ROOM * way, -ROOM * way):

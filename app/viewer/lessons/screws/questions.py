@@ -106,7 +106,7 @@ def _far(robot: Robot, S: Array, units: Units) -> tuple[dict[str, float], dict[s
 
 def _other_far(S: Array, far: int, point: Array) -> int:
     """Another joint that turns, far from the origin, whose nearest point has no number of `point`; else `far`."""
-    for joint in np.argsort(-np.linalg.norm(S[3:], axis=0)).tolist():
+    for joint in np.argsort(-np.linalg.norm(S[3:], axis=0), kind="stable").tolist():
         nearest = float(np.abs(foot(S[:, joint])).max())
         if joint != far and nearest > 10.0 * LEAST and (abs(nearest - np.abs(point)) > 0.03 * nearest).all():
             return int(joint)
