@@ -55,16 +55,17 @@ def move_row(task: Task, value: float, most: float, y: Array, p: Point) -> bool:
 def _reach(task: Task, value: float, sense: float, y: Array, p: Point) -> bool:
     """As `settle`, in shorter steps along the curve where one is too long for Newton's method.
 
-    Beside a fold postures move by the root of what the parameter does.
+    Beside a fold postures move by the root of what the parameter does, beside a singular wrist joints turn fast.
     """
     last, share = y.copy(), 1.0
     for _ in range(_STRIDES):
-        goal = value if share == 1.0 else y[task.joint] + share * (value - y[task.joint])
+        at = dial_of(task, y)
+        goal = value if share == 1.0 else at + share * wrap(value - at)
         if settle(task, goal, sense, y, p):
             if share == 1.0:
                 return True
             last[:], share = y, 1.0
-        elif task.joint < 0 or share < _SHORTEST:
+        elif share < _SHORTEST:
             return False
         else:
             y[:], share = last, 0.5 * share

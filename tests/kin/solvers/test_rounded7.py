@@ -305,6 +305,18 @@ def test_a_short_interval_between_two_folds_has_every_branch_at_each_value():
         assert {s.branch for s in found.solutions} == set(kin.branch_names(robot))
 
 
+def test_a_posture_beside_a_singular_wrist_is_found_at_each_value():
+    robot, _ = arm_named("iiwa14 1.57")
+    T = kin.fk(robot, (-1.196114, -1.353726, 2.868948, 1.587245, -1.41769, 0.329724, -2.732397))
+    branch = "shoulder front · elbow positive · wrist no-flip"  # sin θ6 passes zero by 0.0023 on this interval
+    (own,) = [s for s in kin.solve_ik(robot, T).solutions if s.branch == branch]
+    low, high = own.redundancy[0].intervals[-1]
+    assert high - low < 0.02
+    for value in np.linspace(low, high, 41)[1:-1].tolist():
+        found = kin.solve_ik(robot, T, redundancy=value, branch=branch)
+        assert found.status is Status.SOLVED, value
+
+
 @pytest.mark.parametrize("name", ["panda 1.5708", "panda 1.571", "xarm7-urdf 1.5708", "gen72-urdf 1.5708"])
 def test_the_generating_configuration_is_found_with_the_given_joint_locked(name):
     robot, _ = arm_named(name)
