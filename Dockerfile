@@ -24,9 +24,12 @@ RUN install="install --no-compile --require-hashes --only-binary :all:" \
     && pip --python /opt/kinboard/bin/python $install -r requirements.lock \
     && pip --python /opt/tools/bin/python $install -r requirements-build.lock
 # What only developers of these packages need: their tests, headers, debugging symbols, and the viewer's sources (its
-# built page stays). Libraries in *.libs are left alone: they were patched in a way that strip may break.
+# built page stays). Nor is pillow's largest library needed, for AVIF, which nothing here reads or writes. Libraries in
+# *.libs are left alone: they were patched in a way that strip may break.
 RUN cd /opt/kinboard/lib/python*/site-packages \
     && find . -type d -name tests -prune -exec rm -r {} + \
+    && find . -type f \( -name '_simd.*.so' -o -name '*_tests.*.so' \) -delete \
+    && find . -type f \( -name '_avif.*.so' -o -name 'libavif-*' \) -delete \
     && find . -type f \( -name '*.pyi' -o -name '*.h' -o -name '*.pxd' -o -name '*.lib' -o -name '*.a' \) -delete \
     && find viser/client -mindepth 1 -maxdepth 1 ! -name build ! -name '*.py' -exec rm -r {} + \
     && find . -name '*.so' ! -path '*.libs/*' -exec strip --strip-unneeded {} +

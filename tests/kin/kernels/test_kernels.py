@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import kin
@@ -38,5 +39,7 @@ def test_kernels_are_compiled_again_when_a_kernel_they_call_has_changed(tmp_path
     common.write_text(common.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
     assert run() == "2 0 False True", "compiled anew"
     for file in (tmp_path / "cache").rglob("*.nbc"):
+        data = file.read_bytes()
+        assert len(data) < 0.6 * len(zlib.decompress(data[:-4])), "compressed"
         file.write_bytes(file.read_bytes()[:-1])
     assert run() == "2 0 False True", "damaged"

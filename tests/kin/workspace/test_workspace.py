@@ -382,7 +382,7 @@ def test_a_gantry_is_a_box():
     assert kin.workspace_section(GANTRY, ([0, 0, 0.3], [0, 0, 1])).area == pytest.approx(0.125, abs=1e-6)
 
 
-def test_a_height_that_all_configurations_have_is_told_at_the_first_one():
+def test_a_height_that_all_configurations_have_is_that_of_the_first_one():
     """A partition of equal numbers differs from processor to processor."""
     region = Region.of(PLANAR)
     first = np.empty((1, 2))
