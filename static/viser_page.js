@@ -367,6 +367,8 @@ const viserPage = (() => {
       },
     });
     placed.add(viewer.nodeRefFromName);
+    // A picture that rests is empty when viser changes its resolution, until it is drawn again.
+    new MutationObserver(() => viewer.requestRender()).observe(canvas, { attributeFilter: ["width", "height"] });
   }
   watch(enterViewer, { delay: 50 });
 

@@ -278,6 +278,24 @@ def test_labels_are_drawn_where_they_belong_while_the_arm_moves_and_another_come
     tab.close()
 
 
+RESIZED = """async () => {
+  const canvas = document.querySelector("canvas[data-engine]");
+  let fiber = canvas[Object.keys(canvas).find((key) => key.startsWith("__reactFiber$"))];
+  while (!fiber.memoizedProps?.value?.mutable?.current?.nodeRefFromName) fiber = fiber.return;
+  const viewer = fiber.memoizedProps.value.mutable.current, draw = viewer.requestRender;
+  let asked = 0;
+  viewer.requestRender = () => { asked++; draw(); };
+  canvas.width -= 1;  // as viser does where it draws slowly: the picture is empty now
+  await Promise.resolve();
+  viewer.requestRender = draw;
+  return asked;
+}"""
+
+
+def test_a_picture_of_another_resolution_is_drawn_at_once(desktop: Tab) -> None:
+    assert desktop.page.evaluate(RESIZED) >= 1
+
+
 def test_typing_into_a_menu_replaces_the_name_that_is_chosen(desktop: Tab) -> None:
     page, field = desktop.page, desktop.row("Robot").locator("input:visible").first
     chosen = field.input_value()

@@ -156,10 +156,10 @@ def test_a_class_from_the_landing_page_to_the_csv(members: list[Member], address
     teacher.do("wall")
     teacher.shows("[data-class-wall]")
     for _ in range(int(WAIT / 500)):
-        if pads(teacher.page) > 100:
+        if (green := pads(teacher.page)) > 100:
             break
         teacher.page.wait_for_timeout(500)
-    assert pads(teacher.page) > 100, "the pads of those who have solved the task are green"
+    assert green > 100, "the pads of those who have solved the task are green"
     save_picture(teacher.page, "class-wall")
     teacher.do("wall")
 
