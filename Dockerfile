@@ -7,7 +7,7 @@
 #   --build-arg BASE=docker.io/library/python:3.13-slim-trixie@sha256:…
 ARG BASE=docker.io/library/python:3.13-slim-trixie
 # Checked against the wheel, and the image's label.
-ARG VERSION=0.2.0
+ARG VERSION=1.0.0
 
 FROM ${BASE} AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_ROOT_USER_ACTION=ignore
