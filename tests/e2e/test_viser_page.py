@@ -208,6 +208,16 @@ def test_labels_of_the_scene_follow_the_colours_of_the_page(tab: Tab) -> None:
     assert not any(page.evaluate(SHADES))
 
 
+FIND_VIEWER = """
+function findViewer() {  // viser's own state of the scene
+  const canvas = document.querySelector("canvas[data-engine]");
+  let fiber = canvas?.[Object.keys(canvas).find((key) => key.startsWith("__reactFiber$"))];
+  while (fiber && !fiber.memoizedProps?.value?.mutable?.current?.nodeRefFromName) fiber = fiber.return;
+  return fiber?.memoizedProps.value;
+}
+"""
+
+
 class LabelsTab(Tab):
     """A tab that compares where each label is drawn with where it belongs, in every frame.
 
@@ -218,18 +228,13 @@ class LabelsTab(Tab):
 
     scripts = (
         Tab.scripts
+        + FIND_VIEWER
         + """
 {
   window.strayed = [];
   const gl = WebGL2RenderingContext.prototype;
-  const find = () => {
-    const canvas = document.querySelector("canvas[data-engine]");
-    let fiber = canvas?.[Object.keys(canvas).find((key) => key.startsWith("__reactFiber$"))];
-    while (fiber && !fiber.memoizedProps?.value?.mutable?.current?.nodeRefFromName) fiber = fiber.return;
-    return fiber?.memoizedProps.value;
-  };
   const look = (data) => {
-    const viewer = find();
+    const viewer = findViewer();
     if (!viewer) return;
     const { nodeRefFromName: nodes, nodePoseData: poses } = viewer.mutable.current;
     const drawn = [];
@@ -278,18 +283,17 @@ def test_labels_are_drawn_where_they_belong_while_the_arm_moves_and_another_come
     tab.close()
 
 
-RESIZED = """async () => {
-  const canvas = document.querySelector("canvas[data-engine]");
-  let fiber = canvas[Object.keys(canvas).find((key) => key.startsWith("__reactFiber$"))];
-  while (!fiber.memoizedProps?.value?.mutable?.current?.nodeRefFromName) fiber = fiber.return;
-  const viewer = fiber.memoizedProps.value.mutable.current, draw = viewer.requestRender;
+RESIZED = f"""async () => {{
+  {FIND_VIEWER}
+  const viewer = findViewer().mutable.current, draw = viewer.requestRender;
   let asked = 0;
-  viewer.requestRender = () => { asked++; draw(); };
-  canvas.width -= 1;  // as viser does where it draws slowly: the picture is empty now
+  viewer.requestRender = () => {{ asked++; draw(); }};
+  // As viser does where it draws slowly: the picture is empty now.
+  document.querySelector("canvas[data-engine]").width -= 1;
   await Promise.resolve();
   viewer.requestRender = draw;
   return asked;
-}"""
+}}"""
 
 
 def test_a_picture_of_another_resolution_is_drawn_at_once(desktop: Tab) -> None:

@@ -59,8 +59,10 @@ def _reach(task: Task, value: float, sense: float, y: Array, p: Point) -> bool:
     """
     last, share = y.copy(), 1.0
     for _ in range(_STRIDES):
-        at = dial_of(task, y)
-        goal = value if share == 1.0 else at + share * wrap(value - at)
+        goal = value
+        if share < 1.0:
+            at = dial_of(task, y)
+            goal = at + share * wrap(value - at)
         if settle(task, goal, sense, y, p):
             if share == 1.0:
                 return True
