@@ -171,51 +171,54 @@ class Recording:
             raise InputError("recording", f"{end:g} s", f"at most {self.bounds.seconds:g} s")
         if size > self.bounds.size:
             raise too_large(self.bounds.size)
+        if self._crowded(size):
+            raise InputError("recording", "no room in the service for it", "another try, when others are closed")
+        _track(entries, self.robot.n)  # before it counts: an error may keep what it has seen for long
         with self._lock:
             self.entries, self.size = entries, size
             self._finish(end, READ)
-        if self._crowded():
-            self.entries, self.size = [], 0
-            raise InputError("recording", "no room in the service for it", "another try, when others are closed")
-        self.track()
         return self
 
     def _finish(self, seconds: float, why: str) -> None:
         if self.ended is None:
             self._end, self.ended = seconds, why
 
-    def _crowded(self) -> bool:
+    def _crowded(self, more: int = 0) -> bool:
         if self.bounds.shared is None:
             return False
         with _shared_lock:
-            return sum(each.size for each in _shared) + STEP > self.bounds.shared
-
-    def _values(self, given: object) -> Array:
-        """A configuration; NaN where it is none that can be drawn."""
-        values = np.array(given, dtype=float)
-        if values.shape != (self.robot.n,):
-            raise InputError("recording", str(given), f"configurations of {self.robot.n} numbers")
-        return values if (np.abs(values) < LARGEST).all() else np.full(self.robot.n, np.nan)
+            return sum(each.size for each in _shared) + more + STEP > self.bounds.shared
 
     def track(self) -> Track:
         """The arm over time."""
-        entries, n = list(self.entries), self.robot.n
-        spoken = (SHOWN,) if any(each.topic == SHOWN for each in entries) else SPOKEN
-        unknown = np.full(n, np.nan)
-        now = {"q": unknown, "measured": unknown}
-        times, rows = [], []
-        for each in entries:
-            if each.topic not in (*spoken, MEASURED):
-                continue
-            field = each.topic.rpartition("/")[2]
-            value = json.loads(each.data)[field]
-            now[field] = unknown if value is None or len(value) != n else self._values(value)
-            times.append(each.time)
-            rows.append((now["q"], now["measured"]))
-        found = np.array(rows).reshape(-1, 2, n)
-        return Track(np.array(times), found[:, 0], found[:, 1])
+        return _track(list(self.entries), self.robot.n)
 
 
 def too_large(most: int) -> InputError:
     """The messages of a recording take more than it may have."""
     return InputError("recording", f"more than {most / 1e6:.3g} MB in memory", f"at most {most / 1e6:.3g} MB")
+
+
+def _track(entries: list[Entry], n: int) -> Track:
+    spoken = (SHOWN,) if any(each.topic == SHOWN for each in entries) else SPOKEN
+    unknown = np.full(n, np.nan)
+    now = {"q": unknown, "measured": unknown}
+    times, rows = [], []
+    for each in entries:
+        if each.topic not in (*spoken, MEASURED):
+            continue
+        field = each.topic.rpartition("/")[2]
+        value = json.loads(each.data)[field]
+        now[field] = unknown if value is None or len(value) != n else _values(value, n)
+        times.append(each.time)
+        rows.append((now["q"], now["measured"]))
+    found = np.array(rows).reshape(-1, 2, n)
+    return Track(np.array(times), found[:, 0], found[:, 1])
+
+
+def _values(given: object, n: int) -> Array:
+    """A configuration; NaN where it is none that can be drawn."""
+    values = np.array(given, dtype=float)
+    if values.shape != (n,):
+        raise InputError("recording", str(given), f"configurations of {n} numbers")
+    return values if (np.abs(values) < LARGEST).all() else np.full(n, np.nan)
