@@ -1,6 +1,6 @@
 """A simulated arm follows the arm of a page: MuJoCo moves it with a servo at each joint, gravity and a payload.
 
-    pip install '.[mujoco]'
+    pip install -e '.[mujoco]'
     python examples/mujoco_arm.py K7QF-2M4A --payload 2 --plot tracking.svg
 
 What is dragged in the page, or played in its tab *Program*, is commanded; the ghost is where the simulated arm is.
@@ -27,7 +27,7 @@ import kin
 try:
     import mujoco
 except ImportError:
-    raise SystemExit("mujoco_arm.py needs MuJoCo: pip install '.[mujoco]' in the folder of Kinboard") from None
+    raise SystemExit("mujoco_arm.py needs MuJoCo: pip install -e '.[mujoco]' in the folder of Kinboard") from None
 
 NAME: Final = "mujoco_arm.py"
 STEP: Final = 0.002  # s of a step of the simulation

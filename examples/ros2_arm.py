@@ -1,6 +1,6 @@
 """An arm of ROS 2 beside the arm of a page, through rosbridge: `/joint_states` in, `JointTrajectory` out.
 
-    pip install '.[ros2]'
+    pip install -e '.[ros2]'
     ros2 launch rosbridge_server rosbridge_websocket_launch.xml
     python examples/ros2_arm.py K7QF-2M4A --joints shoulder_pan_joint,shoulder_lift_joint,elbow_joint,…
 
@@ -29,7 +29,7 @@ import kin
 try:
     import roslibpy
 except ImportError:
-    raise SystemExit("ros2_arm.py needs roslibpy: pip install '.[ros2]' in the folder of Kinboard") from None
+    raise SystemExit("ros2_arm.py needs roslibpy: pip install -e '.[ros2]' in the folder of Kinboard") from None
 
 NAME: Final = "ros2_arm.py"
 BRIDGE, STATES, TRAJECTORY = (

@@ -1,6 +1,6 @@
 """An SO-100 or SO-101 beside the arm of a page, over the bus of its Feetech servos.
 
-    pip install '.[so101]'
+    pip install -e '.[so101]'
     python examples/so101_arm.py K7QF-2M4A --port /dev/ttyACM0 --calibration my_arm.json
 
 The ghost of the page is where the encoders say that the arm is; nothing is written to the bus. With `--drive` the
@@ -31,7 +31,7 @@ try:
     from serial.tools.list_ports import comports
 except ImportError:
     raise SystemExit(
-        "so101_arm.py needs feetech-servo-sdk: pip install '.[so101]' in the folder of Kinboard"
+        "so101_arm.py needs feetech-servo-sdk: pip install -e '.[so101]' in the folder of Kinboard"
     ) from None
 
 GONE: tuple[type[Exception], ...] = (OSError,)  # what is raised once a port is gone
