@@ -224,6 +224,7 @@ def test_pages_of_other_origins_are_refused(address: str, tls: ssl.SSLContext) -
             origin="https://elsewhere.example",
             additional_headers=BEARER,
             proxy=None,
+            open_timeout=60,
         )
     assert refused.value.response.status_code == 403
 

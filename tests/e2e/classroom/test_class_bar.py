@@ -109,6 +109,9 @@ def test_the_bar_covers_no_tool_and_nothing_covers_the_bar(class_of_screens: tup
     for student in students:
         expect(student.page.locator(f"[data-exercise={EXERCISE}]")).to_be_attached()
     all_keep_apart("[data-class-bar=free]", "task")
+    for student in students:
+        student.open("Move")
+    all_keep_apart("[data-class-bar=free] [data-guide-do=task]", "task-to-open")
     teacher.do("follow")
     for student in students:
         expect(student.page.locator("[data-class-paused]")).to_have_text("Task paused")

@@ -242,7 +242,7 @@ def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
     assert (seat.task, seat.work[EXERCISE].tries, seat.work[EXERCISE].progress) == (EXERCISE, 2, "solved")
 
     # The words below an answer do not stay below the next exercise, from which the bar leads back.
-    leads_back = "Open the task</button>"
+    leads_back = "Open task</button>"
 
     def beside_the_task() -> bool:
         """Whether the way back stands in every tab: beside the task itself it is hidden in the tab Learn."""
