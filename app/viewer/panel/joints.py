@@ -178,6 +178,7 @@ class JointSliders:
         for place, i in self._crossed:
             slider = self._sliders[place][i]
             show_value(slider, self._value(slider, i, q), again=True)
+            self._shown_at[place, i] = time.perf_counter()
         self._crossed.clear()
 
     def _value(self, slider: viser.GuiSliderHandle[float], i: int, q: Array) -> float:

@@ -23,7 +23,7 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.panel.joints import label, lock_buttons
+from app.viewer.panel.joints import ON_ITS_WAY, label, lock_buttons
 from app.viewer.server import ViewerServer
 from app.viewer.session import persistence
 from app.viewer.session.page import VisitorPage
@@ -178,6 +178,23 @@ def slider_after_home(tab: FakeBrowser, page: VisitorPage) -> None:
     tab.set(ELBOW, 50.0)
 
 
+def slider_after_a_repeat(tab: FakeBrowser, page: VisitorPage) -> None:
+    """What has crossed a change is sent again later, and this crosses the next change."""
+    persistence.SAVE_AFTER = ON_ITS_WAY + 0.1  # as long as `server` is there
+    repeated: list[float] = []
+    show_crossed = page.sliders.show_crossed
+
+    def show(q: np.ndarray) -> None:
+        show_crossed(q)
+        repeated.append(q[1])
+
+    page.sliders.show_crossed = show  # type: ignore[method-assign]
+    slider_after_home(tab, page)
+    while not np.isclose(repeated, math.radians(50)).any():
+        time.sleep(0.002)
+    tab.set(ELBOW, 20.0)
+
+
 def target_after_a_slider(tab: FakeBrowser, page: VisitorPage) -> None:
     tab.set(ELBOW, 75.0)
     unheard(page, 75.0)
@@ -186,9 +203,11 @@ def target_after_a_slider(tab: FakeBrowser, page: VisitorPage) -> None:
     tab.release()
 
 
-@pytest.mark.parametrize("acts", [slider_after_home, target_after_a_slider])
+@pytest.mark.parametrize(
+    ("acts", "joint"), [(slider_after_home, 50), (slider_after_a_repeat, 20), (target_after_a_slider, None)]
+)
 def test_what_crosses_an_earlier_answer_on_the_way_is_shown(
-    server: tuple[ViewerServer, int], acts: Callable[[FakeBrowser, VisitorPage], None]
+    server: tuple[ViewerServer, int], acts: Callable[[FakeBrowser, VisitorPage], None], joint: float | None
 ) -> None:
     viewer, port = server
     with FakeBrowser(port) as tab:
@@ -196,7 +215,7 @@ def test_what_crosses_an_earlier_answer_on_the_way_is_shown(
         (page,) = viewer.pages.values()
         acts(tab, page)
         shows_what_is(tab, page, "")
-        if acts is target_after_a_slider:
+        if joint is None:
             assert page.arm.open_target is not None
         else:
-            assert page.arm.q[1] == pytest.approx(math.radians(50))
+            assert page.arm.q[1] == pytest.approx(math.radians(joint))
