@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,6 +15,7 @@ import viser
 
 from app.exercises.typed import EntryError
 from app.viewer.panel import Post, assign, listen, listen_click
+from app.viewer.panel.crossing import Crossings
 from app.viewer.panel.entry import read_value
 from app.viewer.panel.fields import field, fields_html, limit_marks, shown
 from app.viewer.panel.status import Notice
@@ -26,7 +26,6 @@ from kin.units import Unit, Units, general
 
 DIGITS = 2
 REMEMBERED = 200  # fields of sliders, also of those that were replaced
-ON_ITS_WAY = 2.0  # s that a value may take to the page, and the page's own back
 # Marks the label of a locked joint; invisible. static/input.js presses such a button, on which viewer.css draws a
 # padlock.
 LOCKED = "\N{WORD JOINER}"
@@ -86,10 +85,9 @@ class JointSliders:
         self.robot = robot
         self._units = units
         self._held = 0  # index of the folder whose slider was moved last
-        # When a value was sent to a slider, by folder and joint; until now also to the sliders that these replace.
-        replaced = itertools.product(range(len(folders)), range(robot.n if before else 0))
-        self._shown_at = dict.fromkeys(replaced, time.perf_counter())
-        self._crossed: set[tuple[int, int]] = set()  # moved while such a value may have been on its way
+        self._crossings = Crossings[tuple[int, int]]()  # by folder and joint
+        if before is not None:  # what was sent to a slider is on its way to the one that replaces it
+            self._crossings.sent(itertools.product(range(len(folders)), range(robot.n)))
         # Of each field: index and kind of its joint, and the unit of what is typed there.
         self._fields: dict[object, tuple[int, str, Unit]] = {} if before is None else before._fields
         self._sliders: list[list[viser.GuiSliderHandle[float]]] = []
@@ -149,8 +147,7 @@ class JointSliders:
             place: index of the slider's folder.
         """
         self._held = place
-        if time.perf_counter() - self._shown_at.get((place, index), -math.inf) < ON_ITS_WAY:
-            self._crossed.add((place, index))
+        self._crossings.heard((place, index))
         if not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(f"joint {index + 1}", value, "a finite number")
         raw = self._unit(index).read(float(value))
@@ -167,19 +164,13 @@ class JointSliders:
                 held = i == dragged and place == self._held and slider.min <= slider.value <= slider.max
                 if not held and value != slider.value:
                     assign(slider, value)
-                    self._shown_at[place, i] = time.perf_counter()
+                    self._crossings.sent([(place, i)])
 
-    def show_crossed(self, q: Array) -> None:
-        """Send once more what crossed a visitor's own change of the same slider, now that the visitor rests.
-
-        The page shows what came last: where *Home* was pressed before a slider was moved, it may have got the
-        angle of home after that. The slider would stay elsewhere than its joint.
-        """
-        for place, i in self._crossed:
+    def show_again(self, q: Array) -> None:
+        """Show what has crossed a visitor's change of the same slider, now that the visitor rests."""
+        for place, i in self._crossings.pop():
             slider = self._sliders[place][i]
             show_value(slider, self._value(slider, i, q), again=True)
-            self._shown_at[place, i] = time.perf_counter()
-        self._crossed.clear()
 
     def _value(self, slider: viser.GuiSliderHandle[float], i: int, q: Array) -> float:
         """What the slider of joint i shows at a configuration ``(n,)``."""

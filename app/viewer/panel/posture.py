@@ -12,9 +12,11 @@ from collections.abc import Sequence
 import viser
 
 from app.viewer.panel import Post, assign, listen, update_html
+from app.viewer.panel.crossing import Crossings
 from app.viewer.panel.entry import read_value
 from app.viewer.panel.fields import field, fields_html, limit_marks
 from app.viewer.views.templates import render
+from app.viewer.viser_patches import show_value
 from kin import InputError, Redundancy, Robot, branch_meanings, branch_names
 from kin.units import DEFAULT_UNITS, Unit, Units
 
@@ -114,6 +116,7 @@ class RedundancySliders:
         self._tracks: dict[str, viser.GuiHtmlHandle] = {}
         self._html: viser.GuiHtmlHandle | None = None
         self._uuids: dict[str, str] = {}
+        self._crossings = Crossings[str]()
         self._unit = DEFAULT_UNITS.angles
 
     def show(
@@ -125,12 +128,14 @@ class RedundancySliders:
             self.remove()
             self._key = key
             self._make(parameters, robot, units)
+            self._crossings.sent(self._sliders)
         for parameter in parameters:
             slider = self._sliders[parameter.name]
             item = on_side_of(slider.value, parameter, self._unit)
-            value = self._unit.shown(item.value)
-            if item.name != dragged:
-                assign(slider, min(max(value, slider.min), slider.max))
+            value = min(max(self._unit.shown(item.value), slider.min), slider.max)
+            if item.name != dragged and value != slider.value:
+                assign(slider, value)
+                self._crossings.sent([item.name])
             track = feasible_html(item, float(slider.min), float(slider.max), self._unit)
             update_html(self._tracks[item.name], track)
 
@@ -154,7 +159,13 @@ class RedundancySliders:
             raise InputError("redundancy parameter", name, "one of " + ", ".join(self._sliders))
         if not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(name, value, "a finite number")
+        self._crossings.heard(name)
         return self._unit.read(float(value))
+
+    def show_again(self) -> None:
+        """Show what has crossed a visitor's change of the same slider, now that the visitor rests."""
+        for name in self._crossings.pop():
+            show_value(self._sliders[name], self._sliders[name].value, again=True)
 
     def remove(self) -> None:
         """Remove the sliders from the panel."""
@@ -165,6 +176,7 @@ class RedundancySliders:
         if self._html is not None:
             self._html.remove()
         self._sliders, self._tracks, self._html, self._uuids, self._key = {}, {}, None, {}, ()
+        self._crossings.clear()
 
     def _make(self, parameters: Sequence[Redundancy], robot: Robot, units: Units) -> None:
         self._unit = unit = units.angles

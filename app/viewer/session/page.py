@@ -380,7 +380,8 @@ class VisitorPage(ShownArm, Worker):
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
             self._save()
             self._show_hints()
-            self.sliders.show_crossed(self.arm.goal)
+            self.sliders.show_again(self.arm.goal)
+            self.posture.show_again()
             self.arm.show_gizmo_again()
             self.place_scale()
 

@@ -55,6 +55,10 @@ class PosturePanel:
         self._sliders.show(parameters, robot, self._stage.units, self._dragged)
         self._dragged = None
 
+    def show_again(self) -> None:
+        """Show what has crossed a visitor's change of a slider, now that the visitor rests."""
+        self._sliders.show_again()
+
     def use_activity(self) -> None:
         """Something else is open or withheld."""
         if self._asked != ("postures" in self._stage.activity.withheld):

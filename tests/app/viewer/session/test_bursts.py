@@ -23,7 +23,8 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.panel.joints import ON_ITS_WAY, label, lock_buttons
+from app.viewer.panel.crossing import ON_ITS_WAY
+from app.viewer.panel.joints import label, lock_buttons
 from app.viewer.server import ViewerServer
 from app.viewer.session import persistence
 from app.viewer.session.page import VisitorPage
@@ -182,13 +183,13 @@ def slider_after_a_repeat(tab: FakeBrowser, page: VisitorPage) -> None:
     """What has crossed a change is sent again later, and this crosses the next change."""
     persistence.SAVE_AFTER = ON_ITS_WAY + 0.1  # as long as `server` is there
     repeated: list[float] = []
-    show_crossed = page.sliders.show_crossed
+    show_again = page.sliders.show_again
 
     def show(q: np.ndarray) -> None:
-        show_crossed(q)
+        show_again(q)
         repeated.append(q[1])
 
-    page.sliders.show_crossed = show  # type: ignore[method-assign]
+    page.sliders.show_again = show  # type: ignore[method-assign]
     slider_after_home(tab, page)
     while not np.isclose(repeated, math.radians(50)).any():
         time.sleep(0.002)
@@ -219,3 +220,24 @@ def test_what_crosses_an_earlier_answer_on_the_way_is_shown(
             assert page.arm.open_target is not None
         else:
             assert page.arm.q[1] == pytest.approx(math.radians(joint))
+
+
+def test_an_arm_angle_moved_right_after_home_is_shown(server: tuple[ViewerServer, int]) -> None:
+    viewer, port = server
+    arm, psi = STORE.get("iiwa14"), "Arm angle ψ"
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        (page,) = viewer.pages.values()
+        for name, value in (("Robot", arm.name), ("Go to", "Random"), (psi, 40.0)):
+            tab.set(name, value)
+            rest(tab, page)
+        tab.set("Go to", "Home")
+        unheard(page, math.degrees(arm.q_home[1]))
+        tab.set(psi, 20.0)
+        tab.wait(lambda: page.arm.moving or not np.allclose(page.arm.goal, arm.q_home))
+        shows_what_is(tab, page, "")
+        tab.wait(lambda: tab.value(psi) == 20.0)
+        (free,) = kin.solve_ik(
+            arm, kin.fk(arm, page.arm.q), q_seed=page.arm.q, branch="seed", max_solutions=1
+        ).redundancy
+        assert math.degrees(free.value) == pytest.approx(20.0, abs=0.01)
