@@ -1,11 +1,29 @@
 #!/bin/sh
-# Set everything up in .venv, then run every check. Arguments go to pytest, e.g. tests/kin, or -m browser.
+# Set everything up in .venv, then check: linters, types, and the tests that a change needs (some minutes).
+#   sh scripts/test.sh --all       all tests but those marked slow (half an hour)
+#   sh scripts/test.sh tests/kin   other arguments go to pytest
 # With KINBOARD_TEST_PICTURES=1 the browser tests save pictures of the screens in tests/artifacts.
 set -eu
 root=$(cd "$(dirname "$0")/.." && pwd)
 . "$root/scripts/venv.sh"
 unset PYTHONDONTWRITEBYTECODE # hundreds of processes are started, each of which would compile all it imports
 chromium=${KINBOARD_TEST_CHROMIUM:-/usr/bin/chromium}
+work=$(mktemp -d)
+started= # processes in the background that may be ended at any time
+programs= # the one that installs Debian's packages, which may not
+
+# However this script ends, nothing goes on behind it.
+end() {
+  status=$?
+  trap - EXIT INT TERM HUP
+  for each in $started; do kill "$each" 2>/dev/null || :; done
+  [ -z "$programs" ] || wait "$programs" || :
+  for each in $started; do wait "$each" 2>/dev/null || :; done
+  rm -rf "$work"
+  exit "$status"
+}
+trap end EXIT
+trap 'exit 130' INT TERM HUP
 
 # Three browsers, a screen for two of them, PostgreSQL, shells, a C++ compiler, curl and the two proxies, if they are missing.
 install_programs() {
@@ -27,8 +45,26 @@ install_programs() {
   done
 }
 
-compile_kernels() {
-  python -c 'import kin; kin.warm_up(everything=True)'
+# $1: what it is for people; the rest: the command.
+step() {
+  name=$1
+  shift
+  "$@" || fail "$name failed: its message is above."
+}
+
+# The same in the background; `finish` waits for it and shows what it printed.
+start() {
+  name=$1
+  shift
+  "$@" >"$work/$name" 2>&1 &
+  started="$started $!"
+  eval "pid_$name=$!"
+}
+finish() {
+  eval "pid=\$pid_$1"
+  wait "$pid" && result=0 || result=$?
+  cat "$work/$1"
+  return $result
 }
 
 cd "$root"
@@ -36,49 +72,46 @@ cd "$root"
 PATH="$root/.venv/bin:$root/.venv/debian/usr/sbin:$root/.venv/debian/usr/bin:$PATH:/usr/sbin"
 install_programs & # while pip downloads
 programs=$!
-if [ $# -gt 0 ]; then
-  install_kinboard "[test]"
-  wait $programs
-  ruff check .
-  ruff format --check .
-  sh scripts/lint.sh
-  mypy
+install_kinboard "[test]"
+
+case ${1:-} in
+  --all) selected="not slow" ;;
+  "") selected="not slow and not full" ;;
+  *) selected= ;;
+esac
+if [ -n "$selected" ]; then
+  # Kernels are compiled before any test, by two processes from both ends: tests that run beside each other would compile
+  # the same ones.
+  start kernels python -c 'import kin; kin.warm_up(everything=True)'
+  start backwards python -c 'from kin.warmup import warm_up_rest; warm_up_rest(backwards=True)'
+fi
+step "ruff check" ruff check .
+step "ruff format" ruff format --check .
+step "the check of static/ (ESLint)" sh scripts/lint.sh
+start mypy mypy
+wait $programs && programs= || { programs=; fail "what the tests need could not be installed: the message is above."; }
+if [ -z "$selected" ]; then
+  finish mypy || fail "mypy failed."
+  trap - EXIT
+  rm -rf "$work"
   exec pytest "$@"
 fi
-# Kernels are compiled before any test, by two processes from both ends: two runs would both compile the same ones.
-# They need no more than Kinboard itself does; what the tests need is downloaded meanwhile.
-install_kinboard ""
-compile_kernels &
-compiling=$!
-python -c 'from kin.warmup import warm_up_rest; warm_up_rest(backwards=True)' &
-backwards=$!
-install_kinboard "[test]"
-ruff check .
-ruff format --check .
-sh scripts/lint.sh
-wait $programs
-# If the second installation replaced a library in use, a compiling process may have failed: once more then.
-wait $compiling && wait $backwards || compile_kernels
-# Browsers and processes that start on a loaded machine can be late: a failure counts if it comes twice, in a browser
-# three times. The summary names what was run again ("rerun"), which is a fault of the test or of the code all the same.
-twice="--reruns 1 -r R"
+finish kernels || fail "kernels could not be compiled."
+finish backwards || fail "kernels could not be compiled."
+
 # The files with tests of a marker: collecting all others takes longer than some of these run.
 files_of() {
   grep -rl "pytest\.mark\.$1\b" tests --include="test_*.py"
 }
 # Pages draw for as long as they wait: beside other work, browsers take twice as much of the processors. They come first,
 # then what computes, in four processes, as many tests wait for arms that move; then alone what measures time.
-failed=0
-pytest --reruns 2 -r R -n 3 --dist loadfile --no-loadscope-reorder -m "not slow and browser" $(files_of browser) || failed=1
-types=$(mktemp)
-trap 'rm -f "$types"' EXIT
-mypy >"$types" 2>&1 &
-typing=$!
+failed=
+in_processes="--dist loadfile --no-loadscope-reorder"
+pytest -n 3 $in_processes -m "$selected and browser" $(files_of browser) || failed="$failed browsers"
 # The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Four that
 # begin together would each do so. What cannot be collected is said by the run.
 pytest --collect-only -qq >/dev/null 2>&1 || :
-pytest $twice -n 4 --dist loadfile --no-loadscope-reorder -m "not slow and not browser and not bench" || failed=1
-wait $typing || failed=1
-cat "$types"
-pytest $twice -m "not slow and bench" $(files_of bench) || failed=1
-exit $failed
+pytest -n 4 $in_processes -m "$selected and not browser and not bench" || failed="$failed tests"
+finish mypy || failed="$failed mypy"
+[ "$selected" = "not slow and not full" ] || pytest -m "$selected and bench" $(files_of bench) || failed="$failed measurements"
+[ -z "$failed" ] || fail "failed:$failed. The messages are above."

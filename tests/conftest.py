@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import gc
 import os
-import socket
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 from playwright.sync_api import Browser, sync_playwright
+
+import kin
+from kin.warmup import one_of_each_family
 
 settings.register_profile("local", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
@@ -44,6 +46,7 @@ LONG = frozenset(
         "e2e/classroom/test_class_lines.py",
         "e2e/lessons/test_accessibility.py",
         "e2e/test_dashboard.py",
+        "e2e/test_other_browsers.py",
         "e2e/test_screens.py",
         "kin/kernels/test_kernels.py",
         "kin/kernels/test_loaded_kernels.py",
@@ -51,6 +54,24 @@ LONG = frozenset(
     )
 )
 assert not (moved := [str(file) for file in LONG if not file.exists()]), moved
+
+
+# Without --all, a test of each built-in arm runs for these: in tests/kin for one of each family of closed forms,
+# elsewhere, where a closed form is a black box, for some with five to seven joints and one with a slide.
+ONE_OF_EACH_FAMILY = frozenset(robot.id for robot in one_of_each_family())
+SOME = frozenset({"pioneer5", "redundant7-craig", "puma560", "scara"})
+
+
+def stands_for_others(item: pytest.Item) -> bool:
+    """Whether a test is of no built-in arm, or of one that stands for the others."""
+    values = (
+        item.callspec.params.values() if isinstance(item, pytest.Function) and hasattr(item, "callspec") else ()
+    )
+    ids = {
+        each.id if isinstance(each, kin.Robot) else each for each in values if isinstance(each, kin.Robot | str)
+    }
+    chosen = ONE_OF_EACH_FAMILY if item.path.is_relative_to(TESTS / "kin") else SOME
+    return ids & kin.builtin_robots().keys() <= chosen
 
 
 @pytest.hookimpl(wrapper=True)
@@ -66,31 +87,21 @@ def pytest_collection() -> Iterator[None]:
     return found
 
 
+@pytest.hookimpl(tryfirst=True)  # before -m is applied
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the long files; then files of `kin`, which compute, take turns with those that often wait."""
+    """Mark the tests of arms that stand for no others as `full`, and begin with the long files.
+
+    Then files of `kin`, which compute, take turns with those that often wait.
+    """
+    for item in items:
+        if not stands_for_others(item):
+            item.add_marker(pytest.mark.full)
     files = list(dict.fromkeys(item.path for item in items))
     computing = {path for path in files if path.is_relative_to(TESTS / "kin")}
     place = {}
     for part in ([path for path in files if (path in computing) == computes] for computes in (True, False)):
         place |= {path: (path not in LONG, i / len(part)) for i, path in enumerate(part)}
     items.sort(key=lambda item: place[item.path])
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say why each test that is run again failed: the plugin that runs it again tells its name alone."""
-    for report in terminalreporter.stats.get("rerun", ()):
-        terminalreporter.section(f"run again: {report.nodeid} ({report.when})")
-        terminalreporter.line(report.longreprtext)
-
-
-def pytest_sessionstart(session: pytest.Session) -> None:
-    """Send at once what ``pytest --reruns`` sends before each test from its process to the one that counts.
-
-    Otherwise each of its messages waits until the one before is acknowledged, for 40 ms. Most tests are shorter.
-    """
-    counts = getattr(session.config, "failures_db", None)
-    if (line := getattr(counts, "sock", None)) is not None:
-        line.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -84,6 +84,7 @@ def shell(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {**os.environ, "PATH": f"{folder}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("command", "shown"), commands(), ids=[command for command, _ in commands()])
 def test_command_line_examples_run_and_print_what_is_shown(shell, tmp_path, command, shown):
     """In a folder with the checkout's data, where the files that they write are left."""
@@ -114,6 +115,7 @@ def test_the_page_of_the_command_line_has_every_command_and_no_other_option():
         assert option in "".join(helps.values()), option
 
 
+@pytest.mark.full
 def test_rest_examples_are_answered():
     lines = dict.fromkeys(
         line for block in blocks("sh") for line in block.splitlines() if line.startswith("curl ")
@@ -210,6 +212,7 @@ def test_the_page_of_a_solver_names_built_in_arms_that_it_solves():
     assert not without & {f"docs/background/{name}.md" for name in solved}
 
 
+@pytest.mark.full
 def test_the_page_of_arms_is_the_one_that_its_script_writes():
     done = subprocess.run(
         [sys.executable, "-c", "from scripts.arms_page import page; print(page(), end='')"],
@@ -328,6 +331,7 @@ def loaded(html: str) -> list[str]:
     return parser.found
 
 
+@pytest.mark.full
 def test_the_site_has_its_figures(site):
     named = {
         name: page

@@ -85,6 +85,7 @@ def reached(folder, arm):
     return T
 
 
+@pytest.mark.full
 def test_the_hour_in_python(folder):
     code = example('python title="hour.py"')
     assert len(code.splitlines()) <= 40
@@ -124,6 +125,7 @@ def test_the_request_of_the_matlab_program_is_answered_with_the_field_that_it_sh
     assert np.allclose(shown, kin.fk("pioneer5", np.fromstring(numbers, sep=" "))[:3, 3])
 
 
+@pytest.mark.full
 def test_the_hour_on_the_command_line(folder):
     code = example('sh title="hour.sh"')
     assert len(code.splitlines()) <= 10

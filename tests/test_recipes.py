@@ -245,6 +245,7 @@ def test_the_recipe_names_every_place_that_has_to_change(what: str) -> None:
         assert any(path == each or (each.endswith("/") and path.startswith(each)) for each in named), path
 
 
+@pytest.mark.full
 def test_what_was_added_is_found_everywhere(scratch: Path, found: dict[str, Any]) -> None:
     assert all(file.startswith(str(scratch)) for file in found["folders"])
     assert found["verdicts"] == [False, True]

@@ -337,6 +337,7 @@ def private_names(sources: Sources) -> Iterator[str]:
             yield from (f"{path}: {name}" for name in private)
 
 
+@pytest.mark.full
 def test_tests_use_fewer_and_fewer_private_names():
     assert len([*private_names(read_sources("tests"))]) <= PRIVATE
 

@@ -216,6 +216,7 @@ class Machine:
         return Turns(Contestant(name, work, [(k,) for k in range(5)], lambda _: [], per_call))
 
 
+@pytest.mark.full
 def test_ratios_are_robust_to_a_machine_that_slows_down():
     machine = Machine()
     fast, slow = machine.worker("fast", 1000), machine.worker("slow", 3000)
@@ -226,6 +227,7 @@ def test_ratios_are_robust_to_a_machine_that_slows_down():
     assert fast.noise > 0.1
 
 
+@pytest.mark.full
 def test_contestants_take_turns_and_every_target_is_used():
     machine = Machine()
     workers = [machine.worker(name, 1000, per_call=4) for name in "abc"]
@@ -241,6 +243,7 @@ def test_contestants_take_turns_and_every_target_is_used():
 # -- whole runs --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_a_run_without_peers_measures_us_against_the_floor():
     found = run(brief("fk", "fk-batch", "ik-pioneer5", "ik-srs-batch", "solve-redundant7", "motion-line"))
     assert [row.task.row.id for row in found.rows] == [
@@ -263,6 +266,7 @@ def test_a_run_without_peers_measures_us_against_the_floor():
     assert both.floor.to_array < 1.0
 
 
+@pytest.mark.full
 def test_an_arm_that_is_not_built_in_is_reported():
     row = replace(ROWS_BY_ID["fk"], id="nowhere", robot="nowhere")
     found = run(replace(BRIEF, rows=(row, ROWS_BY_ID["fk"])))
@@ -270,6 +274,7 @@ def test_an_arm_that_is_not_built_in_is_reported():
     assert "nowhere" in "\n".join(report.notes(found))
 
 
+@pytest.mark.full
 def test_a_library_that_is_missing_or_fails_does_not_end_the_run():
     def fails(task):
         raise ValueError("no such arm")
@@ -288,12 +293,14 @@ def test_a_library_that_is_missing_or_fails_does_not_end_the_run():
     assert found.faults == ()
 
 
+@pytest.mark.full
 def test_wrong_answers_of_kinboard_are_reported_as_faults(monkeypatch):
     monkeypatch.setattr(kin, "ik_branches", lambda robot, T, value: np.zeros((8, robot.n)))
     found = run(brief("ik-srs"))
     assert found.faults == (f"ik-srs: {OURS} misses targets or answers wrongly",)
 
 
+@pytest.mark.full
 def test_an_interrupted_run_reports_its_results_so_far():
     def stop(words, share):
         if words.startswith("round 2"):
@@ -306,6 +313,7 @@ def test_an_interrupted_run_reports_its_results_so_far():
     assert "interrupted" in "\n".join(report.notes(found))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "row", ["fk", "fk-batch", "ik-pioneer5", "ik-pioneer5-batch", "ik-srs", "solve-redundant7-craig"]
 )
@@ -333,6 +341,7 @@ def bench(capsys, *words):
     return code, out, err
 
 
+@pytest.mark.full
 def test_the_command_prints_and_writes_the_same_report(capsys, quick, tmp_path):
     files = tmp_path / "bench.json", tmp_path / "bench.svg"
     words = (
@@ -365,6 +374,7 @@ def test_the_command_prints_and_writes_the_same_report(capsys, quick, tmp_path):
     assert OURS in drawn
 
 
+@pytest.mark.full
 def test_processor_time_can_be_selected(capsys, quick):
     code, out, _ = bench(capsys, "--quick", "--rows", "fk", "--peers", "none", "--cpu-time")
     assert code == 0

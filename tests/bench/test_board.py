@@ -219,6 +219,7 @@ def wait_for_state(runs, *states):
     raise AssertionError(f"still {runs.status()}")
 
 
+@pytest.mark.full
 def test_one_run_at_a_time_with_progress_and_a_result(runs, tmp_path):
     assert (runs.status(), runs.result(), runs.cancel()) == (Status(), None, False)
     assert runs.start()
@@ -232,6 +233,7 @@ def test_one_run_at_a_time_with_progress_and_a_result(runs, tmp_path):
     assert not beside.cancel()
 
 
+@pytest.mark.full
 def test_a_run_is_cancelled_by_any_process_and_can_be_started_again(runs, tmp_path):
     assert runs.start()
     wait_for_state(runs, "running")
@@ -242,6 +244,7 @@ def test_a_run_is_cancelled_by_any_process_and_can_be_started_again(runs, tmp_pa
     assert wait_for_state(runs, "running").state == "running"
 
 
+@pytest.mark.full
 def test_a_run_that_fails_or_is_killed_says_so(runs, tmp_path):
     (tmp_path / "go").write_text("fail", "utf-8")
     assert runs.start()

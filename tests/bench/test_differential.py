@@ -195,6 +195,7 @@ def test_the_questions_are_shared_out():
         shares(10, ["ur6"])
 
 
+@pytest.mark.full
 def test_a_tree_is_a_folder_or_a_commit(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert trees.tree_of(str(trees.ROOT)) == trees.ROOT
@@ -225,6 +226,7 @@ def changed_tree(folder):
     return folder
 
 
+@pytest.mark.full
 def test_the_command_compares_two_trees(tmp_path):
     """The same kernels for both, so that nothing has to be compiled."""
     numbers = list(map(str, NUMBERS))

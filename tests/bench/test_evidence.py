@@ -111,6 +111,7 @@ def measured(monkeypatch, tmp_path):
     return run
 
 
+@pytest.mark.full
 def test_times_of_an_idle_machine_are_recorded_with_its_name(measured, monkeypatch):
     monkeypatch.setattr(times, "busy_seconds", times.own_seconds)
     monkeypatch.setattr(times, "commit", lambda: "0123abcd")
@@ -126,6 +127,7 @@ def test_times_of_an_idle_machine_are_recorded_with_its_name(measured, monkeypat
     assert (row["in_batch"] > 0.0, row["batch"] >= 64) == (True, True)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("busy", "commit", "said"),
     [(2.0, "0123abcd", "other processes used"), (0.0, "0123abcd+", "kin/ or app/ has changes")],

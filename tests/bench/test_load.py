@@ -14,6 +14,8 @@ from load.raw import Socket
 from load.service import Usage
 from load.visitor import STEP, SWING, Visitor
 
+pytestmark = pytest.mark.full
+
 
 @pytest.fixture(scope="module")
 def served():

@@ -11,7 +11,7 @@ from load.service import serve
 RATIO = 5.0  # of the 95th percentile of drags beside the bodies to that of the quiet seconds before
 ATTEMPTS = 3  # another program may take the processor in one phase and not in the other
 
-pytestmark = pytest.mark.bench
+pytestmark = [pytest.mark.bench, pytest.mark.full]
 
 
 def test_bodies_of_too_many_values_hardly_delay_drags(monkeypatch):

@@ -15,6 +15,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
+pytestmark = pytest.mark.full
+
 ROOT = Path(__file__).parents[2]
 SECTION = (
     (ROOT / "docs" / "running.md").read_text(encoding="utf-8").split("## As a package\n")[1].split("\n## ")[0]

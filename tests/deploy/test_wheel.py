@@ -24,6 +24,8 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "deploy" / "wheel"))
 from renaming import renamed, write_renamed  # noqa: E402
 
+pytestmark = pytest.mark.full
+
 FOREIGN = 'raise ImportError("the package app of another project")\n'
 
 

@@ -29,7 +29,7 @@ QUIET = """
   window.setInterval = (act, ms, ...rest) => setInterval(act, ms === 1000 ? 20000 : ms, ...rest);
 }
 """
-# Half of the work of a page is drawing the scene in software, and no test looks at the picture: its edges are not
+# Half of the work of a page is drawing the scene in software. Where a test looks at the picture, edges are not
 # smoothed, there are ten frames a second, and after one that is drawn the next ones leave it as it is for a while.
 # Pictures that are saved have all of it.
 ROUGH = """
@@ -68,6 +68,8 @@ ROUGH = """
 }
 """
 PLAIN = QUIET if PICTURES else QUIET + ROUGH
+# For tests that would pass on a page without a picture: nothing is drawn.
+BLIND = PLAIN if PICTURES else QUIET + (Path(__file__).parent / "no_drawing.js").read_text(encoding="utf-8")
 # As after the first minute: the hints are closed, and so is the note that the browser draws slowly.
 NO_HINTS = """
 localStorage.setItem("kinboard-hints", "drag joint learn");
@@ -93,13 +95,13 @@ UNCHANGED = """() => {
 
 
 class Tab:
-    """One browser tab: actions on its controls, and readings of what it shows.
+    """One browser tab: actions on its controls, and readings of what it shows. Its scene is not drawn.
 
     Attributes:
         scripts: what runs in the page first.
     """
 
-    scripts = PLAIN + NO_HINTS
+    scripts = BLIND + NO_HINTS
 
     def __init__(self, browser: Browser, address: str, width: int, height: int, touch: bool = False) -> None:
         self.touch = touch
@@ -325,6 +327,12 @@ class Tab:
         if PICTURES:
             self.page.wait_for_timeout(400)
             save_picture(self.page, name)
+
+
+class DrawnTab(Tab):
+    """A tab whose scene is drawn, for tests that look at it."""
+
+    scripts = PLAIN + NO_HINTS
 
 
 def pixel(

@@ -69,6 +69,7 @@ def test_a_teacher_writes_an_exercise_and_tries_it(tab: Tab, tmp_path: Path) -> 
     tab.spoilt = True  # its list of exercises has one more, which is open
 
 
+@pytest.mark.full
 def test_the_form_fits_a_phone(phone: Tab) -> None:
     page = phone.page
     phone.open("Learn")

@@ -11,7 +11,7 @@ from playwright.sync_api import expect
 
 import kin
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 PIONEER = kin.get_robot("pioneer5")
 

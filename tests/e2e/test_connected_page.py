@@ -97,6 +97,7 @@ def test_the_frame_is_there_as_long_as_something_is_driven(tab: Tab, driving: An
     expect(frame).to_be_hidden()
 
 
+@pytest.mark.full
 def test_the_frame_stays_and_goes_while_the_panel_is_folded_away(tab: Tab, driving: Any) -> None:
     frame = tab.page.locator("#kb-driven")
     tab.page.get_by_label("Collapse panel area").or_(tab.page.get_by_label("Collapse column")).first.click()
@@ -125,6 +126,7 @@ OPEN = """([name, text, drop]) => {
 }"""
 
 
+@pytest.mark.full
 def test_what_is_dropped_or_opened_goes_to_where_it_belongs(tab: Tab) -> None:
     page, robot = tab.page, kin.get_robot("ur5")
     tab.show(robot)
@@ -163,6 +165,7 @@ def test_what_is_dropped_or_opened_goes_to_where_it_belongs(tab: Tab) -> None:
     expect(tab.status.first).to_contain_text("a recording of a connection (MCAP or CSV)")
 
 
+@pytest.mark.full
 def test_the_words_fit_a_phone(phone: Tab, address: str) -> None:
     phone.show(kin.get_robot("pioneer5"))
     for arm in connected(phone, address):

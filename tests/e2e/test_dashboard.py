@@ -124,6 +124,7 @@ def test_branches_and_the_arm_angle_move_the_arm_and_not_the_tool(tab: Tab) -> N
     assert np.abs(kept - q).max() < 1e-6, "the arm stays"
 
 
+@pytest.mark.full
 def test_five_joints_name_the_roll_error(tab: Tab) -> None:
     home = kin.fk(PIONEER, PIONEER.q_home)
     axes = [tab.pixel(PIONEER, home[:3, 3] + 0.05 * home[:3, k]) for k in range(3)]
@@ -137,6 +138,7 @@ def test_five_joints_name_the_roll_error(tab: Tab) -> None:
     tab.screenshot("roll-error")
 
 
+@pytest.mark.full
 def test_the_move_tab_fits_a_small_window(tab: Tab) -> None:
     assert tab.hidden() <= 75, "more than the heads of the closed folders Jog and Obstacles"
 
@@ -147,6 +149,7 @@ def test_phone(phone: Tab) -> None:
     phone.wait_for_tool(kin.fk(PIONEER, home_with(PIONEER, 0, 60))[:3, 3], within=0.06)
 
 
+@pytest.mark.full
 def test_a_zip_or_several_files_show_the_real_arm_and_delete_removes_it(tab: Tab) -> None:
     page, two = tab.page, kin.load_urdf(TWO_JOINTS)
     tab.open("Robot")
@@ -196,6 +199,7 @@ def test_a_file_dropped_onto_the_scene_is_the_arm(tab: Tab) -> None:
     tab.show(kin.get_robot("pioneer5"))
 
 
+@pytest.mark.full
 def test_the_choice_between_several_ends_is_seen(tab: Tab) -> None:
     page = tab.page
     tab.open("Robot")

@@ -79,6 +79,7 @@ def test_exercises_by_keyboard_and_mouse(tab: Tab) -> None:
     expect(page.locator("[data-exercises]")).to_have_count(0)
 
 
+@pytest.mark.full
 def test_exercises_on_a_phone(phone: Tab) -> None:
     """Nothing is wider than the screen, and what is pressed is large enough."""
     page = phone.page

@@ -69,6 +69,7 @@ def test_a_listed_site_embeds_the_viewer(page: Page, outer: int) -> None:
     expect(whole).to_have_attribute("href", re.compile(r"/viewer/#s=[\w-]+$"))  # once the arm rests
 
 
+@pytest.mark.full
 def test_the_scene_alone(page: Page, address: str) -> None:
     page.goto(f"{address}viewer/?embed=1")
     expect(page.locator("[data-status]")).to_be_visible()
@@ -93,6 +94,7 @@ def test_a_notebook_moves_the_arm(page: Page) -> None:
         notebook.running().close()
 
 
+@pytest.mark.full
 def test_another_site_does_not(page: Page, outer: int) -> None:
     refused: list[str] = []
     page.on("console", lambda message: refused.append(message.text))

@@ -88,6 +88,7 @@ def test_hints_come_once(browser: Browser, address: str) -> None:
     page.close()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (900, 600)])
 def test_hints_of_small_screens_cover_nothing(browser: Browser, address: str, width: int, height: int) -> None:
     touch = min(width, height) < 500
@@ -110,6 +111,7 @@ def test_hints_of_small_screens_cover_nothing(browser: Browser, address: str, wi
     page.close()
 
 
+@pytest.mark.full
 def test_hints_go_while_another_tab_is_open(browser: Browser, address: str) -> None:
     page = browser.new_page(viewport={"width": 1280, "height": 720})
     page.add_init_script(PLAIN)
@@ -133,6 +135,7 @@ def test_hints_go_while_another_tab_is_open(browser: Browser, address: str) -> N
     page.close()
 
 
+@pytest.mark.full
 def test_card_and_legend_of_a_projector_cover_nothing_of_the_arm(browser: Browser, address: str) -> None:
     tab = Tab(browser, address, 1280, 720)
     page = tab.page
@@ -151,6 +154,7 @@ def test_card_and_legend_of_a_projector_cover_nothing_of_the_arm(browser: Browse
     tab.close()
 
 
+@pytest.mark.full
 def test_note_on_slow_drawing_in_the_status_card_is_closed_for_good(browser: Browser, address: str) -> None:
     page = browser.new_page(viewport={"width": 1280, "height": 720})
     page.add_init_script(PLAIN)
@@ -172,6 +176,7 @@ def test_note_on_slow_drawing_in_the_status_card_is_closed_for_good(browser: Bro
     page.close()
 
 
+@pytest.mark.full
 def test_cover_says_why_a_page_waits(browser: Browser, address: str) -> None:
     page = browser.new_page()
     silent = "window.Worker = class extends EventTarget { postMessage() {} terminate() {} }"
@@ -197,6 +202,7 @@ def test_cover_says_that_a_script_failed(browser: Browser, address: str) -> None
     page.close()
 
 
+@pytest.mark.full
 def test_a_page_that_comes_despite_an_error_says_nothing(browser: Browser, address: str) -> None:
     page = browser.new_page()
     page.route("**/static/hints.js", lambda route: route.abort())

@@ -91,6 +91,7 @@ def test_the_move_tab(tab: Tab) -> None:
     expect(page.get_by_text("Posture", exact=True)).to_be_visible()
 
 
+@pytest.mark.full
 def test_a_lesson(tab: Tab) -> None:
     page = tab.page
     tab.select(PUMA)
@@ -121,6 +122,7 @@ def with_elbow(degrees: float) -> np.ndarray:
     return point
 
 
+@pytest.mark.full
 def test_a_field_names_what_is_valid_and_keeps_its_digits(tab: Tab) -> None:
     field = tab.row(ELBOW).locator("input:visible").last
     for text in ("abc", "NaN", "   ", "200", "1e999"):
@@ -211,6 +213,7 @@ def test_a_target_is_typed_and_moved_by_keys(tab: Tab) -> None:
     tab.choose("Target must match", "Full pose")
 
 
+@pytest.mark.full
 def test_the_overview_of_keys_is_that_of_the_docs_and_takes_all_keys_while_it_is_open(
     tab: Tab, phone: Tab
 ) -> None:
@@ -248,6 +251,7 @@ def test_the_overview_of_keys_is_that_of_the_docs_and_takes_all_keys_while_it_is
         shown.open("Move")
 
 
+@pytest.mark.full
 def test_the_overview_of_keys_is_dark_on_a_dark_page(tab: Tab) -> None:
     colours = "node => [getComputedStyle(node).backgroundColor, getComputedStyle(node).color]"
     for dark in (True, False):

@@ -101,6 +101,7 @@ def test_a_picture_is_offered_and_the_settings_of_viser_are_not(desktop: Tab, tm
     expect(tab.page.locator(".tabler-icon-adjustments")).not_to_be_visible()
 
 
+@pytest.mark.full
 def test_the_toolbar_looks_from_the_top(desktop: Tab) -> None:
     """The camera stands in the link, a moment after it has come to rest."""
     page = desktop.page
@@ -119,6 +120,7 @@ def test_the_toolbar_looks_from_the_top(desktop: Tab) -> None:
     page.get_by_role("button", name="Reset view").click()
 
 
+@pytest.mark.full
 def test_labels_show_hints_but_not_over_a_menu(desktop: Tab) -> None:
     tab = desktop
     tab.open("Move")
@@ -139,6 +141,7 @@ def test_labels_show_hints_but_not_over_a_menu(desktop: Tab) -> None:
     tab.page.keyboard.press("Escape")
 
 
+@pytest.mark.full
 def test_a_press_hides_the_hint(desktop: Tab) -> None:
     tab = desktop
     tab.open("Move")
@@ -199,6 +202,7 @@ MADE_NARROWER = """() => new Promise((done) => {
 })"""
 
 
+@pytest.mark.full
 def test_the_panel_is_as_wide_as_the_window_allows_until_a_width_is_chosen(browser: Browser, address: str) -> None:
     tab = Tab(browser, address, 1920, 1080)
     width = "document.querySelector('[data-dock-region=right]').offsetWidth"
@@ -230,6 +234,7 @@ CUT = """() => [...document.querySelectorAll("[data-arm] table input:not(.kb-arm
 }).filter(([, needed, room]) => needed > room)"""
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("robot", "longest"), [("panda", "−166.003062"), ("ur5", "−392.25")])
 def test_no_number_of_an_arm_s_tables_is_cut(desktop: Tab, robot: str, longest: str) -> None:
     desktop.select(kin.get_robot(robot))
@@ -242,6 +247,7 @@ def test_no_number_of_an_arm_s_tables_is_cut(desktop: Tab, robot: str, longest: 
     desktop.select(kin.get_robot("pioneer5"))
 
 
+@pytest.mark.full
 def test_the_menu_of_robots_shows_their_pictures_and_makers(desktop: Tab) -> None:
     page = desktop.page
     desktop.row("Robot").locator("input:visible").first.click()
@@ -267,6 +273,7 @@ AXES_BELOW_CARD = """() => {
 }"""
 
 
+@pytest.mark.full
 def test_axes_in_a_corner_point_as_those_of_the_world(desktop: Tab, phone: Tab) -> None:
     page = desktop.page
     desktop.open("View")
@@ -296,6 +303,7 @@ def test_axes_in_a_corner_point_as_those_of_the_world(desktop: Tab, phone: Tab) 
     phone.page.evaluate("document.querySelector('[data-lengthened]').remove()")
 
 
+@pytest.mark.full
 def test_the_size_of_the_text_is_chosen_and_kept(desktop: Tab) -> None:
     tab, width = desktop, "document.querySelector('[data-dock-region=right]').offsetWidth"
     tab.open("View")
@@ -455,6 +463,7 @@ def test_a_finger_drags_the_gizmo(phone: Tab) -> None:
     assert np.linalg.norm(moved - home[:3, 2] * (moved @ home[:3, 2])) < 1e-3, "and nowhere else"
 
 
+@pytest.mark.full
 def test_a_phone_that_is_turned_keeps_tab_and_history(phone: Tab) -> None:
     page = phone.page
     phone.open("Move")
@@ -471,6 +480,7 @@ def test_a_phone_that_is_turned_keeps_tab_and_history(phone: Tab) -> None:
     phone.open("Move")
 
 
+@pytest.mark.full
 def test_a_closed_sheet_leaves_the_status_and_a_tap_reaches_the_scene(phone: Tab) -> None:
     """viser ignores captured pointers, and browsers capture every touch."""
     page = phone.page

@@ -43,6 +43,7 @@ def program(desktop: Tab) -> Iterator[Tab]:
     desktop.page.locator("[data-program-do=clear]").click()
 
 
+@pytest.mark.full
 def test_the_table_of_peaks_stays_open_while_the_page_updates(program: Tab) -> None:
     page = program.page
     for i in range(2):
@@ -174,6 +175,7 @@ def ur5(desktop: Tab) -> Iterator[Tab]:
     expect(desktop.page.locator("[data-program-item]")).to_have_count(0)
 
 
+@pytest.mark.full
 def test_a_click_in_the_chart_of_postures_starts_there(ur5: Tab) -> None:
     rows = open_file(ur5, list(LINE))
     page = ur5.page
@@ -207,6 +209,7 @@ def test_a_button_that_is_held_while_the_list_is_sent_again_is_pressed(ur5: Tab)
     expect(rows.nth(2)).to_contain_text("at 40 %")
 
 
+@pytest.mark.full
 def test_what_is_typed_while_the_list_is_sent_again_stays_and_is_used(ur5: Tab) -> None:
     rows = open_file(ur5, list(LINE))
     page = ur5.page
@@ -227,6 +230,7 @@ def test_what_is_typed_while_the_list_is_sent_again_stays_and_is_used(ur5: Tab) 
     expect(speed).to_have_value("40")
 
 
+@pytest.mark.full
 def test_a_way_around_an_obstacle_is_put_into_the_program(ur5: Tab) -> None:
     (sphere,) = placed.added((), "sphere", UR5, UR5.q_home)
     T = kin.fk(UR5, UR5.q_home)

@@ -17,7 +17,7 @@ from playwright.sync_api import Browser, Page, expect
 import kin
 from app.shared.static_folder import static_folder
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 LOOK = (Path(__file__).parent / "screens.js").read_text(encoding="utf-8")
 COLD = 120_000  # ms; a service that is ready may still be compiling the kernels of sections and maps

@@ -154,6 +154,7 @@ def orbit(page: Page, right: int, down: int) -> None:
     page.mouse.up()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("said", "opened"), [("", "Learn"), ("&tab=Move", "Move"), ("&tab=Robot", "Robot")])
 def test_a_link_to_a_lesson_opens_it(browser: Browser, address: str, said: str, opened: str) -> None:
     page = browser.new_page(viewport={"width": 1280, "height": 720})
@@ -230,6 +231,7 @@ def test_link_reload_and_lost_connection(shared: Tab, proxy: Proxy, browser: Bro
     shared.wait_for_tool(kin.fk(PIONEER, turned(60))[:3, 3], within=0.06)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "width", "height", "scheme"),
     [("light", 1280, 720, "light"), ("dark", 1280, 720, "dark"), ("phone", 390, 844, "dark")],
@@ -354,6 +356,7 @@ def test_an_arm_of_ones_own_is_typed_and_kept(tab: Tab) -> None:
     tab.wait_for_tool(kin.fk(PIONEER, PIONEER.q_home)[:3, 3], within=0.06)
 
 
+@pytest.mark.full
 def test_a_large_file_of_ones_own_comes_in_whole(tab: Tab) -> None:
     page = tab.page
     tab.open("Robot")

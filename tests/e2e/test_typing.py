@@ -129,6 +129,7 @@ def type_everywhere(tab: Tab, address: str, title: str, most: int) -> None:
             assert type_slowly(tab, k, text, chance) == {text}, f"field {k + 1} of {title}"
 
 
+@pytest.mark.full
 def test_a_field_shows_what_was_typed_while_it_has_the_focus(tab: Tab, address: str) -> None:
     type_everywhere(tab, address, "Move", 2)
     type_everywhere(tab, address, "Robot", 3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from page import Tab
+from page import DrawnTab, Tab
 from playwright.sync_api import Browser, expect
 
 import kin
@@ -196,16 +196,22 @@ COLLECT = """
 """
 
 
-def test_labels_of_the_scene_follow_the_colours_of_the_page(tab: Tab) -> None:
+class CollectingTab(DrawnTab):
+    """A tab that keeps the shaders of its labels."""
+
+    scripts = DrawnTab.scripts + COLLECT
+
+
+def test_labels_of_the_scene_follow_the_colours_of_the_page(browser: Browser, address: str) -> None:
+    tab = CollectingTab(browser, address, 900, 600)
     page = tab.page
-    page.add_init_script(COLLECT)
-    page.reload()
     page.wait_for_function("window.labelPrograms?.length >= 2", timeout=30_000)
     assert not any(page.evaluate(SHADES))
     tab.set_dark(True)
     assert all(page.evaluate(SHADES)), "letters and boxes are drawn in the dark colours"
     tab.set_dark(False)
     assert not any(page.evaluate(SHADES))
+    tab.close()
 
 
 FIND_VIEWER = """
@@ -218,7 +224,7 @@ function findViewer() {  // viser's own state of the scene
 """
 
 
-class LabelsTab(Tab):
+class LabelsTab(DrawnTab):
     """A tab that compares where each label is drawn with where it belongs, in every frame.
 
     viser writes the places of all labels into a texture of 4096 pixels, and sends it while it draws a frame.
@@ -227,7 +233,7 @@ class LabelsTab(Tab):
     """
 
     scripts = (
-        Tab.scripts
+        DrawnTab.scripts
         + FIND_VIEWER
         + """
 {

@@ -55,6 +55,7 @@ def test_a_cloud_is_drawn_and_a_click_moves_the_arm_to_its_point(tab: Tab) -> No
     tab.page.get_by_role("button", name="Reset view").click()
 
 
+@pytest.mark.full
 def test_a_cut_and_the_section_plot(tab: Tab) -> None:
     draw(tab, FEW)
     tab.choose("Colour by", "Manipulability")

@@ -272,6 +272,7 @@ def test_determinant_of_the_pioneer_arm_equals_its_closed_form():
         assert np.linalg.det(J) == pytest.approx(wanted, rel=1e-9, abs=1e-15)
 
 
+@pytest.mark.full
 def test_threads_get_the_same_results_as_serial_calls():
     robot = kin.get_robot("redundant7")
     batches = [robot.random_q(np.random.default_rng(i), 500) for i in range(40)]

@@ -109,6 +109,7 @@ def test_missing_limits_and_home_get_defaults():
     assert robot.in_limits(robot.q_home)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("old", "new", "field", "valid"),
     [
@@ -302,6 +303,7 @@ def test_round_values_are_written_round():
     assert 'angle = "deg"' in kin.robot_to_toml(kin.get_robot("ur5"))
 
 
+@pytest.mark.full
 @settings(max_examples=150, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),

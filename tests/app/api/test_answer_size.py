@@ -46,6 +46,7 @@ def refused(answer, field: str):
     return error
 
 
+@pytest.mark.full
 def test_a_list_whose_answer_would_be_too_large_is_refused_before_it_is_computed(bounded, monkeypatch):
     monkeypatch.setattr(ik, "solve", lambda *_: pytest.fail("computed"))
     body = {"target": [POSE] * 100, "images": "all"}
@@ -59,6 +60,7 @@ def test_a_list_whose_answer_would_be_too_large_is_refused_before_it_is_computed
     assert len(bounded.post(f"{API}/ur5/ik", json=body | {"target": [POSE] * 45}).json()["results"]) == 45
 
 
+@pytest.mark.full
 def test_other_lists_are_refused_too(bounded):
     q = list(UR5.home)
     assert (
@@ -94,6 +96,7 @@ def test_the_largest_lists_of_the_default_settings_are_allowed():
         assert ik._size(robot, request.options("pose")) * settings.max_batch < settings.max_answer
 
 
+@pytest.mark.full
 def test_answers_that_nobody_reads_are_bounded_together_and_freed_when_the_client_leaves(application):
     memory = application.state.compute.memory
     body = {"target": [POSE] * 45, "images": "all"}

@@ -179,6 +179,7 @@ def test_every_form_of_a_target_gives_the_same_answer(client, robot):
             closes(robot, pose, answer["solutions"][0], task)
 
 
+@pytest.mark.full
 @each_robot
 def test_ik_agrees_with_the_core(client, robot):
     q, seed = random_q(robot, 2, seed=3)
@@ -285,6 +286,7 @@ def test_the_compromise_of_a_five_joint_arm_is_reported(client):
     assert least["rotation_error"] <= roll["rotation_error"]
 
 
+@pytest.mark.full
 def test_extreme_but_finite_numbers_never_put_nan_into_an_answer(client):
     for robot in ROBOTS:
         for value in (1e6, -1e6, 1e-300, 5e-324, 0.0):

@@ -378,6 +378,7 @@ def test_the_doctor_for_urdf(client):
     assert post(client, "robots/doctor", {"urdf": 7}, 422)["errors"][0]["field"] == "urdf"
 
 
+@pytest.mark.full
 def test_export(client):
     panda = kin.get_robot("panda")
     for name, convention in (("toml", "modified"), ("mdh", "modified"), ("dh", "standard")):
@@ -429,6 +430,7 @@ def signatures():
     return sum(len(each.signatures) for each in objects(Dispatcher))
 
 
+@pytest.mark.full
 def test_an_arm_sent_along_compiles_nothing(client):
     """All kernels take any arm: what is compiled before the first one is enough."""
     kin.warm_up()

@@ -44,6 +44,7 @@ def refused_as_too_slow(answer):
 # -- time ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_a_batch_that_takes_too_long_is_abandoned(hurried, monkeypatch):
     solved = []
     solve = ik.solve
@@ -62,6 +63,7 @@ def test_a_path_that_takes_too_long_is_abandoned(hurried):
     refused_as_too_slow(hurried.post(f"{PANDA}/ik/path", json={"targets": [FAR] * 1000}))
 
 
+@pytest.mark.full
 def test_targets_checked_in_time_are_returned_with_a_problem():
     # Long enough for some also where a busy machine lets the computation begin late.
     client = TestClient(create_app(Settings(time_budget=1.0)))
@@ -108,6 +110,7 @@ def test_a_request_without_a_slot_waits_and_is_then_refused():
     assert (problem.status, problem.type) == (503, "urn:kinboard:problem:busy")
 
 
+@pytest.mark.full
 def test_heavy_requests_leave_threads_for_other_requests():
     """With every slot taken and more requests waiting, a page that needs a thread is still served."""
     service = create_app(Settings(max_requests=2, time_budget=3.0))
@@ -264,6 +267,7 @@ junk = st.recursive(
 )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("what", ROUTES)
 @settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(data=st.data())

@@ -25,6 +25,7 @@ def operations(document):
                 yield path, method, operation
 
 
+@pytest.mark.full
 def test_every_operation_has_summary_description_and_documented_refusals(document):
     seen = 0
     for path, method, operation in operations(document):
@@ -198,6 +199,7 @@ def test_answers_have_examples_that_are_answered(client, document, request):
         ANSWERS.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
+@pytest.mark.full
 def test_every_example_request_works(client, document):
     tried = 0
     for path, _, operation in operations(document):

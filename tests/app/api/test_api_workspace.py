@@ -248,6 +248,7 @@ def extent(answer):
     return [(answer[end]["value"], answer[end]["q"], answer[end]["point"]) for end in ("least", "largest")]
 
 
+@pytest.mark.full
 def test_the_summary_agrees_with_the_core(client):
     answer = client.get(f"{WORKSPACE}/summary?section=true&resolution=24&effort=2").json()
     TypeAdapter(WorkspaceAnswer).validate_python(answer, strict=True)
@@ -351,6 +352,7 @@ def ask(client, robot, status=200, **body):
     return answer.json()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("robot", [PIONEER, SRS, kin.get_robot("scara")], ids=lambda robot: robot.id)
 def test_every_point_of_a_cloud_is_reachable_and_points_outside_are_not(client, robot):
     cloud = Cloud(robot, reachable.AT_ONCE + 5, strategy="quasi")

@@ -15,6 +15,8 @@ import playwright._impl._driver as driver
 import pytest
 from live_server import serve, without_viewer
 
+pytestmark = pytest.mark.full
+
 PACKAGE = "kinboard_client"
 INTEGRATE = Path(__file__).parents[3] / "docs" / "integrate.md"
 MODULES = Path(sys.prefix) / "lint" / "node_modules"  # where scripts/lint.sh installs what comes from npm

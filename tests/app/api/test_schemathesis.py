@@ -18,6 +18,8 @@ import kin
 from app.service.main import create_app
 from app.shared.settings import Settings
 
+pytestmark = pytest.mark.full
+
 CASES = int(os.environ.get("KINBOARD_TEST_CASES", "12"))
 FEW = settings(
     max_examples=CASES, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck)

@@ -118,6 +118,7 @@ def test_the_start_names_a_newer_database_and_the_service_runs(teacher, tmp_path
     assert f"the database of classrooms in {tmp_path / 'data'} was {NEWER}" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_postgres_of_a_newer_version(tmp_path, caplog) -> None:
     with running() as server:
         url = server.create()

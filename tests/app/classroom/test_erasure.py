@@ -80,6 +80,7 @@ def test_an_ended_room_is_erased_at_once_if_nobody_reads(hub, tmp_path) -> None:
     assert hub.rooms.said_of_ended() == ERASED
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seen", ["before", "after"])
 def test_a_reader_delays_the_erasing_and_nothing_is_called_erased_before(hub, tmp_path, seen) -> None:
     """A reader that sees the room as it was, or one that only keeps the log from being emptied."""
@@ -160,6 +161,7 @@ def test_what_is_deleted_while_the_log_is_emptied_is_not_called_erased(hub, tmp_
     assert hub.rooms.said_of_ended() == ERASED
 
 
+@pytest.mark.full
 def test_a_long_lesson_leaves_nothing(hub, tmp_path) -> None:
     """Rows that grow, move and are split over pages of the file, in an order that chance says."""
     chance = random.Random(7)
@@ -253,6 +255,7 @@ def test_a_service_erases_as_soon_as_the_reader_lets_go(tmp_path, monkeypatch, c
     assert caplog.text.count("another program reads them") == 1, "one line, however often it is tried"
 
 
+@pytest.mark.full
 def test_postgres_deletes_and_nothing_is_called_erased(tmp_path) -> None:
     with running() as server:
         hub = Hub(tmp_path, server.create())

@@ -384,6 +384,7 @@ def test_a_locked_database_delays_and_loses_nothing(hubs, tmp_path, monkeypatch)
         assert sorted(connection.scalars(select(Attempt.id))) == sorted([first.id, second.id])
 
 
+@pytest.mark.full
 def test_a_class_that_joins_at_once_waits_for_its_turn(hubs, monkeypatch):
     """Sixty transactions take longer together than anybody waits for a lock, and no student is turned away."""
     monkeypatch.setattr("app.classroom.database.WAIT", 0.3)
@@ -505,6 +506,7 @@ def test_a_page_that_fails_stops_no_other(hubs, caplog):
     assert "could not be notified" in caplog.text
 
 
+@pytest.mark.full
 def test_the_start_imports_no_database():
     late = {"sqlalchemy", "alembic", "segno", "jinja2"}  # a service without classrooms does not wait for them
     code = f"import sys, app.service.main; print({late} & set(sys.modules) or 'none')"
@@ -643,6 +645,7 @@ def test_an_alias_of_marks_alone_is_refused(hubs, alias):
     assert hub.rooms.find(hub.rooms.join(room.code, "e\u0301")).alias == "é"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("second", [False, True])
 def test_a_page_that_is_connected_and_silent_is_away_within_ten_seconds(hubs, monkeypatch, second):
     """A phone in a dead spot: its connection stays, and nothing comes. Times are a quarter of the real ones."""

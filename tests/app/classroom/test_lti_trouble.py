@@ -85,6 +85,7 @@ async def launched(application, platform: Platform, **token: object) -> httpx2.R
         return await client.post("/lti/launch", data={"id_token": signed, "state": asked["state"][0]})
 
 
+@pytest.mark.full
 def test_launches_of_a_silent_platform_stall_neither_rooms_nor_other_platforms(tmp_path) -> None:
     """As many launches as the service has threads and more, of anybody, without a valid signature."""
 
@@ -145,6 +146,7 @@ def test_launches_that_wait_for_the_database_are_bounded(application, platform, 
     assert asyncio.run(launched(application, platform)).status_code == 303
 
 
+@pytest.mark.full
 def test_a_failure_is_remembered_for_a_while(tmp_path, platform, monkeypatch) -> None:
     with service(tmp_path, platform) as application:
         browser = TestClient(application, base_url=TOOL, follow_redirects=False)
@@ -563,6 +565,7 @@ ODD = st.recursive(
 )
 
 
+@pytest.mark.full
 @settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 @given(changes=st.dictionaries(st.sampled_from(PATHS), ODD, min_size=1, max_size=2), link=st.booleans())
 def test_no_signed_message_is_an_error_of_ours(browser, platform, changes, link) -> None:

@@ -110,6 +110,7 @@ def fill(connection: Connection, now: float) -> None:
     connection.execute(insert(tables.tables["attempt"]), answer)
 
 
+@pytest.mark.full
 def test_a_class_of_the_first_version_goes_on_after_all_migrations(hub, old) -> None:
     with old.begin():
         fill(old, clock.now())

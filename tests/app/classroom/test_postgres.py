@@ -38,6 +38,7 @@ def hubs(database, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.full
 def test_a_class_on_two_machines(hubs):
     here, there = hubs
     room = here.rooms.open("Kinematics", 3600)

@@ -170,6 +170,7 @@ def test_every_error_of_sqlite_is_said_in_words(tmp_path: Path) -> None:
     database.close()
 
 
+@pytest.mark.full
 def test_one_student_cannot_fill_the_disk_with_answers(hub: Hub) -> None:
     """Long answers of one seat end at a sum; those of others are stored."""
     code = hub.rooms.open("Class", 3600.0).code

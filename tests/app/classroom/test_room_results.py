@@ -100,6 +100,7 @@ def test_nobody_else_does(school: Class) -> None:
     assert "room/results" not in school.browser(student).get("/room").text
 
 
+@pytest.mark.full
 def test_a_lost_database_is_said(school: Class, tmp_path: Path) -> None:
     teacher = school.browser(Ticket(school.room.id))
     assert teacher.get("/room/results").status_code == 200

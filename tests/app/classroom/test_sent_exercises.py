@@ -121,6 +121,7 @@ def stored(school: School, has: Callable[[dict[str, object]], bool]) -> None:
         time.sleep(0.02)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("how", ["task", "course"])
 def test_results_name_what_the_teacher_wrote(school: School, how: str, capsys: pytest.CaptureFixture[str]) -> None:
     send(school, how, own())

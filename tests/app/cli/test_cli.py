@@ -62,6 +62,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("command", ["serve", "robots"])
 def test_without_its_dependencies_a_command_says_what_to_install(command):
     done = subprocess.run(
@@ -415,6 +416,7 @@ def test_version_and_help(capsys):
     assert "kinboard fk pioneer5 90 30 60 30 30" in out
 
 
+@pytest.mark.full
 def test_the_program_itself():
     """A process of its own, without the compiler: the same digits, and a start that does not load the server."""
     words = [
@@ -472,6 +474,7 @@ def test_check_tells_what_an_arm_is(capsys):
     assert "joints      4, giving the tool 4 independent motions" in out
 
 
+@pytest.mark.full
 def test_check_names_the_solver_and_why(capsys):
     for robot in kin.classic_robots().values():
         got = answer(capsys, "check", ROOT / "kin" / "robots" / f"{robot.id}.toml")
@@ -566,6 +569,7 @@ def test_import_prints_or_writes_a_robot_file(capsys, tmp_path):
     assert json.loads(out)["pose"]["position"] == pytest.approx([0.088, 0, 0.926], abs=1e-12)
 
 
+@pytest.mark.full
 def test_import_reads_the_collision_meshes_beside_the_urdf(capsys, tmp_path):
     for name, content in robot_files(COLLISIONS).items():
         path = tmp_path / name
@@ -592,6 +596,7 @@ def test_import_reads_the_collision_meshes_beside_the_urdf(capsys, tmp_path):
     assert {c.link for c in kin.load_robot(tmp_path / "two.toml").capsules if c.assumed} == {1}
 
 
+@pytest.mark.full
 def test_a_collision_mesh_beyond_the_limits_refuses_the_import(capsys, tmp_path):
     files = {**robot_files(COLLISIONS), "two/meshes/upper.stl": announced(10**7) + bytes(50)}
     for name, content in files.items():
@@ -623,6 +628,7 @@ def test_import_offers_the_tips(capsys, tmp_path):
     assert "--output" in err
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("form", ["toml", "dh", "mdh", "urdf", "mjcf"])
 def test_export_in_every_format(capsys, tmp_path, form):
     code, out, _ = run(capsys, "export", "puma560", "--format", form)
@@ -663,6 +669,7 @@ def clouds():
     made.close()
 
 
+@pytest.mark.full
 def test_workspace_tells_sizes(capsys):
     facts = kin.workspace_facts(PIONEER, effort=2)
     code, out, err = run(capsys, "workspace", "pioneer5", "--effort", 2)
@@ -759,6 +766,7 @@ def test_workspace_refuses_what_it_cannot_do(capsys, tmp_path, monkeypatch, word
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.full
 def test_workspace_draws_and_encloses(capsys, tmp_path):
     picture, body, cloud = tmp_path / "a.svg", tmp_path / "a.stl", tmp_path / "a.csv"
     words = ["workspace", "pioneer5", "-n", 20_000, "--effort", 2, "--limit", "1=0:90"]
@@ -796,6 +804,7 @@ def test_a_hull_without_scipy_says_what_to_install(capsys, tmp_path, monkeypatch
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.full
 def test_an_interrupted_cloud_leaves_nothing_behind(tmp_path):
     old = tmp_path / "cloud.bin"
     old.write_bytes(b"old")

@@ -75,6 +75,7 @@ def test_fish_completes(script, words, expected):
     assert {each for each in found if not Path(each).exists()} == expected
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("words", "expected"), CASES)
 def test_zsh_completes(script, words, expected):
     """Typed at a terminal: zsh completes only there. A list is shown where there are several."""

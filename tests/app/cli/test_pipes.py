@@ -206,6 +206,7 @@ def test_more_rows_than_one_piece_are_answered_in_order(run, monkeypatch):
     assert np.array_equal(np.load(io.BytesIO(out)), kin.fk(UR5, q))
 
 
+@pytest.mark.full
 def test_each_line_is_answered_before_the_next_one_is_sent():
     words = [sys.executable, "-m", "app.cli", "fk", "ur5", "--configurations", "-"]
     with subprocess.Popen(
@@ -379,6 +380,7 @@ def test_a_way_is_piped_to_the_motion_of_its_program(run):
     assert json.loads(out)["samples"]["q"][-1] == pytest.approx(np.radians([60, -90, 90, 0, 90, 0]).tolist())
 
 
+@pytest.mark.full
 def test_limits_that_are_wider_than_the_arm_are_intersected_in_rest_and_here(run, client):
     words = ("ik", "panda", "--position", 400, 100, 500, "--wxyz", 0, 1, 0, 0, "--limit", "1=-180:180", "--json")
     code, out, _ = run(*words)

@@ -15,6 +15,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path / "data"
 
 
+@pytest.mark.full
 def test_a_room_is_opened_listed_and_ended(capsys, folder):
     assert main(["room", "list"]) == 0
     assert "no room" in capsys.readouterr().out

@@ -24,6 +24,7 @@ def test_a_package_that_has_been_imported_stays() -> None:
         assert importlib.import_module("json") is sys.modules["json"] is not None
 
 
+@pytest.mark.full
 def test_a_service_moves_its_first_arm_without_what_it_does_not_need() -> None:
     """These imports would take a third of the time until a service is ready."""
     warm_up_first()  # what is not in the cache yet is compiled here

@@ -123,6 +123,7 @@ def test_without_the_extra_a_sentence_says_what_is_missing(tmp_path, monkeypatch
     assert "pip install 'kinboard[parquet]'" in capsys.readouterr().err
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("small")
 def test_what_is_no_parquet_file_of_targets_is_refused_by_name(tmp_path, capsys):
     source, out = tmp_path / "in.parquet", tmp_path / "out.npy"
@@ -143,6 +144,7 @@ def test_what_is_no_parquet_file_of_targets_is_refused_by_name(tmp_path, capsys)
         assert not out.exists()
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("small")
 def test_a_cluster_writes_the_same_file(tmp_path, capsys):
     np.save(tmp_path / "in.npy", poses(30))
@@ -170,6 +172,7 @@ def test_a_cluster_that_cannot_help_is_refused(tmp_path, monkeypatch, capsys, wo
     assert message in said
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("small")
 @pytest.mark.parametrize("ending", ["npy", "csv", "parquet"])
 def test_an_interrupted_run_goes_on_where_it_ended(tmp_path, monkeypatch, ending):

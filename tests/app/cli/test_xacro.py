@@ -12,6 +12,8 @@ from app.cli import xacro
 from app.cli.parser import main
 from kin import KinematicsError, RobotFileError
 
+pytestmark = pytest.mark.full
+
 XMLNS = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 ARM = """<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">
 <xacro:arg name="length" default="0.4"/><xacro:property name="L" value="$(arg length)"/>

@@ -371,6 +371,7 @@ def test_arms_with_very_many_rows_have_no_equations():
         book(replace(puma, rows=(*puma.rows, *fixed)))
 
 
+@pytest.mark.full
 def test_sympy_is_imported_for_derived_equations_only():
     code = (
         "import sys, app.equations, app.viewer.lessons.equations, kin\n"

@@ -233,6 +233,7 @@ HARD = (
 ANY = st.one_of(st.text(max_size=40), st.sampled_from(HARD))
 
 
+@pytest.mark.full
 @settings(max_examples=150, deadline=None)
 @given(st.data(), ANY)
 def test_whatever_is_typed_is_a_draft_that_is_tried(data: st.DataObject, text: str) -> None:

@@ -50,6 +50,7 @@ def test_lessons_have_files() -> None:
     assert FILES.keys() == {lesson.key for lesson in LESSONS}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("key", FILES)
 def test_every_text_is_made_for_all_arms_and_units(key: str) -> None:
     lesson = next(one for one in LESSONS if one.key == key)

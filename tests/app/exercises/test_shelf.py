@@ -207,6 +207,7 @@ def own(name: str, title: str) -> Exercise:
     return parse_exercise(text(name, title=title))
 
 
+@pytest.mark.full
 def test_a_page_has_its_own_in_place_of_the_folders_but_of_no_built_in_one(folder: Path, no_pause: None) -> None:
     known = Exercises(folder)
     page = Shelf(known)

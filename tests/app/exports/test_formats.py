@@ -173,6 +173,7 @@ def test_viewers_of_point_clouds_read_the_ply_file(clouds, with_q):
     assert np.array_equal(vertex["manipulability"].ravel(), chunk.measures["manipulability"])
 
 
+@pytest.mark.full
 @each_format
 def test_memory_does_not_grow_with_the_cloud(clouds, name, monkeypatch):
     monkeypatch.setattr("app.shared.clouds.SAMPLED", 4096)

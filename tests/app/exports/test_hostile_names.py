@@ -118,6 +118,7 @@ def test_worksheets_hold_names_as_text(name):
     assert len(row) == 22
 
 
+@pytest.mark.full
 @given(st.text(st.characters(codec="utf-8"), max_size=30))
 def test_any_name_in_a_worksheet_leaves_its_latex_and_drawing_whole(name):
     robot = own_arm(kin.robot_to_dict(arm("plain"))).robot

@@ -208,6 +208,7 @@ def drawn(page: FakeBrowser) -> list[str]:
     return [n for n in page.nodes if re.search(r"/connect-\d+/drawn", n) and page.visible.get(n, True)]
 
 
+@pytest.mark.full
 def test_a_lost_connection_comes_back_with_what_was_drawn(page, arm):
     arm.draw.label("name", [0, 0, 1], "goal")
     arm.measured = Q
@@ -221,6 +222,7 @@ def test_a_lost_connection_comes_back_with_what_was_drawn(page, arm):
     shown(page, kin.fk(ARM, Q))
 
 
+@pytest.mark.full
 def test_many_threads_may_use_it(page, arm):
     failed: list[BaseException] = []
 

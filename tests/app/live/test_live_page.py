@@ -263,6 +263,7 @@ def test_a_page_that_leaves_ends_the_connection(viewer):
         assert program.until("end")["reason"] == "The page was closed."
 
 
+@pytest.mark.full
 def test_no_link_holds_a_code(page, program):
     program.do(q=Q, draw={"a": {"kind": "label", "position": [0, 0, 1], "text": "secret"}})
     stored = page.stored()
@@ -337,6 +338,7 @@ def app_schemas() -> set[str]:
     return set(create_app(Settings()).openapi()["components"]["schemas"])
 
 
+@pytest.mark.full
 def test_the_documents_have_the_schema_and_every_field():
     written = (ROOT / "docs/live-schema.json").read_text(encoding="utf-8")
     run = [sys.executable, "-c", "import sys; from scripts.live_schema import schema; sys.stdout.write(schema())"]

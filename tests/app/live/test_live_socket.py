@@ -265,6 +265,7 @@ def test_large_messages_are_refused_and_huge_ones_end_the_connection(page, port)
     assert "q" not in page.taken
 
 
+@pytest.mark.full
 def test_large_messages_wait_for_their_turn(page, port):
     """A message of 2 MiB costs as much as 256 others: two may come at once, the next ones one a second."""
     with call(port, page.line.code) as program:
@@ -405,6 +406,7 @@ def test_codes_tell_the_process_that_has_the_page():
     assert unused_code((), 3, 4) not in codes[3]
 
 
+@pytest.mark.full
 def test_delay_and_rate_are_measured(page, port):
     with call(port, page.line.code) as program:
         heard(program, "welcome")

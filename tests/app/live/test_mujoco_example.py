@@ -95,6 +95,7 @@ def press(page, name, *index, value=None):
     page.say("feature", ["program", [name, *index, len(page.log)], value])
 
 
+@pytest.mark.full
 def test_a_program_of_the_page_is_followed_and_measured(viewer, page, tmp_path, capsys):
     """The ghost is behind the commanded arm; the terminal has the errors, the files have all values."""
     plot, table = tmp_path / "tracking.svg", tmp_path / "tracking.csv"

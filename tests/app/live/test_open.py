@@ -153,6 +153,7 @@ def ready(address: str) -> bool:
         return False
 
 
+@pytest.mark.full
 def test_the_program_opens_the_browser_and_ends_with_ctrl_c(tmp_path):
     browser, seen, said = tmp_path / "browser", tmp_path / "seen", tmp_path / "said"
     browser.write_text(f'#!/bin/sh\nprintf %s "$1" > {seen}.part && mv {seen}.part {seen}\n')

@@ -61,6 +61,7 @@ def opened(page: FakeBrowser, name: str, data: bytes) -> None:
     page.wait(lambda: words(page) == "opened")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("write", [to_mcap, lambda made: to_csv(made).encode()], ids=["mcap", "csv"])
 def test_a_recording_is_opened_and_played_with_both_arms(page, write):
     made = recording()
@@ -83,6 +84,7 @@ def test_a_recording_is_opened_and_played_with_both_arms(page, write):
     page.wait(lambda: words(page) == "")
 
 
+@pytest.mark.full
 def test_the_arm_of_a_recording_is_shown_with_it(page):
     scara = kin.get_robot("scara")
     opened(page, "scara.mcap", to_mcap(recording(scara)))
@@ -97,6 +99,7 @@ def test_the_arm_of_a_recording_is_shown_with_it(page):
     page.wait(lambda: "Play recording" in labels(page))
 
 
+@pytest.mark.full
 def test_an_arm_that_the_service_does_not_have_becomes_the_visitors_own(page):
     own = kin.parse_robot(kin.robot_to_toml(ARM).replace("0.425", "0.525"), "longer.toml")
     assert own != ARM

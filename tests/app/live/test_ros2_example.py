@@ -60,6 +60,7 @@ def test_the_ghost_is_where_the_arm_of_ros_is(page, bridge, run):
     page.wait(lambda: "data-live-measured" not in page.html)
 
 
+@pytest.mark.full
 def test_a_driven_arm_follows_slowly_and_starts_where_it_is(page, bridge, run, patient, capsys):
     run("--drive", "--yes", "--speed", f"{SPEED}")
     page.wait(lambda: "ROS 2 arm at ws://127.0.0.1" in page.html)

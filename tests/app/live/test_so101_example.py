@@ -95,6 +95,7 @@ def test_the_mirror_shows_the_encoders_and_writes_nothing(page, bus, run):
     assert bus.refused == []
 
 
+@pytest.mark.full
 def test_match_motors_takes_what_the_servos_read(page, bus, run):
     run()
     page.wait(lambda: shows(page, bus))
@@ -108,6 +109,7 @@ def test_match_motors_takes_what_the_servos_read(page, bus, run):
     assert bus.written == []
 
 
+@pytest.mark.full
 def test_broken_packets_are_asked_for_again(page, bus, run, capsys):
     started = run()
     page.wait(lambda: shows(page, bus))
@@ -125,6 +127,7 @@ def test_broken_packets_are_asked_for_again(page, bus, run, capsys):
     assert bus.written == []
 
 
+@pytest.mark.full
 def test_a_servo_that_comes_and_goes_hides_the_ghost(page, bus, run, capsys):
     run()
     page.wait(lambda: shows(page, bus))
@@ -137,6 +140,7 @@ def test_a_servo_that_comes_and_goes_hides_the_ghost(page, bus, run, capsys):
     assert "All servos answer again." in said
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("missing", "words"),
     [
@@ -152,6 +156,7 @@ def test_a_missing_servo_is_named(page, bus, run, capsys, missing, words):
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_servos_of_another_kind_are_refused(page, bus, run, capsys):
     bus.servos[2].put(3, (1284).to_bytes(2, "little"))
     started = run()
@@ -159,6 +164,7 @@ def test_servos_of_another_kind_are_refused(page, bus, run, capsys):
     assert "motor 2 (shoulder_lift) is of model 1284, expected STS3215 (777)" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_a_driven_arm_starts_where_it_is_and_follows_slowly(page, bus, run, patient, capsys):
     started = run("--drive", "--yes", "--speed", SPEED)
     page.wait(lambda: "The arm follows the page." in capsys.readouterr().out)
@@ -207,6 +213,7 @@ def rests(bus) -> bool:
     return bus.servos[1].position == before and before - TICKS[0] < 500
 
 
+@pytest.mark.full
 def test_a_page_that_leaves_stops_the_arm(page, bus, run, patient, capsys):
     started = on_its_way(page, bus, run, capsys)
     started.end(page)
@@ -217,6 +224,7 @@ def test_a_page_that_leaves_stops_the_arm(page, bus, run, patient, capsys):
     assert "withdrawn" in said.err or "does not answer" in said.err
 
 
+@pytest.mark.full
 def test_a_page_that_is_silent_stops_the_arm(page, bus, run, patient, monkeypatch, capsys):
     """The connection stands, and nothing comes: the page is asked for signs of life."""
     started = on_its_way(page, bus, run, capsys)
@@ -227,6 +235,7 @@ def test_a_page_that_is_silent_stops_the_arm(page, bus, run, patient, monkeypatc
     assert rests(bus)
 
 
+@pytest.mark.full
 def test_a_servo_that_is_lost_stops_all_others(page, bus, run, patient, capsys):
     started = on_its_way(page, bus, run, capsys)
     bus.missing.add(5)
@@ -238,6 +247,7 @@ def test_a_servo_that_is_lost_stops_all_others(page, bus, run, patient, capsys):
     assert "It goes on to its last goal" in said
 
 
+@pytest.mark.full
 def test_an_overloaded_servo_stops_the_arm(page, bus, run, patient, capsys):
     started = on_its_way(page, bus, run, capsys)
     bus.servos[2].error = 1 << 5
@@ -246,6 +256,7 @@ def test_an_overloaded_servo_stops_the_arm(page, bus, run, patient, capsys):
     assert rests(bus)
 
 
+@pytest.mark.full
 def test_a_bus_that_is_unplugged_ends_the_program(page, bus, run, patient, capsys):
     started = on_its_way(page, bus, run, capsys)
     bus.unplug()
@@ -254,6 +265,7 @@ def test_a_bus_that_is_unplugged_ends_the_program(page, bus, run, patient, capsy
     assert f"the bus at {bus.port} is gone" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_a_servo_that_is_held_is_not_pushed_for_long(page, bus, run, patient, capsys):
     started = on_its_way(page, bus, run, capsys, "--speed", 90)
     bus.servos[1].stuck = True
@@ -263,6 +275,7 @@ def test_a_servo_that_is_held_is_not_pushed_for_long(page, bus, run, patient, ca
     assert abs(bus.servos[1].word(GOAL) - bus.servos[1].position) < 3, "its goal is where it is"
 
 
+@pytest.mark.full
 def test_the_motors_are_released_when_asked(page, bus, run, patient, capsys):
     started = on_its_way(page, bus, run, capsys, "--release")
     started.end(page)

@@ -150,6 +150,7 @@ def test_a_new_path_ends_the_one_before() -> None:
     assert threading.active_count() < 50
 
 
+@pytest.mark.full
 def test_the_process_serves_and_ends_with_its_input(monkeypatch) -> None:
     for name in ("KINBOARD_TOKEN", "KINBOARD_HOST"):
         monkeypatch.delenv(name, raising=False)

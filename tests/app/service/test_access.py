@@ -289,6 +289,7 @@ def test_a_websocket_needs_the_token_too(guarded, path):
     assert refused.value.code == 1008
 
 
+@pytest.mark.full
 def test_a_logged_in_browser_gets_a_viewer():
     application = create_app(Settings(token=TOKEN))  # type: ignore[arg-type]
     with serve(application) as port:
@@ -323,6 +324,7 @@ def test_read_only_does_not_restrict_clients_with_the_token():
     assert client.get("/api/v1/robots", headers={"authorization": "Bearer wrong"}).status_code == 401
 
 
+@pytest.mark.full
 def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
     application = create_app(Settings(read_only=True))
     own = own_arm({**kin.robot_to_dict(PIONEER), "name": "Bob's arm"})
@@ -346,6 +348,7 @@ def test_a_read_only_visitor_sees_the_arm_of_a_link_and_cannot_move_it():
             assert (tab.tool_pose() == before).all()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("everything", [False, True])
 def test_a_link_makes_the_service_compute_for_those_who_may(everything, monkeypatch):
     """The same link: a visitor with all rights gets a cloud, sizes, a map and a target; a read-only one none."""
@@ -532,6 +535,7 @@ def test_a_websocket_for_another_host_is_refused():
 # Proxies
 
 
+@pytest.mark.full
 def test_a_client_cannot_choose_its_address():
     """Wrong tokens count for the address of the connection, whatever the header says."""
     application = create_app(Settings(token=TOKEN))  # type: ignore[arg-type]
@@ -540,6 +544,7 @@ def test_a_client_cannot_choose_its_address():
     assert codes == [401] * access.TRIES + [429]
 
 
+@pytest.mark.full
 def test_a_trusted_proxy_names_the_client(monkeypatch):
     monkeypatch.setattr(access, "TRY_EVERY", 3600.0)  # on a busy machine the tries may take ten seconds
     settings = Settings(token=TOKEN, trusted_proxies=("127.0.0.0/8",))  # type: ignore[arg-type]

@@ -266,6 +266,7 @@ def test_http_1_0_gets_an_answer_without_chunks(service):
 # -- answers ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_an_answer_that_nobody_reads_ends(service):
     request = f"GET {ARM}/workspace?n=20000000&format=bin HTTP/1.1\r\nHost: localhost\r\n\r\n"
     with service.connection(receive=4096) as connection:
@@ -275,6 +276,7 @@ def test_an_answer_that_nobody_reads_ends(service):
         wait_for(lambda: closed(connection), 30)
 
 
+@pytest.mark.full
 def test_an_answer_that_is_read_byte_by_byte_ends(service):
     ended = 'kinboard_refused_connections_total{why="unread"}'
     before = service.metric(ended)
@@ -484,6 +486,7 @@ def test_a_malformed_message_ends_the_connection(service, path, sent, code):
             received = received[-200:] + chunk
 
 
+@pytest.mark.full
 def test_a_client_that_answers_no_ping_is_disconnected(service):
     with upgraded(service, "/viewer") as connection:
         wait_for(lambda: closed(connection, 0.1), 30)
@@ -511,6 +514,7 @@ def test_a_ping_is_answered_and_a_message_in_fragments_is_read(service):
             received = received[-20:] + connection.recv(1 << 20)
 
 
+@pytest.mark.full
 def test_a_client_that_does_not_read_its_websocket_is_disconnected(service):
     before = service.metric('kinboard_refused_connections_total{why="unread"}')
     with service.connection(receive=4096) as connection:
@@ -565,6 +569,7 @@ def test_one_client_gets_its_share_of_the_viewer_and_others_the_rest(service):
         assert service.metric("kinboard_visitors") == 4
 
 
+@pytest.mark.full
 def test_connections_beyond_the_open_files_are_refused():
     guard = Guard(Settings(), files=100)
     assert guard.refusal("192.0.2.1", 80) is None

@@ -45,7 +45,10 @@ VISITORS = 10.0  # s
 LINES = 60  # of the log during one fault
 COMPILING = 30.0  # s, until a page opens without any compiled kernel; REST says 503 meanwhile
 
-pytestmark = pytest.mark.skipif(not SUPPORTED, reason="processes of several roles are on Linux only")
+pytestmark = [
+    pytest.mark.skipif(not SUPPORTED, reason="processes of several roles are on Linux only"),
+    pytest.mark.full,
+]
 
 Act = Callable[[Machine, ExitStack], object]
 

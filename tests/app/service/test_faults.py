@@ -36,6 +36,8 @@ from app.shared.store import Store
 from app.viewer.server import RESTARTS, ViewerServer
 from app.viewer.session.controller import ArmController
 
+pytestmark = pytest.mark.full
+
 ROOT = Path(__file__).parents[3]
 ARM = kin.get_robot("pioneer5")
 FAR = {"position": [5.0, 0.0, 0.0], "wxyz": [1.0, 0.0, 0.0, 0.0]}  # takes the Panda some tenths of a second each

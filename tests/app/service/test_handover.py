@@ -22,7 +22,7 @@ from app.live.codes import unused_code
 from app.service.handover import AT_ONCE, LARGEST, SUPPORTED, Handover, Member, Phase, Role, members
 from app.service.web.access import TRIES, TRY_EVERY
 
-pytestmark = pytest.mark.skipif(not SUPPORTED, reason="one process on this system")
+pytestmark = [pytest.mark.skipif(not SUPPORTED, reason="one process on this system"), pytest.mark.full]
 
 HOST = "Host: localhost\r\n"
 TARGET = {"target": {"position": [0.045, 0.191, -0.211]}}

@@ -17,7 +17,7 @@ from app.live import home_of
 from app.live.client import RefusedError
 from app.service.handover import SUPPORTED
 
-pytestmark = pytest.mark.skipif(not SUPPORTED, reason="one process on this system")
+pytestmark = [pytest.mark.skipif(not SUPPORTED, reason="one process on this system"), pytest.mark.full]
 Q = np.array([1.0, 0.5, 0.5, 0.5, 0.5])  # of the first arm
 
 

@@ -120,6 +120,7 @@ def test_rest_is_served_when_the_viewer_fails(monkeypatch, caplog):
     assert "this version of viser cannot be used" in caplog.text
 
 
+@pytest.mark.full
 def test_stopping_ends_the_viewer_and_the_thread_that_started_it(monkeypatch):
     stop = ViewerServer.stop
     stopped: list[ViewerServer] = []
@@ -264,6 +265,7 @@ def test_the_old_addresses_of_the_documentation_do_not_exist(client):
     assert client.get("/docs/", follow_redirects=False).headers["location"] == "../docs"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sent", ["", "/kinboard"], ids=["proxy strips the prefix", "proxy passes it on"])
 @pytest.mark.parametrize("setting", ["/kinboard", "kinboard/"])
 def test_the_service_works_behind_a_path_prefix(sent, setting):

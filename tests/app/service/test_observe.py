@@ -88,6 +88,7 @@ def test_the_metrics_page_is_what_prometheus_reads(client):
     assert counted("kinboard_resident_bytes") > 50e6
 
 
+@pytest.mark.full
 def test_the_times_of_requests_up_to_their_limit_fall_into_different_buckets(client):
     client.get("/livez")
     edges = [
@@ -156,6 +157,7 @@ count(1, "[REQUESTS.labels('', k, 0).inc() for k in range(20_000)]; print('more'
 """
 
 
+@pytest.mark.full
 def test_several_processes_count_as_one_and_a_process_goes_on_where_its_predecessor_ended():
     out = subprocess.run(
         [sys.executable, "-c", COUNTING],

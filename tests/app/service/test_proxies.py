@@ -27,6 +27,8 @@ import kin
 from app.service.main import create_app
 from app.shared.settings import Settings
 
+pytestmark = pytest.mark.full
+
 DEPLOY = Path(__file__).parents[3] / "deploy"
 PIONEER = kin.get_robot("pioneer5")
 LARGE = 12 * 1024 * 1024

@@ -232,6 +232,7 @@ def test_a_huge_message_is_not_read(viser, bridge):
     assert viser.received == []
 
 
+@pytest.mark.full
 def test_a_flood_is_throttled_without_delaying_other_visitors(port, viser):
     stop = threading.Event()
 

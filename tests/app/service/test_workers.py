@@ -24,6 +24,8 @@ from app.service.main import run
 from app.service.workers import supervise
 from app.shared.settings import Settings
 
+pytestmark = pytest.mark.full
+
 ROOT = Path(__file__).parents[3]
 
 

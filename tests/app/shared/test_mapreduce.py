@@ -90,6 +90,7 @@ def busy(client, name):
 # Written to be run in this order: first one worker dies, at last the scheduler.
 
 
+@pytest.mark.full
 def test_a_worker_killed_in_mid_run_loses_nothing(cluster):
     grid = kin.workspace.capability_grid(OWN, resolution=14)
     with distributed.Client(cluster.address, set_as_default=False) as client:
@@ -237,6 +238,7 @@ def read(ending):
     return {".npz": npz, ".csv": csv, ".ply": ply}[ending]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["map.xls", "missing/map.npz", "map"])
 def test_a_file_that_cannot_be_is_refused_before_the_work(capsys, monkeypatch, tmp_path, name):
     monkeypatch.setattr(mapreduce, "capability_block", None)

@@ -26,6 +26,7 @@ def test_an_arm_of_the_same_id_with_another_table_gets_its_own_names():
     assert solver_names(other) == SolverNames("pair2", *computed_names(other)[1:])
 
 
+@pytest.mark.full
 def test_a_list_of_all_arms_solves_nothing():
     program = (
         "import kin, kin.solvers\n"

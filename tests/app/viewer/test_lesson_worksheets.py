@@ -103,6 +103,7 @@ def printed(lesson, robot, outline):
     return parts, around
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
 def test_a_sheet_prints_nothing_that_it_asks(lesson):
     """Other numbers may equal an answer by chance, but not on half of the arms that have the question."""

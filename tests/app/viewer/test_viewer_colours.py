@@ -28,6 +28,7 @@ def is_dark(tab: FakeBrowser) -> bool:
     return bool(themes[-1])
 
 
+@pytest.mark.full
 def test_the_page_follows_the_system(port: int) -> None:
     with FakeBrowser(port, memory=memory(ViewState(), dark=True)) as tab:
         assert is_dark(tab)

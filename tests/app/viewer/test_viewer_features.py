@@ -108,6 +108,7 @@ def wait_for_call(tab: FakeBrowser, *call: object, times: int = 1) -> None:
         assert time.monotonic() < end, Witness.calls
 
 
+@pytest.mark.full
 def test_a_tab_is_called_by_the_workers_threads_alone(tab: FakeBrowser) -> None:
     assert Witness.calls[0] == ("made", "pioneer5")
     tab.set("Witness", 3)

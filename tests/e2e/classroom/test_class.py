@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from page import WAIT, Tab, save_picture
+from page import WAIT, DrawnTab, Tab, save_picture
 from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 from test_screens import problems
@@ -25,13 +25,15 @@ ROBOT = kin.get_robot("pioneer5")
 
 
 class Member(Tab):
-    """A tab of the teacher, or of a student who has joined by code and alias."""
+    """A tab of the teacher, whose wall is looked at, or of a student who has joined by code and alias."""
 
     def __init__(
         self, browser: Browser, address: str, code: str = "", alias: str = "", phone: bool = False
     ) -> None:
         self._code, self._alias = code, alias
         self.code = ""
+        if not code:
+            self.scripts = DrawnTab.scripts
         super().__init__(browser, address, *((390, 844) if phone else (1280, 720)), touch=phone)
 
     def _arrive(self) -> None:

@@ -9,7 +9,7 @@ from page import PLAIN, save_picture
 from playwright.sync_api import Browser, Page, expect
 from test_class import EXERCISE, Member
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 BOX = """(selector) => {
   const node = [...document.querySelectorAll(selector)].find((each) => each.checkVisibility());

@@ -18,7 +18,7 @@ from test_class import Member
 from app.exercises import Exercises
 from app.viewer.room.member import SURE
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 EXERCISE, TYPED, OTHER = "which-joint-goes-down", "swing", "which-joint-moved"
 TITLE, OTHER_TITLE = Exercises().get(EXERCISE).title, Exercises().get(OTHER).title

@@ -73,6 +73,7 @@ def measured(tab: Tab, what: str) -> list[str]:
     return found
 
 
+@pytest.mark.full
 def test_the_tree_of_every_tab(tab: Tab) -> None:
     found = {}
     for title in TABS:
@@ -168,6 +169,7 @@ class Keys:
         self.stays()
 
 
+@pytest.mark.full
 def test_a_lesson_by_keyboard_alone_and_the_tree_of_each_step(tab: Tab) -> None:
     tab.reopen()  # another test may have left the lesson at a later step
     page, keys, outline = tab.page, Keys(tab), EquationsLesson.outline(PIONEER, Units())
@@ -244,6 +246,7 @@ def screens(tab: Tab) -> Iterator[str]:
     tab.choose("Lesson", "None")
 
 
+@pytest.mark.full
 def test_sizes_spacing_and_reflow_on_a_phone(small: Tab) -> None:
     small.show(PIONEER)
     found: dict[str, list[str]] = {}
@@ -260,6 +263,7 @@ def test_sizes_spacing_and_edges_on_a_desk(tab: Tab) -> None:
     assert {name: wrong for name, wrong in found.items() if wrong} == {}
 
 
+@pytest.mark.full
 def test_letter_keys_can_be_switched_off(tab: Tab) -> None:
     page = tab.page
     tab.open("View")
@@ -280,6 +284,7 @@ def test_letter_keys_can_be_switched_off(tab: Tab) -> None:
     page.keyboard.press("Escape")
 
 
+@pytest.mark.full
 def test_no_control_with_the_focus_is_covered(phone: Tab) -> None:
     phone.show(PIONEER)
     page, covered = phone.page, list[str]()

@@ -37,6 +37,7 @@ def lesson(tab: Tab) -> Iterator[Tab]:
     tab.choose("Lesson", "None")
 
 
+@pytest.mark.full
 def test_steps_by_keyboard_with_typeset_matrices(lesson: Tab) -> None:
     page = lesson.page
     following = page.get_by_role("button", name="Next")
@@ -68,6 +69,7 @@ def test_steps_by_keyboard_with_typeset_matrices(lesson: Tab) -> None:
     expect(page.get_by_role("button", name="Play")).to_be_visible()
 
 
+@pytest.mark.full
 def test_both_conventions_are_compared(lesson: Tab) -> None:
     page = lesson.page
     lesson.choose("Robot", kin.get_robot("redundant7").name)

@@ -10,7 +10,7 @@ from playwright.sync_api import Locator, expect
 import kin
 from kin import chapter
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 PIONEER = kin.get_robot("pioneer5")
 

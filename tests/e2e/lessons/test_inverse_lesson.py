@@ -14,7 +14,7 @@ from app.viewer.lessons.inverse.arm import arm_of
 from app.viewer.lessons.inverse.drawing import room
 from app.viewer.lessons.inverse.exercise import example, exercise
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.full]
 
 PIONEER = kin.get_robot("pioneer5")
 

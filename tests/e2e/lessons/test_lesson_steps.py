@@ -96,6 +96,7 @@ WALKS = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("lesson", WALKS)
 def test_a_lesson_from_its_first_step_to_its_check(desktop: Tab, lesson: type[Lesson]) -> None:
     tab, keyboard = desktop, lesson.key in ("dh", "velocity")

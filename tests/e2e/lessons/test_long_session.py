@@ -19,7 +19,7 @@ from playwright.sync_api import Error as PlaywrightError
 import kin
 from app.viewer.lessons import LESSONS
 
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.full]
 SECONDS = float(os.environ.get("KINBOARD_TEST_SECONDS", "60"))
 SEED = int(os.environ.get("KINBOARD_TEST_SEED", "0")) or random.randrange(1, 10**6)
 TABS = ["Learn", "Robot", "Workspace", "Program", "View", "Move"]

@@ -73,6 +73,7 @@ def test_the_reason_of_a_wrong_answer_is_in_the_window(small: Tab) -> None:
     small.choose("Lesson", "None")
 
 
+@pytest.mark.full
 def test_the_way_on_from_a_branch_that_ends_is_in_the_window(phone: Tab, no_spoilt_page: None) -> None:
     """The other shoulder is right, and leads to an elbow that does not reach: the way on is on the screen."""
     phone.reopen()  # with no answer yet
@@ -96,6 +97,7 @@ def test_the_way_on_from_a_branch_that_ends_is_in_the_window(phone: Tab, no_spoi
     phone.choose("Lesson", "None")
 
 
+@pytest.mark.full
 def test_what_comes_under_the_finger_does_not_look_pressed(phone: Tab, no_spoilt_page: None) -> None:
     phone.reopen()  # with no answer yet
     page = phone.page
@@ -116,6 +118,7 @@ def test_what_comes_under_the_finger_does_not_look_pressed(phone: Tab, no_spoilt
     phone.choose("Lesson", "None")
 
 
+@pytest.mark.full
 def test_what_is_opened_is_shown_below_the_head_of_the_sheet(phone: Tab, no_spoilt_page: None) -> None:
     page = phone.page
     phone.show(PIONEER)
@@ -137,6 +140,7 @@ def test_what_is_opened_is_shown_below_the_head_of_the_sheet(phone: Tab, no_spoi
     phone.choose("Lesson", "None")
 
 
+@pytest.mark.full
 def test_a_course_leads_on_from_where_the_answer_is(phone: Tab, no_spoilt_page: None) -> None:
     phone.reopen()  # with no answer yet
     page = phone.page
@@ -168,6 +172,7 @@ def left_off_at(page: Page) -> object:
     return decode(text, list(kin.builtin_robots().values())).features.get("course", {}).get("at")
 
 
+@pytest.mark.full
 def test_a_closed_page_is_continued_in_the_next_one(phone: Tab, no_spoilt_page: None) -> None:
     phone.reopen()
     page = phone.page

@@ -59,6 +59,7 @@ def test_a_click_on_a_ghost_in_the_picture_morphs_the_arm(tab: Tab) -> None:
     expect(tab.page.locator("[data-here]")).to_have_attribute("data-posture", here)
 
 
+@pytest.mark.full
 def test_the_reason_for_no_solution_and_a_remedy(tab: Tab) -> None:
     learn(tab, PUMA, "Postures")
     tab.drag_arrow(PUMA, kin.fk(PUMA, PUMA.q_home), axis=2, lengths=3.0)
@@ -71,12 +72,14 @@ def test_the_reason_for_no_solution_and_a_remedy(tab: Tab) -> None:
     expect(button).to_have_count(0)
 
 
+@pytest.mark.full
 def test_the_cone_and_the_rings_of_five_joints(tab: Tab) -> None:
     learn(tab, PIONEER, "Postures")
     expect(tab.page.locator("[data-cone]")).to_contain_text("% of all directions")
     tab.screenshot("approach-cone")
 
 
+@pytest.mark.full
 def test_the_ring_of_arm_angles(tab: Tab) -> None:
     learn(tab, SRS, "Redundancy")
     p = kin.fk(SRS, SRS.q_home)[:3, 3]
@@ -93,6 +96,7 @@ def test_the_ring_of_arm_angles(tab: Tab) -> None:
     tab.screenshot("redundancy-trade")
 
 
+@pytest.mark.full
 def test_lock_buttons(tab: Tab) -> None:
     tab.show(PUMA)
     tab.row("Locked").get_by_role("button", name="2", exact=True).click()

@@ -19,7 +19,7 @@ from app.viewer.worksheet.feature import parts_of
 from app.viewer.worksheet.views import page_html
 from kin.units import DEFAULT_UNITS
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full]
 ROOT = Path(__file__).parents[3]
 
 

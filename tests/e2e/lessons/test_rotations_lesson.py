@@ -8,7 +8,7 @@ from playwright.sync_api import expect
 
 import kin
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 
 def test_gimbal_lock_and_a_chain_by_mouse_and_by_keyboard(desktop: Tab) -> None:

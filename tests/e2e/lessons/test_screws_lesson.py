@@ -8,7 +8,7 @@ from playwright.sync_api import expect
 
 import kin
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 SCARA = kin.get_robot("scara")
 

@@ -68,6 +68,7 @@ def test_jogging_by_click_by_keyboard_and_by_holding(lesson: Tab) -> None:
     assert tops[0] == tops[1] < tops[2] == tops[3], "six in a row"
 
 
+@pytest.mark.full
 def test_a_singular_pose_and_the_lost_direction(lesson: Tab) -> None:
     lesson.page.get_by_role("tab", name="Move").click()
     lesson.type_number("5 axis 5", "0")
@@ -80,6 +81,7 @@ def test_a_singular_pose_and_the_lost_direction(lesson: Tab) -> None:
     lesson.screenshot("velocity-singular")
 
 
+@pytest.mark.full
 def test_force_null_space_and_line_by_mouse_and_keyboard(lesson: Tab) -> None:
     page = lesson.page
     for folder in ("Forces", "Null space", "Along a line"):
@@ -104,6 +106,7 @@ def test_force_null_space_and_line_by_mouse_and_keyboard(lesson: Tab) -> None:
         page.get_by_role("button", name=folder, exact=True).press("Enter")
 
 
+@pytest.mark.full
 def test_seven_columns_fit_a_phone(phone: Tab) -> None:
     phone.select(IIWA)
     open_lesson(phone)

@@ -18,7 +18,7 @@ from jupyter_client.manager import KernelManager
 from page import NO_HINTS, PLAIN, WAIT
 from playwright.sync_api import Browser, expect
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 ROOT = Path(__file__).parents[3]
 PATIENCE = 120.0  # s for a cell; the service may compile kernels

@@ -11,7 +11,7 @@ from playwright.sync_api import expect
 import kin
 from app.viewer.tabs.robot.motors.run import COUNT, begun
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 SO101 = kin.get_robot("so101")
 REAL = [replace(motor, sign=-1, offset=91.4) for motor in SO101.motors if motor.id != 6]

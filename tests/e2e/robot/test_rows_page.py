@@ -42,6 +42,7 @@ def test_a_field_that_is_left_for_a_button_is_left_once(empty: Tab) -> None:
     expect(page.locator('[data-arm-do="add"]')).to_be_focused()
 
 
+@pytest.mark.full
 def test_a_new_row_is_the_one_for_the_buttons(empty: Tab) -> None:
     page = empty.page
     page.evaluate(ADD)

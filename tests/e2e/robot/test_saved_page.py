@@ -106,6 +106,7 @@ def test_a_slider_and_a_typed_value_move_the_arm(saved: Page) -> None:
     expect(field).to_have_value("−0.532")
 
 
+@pytest.mark.full
 def test_the_postures_are_stepped_through_and_the_program_plays(saved: Page) -> None:
     T, seen = kin.fk(UR5, Q), []
     for k in range(8):
@@ -146,6 +147,7 @@ def test_the_arm_is_drawn_and_can_be_turned_with_the_keyboard(saved: Page) -> No
         saved.screenshot(path=ARTIFACTS / "saved-page.png")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("width", [320, 390, 768])
 def test_a_phone_shows_everything_without_scrolling_sideways(saved: Page, width: int) -> None:
     saved.set_viewport_size({"width": width, "height": 844})
@@ -157,6 +159,7 @@ def test_a_phone_shows_everything_without_scrolling_sideways(saved: Page, width:
         assert box["x"] + box["width"] <= width
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["firefox", "webkit"])
 def test_other_browsers_compute_and_draw_the_same(name: str, file: Path, tmp_path: Path) -> None:
     """The driver runs its scripts with ``eval``, which the page itself forbids."""

@@ -8,7 +8,7 @@ from playwright.sync_api import FloatRect, Locator, expect
 
 import kin
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 UR5, PIONEER = kin.get_robot("ur5"), kin.get_robot("pioneer5")
 BOTTOM = "document.querySelector('canvas[data-engine]').getBoundingClientRect().bottom"

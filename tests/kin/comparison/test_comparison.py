@@ -106,6 +106,7 @@ def test_an_arm_is_found_again_in_other_frames(arm):
         assert_confirmed(found, arm, b, rng)
 
 
+@pytest.mark.full
 def test_random_tables_are_found_again_in_other_frames():
     rng = np.random.default_rng(3)
     for _ in range(150):
@@ -142,6 +143,7 @@ def test_a_small_change_is_the_same_arm_only_if_poses_cannot_tell():
     assert said == {"identical", "same", "different"}
 
 
+@pytest.mark.full
 def test_senses_and_zeros_cost_no_less_than_is_reckoned():
     """Changed tables are given up by this bound: no plainest mapping is below it, and most are at it."""
     rng = np.random.default_rng(8)

@@ -40,6 +40,7 @@ def assert_moves_alike(robot: Robot, text: str, site: str = "tool") -> None:
         assert np.abs(pose(model, data, q, site) - kin.fk(robot, q)).max() < NEAR * max(1.0, robot.reach)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("robot", ARMS, ids=lambda robot: robot.id)
 def test_a_built_in_arm_is_loaded_by_mujoco_and_read_back(robot):
     text = kin.robot_to_mjcf(robot)
@@ -101,6 +102,7 @@ MOUNTED = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("mounting", "floor", "turn"), MOUNTED)
 def test_mounting_and_floor_are_written_and_read_back(mounting, floor, turn):
     T = np.eye(4)
@@ -259,6 +261,7 @@ def test_radians_are_read_as_such():
     assert_moves_alike(robot, text, "tcp")
 
 
+@pytest.mark.full
 def test_capsules_of_mjcf_are_those_of_the_arm():
     arm = kin.get_robot("ur5")
     back = kin.load_urdf(kin.robot_to_mjcf(arm))

@@ -42,6 +42,7 @@ def read(upper: str = BOX, fore: str = BOX, **more) -> kin.UrdfRobot:
     return kin.read_urdf(LINKS.format(upper=upper, fore=fore), tip="hand", **more)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", QUICK)
 def test_no_contact_of_the_makers_meshes_is_missed(name):
     """Recorded by tests/data/make_golden_bodies.py with coal; takes a while, because all meshes are fitted."""
@@ -88,6 +89,7 @@ def test_an_import_with_capsules_survives_a_round_trip(name):
     assert kin.parse_robot(kin.robot_to_toml(robot)) == robot
 
 
+@pytest.mark.full
 def test_shapes_are_where_the_urdf_places_them():
     """At random configurations, sampled points of the bodies are inside of capsules, in the world frame."""
     robot, report = read()
@@ -110,6 +112,7 @@ def test_shapes_are_where_the_urdf_places_them():
             assert min(gaps) > -0.06
 
 
+@pytest.mark.full
 def test_a_mesh_that_is_not_at_hand_is_a_tube_and_the_words_say_so():
     robot, report = read(fore=MESH)
     assert [body.assumed for body in report.bodies] == [False, False, True]
@@ -136,6 +139,7 @@ def test_a_mesh_that_can_be_read_is_fitted_with_its_scale():
     assert "more than 10 times the reach" in huge.about_bodies
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
@@ -165,6 +169,7 @@ def test_without_collision_bodies_all_is_assumed():
     assert "states no collision bodies" in report.about_bodies
 
 
+@pytest.mark.full
 def test_a_link_without_a_body_is_a_tube():
     robot, report = read(upper="")
     assert report.bodies[1].assumed
@@ -172,6 +177,7 @@ def test_a_link_without_a_body_is_a_tube():
     assert "the file states no body" in report.about_bodies
 
 
+@pytest.mark.full
 def test_the_home_of_an_import_is_free_of_contacts():
     """In the middle of its limits this arm is folded onto its base."""
     fold = '<limit lower="-2" upper="2"/>'

@@ -148,6 +148,7 @@ CASES = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("old", "new", "symptom", "rank", "mended"), CASES, ids=lambda value: str(value)[:32])
 def test_what_is_wrong_is_found_on_its_line_and_mended(old, new, symptom, rank, mended):
     assert WELL.count(old) == 1
@@ -173,6 +174,7 @@ def test_what_is_wrong_is_found_on_its_line_and_mended(old, new, symptom, rank, 
     assert "<!-- bends -->" in found.mended
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("old", "new", "symptom", "words"),
     [
@@ -209,6 +211,7 @@ def test_what_needs_a_decision_is_named_with_advice(old, new, symptom, words):
     assert all(each.mend for each in worth_saying(found))
 
 
+@pytest.mark.full
 def test_ordinary_limits_are_not_suspicious():
     """Turns of a joint that count in radians: ±2π of the UR arms, ±4π, five turns of a joint without stops."""
     for limit in (2 * math.pi, 4 * math.pi, 6.2832, 10 * math.pi, 7.5):
@@ -216,6 +219,7 @@ def test_ordinary_limits_are_not_suspicious():
         assert worth_saying(kin.examine_urdf(text, **HAND)) == []
 
 
+@pytest.mark.full
 def test_angles_that_were_meant_are_not_rounded():
     for angle in ("1.5", "0.79", "3.1", "1.570796326794897", "0.123", "-2.36"):
         text = WELL.replace('rpy="1.5707963267948966 0 0"', f'rpy="{angle} 0 0"')
@@ -224,6 +228,7 @@ def test_angles_that_were_meant_are_not_rounded():
         assert bool(found) == (1e-7 < off < 6e-3), (angle, found)
 
 
+@pytest.mark.full
 def test_a_chain_of_followers_becomes_one_step():
     third = """<link name="tip2"/><joint name="third" type="prismatic"><parent link="claw"/><child link="tip2"/>
     <axis xyz="0 0 1"/><limit lower="0" upper="0.02" velocity="1" effort="1"/>
@@ -235,6 +240,7 @@ def test_a_chain_of_followers_becomes_one_step():
     assert '<mimic joint="slide" multiplier="-1.0" offset="0.08"/>' in found.mended
 
 
+@pytest.mark.full
 def test_a_follower_on_the_way_to_the_tool_is_offered_to_move_on_its_own():
     found = kin.examine_urdf(WELL, base="foot", tip="claw")
     (finding,) = worth_saying(found)
@@ -243,6 +249,7 @@ def test_a_follower_on_the_way_to_the_tool_is_offered_to_move_on_its_own():
     assert found.mended_arm.robot.n == 4
 
 
+@pytest.mark.full
 def test_the_effect_of_mends_on_the_tool_is_measured():
     text = WELL.replace('rpy="1.5707963267948966 0 0"', 'rpy="1.57 0 0"')
     found = kin.examine_urdf(text, **HAND)
@@ -293,6 +300,7 @@ class Sent:
         return "meshes/fore.stl" if "gone" in path else None
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("side", "scale"),
     [(250.0, "0.001 0.001 0.001"), (0.25, None), (0.0, None), (2.5e-4, "1000.0 1000.0 1000.0")],
@@ -307,6 +315,7 @@ def test_a_mesh_in_another_unit_gets_a_scale(side, scale):
     assert f'<mesh filename="package://small/fore.stl" scale="{scale}"/>' in found.mended
 
 
+@pytest.mark.full
 def test_a_mesh_that_is_missing_is_named_and_found_elsewhere():
     found = kin.examine_urdf(WELL, **HAND, files=Sent())
     (finding,) = worth_saying(found)
@@ -331,6 +340,7 @@ def test_the_nearest_possible_inertia_is_that_of_a_body():
     assert nearest_possible(-body) is None
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "iso-8859-1", "utf-16"])
 def test_files_in_other_encodings_are_mended_as_utf_8(tmp_path, encoding):
     text = WELL.replace('version="1.0"', f'version="1.0" encoding="{encoding.removesuffix("-sig")}"')

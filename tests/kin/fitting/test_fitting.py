@@ -95,6 +95,7 @@ def test_spheres_and_capsules_are_met_exactly():
     assert sorted([pill.start[2], pill.end[2]]) == pytest.approx([-0.2, 0.2], abs=1e-3)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("count", [1, 2, 40])
 def test_a_point_a_line_and_a_plane_have_capsules(count):
     flat = np.zeros((count, 3, 3))
@@ -110,6 +111,7 @@ def test_no_body_has_no_capsules():
     assert capsules_around(np.empty((0, 3, 3))) == []
 
 
+@pytest.mark.full
 def test_a_mesh_of_many_triangles_is_fitted_soon_and_held():
     body = np.asarray(trimesh.creation.icosphere(6).triangles) * (0.1, 0.1, 0.4)
     assert len(body) > LARGE

@@ -460,6 +460,7 @@ def test_the_best_of_many_is_that_of_one_bit_for_bit(name, more):
         assert repr(found[i]) == repr(alone)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "task", "turned"),
     [("planar2r", "pose", False), ("so100", "pose", True), ("rpp", "position", True), ("rpp", "approach", True)],

@@ -45,6 +45,7 @@ def newton(robot, target, q, task):
     return None
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_a_numeric_search_from_many_starts_finds_no_further_branch(robot_id):
     """Each result of Newton's method is one of the branches at its value of the redundancy parameter."""

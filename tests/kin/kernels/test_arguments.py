@@ -147,6 +147,7 @@ def answers():
     return found("fk", "jacobian", "branches", "solutions", "seed")
 
 
+@pytest.mark.full
 def test_functions_that_are_not_compiled_answer_the_same(answers):
     names = ("fk", "jacobian", "solutions", "seed")
     program = f"import json, test_arguments; print(json.dumps(test_arguments.found{names}))"
@@ -167,6 +168,7 @@ def test_functions_that_are_not_compiled_answer_the_same(answers):
             assert np.array(answer) == pytest.approx(np.array(answers[name]), abs=1e-12), name
 
 
+@pytest.mark.full
 def test_no_call_keeps_a_reference_or_memory():
     q, text, T = Q.copy(), Q.tolist(), np.empty((4, 4))
     everything = (q, text, T, ROBOT.model, np.ndarray, q.dtype)
@@ -278,6 +280,7 @@ WRONG_PLACES = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("place", WRONG_PLACES)
 def test_arrays_that_are_laid_out_otherwise_are_passed_as_numba_does(place):
     old, new, why = WRONG_PLACES[place]

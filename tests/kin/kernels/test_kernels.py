@@ -9,9 +9,12 @@ import sys
 import zlib
 from pathlib import Path
 
+import pytest
+
 import kin
 
 
+@pytest.mark.full
 def test_kernels_are_compiled_again_when_a_kernel_they_call_has_changed(tmp_path):
     """The cache of numba alone depends on the kernel's own file only."""
     package = tmp_path / "kin"

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import kin
 
 KERNELS = '''
@@ -62,6 +64,7 @@ def run(folder: Path) -> dict[str, object]:
     return answer
 
 
+@pytest.mark.full
 def test_loaded_machine_code_works_without_the_compiler_and_callers_can_be_compiled(tmp_path: Path) -> None:
     first = run(tmp_path)
     assert (first["inner"], first["outer"]) == ([ROWS, ERROR, 0], [ROWS[::-1], ERROR, 0])

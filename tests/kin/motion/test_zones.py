@@ -56,6 +56,7 @@ def assert_no_longer(arm, seed):
     return blended.planned and stopped.planned
 
 
+@pytest.mark.full
 @settings(max_examples=12)
 @given(st.sampled_from(ARMS), st.integers(0, 2**32 - 1))
 def test_a_zone_never_makes_a_motion_longer(arm, seed):

@@ -90,6 +90,7 @@ def assert_exact(robot, targets, result, task="pose", rows=slice(None)):
 # -- continuous paths ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_poses_of_smooth_motions_have_no_jump(robot_id):
     """Poses of random joint motions: the path is exact and hardly longer than the original motion."""
@@ -211,6 +212,7 @@ def test_a_long_rotation_starts_at_the_image_with_enough_range():
         assert math.degrees(result.q[-1, 6]) == pytest.approx(250.0, abs=30.0)
 
 
+@pytest.mark.full
 def test_a_rotation_beyond_the_range_of_joint_7_has_one_jump_that_names_it():
     """700° do not fit into 540°: one jump, at the latest where θ7 reaches its limit."""
     robot, targets = roll_path(0.0, 700.0, 29)

@@ -52,6 +52,7 @@ def test_each_cell_is_what_forward_kinematics_and_limits_say(robot, by):
     assert "free" in seen
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("robot", "by"), CASES[:2])
 def test_the_postures_that_lead_through_are_those_from_which_the_line_can_be_driven(robot, by):
     found = kin.path_postures(robot, line(robot, by, 200))

@@ -228,6 +228,7 @@ def test_no_configuration_is_absent_where_the_answer_is_called_complete(robot):
     assert unknown <= max(2, TARGETS // 100)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("robot", FAMILIES, ids=lambda robot: robot.id)
 def test_near_folds_of_a_few_configurations(robot):
     near_folds(robot, 6)

@@ -329,6 +329,7 @@ def planar_arm(monkeypatch):
     closed_form_of.cache_clear()
 
 
+@pytest.mark.full
 def test_a_new_solver_needs_its_module_and_one_row(planar_arm):
     assert kin.branch_names(planar_arm) == ("elbow left", "elbow right")
     for q, T in zip(*targets(planar_arm, 20), strict=True):

@@ -272,6 +272,7 @@ def careful(robot, T):
     return form.solve(SolverInput(T, POSE, (math.nan,), False, robot.q_home.copy(), -far, far)).q
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_batch_is_bit_identical_to_single_targets_and_misses_no_branch(family):
     rng = np.random.default_rng(3)

@@ -156,6 +156,7 @@ def test_random_chains_solve_poses_inside_their_limits(n, convention):
             assert found.error <= 1e-10
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("frame", ["tool", "base"])
 def test_every_mask(frame):
     """All 63 masks, each on a random chain: the kept coordinates have no error."""
@@ -176,6 +177,7 @@ def test_every_mask(frame):
         assert robot.in_limits(found.q)
 
 
+@pytest.mark.full
 def test_limits_and_locks_hold_exactly():
     """Solved or not, no joint is outside its limits, not even by a rounding error."""
     rng = np.random.default_rng(8)

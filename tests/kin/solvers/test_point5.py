@@ -184,6 +184,7 @@ def test_requested_values_are_kept():
         assert all(s.q[3] == q[3] and s.q[4] == q[4] for s in result.solutions)
 
 
+@pytest.mark.full
 def test_no_configuration_of_a_dense_search_is_nearer():
     rng = np.random.default_rng(13)
     for q in ROBOT.random_q(rng, 12):

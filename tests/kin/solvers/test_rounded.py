@@ -168,6 +168,7 @@ FIVE = arm(
 )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("robot", "task"), [(PLANAR, "position"), (FIVE, "approach")])
 def test_what_can_be_reached_is_never_called_unreachable(robot, task):
     for seed in range(2):

@@ -276,6 +276,7 @@ def test_between_the_folds_of_the_two_tables_both_postures_at_a_value_are_found(
     assert apart[::2] == pytest.approx(apart[0] * 10.0 ** -np.arange(0.0, 2.5, 0.5), rel=0.05)
 
 
+@pytest.mark.full
 def test_intervals_whose_postures_are_all_beside_folds_belong_to_their_branches():
     robot, _ = arm_named("gen3 1.57")
     T = kin.fk(robot, (1.51258, -0.24395, -2.48770, -0.26665, -1.54266, 2.22576, 1.43931))
@@ -329,6 +330,7 @@ def test_the_generating_configuration_is_found_with_the_given_joint_locked(name)
         assert all(s.q[joint] == q[joint] for s in found.solutions)
 
 
+@pytest.mark.full
 @arms
 def test_no_posture_is_missing(name):
     found = Judge(name).count(2, seed=5, values=12, random=30)
@@ -405,6 +407,7 @@ def test_a_branch_without_any_row_inside_the_limits_leaves_no_doubt():
         assert {s.branch for s in found.solutions} == {s.branch for s in kin.solve_ik(exact, T).solutions}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("name", "target"), [("iiwa14 1.57", 40), ("iiwa14 1.57", 44), ("rm75-urdf 1.5708", 6)])
 def test_followed_intervals_leave_out_what_a_step_passes(name, target):
     """A joint that lacks less of a whole turn than a step is long went out of its limits and in again unseen."""
@@ -432,6 +435,7 @@ def test_a_branch_is_listed_of_which_only_narrow_intervals_are_far_from_folds():
     assert len(found.solutions) == 8
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("seed", "target"), [(2, 41), (3, 23)])
 def test_an_interval_has_gaps_that_the_nearby_exact_arm_hides(seed, target):
     """With wider limits the exact arm has one interval, with narrower ones the first part of it only."""
@@ -443,6 +447,7 @@ def test_an_interval_has_gaps_that_the_nearby_exact_arm_hides(seed, target):
     assert judge.beyond(T, found, 60) == []
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "q",
     [
@@ -459,6 +464,7 @@ def test_every_value_of_a_listed_interval_is_found_when_it_is_asked_for(q):
     assert judge.beyond(T, found, 60) == []
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["panda 1.5708", "iiwa14 1.57"])
 def test_one_branch_at_each_value_is_that_of_all_branches_bit_for_bit(name):
     (robot, _), rng = arm_named(name), np.random.default_rng(9)

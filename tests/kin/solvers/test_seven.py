@@ -277,6 +277,7 @@ def test_a_pose_beyond_a_limit_says_so(robot):
     assert all(4 in {v.joint + 1 for v in posture.violations} for posture in result.blocked)
 
 
+@pytest.mark.full
 def test_the_ranges_of_a_result_are_those_of_all_branches():
     """At each of 600 values inside them there is a solution, and at one outside there is none."""
     rng = np.random.default_rng(1)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 from kin import classic_robots
 from kin.solvers import NUMERIC, family_of
 from kin.warmup import MADE_UP, MOTIONS, all_of, first_family, made_up_arms, parts
@@ -30,6 +32,7 @@ def test_every_family_has_its_parts_and_all_fit_into_the_memory():
     assert all(steps for steps in parts().values())
 
 
+@pytest.mark.full
 def test_parts_are_listed_without_compiling_for_arms_that_visitors_may_bring():
     """Matching a general arm compiles for many seconds, which an event loop would wait for."""
     assert tuple(map(family_of, made_up_arms())) == MADE_UP

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
 from numba.core.event import trigger_event
 
 import kin
@@ -76,6 +77,7 @@ assert after == before, {k: n for k, n in after.items() if before.get(k) != n}
 """
 
 
+@pytest.mark.full
 def test_after_warm_up_rest_no_call_compiles_a_kernel():
     """In a separate process, in which nothing else has loaded kernels."""
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=False)
@@ -94,6 +96,7 @@ def test_warm_up_rest_can_be_cancelled_between_kernels(monkeypatch):
     assert steps[12:] == list(range(9))[::-1]
 
 
+@pytest.mark.full
 def test_two_processes_share_the_kernels_of_the_first_arm():
     """One ends with the solver, the other begins with it."""
     program = (

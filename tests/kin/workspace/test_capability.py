@@ -108,6 +108,7 @@ def sphere_mean(powers):
 # Comparison with inverse kinematics
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["pioneer5", "puma560", "ur5", "scara", "redundant7", "redundant7-craig"])
 def test_a_closed_form_map_equals_inverse_kinematics_everywhere(name):
     found = mapped(name)
@@ -248,6 +249,7 @@ def test_voxels_have_the_right_indices_and_centres():
         found.share[0] = 1.0
 
 
+@pytest.mark.full
 def test_a_finer_map_has_the_volume_of_the_workspace():
     found = mapped("puma560", 18, 12)
     volume = kin.workspace_facts(kin.get_robot("puma560"), effort=2).volume

@@ -36,6 +36,7 @@ def by_all_probes(region):
     return np.flatnonzero((distance <= CLOSE * size).any(axis=1)), np.flatnonzero(layer.any(axis=1))
 
 
+@pytest.mark.full
 def test_the_cubes_are_those_of_all_probes_in_either_order(region):
     reached, outer = by_all_probes(region)
     assert len(reached)

@@ -41,6 +41,7 @@ def check(found: kin.Section, robot: kin.Robot) -> None:
     assert found.area >= -1e-12
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("robot_id", "resolution"), OVERSHOOTING)
 def test_a_section_reaches_beyond_the_points_that_made_its_map(robot_id, resolution):
     robot = kin.get_robot(robot_id)

@@ -224,6 +224,7 @@ def halfway(curve):
     return np.concatenate([curve + k / 8 * (following - curve) for k in range(8)])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_volume_samples_are_even_in_space(robot_id):
     robot = kin.get_robot(robot_id)
@@ -402,6 +403,7 @@ def test_a_planar_arm_is_a_ring():
     assert ring.area == pytest.approx(math.pi * (0.25 - inner**2), rel=1e-3)
 
 
+@pytest.mark.full
 def test_both_methods_give_the_same_volume():
     robot = kin.get_robot("redundant7")
     revolved = kin.workspace_facts(robot, effort=3)
@@ -411,6 +413,7 @@ def test_both_methods_give_the_same_volume():
     assert abs(surface.value - revolved.surface.value) < 4.0 * math.hypot(surface.error, revolved.surface.error)
 
 
+@pytest.mark.full
 def test_errors_shrink_with_effort():
     region = Region.of(kin.get_robot("pioneer5"), kin.JointConstraints(locked=[None, None, None, 0.0, 0.5]))
     few, many = from_probes(region, 2)[0], from_probes(region, 6)[0]

@@ -24,11 +24,13 @@ def preparation() -> Preparation:
     return made
 
 
+@pytest.mark.full
 def test_the_other_process_does_every_step_that_is_left(preparation):
     assert PartsCompiler(preparation).run()
     assert preparation.ready(parts())
 
 
+@pytest.mark.full
 def test_a_process_that_ends_early_does_not_count_as_done(preparation, monkeypatch):
     program = compiler._PARTS.replace("()\n", "()\n    if step == '2': sys.exit()\n")
     assert program != compiler._PARTS

@@ -76,6 +76,7 @@ def live(served: tuple[Any, httpx2.Client], monkeypatch: pytest.MonkeyPatch) -> 
     return served
 
 
+@pytest.mark.full
 def test_a_request_that_waits_for_the_compiler_is_answered_in_time_and_the_next_one_with_200(
     live: tuple[Any, httpx2.Client],
 ) -> None:

@@ -400,6 +400,7 @@ def test_every_kind_of_field_is_tried() -> None:
     assert {Kept, Text} <= tried or not any(lesson.key == "rotations" for lesson in DECLARED)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("lesson", DECLARED, ids=lambda each: each.key)
 def test_panels_of_all_arms_name_fields_that_exist(lesson: type[Lesson]) -> None:
     with bare_page(CLASSICS[0]) as page:

@@ -112,6 +112,7 @@ def test_the_arm_and_pose_on_show_become_those_of_the_exercise(server: int) -> N
         tab.wait(lambda: f">{q}</textarea>" in tab.html)
 
 
+@pytest.mark.full
 def test_hostile_messages_and_files_change_nothing(server: int) -> None:
     with FakeBrowser(server, memory=stored(to_toml(DRAFT))) as tab:
         tab.wait(lambda: 'value="My own"' in tab.html)
@@ -314,6 +315,7 @@ def test_a_folder_that_fails_while_it_is_saved_loses_nothing(
         tab.wait(lambda: "It is saved on the server" in shown(tab))
 
 
+@pytest.mark.full
 def test_a_kind_begins_with_its_plainest_exercise(server: int) -> None:
     with FakeBrowser(server, memory=stored()) as tab:
         tab.wait(lambda: "Begin with a kind" in shown(tab))

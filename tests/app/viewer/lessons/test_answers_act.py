@@ -268,6 +268,7 @@ def picture(tab: FakeBrowser) -> np.ndarray:
     return np.array([tab.camera[name] for name in ("position", "look_at", "up_direction")], float)
 
 
+@pytest.mark.full
 def test_the_camera_moves_back_until_it_shows_where_an_answer_leads_and_comes_back(server: int) -> None:
     with FakeBrowser(server, 956, 720) as tab:
         tab.settle()

@@ -127,6 +127,7 @@ def leaks(server: int, lesson: Any) -> dict[str, list[tuple[str, set[float]]]]:
     return {name: hits for name, hits in found.items() if 2 * len(hits) >= max(2, asked[name])}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("lesson", MOVED, ids=lambda lesson: lesson.key)
 def test_no_answer_is_on_show_before_it_is_given(server: int, lesson: Any) -> None:
     assert leaks(server, lesson) == {}
@@ -218,6 +219,7 @@ def test_no_self_motion_leaves_the_rank_to_be_asked() -> None:
         assert question.answer == (rank if rank == robot.n else robot.n - rank), robot.id
 
 
+@pytest.mark.full
 def test_an_answer_on_show_is_found(server: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Progress, "withheld", frozenset())
     velocity = next(lesson for lesson in LESSONS if lesson.key == "velocity")

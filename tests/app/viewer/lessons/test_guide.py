@@ -487,6 +487,7 @@ def press(tab: FakeBrowser, key: list[object], value: object) -> None:
     tab.say("feature", ["guide", key, value])
 
 
+@pytest.mark.full
 def test_a_visitor_answers_and_the_link_keeps_it(server: int) -> None:
     with FakeBrowser(server) as tab:
         tab.settle()

@@ -191,12 +191,14 @@ def indistinct(outline: Outline) -> list[tuple[str, float, float]]:
     return found
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
 def test_no_mistake_and_no_zero_is_right(lesson: type) -> None:
     for robot in (*ARMS, *TYPED, rolled(3.1416)):
         assert not indistinct(lesson.outline(robot, UNITS)), robot.id  # type: ignore[attr-defined]
 
 
+@pytest.mark.full
 def test_no_mistake_and_no_zero_is_right_at_other_homes() -> None:
     for robot, module in itertools.product(arms_at_other_homes(), (dh, equations, velocity)):
         assert not indistinct(module.outline(robot, UNITS)), (robot.id, robot.home)

@@ -72,6 +72,7 @@ def is_at(tab: FakeBrowser, robot: Robot, q: Any) -> bool:
     return np.allclose(tab.tool_pose(), kin.fk(robot, np.array(q)), atol=1e-6)
 
 
+@pytest.mark.full
 def test_the_ellipsoid_is_called_flat_where_an_axis_is_lost() -> None:
     said = set()
     for robot in CLASSICS:
@@ -133,6 +134,7 @@ def test_opening_a_step_brings_the_arm_to_its_pose(server: int, lesson: Any, rob
                 tab.wait(lambda end=end: np.allclose(tab.gizmo_pose()[:3, 3], end.target[:3], atol=1e-6))
 
 
+@pytest.mark.full
 def test_an_answered_step_opens_where_its_answer_led(server: int) -> None:
     puma = kin.get_robot("puma560")
     steps = RotationsLesson.outline(puma, DEGREES).steps

@@ -110,6 +110,7 @@ def test_lessons_count_their_verbs() -> None:
         assert len(verbs) >= 3, (lesson.key, verbs)
 
 
+@pytest.mark.full
 def test_right_answers_are_right_in_all_units_and_the_start_is_not() -> None:
     for robot, lesson, step, question in ALL:
         right = question.right()

@@ -407,6 +407,7 @@ def test_next_and_back_go_to_the_ends_of_motions(tab: FakeBrowser) -> None:
     tab.wait(lambda: shows(tab, at(PIONEER, PIONEER.q_home, 1)))
 
 
+@pytest.mark.full
 def test_playing_goes_to_the_end_and_stops(tab: FakeBrowser, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(player, "MOTION_TIME", 0.05)
     monkeypatch.setattr(player, "REST", 0.01)
@@ -505,6 +506,7 @@ def test_a_shared_address_restores_the_settings_and_ignores_invalid_ones(
     assert tab.value("Compare conventions") is True
 
 
+@pytest.mark.full
 def test_assigning_replaces_the_walk_and_follows_the_arm_in_place(tab: FakeBrowser) -> None:
     tab.set("Assign it yourself", True)
     tab.wait(lambda: "Which line is z₀?" in tab.html)

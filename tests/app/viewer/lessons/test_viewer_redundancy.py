@@ -222,6 +222,7 @@ def test_the_panda_moves_through_its_whole_range_while_the_tool_stays() -> None:
     assert [end.value for end in ends] == [x for interval in item.intervals for x in interval]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("robot", [PANDA, GEN3, SAWYER], ids=lambda robot: robot.id)
 def test_the_path_of_the_elbow_is_that_of_the_self_motion(robot: kin.Robot) -> None:
     T, q, options = home(robot), robot.q_home, kin.IKOptions()
@@ -276,6 +277,7 @@ def free_label(tab: FakeBrowser) -> str:
     return name
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("robot", [SRS, PRINTED], ids=lambda robot: robot.id)
 def test_the_tool_stays_in_every_frame_of_a_swing(tab: FakeBrowser, robot: kin.Robot) -> None:
     tab.choose(robot.name)
@@ -292,6 +294,7 @@ def test_the_tool_stays_in_every_frame_of_a_swing(tab: FakeBrowser, robot: kin.R
     assert max(exponents) < -9
 
 
+@pytest.mark.full
 def test_the_end_of_the_range_names_the_joint(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
     (free,) = self_motion.redundancy_at(SRS, home(SRS), kin.IKOptions(), SRS.q_home)
@@ -318,6 +321,7 @@ def test_the_ring_is_drawn_with_its_ends_and_removed_with_the_lesson(tab: FakeBr
     assert not [n for n in tab.nodes if n.startswith("/redundancy")]
 
 
+@pytest.mark.full
 def test_a_sweep_reverses_at_the_limits_until_a_target_is_dragged(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
     swing(tab, free_label(tab), 100)
@@ -366,6 +370,7 @@ def test_the_choice_between_two_redundancy_at(tab: FakeBrowser) -> None:
     assert tab.value("5 pivoting wrist") == pytest.approx(40, abs=0.01)
 
 
+@pytest.mark.full
 def test_without_a_closed_form_a_joint_leads(tab: FakeBrowser) -> None:
     robot = STORE.get("puma560")
     tab.choose(robot.name)

@@ -198,6 +198,7 @@ def server() -> Iterator[int]:
         yield port
 
 
+@pytest.mark.full
 def test_the_controls_change_table_product_and_scene(server: int) -> None:
     pioneer = CLASSICS[0]
     zero = kin.screws(pioneer)

@@ -439,6 +439,7 @@ def test_a_column_is_drawn_and_removed(tab: FakeBrowser) -> None:
     tab.wait(lambda: not [n for n in tab.nodes if n.startswith("/velocity")])
 
 
+@pytest.mark.full
 def test_every_arm_can_be_shown(tab: FakeBrowser) -> None:
     for robot in CLASSICS:
         use(tab, robot)

@@ -43,6 +43,7 @@ def wrong_answers(question: Question) -> Iterator[tuple[list[object], object]]:
             yield ["fields"], [["10 20 30 40 50 60"]]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("robot_id", ["pioneer5", "iiwa14"])
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
 def test_a_lesson_is_answered_from_end_to_end(server: int, lesson: Any, robot_id: str) -> None:

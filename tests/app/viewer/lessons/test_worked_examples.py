@@ -263,6 +263,7 @@ def tools(key: str, way: np.ndarray) -> np.ndarray:
     return np.array([numpy_arm.pose(example_in(key).robot, q) for q in way])
 
 
+@pytest.mark.full
 def test_what_is_said_of_a_whole_motion_is_true_in_every_frame() -> None:
     shares = np.linspace(0.0, 1.0, 97)  # between the samples, too
 
@@ -433,6 +434,7 @@ def lamps(tab: FakeBrowser) -> set[str]:
     return {name for name in seen(tab) if tab.nodes[name]["type"].startswith(kinds)}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("key", ["velocity", "dh", "numeric"])
 def test_only_the_example_is_seen_and_everything_comes_back(server: int, key: str) -> None:
     lesson = next(each for each in LESSONS if each.key == key)
@@ -465,6 +467,7 @@ def test_only_the_example_is_seen_and_everything_comes_back(server: int, key: st
         assert [tab.script[name] for name in ("undo", "redo")] == history
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("way", ["step", "answer", "lesson", "arm", "joint", "undo"])
 def test_whatever_else_is_done_ends_the_example(server: int, way: str) -> None:
     with FakeBrowser(server) as tab:

@@ -69,6 +69,7 @@ def test_a_file_is_read_whole_or_not_at_all() -> None:
         Archive(damaged).read("two/meshes/upper.stl")
 
 
+@pytest.mark.full
 def test_a_sum_of_files_is_bounded_too() -> None:
     noise = bytes(range(256)) * 1000
     with pytest.raises(MeshError) as caught:

@@ -229,6 +229,7 @@ def library(reader: MeshReader) -> dict[str, Drawing]:
     return found
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", DETAILED)
 def test_the_links_of_a_detailed_body_touch_at_their_joints_in_every_pose(
     library: dict[str, Drawing], name: str
@@ -294,6 +295,7 @@ def test_the_library_loads_a_body_once_and_says_when(reader: MeshReader) -> None
     assert library.get(puma, lambda why: None) is not None
 
 
+@pytest.mark.full
 def test_bodies_of_packages_have_room_of_their_own_and_say_why_they_cannot_be_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

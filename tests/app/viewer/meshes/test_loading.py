@@ -378,6 +378,7 @@ def soup() -> trimesh.Trimesh:
     return trimesh.Trimesh(corners, np.arange(18_000).reshape(-1, 3), process=False)
 
 
+@pytest.mark.full
 def test_smooth_meshes_make_room_for_those_that_cannot_be_simplified(tmp_path: Path) -> None:
     ball = trimesh.creation.icosphere(subdivisions=7)
     for name, mesh in (("soup.stl", soup()), ("ball.stl", ball)):
@@ -390,6 +391,7 @@ def test_smooth_meshes_make_room_for_those_that_cannot_be_simplified(tmp_path: P
     assert 60_000 < triangles < 1.4 * 80_000
 
 
+@pytest.mark.full
 def test_what_cannot_be_drawn_or_simplified_is_refused(tmp_path: Path) -> None:
     flat = trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False)
     for name, mesh in (("soup.stl", soup()), ("flat.stl", flat)):

@@ -55,6 +55,7 @@ def bodies(tab: FakeBrowser) -> dict[str, tuple[int, ...]]:
     }
 
 
+@pytest.mark.full
 def test_a_table_is_added_typed_and_taken_back(port: int) -> None:
     with FakeBrowser(port, memory=opened(UR5_ALONE)) as tab:
         tab.settle()
@@ -150,6 +151,7 @@ def gizmo_of_the_obstacle(tab):
     return gizmo, tab.nodes[gizmo]["owner"]
 
 
+@pytest.mark.full
 def test_obstacles_are_dragged_with_their_gizmo(port: int) -> None:
     with FakeBrowser(port, memory=opened(PageState("ur5", obstacles=(WALL,)))) as tab:
         gizmo, owner = gizmo_of_the_obstacle(tab)
@@ -163,6 +165,7 @@ def test_obstacles_are_dragged_with_their_gizmo(port: int) -> None:
         assert tab.script["undo"] == "Drag of an obstacle"
 
 
+@pytest.mark.full
 def test_a_drag_of_an_obstacle_is_one_step_however_long_it_rests(
     port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -185,6 +188,7 @@ def test_a_drag_of_an_obstacle_is_one_step_however_long_it_rests(
             tab.wait(lambda xyz=xyz: bool(kept(tab).obstacles) and kept(tab).obstacles[0].xyz == xyz)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("key", "value"),
     [(("add", "torus"), None), (("choose",), 7), (("choose",), "x"), (("set", "colour"), "1"), (("set", "x"), 5)],
@@ -237,6 +241,7 @@ def test_the_answer_is_about_the_present_choice_of_avoiding(port: int) -> None:
         wait_for(tab, "reached", "8 configurations for this pose.")
 
 
+@pytest.mark.full
 def test_a_table_that_is_raised_or_lowered_is_avoided_at_a_target_that_was_reached(port: int) -> None:
     with FakeBrowser(port, memory=opened(PageState("ur5", obstacles=(bench(-0.1),)))) as tab:
         tab.settle()
@@ -253,6 +258,7 @@ def test_a_table_that_is_raised_or_lowered_is_avoided_at_a_target_that_was_reach
         wait_for(tab, "reached", "8 configurations for this pose.")
 
 
+@pytest.mark.full
 def test_an_arm_that_touches_moves_to_a_free_posture_only_when_that_is_switched_on(port: int) -> None:
     touching = next(q for q in POSTURES if kin.clearance(UR5, q, [bench(-0.1)]) < -0.01)
     before = PageState("ur5", touching, obstacles=(bench(-0.1),))

@@ -104,6 +104,7 @@ def test_what_is_wrong_is_said(kind: str, text: str, rotations: Rotations, why: 
     assert caught.value.title == why
 
 
+@pytest.mark.full
 def test_the_page_writes_and_reads_the_chosen_notation(port: int) -> None:
     ur5 = kin.get_robot("ur5")
     with FakeBrowser(port) as tab:

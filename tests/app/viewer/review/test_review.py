@@ -346,6 +346,7 @@ def test_what_varies_comes_back_with_other_numbers(exercise: Exercise) -> None:
 # On another arm
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
 def test_questions_are_asked_again_on_an_arm_with_other_numbers(lesson: Any) -> None:
     ur5 = STORE.get("ur5")

@@ -164,6 +164,7 @@ def test_who_follows_reads_what_is_true_of_the_arm_on_show(room: Class) -> None:
     student.wait(lambda: 'data-status="hand"' in student.html)
 
 
+@pytest.mark.full
 def test_a_student_who_moves_the_arm_lets_go(room: Class) -> None:
     _, student, _, q = lead(room)
     student.settle(1.0)  # not within the grace of a new lead
@@ -173,6 +174,7 @@ def test_a_student_who_moves_the_arm_lets_go(room: Class) -> None:
     at(student, q)
 
 
+@pytest.mark.full
 def test_an_arm_that_moves_does_not_render_the_tab_again(room: Class, monkeypatch: pytest.MonkeyPatch) -> None:
     teacher, student, _, q = lead(room)
     student.settle(1.0)
@@ -303,6 +305,7 @@ def test_a_lead_pauses_the_task_and_returns_to_it(room: Class) -> None:
     student.wait(lambda: "data-class-paused" not in student.html)
 
 
+@pytest.mark.full
 def test_a_lead_pauses_the_exercise_of_a_course_and_returns_to_it(room: Class) -> None:
     teacher, student, ticket, q = lead(room)
     press(teacher, "fields", "course", value=[["0"]])
@@ -338,6 +341,7 @@ def test_a_lead_pauses_the_exercise_of_a_course_and_returns_to_it(room: Class) -
     assert student.value("Lesson") == "Screws"
 
 
+@pytest.mark.full
 def test_what_is_opened_is_stored_in_the_same_step(room: Class) -> None:
     """A reload brings it back, however soon it comes: also while the arm is still on its way to the pose."""
     student, _ = room.join("Ann")
@@ -508,6 +512,7 @@ def test_a_students_arm_is_shown_to_all(room: Class) -> None:
     at(teacher, ROBOT.q_home)
 
 
+@pytest.mark.full
 def test_the_wall_sends_one_list_of_poses_for_all(room: Class) -> None:
     teacher = room.teacher()
     students = [room.join(f"Student {i}") for i in range(3)]
@@ -603,6 +608,7 @@ def test_the_wall_says_what_the_list_says(room: Class) -> None:
     teacher.wait(lambda: "Close the wall" not in teacher.html)
 
 
+@pytest.mark.full
 def test_a_driven_arm_is_marked_on_the_wall_and_in_the_list(room: Class, monkeypatch: pytest.MonkeyPatch) -> None:
     lines: list[Line] = []
     open_line = Lines.open
@@ -782,6 +788,7 @@ def test_who_stays_when_nobody_is_removed_is_said(room: Class, monkeypatch: pyte
     assert "Stay: Ghost 0, Ghost 1, Ghost 2: joined less than a minute ago; press again later." in teacher.html
 
 
+@pytest.mark.full
 def test_a_double_click_is_one(room: Class) -> None:
     teacher = room.teacher()
     ann, _ = room.join("Ann")

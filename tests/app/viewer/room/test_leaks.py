@@ -276,6 +276,7 @@ def fixed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ExerciseContext, "seed", seed)
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("fixed")
 def test_no_message_gives_the_answer_of_an_open_task_away(students: Room) -> None:
     found = open_all(students, list(ALL.all))
@@ -289,6 +290,7 @@ PLANTS: list[tuple[str, Callable[[Exercise, Variant], str]]] = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("fixed")
 @pytest.mark.parametrize(("how", "plant"), PLANTS, ids=[how for how, _ in PLANTS])
 def test_a_leak_is_found(students: Room, monkeypatch: pytest.MonkeyPatch, how: str, plant: Any) -> None:

@@ -83,6 +83,7 @@ def test_a_narrow_picture_shows_what_a_wide_one_shows() -> None:
     assert np.isfinite(camera.narrowed(straight_down, PHONE)).all()
 
 
+@pytest.mark.full
 def test_a_picture_of_another_shape_shows_the_same(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -122,6 +123,7 @@ def test_a_picture_that_is_narrow_for_a_moment_leaves_the_view(port: int) -> Non
         assert tab.kept == [], "nobody has chosen a view"
 
 
+@pytest.mark.full
 def test_the_camera_is_stored_when_it_stops_and_restored(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -173,6 +175,7 @@ def test_a_roll_of_the_camera_is_stored_and_reset(port: int) -> None:
         assert np.allclose(shown(tab), default(PIONEER, DESKTOP))
 
 
+@pytest.mark.full
 def test_a_view_before_the_camera_was_aimed_is_not_stored(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -184,6 +187,7 @@ def test_a_view_before_the_camera_was_aimed_is_not_stored(port: int) -> None:
         assert rest(tab, 2).camera is not None
 
 
+@pytest.mark.full
 def test_a_page_that_is_already_at_its_view_is_trusted_at_once(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -194,6 +198,7 @@ def test_a_page_that_is_already_at_its_view_is_trusted_at_once(port: int) -> Non
         assert rest(tab).camera is not None
 
 
+@pytest.mark.full
 def test_a_page_that_never_confirms_its_view_is_trusted_after_a_while(port: int, monkeypatch) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -205,6 +210,7 @@ def test_a_page_that_never_confirms_its_view_is_trusted_after_a_while(port: int,
         assert rest(tab).camera is not None
 
 
+@pytest.mark.full
 @pytest.mark.filterwarnings("ignore:.*does not match annotation")
 @pytest.mark.parametrize(
     "nonsense",
@@ -225,6 +231,7 @@ def test_an_invalid_camera_is_ignored(port: int, nonsense: dict[str, object]) ->
         assert "Something went wrong" not in tab.html
 
 
+@pytest.mark.full
 def test_a_link_from_a_desktop_shows_the_arm_on_a_phone_and_comes_back(port: int) -> None:
     link = memory(PageState("pioneer5", PIONEER.q_home, camera=ASIDE))
     with FakeBrowser(port, 390, 844, memory=link) as tab:
@@ -398,6 +405,7 @@ def frames(robot: kin.Robot, q: np.ndarray) -> np.ndarray:
     return kin.link_frames(robot, q)[:, :3, 3]
 
 
+@pytest.mark.full
 def test_random_never_takes_the_arm_out_of_the_picture(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -437,6 +445,7 @@ def test_random_never_takes_the_arm_out_of_the_picture(port: int) -> None:
         assert np.allclose(np.cross(*out), 0.0, atol=1e-2), "the direction stays"
 
 
+@pytest.mark.full
 def test_standard_views_and_fit_arm(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -467,6 +476,7 @@ def test_standard_views_and_fit_arm(port: int) -> None:
         tab.wait(lambda: np.allclose(shown(tab), default(PIONEER, DESKTOP)))
 
 
+@pytest.mark.full
 def test_fit_shows_arm_program_and_obstacles_but_nothing_far_away(port: int) -> None:
     ball = kin.Obstacle("sphere", (0.0, 1.2, 0.2), radius=0.2, name="ball")
     lost = kin.Obstacle("sphere", (0.0, 0.0, 500.0), radius=0.2, name="lost")
@@ -495,6 +505,7 @@ def test_fit_shows_arm_program_and_obstacles_but_nothing_far_away(port: int) -> 
         assert np.linalg.norm(shown(tab)[0] - shown(tab)[1]) < closer
 
 
+@pytest.mark.full
 def test_fit_shows_the_workspace_cloud(port: int) -> None:
     cloud = {"drawn": True, "n": 20_000, "strategy": "uniform", "axis": "y", "at": 0.0}
     state = PageState(PIONEER.id, camera=ASIDE, features={"workspace": cloud})
@@ -511,6 +522,7 @@ def test_fit_shows_the_workspace_cloud(port: int) -> None:
         assert viewpoints.contains(shown(tab), DESKTOP, points, 0.0)
 
 
+@pytest.mark.full
 def test_the_camera_returns_from_below_the_floor_and_from_far_aside(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()

@@ -204,6 +204,7 @@ def target_after_a_slider(tab: FakeBrowser, page: VisitorPage) -> None:
     tab.release()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("acts", "joint"), [(slider_after_home, 50), (slider_after_a_repeat, 20), (target_after_a_slider, None)]
 )
@@ -222,6 +223,7 @@ def test_what_crosses_an_earlier_answer_on_the_way_is_shown(
             assert page.arm.q[1] == pytest.approx(math.radians(joint))
 
 
+@pytest.mark.full
 def test_an_arm_angle_moved_right_after_home_is_shown(server: tuple[ViewerServer, int]) -> None:
     viewer, port = server
     arm, psi = STORE.get("iiwa14"), "Arm angle ψ"

@@ -90,6 +90,7 @@ def events() -> set[str]:
     return found - {"message"}
 
 
+@pytest.mark.full
 def test_every_event_that_is_posted_has_a_rule_and_every_rule_an_event() -> None:
     assert events() == set(RULES)
 

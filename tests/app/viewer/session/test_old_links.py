@@ -222,6 +222,7 @@ def test_there_is_a_link_for_every_lesson_and_tab() -> None:
     assert {"workspace", "program", "the page"} <= set(RECORDED)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("case", RECORDED)
 def test_a_recorded_link_restores_what_it_did(port: int, case: str) -> None:
     recorded = RECORDED[case]

@@ -363,6 +363,7 @@ def test_a_robot_that_a_program_sends_waits_for_its_kernels(port, preparation, l
         assert [letter for letter in line.letters() if letter.preparing is None] == [Letter(1)]
 
 
+@pytest.mark.full
 def test_a_program_that_shows_another_arm_waits_until_it_is_compiled(preparation, lines, monkeypatch):
     monkeypatch.setattr(live_line, "PREPARING", 0.1)
     monkeypatch.setattr(client_page, "TIMEOUT", 0.5)

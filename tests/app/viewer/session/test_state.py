@@ -429,6 +429,7 @@ def kept(tab: FakeBrowser) -> PageState:
     return decode(tab.stored(), ROBOTS)
 
 
+@pytest.mark.full
 def test_a_link_and_a_reconnection_restore_the_view(port):
     q = PUMA.random_q(np.random.default_rng(8))
     far = kin.fk(PUMA, q)
@@ -476,6 +477,7 @@ def test_the_first_frame_shows_the_arm_as_in_the_link(port):
         assert not [m for m in tab.log if m["type"] == "SetOrientationMessage" and "ease" in m]
 
 
+@pytest.mark.full
 def test_the_state_is_stored_after_a_drag_and_not_during_it(port):
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -516,6 +518,7 @@ def test_a_hostile_stored_state_gives_a_fresh_page_that_says_so(port, memory, no
         assert notice in tab.html
 
 
+@pytest.mark.full
 @settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
 @given(hostile_states())
 @example(packed({"v": 1, "robot": "\ud800"}))
@@ -530,6 +533,7 @@ def test_a_hostile_state_reaches_its_page(port, caplog, text):
     assert "Traceback" not in caplog.text
 
 
+@pytest.mark.full
 def test_a_page_that_is_too_long_for_its_address_says_so(port):
     with FakeBrowser(port, memory=remembering(encode(PageState("ur5")))) as tab:
         tab.settle()
@@ -560,6 +564,7 @@ def options(tab: FakeBrowser) -> tuple[str, ...]:
     return tuple(tab.gui[tab.element("Locked")]["props"]["options"])
 
 
+@pytest.mark.full
 def test_locked_joints_are_restored_at_their_values(port):
     q = PUMA.random_q(np.random.default_rng(4))
     state = PageState("puma560", q, locks=(1,), features={"counter": {"count": 2}})

@@ -41,6 +41,7 @@ def red(tab: FakeBrowser) -> set[str]:
     }
 
 
+@pytest.mark.full
 def test_links_that_touch_are_red_and_named(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose("UR5")
@@ -69,6 +70,7 @@ def test_links_that_touch_are_red_and_named(port: int) -> None:
         assert not red(tab)
 
 
+@pytest.mark.full
 def test_dragging_avoids_self_collision_on_request(port: int) -> None:
     q = UR5.q_home.copy()
     q[2] = np.radians(FOLDED)

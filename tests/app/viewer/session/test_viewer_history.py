@@ -77,6 +77,7 @@ def test_a_step_that_changed_nothing_is_skipped() -> None:
     assert step.label == "first"
 
 
+@pytest.mark.full
 def test_joints_target_and_locks_are_undone_and_redone(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -107,6 +108,7 @@ def test_joints_target_and_locks_are_undone_and_redone(port: int) -> None:
         assert tab.script["redo"] == "", "a new step cannot be followed by an old one"
 
 
+@pytest.mark.full
 def test_a_drag_is_one_step_however_long_it_takes(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(UR5.name)
@@ -129,6 +131,7 @@ def test_a_drag_is_one_step_however_long_it_takes(port: int) -> None:
         shows(tab, UR5, UR5.q_home)
 
 
+@pytest.mark.full
 def test_a_slider_is_one_step_until_it_is_released(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -144,6 +147,7 @@ def test_a_slider_is_one_step_until_it_is_released(port: int) -> None:
         shows(tab, PIONEER, turned())
 
 
+@pytest.mark.full
 def test_an_unreachable_target_comes_back_with_its_reason(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(UR5.name)
@@ -203,6 +207,7 @@ def test_settings_are_undone(port: int) -> None:
             tab.wait(lambda name=name, value=value: tab.value(name) == value)  # type: ignore[misc]
 
 
+@pytest.mark.full
 def test_robots_keep_their_pose_and_a_change_of_robot_is_undone(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -232,6 +237,7 @@ def test_robots_keep_their_pose_and_a_change_of_robot_is_undone(port: int) -> No
         assert locked == lock_buttons([i == 2 for i in range(6)])
 
 
+@pytest.mark.full
 def test_the_browser_goes_back_and_forward_through_the_same_steps(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -273,6 +279,7 @@ def test_a_return_and_a_viewpoint_are_stored_as_what_they_are(port: int) -> None
         assert math.isclose(tab.value(BASE), 90)
 
 
+@pytest.mark.full
 def test_a_step_that_goes_on_after_a_rest_replaces_its_entry(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -288,6 +295,7 @@ def test_a_step_that_goes_on_after_a_rest_replaces_its_entry(port: int) -> None:
         tab.wait(lambda: tab.value(BASE) == 90)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "text", ["", "x", "[", "[[1]]", '[["a", "undo", null]]', "[" * 5000, '[[1, "none such", 0]]']
 )

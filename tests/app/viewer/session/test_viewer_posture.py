@@ -32,6 +32,7 @@ def branch_shown(tab: FakeBrowser) -> str:
     return re.findall(r'data-branch="([^"]*)"', tab.html)[-1]
 
 
+@pytest.mark.full
 def test_every_branch_can_be_chosen_and_the_tool_stays(port: int) -> None:
     T = kin.fk(SRS, SRS.q_home)
     with FakeBrowser(port) as tab:
@@ -51,6 +52,7 @@ def test_every_branch_can_be_chosen_and_the_tool_stays(port: int) -> None:
         assert min(gaps) > 0.1, "eight branches are eight postures"
 
 
+@pytest.mark.full
 def test_a_chosen_branch_is_kept_while_dragging_and_left_by_hand(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(SRS.name)
@@ -71,6 +73,7 @@ def test_a_chosen_branch_is_kept_while_dragging_and_left_by_hand(port: int) -> N
         assert tab.value("Posture") == "Closest"
 
 
+@pytest.mark.full
 def test_a_posture_that_is_not_possible_here_is_explained_and_nothing_moves(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -122,6 +125,7 @@ def test_a_value_outside_the_feasible_range_is_refused_by_name(port: int) -> Non
         tab.wait(lambda: tab.value("Arm angle ψ") == pytest.approx(high, abs=0.06))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("robot", [SRS, PRINTED], ids=lambda robot: robot.id)
 def test_the_free_slider_moves_the_arm_and_not_the_tool(port: int, robot: kin.Robot) -> None:
     T = kin.fk(robot, robot.q_home)
@@ -140,6 +144,7 @@ def test_the_free_slider_moves_the_arm_and_not_the_tool(port: int, robot: kin.Ro
         assert np.allclose(kin.fk(robot, q_of(tab, robot)), T, atol=5e-4)
 
 
+@pytest.mark.full
 def test_beyond_the_feasible_range_the_arm_stops_at_its_end_and_says_which_joint(port: int) -> None:
     T = kin.fk(SRS, SRS.q_home)
     with FakeBrowser(port) as tab:

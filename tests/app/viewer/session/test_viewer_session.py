@@ -92,6 +92,7 @@ def test_a_slider_is_eased_and_ends_exactly(port: int) -> None:
         assert turns[-1] == pytest.approx([math.cos(math.pi / 2), 0, 0, 1], abs=1e-12)
 
 
+@pytest.mark.full
 def test_two_visitors_do_not_disturb_each_other(port: int) -> None:
     with FakeBrowser(port) as one, FakeBrowser(port) as two:
         one.settle()
@@ -126,6 +127,7 @@ def test_sixty_fast_drags_end_at_the_last_target(port: int) -> None:
         assert 'data-status="reached"' in tab.html
 
 
+@pytest.mark.full
 def test_the_gizmo_is_never_moved_while_held_nor_away_from_an_unreachable_target(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(SRS.name)
@@ -195,6 +197,7 @@ def test_an_open_lesson_is_kept_for_the_next_page_of_the_browser(port: int) -> N
         assert tab.left_off == tab.kept[-1:]
 
 
+@pytest.mark.full
 def test_home_random_and_units(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -217,6 +220,7 @@ def test_home_random_and_units(port: int) -> None:
         arrives(tab, kin.fk(PIONEER, PIONEER.q_home), 1e-9)
 
 
+@pytest.mark.full
 def test_random_keeps_locked_joints_and_clear_of_the_pedestal(port: int) -> None:
     """Six of ten configurations of the Pioneer are not clear."""
     with FakeBrowser(port) as tab:
@@ -235,6 +239,7 @@ def test_random_keeps_locked_joints_and_clear_of_the_pedestal(port: int) -> None
         assert len(poses) == 4
 
 
+@pytest.mark.full
 def test_every_robot_can_be_chosen_and_left_again(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -268,6 +273,7 @@ HOSTILE = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("name", "act"), HOSTILE, ids=[name for name, _ in HOSTILE])
 def test_hostile_values_are_shown_as_errors_and_the_session_lives(
     port: int, name: str, act: object, caplog: pytest.LogCaptureFixture
@@ -286,6 +292,7 @@ def test_hostile_values_are_shown_as_errors_and_the_session_lives(
         assert tab.value("Robot") == PIONEER.name
 
 
+@pytest.mark.full
 def test_an_arm_is_shown_as_body_skeleton_or_both(port: int) -> None:
     def seen(tab: FakeBrowser, name: str) -> set[bool]:
         return {tab.visible.get(node, True) for node in tab.nodes if node.split("/")[-1].startswith(name)}
@@ -302,6 +309,7 @@ def test_an_arm_is_shown_as_body_skeleton_or_both(port: int) -> None:
         tab.wait(lambda: tab.value("Show arm as") == "Body")
 
 
+@pytest.mark.full
 def test_values_beyond_a_stop_end_at_the_stop(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -313,6 +321,7 @@ def test_values_beyond_a_stop_end_at_the_stop(port: int) -> None:
         assert tab.value("2 rotating elbow") == 150
 
 
+@pytest.mark.full
 def test_a_target_at_the_end_of_the_world_is_only_out_of_reach(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -320,6 +329,7 @@ def test_a_target_at_the_end_of_the_world_is_only_out_of_reach(port: int) -> Non
         tab.wait(lambda: 'data-status="unreachable"' in tab.html)
 
 
+@pytest.mark.full
 def test_an_idle_visitor_costs_no_processor_time(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -328,6 +338,7 @@ def test_an_idle_visitor_costs_no_processor_time(port: int) -> None:
         assert time.process_time() - before < 0.1
 
 
+@pytest.mark.full
 def test_fifty_visits_leave_no_thread(viewer: tuple[ViewerServer, int]) -> None:
     server, port = viewer
     with FakeBrowser(port) as tab:  # whatever starts with the first visit has started

@@ -233,6 +233,7 @@ def test_a_target_that_is_jogged_out_of_reach_waits_beside_the_tool(port: int) -
         tab.wait(lambda: tab.tool_pose()[2, 3] < highest - 0.009)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "value",
     [
@@ -255,6 +256,7 @@ def test_a_jog_that_no_button_sends_changes_nothing(port: int, value: object) ->
         arrives(tab, T)
 
 
+@pytest.mark.full
 def test_a_gizmo_along_the_base_turns_the_target_about_the_base(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(UR5.name)
@@ -279,6 +281,7 @@ def test_a_gizmo_along_the_base_turns_the_target_about_the_base(port: int) -> No
         assert np.allclose(tab.gizmo_pose()[:3, :3], np.eye(3), atol=1e-12), "for every robot"
 
 
+@pytest.mark.full
 def test_with_shift_the_gizmo_moves_in_steps(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(UR5.name)

@@ -56,6 +56,7 @@ class Visitor:
         return self.again
 
 
+@pytest.mark.full
 def test_a_call_is_one_step_and_calls_before_it_are_one(threads):
     visitor, blocks = Visitor(threads), Visitor(threads, 0.01)
     blocks.turn.call()
@@ -113,6 +114,7 @@ def test_a_visitor_is_called_again_when_it_asked_for_it_and_earlier_if_something
     wait_for(lambda: visitor.steps == 5)
 
 
+@pytest.mark.full
 def test_a_step_that_blocks_holds_up_nobody_else(threads):
     blocks, others = Visitor(threads, LONG), [Visitor(threads) for _ in range(5)]
     blocks.turn.call()
@@ -388,6 +390,7 @@ def test_what_is_waited_for_before_a_page_is_built_fails_that_page_alone(caplog)
     assert "no answer" in caplog.text
 
 
+@pytest.mark.full
 def test_the_event_loop_is_woken_once_for_the_steps_of_a_row(threads):
     woken: list[int] = []
     done: list[int] = []
@@ -420,6 +423,7 @@ def test_another_thread_than_the_leader_wakes_it_at_once(threads):
     assert woken == [threading.current_thread().name]
 
 
+@pytest.mark.full
 def test_what_a_step_leaves_is_done_by_the_thread_that_takes_over(threads):
     woken: list[float] = []
     first, long = Visitor(threads), Visitor(threads, LONG)

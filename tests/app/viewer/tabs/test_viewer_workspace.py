@@ -470,6 +470,7 @@ def test_a_slow_page_is_not_flooded(tab):
     tab.click("Clear")
 
 
+@pytest.mark.full
 def test_a_dragged_arm_and_a_growing_cloud_share_the_connection(tab):
     n = 8 * SAMPLED
     home = kin.fk(PIONEER, PIONEER.q_home)
@@ -492,6 +493,7 @@ def test_a_dragged_arm_and_a_growing_cloud_share_the_connection(tab):
     assert len(moved) > 3
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("label", "by"), [("Height", "height"), ("Manipulability", "manipulability"), ("Limit margin", "limit_margin")]
 )
@@ -520,6 +522,7 @@ def test_measures_are_computed_only_for_their_colours(tab, monkeypatch):
     assert {c.measures for c in asked} == {(), ("manipulability",)}
 
 
+@pytest.mark.full
 def test_a_cut_hides_points_without_sending_any(tab):
     tab.draw(N, seed=15)
     points = tab.points()
@@ -548,6 +551,7 @@ def test_a_cut_hides_points_without_sending_any(tab):
     assert np.array_equal(tab.points(only_visible=True), points)
 
 
+@pytest.mark.full
 def test_the_tab_follows_the_unit_of_length_and_keeps_its_state():
     server = ViewerServer(STORE, Settings(), Clouds())
     with serve_viewer(server) as port, Visitor(port) as tab:
@@ -618,6 +622,7 @@ def ray_to(point: np.ndarray, eye: np.ndarray) -> dict:
     }
 
 
+@pytest.mark.full
 def test_a_click_moves_the_arm_to_the_configuration_of_the_point(tab):
     tab.draw(N, seed=17)
     tab.wait(lambda: tab.sent("ScenePointerEnableMessage") == 1)
@@ -814,6 +819,7 @@ def test_a_failing_part_is_reported_pauses_the_cloud_and_can_be_retried(tab, mon
     assert np.abs(tab.points() - whole(PIONEER, N, 21).points).max() < HALF
 
 
+@pytest.mark.full
 def test_section_and_sizes_appear_when_they_are_ready(tab):
     robot = STORE.get("scara")  # the fastest to compute
     tab.set("Robot", robot.name)

@@ -96,6 +96,7 @@ def texts(page: BarePage) -> str:
     return " ".join(str(part) for part in (page.panel(), page.scene()))
 
 
+@pytest.mark.full
 def test_what_a_joint_makes_of_its_row_is_withheld_while_it_is_asked(page: BarePage) -> None:
     lesson = page.feature
     assert isinstance(lesson, DHLesson)

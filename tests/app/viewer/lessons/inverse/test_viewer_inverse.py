@@ -448,6 +448,7 @@ def followed(tab: FakeBrowser) -> str:
     return re.search(r'data-derivation="([^"]*)"', tab.html).group(1)  # type: ignore[union-attr]
 
 
+@pytest.mark.full
 def test_a_typed_way_is_followed_to_its_posture(port: int) -> None:
     arm = of(ABB)
     given = exercise(arm, example(arm))

@@ -366,6 +366,7 @@ def server() -> Iterator[int]:
         yield port
 
 
+@pytest.mark.full
 def test_a_visitor_watches_an_iteration(server: int) -> None:
     with FakeBrowser(server) as tab:
         tab.settle()

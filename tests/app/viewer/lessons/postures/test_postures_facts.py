@@ -89,6 +89,7 @@ def test_hidden_ghosts_are_left_out_and_all_of_them_if_there_are_to_be_none(robo
     assert facts(robot, 1, ghosts=False).seen == set()
 
 
+@pytest.mark.full
 def test_the_cone_has_the_directions_of_which_some_configuration_within_the_limits_is_found() -> None:
     robot = STORE.get("pioneer5")
     rng = np.random.default_rng(6)
@@ -150,6 +151,7 @@ def test_a_target_that_is_missed_is_explained_and_its_remedies_go_with_it() -> N
 FRAMES = {"ur5": 20.0, "pioneer5": 13.3, "planar2r": 1.0, "scara": 3.2}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", FRAMES)
 def test_a_new_list_takes_no_more_messages_than_before(name: str) -> None:
     robot = STORE.get(name)

@@ -324,6 +324,7 @@ def test_ghosts_can_be_hidden_one_by_one_and_all_together(tab: FakeBrowser) -> N
     assert shown(tab) == before
 
 
+@pytest.mark.full
 def test_the_list_follows_the_target_and_is_not_sent_again_unchanged(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     T = home(PUMA)
@@ -341,6 +342,7 @@ def test_the_list_follows_the_target_and_is_not_sent_again_unchanged(tab: FakeBr
     assert not tab.log
 
 
+@pytest.mark.full
 def test_a_missed_target_is_explained_and_one_click_moves_it(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     T = home(PUMA)
@@ -356,6 +358,7 @@ def test_a_missed_target_is_explained_and_one_click_moves_it(tab: FakeBrowser) -
     assert "Nearest reachable pose" not in [m["props"].get("label") for m in tab.gui.values()]
 
 
+@pytest.mark.full
 def test_one_click_reduces_the_task_and_one_unlocks(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     tab.set("Locked", "1")
@@ -377,6 +380,7 @@ def test_one_click_reduces_the_task_and_one_unlocks(tab: FakeBrowser) -> None:
     assert 'data-status="reached"' in tab.html
 
 
+@pytest.mark.full
 def test_one_click_allows_any_posture(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     chosen = kin.branch_of(PUMA, PUMA.q_home)

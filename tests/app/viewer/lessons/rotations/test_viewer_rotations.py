@@ -282,6 +282,7 @@ def turned(tab: FakeBrowser) -> np.ndarray:
     return pose_from_position_wxyz((0, 0, 0), tab.poses[name]["wxyz"])[:3, :3]
 
 
+@pytest.mark.full
 def test_a_visitor_turns_a_frame_and_builds_a_chain(server: int) -> None:
     robot = ROBOTS[0]
     with FakeBrowser(server) as tab:

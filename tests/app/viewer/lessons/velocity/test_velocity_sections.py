@@ -204,6 +204,7 @@ def run_a_self_motion(tab: FakeBrowser, panda: kin.Robot, ended: Callable[[Array
     assert measure(panda, shown_q(tab, panda), "pose", 6) > before
 
 
+@pytest.mark.full
 def test_the_self_motion_runs_with_the_tool_held(server: int) -> None:
     panda = STORE.get("panda")
     with FakeBrowser(server) as tab:

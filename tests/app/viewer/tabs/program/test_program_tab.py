@@ -96,6 +96,7 @@ def record(tab: FakeBrowser, *degrees: float) -> None:
         press(tab, "record")
 
 
+@pytest.mark.full
 def test_recorded_poses_are_played(tab: FakeBrowser) -> None:
     record(tab, 20, 50)
     assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
@@ -114,6 +115,7 @@ def test_recorded_poses_are_played(tab: FakeBrowser) -> None:
     assert tab.script["undo"] == "Time of the program"
 
 
+@pytest.mark.full
 def test_the_link_has_the_end_of_a_program_that_was_played(tab: FakeBrowser) -> None:
     record(tab, 10, 170)
     tab.set(TURN, 100)
@@ -131,6 +133,7 @@ def test_the_link_has_the_end_of_a_program_that_was_played(tab: FakeBrowser) -> 
     tab.wait(lambda: np.allclose(kept(), turned(170), atol=1e-6))
 
 
+@pytest.mark.full
 def test_moving_the_arm_ends_playing(tab: FakeBrowser) -> None:
     record(tab, 10, 170)
     press(tab, "loop", value=True)
@@ -141,6 +144,7 @@ def test_moving_the_arm_ends_playing(tab: FakeBrowser) -> None:
     shows(tab, PIONEER, turned(35))
 
 
+@pytest.mark.full
 def test_every_change_can_be_undone(tab: FakeBrowser) -> None:
     record(tab, 20, 50)
     press(tab, "field", 1, value=["name", "<b>above</b>"])
@@ -167,6 +171,7 @@ def programs(link: str) -> dict[str, object]:
     return decode(link, STORE.robots).features.get("program", {}).get("programs", {})  # type: ignore[return-value]
 
 
+@pytest.mark.full
 def test_a_program_lives_in_the_link_one_for_each_robot(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -191,6 +196,7 @@ def type_limit(tab: FakeBrowser, text: str) -> None:
     tab.wait(lambda: tab.script["reply"][0] >= number)
 
 
+@pytest.mark.full
 def test_an_arm_of_ones_own_has_a_program_and_a_refusal_is_at_its_waypoint(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -208,6 +214,7 @@ def test_an_arm_of_ones_own_has_a_program_and_a_refusal_is_at_its_waypoint(port:
         tab.wait(lambda: "kb-fault" not in part(tab, "list"))
 
 
+@pytest.mark.full
 def test_a_locked_joint_keeps_its_value(port: int) -> None:
     with FakeBrowser(port) as tab:
         record(tab, 20, 50)
@@ -223,6 +230,7 @@ def test_a_locked_joint_keeps_its_value(port: int) -> None:
         assert np.allclose(tab.tool_pose(), before)
 
 
+@pytest.mark.full
 def test_a_line_that_cannot_be_driven_says_what_would_help(tab: FakeBrowser) -> None:
     record(tab, 10, 170)
     press(tab, "field", 1, value=["kind", "lin"])
@@ -269,6 +277,7 @@ def ur5(page: FakeBrowser) -> Iterator[FakeBrowser]:
     press(page, "clear")
 
 
+@pytest.mark.full
 def test_a_line_that_arrives_otherwise_shows_its_true_values_and_each_remedy_holds(ur5: FakeBrowser) -> None:
     line_of_the_ur5(ur5)
     assert part(ur5, "list").count(OTHER) == 1
@@ -300,6 +309,7 @@ def test_a_line_that_arrives_otherwise_shows_its_true_values_and_each_remedy_hol
     assert np.allclose(recorded(ur5, 1), after, atol=1e-6)
 
 
+@pytest.mark.full
 def test_a_program_that_cannot_be_driven_keeps_what_can_and_says_where_it_ends(ur5: FakeBrowser) -> None:
     line_of_the_ur5(ur5, "ptp q = [180, -110, 110, -90, -90, 0]", "lin q = [0, -110, 110, -90, -90, 0]")
     assert "The program ends on the way to 4 of 4" in ur5.html
@@ -323,6 +333,7 @@ def test_a_program_that_cannot_be_driven_keeps_what_can_and_says_where_it_ends(u
     ur5.wait(lambda: "cannot be driven to its end" not in ur5.html)
 
 
+@pytest.mark.full
 def test_a_file_is_opened_and_one_that_does_not_fit_is_refused(tab: FakeBrowser) -> None:
     text = "units = { angle = 'deg' }\n" + "[[segments]]\nkind = 'ptp'\nq = [90, 30, 60, 30, 30]\n" * 2
     press(tab, "upload", value=["two.toml", text])
@@ -340,6 +351,7 @@ def test_a_file_is_opened_and_one_that_does_not_fit_is_refused(tab: FakeBrowser)
 HERE = "[[segments]]\nkind = 'ptp'\nq = [0.5, 0.6, 0.7, 0.5, 0.5]\n"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -374,6 +386,7 @@ def test_a_file_that_cannot_be_driven_or_held_is_named_and_nothing_is_lost(
     assert clock(tab)["duration"] == "0.000"
 
 
+@pytest.mark.full
 def test_postures_on_the_way_are_shown_and_a_click_starts_there(ur5: FakeBrowser) -> None:
     line_of_the_ur5(ur5)
     before, _ = recorded(ur5, 0), recorded(ur5, 1)
@@ -402,6 +415,7 @@ def test_postures_on_the_way_are_shown_and_a_click_starts_there(ur5: FakeBrowser
     assert part(ur5, "postures") == ""
 
 
+@pytest.mark.full
 def test_a_motion_over_time_is_saved_in_each_format(ur5: FakeBrowser) -> None:
     line_of_the_ur5(ur5)
     for name, title in MOTIONS.items():

@@ -127,6 +127,7 @@ def test_none_found_in_time_is_not_called_none_and_loses_nothing(blocked: FakeBr
     assert part(blocked, "way") == ""
 
 
+@pytest.mark.full
 def test_a_search_shows_its_progress_and_is_cancelled(blocked: FakeBrowser) -> None:
     press(blocked, "way", 1)
     press(blocked, "way-seconds", value=f"{DURATION:g}")
@@ -213,6 +214,7 @@ def test_units_that_are_changed_while_a_search_goes_on_neither_end_it_nor_lose_a
         assert f'value="{goal[0]:.5f}"' in part(tab, "list"), "joint values in radians"
 
 
+@pytest.mark.full
 def test_units_that_are_changed_while_a_form_is_open_leave_what_was_typed(blocked: FakeBrowser) -> None:
     press(blocked, "way", 1)
     press(blocked, "way-seconds", value=f"{DURATION:g}")

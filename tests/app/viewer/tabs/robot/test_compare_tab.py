@@ -80,6 +80,7 @@ def open_arm(tab: FakeBrowser, robot: str) -> None:
     tab.settle()
 
 
+@pytest.mark.full
 def test_a_mistake_is_named_and_one_click_mends_it_in_one_step(port: int) -> None:
     with FakeBrowser(port) as tab:
         open_arm(tab, "ur5")
@@ -105,6 +106,7 @@ def test_a_mistake_is_named_and_one_click_mends_it_in_one_step(port: int) -> Non
         assert ghosts(tab) == []
 
 
+@pytest.mark.full
 def test_a_proposal_for_another_table_is_not_used(port: int) -> None:
     with FakeBrowser(port) as tab:
         open_arm(tab, "ur5")
@@ -116,6 +118,7 @@ def test_a_proposal_for_another_table_is_not_used(port: int) -> None:
             assert tab.value("Robot") == UR5.name
 
 
+@pytest.mark.full
 def test_a_pasted_table_is_compared_and_kept_in_the_link(port: int) -> None:
     with FakeBrowser(port) as tab:
         open_arm(tab, "panda")
@@ -132,6 +135,7 @@ def test_a_pasted_table_is_compared_and_kept_in_the_link(port: int) -> None:
         assert "The other arm is the typed table" in part(tab, "compared")
 
 
+@pytest.mark.full
 def test_frames_that_may_differ_are_a_choice(port: int) -> None:
     with FakeBrowser(port) as tab:
         open_arm(tab, "ur5")
@@ -147,6 +151,7 @@ def test_frames_that_may_differ_are_a_choice(port: int) -> None:
         assert saved(tab)["frames"] == "free"
 
 
+@pytest.mark.full
 def test_what_cannot_be_read_names_row_and_column(port: int) -> None:
     with FakeBrowser(port) as tab:
         open_arm(tab, "ur5")
@@ -155,6 +160,7 @@ def test_what_cannot_be_read_names_row_and_column(port: int) -> None:
         assert part(tab, "compared") == ""
 
 
+@pytest.mark.full
 def test_the_joint_slider_walks_along_both_arms(port: int) -> None:
     with FakeBrowser(port) as tab:
         open_arm(tab, "panda")
@@ -171,6 +177,7 @@ def test_the_joint_slider_walks_along_both_arms(port: int) -> None:
         )
 
 
+@pytest.mark.full
 def test_the_search_can_be_cancelled_and_the_verdict_stays(port: int) -> None:
     with FakeBrowser(port) as tab:
         open_arm(tab, "panda")

@@ -33,6 +33,7 @@ def upload(tab: FakeBrowser, text: str, name: str = "two.urdf") -> None:
     say(tab, "upload", value=[name, True, True, text])
 
 
+@pytest.mark.full
 def test_an_import_has_a_report_and_the_mended_file_is_saved_and_opened(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -51,6 +52,7 @@ def test_an_import_has_a_report_and_the_mended_file_is_saved_and_opened(port: in
         tab.wait(lambda: 'data-arm="doctor"' not in tab.html)
 
 
+@pytest.mark.full
 def test_each_finding_can_be_mended_by_itself(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -73,6 +75,7 @@ def test_each_finding_can_be_mended_by_itself(port: int) -> None:
         tab.wait(lambda: "Nothing is wrong or suspicious." in report(tab))
 
 
+@pytest.mark.full
 def test_all_and_none_are_one_press_and_what_cannot_be_mended_is_refused(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -116,6 +119,7 @@ def test_what_is_no_xml_has_a_line(port: int) -> None:
         tab.wait(lambda: 'data-arm="doctor"' not in tab.html)
 
 
+@pytest.mark.full
 def test_the_meshes_of_a_zip_are_looked_at(port: int) -> None:
     files = robot_files()
     meshes = [name for name in files if not name.endswith(".urdf")]
@@ -128,6 +132,7 @@ def test_the_meshes_of_a_zip_are_looked_at(port: int) -> None:
         tab.wait(lambda: "Nothing is wrong or suspicious." in report(tab))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("value", ["steal", "", None, 7, ["save"]])
 def test_what_the_buttons_do_not_send_changes_nothing(port: int, value: object) -> None:
     with FakeBrowser(port) as tab:

@@ -115,6 +115,7 @@ def table(tab: FakeBrowser) -> list[list[str]]:
     return [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in rows]
 
 
+@pytest.mark.full
 def test_fields_change_one_motor_and_undo_takes_it_back(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -151,6 +152,7 @@ def test_fields_change_one_motor_and_undo_takes_it_back(port: int) -> None:
         assert motors_of(tab)[1].range is None
 
 
+@pytest.mark.full
 def test_a_calibration_is_opened_as_a_file(port: int) -> None:
     entry = {"drive_mode": 0, "homing_offset": 5, "range_min": 700, "range_max": 3300}
     text = json.dumps({motor.name: {"id": motor.id, **entry} for motor in SO101.motors})
@@ -181,6 +183,7 @@ def test_a_calibration_is_opened_as_a_file(port: int) -> None:
         assert decode(tab.stored(), tuple(ROBOTS.values())).own is None
 
 
+@pytest.mark.full
 def test_match_motors_shows_poses_and_writes_what_it_finds(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()

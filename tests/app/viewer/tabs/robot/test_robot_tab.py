@@ -92,6 +92,7 @@ def longer(robot: kin.Robot, row: int, a: float) -> kin.Robot:
     return kin.robot_from_dict(data)
 
 
+@pytest.mark.full
 def test_a_typed_cell_changes_the_arm_and_undo_takes_it_back(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -153,6 +154,7 @@ def test_no_arm_is_offered_twice_to_start_from(port: int) -> None:
         assert '<option value="planar-2r" selected>' in part(tab, "start"), "a link of before still has its name"
 
 
+@pytest.mark.full
 def test_undo_forgets_the_only_expression_that_was_typed(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -176,6 +178,7 @@ def test_each_choice_is_a_step_and_typing_is_one(port: int) -> None:
         assert tab.value("Robot") == PIONEER.name
 
 
+@pytest.mark.full
 def test_slow_typing_is_one_step_until_the_cell_is_left(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -273,6 +276,7 @@ def test_rows_examples_convention_and_reset(port: int) -> None:
         assert tab.value("Robot") == UR5.name
 
 
+@pytest.mark.full
 def test_the_link_restores_the_arm(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -360,6 +364,7 @@ UNEXPECTED: list[tuple[list[object], object]] = [
 ]
 
 
+@pytest.mark.full
 def test_messages_that_the_page_does_not_send_change_nothing(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -383,6 +388,7 @@ def test_units_of_the_page_are_those_of_the_table(port: int) -> None:
         shows(tab, longer(PIONEER, 1, 0.25), PIONEER.q_home)
 
 
+@pytest.mark.full
 def test_every_lesson_follows_an_arm_that_changes(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -404,6 +410,7 @@ def test_an_arm_of_one_posture_is_not_said_to_have_up_to_one() -> None:
     assert "up to 8 postures" in said["ur5"]
 
 
+@pytest.mark.full
 def test_the_same_arm_in_the_other_convention(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -471,6 +478,7 @@ def test_a_target_out_of_reach_waits_for_a_longer_arm(port: int) -> None:
         tab.wait(lambda: np.allclose(tab.tool_pose()[:3, 3], [1.75, 0.0, 0.0], atol=1e-6))
 
 
+@pytest.mark.full
 def test_the_own_arm_keeps_its_pose_while_another_robot_is_on_show(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -512,6 +520,7 @@ def test_the_origin_that_a_link_names_may_be_unknown(port: int, start: object, w
         assert tab.value("Robot").startswith("My arm")
 
 
+@pytest.mark.full
 def test_reset_goes_back_to_the_file_that_the_arm_came_from(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -568,6 +577,7 @@ def test_long_texts_and_empty_parts_are_not_kept(port: int) -> None:
         assert "Invalid input" in tab.html
 
 
+@pytest.mark.full
 def test_the_status_says_what_a_change_has_put_back_or_replaced(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -593,6 +603,7 @@ def test_the_status_says_what_a_change_has_put_back_or_replaced(port: int) -> No
         assert len(re.findall("data-row=", part(tab, "table"))) == len(PIONEER.rows) + 1
 
 
+@pytest.mark.full
 def test_expressions_stay_in_their_cells_and_in_the_link(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()

@@ -52,6 +52,7 @@ def meshes(tab: FakeBrowser) -> set[str]:
 ALL = {"mesh-0-0", "mesh-0-1", "mesh-0-2", "mesh-1-2", "mesh-2-2"}
 
 
+@pytest.mark.full
 def test_a_zip_shows_the_real_arm_and_undo_brings_back_what_it_replaced(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -90,6 +91,7 @@ def kept_arm(tab: FakeBrowser) -> kin.Robot:
     return own.robot
 
 
+@pytest.mark.full
 def test_a_zip_gives_the_arm_the_capsules_of_its_collision_bodies(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -115,6 +117,7 @@ def test_a_zip_gives_the_arm_the_capsules_of_its_collision_bodies(port: int) -> 
         tab.wait(lambda: kept_arm(tab).capsules == robot.capsules)
 
 
+@pytest.mark.full
 def test_a_urdf_alone_says_which_bodies_are_assumed(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -171,6 +174,7 @@ BAD_MESHES = {
 }
 
 
+@pytest.mark.full
 def test_a_bad_zip_changes_nothing_and_bad_meshes_leave_a_skeleton(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -212,6 +216,7 @@ TOO_LARGE = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", TOO_LARGE)
 def test_a_mesh_that_is_too_large_refuses_the_file_and_the_arm_on_show_stays(port: int, name: str) -> None:
     data, value, valid = TOO_LARGE[name]
@@ -320,6 +325,7 @@ def test_the_next_zip_and_leaving_end_what_is_being_read(monkeypatch: pytest.Mon
         assert reader.memory.held == 0
 
 
+@pytest.mark.full
 def test_a_real_shape_that_cannot_be_read_is_said_in_the_page() -> None:
     viewer = ViewerServer(Store(), Settings(), Clouds())
     viewer.services.meshes._of_packages._most = 0
@@ -346,6 +352,7 @@ def test_the_shapes_of_a_urdf_need_no_zip(port: int) -> None:
         tab.wait(lambda: meshes(tab) == ALL - {"mesh-2-2"})
 
 
+@pytest.mark.full
 def test_the_own_arm_can_be_deleted_and_examples_say_what_they_replace(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
