@@ -347,6 +347,7 @@ def test_the_site_has_its_figures(site):
         assert kin.get_robot(name).name in figure.read_text(encoding="utf-8")
 
 
+@pytest.mark.full
 def test_the_site_loads_nothing_from_the_internet(site):
     pages = list(site.rglob("*.html"))
     assert len(pages) > len(PAGES) - 1

@@ -95,6 +95,7 @@ def test_several_parameters_of_one_entry_become_one_entry_each():
     )
 
 
+@pytest.mark.full
 def test_a_warning_of_mkdocs_fails_the_build(tmp_path):
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs/index.md").write_text("# Start\n\n[nowhere](gone.md)\n", encoding="utf-8")

@@ -79,6 +79,7 @@ def test_a_summary_that_nobody_waits_for_is_cancelled(live, endless):
     assert endless.cancelled.wait(20)
 
 
+@pytest.mark.full
 def test_summaries_that_wait_for_their_turn_are_cancelled_too(live, endless):
     app, client = live
     with ThreadPoolExecutor(4) as callers:
@@ -88,6 +89,7 @@ def test_summaries_that_wait_for_their_turn_are_cancelled_too(live, endless):
     assert endless.cancelled.wait(20)
 
 
+@pytest.mark.full
 def test_a_client_that_leaves_does_not_cancel_the_summary_for_others(live, endless):
     _, client = live
     with ThreadPoolExecutor(1) as other:
@@ -101,6 +103,7 @@ def test_a_client_that_leaves_does_not_cancel_the_summary_for_others(live, endle
     assert not endless.cancelled.is_set()
 
 
+@pytest.mark.full
 def test_a_summary_that_was_refused_goes_on_for_a_while_and_is_then_cancelled(live, endless):
     app, client = live
     app.state.compute.seconds = 0.3
@@ -110,6 +113,7 @@ def test_a_summary_that_was_refused_goes_on_for_a_while_and_is_then_cancelled(li
     assert endless.cancelled.wait(20)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("work", "targets"),
     [
@@ -134,6 +138,7 @@ def test_a_batch_ends_when_its_client_leaves_and_gives_its_slot_back(live, monke
     assert 0 < len(answered) < 500
 
 
+@pytest.mark.full
 def test_a_client_that_leaves_while_it_waits_for_a_slot_is_forgotten(live, monkeypatch):
     _, client = live
     begun = []

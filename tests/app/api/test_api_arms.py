@@ -81,6 +81,7 @@ def test_neither_takes_another_text_for_an_angle(schema, text):
 PATTERN = _SCHEMA["properties"]["rows"]["items"]["properties"]["theta"]["anyOf"][1]["pattern"]
 
 
+@pytest.mark.full
 @settings(max_examples=40)
 @given(st.from_regex(PATTERN, fullmatch=True))
 @example("-999999.999999999 rad")

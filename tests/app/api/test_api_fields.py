@@ -35,6 +35,7 @@ def ask(client, robot, what, fields=None, **body):
     return response.json()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("robot_id", ["pioneer5", "ur5", "iiwa14", "scara"])
 def test_few_fields_of_many_targets_are_those_of_whole_answers(client, robot_id, form):
@@ -54,6 +55,7 @@ def test_few_fields_of_many_targets_are_those_of_whole_answers(client, robot_id,
     assert {each["status"] for each in quick} > {"solved"}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("given", [{}, {"max_solutions": 1}, {"respect_limits": False, "max_solutions": 3}])
 @pytest.mark.parametrize("robot_id", ["pioneer5", "ur5", "iiwa14"])
 @pytest.mark.parametrize("form", ["matrix", "approach"])

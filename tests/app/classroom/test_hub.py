@@ -705,6 +705,7 @@ def test_storing_leaves_what_is_pending_as_it_is(hubs):
     }
 
 
+@pytest.mark.full
 def test_attempts_are_bounded(hubs, monkeypatch):
     monkeypatch.setattr("app.classroom.rooms.MAX_ATTEMPTS", 2)
     hub, _ = hubs

@@ -616,6 +616,7 @@ def test_odd_claims_are_named(browser, platform, changes, words) -> None:
     assert words in answer.text.replace("&#x27;", "'")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("given_name", [" ", "\u202e\u200b", "x" * 300, "\ufb2c" * 40])
 def test_a_name_that_shows_nothing_or_is_too_long_keeps_nobody_out(browser, platform, given_name) -> None:
     link = {"id": f"odd {len(given_name)}", "title": given_name}

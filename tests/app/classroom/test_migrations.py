@@ -127,6 +127,7 @@ def test_a_class_of_the_first_version_goes_on_after_all_migrations(hub, old) -> 
     goes_on(hub)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("revision", REVISIONS[:-1])
 def test_the_service_migrates_a_class_of_each_earlier_version(hub, old, revision) -> None:
     with old.begin():

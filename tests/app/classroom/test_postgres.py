@@ -65,6 +65,7 @@ def test_a_class_on_two_machines(hubs):
             assert table.name == "setting" or rows == [], table.name
 
 
+@pytest.mark.full
 def test_two_machines_that_write_at_the_same_time_lose_nothing(hubs):
     here, there = hubs
     room = here.rooms.open("Kinematics", 3600)

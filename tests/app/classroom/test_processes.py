@@ -30,6 +30,7 @@ def started(*arguments: object) -> subprocess.Popen[str]:
     return subprocess.Popen(command, env=env, cwd=ROOT, stdout=subprocess.PIPE, text=True)
 
 
+@pytest.mark.full
 def test_a_killed_process_loses_no_confirmed_answer_and_its_seats_come_back(tmp_path):
     hub = Hub(tmp_path)
     room = hub.rooms.open("Kinematics", 3600)

@@ -75,6 +75,7 @@ def test_log_and_metrics_keep_the_secret_of_the_teachers_link(
     assert "/room/teach/a" not in metrics, "a series for each guess would fill the memory"
 
 
+@pytest.mark.full
 def test_wrong_codes_take_no_seats_of_the_class(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limits, "SEATS", 3)
     monkeypatch.setattr(limits, "SLOW", 0.0)

@@ -148,6 +148,7 @@ def test_students_get_none_of_it(school: School) -> None:
     student.leave()
 
 
+@pytest.mark.full
 def test_a_mended_exercise_has_words_while_they_are_the_same(school: School) -> None:
     send(school, "task", own("Befor", "It slides"))
     school.answer()
@@ -157,6 +158,7 @@ def test_a_mended_exercise_has_words_while_they_are_the_same(school: School) -> 
     assert school.row() == ("After", "2"), "it is not known which of them the student has read"
 
 
+@pytest.mark.full
 def test_a_room_of_before_still_opens(school: School) -> None:
     with school.hub.database.write() as connection:
         state = {"task": {"exercise": "my-own", "at": 1.0, "own": own()}, "follow": False}

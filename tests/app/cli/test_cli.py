@@ -874,6 +874,7 @@ def test_move_answers_as_the_core_and_writes_each_format(capsys, tmp_path):
     assert np.allclose(rows[:, 1:8], expected.sample(rows[:, 0]).q, atol=1e-12)
 
 
+@pytest.mark.full
 def test_move_prints_segments_and_peaks_and_draws_a_picture(capsys, tmp_path):
     picture = tmp_path / "motion.svg"
     code, out, _ = run(capsys, "move", "panda", PICK, "--picture", picture)

@@ -30,6 +30,7 @@ def test_ik_says_what_touches(client: TestClient) -> None:
     assert details.get("touching", 0) + details["configurations"] == len(every)
 
 
+@pytest.mark.full
 def test_paths_and_motions_are_checked(client: TestClient) -> None:
     path = client.post("/api/v1/robots/ur5/ik/path", json={"targets": [TARGET], "obstacles": [CRATE]}).json()
     assert path["gaps"][0]["status"] == "collision"

@@ -62,6 +62,7 @@ def test_an_id_that_is_not_known_is_looked_for_at_once(folder: Path) -> None:
     assert there.get("mine") is not None
 
 
+@pytest.mark.full
 def test_it_is_replaced_only_by_who_knows_what_is_there(folder: Path) -> None:
     here, there = Exercises(folder), Exercises(folder)
     first = here.save(text())
@@ -110,6 +111,7 @@ def test_a_link_that_somebody_put_there_is_not_followed(folder: Path, tmp_path: 
     assert not (tmp_path / "elsewhere.toml").exists()
 
 
+@pytest.mark.full
 def test_of_many_who_save_one_id_at_once_one_succeeds(folder: Path) -> None:
     services = [Exercises(folder) for _ in range(8)]
 

@@ -135,6 +135,7 @@ def test_another_arm_comes_with_its_table(page, arm):
     page.wait(lambda: len(page.sliders_in("Joints")) == 2)
 
 
+@pytest.mark.full
 def test_readings_of_motors_show_the_real_arm_and_match_motors_takes_them(page, arm):
     with pytest.raises(kin.InputError, match="an arm with motors"):
         arm.readings = [1.0] * 6

@@ -124,6 +124,7 @@ def test_q_moves_the_arm_and_a_burst_is_one_step_of_undo(page, program):
     assert undo(page) != "Connected program"
 
 
+@pytest.mark.full
 def test_a_target_is_solved_as_if_it_were_dragged_and_its_answer_is_heard(page, program):
     program.send(subscribe={"values": ["q", "target", "result", "contacts"], "rate": 60})
     T = kin.fk(ARM, Q)

@@ -105,6 +105,7 @@ def driven(page, bridge, run, capsys, *words):
     return started
 
 
+@pytest.mark.full
 def test_a_silent_arm_is_not_moved_any_further(page, bridge, run, patient, monkeypatch, capsys):
     started = driven(page, bridge, run, capsys)
     monkeypatch.setattr(driving, "ARM_LOST", 0.5)
@@ -116,6 +117,7 @@ def test_a_silent_arm_is_not_moved_any_further(page, bridge, run, patient, monke
     page.wait(lambda: "ROS 2 arm at ws://127.0.0.1" not in page.html)
 
 
+@pytest.mark.full
 def test_a_page_that_leaves_stops_the_arm(page, bridge, run, patient, capsys):
     started = driven(page, bridge, run, capsys)
     started.end(page)
@@ -128,6 +130,7 @@ def test_a_page_that_leaves_stops_the_arm(page, bridge, run, patient, capsys):
     assert bridge.q[NAMES[0]] == pytest.approx(bridge.received[-1][1]["points"][0]["positions"][0], abs=1e-6)
 
 
+@pytest.mark.full
 def test_an_arm_that_is_held_is_not_pushed(page, bridge, run, patient, capsys):
     started = driven(page, bridge, run, capsys, "--speed", "60")
     bridge.stuck = True

@@ -137,6 +137,7 @@ def test_a_connection_of_another_process_that_cannot_be_taken_is_closed(monkeypa
 # -- requests --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 def test_requests_sent_ahead_are_answered_in_order(service):
     paths = ["livez", "nothing", "livez", "static/landing.css", "livez"]
     requests = b"".join(f"GET /{path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode() for path in paths[:-1])
@@ -166,6 +167,7 @@ def test_requests_sent_ahead_take_no_memory(service):
     assert service.memory() - before < 50e6
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("sent", "status", "kind"),
     [
@@ -547,6 +549,7 @@ def test_one_client_gets_its_share_of_the_connections_and_others_the_rest(servic
     wait_for(lambda: service.answers_after() < 10, 10)
 
 
+@pytest.mark.full
 def test_one_client_gets_its_share_of_the_viewer_and_others_the_rest(service):
     wait_for(lambda: service.metric("kinboard_visitors") == 0, 30)
     with ExitStack() as stack:

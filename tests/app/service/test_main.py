@@ -53,6 +53,7 @@ def readiness(status: str, complete: bool) -> dict:
     return {"status": status, "complete": complete, "kernels": None, "classrooms": "ready"}
 
 
+@pytest.mark.full
 def test_livez_and_readyz(client):
     alive = client.get("/livez")
     assert (alive.status_code, alive.json()) == (200, {"status": "alive", "pid": os.getpid()})
@@ -61,6 +62,7 @@ def test_livez_and_readyz(client):
     assert ready.headers["cache-control"] == "no-store"
 
 
+@pytest.mark.full
 def test_during_warm_up_pages_are_served_and_readyz_reports_warming(monkeypatch):
     warm = threading.Event()
     monkeypatch.setattr(app.service.startup, "warm_up_first", lambda: warm.wait(30))

@@ -367,6 +367,7 @@ def test_text_messages_are_refused(port, viser):
     wait_for(lambda: len(viser.endings) == 1)
 
 
+@pytest.mark.full
 def test_a_slow_reader_slows_viser_and_memory_stays_bounded(port, viser):
     with visit(port, max_queue=1) as visitor:
         visitor.send(said("flood"))

@@ -111,6 +111,7 @@ def test_a_worker_killed_in_mid_run_loses_nothing(cluster):
     assert len(there.index) > 500
 
 
+@pytest.mark.full
 def test_the_command_line_gives_the_same_file_from_a_cluster(cluster, capsys, tmp_path):
     words = ["capability", "pioneer5", "--resolution", "8", "--directions", "12", "--json", "-o"]
     assert parser.main([*words, str(tmp_path / "here.npz")]) == 0
@@ -133,6 +134,7 @@ def test_an_iterator_closed_early_leaves_the_cluster_free(cluster):
         assert not busy(client, "one")
 
 
+@pytest.mark.full
 def test_a_map_is_not_cut_short_when_the_scheduler_dies(cluster, caplog):
     grid = kin.workspace.capability_grid(OWN, resolution=14)
     blocks = mapreduce.run_dask(grid, cluster.address)
@@ -200,6 +202,7 @@ def test_the_summary_is_for_people(capsys):
     assert "12, closed form" in out
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("ending", WRITERS)
 def test_files_hold_the_map(capsys, tmp_path, ending):
     path = tmp_path / f"map{ending}"

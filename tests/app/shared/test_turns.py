@@ -48,6 +48,7 @@ class Computing(threading.Thread):
         assert not self.is_alive()
 
 
+@pytest.mark.full
 def test_one_runs_at_a_time_and_all_get_on(monkeypatch):
     monkeypatch.setattr(turns, "STUCK", 60.0)
     all_turns, at_once, most = Turns(1), [0], [0]

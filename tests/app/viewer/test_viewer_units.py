@@ -64,6 +64,7 @@ def test_changing_the_unit_changes_every_number_and_moves_nothing(port: int) -> 
             assert tab.value("Lengths") == units.length
 
 
+@pytest.mark.full
 def test_a_sliding_joint_is_moved_in_the_unit_and_late_events_are_dropped(server: ViewerServer, port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -84,6 +85,7 @@ def test_a_sliding_joint_is_moved_in_the_unit_and_late_events_are_dropped(server
         tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(SCARA, q), atol=1e-9))
 
 
+@pytest.mark.full
 def test_the_displayed_answer_is_converted_to_the_new_units(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -110,6 +112,7 @@ def test_the_displayed_answer_is_converted_to_the_new_units(port: int) -> None:
         assert 'data-status="hand"' in tab.html
 
 
+@pytest.mark.full
 def test_the_unit_is_stored_and_restored(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -125,6 +128,7 @@ def test_the_unit_is_stored_and_restored(port: int) -> None:
         assert tab.value(label(SCARA, 2)) == pytest.approx(100 * SCARA.q_home[2])
 
 
+@pytest.mark.full
 def test_an_unknown_unit_is_refused_by_name(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()

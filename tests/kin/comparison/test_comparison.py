@@ -95,6 +95,7 @@ def test_an_arm_is_identical_to_itself_in_both_conventions(arm):
         assert found.explanations == ()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("arm", ARMS, ids=ids)
 def test_an_arm_is_found_again_in_other_frames(arm):
     rng = np.random.default_rng(arm.n)

@@ -62,6 +62,7 @@ def test_no_contact_of_the_makers_meshes_is_missed(name):
     assert not ours.all()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", QUICK)
 def test_the_capsules_hold_every_corner_of_the_makers_meshes(name):
     (robot, report), links = imported(name)

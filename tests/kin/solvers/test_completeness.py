@@ -164,6 +164,7 @@ def test_a_pair_that_a_noisy_cut_loses_is_found():
     assert (result.completeness, result.complete, result.details.complete) == ("proved", True, True)
 
 
+@pytest.mark.full
 def test_cuts_that_are_valid_by_rounding_alone_come_last():
     form = closed_form_of(typed(CRX, 4))
     T = kin.fk(form.robot, LOST)
@@ -254,6 +255,7 @@ def test_the_error_of_a_posture_is_the_motion_that_removes_it():
         assert np.abs(search._errors(T, at[None])[0] - search._jacobian(at[None])[0] @ by).max() < 1e-8
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("place", [28, 160, 190, 537, 710, 1092])
 def test_doubt_about_targets_of_a_rounded_puma_is_settled(place):
     """By Newton's steps, or by the elimination where continuation has too few postures, or none (28, 160, 190)."""

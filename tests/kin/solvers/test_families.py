@@ -206,6 +206,7 @@ NAMED = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_configuration_is_among_the_branches_of_its_pose_and_all_meet_it(family):
     rng = np.random.default_rng(1)

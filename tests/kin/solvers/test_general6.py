@@ -148,6 +148,7 @@ def test_of_a_hundred_random_tables_hardly_any_pose_is_missed():
     assert missed <= 10
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["puma560", "ur5", "irb120"])
 def test_arms_of_a_family_have_the_solutions_of_their_closed_form(name):
     robot = kin.get_robot(name)

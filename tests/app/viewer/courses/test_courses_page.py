@@ -304,6 +304,7 @@ def test_a_seat_is_not_left_for_a_course() -> None:
     assert practice.seed_of(fixed) == seed, "where nothing is drawn, other numbers are no other task"
 
 
+@pytest.mark.full
 def test_a_teacher_pairs_exercises_before_and_after(server: int) -> None:
     with FakeBrowser(server, memory=opened({"course": {}})) as tab:
         tab.wait(lambda: "New course" in shown(tab))

@@ -141,6 +141,7 @@ ANSWERED = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("key", ANSWERED)
 def test_what_a_lesson_draws_and_lists_comes_with_the_answer(server: int, key: str) -> None:
     title = next(lesson.title for lesson in LESSONS if lesson.key == key)

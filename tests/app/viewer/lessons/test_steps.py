@@ -157,6 +157,7 @@ def test_an_answered_step_opens_where_its_answer_led(server: int) -> None:
         tab.wait(lambda: frames_beside(tab) == 0)
 
 
+@pytest.mark.full
 def test_a_step_is_one_step_of_undo(server: int) -> None:
     steps = VelocityLesson.outline(UR5, DEGREES).steps
     assert steps[1].pose is not None
@@ -336,6 +337,7 @@ def test_an_old_link_keeps_its_answers() -> None:
     )
 
 
+@pytest.mark.full
 def test_an_arm_that_can_is_offered_and_undo_goes_back(server: int) -> None:
     with FakeBrowser(server) as tab:
         tab.settle()

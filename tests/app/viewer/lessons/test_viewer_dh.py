@@ -426,6 +426,7 @@ def test_playing_goes_to_the_end_and_stops(tab: FakeBrowser, monkeypatch: pytest
     assert tab.value("Row") < 1.0
 
 
+@pytest.mark.full
 def test_moving_the_arm_updates_the_lesson(tab: FakeBrowser) -> None:
     tab.set("Row", 3)
     tab.settle()

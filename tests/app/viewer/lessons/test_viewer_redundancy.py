@@ -344,6 +344,7 @@ def test_a_sweep_reverses_at_the_limits_until_a_target_is_dragged(tab: FakeBrows
     assert np.allclose(tab.tool_pose(), T, atol=1e-6)
 
 
+@pytest.mark.full
 def test_a_trade_is_explained_and_drawn(tab: FakeBrowser) -> None:
     tab.choose(PRINTED.name)
     assert "The axes of joints 1 and 2 coincide" in tab.html
@@ -355,6 +356,7 @@ def test_a_trade_is_explained_and_drawn(tab: FakeBrowser) -> None:
     assert not [n for n in tab.nodes if "/feasible-" in n]
 
 
+@pytest.mark.full
 def test_the_choice_between_two_redundancy_at(tab: FakeBrowser) -> None:
     tab.choose(PIONEER.name)
     assert "No redundancy" in tab.html
@@ -391,6 +393,7 @@ def test_without_a_closed_form_a_joint_leads(tab: FakeBrowser) -> None:
     assert np.abs(tab.tool_pose()[:3, 3] - p).max() < 1e-6
 
 
+@pytest.mark.full
 def test_invalid_values_are_refused_and_the_lesson_keeps_working(tab: FakeBrowser) -> None:
     tab.choose(SRS.name)
     for name, value in ((free_label(tab), math.nan), (free_label(tab), math.inf)):

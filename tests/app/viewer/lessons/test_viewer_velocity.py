@@ -369,6 +369,7 @@ def test_jogging_moves_the_tool_by_the_step(tab: FakeBrowser) -> None:
     tab.wait(lambda: "Invalid input" in tab.html)
 
 
+@pytest.mark.full
 def test_steps_and_sentences_follow_the_unit_of_length(tab: FakeBrowser) -> None:
     robot = STORE.get("irb120")
     use(tab, robot)
@@ -404,6 +405,7 @@ def test_distances_to_a_singularity_follow_the_units() -> None:
         assert f">{units.distance(found.distance)}<" in views.others_html(robot, (found,), units)
 
 
+@pytest.mark.full
 def test_a_singular_pose_is_shown_with_its_kind_and_lost_directions(tab: FakeBrowser) -> None:
     use(tab, STORE.get("irb120"))
     assert 'data-singular="far"' in tab.html

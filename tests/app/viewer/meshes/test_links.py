@@ -81,6 +81,7 @@ def read_two(reader: MeshReader, robot: Robot, urdf: str = TWO_JOINTS) -> Meshes
     return reader.of("a").read(shapes, packed(robot_files()), "two/urdf/two.urdf").result()
 
 
+@pytest.mark.full
 def test_every_body_moves_with_its_link(two: tuple[Robot, Drawing, Meshes]) -> None:
     robot, body, _ = two
     for q in robot.random_q(RNG, 20):
@@ -105,6 +106,7 @@ def test_colours_are_those_of_the_mesh_or_else_of_the_urdf(two: tuple[Robot, Dra
     assert colors == [{PLAIN}, {(0, 0, 255)}, {(255, 0, 0), (255, 255, 255), PLAIN}]
 
 
+@pytest.mark.full
 def test_a_mesh_in_millimetres_is_refused_with_the_remedy(reader: MeshReader) -> None:
     with pytest.raises(MeshError) as caught:
         read_two(reader, kin.load_urdf(TWO_JOINTS), TWO_JOINTS.replace('scale="0.001 0.001 0.001"', ""))
@@ -281,6 +283,7 @@ def test_a_detailed_body_is_where_the_urdf_of_its_package_has_it(name: str) -> N
             assert np.allclose(here, turn @ other, atol=1.5e-3), (file, q)
 
 
+@pytest.mark.full
 def test_the_library_loads_a_body_once_and_says_when(reader: MeshReader) -> None:
     library = Library(reader)
     offered = {robot.id for robot in library.offered(tuple(kin.classic_robots().values()))}

@@ -211,6 +211,7 @@ def reader():
     made.close()
 
 
+@pytest.mark.full
 def test_the_process_reads_a_zip_and_its_memory_is_given_back(
     reader: MeshReader, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -227,6 +228,7 @@ def test_the_process_reads_a_zip_and_its_memory_is_given_back(
     assert reader.memory.held == 0
 
 
+@pytest.mark.full
 def test_the_process_says_what_is_wrong_and_may_not_take_long(
     reader: MeshReader, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -99,6 +99,7 @@ def test_no_shadow_of_a_table_shows_on_its_own_top(port: int, height: float, cas
             assert tab.poses[node]["position"][2] - 0.5 * parts[name]["dimensions"][2] == pytest.approx(-height)
 
 
+@pytest.mark.full
 def test_what_touches_is_red_and_named(port: int) -> None:
     with FakeBrowser(port, memory=opened(PageState("ur5", obstacles=(WALL,)))) as tab:
         tab.settle()
@@ -121,6 +122,7 @@ def test_names_of_obstacles_in_a_link_are_text_on_the_page(port: int) -> None:
         assert "<img src=x" not in tab.html
 
 
+@pytest.mark.full
 def test_a_drag_of_the_target_avoids_the_wall_on_request(port: int) -> None:
     q = UR5.q_home.copy()
     q[0] = np.radians(150.0)
@@ -230,6 +232,7 @@ def reach(tab: FakeBrowser) -> None:
     tab.settle(0.4)
 
 
+@pytest.mark.full
 def test_the_answer_is_about_the_present_choice_of_avoiding(port: int) -> None:
     with FakeBrowser(port, memory=opened(PageState("ur5", obstacles=(bench(0.0),)))) as tab:
         tab.settle()

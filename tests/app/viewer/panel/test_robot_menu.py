@@ -74,6 +74,7 @@ def test_words_shorten_the_menu_and_the_arm_on_show_stays(port: int) -> None:
         tab.wait(lambda: offered(tab) == everything)
 
 
+@pytest.mark.full
 def test_an_arm_that_was_found_opens(port: int) -> None:
     kr6 = STORE.get("kr6")
     with FakeBrowser(port) as tab:

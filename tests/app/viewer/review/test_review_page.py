@@ -73,6 +73,7 @@ def row(tab: FakeBrowser) -> str:
     return html.unescape(found[-1]) if found else ""
 
 
+@pytest.mark.full
 def test_an_exercise_that_was_missed_comes_back_with_other_numbers(server: int, clock: SimpleNamespace) -> None:
     one = ALL.get("row-distance")
     assert one is not None
@@ -127,6 +128,7 @@ def _seed(tab: FakeBrowser, one: Exercise) -> int:
     return seed
 
 
+@pytest.mark.full
 def test_a_question_of_a_lesson_comes_back_on_another_arm(server: int, clock: SimpleNamespace) -> None:
     key = f"velocity/{QUESTION}"
     with FakeBrowser(server, memory=memory(PageState("ur5", lesson="velocity"))) as tab:

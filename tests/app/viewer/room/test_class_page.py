@@ -118,6 +118,7 @@ def lead(room: Class) -> tuple[FakeBrowser, FakeBrowser, Ticket, np.ndarray]:
     return teacher, student, ticket, q
 
 
+@pytest.mark.full
 def test_a_page_without_a_room_has_nothing_of_it(room: Class) -> None:
     plain = room.browser("")
     plain.settle()
@@ -128,6 +129,7 @@ def test_a_page_without_a_room_has_nothing_of_it(room: Class) -> None:
     assert not any(thread.name == "kinboard-classroom" for thread in threading.enumerate())
 
 
+@pytest.mark.full
 def test_students_see_what_the_teacher_does_until_they_let_go(room: Class) -> None:
     teacher, student, _, q = lead(room)
     q[1] = np.radians(60.0)
@@ -266,6 +268,7 @@ def test_a_task_opens_and_its_answers_are_stored(room: Class) -> None:
     assert "1 of 1 solved" in teacher.html
 
 
+@pytest.mark.full
 def test_two_tabs_and_a_repeated_answer_are_one_student(room: Class) -> None:
     teacher, student, ticket, _ = lead(room)
     press(teacher, "fields", "task", value=[[EXERCISE]])
@@ -460,6 +463,7 @@ def test_a_course_replaces_the_task_and_says_so(room: Class) -> None:
     student.wait(lambda: student.value("Lesson") == "Courses")
 
 
+@pytest.mark.full
 def test_a_question_is_asked_and_counted(room: Class) -> None:
     teacher = room.teacher()
     ann, _ = room.join("Ann")
@@ -555,6 +559,7 @@ def test_the_wall_sends_one_list_of_poses_for_all(room: Class) -> None:
     assert teacher.visible[teacher.gizmo] is True
 
 
+@pytest.mark.full
 def test_the_wall_comes_back_after_a_reload(room: Class) -> None:
     teacher, _ = room.teacher(), room.join("Ann")
 
@@ -640,6 +645,7 @@ def test_a_driven_arm_is_marked_on_the_wall_and_in_the_list(room: Class, monkeyp
     teacher.wait(lambda: names() == ["Ann", "Bob"])
 
 
+@pytest.mark.full
 def test_the_wall_shows_arms_only(room: Class) -> None:
     def seen() -> set[str]:
         """What is visible at the top of the scene, but lights."""
@@ -670,6 +676,7 @@ def test_hands_are_seen_and_lowered(room: Class) -> None:
     ann.wait(lambda: "Raise hand" in ann.html)
 
 
+@pytest.mark.full
 def test_students_are_renamed_and_removed_and_the_room_ended_at_the_second_press(room: Class) -> None:
     teacher = room.teacher()
     ann, ticket = room.join("Rude")
@@ -713,6 +720,7 @@ def test_a_removed_student_reads_so_at_once_and_keeps_the_work(room: Class) -> N
     at(student, q)
 
 
+@pytest.mark.full
 def test_where_a_token_is_needed_who_was_removed_can_only_look(tmp_path: Path) -> None:
     hub = Hub(tmp_path)
     settings = Settings(data=tmp_path, token=SecretStr("a-long-enough-token"))

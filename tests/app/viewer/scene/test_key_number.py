@@ -79,6 +79,7 @@ def test_the_words_at_a_contact_leave_room_for_the_number_above_a_missed_target(
     assert place_beside(contact, size, None, radius) == (size, "bottom-center")
 
 
+@pytest.mark.full
 def test_labels_follow_the_size_of_the_text(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -101,6 +102,7 @@ def test_labels_follow_the_size_of_the_text(port: int) -> None:
         assert sizes()["/key-number"] == pytest.approx(1.7)
 
 
+@pytest.mark.full
 def test_how_far_the_target_is_dragged_stands_beside_it_until_it_is_released(port: int) -> None:
     home = kin.fk(UR5, UR5.q_home)
     moved = home.copy()

@@ -103,6 +103,7 @@ def test_a_picture_of_another_shape_shows_the_same(port: int) -> None:
         assert np.abs(rest(tab).camera - ASIDE).max() < 1e-3
 
 
+@pytest.mark.full
 def test_a_picture_that_is_narrow_for_a_moment_leaves_the_view(port: int) -> None:
     """A window made as narrow as a phone squeezes the picture beside the panel before the panel moves below it."""
     narrow = default(PIONEER, 64 / 350)
@@ -257,6 +258,7 @@ def test_an_address_without_a_camera_has_the_default_view(port: int) -> None:
         assert np.allclose(shown(tab), default(UR5, PHONE))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("far", [0.5, 0.8])
 def test_a_link_to_a_target_out_of_reach_shows_arm_and_target_on_a_phone(port: int, far: float) -> None:
     T = kin.fk(PIONEER, PIONEER.q_home)
@@ -568,6 +570,7 @@ def test_the_gizmo_is_larger_in_the_picture_of_a_phone(port: int) -> None:
             assert size(tab) == pytest.approx(factor * usual)
 
 
+@pytest.mark.full
 def test_a_glide_has_steps_and_zooming_has_limits(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()

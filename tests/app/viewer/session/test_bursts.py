@@ -153,6 +153,7 @@ def follow(server: tuple[ViewerServer, int], seed: int, bursts: int) -> None:
             shows_what_is(tab, page, f"seed {seed}, burst {k}: {', '.join(names)}")
 
 
+@pytest.mark.full
 def test_after_bursts_of_acts_the_page_shows_what_is(server: tuple[ViewerServer, int]) -> None:
     follow(server, 4, 3)
 

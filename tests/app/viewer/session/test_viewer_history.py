@@ -57,6 +57,7 @@ def test_states_are_taken_back_in_order_and_forgotten_when_there_are_too_many() 
     assert history.labels == ("another", "")
 
 
+@pytest.mark.full
 def test_the_status_of_an_undone_step_ends_with_the_next_action(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.set(BASE, 45.0)
@@ -168,6 +169,7 @@ def test_an_unreachable_target_comes_back_with_its_reason(port: int) -> None:
         assert np.allclose(tab.gizmo_pose(), T, atol=1e-9)
 
 
+@pytest.mark.full
 def test_settings_are_undone(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -264,6 +266,7 @@ def test_the_browser_goes_back_and_forward_through_the_same_steps(port: int) -> 
         tab.wait(lambda: "The link cannot be read" in tab.html)
 
 
+@pytest.mark.full
 def test_a_return_and_a_viewpoint_are_stored_as_what_they_are(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()

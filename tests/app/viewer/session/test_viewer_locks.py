@@ -34,6 +34,7 @@ def test_the_buttons_tell_what_is_locked() -> None:
     assert lock_buttons([False, True]) == ("1", f"{LOCKED}2", UNLOCK_ALL)
 
 
+@pytest.mark.full
 def test_a_locked_joint_stays_while_the_target_is_dragged_and_moves_by_hand(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(SRS.name)
@@ -65,6 +66,7 @@ def test_a_locked_joint_stays_while_the_target_is_dragged_and_moves_by_hand(port
         assert f"{LOCKED}3" in options(tab)
 
 
+@pytest.mark.full
 def test_unlocking_frees_the_joint_and_another_arm_has_no_locks(port: int) -> None:
     T = kin.fk(SRS, SRS.q_home)
     T[:3, 3] += (0.0, 0.15, 0.0)

@@ -42,6 +42,7 @@ def fields(tab: FakeBrowser) -> dict[str, dict[str, object]]:
     return found
 
 
+@pytest.mark.full
 def test_a_typed_joint_value_keeps_its_digits(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -74,6 +75,7 @@ def test_a_value_typed_into_a_field_that_was_replaced_counts_for_the_same_joint(
         arrives(tab, kin.fk(SCARA, SCARA.q_home))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("text", ["abc", "NaN", "  ", "200", "-5", "1e999"])
 def test_an_invalid_joint_value_is_named_and_moves_nothing(port: int, text: str) -> None:
     with FakeBrowser(port) as tab:
@@ -136,6 +138,7 @@ def test_a_typed_target_is_solved_like_a_dragged_one(port: int) -> None:
         tab.wait(lambda: 'data-status="unreachable"' in tab.html)
 
 
+@pytest.mark.full
 def test_a_point_alone_sets_the_task_and_a_pose_sets_it_back(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(UR5.name)
@@ -164,6 +167,7 @@ def test_a_point_and_a_direction_set_the_task_to_both(port: int) -> None:
         assert np.allclose(tab.tool_pose()[:3, 2], (0.0, 0.6, -0.8), atol=1e-6)
 
 
+@pytest.mark.full
 def test_keys_move_the_target_along_tool_and_base_axes(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(UR5.name)
@@ -186,6 +190,7 @@ def test_keys_move_the_target_along_tool_and_base_axes(port: int) -> None:
         assert np.allclose(tab.gizmo_pose(), gizmo, atol=1e-6)
 
 
+@pytest.mark.full
 def test_jog_moves_the_tool_along_its_own_axes_and_those_of_the_base(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(UR5.name)
@@ -204,6 +209,7 @@ def test_jog_moves_the_tool_along_its_own_axes_and_those_of_the_base(port: int) 
         arrives(tab, T)
 
 
+@pytest.mark.full
 def test_jog_moves_a_joint_as_far_as_its_limit(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(SCARA.name)

@@ -68,6 +68,7 @@ def test_a_call_is_one_step_and_calls_before_it_are_one(threads):
     assert visitor.steps == 1
 
 
+@pytest.mark.full
 def test_a_call_during_a_step_is_another_step(threads):
     visitor = Visitor(threads, 0.05)
     visitor.turn.call()
@@ -417,6 +418,7 @@ def test_the_event_loop_is_woken_once_for_the_steps_of_a_row(threads):
     assert woken == [TOGETHER, 2 * TOGETHER, count]
 
 
+@pytest.mark.full
 def test_another_thread_than_the_leader_wakes_it_at_once(threads):
     woken: list[str] = []
     threads.after_steps(lambda: woken.append(threading.current_thread().name))

@@ -289,6 +289,7 @@ def test_voxels_are_shown_while_the_map_grows_and_kept_on_stop(tab, held, monkey
     assert "data-shown" not in tab.html
 
 
+@pytest.mark.full
 def test_the_threshold_hides_levels_without_sending_voxels(tab):
     found = the_map()
     tab.compute()
@@ -311,6 +312,7 @@ def test_the_threshold_hides_levels_without_sending_voxels(tab):
     assert 'data-legend="map-manipulability"' in tab.html
 
 
+@pytest.mark.full
 def test_the_cut_of_the_tab_applies_to_the_voxels(tab):
     found = the_map()
     tab.compute()
@@ -341,6 +343,7 @@ def test_a_new_map_opens_cut_along_the_arm_on_the_side_of_the_camera(tab):
     tab.wait(lambda: tab.value("Cut") == "none")
 
 
+@pytest.mark.full
 def test_a_new_map_stays_whole_for_who_has_chosen_no_cut_and_where_it_is_flat(service, tab):
     tab.compute()
     tab.done(len(the_map().index))

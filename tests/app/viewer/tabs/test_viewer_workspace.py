@@ -409,6 +409,7 @@ def test_many_points_are_warned_of_where_the_page_draws_in_software(tab):
     assert "with 4\u202f000\u202f000 points the page may freeze for seconds" in tab.html
 
 
+@pytest.mark.full
 def test_pause_stops_the_cloud_and_continue_resumes_it(tab):
     n = 24 * SAMPLED
     tab.set("Points", n)

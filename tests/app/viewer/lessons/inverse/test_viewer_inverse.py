@@ -536,6 +536,7 @@ def test_an_arm_without_a_derivation_offers_others(port: int) -> None:
         assert all_signs(of(SRS))[0] == (1, 1, 1)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("robot", [PUMA, SRS], ids=lambda robot: robot.id)
 def test_a_wrong_angle_is_drawn_beside_the_arm(port: int, robot: Robot) -> None:
     arm = of(robot)

@@ -278,6 +278,7 @@ def test_the_list_marks_the_branch_the_arm_is_on(tab: FakeBrowser) -> None:
     assert rows(tab) == expected
 
 
+@pytest.mark.full
 def test_a_click_on_a_ghost_morphs_the_arm_into_it(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     postures = survey(PUMA, home(PUMA), kin.IKOptions(), PUMA.q_home)
@@ -291,6 +292,7 @@ def test_a_click_on_a_ghost_morphs_the_arm_into_it(tab: FakeBrowser) -> None:
     assert str(index + 1) not in shown(tab), "the arm stands where its ghost would"
 
 
+@pytest.mark.full
 def test_a_number_moves_the_arm_or_explains_why_it_is_outside_limits(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     states = list(rows(tab).values())
@@ -307,6 +309,7 @@ def test_a_number_moves_the_arm_or_explains_why_it_is_outside_limits(tab: FakeBr
     assert short(names[other]) in tab.html
 
 
+@pytest.mark.full
 def test_ghosts_can_be_hidden_one_by_one_and_all_together(tab: FakeBrowser) -> None:
     tab.choose(PUMA.name)
     before = shown(tab)
@@ -408,6 +411,7 @@ def test_the_cone_is_drawn_for_five_joints_and_can_be_hidden(tab: FakeBrowser) -
     assert not [n for n in tab.nodes if "/cone" in n]
 
 
+@pytest.mark.full
 def test_leaving_the_lesson_removes_its_nodes_and_controls(tab: FakeBrowser) -> None:
     for robot in (PANDA, SRS):
         tab.choose(robot.name)

@@ -65,6 +65,7 @@ def test_frames_of_a_chain_are_products_from_the_left_and_from_the_right() -> No
             assert place == pytest.approx(T, abs=1e-12)
 
 
+@pytest.mark.full
 def test_another_convention_keeps_the_rotation_even_in_one_batch_of_events(monkeypatch) -> None:
     for name in ("TIME", "REST"):
         monkeypatch.setattr(f"app.viewer.lessons.rotations.turning.{name}", 1e-3)

@@ -171,6 +171,7 @@ def test_what_cannot_be_a_time_limit_or_a_seed_is_refused(
     assert 'value="0"' in part(blocked, "way")
 
 
+@pytest.mark.full
 def test_a_waypoint_inside_an_obstacle_and_a_start_that_touches_are_answers(port: int) -> None:
     goal = UR5.q_home.copy()
     goal[0] += 1.0

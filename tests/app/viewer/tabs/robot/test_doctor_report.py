@@ -143,6 +143,7 @@ def test_what_the_buttons_do_not_send_changes_nothing(port: int, value: object) 
         assert report(tab) == before
 
 
+@pytest.mark.full
 def test_mjcf_is_opened_without_a_report(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()

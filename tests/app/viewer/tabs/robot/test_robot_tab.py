@@ -121,6 +121,7 @@ def test_a_typed_cell_changes_the_arm_and_undo_takes_it_back(port: int) -> None:
         assert tab.value("Robot") == f"My arm ({PIONEER.name} variant)"
 
 
+@pytest.mark.full
 def test_home_and_limits_of_motion_are_typed_and_kept(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
@@ -204,6 +205,7 @@ def test_what_is_wrong_with_a_frame_is_said_below_the_frames(port: int) -> None:
         assert "5o" not in part(tab, "wrong").partition(">")[2]
 
 
+@pytest.mark.full
 def test_the_mounting_is_chosen_and_the_floor_is_typed(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()

@@ -131,6 +131,7 @@ def test_a_urdf_alone_says_which_bodies_are_assumed(port: int) -> None:
         assert "assumed are tubes for link 1" in part(tab, "about")
 
 
+@pytest.mark.full
 def test_what_is_wanted_of_a_zip_is_asked(port: int) -> None:
     fork = TWO_JOINTS.replace(
         "</robot>",
@@ -261,6 +262,7 @@ def test_steps_made_while_a_file_is_read_that_is_refused_are_taken_back_with_it(
         assert tab.value("Robot") == before
 
 
+@pytest.mark.full
 def test_an_upload_that_stalls_ends_and_gives_back_its_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
     viewer = ViewerServer(Store(), Settings(), Clouds())
