@@ -2,9 +2,12 @@
 
 fail() { echo "kinboard: $*" >&2; exit 1; }
 
+# Another apt may hold the lock, such as that of automatic updates: it is waited for.
+locked="-o DPkg::Lock::Timeout=300"
+
 # Once per run.
 apt_update() {
-  [ -n "${apt_updated:-}" ] || apt-get update -qq || return 1
+  [ -n "${apt_updated:-}" ] || apt-get $locked update -qq || return 1
   apt_updated=yes
 }
 
@@ -12,7 +15,7 @@ apt_update() {
 apt_install() {
   if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
     echo "Installing $* with apt…"
-    apt_update && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+    apt_update && DEBIAN_FRONTEND=noninteractive apt-get $locked install -y -qq --no-install-recommends "$@" >/dev/null
   else
     return 1
   fi
