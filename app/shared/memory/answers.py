@@ -1,8 +1,15 @@
-"""Bytes of answers that one process holds, from their computation until the client has read them."""
+"""Bytes of answers that one process holds, from their computation until the client has read them.
+
+A reservation that nobody refers to any more is given back by its finaliser. The garbage collector may call that in
+the middle of any statement, so also in a thread that holds the lock of the memory: a finaliser that waited for
+the lock would stop this thread, and all others after it. So it only leaves its bytes in a queue, and whoever holds
+the lock next subtracts them.
+"""
 
 from __future__ import annotations
 
 import threading
+from collections import deque
 
 SMALL = 64 * 1024  # bytes; smaller answers are not counted
 
@@ -37,11 +44,14 @@ class AnswerMemory:
         self._most = max(most, most_of_one)  # else the largest answer could never be given
         self._lock = threading.Lock()
         self._held = 0
+        self._forgotten: deque[int] = deque()  # bytes of reservations that were not released
 
     @property
     def held(self) -> int:
         """Bytes of all answers that are held or reserved."""
-        return self._held
+        with self._lock:
+            self._settle()
+            return self._held
 
     def reserve(self, size: int) -> Reservation:
         """Room for an answer of about this size.
@@ -58,9 +68,19 @@ class AnswerMemory:
         if after > self.most_of_one:
             raise AnswerTooLargeError(after, self.most_of_one)
         with self._lock:
+            self._settle()
             if after > before and self._held + after - before > self._most:
                 raise MemoryFullError
             self._held += after - before
+
+    def _settle(self) -> None:
+        """Subtract what was forgotten; the lock is held."""
+        while self._forgotten:
+            self._held -= self._forgotten.popleft()
+
+    def _forget(self, size: int) -> None:
+        """Give back bytes of a reservation that is being finalised: takes no lock."""
+        self._forgotten.append(size)
 
 
 class MemoryShare(AnswerMemory):
@@ -84,6 +104,10 @@ class MemoryShare(AnswerMemory):
             super()._change(after, before)
             raise
 
+    def _forget(self, size: int) -> None:
+        super()._forget(size)
+        self._whole._forget(size)
+
 
 class Reservation:
     """Room for one answer, given back by `release` or when it is forgotten."""
@@ -103,4 +127,5 @@ class Reservation:
         self.resize(0)
 
     def __del__(self) -> None:
-        self.release()
+        if self._size:
+            self._memory._forget(self._size)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import socket
 import threading
 
@@ -17,7 +18,7 @@ import kin
 from app.api import ik
 from app.api.batches import SENT, HeldResponse
 from app.service.main import create_app
-from app.shared.memory.answers import SMALL, AnswerMemory, AnswerTooLargeError, MemoryFullError
+from app.shared.memory.answers import SMALL, AnswerMemory, AnswerTooLargeError, MemoryFullError, MemoryShare
 from app.shared.settings import Settings
 
 API = "/api/v1/robots"
@@ -169,6 +170,37 @@ def test_memory_is_bounded_for_one_and_for_all():
     first.release()
     first.release()
     assert memory.held == 0
+
+
+@pytest.mark.parametrize("locked", ["whole", "share"])
+def test_a_reservation_may_be_collected_by_a_thread_that_holds_the_lock(locked):
+    """As the collector does that begins while the error of a full memory is made."""
+    whole = AnswerMemory(2 * SMALL, 4 * SMALL)
+    share = MemoryShare(whole, 2 * SMALL)
+    cycle = [share.reserve(2 * SMALL)]
+    cycle.append(cycle)
+    del cycle
+
+    def collect():
+        with (whole if locked == "whole" else share)._lock:
+            gc.collect()
+
+    thread = threading.Thread(target=collect, daemon=True)
+    thread.start()
+    thread.join(10.0)
+    assert not thread.is_alive(), "it waits for a lock that it holds"
+    assert (share.held, whole.held) == (0, 0)
+    share.reserve(2 * SMALL)
+
+
+def test_what_was_forgotten_leaves_room_for_the_next():
+    memory = AnswerMemory(4 * SMALL, 4 * SMALL)
+    for _ in range(3):  # forgotten each time, without `held` being asked
+        memory.reserve(3 * SMALL)
+    kept = memory.reserve(3 * SMALL)
+    kept.release()
+    del kept
+    assert memory.held == 0, "what was released is not given back again"
 
 
 def test_concurrent_reservations_are_counted_exactly():
