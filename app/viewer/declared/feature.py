@@ -35,7 +35,8 @@ from kin.transforms import Array
 S = TypeVar("S", bound=Settings)
 F = TypeVar("F", bound=Facts[Any])
 P = ParamSpec("P")
-OWN = frozenset({"at", "do", "drag"})  # the keys of events of declared nodes
+# The first parts of keys that `DeclaredFeature.handle` takes itself: they name fields and methods of the feature.
+OWN = frozenset({"at", "do", "done", "drag"})
 
 
 class DeclaredFeature(Feature, Generic[S, F]):
