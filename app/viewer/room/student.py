@@ -75,7 +75,7 @@ class Student(Member):
         task, activity = self.activity.task, self.activity
         self._borrow()
         if self.room.seat is not None:
-            activity.know(self.room.seat.work, bool(self._submissions.waiting))
+            activity.know(self.room.seat.work, bool(self._submissions.state.waiting))
         activity.task = None if self.room.task is None else activity.exercises.get(self.room.task.exercise)
         self._set_course(task if self.room.task is None else None)
         self._set_task()
@@ -236,7 +236,7 @@ class Student(Member):
 
     def _note(self) -> None:
         """Say below the verdict whether the answers are stored; of another exercise only what is not."""
-        activity, sent = self.activity, self._submissions
+        activity, sent = self.activity, self._submissions.state
         if not (sent.stored or sent.waiting or sent.problem):
             return
         if sent.problem:
@@ -321,7 +321,7 @@ class Student(Member):
         self._tell()
         guest = self.page.guest
         update_html(
-            self._head, views.student_html(self.room, self.mode, self.activity.task, self._submissions, guest)
+            self._head, views.student_html(self.room, self.mode, self.activity.task, self._submissions.state, guest)
         )
         update_html(self._question, views.poll_html(self.room.poll, teacher=False))
         update_html(self._stored, views.stored_html(self.room, now()))

@@ -7,6 +7,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from typing import NamedTuple
 
 from app.classroom.views import ClassroomUnavailable, Confirmed, NewAttempt, RefusedError
 
@@ -14,6 +15,20 @@ log = logging.getLogger(__name__)
 
 AGAIN = 2.0  # s after an attempt that the database did not take
 PATIENCE = 60.0  # s for which a page that has gone still tries
+
+
+class SubmissionState(NamedTuple):
+    """How far a student's answers are.
+
+    Attributes:
+        waiting: how many are not stored yet.
+        stored: how many are stored.
+        problem: why the oldest one is not stored yet, or could not be; empty if all is well.
+    """
+
+    waiting: int = 0
+    stored: int = 0
+    problem: str = ""
 
 
 class Submissions:
@@ -24,8 +39,7 @@ class Submissions:
         changed: called by the thread after each outcome.
 
     Attributes:
-        stored: how many are stored.
-        problem: why the oldest one is not stored yet, or could not be; empty if all is well.
+        state: how far they are; replaced as a whole, so that a reader needs no lock and never sees half an outcome.
     """
 
     def __init__(self, submit: Callable[[NewAttempt], Confirmed], changed: Callable[[], None]) -> None:
@@ -34,18 +48,14 @@ class Submissions:
         self._waiting: deque[NewAttempt] = deque()
         self._running = False
         self._closed = threading.Event()
-        self.stored = 0
-        self.problem = ""
-
-    @property
-    def waiting(self) -> int:
-        """How many are not stored yet."""
-        return len(self._waiting)
+        self.state = SubmissionState()
 
     def add(self, attempt: NewAttempt) -> None:
         """Store an attempt after those that wait."""
         with self._lock:
             self._waiting.append(attempt)
+            problem = self.state.problem if len(self._waiting) > 1 else ""  # else that of an answer that is done
+            self.state = SubmissionState(len(self._waiting), self.state.stored, problem)
             if self._running:
                 return
             self._running = True
@@ -63,22 +73,23 @@ class Submissions:
                     self._running = False
                     return
                 attempt = self._waiting[0]
+            stored, problem = 0, ""
             try:
                 self._submit(attempt)
+                stored = 1
             except ClassroomUnavailable as error:
-                self.problem = str(error)
+                with self._lock:
+                    self.state = self.state._replace(problem=str(error))
                 self._changed()
                 tries -= self._closed.is_set()
                 time.sleep(AGAIN)
                 continue
             except RefusedError as error:
-                self.problem = str(error)
+                problem = str(error)
             except Exception:
                 log.exception("an answer could not be stored")
-                self.problem = "The answer could not be stored; the server log has the details."
-            else:
-                self.stored += 1
-                self.problem = ""
+                problem = "The answer could not be stored; the server log has the details."
             with self._lock:
                 self._waiting.popleft()
+                self.state = SubmissionState(len(self._waiting), self.state.stored + stored, problem)
             self._changed()

@@ -14,7 +14,7 @@ from app.classroom.tokens import show_code
 from app.classroom.views import Poll, RoomView, SeatView
 from app.classroom.work import URGENCY, Progress
 from app.exercises import Exercise, Exercises, VariantError
-from app.viewer.room.submissions import Submissions
+from app.viewer.room.submissions import SubmissionState
 from app.viewer.room.wall import MOST
 from app.viewer.views.templates import render
 from kin.units import Units
@@ -68,7 +68,7 @@ def _mode(room: RoomView, mode: Mode, guest: bool) -> dict[str, str]:
     return {"symbol": symbol, "title": title, "detail": detail, "color": color}
 
 
-def student_html(room: RoomView, mode: Mode, task: Exercise | None, sent: Submissions, guest: bool) -> str:
+def student_html(room: RoomView, mode: Mode, task: Exercise | None, sent: SubmissionState, guest: bool) -> str:
     """Who leads, the task, and the raised hand.
 
     Args:

@@ -57,7 +57,8 @@ class SendWindow:
                     self._asking = False
                     return
             self._wait()
-            self._arrived = mark
+            with self._lock:
+                self._arrived = mark
             self._notify()
 
     def _wait(self) -> None:

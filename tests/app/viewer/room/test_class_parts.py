@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import threading
 from dataclasses import replace
@@ -23,7 +24,7 @@ from app.viewer.room import submissions, views
 from app.viewer.room.member import act_of
 from app.viewer.room.sharing import REST, Sharing
 from app.viewer.room.student import Student
-from app.viewer.room.submissions import Submissions
+from app.viewer.room.submissions import Submissions, SubmissionState
 from app.viewer.room.wall import LETTER, LINES, MOST, PADS, SYMBOLS, SmallArm, layout_of
 from app.viewer.session.state import PageState
 from app.viewer.worksheet.feature import Worksheets
@@ -103,19 +104,61 @@ def test_an_answer_is_stored_or_it_is_said_why_not(
         return Confirmed(attempt.id, 1.0)
 
     def note() -> None:
-        problems.append(sent.problem)
-        if not sent.waiting:
+        problems.append(sent.state.problem)
+        if not sent.state.waiting:
             changed.set()
 
     sent = Submissions(submit, note)
     sent.add(ATTEMPT)
     assert changed.wait(10.0)
     assert problems[0] == str(error)
-    assert (sent.stored, sent.waiting) == (stored, 0)
+    assert (sent.state.stored, sent.state.waiting) == (stored, 0)
     changed.clear()
     sent.add(ATTEMPT)
     assert changed.wait(10.0)
-    assert (sent.stored, sent.problem) == (stored + 1, "")
+    assert (sent.state.stored, sent.state.problem) == (stored + 1, "")
+
+
+def test_no_half_of_an_outcome_of_an_answer_is_seen() -> None:
+    """A page that looks between two steps must not read that a refused answer is tried again."""
+    outcomes = [None, RefusedError("removed."), ZeroDivisionError(), None]
+    seen: list[SubmissionState] = []
+    stored = threading.Event()
+
+    class WatchedLock:
+        """Notes what others see whenever it is taken and released."""
+
+        def __enter__(self) -> None:
+            lock.acquire()
+            seen.append(sent.state)
+
+        def __exit__(self, *_: object) -> None:
+            seen.append(sent.state)
+            lock.release()
+
+    def submit(attempt: NewAttempt) -> Confirmed:
+        if (error := outcomes.pop(0)) is not None:
+            raise error
+        return Confirmed(attempt.id, 1.0)
+
+    lock = threading.Lock()
+    sent = Submissions(submit, stored.set)
+    sent._lock = WatchedLock()  # type: ignore[assignment]
+    failed = "The answer could not be stored; the server log has the details."
+    said = ["", "removed.", failed, ""]
+    for problem in said:
+        stored.clear()
+        sent.add(ATTEMPT)
+        assert stored.wait(10.0)
+        assert sent.state.problem == problem
+    before, *after = (each for each, _ in itertools.groupby(seen))
+    assert before == (0, 0, "")
+    assert after == [
+        (1, 0, ""), (0, 1, ""),
+        (1, 1, ""), (0, 1, "removed."),
+        (1, 1, ""), (0, 1, failed),
+        (1, 1, ""), (0, 2, ""),
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
