@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import os
 import threading
 from collections.abc import Callable, Iterable, Mapping
@@ -58,6 +59,8 @@ LOOK = 0.5  # seconds between two looks whose connection is silent
 SILENT = 5.0  # seconds without a sign of a page's browser, which is asked for one every two seconds
 SEAT_PAGE_EVERY = 0.2  # seconds between two states of the students' pages
 RETRY = 0.5  # seconds after an error of the database
+RETRY_ROOM = 5.0  # seconds after an error of one room, which others do not wait for
+UNSTORED = "What happens in this room cannot be stored now; the server log has the details."
 LINGER = 5.0  # seconds that the thread waits for the next page after the last has left
 
 
@@ -256,9 +259,11 @@ class Hub:
     def leave(self, page: Attendance) -> None:
         """Forget an attendance; what it has reported is still stored."""
         room = page.ticket.room
-        with self._lock, contextlib.suppress(ValueError):
-            self._attendances.get(room, []).remove(page)
-            self._look_who_is_here(self._lives[room])
+        with self._lock:
+            pages = self._attendances.get(room, [])
+            if page in pages:
+                pages.remove(page)
+                self._look_who_is_here(self._lives[room])
 
     def _look_who_is_here(self, live: LiveRoom) -> None:
         pages = self._attendances.get(live.id, ())
@@ -309,10 +314,9 @@ class Hub:
 
     def _tick(self) -> bool:
         """Write, read, notify; returns whether the database answered."""
-        beat = steady() - self._beat_at >= BEAT
-        if beat:
-            self._beat_at = steady()
         with self._lock:
+            if beat := steady() - self._beat_at >= BEAT:
+                self._beat_at = steady()
             if steady() - self._looked_at >= LOOK:
                 self._looked_at = steady()
                 for live in self._lives.values():
@@ -340,33 +344,50 @@ class Hub:
             news: dict[str, tuple[Pending, set[str]]] = {}
             for room, live in sorted(self._lives.items()):  # sorted: two processes lock rooms in the same order
                 beats = live.here if beat and live.row else set()
-                if not live.closed and (live.pending or beats):
+                due = steady() >= live.retry_at or self._stopping.is_set()
+                if due and not live.closed and (live.pending or beats):
                     news[room] = live.pending, set(beats)
                     live.flying, live.pending = live.pending, Pending()
-        if not news:
-            return True
-        from app.classroom.ticks import store
+        return not news or self._store(news)
 
+    def _store(self, news: dict[str, tuple[Pending, set[str]]]) -> bool:
+        """Store news of rooms in one transaction, or put them back; returns whether the database answered."""
         try:
+            from app.classroom.ticks import store
+
             with self.database.write(durable=False) as connection:
                 versions = {room: store(connection, room, *each) for room, each in news.items()}
         except ClassroomUnavailable as error:
-            with self._lock:
-                for room, (pending, _) in news.items():
-                    self._lives[room].pending.add_older(pending)
-                    self._lives[room].flying = Pending()
+            self._put_back(news)
             self._set_problem(news, str(error))
             return False
+        except Exception:
+            if len(news) == 1:
+                logger.exception("what happens in a room could not be stored; next try in %g s", RETRY_ROOM)
+                self._put_back(news, steady() + RETRY_ROOM)
+                self._set_problem(news, UNSTORED)
+                return True
+            versions = None
+        if versions is None:  # each by itself: one room must not hold up the others
+            return all([self._store({room: each}) for room, each in news.items()])
         with self._lock:
             for room, version in versions.items():
                 live = self._lives[room]
-                live.flying = Pending()
+                live.flying, live.retry_at = Pending(), -math.inf
                 live.note_beats(news[room][1])
                 if version is not None and version <= live.version:  # read meanwhile, below what was on its way
                     live.row["version"] = version - 1
                 elif version == live.version + 1:  # nobody else has written: there is nothing to read
                     live.row["version"] = version
         return True
+
+    def _put_back(self, news: Iterable[str], retry_at: float = -math.inf) -> None:
+        """What was on its way is pending again, below what has been told since."""
+        with self._lock:
+            for room in news:
+                live = self._lives[room]
+                live.pending.add_older(live.flying)
+                live.flying, live.retry_at = Pending(), retry_at
 
     def _poll(self, rooms: Iterable[str]) -> bool:
         with self._lock:
@@ -390,7 +411,9 @@ class Hub:
         self._notify(found)
         if ended := [room for room, loaded in found.items() if loaded is None]:
             self._close(ended)
-        self._set_problem(known, "")
+        with self._lock:
+            well = [room for room in known if room in self._lives and self._lives[room].retry_at == -math.inf]
+        self._set_problem(well, "")
         return True
 
     def _tries_of(self, room: str) -> Mapping[str, int]:

@@ -59,6 +59,7 @@ class LiveRoom:
         self.seats: dict[str, LiveSeat] = {}
         self.pending = Pending()
         self.flying = Pending()  # on its way into the database
+        self.retry_at = -math.inf  # when `pending` is tried again, after an error that is this room's alone
         self.pages: dict[str, str] = {}  # newest states of students' pages, for the next time they are due
         self._paged = -math.inf  # when they were last taken
         self._seen_by_all = self._seen_by_teacher = 0  # counts of changes

@@ -175,9 +175,6 @@ class Member(Feature):
     def on_style(self) -> None:
         self._dirty = True
 
-    def on_leave(self) -> None:
-        self.attendance.leave()
-
     def admit(self, key: Hashable, value: object) -> bool:
         """Whether an event may act on the page."""
         act = act_of(key, value, self.page.features)

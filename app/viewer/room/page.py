@@ -57,6 +57,8 @@ class ClassroomPage(MemberPage):
             self._persistence.due = time.perf_counter() + SAVE_AFTER if due is None else due
 
     def _leave(self) -> None:
-        super()._leave()
-        if self.attendance is not None:
-            self.attendance.leave()
+        try:
+            super()._leave()
+        finally:
+            if self.attendance is not None:
+                self.attendance.leave()

@@ -29,6 +29,7 @@ from app.classroom import (
     clock,
     rooms,
 )
+from app.classroom.hub import RETRY_ROOM, UNSTORED
 from app.classroom.live import Pending
 from app.classroom.standing import standing
 from app.classroom.tables import REVISION, Attempt, Base, Room, Seat
@@ -382,6 +383,75 @@ def test_a_locked_database_delays_and_loses_nothing(hubs, tmp_path, monkeypatch)
     assert student.submit(new) == second  # again after an unclear end: stored once
     with here.database.read() as connection:
         assert sorted(connection.scalars(select(Attempt.id))) == sorted([first.id, second.id])
+
+
+@pytest.fixture
+def ticked(hubs, monkeypatch):
+    """A hub without its thread, two rooms with their teachers, and `fails(room)`: storing it raises from now on."""
+    hub, _ = hubs
+    monkeypatch.setattr(hub, "_run", lambda: None)
+    broken = set()
+
+    def store_or_fail(connection, room, *news):
+        if room in broken:
+            raise ZeroDivisionError("no error of the database")
+        return store(connection, room, *news)
+
+    monkeypatch.setattr("app.classroom.ticks.store", store_or_fail)
+    rooms = [hub.rooms.open(title, 3600) for title in ("Ada's", "Emmy's")]
+    teachers = [hub.attend(hub.ticket(room.token), nothing) for room in rooms]
+    hub._tick()
+    return hub, teachers, broken
+
+
+def stored(hub, page):
+    with hub.database.read() as connection:
+        return connection.scalar(select(Room.state).where(Room.id == page.ticket.room)) or {}
+
+
+def test_an_error_that_is_not_the_database_s_loses_nothing_of_the_tick_and_holds_up_no_other_room(
+    ticked, monkeypatch, caplog
+):
+    hub, (bad, well), broken = ticked
+    now = [clock.steady()]
+    monkeypatch.setattr("app.classroom.hub.steady", lambda: now[0])
+    broken.add(bad.ticket.room)
+    bad.send_task("swing")
+    bad.set_frozen(True)
+    well.set_follow(True)
+    assert hub._tick()
+    assert stored(hub, well)["follow"]
+    assert not stored(hub, bad).get("frozen")
+    assert bad.room.frozen, "in this process at once"
+    assert (bad.room.problem, well.room.problem) == (UNSTORED, "")
+    assert "could not be stored" in caplog.text
+    caplog.clear()
+    bad.set_frozen(False)  # newer than what could not be stored
+    well.set_frozen(True)
+    assert hub._tick()
+    assert stored(hub, well)["frozen"]
+    assert not caplog.records, "it is not tried in each tick"
+    now[0] += RETRY_ROOM
+    hub._tick()
+    assert len(caplog.records) == 1
+    assert bad.room.problem == UNSTORED
+    broken.clear()
+    now[0] += RETRY_ROOM
+    hub._tick()
+    assert stored(hub, bad)["task"]["exercise"] == "swing"
+    assert not stored(hub, bad)["frozen"]
+    assert bad.room.problem == ""
+
+
+def test_what_could_not_be_stored_is_tried_once_more_when_the_service_stops(ticked):
+    hub, (bad, _), broken = ticked
+    broken.add(bad.ticket.room)
+    bad.set_frozen(True)
+    hub._tick()
+    broken.clear()
+    hub._stopping.set()
+    hub._tick()
+    assert stored(hub, bad)["frozen"]
 
 
 @pytest.mark.full

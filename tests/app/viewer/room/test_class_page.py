@@ -16,13 +16,14 @@ from live_server import serve_viewer
 from pydantic import SecretStr
 
 import kin
-from app.classroom import COOKIE, Hub, Ticket
+from app.classroom import COOKIE, Attendance, Hub, Ticket
 from app.live import Line, Lines
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.room.following import decoded
 from app.viewer.room.member import SURE, Member
+from app.viewer.room.page import ClassroomPage
 from app.viewer.room.student import Student
 from app.viewer.room.teacher import Teacher
 from app.viewer.room.wall import DRIVEN, PADS
@@ -127,6 +128,27 @@ def test_a_page_without_a_room_has_nothing_of_it(room: Class) -> None:
     forged.settle()
     assert "data-class" not in forged.html
     assert not any(thread.name == "kinboard-classroom" for thread in threading.enumerate())
+
+
+def test_a_page_leaves_its_room_once(room: Class, monkeypatch: pytest.MonkeyPatch) -> None:
+    left: list[str] = []
+    gone = threading.Event()
+    forget, end = room.hub.leave, ClassroomPage._leave
+
+    def leave(page: Attendance) -> None:
+        left.append(page.ticket.seat)
+        forget(page)
+
+    def end_page(page: ClassroomPage) -> None:
+        end(page)
+        gone.set()
+
+    student, ticket = room.join("Ann")
+    monkeypatch.setattr(room.hub, "leave", leave)
+    monkeypatch.setattr(ClassroomPage, "_leave", end_page)
+    student.close()
+    assert gone.wait(10.0)
+    assert left == [ticket.seat]
 
 
 @pytest.mark.full
