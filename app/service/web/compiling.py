@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import re
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -28,6 +28,7 @@ RETRY_AFTER = 5  # s
 
 T = TypeVar("T")
 _API = "/api/"
+_counting: set[asyncio.Task[Any]] = set()  # tasks that nobody awaits: the event loop alone keeps none alive
 _ROBOT = re.compile(r"/api/v\d+/robots/([^/]+)/")
 
 
@@ -86,6 +87,8 @@ async def known_soon(answer: Callable[[], T]) -> T | None:
     The first call in a process looks at all families of arms, for which it may have to wait for the compiler too.
     """
     waiting = asyncio.create_task(run_in_threadpool(answer))
+    _counting.add(waiting)
+    waiting.add_done_callback(_counting.discard)
     await asyncio.wait((waiting,), timeout=COUNTING)
     return waiting.result() if waiting.done() else None
 

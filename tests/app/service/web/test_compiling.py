@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import gc
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -170,3 +172,22 @@ def test_readyz_does_not_wait_for_the_compiler(
             assert time.monotonic() - began < 3.0
     finally:
         app.state.startup.preparation.finish()
+
+
+def test_a_count_that_takes_long_goes_on_after_its_question(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The event loop has weak references to tasks: the collector would take one that nobody awaits."""
+
+    async def ask() -> None:
+        async def count(_: Callable[[], None]) -> str:
+            return await asyncio.get_running_loop().create_future()  # type: ignore[no-any-return]
+
+        monkeypatch.setattr(compiling, "run_in_threadpool", count)
+        monkeypatch.setattr(compiling, "COUNTING", 0.0)
+        assert await compiling.known_soon(lambda: None) is None
+        gc.collect()
+        (counting,) = asyncio.all_tasks() - {asyncio.current_task()}
+        counting.cancel()
+        await asyncio.wait((counting,))
+
+    asyncio.run(ask())
+    assert not compiling._counting
