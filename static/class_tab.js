@@ -98,12 +98,16 @@
     }
   }
 
-  // The connection: asked for all the time, so that a page never looks ready when nothing it does arrives.
+  // The connection: a browser notices late that nothing comes through any more, and a page must not look ready then. What
+  // comes from the service shows that it is there. It is asked for only while that is in doubt: after something was sent
+  // and nothing has come, after the connection has ended, and after a long silence.
 
-  const EVERY = 800; // ms
+  const EVERY = 800; // ms between two looks at the connection, and two questions while it is in doubt
+  const SILENCE = 5000; // ms
   const PATIENCE = 1500; // ms for an answer of the service
   const WAITING = 2500; // ms after which it is said that an answer waits
   let online = true;
+  let sure = 0; // until when (ms) the connection is not in doubt
   const note = document.createElement("div");
   note.className = "kb-class-offline";
   note.role = "status";
@@ -122,20 +126,27 @@
     online = state;
     tell();
   }
-  async function ask() {
-    if (member() && !document.hidden) {
+  function heard() {
+    sure = Date.now() + SILENCE;
+    if (!online) become(true);
+  }
+  function doubt() { sure = 0; }
+  async function look() {
+    if (member() && !document.hidden && Date.now() >= sure) {
       try {
         await fetch("../livez", { cache: "no-store", signal: AbortSignal.timeout(PATIENCE) });
-        become(true);
+        heard();
       } catch {
         become(false);
       }
     }
-    setTimeout(ask, EVERY);
+    tell(); // the page may have come into a room, or left it
+    setTimeout(look, EVERY);
   }
-  addEventListener("offline", () => become(false));
+  viserPage.watchLine((what) => { if (what === "heard") heard(); else doubt(); });
+  addEventListener("offline", () => { doubt(); become(false); });
   addEventListener("online", () => tell());
-  setTimeout(ask, EVERY);
+  setTimeout(look, EVERY);
 
   // A new connection counts from the beginning.
   addEventListener("kinboard-connect", () => { opened = ""; sent = new Set(); filled = null; });

@@ -175,7 +175,11 @@ const viserPage = (() => {
   const cameraWatchers = [];
   const htmlWatchers = new Map(); // what HTML of the panel begins with → what to call
   const workers = new WeakSet(); // that are listened to
+  const lineWatchers = [];
+  const tellLine = (what) => { for (const act of lineWatchers) act(what); };
   function hear({ data }) {
+    if (data?.type === "closed") tellLine("closed");
+    else if (data?.type === "connected" || data?.type === "message_batch") tellLine("heard");
     if (!Array.isArray(data?.messages)) return;
     HOOKS.hear++;
     dropVoidUpdates(data.messages);
@@ -212,12 +216,14 @@ const viserPage = (() => {
       HOOKS.reportCamera++;
       for (const act of cameraWatchers) act(data.message.wxyz);
     }
+    if (data?.type === "send") tellLine("sent");
     return postMessage.call(this, data, ...rest);
   };
   function sendDirectly(message) {
     const before = messages.slice(-4); // the field may not have sent them yet; what was read already is ignored
     const value = JSON.stringify(bytes([...before, message]) < LONGEST ? [...before, message] : [message]);
     postMessage.call(link.worker, { type: "send", message: { type: "GuiUpdateMessage", uuid: link.uuid, updates: { value } } });
+    tellLine("sent");
   }
 
   function send(name, argument = null, done = null, direct = false) {
@@ -510,6 +516,8 @@ const viserPage = (() => {
     watch,
     /** Call `act` with the camera's orientation (w, x, y, z) in the world frame when viser reports it. */
     watchCamera: (act) => { cameraWatchers.push(act); },
+    /** Call `act` with "sent" or "heard" when something goes to the service or comes from it, and with "closed". */
+    watchLine: (act) => { lineWatchers.push(act); },
     /** Call `act` with HTML of the panel that begins with `start`, when it comes: the panel itself may be folded away. */
     watchHtml: (start, act) => { htmlWatchers.set(start, act); },
     /** Call `act` when the value of a slider changes; `thumb` is what `thumbOf` returns. */

@@ -369,7 +369,8 @@ class Hub:
                 return True
             versions = None
         if versions is None:  # each by itself: one room must not hold up the others
-            return all([self._store({room: each}) for room, each in news.items()])
+            answered = [self._store({room: each}) for room, each in news.items()]
+            return all(answered)
         with self._lock:
             for room, version in versions.items():
                 live = self._lives[room]

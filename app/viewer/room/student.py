@@ -321,7 +321,8 @@ class Student(Member):
         self._tell()
         guest = self.page.guest
         update_html(
-            self._head, views.student_html(self.room, self.mode, self.activity.task, self._submissions.state, guest)
+            self._head,
+            views.student_html(self.room, self.mode, self.activity.task, self._submissions.state, guest),
         )
         update_html(self._question, views.poll_html(self.room.poll, teacher=False))
         update_html(self._stored, views.stored_html(self.room, now()))

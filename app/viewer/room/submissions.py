@@ -39,7 +39,7 @@ class Submissions:
         changed: called by the thread after each outcome.
 
     Attributes:
-        state: how far they are; replaced as a whole, so that a reader needs no lock and never sees half an outcome.
+        state: how far they are; replaced as a whole, so that readers need no lock and never see half an outcome.
     """
 
     def __init__(self, submit: Callable[[NewAttempt], Confirmed], changed: Callable[[], None]) -> None:

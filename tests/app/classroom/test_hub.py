@@ -387,7 +387,7 @@ def test_a_locked_database_delays_and_loses_nothing(hubs, tmp_path, monkeypatch)
 
 @pytest.fixture
 def ticked(hubs, monkeypatch):
-    """A hub without its thread, two rooms with their teachers, and `fails(room)`: storing it raises from now on."""
+    """A hub without its thread, teachers of two rooms, and the set of the rooms that cannot be stored."""
     hub, _ = hubs
     monkeypatch.setattr(hub, "_run", lambda: None)
     broken = set()

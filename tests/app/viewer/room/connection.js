@@ -1,0 +1,93 @@
+"use strict";
+// Runs static/viser_page.js and static/class_tab.js as the page of a student does, with a clock of its own, and prints
+// what they ask the service and when they say "No connection". Usage: node connection.js FOLDER_OF_SCRIPTS < steps.json
+//
+// A step is ["wait", ms], ["sent"], ["heard"], ["closed"], ["cut"], ["mend"] or ["event", name].
+const fs = require("node:fs");
+const path = require("node:path");
+const vm = require("node:vm");
+
+let now = 1e6;
+let timers = [];
+let cut = false;
+const log = [];
+
+class FakeDate extends Date { static now() { return now; } }
+const setTimeout = (act, delay = 0, ...rest) => {
+  const timer = { at: now + delay, act: () => act(...rest) };
+  timers.push(timer);
+  return timer;
+};
+/** Let all that waits for promises run. */
+const settle = () => new Promise((done) => setImmediate(done));
+async function wait(ms) {
+  const end = now + ms;
+  for (;;) {
+    await settle();
+    const next = timers.filter(({ at }) => at <= end).sort((a, b) => a.at - b.at)[0];
+    if (!next) break;
+    timers = timers.filter((each) => each !== next);
+    now = next.at;
+    next.act();
+  }
+  now = end;
+}
+
+/** A class of the browser: its prototype has what viser_page.js replaces. */
+const standIn = (name, ...properties) => {
+  const made = { [name]: class {} }[name];
+  for (const each of properties) Object.defineProperty(made.prototype, each, { configurable: true, get() { return ""; }, set() {} });
+  return made;
+};
+class Worker extends EventTarget { postMessage() {} }
+class WebGL2RenderingContext { shaderSource() {} attachShader() {} linkProgram() {} }
+class Storage { getItem() { return null; } setItem() {} }
+
+const page = new EventTarget();
+const note = { classList: [], textContent: "", hidden: true, isConnected: true };
+const bar = { dataset: {}, offsetHeight: 0 };
+const root = { dataset: {}, style: { setProperty() {} }, toggleAttribute() {} };
+const document = Object.assign(new EventTarget(), {
+  hidden: false,
+  documentElement: root,
+  createElement: () => note,
+  querySelector: (selector) => (selector.startsWith("[data-class-bar]") ? bar : null),
+  querySelectorAll: () => [],
+});
+const world = vm.createContext({
+  document, setTimeout, Date: FakeDate, Worker, WebGL2RenderingContext, Storage, Event, CustomEvent, URL, TextEncoder,
+  Intl, navigator: { language: "en", languages: ["en"] }, history: { replaceState() {} }, location: new URL("http://127.0.0.1/viewer/"),
+  addEventListener: page.addEventListener.bind(page), dispatchEvent: page.dispatchEvent.bind(page),
+  localStorage: new Storage(), sessionStorage: new Storage(), ResizeObserver: class { observe() {} disconnect() {} },
+  Node: standIn("Node", "textContent"), Element: standIn("Element", "innerHTML"), HTMLScriptElement: standIn("HTMLScriptElement"),
+  HTMLInputElement: standIn("HTMLInputElement", "value"), Navigator: standIn("Navigator"), MutationObserver: class { observe() {} },
+  AbortSignal: { timeout: (ms) => ms },
+  fetch: (url, { signal: patience }) => {
+    log.push([now - 1e6, url]);
+    return cut ? new Promise((_, refuse) => setTimeout(() => refuse(new Error("timeout")), patience)) : Promise.resolve({});
+  },
+});
+world.window = world;
+for (const name of ["viser_page.js", "class_tab.js"]) {
+  vm.runInContext(fs.readFileSync(path.join(process.argv[2], name), "utf8"), world, { filename: name });
+}
+Object.defineProperty(note, "textContent", { set(text) { this.text = text; log.push([now - 1e6, text]); }, get() { return this.text ?? ""; } });
+
+const line = new Worker();
+line.postMessage({ type: "set_server" });
+const tell = (data) => line.dispatchEvent(Object.assign(new Event("message"), { data }));
+const steps = {
+  wait,
+  sent: () => line.postMessage({ type: "send", message: { type: "GuiUpdateMessage", uuid: "a", updates: { value: 1 } } }),
+  heard: () => tell({ type: "message_batch", messages: [] }),
+  closed: () => tell({ type: "closed" }),
+  cut: () => { cut = true; },
+  mend: () => { cut = false; },
+  event: (name) => page.dispatchEvent(new Event(name)),
+  hide: () => { document.hidden = true; },
+};
+(async () => {
+  for (const [step, ...rest] of JSON.parse(fs.readFileSync(0, "utf8"))) await steps[step](...rest);
+  await settle();
+  console.log(JSON.stringify(log));
+})();
