@@ -383,7 +383,7 @@ class Hub:
         return True
 
     def _put_back(self, news: Iterable[str], retry_at: float = -math.inf) -> None:
-        """What was on its way is pending again, below what has been told since."""
+        """What was on its way is pending again, below what has been reported since."""
         with self._lock:
             for room in news:
                 live = self._lives[room]

@@ -2,8 +2,8 @@
 
 A reservation that nobody refers to any more is given back by its finaliser. The garbage collector may call that in
 the middle of any statement, so also in a thread that holds the lock of the memory: a finaliser that waited for
-the lock would stop this thread, and all others after it. So it only leaves its bytes in a queue, and whoever holds
-the lock next subtracts them.
+the lock would stop this thread, and all others after it. So it only leaves its bytes in a queue, from which they
+are subtracted under the lock later.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ import kin
 from app.api import ik
 from app.api.batches import SENT, HeldResponse
 from app.service.main import create_app
+from app.shared.memory import answers
 from app.shared.memory.answers import SMALL, AnswerMemory, AnswerTooLargeError, MemoryFullError, MemoryShare
 from app.shared.settings import Settings
 
@@ -172,25 +173,35 @@ def test_memory_is_bounded_for_one_and_for_all():
     assert memory.held == 0
 
 
-@pytest.mark.parametrize("locked", ["whole", "share"])
-def test_a_reservation_may_be_collected_by_a_thread_that_holds_the_lock(locked):
-    """As the collector does that begins while the error of a full memory is made."""
-    whole = AnswerMemory(2 * SMALL, 4 * SMALL)
-    share = MemoryShare(whole, 2 * SMALL)
+@pytest.mark.parametrize("full", ["whole", "share"])
+def test_a_reservation_may_be_collected_while_the_memory_is_locked(full, monkeypatch):
+    """The garbage collector may begin anywhere, as here where the error of a full memory is made."""
+
+    class CollectedError(MemoryFullError):
+        def __init__(self):
+            gc.collect()
+
+    monkeypatch.setattr(answers, "MemoryFullError", CollectedError)
+    whole = AnswerMemory(4 * SMALL, (4 if full == "whole" else 100) * SMALL)
+    share = MemoryShare(whole, (4 if full == "share" else 100) * SMALL)
+    kept = share.reserve(2 * SMALL)
     cycle = [share.reserve(2 * SMALL)]
     cycle.append(cycle)
     del cycle
+    raised = []
 
-    def collect():
-        with (whole if locked == "whole" else share)._lock:
-            gc.collect()
+    def reserve():
+        with pytest.raises(MemoryFullError):
+            share.reserve(4 * SMALL)
+        raised.append(True)
 
-    thread = threading.Thread(target=collect, daemon=True)
+    thread = threading.Thread(target=reserve, daemon=True)
     thread.start()
     thread.join(10.0)
-    assert not thread.is_alive(), "it waits for a lock that it holds"
-    assert (share.held, whole.held) == (0, 0)
+    assert raised, "it waits for a lock that it holds"
+    assert share.held == whole.held == 2 * SMALL
     share.reserve(2 * SMALL)
+    kept.release()
 
 
 def test_what_was_forgotten_leaves_room_for_the_next():

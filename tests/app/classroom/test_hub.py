@@ -386,22 +386,18 @@ def test_a_locked_database_delays_and_loses_nothing(hubs, tmp_path, monkeypatch)
 
 
 @pytest.fixture
-def ticked(hubs, monkeypatch):
-    """A hub without its thread, teachers of two rooms, and the set of the rooms that cannot be stored."""
-    hub, _ = hubs
-    monkeypatch.setattr(hub, "_run", lambda: None)
-    broken = set()
+def broken(monkeypatch):
+    """The rooms that cannot be stored, and the rooms whose storing was tried."""
+    rooms, tried = set(), []
 
     def store_or_fail(connection, room, *news):
-        if room in broken:
+        tried.append(room)
+        if room in rooms:
             raise ZeroDivisionError("no error of the database")
         return store(connection, room, *news)
 
     monkeypatch.setattr("app.classroom.ticks.store", store_or_fail)
-    rooms = [hub.rooms.open(title, 3600) for title in ("Ada's", "Emmy's")]
-    teachers = [hub.attend(hub.ticket(room.token), nothing) for room in rooms]
-    hub._tick()
-    return hub, teachers, broken
+    return rooms, tried
 
 
 def stored(hub, page):
@@ -409,49 +405,49 @@ def stored(hub, page):
         return connection.scalar(select(Room.state).where(Room.id == page.ticket.room)) or {}
 
 
-def test_an_error_that_is_not_the_database_s_loses_nothing_of_the_tick_and_holds_up_no_other_room(
-    ticked, monkeypatch, caplog
+def test_any_error_while_a_room_is_stored_loses_nothing_and_holds_up_no_other_room(
+    hubs, broken, monkeypatch, caplog
 ):
-    hub, (bad, well), broken = ticked
+    hub, _ = hubs
+    rooms, tried = broken
     now = [clock.steady()]
     monkeypatch.setattr("app.classroom.hub.steady", lambda: now[0])
-    broken.add(bad.ticket.room)
-    bad.send_task("swing")
+    bad, well = (hub.attend(hub.ticket(hub.rooms.open(title, 3600).token), nothing) for title in ("Bad", "Well"))
+    rooms.add(bad.ticket.room)
     bad.set_frozen(True)
-    well.set_follow(True)
-    assert hub._tick()
-    assert stored(hub, well)["follow"]
-    assert not stored(hub, bad).get("frozen")
-    assert bad.room.frozen, "in this process at once"
-    assert (bad.room.problem, well.room.problem) == (UNSTORED, "")
-    assert "could not be stored" in caplog.text
-    caplog.clear()
-    bad.set_frozen(False)  # newer than what could not be stored
     well.set_frozen(True)
-    assert hub._tick()
-    assert stored(hub, well)["frozen"]
-    assert not caplog.records, "it is not tried in each tick"
+    until(lambda: stored(hub, well).get("frozen"))
+    until(lambda: bad.room.problem == UNSTORED)
+    assert not stored(hub, bad)
+    assert bad.room.frozen, "in this process at once"
+    assert "could not be stored" in caplog.text
+    count = tried.count(bad.ticket.room)
+    bad.set_frozen(False)  # newer than what could not be stored
+    bad.show_seat("Ann")
+    well.set_frozen(False)
+    until(lambda: not stored(hub, well)["frozen"])
+    well.set_frozen(True)
+    until(lambda: stored(hub, well)["frozen"])
+    assert tried.count(bad.ticket.room) == count, "not in each tick"
+    assert (bad.room.problem, well.room.problem) == (UNSTORED, "")
+    rooms.clear()
     now[0] += RETRY_ROOM
-    hub._tick()
-    assert len(caplog.records) == 1
-    assert bad.room.problem == UNSTORED
-    broken.clear()
-    now[0] += RETRY_ROOM
-    hub._tick()
-    assert stored(hub, bad)["task"]["exercise"] == "swing"
-    assert not stored(hub, bad)["frozen"]
-    assert bad.room.problem == ""
+    until(lambda: stored(hub, bad))
+    assert stored(hub, bad) == {"frozen": False, "shown": {"seat": "Ann", "named": True}}
+    until(lambda: not bad.room.problem)
 
 
-def test_what_could_not_be_stored_is_tried_once_more_when_the_service_stops(ticked):
-    hub, (bad, _), broken = ticked
-    broken.add(bad.ticket.room)
-    bad.set_frozen(True)
-    hub._tick()
-    broken.clear()
-    hub._stopping.set()
-    hub._tick()
-    assert stored(hub, bad)["frozen"]
+def test_what_could_not_be_stored_is_tried_again_when_the_service_stops(hubs, broken, monkeypatch):
+    hub, other = hubs
+    rooms, _ = broken
+    monkeypatch.setattr("app.classroom.hub.RETRY_ROOM", 1e9)
+    page = hub.attend(hub.ticket(hub.rooms.open("Kinematics", 3600).token), nothing)
+    rooms.add(page.ticket.room)
+    page.set_frozen(True)
+    until(lambda: page.room.problem)
+    rooms.clear()
+    hub.close()
+    assert stored(other, page)["frozen"]
 
 
 @pytest.mark.full

@@ -132,22 +132,25 @@ def test_a_page_without_a_room_has_nothing_of_it(room: Class) -> None:
 
 def test_a_page_leaves_its_room_once(room: Class, monkeypatch: pytest.MonkeyPatch) -> None:
     left: list[str] = []
-    gone = threading.Event()
-    forget, end = room.hub.leave, ClassroomPage._leave
+    pages: list[ClassroomPage] = []
+    ending = threading.Event()
+    leave, end = room.hub.leave, ClassroomPage.end
 
-    def leave(page: Attendance) -> None:
+    def note(page: Attendance) -> None:
         left.append(page.ticket.seat)
-        forget(page)
+        leave(page)
 
-    def end_page(page: ClassroomPage) -> None:
+    def keep(page: ClassroomPage) -> None:
+        pages.append(page)
         end(page)
-        gone.set()
+        ending.set()
 
     student, ticket = room.join("Ann")
-    monkeypatch.setattr(room.hub, "leave", leave)
-    monkeypatch.setattr(ClassroomPage, "_leave", end_page)
+    monkeypatch.setattr(room.hub, "leave", note)
+    monkeypatch.setattr(ClassroomPage, "end", keep)
     student.close()
-    assert gone.wait(10.0)
+    assert ending.wait(10.0)
+    assert pages[0].join(10.0)
     assert left == [ticket.seat]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import threading
 from dataclasses import replace
@@ -24,7 +23,7 @@ from app.viewer.room import submissions, views
 from app.viewer.room.member import act_of
 from app.viewer.room.sharing import REST, Sharing
 from app.viewer.room.student import Student
-from app.viewer.room.submissions import Submissions, SubmissionState
+from app.viewer.room.submissions import Submissions
 from app.viewer.room.wall import LETTER, LINES, MOST, PADS, SYMBOLS, SmallArm, layout_of
 from app.viewer.session.state import PageState
 from app.viewer.worksheet.feature import Worksheets
@@ -122,36 +121,30 @@ def test_an_answer_is_stored_or_it_is_said_why_not(
 def test_no_half_of_an_outcome_of_an_answer_is_seen() -> None:
     """A page that looks between two steps must not read that a refused answer is tried again."""
     outcomes = [None, RefusedError("removed."), ZeroDivisionError(), None]
-    seen: list[SubmissionState] = []
+    seen: list[object] = []
     stored = threading.Event()
 
-    class WatchedLock:
-        """Notes what others see whenever it is taken and released."""
+    class Seen(Submissions):
+        """Notes what others see from each step on."""
 
-        def __enter__(self) -> None:
-            lock.acquire()
-            seen.append(sent.state)
-
-        def __exit__(self, *_: object) -> None:
-            seen.append(sent.state)
-            lock.release()
+        def __setattr__(self, name: str, value: object) -> None:
+            super().__setattr__(name, value)
+            if name == "state":
+                seen.append(value)
 
     def submit(attempt: NewAttempt) -> Confirmed:
         if (error := outcomes.pop(0)) is not None:
             raise error
         return Confirmed(attempt.id, 1.0)
 
-    lock = threading.Lock()
-    sent = Submissions(submit, stored.set)
-    sent._lock = WatchedLock()  # type: ignore[assignment]
+    sent = Seen(submit, stored.set)
     failed = "The answer could not be stored; the server log has the details."
-    said = ["", "removed.", failed, ""]
-    for problem in said:
+    for problem in ("", "removed.", failed, ""):
         stored.clear()
         sent.add(ATTEMPT)
         assert stored.wait(10.0)
         assert sent.state.problem == problem
-    before, *after = (each for each, _ in itertools.groupby(seen))
+    before, *after = seen
     assert before == (0, 0, "")
     assert after == [
         (1, 0, ""), (0, 1, ""),
@@ -178,7 +171,7 @@ def test_no_half_of_an_outcome_of_an_answer_is_seen() -> None:
     ],
 )
 def test_acts_are_what_a_visitor_does_to_the_arm(key: object, value: object, act: str) -> None:
-    assert act_of(key, value, (Practising, Student, Worksheets)) == act  # type: ignore[arg-type]
+    assert act_of(key, value, (Practising, Student, Worksheets)) == act  # type: ignore[arg-type]  # type: ignore[arg-type]
 
 
 def work(*scores: float | None, exercise: str = "swing", answer: str = "[1]") -> dict[str, Work]:

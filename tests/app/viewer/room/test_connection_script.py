@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ def test_a_page_that_hears_of_the_service_does_not_ask_for_it() -> None:
 
 def test_a_page_at_rest_asks_every_five_to_six_seconds() -> None:
     asked = [at for at, what in said(["wait", 60_000]) if what == ASKED]
-    pauses = [after - before for before, after in zip(asked, asked[1:], strict=False)]
+    pauses = [after - before for before, after in pairwise(asked)]
     assert 5000 <= min(pauses) <= max(pauses) < 5800
     assert said(["hide"], ["wait", 60_000]) == []
 
@@ -45,12 +46,12 @@ def test_a_page_at_rest_asks_every_five_to_six_seconds() -> None:
     ids=["acts", "closed", "offline", "rests"],
 )
 def test_a_lost_connection_is_said(act: list[Any], within: float) -> None:
-    told = said(["wait", 1000], ["heard"], ["cut"], act, ["wait", 9000])
-    lost = min(at for at, what in told if what == LOST)
+    shown = said(["wait", 1000], ["heard"], ["cut"], act, ["wait", 9000])
+    lost = min(at for at, what in shown if what == LOST)
     assert lost - 1000 <= within
-    asked = [at for at, what in told if what == ASKED and at > 1000]
+    asked = [at for at, what in shown if what == ASKED and at > 1000]
     assert len(asked) >= 2, "it goes on asking"
-    assert told[-1][1] != "", "and goes on saying so"
+    assert shown[-1][1] != "", "and goes on saying so"
 
 
 def test_a_connection_that_is_back_is_seen() -> None:
