@@ -3,6 +3,11 @@
 uvicorn queues any number of pipelined requests, collects a head of any size, and waits for requests without end.
 Here a connection has at most `MAX_PIPELINE` requests waiting, heads are bounded, requests must arrive in time, and
 answers must be read. Refusals are problem documents. Answers to HTTP/1.0 are not chunked.
+
+A request in chunks may have more than its body: extensions of chunks, and trailer fields after the last one. uvicorn
+takes trailers for header fields, after the application has read those. Here both are counted, bounded as the head
+is, and dropped. What is ambiguous about where a request ends or which host it is for is refused: httptools does so
+for its length, `_check_head` for the rest.
 """
 
 from __future__ import annotations
@@ -33,6 +38,7 @@ if TYPE_CHECKING:
 MAX_PIPELINE: Final = 16  # requests of a connection that wait for the one being answered
 MAX_HEAD: Final = 64 * 1024  # bytes
 MAX_HEADERS: Final = 128
+CHUNK_FRAME: Final = 16  # bytes of a chunk besides its data that do not count: its size and two line ends
 MIN_RATE: Final = 1024.0  # bytes per second, on average, at which a body must arrive
 PIECE: Final = (
     LARGEST - MAX_HEAD
@@ -50,8 +56,9 @@ require_shape(
     HttpToolsProtocol,
     *("connection_made", "connection_lost", "data_received", "resume_writing", "_unset_keepalive_if_required"),
     "timeout_keep_alive_handler",
-    *("on_message_begin", "on_headers_complete", "on_message_complete", "on_response_complete"),
-    *("_start_asgi_task", "handle_websocket_upgrade", "_should_upgrade", "_unsupported_upgrade_warning"),
+    *("on_message_begin", "on_header", "on_headers_complete", "on_body", "on_message_complete"),
+    "on_response_complete",
+    *("_start_asgi_task", "handle_websocket_upgrade", "_should_upgrade"),
     *("cycle", "flow", "headers", "parser", "pipeline", "server_state"),
 )
 require_shape(
@@ -133,7 +140,10 @@ class HttpProtocol(HttpToolsProtocol):
         self._outflow: Outflow
         self._in_message = False
         self._head_complete = False
+        self._ignored_upgrade = False  # the head offers another protocol, and is parsed again without that
         self._head = 0  # bytes of an incomplete head, without those that came with its beginning
+        self._besides = 0  # bytes after the head that are neither body nor frames of chunks
+        self._trailers: list[int] = []  # bytes of each trailer field
         self._received = 0  # bytes since the message began
         self._since = 0.0  # when we began to wait for what the client is to send
         self._last = 0.0  # when it last sent something
@@ -229,44 +239,90 @@ class HttpProtocol(HttpToolsProtocol):
         self._last = self.loop.time()
         if self._handover is not None:
             self._keep(data)
+        view = memoryview(data)
+        if all(self._parse(view[start : start + MAX_HEAD]) for start in range(0, len(data), MAX_HEAD)):
+            if not self._in_message or self._head_complete:
+                self._raw = None
+
+    def _parse(self, piece: memoryview | bytes) -> bool:
+        """Parse at most `MAX_HEAD` bytes; returns whether what follows them is for this parser too.
+
+        How much of a piece belongs to a head, or to what follows it, that begins within the piece is not known and
+        not counted. So at most two pieces of an incomplete field are kept before it is refused.
+        """
+        self._besides += len(piece)
         try:
-            self.parser.feed_data(data)
-        except httptools.HttpParserUpgrade:
+            self.parser.feed_data(piece)
+        except httptools.HttpParserUpgrade as upgrade:
             if self._should_upgrade():
                 self.handle_websocket_upgrade()
-            return
+                return False
+            return self._parse(self._plain_head()) and self._parse(piece[upgrade.args[0] :])
         except httptools.HttpParserError as error:
             self._end(error.__context__)
-            return
-        if self._in_message and not self._head_complete:
-            self._head += len(data) if self._head >= 0 else 1
+            return False
+        if not self._in_message:
+            return True
+        if self._head_complete:
+            self._besides = max(0, self._besides)
+            if self._besides > MAX_HEAD:
+                self._refuse(_trailers_too_large())
+        else:
+            self._head += len(piece) if self._head >= 0 else 1
             if self._head > MAX_HEAD or len(self.headers) > MAX_HEADERS:
                 self._refuse(_head_too_large())
-        else:
-            self._raw = None
+        return not self.ended
+
+    def _plain_head(self) -> bytes:
+        """The head that was parsed, without the offer of another protocol, for which httptools skips its body."""
+        start = self.parser.get_method(), self.url, self.parser.get_http_version().encode()
+        lines = [b"%s %s HTTP/%s" % start]
+        lines += [name + b": " + value for name, value in self.headers if name != b"upgrade"]
+        return b"\r\n".join([*lines, b"", b""])
 
     def on_message_begin(self) -> None:
         if len(self.pipeline) >= MAX_PIPELINE:
             raise _PipelineFullError
         super().on_message_begin()
-        self._in_message, self._head_complete = True, False
-        self._head, self._received = -1, 0
+        self._in_message, self._head_complete, self._ignored_upgrade = True, False, False
+        self._head, self._received, self._trailers = -1, 0, []
         self._since = self.loop.time()
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        if not self._head_complete:
+            super().on_header(name, value)
+            return
+        self._trailers.append(len(name) + len(value) + 4)
+        if sum(self._trailers) > MAX_HEAD or len(self._trailers) > MAX_HEADERS:  # they may have come at once too
+            raise _trailers_too_large()
+
+    def on_chunk_header(self) -> None:
+        """httptools has read the size and the extensions of a chunk."""
+        self._besides -= CHUNK_FRAME
+
+    def on_body(self, body: bytes) -> None:
+        self._besides -= len(body)
+        super().on_body(body)
 
     def on_headers_complete(self) -> None:
         size = len(self.url) + sum(len(name) + len(value) + 4 for name, value in self.headers)
         if size > MAX_HEAD or len(self.headers) > MAX_HEADERS:  # a whole head may have come at once
             raise _head_too_large()
+        _check_head(self.parser.get_http_version(), self.parser.get_method(), self.headers)
+        self._ignored_upgrade = self.parser.should_upgrade() and not self._should_upgrade()
+        if self._ignored_upgrade:
+            return
         if self._handover is not None:
             path = urllib.parse.unquote((httptools.parse_url(self.url).path or b"").decode("ascii", "replace"))
             if (elsewhere := self._handover.destination(path, bool(self._first))) is not None:
                 raise _ElsewhereError(elsewhere)
-        self._head_complete, self._first = True, b""
         super().on_headers_complete()
+        self._head_complete, self._first, self._besides = True, b"", 0
 
     def on_message_complete(self) -> None:
         self._in_message = False
-        super().on_message_complete()
+        if not self._ignored_upgrade:
+            super().on_message_complete()
 
     def on_response_complete(self) -> None:
         self._since = self._last = self.loop.time()
@@ -331,9 +387,6 @@ class HttpProtocol(HttpToolsProtocol):
         self.transport.write(raw_answer(error, self.server_state.default_headers))
         self.transport.close()
 
-    def _unsupported_upgrade_warning(self) -> None:
-        """Nothing: a client that offers another protocol gets HTTP/1.1, as it expects."""
-
     # the application
 
     def handle_websocket_upgrade(self) -> None:
@@ -387,6 +440,25 @@ class _ElsewhereError(Exception):
 def _head_too_large() -> ProblemError:
     detail = f"The head of the request has more than {MAX_HEAD} bytes or {MAX_HEADERS} fields."
     return ProblemError(431, "head-too-large", detail, "Send fewer or shorter header fields.")
+
+
+def _trailers_too_large() -> ProblemError:
+    detail = f"Trailers and chunk extensions of the request have more than {MAX_HEAD} bytes or {MAX_HEADERS} fields."
+    return ProblemError(431, "head-too-large", detail, "Send them in the body.")
+
+
+def _check_head(version: str, method: bytes, headers: Iterable[tuple[bytes, bytes]]) -> None:
+    """Raises `ProblemError` for a request of another HTTP, for no host or several, or in unknown codings."""
+    if version not in ("1.0", "1.1"):
+        raise ProblemError(505, "bad-request", f"HTTP/{version} is not supported.", "Send HTTP/1.1.")
+    hosts = sum(name == b"host" for name, _ in headers)
+    if hosts > 1 or (hosts == 0 and version == "1.1"):
+        detail = f"The request has {hosts} header fields Host." if hosts else "The request has no header field Host."
+        raise ProblemError(400, "bad-request", detail, "Send exactly one.")
+    if any(name == b"transfer-encoding" and value.strip().lower() != b"chunked" for name, value in headers):
+        raise ProblemError(501, "bad-request", "The request has a Transfer-Encoding other than chunked.")
+    if method == b"CONNECT":
+        raise ProblemError(501, "bad-request", "CONNECT is not supported: this is not a proxy.")
 
 
 def _while_connected(app: Any, cycle: RequestResponseCycle) -> Any:
