@@ -296,12 +296,8 @@ class HttpProtocol(HttpToolsProtocol):
         if sum(self._trailers) > MAX_HEAD or len(self._trailers) > MAX_HEADERS:  # they may have come at once too
             raise _trailers_too_large()
 
-    def on_chunk_header(self) -> None:
-        """httptools has read the size and the extensions of a chunk."""
-        self._besides -= CHUNK_FRAME
-
     def on_body(self, body: bytes) -> None:
-        self._besides -= len(body)
+        self._besides -= len(body) + CHUNK_FRAME  # at least once for each chunk
         super().on_body(body)
 
     def on_headers_complete(self) -> None:
