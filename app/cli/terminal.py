@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from app.shared.answers.answer import as_json
+from app.shared.digits import index_of
 from app.shared.store import Store
 from kin import (
     InputError,
@@ -89,11 +90,12 @@ def _per_joint(
         return None
     entries: list[float | list[float] | None] = [None] * robot.n
     for joint, texts in given:
-        if not joint.isdecimal() or not 1 <= int(joint) <= robot.n:
+        number = index_of(joint, robot.n + 1)
+        if not number:
             raise InputError(field, joint, f"a joint from 1 to {robot.n} before the =")
         if len(texts) != count:
             raise InputError(field, texts, "JOINT=VALUE" if count == 1 else "JOINT=LOWER:UPPER")
-        i = int(joint) - 1
+        i = number - 1
         values = [quantity(text, units.of(bool(robot.revolute[i])), field) for text in texts]
         entries[i] = values[0] if count == 1 else values
     return entries

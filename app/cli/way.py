@@ -20,6 +20,7 @@ from app.cli.terminal import (
 from app.exports.program_toml import toml_of
 from app.exports.progress import progress_bar
 from app.shared.answers.way import way_answer
+from app.shared.digits import index_of
 from kin import InputError
 from kin.motion import JointTarget, Ptp
 from kin.units import Unit
@@ -35,7 +36,8 @@ def run(arguments: Namespace) -> int:
     q_start = robot.q_home if start is None else configuration(robot, start, "--start", units)
     q_goal = configuration(robot, arguments.goal, "--goal", units)
     avoided = {"avoid_self_collision": arguments.avoid_self_collision, "obstacles": obstacles_of(arguments)}
-    if not arguments.seed.isdecimal():
+    seed = index_of(arguments.seed, MOST_SEED + 1)
+    if seed is None:
         raise InputError("--seed", arguments.seed, f"a whole number from 0 to {MOST_SEED}")
     seconds = quantity(arguments.time_limit, SECONDS, "--time-limit")
     seen = [0.0]
@@ -45,9 +47,7 @@ def run(arguments: Namespace) -> int:
             advance(int(100 * part) - int(100 * seen[0]))
             seen[0] = part
 
-        way = find_way(
-            robot, q_start, q_goal, seed=int(arguments.seed), time_limit=seconds, progress=progress, **avoided
-        )
+        way = find_way(robot, q_start, q_goal, seed=seed, time_limit=seconds, progress=progress, **avoided)
     motion = way_program(way, **avoided) if way.found else None
     is_piped = arguments.output == "-"  # then standard output has the program alone
     if arguments.json and not is_piped:

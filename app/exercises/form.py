@@ -591,7 +591,7 @@ def _number(text: str) -> int | float | str:
         return text
     if not math.isfinite(value):
         return text
-    return int(text) if re.fullmatch(r"[-+]?\d{1,15}", text) else value
+    return int(text) if re.fullmatch(r"[-+]?[0-9]{1,15}", text) else value
 
 
 def _clean(text: str) -> str:

@@ -4,10 +4,10 @@ uvicorn queues any number of pipelined requests, collects a head of any size, an
 Here a connection has at most `MAX_PIPELINE` requests waiting, heads are bounded, requests must arrive in time, and
 answers must be read. Refusals are problem documents. Answers to HTTP/1.0 are not chunked.
 
-A request in chunks may have more than its body: extensions of chunks, and trailer fields after the last one. uvicorn
-takes trailers for header fields, after the application has read those. Here both are counted, bounded as the head
-is, and dropped. What is ambiguous about where a request ends or which host it is for is refused: httptools does so
-for its length, `_check_head` for the rest.
+A request in chunks may have more than its body: extensions of chunks, and trailer fields after the last one.
+uvicorn adds trailers to the header fields. Here both are counted, bounded as the head is, and dropped. A request
+whose end or host is ambiguous is refused: httptools checks its length, `_check_head` the rest. One that offers
+another protocol than websockets is read as if it did not.
 """
 
 from __future__ import annotations
@@ -240,9 +240,9 @@ class HttpProtocol(HttpToolsProtocol):
         if self._handover is not None:
             self._keep(data)
         view = memoryview(data)
-        if all(self._parse(view[start : start + MAX_HEAD]) for start in range(0, len(data), MAX_HEAD)):
-            if not self._in_message or self._head_complete:
-                self._raw = None
+        going_on = all(self._parse(view[start : start + MAX_HEAD]) for start in range(0, len(data), MAX_HEAD))
+        if going_on and (not self._in_message or self._head_complete):
+            self._raw = None
 
     def _parse(self, piece: memoryview | bytes) -> bool:
         """Parse at most `MAX_HEAD` bytes; returns whether what follows them is for this parser too.
@@ -439,7 +439,7 @@ def _head_too_large() -> ProblemError:
 
 
 def _trailers_too_large() -> ProblemError:
-    detail = f"Trailers and chunk extensions of the request have more than {MAX_HEAD} bytes or {MAX_HEADERS} fields."
+    detail = f"Trailers and chunk extensions have more than {MAX_HEAD} bytes or {MAX_HEADERS} fields."
     return ProblemError(431, "head-too-large", detail, "Send them in the body.")
 
 
@@ -449,7 +449,8 @@ def _check_head(version: str, method: bytes, headers: Iterable[tuple[bytes, byte
         raise ProblemError(505, "bad-request", f"HTTP/{version} is not supported.", "Send HTTP/1.1.")
     hosts = sum(name == b"host" for name, _ in headers)
     if hosts > 1 or (hosts == 0 and version == "1.1"):
-        detail = f"The request has {hosts} header fields Host." if hosts else "The request has no header field Host."
+        count = f"{hosts} header fields" if hosts else "no header field"
+        detail = f"The request has {count} Host."
         raise ProblemError(400, "bad-request", detail, "Send exactly one.")
     if any(name == b"transfer-encoding" and value.strip().lower() != b"chunked" for name, value in headers):
         raise ProblemError(501, "bad-request", "The request has a Transfer-Encoding other than chunked.")

@@ -86,7 +86,7 @@ def dask_client(address: str, field: str = "dask") -> Iterator[Any]:
         raise InputError(field, address, "the extra cluster installed: pip install 'kinboard[cluster]'") from None
     distributed: Any = untyped
     running = "the address of a running scheduler, like tcp://host:8786"
-    if not re.fullmatch(r"(tcp|tls)://.+:\d+", address):  # a client that cannot read it would linger
+    if not re.fullmatch(r"(tcp|tls)://.+:[0-9]+", address):  # a client that cannot read it would linger
         raise InputError(field, address, running)
     try:
         client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)

@@ -39,8 +39,10 @@ def add_serve(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         takes_robot=False,
     )
     parser.add_argument("--host", help="address to listen on (default 127.0.0.1)")
-    parser.add_argument("--port", type=int, help="port to listen on (default 8000; 0 takes any free port)")
-    parser.add_argument("--workers", type=int, metavar="N", help="number of server processes (default 1)")
+    parser.add_argument(
+        "--port", type=whole_number, help="port to listen on (default 8000; 0 takes any free port)"
+    )
+    parser.add_argument("--workers", type=whole_number, metavar="N", help="number of server processes (default 1)")
     parser.add_argument(
         "--pin", action="store_true", default=None, help="keep the interpreter of each process on one processor"
     )
@@ -446,7 +448,11 @@ def add_doctor(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     _add_links(parser)
     parser.add_argument("-o", "--output", metavar="FILE", help="write the mended URDF")
     parser.add_argument(
-        "--mend", type=int, nargs="+", metavar="N", help="mend only the findings with these numbers (default: all)"
+        "--mend",
+        type=whole_number,
+        nargs="+",
+        metavar="N",
+        help="mend only the findings with these numbers (default: all)",
     )
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     return parser
@@ -488,10 +494,18 @@ def add_capability(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--voxel", metavar="SIDE", help="side of a voxel, millimetres (--rad: metres)")
     size.add_argument(
-        "--resolution", type=int, default=25, metavar="N", help="voxels along the longest side (default 25)"
+        "--resolution",
+        type=whole_number,
+        default=25,
+        metavar="N",
+        help="voxels along the longest side (default 25)",
     )
     parser.add_argument(
-        "--directions", type=int, default=48, metavar="N", help="directions per voxel: 12, 24, 48 (default) or 96"
+        "--directions",
+        type=whole_number,
+        default=48,
+        metavar="N",
+        help="directions per voxel: 12, 24, 48 (default) or 96",
     )
     _add_dask(parser)
     parser.add_argument("-o", "--output", metavar="FILE", help="write the map to a file: .npz, .ply or .csv")

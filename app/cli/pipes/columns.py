@@ -42,15 +42,21 @@ class Columns:
             cells = [row[place] for place in self.places]
             if not any(map(str.strip, cells)):
                 return [math.nan] * len(cells)
-            return [float(cell) for cell in cells]
+            return [_number(cell) for cell in cells]
         except (ValueError, IndexError):
             expected = f"{len(self.names)} numbers: " + ", ".join(self.names)
             raise InputError(field, ",".join(row), expected) from None
 
 
+def _number(cell: str) -> float:
+    if not cell.isascii():  # `float` takes the digits of every script
+        raise ValueError
+    return float(cell)
+
+
 def _is_number(cell: str) -> bool:
     try:
-        float(cell)
+        _number(cell)
     except ValueError:
         return not cell  # an empty row stands for what was not solved
     return True

@@ -22,7 +22,7 @@ _PLAIN = dict.fromkeys(("", *COUNTED), 1.0)
 SCALES = {"deg": _DEGREE, "rad": 1.0, "mm": 1e-3, "cm": 1e-2, "m": 1.0, **_PLAIN, RATE: _DEGREE}
 MEASURES = {"deg": "angle", "rad": "angle", "mm": "length", "cm": "length", "m": "length"}
 OTHER = {"m/s": 3, "m/rad": 3, "rad/s": 3, "N": 2, "N·m": 2, "s": 3, "kg": 3, "J": 3}  # decimals
-_PERCENT = re.compile(r"(\d+(?:\.\d+)?) ?%")
+_PERCENT = re.compile(r"([0-9]{1,15}(?:\.[0-9]{1,15})?) ?%")
 
 
 @dataclass(frozen=True)

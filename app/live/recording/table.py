@@ -78,7 +78,7 @@ def _take(row: list[str], line: int, n: int, last: float, seen: dict[str, str], 
 
 def _number(cell: str, line: int) -> float:
     try:
-        value = float(cell)
+        value = float(cell) if cell.isascii() else math.nan  # `float` takes the digits of every script
     except ValueError:
         value = math.nan
     if not math.isfinite(value):

@@ -14,6 +14,7 @@ from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import read_code
 from app.classroom.results.codes import clean_alias
+from app.shared.digits import index_of
 from app.viewer.activity.activity import EXERCISES, REVIEW
 from app.viewer.courses import views
 from app.viewer.courses.views import CourseView
@@ -231,16 +232,17 @@ class CourseFeature(Feature):
             exercise = known.get(item.key) if item.kind == "exercise" and known.is_own(item.key) else None
             return course.added(item) if exercise is None else course.bringing(exercise)
         name, _, index = what.partition("-")
-        if not index.isdecimal() or int(index) >= len(course.items):
+        place = index_of(index, len(course.items))
+        if place is None:
             raise InputError("item", what, "the index of an item")
         if name == "before":
-            after = course.items[int(index)]
+            after = course.items[place]
             if after.kind != "exercise":
                 raise InputError("before", text, "a step with an exercise")
             return course.comparing(text, after.key)
         if name == "note":
-            return course.changed(int(index), note=text)
-        return course.changed(int(index), title=text)
+            return course.changed(place, note=text)
+        return course.changed(place, title=text)
 
     def _download(self) -> None:
         course = self._progress.course

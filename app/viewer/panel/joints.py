@@ -14,6 +14,7 @@ import numpy as np
 import viser
 
 from app.exercises.typed import EntryError
+from app.shared.digits import index_of
 from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.panel.crossing import Crossings
 from app.viewer.panel.entry import read_value
@@ -192,11 +193,12 @@ class JointSliders:
                 return
             text = str(event.target.value)
             number = text.removeprefix(LOCKED)
+            joint = index_of(number, self.robot.n + 1)
             if text == UNLOCK_ALL:
                 post(("lock", self.robot.id, None), False)
-            elif number.isdecimal() and 1 <= int(number) <= self.robot.n:
+            elif joint:
                 # Post the requested state, not a toggle: two quick clicks arrive as one.
-                post(("lock", self.robot.id, int(number) - 1), text == number)
+                post(("lock", self.robot.id, joint - 1), text == number)
 
     def remove(self) -> None:
         """Remove the sliders from the panel."""

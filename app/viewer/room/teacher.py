@@ -12,6 +12,7 @@ from app.classroom.courses import Course, SentExercises, parsed
 from app.classroom.standing import standing
 from app.classroom.views import RoomView, SeatView, in_one_line
 from app.exercises import Exercise, ExerciseFileError
+from app.shared.digits import index_of
 from app.viewer.feature import Stage
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
@@ -195,9 +196,10 @@ class Teacher(Member):
     def _send_course(self, index: str) -> None:
         """Let all follow a course, each at an own pace."""
         offered = self._offered
-        if not index.isdecimal() or int(index) >= len(offered):
+        place = index_of(index, len(offered))
+        if place is None:
             raise InputError("course", index, f"0 to {len(offered) - 1}")
-        course = offered[int(index)]
+        course = offered[place]
         own = {one.exercise.id: one.text for one in course.own}
         self.attendance.send_course(json.dumps(self.page.activity.progress.packed(course)), own)
         self.page.status.show(Notice("hand", f"Sent: {course.title}", "All follow it by themselves now."))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
@@ -32,10 +33,10 @@ def test_a_room_is_opened_listed_and_ended(capsys, folder):
     assert "no room has the code" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("wrong", [["--hours", "0"], ["--hours", "nan"], ["x" * 81]])
+@pytest.mark.parametrize("wrong", [["--hours", "0"], ["--hours", "nan"], ["--hours", "５"], ["x" * 81]])
 def test_what_is_refused_is_named(capsys, wrong):
     assert main(["room", "open", *wrong]) == 2
-    assert "kinboard: " in capsys.readouterr().err
+    assert re.match(r"(usage: .*\n)?kinboard( room open)?: ", capsys.readouterr().err)
 
 
 def test_a_folder_that_cannot_be_made_is_named(capsys, folder):

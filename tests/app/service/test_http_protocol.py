@@ -34,7 +34,9 @@ async def reflect(scope: Scope, receive: Receive, send: Send) -> None:
         size, more = size + len(message.get("body", b"")), message.get("more_body", False)
     names = sorted(name.decode() for name, _ in scope["headers"])
     found = json.dumps({"method": scope["method"], "names": names, "size": size}).encode()
-    await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"%d" % len(found))]})
+    await send(
+        {"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"%d" % len(found))]}
+    )
     await send({"type": "http.response.body", "body": found})
 
 
@@ -68,7 +70,7 @@ def refused(port: int, status: int, *parts: bytes) -> str:
 
 
 def cut_off(port: int, *parts: bytes) -> None:
-    """Expect 431, or a reset: what is unread when the service closes the connection may take the answer with it."""
+    """Expect 431, or a reset: the answer is lost if something is unread when the service closes the connection."""
     try:
         found = answer(port, *parts)
     except ConnectionError:

@@ -52,6 +52,13 @@ def join(student, code, alias="Ada"):
     return student.post("/room/join", data={"code": code, "alias": alias})
 
 
+@pytest.mark.parametrize("hours", ["５", "٣", "1_0", "two", "nan"])
+def test_hours_are_a_number_in_ascii_digits(make, hours):
+    answer = make().post("/room", data={"title": "Kinematics 1", "hours": hours})
+    assert answer.status_code == 422
+    assert "is not a number of hours" in answer.text
+
+
 def test_looking_at_the_pages_makes_no_file_and_no_thread(make, tmp_path):
     before = threading.active_count()
     assert "Open a room" in make().get("/room").text

@@ -6,6 +6,7 @@ cookie is not sent with requests that other sites make, and forms are only accep
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
@@ -28,6 +29,7 @@ from app.service.web.rooms.results import Results
 from app.shared.clients import client_of
 from app.shared.security import origin_allowed, set_cookie
 from app.shared.settings import Settings
+from kin.files.numbers import number_of
 
 if TYPE_CHECKING:
     from app.classroom.rooms import OpenRoom
@@ -103,9 +105,8 @@ class _Pages:
         form = await self._form(request)
         title, hours = form.get("title", ""), form.get("hours", "12")
         again = partial(room_page, request, title=title[:200], hours=hours, may_open=True)
-        try:
-            life = float(hours) * 3600.0
-        except ValueError:
+        life = number_of(hours) * 3600.0
+        if math.isnan(life):
             return again(422, message=f"The duration {hours[:20]!r} is not a number of hours.", field="hours")
         client = client_of(request.scope)
         self._limits.opening(client)

@@ -18,6 +18,7 @@ from app.exercises.typed import EntryError
 from app.exports.motion_snippets import SNIPPETS
 from app.exports.program_toml import toml_of
 from app.exports.snippets import named
+from app.shared.digits import index_of
 from app.viewer.feature import Feature, Stage
 from app.viewer.own_arm import KEY
 from app.viewer.panel.status import Notice
@@ -387,14 +388,15 @@ class ProgramTab(Feature):
         """Start in a posture of the chart: the waypoint before takes its joint values."""
         chart = self._chart
         found = None if chart is None or chart.index != index else chart.found
-        if found is None or not isinstance(row, str) or not row.isdecimal() or len(row) > 3:
+        place = None if found is None else index_of(row, len(found.postures))
+        if found is None or place is None:
             return
         before = max((i for i, item in enumerate(self._items[:index]) if item.q), default=None)
-        if int(row) >= len(found.postures) or found.reach[0, int(row)] < 0 or before is None:
+        if found.reach[0, place] < 0 or before is None:
             return
-        q = found.q[0, int(row)]
+        q = found.q[0, place]
         recorded = None if self._plan is None else self._plan.start_as_recorded(index)
-        if recorded is not None and kin.branch_of(found.robot, recorded[1]) == found.postures[int(row)]:
+        if recorded is not None and kin.branch_of(found.robot, recorded[1]) == found.postures[place]:
             q = recorded[1]  # of this posture, the whole turns from which it arrives as recorded
         self._use(changes.changed(self._items, before, q=changes.configuration(q)), self._screen.chosen)
 
@@ -491,8 +493,7 @@ class ProgramTab(Feature):
         self._show_player()
 
     def _set_joint(self, text: object) -> None:
-        joint = int(text) if isinstance(text, str) and text.isdecimal() and len(text) < 4 else None
-        self._screen.joint = joint if joint is not None and joint < self.stage.now.robot.n else None
+        self._screen.joint = index_of(text, self.stage.now.robot.n)
         self._screen.plot(self._motion, self._other)
 
     def _compare(self, value: object) -> None:

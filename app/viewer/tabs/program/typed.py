@@ -10,6 +10,7 @@ import numpy as np
 
 import kin
 from app.exercises.typed import EntryError
+from app.shared.digits import index_of
 from app.viewer.own_arm import clean
 from app.viewer.panel.entry import PoseKind, read_pose, read_value
 from app.viewer.panel.rotations import roll_pitch_yaw
@@ -101,8 +102,8 @@ class Fields:
 
     def _pose(self, field: str, text: str, item: Item) -> Mapping[str, Any]:
         robot, kind = self.robot, field.rstrip("0123456789")
-        if kind == "q" and field[1:].isdecimal() and int(field[1:]) < robot.n:
-            joint = int(field[1:])
+        joint = index_of(field[1:], robot.n) if kind == "q" else None
+        if joint is not None:
             turning = bool(robot.revolute[joint])
             limits = float(robot.lower[joint]), float(robot.upper[joint])
             value = read_value(text, f"Joint {joint + 1}", self.units.of(turning), limits)

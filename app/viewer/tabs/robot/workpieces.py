@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 
+from app.shared.digits import index_of
 from app.viewer.feature import Stage
 from app.viewer.frames import MOST, Frames
 from app.viewer.panel.entry import read_cell
@@ -51,6 +52,7 @@ def added(stage: Stage) -> Frames:
 def removed(frames: Frames, index: object) -> Frames:
     """Without the frame at this place."""
     count = len(frames.workpieces)
-    if not isinstance(index, str) or not index.isdecimal() or int(index) >= count:
+    place = index_of(index, count)
+    if place is None:
         raise InputError("frame-remove", index, f"0 to {count - 1}")
-    return frames.remove(int(index))
+    return frames.remove(place)

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import cast, get_args
 
 from app.shared.computations import Subscription
+from app.shared.digits import index_of
 from app.shared.memory.answers import AnswerMemory
 from app.viewer.declared.scene import SceneView
 from app.viewer.feature import Stage
@@ -165,9 +166,10 @@ class Comparing:
     def proposed(self, index: object, own: OwnArm | None) -> OwnArm:
         """The arm on show with the changes of an explanation; raises `EditError`."""
         found = () if self._found is None else self._found.explanations
-        if not isinstance(index, str) or not index.isdecimal() or int(index) >= len(found):
+        place = index_of(index, len(found))
+        if place is None:
             raise EditError(None, "The table has changed since; this proposal is no longer for it.")
-        return edits.with_table(self._stage.now.robot, own, found[int(index)].robot)
+        return edits.with_table(self._stage.now.robot, own, found[place].robot)
 
     # The drawing
 
