@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from app.shared.answers.answer import as_json
-from app.shared.digits import index_of
 from app.shared.store import Store
 from kin import (
     InputError,
@@ -29,6 +28,7 @@ from kin import (
     pose_from_xyz_rpy,
 )
 from kin.collision.obstacles import checked_obstacles
+from kin.files.numbers import index_of
 from kin.frames import FRAMES
 from kin.transforms import Array
 from kin.typed import ReadError, read, valid

@@ -20,8 +20,8 @@ from app.cli.terminal import (
 from app.exports.program_toml import toml_of
 from app.exports.progress import progress_bar
 from app.shared.answers.way import way_answer
-from app.shared.digits import index_of
 from kin import InputError
+from kin.files.numbers import index_of
 from kin.motion import JointTarget, Ptp
 from kin.units import Unit
 from kin.way import MOST_SEED, find_way, way_program

@@ -6,34 +6,25 @@ Other numbers stay texts here: their units depend on the arm, and `app.cli.termi
 from __future__ import annotations
 
 import argparse
-import math
-import re
-
-from kin.files.numbers import number_of
 
 
 def whole_number(text: str) -> int:
     """A whole number in digits."""
-    text = text.replace("−", "-").strip()
-    if not re.fullmatch("[-+]?[0-9]{1,15}", text):
-        raise ValueError
-    return int(text)
+    return int(_ascii(text.replace("−", "-")))
 
 
 def count(text: str) -> int:
     """A whole number, which may be written as 1e6."""
-    value = number_of(text)
+    value = float(_ascii(text))
     if not value.is_integer():
         raise ValueError
     return int(value)
 
 
-def number(text: str) -> float:
-    """A finite number in ASCII digits."""
-    value = number_of(text)
-    if not math.isfinite(value):
+def _ascii(text: str) -> str:
+    if not text.isascii():  # Python takes the digits of every script
         raise ValueError
-    return value
+    return text
 
 
 def named(text: str) -> tuple[str, list[str]]:

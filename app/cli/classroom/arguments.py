@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from app.cli.arguments.values import number
-
 # A command finds the same database as the service only with the same settings.
 _SAME = "If the service was started with KINBOARD_DATA or KINBOARD_DATABASE_URL, set them to the same values here."
 
@@ -25,8 +23,7 @@ def add_room(commands: Any, _: object) -> argparse.ArgumentParser:
     )
     opening.add_argument(
         "--hours",
-        type=number,
-        default=12.0,
+        default="12",
         metavar="H",
         help="hours until all of it is erased (default: 12)",
     )

@@ -12,6 +12,7 @@ from app.classroom import ClassroomUnavailable, Hub, RefusedError
 from app.classroom.rooms import OpenRoom
 from app.classroom.tokens import read_code, show_code
 from app.shared.settings import Settings
+from kin.files.numbers import number_of
 
 
 def run(arguments: Namespace) -> int:
@@ -21,7 +22,7 @@ def run(arguments: Namespace) -> int:
     try:
         match arguments.action:
             case "open":
-                _show([hub.rooms.open(arguments.title, arguments.hours * 3600.0)], arguments)
+                _show([hub.rooms.open(arguments.title, 3600.0 * number_of(arguments.hours))], arguments)
             case "list":
                 _show(hub.rooms.all() if hub.in_use else [], arguments)
             case _:

@@ -14,7 +14,6 @@ from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import read_code
 from app.classroom.results.codes import clean_alias
-from app.shared.digits import index_of
 from app.viewer.activity.activity import EXERCISES, REVIEW
 from app.viewer.courses import views
 from app.viewer.courses.views import CourseView
@@ -23,6 +22,7 @@ from app.viewer.lessons import LESSONS
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from kin import InputError, KinematicsError
+from kin.files.numbers import index_of
 
 
 class CourseFeature(Feature):

@@ -14,7 +14,6 @@ import numpy as np
 import viser
 
 from app.exercises.typed import EntryError
-from app.shared.digits import index_of
 from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.panel.crossing import Crossings
 from app.viewer.panel.entry import read_value
@@ -22,6 +21,7 @@ from app.viewer.panel.fields import field, fields_html, limit_marks, shown
 from app.viewer.panel.status import Notice
 from app.viewer.viser_patches import show_value
 from kin import InputError, Robot
+from kin.files.numbers import index_of
 from kin.transforms import Array
 from kin.units import Unit, Units, general
 

@@ -12,7 +12,6 @@ from app.classroom.courses import Course, SentExercises, parsed
 from app.classroom.standing import standing
 from app.classroom.views import RoomView, SeatView, in_one_line
 from app.exercises import Exercise, ExerciseFileError
-from app.shared.digits import index_of
 from app.viewer.feature import Stage
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
@@ -27,6 +26,7 @@ from app.viewer.session.history import RESULT
 from app.viewer.session.state import PageState
 from app.viewer.viser_patches import SceneFilter
 from kin import InputError, Robot
+from kin.files.numbers import index_of
 
 logger = logging.getLogger("kinboard.classroom")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 
 import pytest
 
@@ -36,7 +35,7 @@ def test_a_room_is_opened_listed_and_ended(capsys, folder):
 @pytest.mark.parametrize("wrong", [["--hours", "0"], ["--hours", "nan"], ["--hours", "５"], ["x" * 81]])
 def test_what_is_refused_is_named(capsys, wrong):
     assert main(["room", "open", *wrong]) == 2
-    assert re.match(r"(usage: .*\n)?kinboard( room open)?: ", capsys.readouterr().err)
+    assert "kinboard: " in capsys.readouterr().err
 
 
 def test_a_folder_that_cannot_be_made_is_named(capsys, folder):

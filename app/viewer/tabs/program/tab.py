@@ -18,7 +18,6 @@ from app.exercises.typed import EntryError
 from app.exports.motion_snippets import SNIPPETS
 from app.exports.program_toml import toml_of
 from app.exports.snippets import named
-from app.shared.digits import index_of
 from app.viewer.feature import Feature, Stage
 from app.viewer.own_arm import KEY
 from app.viewer.panel.status import Notice
@@ -38,6 +37,7 @@ from app.viewer.tabs.program.ways import Ways
 from app.viewer.tabs.workspace.background import run_in_background
 from app.viewer.takehome.sending import send_page
 from kin import InputError, KinematicsError
+from kin.files.numbers import index_of
 from kin.motion import Motion, Program
 from kin.warmup import MOTIONS
 
@@ -388,8 +388,7 @@ class ProgramTab(Feature):
         """Start in a posture of the chart: the waypoint before takes its joint values."""
         chart = self._chart
         found = None if chart is None or chart.index != index else chart.found
-        place = None if found is None else index_of(row, len(found.postures))
-        if found is None or place is None:
+        if found is None or (place := index_of(row, len(found.postures))) is None:
             return
         before = max((i for i, item in enumerate(self._items[:index]) if item.q), default=None)
         if found.reach[0, place] < 0 or before is None:

@@ -10,13 +10,13 @@ import numpy as np
 
 import kin
 from app.exercises.typed import EntryError
-from app.shared.digits import index_of
 from app.viewer.own_arm import clean
 from app.viewer.panel.entry import PoseKind, read_pose, read_value
 from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.tabs.program.items import LEAST, NAME, Item, configuration, point
 from kin import InputError, Robot, Task
 from kin.axes import inverse
+from kin.files.numbers import index_of
 from kin.motion.program import LONGEST_DWELL
 from kin.transforms import Array
 from kin.typed import ReadError, cut, read

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import re
 
-from app.shared.digits import index_of
 from app.viewer.feature import Stage
 from app.viewer.frames import MOST, Frames
 from app.viewer.panel.entry import read_cell
 from app.viewer.tabs.robot.edits import AXES, Cell, EditError
 from kin import InputError
+from kin.files.numbers import index_of
 from kin.typed import ReadError, cut
 from kin.units import Units
 

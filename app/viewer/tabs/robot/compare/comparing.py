@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from typing import cast, get_args
 
 from app.shared.computations import Subscription
-from app.shared.digits import index_of
 from app.shared.memory.answers import AnswerMemory
 from app.viewer.declared.scene import SceneView
 from app.viewer.feature import Stage
@@ -27,6 +26,7 @@ from app.viewer.tabs.robot.edits import EditError
 from app.viewer.tabs.robot.files import MOST
 from kin import Comparison, InputError, KinematicsError
 from kin.comparison import Frames
+from kin.files.numbers import index_of
 from kin.transforms import Array
 
 POLL = 0.1  # s between two looks at a comparison under way

@@ -1,10 +1,10 @@
-"""Whole numbers in ASCII digits."""
+"""Numbers in ASCII digits."""
 
 from __future__ import annotations
 
 import pytest
 
-from app.shared.digits import index_of
+from kin.files.numbers import index_of
 
 
 @pytest.mark.parametrize(("text", "index"), [("0", 0), ("4", 4), ("004", 4)])
