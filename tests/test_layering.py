@@ -20,6 +20,7 @@ MODEL = {
     "kin.fk",
     "kin.motor",
     "kin.named",
+    "kin.parsing",
     "kin.robot",
     "kin.singularity",
     "kin.tolerances",
@@ -56,7 +57,7 @@ RULES: dict[str, set[str]] = {
     "app/exercises": {"kin", "numpy", "app.exercises"},
     "app/classroom/courses": {"kin", "app.exercises", "app.classroom.courses"},
     "app/classroom": {"sqlalchemy", "alembic", "itsdangerous", "app.classroom", "app.shared"},
-    "app/classroom/lti": {"jwt", "cryptography", "sqlalchemy", "itsdangerous", "app.classroom"},
+    "app/classroom/lti": {"jwt", "cryptography", "sqlalchemy", "itsdangerous", "app.classroom", "kin.parsing"},
     "app/classroom/results": {"kin", "sqlalchemy", "app.classroom", "app.shared.spreadsheets"},
     "app/live": {"kin", "app.classroom.tokens", "app.live", "app.shared.problems"},
     # A program's end of the line needs nothing of the service.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +11,10 @@ from typing import Any, ClassVar
 
 from app.exercises.expressions import VALID, Expression, ExpressionError
 from kin.errors import KinematicsError, shorten
+from kin.parsing import Limits, TextError, read_toml
 
 LONGEST_TEXT = 2000  # characters
+LIMITS = Limits(200_000, 10_000, 16)  # of a file
 MOST_ITEMS = 40
 _PLACE = re.compile(r"\{([^{}]*)\}")
 ALWAYS = Expression("1")
@@ -39,9 +40,9 @@ def text_of(path: Path | str) -> str:
 def toml_of(text: str, file: str) -> dict[str, Any]:
     """The data of a TOML text; raises `ExerciseFileError`, naming `file`."""
     try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise ExerciseFileError(file, "file", str(error), "valid TOML") from None
+        return read_toml(text, LIMITS)
+    except TextError as error:
+        raise ExerciseFileError(file, "file", error.value, error.expected) from None
 
 
 @dataclass(frozen=True)

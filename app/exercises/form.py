@@ -12,14 +12,13 @@ from __future__ import annotations
 import json
 import math
 import re
-import tomllib
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from app.exercises.exercise import TOPICS
-from app.exercises.fields import MOST_ITEMS
+from app.exercises.fields import LIMITS, MOST_ITEMS
 from app.exercises.files import LAST, MOST_HINTS, UNITS
 from app.exercises.kinds import KINDS
 from app.exercises.kinds.find import MEASURES, NONE
@@ -28,6 +27,7 @@ from app.exercises.kinds.number import OTHER, SCALES
 from app.exercises.lessons import LESSONS
 from kin import InputError
 from kin.ik.options import TASKS
+from kin.parsing import TextError, read_toml
 from kin.robot import CONVENTIONS
 
 Draft = dict[str, Any]
@@ -378,8 +378,8 @@ ANSWERS: dict[str, tuple[Field, ...]] = {
 def read(text: str) -> Draft:
     """The draft of any text; empty if it is no TOML. What should be a table and is none is left out."""
     try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError):
+        data = read_toml(text, LIMITS)
+    except TextError:
         return {}
     return {name: value for name, value in data.items() if name not in TABLES or isinstance(value, dict)}
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from functools import lru_cache
 
 from app.exercises.contract import PLAIN_UNITS
 from app.exercises.exercise import Exercise, VariantError
+from kin.parsing import Limits, TextError, read_json
 from kin.units import general
 
 LONGEST = 90  # characters
+LIMITS = Limits(20_000, 10_000, 16)  # of an answer
 
 
 @lru_cache(maxsize=2048)
@@ -20,8 +21,8 @@ def answer_in_words(exercise: Exercise, seed: int, answer: str) -> str:
         answer: as JSON, or its beginning.
     """
     try:
-        given = json.loads(answer)
-    except ValueError:
+        given = read_json(answer, LIMITS)
+    except TextError:
         return _short(answer)  # it goes on
     try:
         asked = exercise.asked(exercise.variant(seed), PLAIN_UNITS)

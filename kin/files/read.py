@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import re
-import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from kin.files.home import default_home
 from kin.files.numbers import LARGEST, NUMBER, scaled
 from kin.frames import matrix_of
 from kin.motor import MOTOR_UNITS, Motor, checked_motors, fit_joints
+from kin.parsing import Limits, TextError, read_toml
 from kin.robot import (
     CONVENTIONS,
     DEFAULT_LIMITS,
@@ -35,6 +35,7 @@ from kin.transforms import as_transform
 
 ANGLES = {"deg": math.pi / 180, "rad": 1.0}
 MAX_ROWS, MAX_CAPSULES, MAX_MOTORS = 32, 64, 64
+LIMITS = Limits(1_000_000, 20_000, 16)  # of a robot file
 MAX_REACH = 1e5  # metres; targets may have coordinates up to 1e6 m
 _TOP = {
     *("id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"),
@@ -140,9 +141,9 @@ def parse_robot(text: str, file: str = "robot") -> Robot:
     if is_path(text):
         raise RobotFileError(file, "file", text, "the text of a robot file (TOML); kin.load_robot takes a path")
     try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError, as is an integer too long
-        raise RobotFileError(file, "file", str(error), "valid TOML") from None
+        data = read_toml(text, LIMITS)
+    except TextError as error:
+        raise RobotFileError(file, "file", error.value, error.expected) from None
     return Reader(file).robot(data)
 
 

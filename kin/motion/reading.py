@@ -21,8 +21,6 @@ world frame, or in the one that `frame` names: ``"base"``, or a workpiece. Every
 
 from __future__ import annotations
 
-import json
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
@@ -51,10 +49,12 @@ from kin.motion.program import (
     kind_of,
 )
 from kin.named import robot_of
+from kin.parsing import Limits, TextError, read_json, read_toml
 from kin.robot import LENGTHS, Robot
 from kin.transforms import Array, as_transform
 
 _TARGET = ("q", "position", "wxyz", "pose", "frame")
+LIMITS = Limits(16_000_000, 4_000_000, 16)  # of a program; a page takes shorter ones
 _TOP = (*field_names(Program), "units")
 _LENGTHS, _ANGLES = ("tool_speed", "blend"), ("tool_turn",)
 
@@ -85,9 +85,9 @@ def parse_program(
         raise InputError("text", text, 'the text of a program, such as pathlib.Path("program.toml").read_text()')
     is_json = text.lstrip("\ufeff \t\r\n").startswith("{")  # no TOML begins so
     try:
-        data = json.loads(text.lstrip("\ufeff")) if is_json else tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError("program", str(error), "valid JSON" if is_json else "valid TOML") from None
+        data = (read_json if is_json else read_toml)(text.lstrip("\ufeff"), LIMITS)
+    except TextError as error:
+        raise InputError("program", error.value, error.expected) from None
     return program_from_dict(data, robot, workpieces)
 
 

@@ -6,7 +6,6 @@ where the range of each motor begins and ends in ticks, and nothing about the ze
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Mapping
@@ -16,11 +15,13 @@ from typing import Any
 from kin.errors import InputError
 from kin.motor import Motor, MotorUnit, checked_motors, fit_joints
 from kin.named import robot_of
+from kin.parsing import Limits, TextError, read_json
 from kin.robot import Robot
 
 _FIELDS = ("id", "drive_mode", "homing_offset", "range_min", "range_max")
 _OLDER = {"motor_names", "calib_mode", "start_pos", "end_pos"}
-_MOST, _LONGEST = 64, 100_000  # motors, characters of a file
+_MOST = 64  # motors
+_LIMITS = Limits(100_000, 2000, 4)  # of a file
 
 
 def motors_from_lerobot(
@@ -111,12 +112,12 @@ def motors_to_lerobot(robot: Robot | str) -> dict[str, dict[str, int]]:
 def _table(calibration: str | Mapping[str, Any]) -> Mapping[str, Any]:
     expected = "LeRobot's calibration: for each motor the fields " + ", ".join(_FIELDS)
     if isinstance(calibration, str):
-        if len(calibration) > _LONGEST:
-            raise InputError("calibration", f"{len(calibration)} characters", f"at most {_LONGEST}")
         try:
-            calibration = json.loads(calibration)
-        except (ValueError, RecursionError):
-            raise InputError("calibration", calibration, expected) from None
+            calibration = read_json(calibration, _LIMITS)
+        except TextError as error:
+            beyond = error.expected.startswith("at most")
+            given, valid = (error.value, error.expected) if beyond else (calibration, expected)
+            raise InputError("calibration", given, valid) from None
     if not isinstance(calibration, Mapping) or not calibration:
         raise InputError("calibration", calibration, expected)
     if _OLDER & set(calibration):

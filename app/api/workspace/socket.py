@@ -32,12 +32,15 @@ from app.shared.metrics import STREAMED
 from app.shared.problems import FieldError, Problem
 from app.shared.slots import Slot
 from kin import Robot, UnknownRobotError
+from kin.parsing import Limits, TextError, read_json
 
 logger = logging.getLogger("kinboard.workspace")
 router = versioned("workspace")
 
 PATIENCE = 10.0  # seconds for the first message of a client that sends its arm along
 PROGRESS_EVERY = 0.1  # seconds between two progress messages
+
+_LIMITS = Limits(1000, 10, 4)  # of a message after the first one
 
 SentCloud = with_robot(CloudQuery)
 
@@ -158,8 +161,8 @@ async def _listen(visitor: WebSocket) -> _Ending:
     if event["type"] == "websocket.disconnect":
         return None
     try:
-        message = json.loads(event.get("text") or "")
-    except (ValueError, RecursionError):
+        message = read_json(event.get("text") or "", _LIMITS)
+    except TextError:
         message = None
     if message == {"cancel": True}:
         return DONE, "cancelled"

@@ -24,9 +24,11 @@ from typing import Any, Self
 from urllib.error import HTTPError
 
 from app.classroom.lti.platforms import HostPort, is_safe, place_of
+from kin.parsing import Limits
 
 PATIENCE = 10.0  # s for the whole exchange
 MOST = 256 * 1024  # bytes of an answer
+LIMITS = Limits(MOST, 20_000, 16)  # of JSON in it
 _MOST_ADDRESSES = 4  # of one name that are tried
 _NAT64 = ipaddress.ip_network("64:ff9b::/96")
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 import math
 import threading
@@ -19,8 +18,9 @@ from concurrent.futures import Future
 from jwt import PyJWK, PyJWKSet, PyJWTError
 
 from app.classroom.clock import steady
-from app.classroom.lti.exchange import PlatformError, ask
+from app.classroom.lti.exchange import LIMITS, PlatformError, ask
 from app.classroom.lti.platforms import Platform
+from kin.parsing import read_json
 
 logger = logging.getLogger("kinboard.lti")
 
@@ -106,7 +106,7 @@ class PlatformKeys:
             failure = ""
         except PlatformError as error:
             failure = f"The platform's keys at {address} cannot be fetched: {error}."
-        except (PyJWTError, ValueError, TypeError, AttributeError, RecursionError):
+        except (PyJWTError, ValueError, TypeError, AttributeError):
             # PyJWT takes the answer as it is: text, a list, or keys without the fields of a key.
             failure = f"What the platform has at {address} is not a set of public keys (JSON Web Key Set)."
         finally:
@@ -120,6 +120,6 @@ class PlatformKeys:
 
 
 def _parsed(text: bytes) -> dict[str, PyJWK]:
-    published = PyJWKSet.from_dict(json.loads(text)).keys
+    published = PyJWKSet.from_dict(read_json(text, LIMITS)).keys
     keys = {each.key_id: each for each in published if each.public_key_use in ("sig", None)}
     return {name: key for name, key in keys.items() if isinstance(name, str) and name}

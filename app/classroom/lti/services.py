@@ -14,9 +14,10 @@ from urllib.parse import urlencode, urlsplit, urlunsplit
 import jwt
 
 from app.classroom.lti.contents import Content
-from app.classroom.lti.exchange import PlatformError, ask
+from app.classroom.lti.exchange import LIMITS, PlatformError, ask
 from app.classroom.lti.launches import CLAIM, SCORE_SCOPE
 from app.classroom.lti.platforms import Platform, Platforms
+from kin.parsing import TextError, read_json
 
 LIFE = 300  # seconds that what we sign is valid
 _DL = "https://purl.imsglobal.org/spec/lti-dl/claim/"
@@ -88,8 +89,8 @@ def post_score(
 def _access_token(answer: bytes) -> str:
     """The token of an answer; raises `PlatformError` for one that cannot stand in a header."""
     try:
-        found = json.loads(answer)["access_token"]
-    except (ValueError, KeyError, TypeError, RecursionError):
+        found = read_json(answer, LIMITS)["access_token"]
+    except (TextError, KeyError, TypeError):
         found = None
     if not isinstance(found, str) or not re.fullmatch(r"[!-~]+", found):
         raise PlatformError("the platform's answer has no access token")

@@ -9,8 +9,8 @@ from __future__ import annotations
 import io
 import json
 import math
+import struct
 from collections.abc import Iterator
-from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -19,6 +19,8 @@ from app.live.recording.recording import ENTRY, Bounds, Entry, Recording, too_la
 from app.live.recording.table import from_csv, to_csv
 from kin import InputError, KinematicsError, Robot, robot_from_dict, robot_to_dict
 from kin._version import __version__
+from kin.files.read import LIMITS
+from kin.parsing import TextError, read_json
 
 if TYPE_CHECKING:
     from mcap.records import Attachment, Chunk
@@ -27,6 +29,11 @@ EXTRA: Final = "pip install 'kinboard[mcap]'"
 FILE: Final = Bounds(seconds=math.inf, size=512 << 20)  # of a file that a program reads
 MAGIC: Final = b"\x89MCAP0\r\n"
 ROBOT, META = "robot.json", "kinboard"
+LONGEST_RECORD: Final = 64 * 1024  # bytes of a channel and of metadata; longer ones are not ours
+LONGEST_NAME: Final = 200  # characters of the name of a program
+WINDOW: Final = 8 << 20  # bytes that zstandard looks back, as RFC 8878 recommends
+_HEAD = struct.Struct("<BQ")  # of a record: its operation code, and bytes of its content
+_MESSAGE = struct.Struct("<HIQQ")  # channel, number, time of the log and of publishing; its data follow
 _NANO = 1_000_000_000
 _NUMBERS = {"type": "array", "items": {"type": "number"}}
 _TYPES: dict[str, dict[str, Any]] = {
@@ -115,10 +122,10 @@ def read_mcap(data: bytes, bounds: Bounds = FILE) -> Recording:
                     robot = record
         if meta is None or robot is None:
             raise wrong
-        arm, start = robot_from_dict(json.loads(robot.data)), robot.log_time
+        arm, start = _robot(robot.data), robot.log_time
         messages.sort(key=itemgetter(0))
         entries = [Entry((at - start) / _NANO, topics[channel], content) for at, channel, content in messages]
-        found = Recording(arm, meta.get("program", ""), bounds, start)
+        found = Recording(arm, meta.get("program", "")[:LONGEST_NAME], bounds, start)
         return found.restored(entries, float(meta.get("seconds", "nan")))
     except KinematicsError:
         raise
@@ -126,19 +133,64 @@ def read_mcap(data: bytes, bounds: Bounds = FILE) -> Recording:
         raise wrong from error
 
 
-def _records(data: bytes, most: int) -> Iterator[Any]:
-    """The records of a file, those in its chunks too: a few bytes may be made to become gigabytes there."""
-    from mcap.records import Chunk
-    from mcap.stream_reader import StreamReader, breakup_chunk
+def _robot(data: bytes) -> Robot:
+    try:
+        return robot_from_dict(read_json(data, LIMITS))
+    except TextError as error:
+        raise InputError(f"recording, {ROBOT}", error.value, error.expected) from None
 
-    left = most
-    for record in StreamReader(io.BytesIO(data), emit_chunks=True, record_size_limit=len(data)).records:
-        if isinstance(record, Chunk):
-            content = _unpacked(record, left)
-            left -= len(content)
-            yield from breakup_chunk(replace(record, compression="", data=content))
-        else:
-            yield record
+
+def _records(data: bytes, most: int) -> Iterator[Any]:
+    """The records of a file that are needed, those in its chunks too, read one at a time.
+
+    A few bytes may be made to become gigabytes in a chunk, so `most` bounds what all chunks have when unpacked, and
+    the number of records. The library would read all records of a chunk at once, and indexes without a bound.
+    """
+    from mcap.data_stream import ReadDataStream
+    from mcap.opcode import Opcode
+    from mcap.records import Attachment, Channel, Chunk, Message, Metadata
+
+    left, count = most, 0
+
+    def read(code: int, content: bytes) -> Iterator[Any]:
+        nonlocal left, count
+        count += 1
+        if count > most // ENTRY:
+            raise too_large(most)
+        stream = ReadDataStream(io.BytesIO(content))
+        match code:
+            case Opcode.MESSAGE:
+                channel, number, logged, published = _MESSAGE.unpack_from(content)
+                yield Message(channel, logged, content[_MESSAGE.size :], published, number)
+            case Opcode.CHANNEL if len(content) <= LONGEST_RECORD:
+                yield Channel.read(stream)
+            case Opcode.METADATA if len(content) <= LONGEST_RECORD:
+                yield Metadata.read(stream)
+            case Opcode.ATTACHMENT:
+                yield Attachment.read(stream)
+            case Opcode.CHUNK:
+                unpacked = _unpacked(Chunk.read(stream), left)
+                left -= len(unpacked)
+                for each in _pieces(unpacked):
+                    if each[0] != Opcode.CHUNK:  # in a chunk there is none
+                        yield from read(*each)
+
+    for code, content in _pieces(data, len(MAGIC)):
+        yield from read(code, content)
+        if code == Opcode.FOOTER:
+            return
+    raise ValueError("the file has no end")
+
+
+def _pieces(data: bytes, at: int = 0) -> Iterator[tuple[int, bytes]]:
+    """Operation code and content of the records from there on; raises `ValueError` where one is cut."""
+    while at < len(data):
+        code, size = _HEAD.unpack_from(data, at)
+        at += _HEAD.size
+        if size > len(data) - at:
+            raise ValueError("a record is longer than the file")
+        yield code, data[at : at + size]
+        at += size
 
 
 def _unpacked(chunk: Chunk, most: int) -> bytes:
@@ -150,7 +202,7 @@ def _unpacked(chunk: Chunk, most: int) -> bytes:
         case "lz4":
             content: bytes = LZ4FrameDecompressor().decompress(chunk.data, most + 1)
         case "zstd":
-            with ZstdDecompressor().stream_reader(chunk.data) as stream:
+            with ZstdDecompressor(max_window_size=WINDOW).stream_reader(chunk.data) as stream:
                 content = stream.read(most + 1)
         case _:
             content = chunk.data

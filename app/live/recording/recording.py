@@ -19,6 +19,7 @@ from weakref import WeakSet
 import numpy as np
 
 from kin import InputError, Robot
+from kin.parsing import Limits, TextError, read_json
 from kin.transforms import Array
 
 SHOWN: Final = "/page/q"
@@ -27,6 +28,7 @@ SPOKEN: Final = ("/sent/q", "/heard/q")  # what was commanded, where the page it
 READ: Final = "read from a file"  # why one has ended that was not made here
 ENTRY: Final = 120  # bytes of an entry beside its data
 LARGEST: Final = 1e6  # radians, metres
+MESSAGE: Final = Limits(16 * 1024, 512, 4)  # of a message with a configuration
 STEP: Final = 1 << 20  # bytes between two looks at all recordings of a process
 
 _shared: WeakSet[Recording] = WeakSet()
@@ -201,19 +203,18 @@ def too_large(most: int) -> InputError:
 
 def _track(entries: list[Entry], n: int) -> Track:
     spoken = (SHOWN,) if any(each.topic == SHOWN for each in entries) else SPOKEN
-    unknown = np.full(n, np.nan)
-    now = {"q": unknown, "measured": unknown}
-    times, rows = [], []
-    for each in entries:
-        if each.topic not in (*spoken, MEASURED):
-            continue
+    wanted = [each for each in entries if each.topic in (*spoken, MEASURED)]
+    now = np.full((2, n), np.nan)  # commanded, measured
+    found = np.empty((len(wanted), 2, n))
+    for k, each in enumerate(wanted):
         field = each.topic.rpartition("/")[2]
-        value = json.loads(each.data)[field]
-        now[field] = unknown if value is None or len(value) != n else _values(value, n)
-        times.append(each.time)
-        rows.append((now["q"], now["measured"]))
-    found = np.array(rows).reshape(-1, 2, n)
-    return Track(np.array(times), found[:, 0], found[:, 1])
+        try:
+            value = read_json(each.data, MESSAGE)[field]
+        except TextError as error:
+            raise InputError(f"recording, {each.topic}", error.value, error.expected) from None
+        now[int(field == "measured")] = np.nan if value is None or len(value) != n else _values(value, n)
+        found[k] = now
+    return Track(np.array([each.time for each in wanted]), found[:, 0], found[:, 1])
 
 
 def _values(given: object, n: int) -> Array:

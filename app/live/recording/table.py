@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import itertools
 import json
 import math
 
 from app.live.recording.recording import MEASURED, SHOWN, Bounds, Entry, Recording
 from kin import InputError, Robot
+from kin.parsing import Limits, TextError, read_csv
 
+LONGEST_ROW = 16 * 1024  # characters: two numbers and names for each of 32 joints are a few thousand
 WAYS = {"commanded": SHOWN, "measured": MEASURED}
 
 
@@ -40,19 +40,17 @@ def from_csv(data: bytes, robot: Robot, bounds: Bounds) -> Recording:
     Raises:
         InputError: it has more bytes than `bounds` says, is no such table, or that of an arm with other joints.
     """
-    if len(data) > bounds.size:
-        raise InputError("recording", f"{len(data)} bytes", f"at most {bounds.size} bytes")
+    rows = read_csv(data, Limits(bounds.size, LONGEST_ROW))
     try:
-        rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
-        first = next(rows, [])
+        _, first = next(rows, (0, []))
         if first != heads(robot):
             raise _other_table(first, robot)
         entries: list[Entry] = []
         last, seen = 0.0, dict.fromkeys(WAYS, "")
-        for row in rows:
-            last = _take(row, rows.line_num, robot.n, last, seen, entries)
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError("recording", str(error), "a recording of a connection (CSV)") from None
+        for line, row in rows:
+            last = _take(row, line, robot.n, last, seen, entries)
+    except TextError as error:
+        raise InputError("recording", error.value, error.expected) from None
     return Recording(robot, bounds=bounds).restored(entries, last)
 
 

@@ -15,27 +15,22 @@ import viser
 
 from app.viewer.panel import Post, update_html
 from app.viewer.views.templates import render
+from kin.parsing import Limits, read_json
 
 LABEL = "Messages of the page"  # of the hidden text field
 AT_ONCE = 32  # messages in the field; more are ignored
 MAX_NUMBER = 2**53
+LIMITS = Limits(64 * 1024, 20_000, 32)  # of a message, and of a link when it is unpacked
 
 
-def read_json(text: str, **options: Any) -> Any:
+def read_page_json(text: str, finite: bool = False) -> Any:
     """The value of a JSON text from a page or a link; raises `ValueError` for what is none or no page could show.
 
     JSON can escape half a letter (``"\\ud800"``), which UTF-8 cannot hold.
     """
-    try:
-        value = json.loads(text, **options)
-        json.dumps(value, ensure_ascii=False).encode()
-    except RecursionError:
-        raise ValueError("nested too deeply") from None
+    value = read_json(text, LIMITS, finite)
+    json.dumps(value, ensure_ascii=False).encode()
     return value
-
-
-def _refuse(number: str) -> object:
-    raise ValueError(f"{number} is no number of JSON")
 
 
 class Reply(NamedTuple):
@@ -74,7 +69,7 @@ class PageScript:
     def read(self, text: str) -> list[tuple[int, str, object]]:
         """The messages in `text` that have not been read yet, as number, name and argument, in order."""
         try:
-            items = read_json(text, parse_constant=_refuse)
+            items = read_page_json(text, finite=True)
         except ValueError:
             return []
         found = []

@@ -30,7 +30,7 @@ from app.viewer.obstacles import placed
 from app.viewer.obstacles.placed import Obstacles
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel.entry import FARTHEST
-from app.viewer.panel.script import read_json
+from app.viewer.panel.script import read_page_json
 from app.viewer.scene.viewpoints import UP
 from app.viewer.session.choices import ViewState
 from kin import KinematicsError, Robot, Task, branch_names, robot_to_dict
@@ -322,7 +322,7 @@ def _unpacked(raw: bytes) -> bytes:
 
 def _parse(text: str) -> dict[str, Any]:
     try:
-        data = read_json(text)
+        data = read_page_json(text)
     except ValueError:
         return {}
     return data if isinstance(data, dict) else {}
