@@ -43,11 +43,12 @@ class TextError(ValueError):
 
     Attributes:
         value, expected: what was given and what would be valid, as `kin.InputError` takes them.
+        syntax: whether it is no text of its format, rather than beyond a limit.
     """
 
-    def __init__(self, value: str, expected: str) -> None:
+    def __init__(self, value: str, expected: str, syntax: bool = False) -> None:
         super().__init__(f"{value}, expected {expected}")
-        self.value, self.expected = value, expected
+        self.value, self.expected, self.syntax = value, expected, syntax
 
 
 # The end of a string is optional: an open one must not be searched again from each quotation mark within it.
@@ -80,7 +81,7 @@ def read_json(text: str | bytes, limits: Limits, finite: bool = False) -> Any:
     try:
         return json.loads(given, parse_constant=_refuse if finite else None)
     except (ValueError, RecursionError) as error:  # an integer of too many digits is a ValueError
-        raise TextError(str(error), "valid JSON") from None
+        raise TextError(str(error), "valid JSON", syntax=True) from None
 
 
 def read_toml(text: str | bytes, limits: Limits) -> dict[str, Any]:
@@ -101,7 +102,7 @@ def read_toml(text: str | bytes, limits: Limits) -> dict[str, Any]:
     try:
         return tomllib.loads(given)
     except (ValueError, RecursionError) as error:
-        raise TextError(str(error), "valid TOML") from None
+        raise TextError(str(error), "valid TOML", syntax=True) from None
 
 
 def read_csv(data: bytes, limits: Limits) -> Iterator[tuple[int, list[str]]]:
@@ -132,7 +133,7 @@ def read_csv(data: bytes, limits: Limits) -> Iterator[tuple[int, list[str]]]:
             taken = 0
             yield rows.line_num, row
     except csv.Error as error:
-        raise TextError(str(error), "valid CSV") from None
+        raise TextError(str(error), "valid CSV", syntax=True) from None
 
 
 def _decoded(text: str | bytes, limits: Limits, kind: str) -> str:
@@ -142,7 +143,7 @@ def _decoded(text: str | bytes, limits: Limits, kind: str) -> str:
     try:
         return text if isinstance(text, str) else text.decode()
     except UnicodeDecodeError as error:
-        raise TextError(str(error), f"{kind} in UTF-8") from None
+        raise TextError(str(error), f"{kind} in UTF-8", syntax=True) from None
 
 
 def _measure(bare: str, marks: str, limits: Limits) -> None:

@@ -115,8 +115,7 @@ def _table(calibration: str | Mapping[str, Any]) -> Mapping[str, Any]:
         try:
             calibration = read_json(calibration, _LIMITS)
         except TextError as error:
-            beyond = error.expected.startswith("at most")
-            given, valid = (error.value, error.expected) if beyond else (calibration, expected)
+            given, valid = (calibration, expected) if error.syntax else (error.value, error.expected)
             raise InputError("calibration", given, valid) from None
     if not isinstance(calibration, Mapping) or not calibration:
         raise InputError("calibration", calibration, expected)

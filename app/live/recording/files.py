@@ -32,6 +32,7 @@ ROBOT, META = "robot.json", "kinboard"
 LONGEST_RECORD: Final = 64 * 1024  # bytes of a channel and of metadata; longer ones are not ours
 LONGEST_NAME: Final = 200  # characters of the name of a program
 WINDOW: Final = 8 << 20  # bytes that zstandard looks back, as RFC 8878 recommends
+PART: Final = 1 << 18  # bytes that are unpacked at once
 _HEAD = struct.Struct("<BQ")  # of a record: its operation code, and bytes of its content
 _MESSAGE = struct.Struct("<HIQQ")  # channel, number, time of the log and of publishing; its data follow
 _NANO = 1_000_000_000
@@ -137,6 +138,8 @@ def _robot(data: bytes) -> Robot:
     try:
         return robot_from_dict(read_json(data, LIMITS))
     except TextError as error:
+        if error.syntax:
+            raise
         raise InputError(f"recording, {ROBOT}", error.value, error.expected) from None
 
 
@@ -194,21 +197,32 @@ def _pieces(data: bytes, at: int = 0) -> Iterator[tuple[int, bytes]]:
 
 
 def _unpacked(chunk: Chunk, most: int) -> bytes:
-    """The bytes of a chunk; raises `InputError` if there are more than `most`."""
+    """The bytes of a chunk; raises `InputError` as soon as there are more than `most`."""
+    content = bytearray()
+    for part in _parts(chunk):
+        content += part
+        if len(content) > most:
+            raise InputError("recording", f"more than {most} bytes when unpacked", f"at most {most} bytes")
+    return bytes(content)
+
+
+def _parts(chunk: Chunk) -> Iterator[bytes]:
+    """The bytes of a chunk in parts: both libraries reserve memory for all that they may return at once."""
     from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
     from zstandard import ZstdDecompressor
 
     match chunk.compression:
         case "lz4":
-            content: bytes = LZ4FrameDecompressor().decompress(chunk.data, most + 1)
+            unpacker = LZ4FrameDecompressor()
+            yield unpacker.decompress(chunk.data, PART)
+            while not (unpacker.eof or unpacker.needs_input):
+                yield unpacker.decompress(b"", PART)
         case "zstd":
             with ZstdDecompressor(max_window_size=WINDOW).stream_reader(chunk.data) as stream:
-                content = stream.read(most + 1)
+                while part := stream.read(PART):
+                    yield part
         case _:
-            content = chunk.data
-    if len(content) > most:
-        raise InputError("recording", f"more than {most} bytes when unpacked", f"at most {most} bytes")
-    return content
+            yield chunk.data
 
 
 def read(data: bytes, robot: Robot, bounds: Bounds = FILE) -> Recording:

@@ -211,6 +211,8 @@ def _track(entries: list[Entry], n: int) -> Track:
         try:
             value = read_json(each.data, MESSAGE)[field]
         except TextError as error:
+            if error.syntax:
+                raise
             raise InputError(f"recording, {each.topic}", error.value, error.expected) from None
         now[int(field == "measured")] = np.nan if value is None or len(value) != n else _values(value, n)
         found[k] = now

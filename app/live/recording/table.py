@@ -50,7 +50,8 @@ def from_csv(data: bytes, robot: Robot, bounds: Bounds) -> Recording:
         for line, row in rows:
             last = _take(row, line, robot.n, last, seen, entries)
     except TextError as error:
-        raise InputError("recording", error.value, error.expected) from None
+        valid = "a recording of a connection (CSV)" if error.syntax else error.expected
+        raise InputError("recording", error.value, valid) from None
     return Recording(robot, bounds=bounds).restored(entries, last)
 
 

@@ -9,6 +9,7 @@ import json
 import math
 import re
 import struct
+import tracemalloc
 from collections.abc import Iterator
 from typing import Any
 
@@ -182,7 +183,7 @@ HOSTILE: dict[str, tuple[bytes, str]] = {
         mcap([(0, "/page/q", b'{"q": [[1], [1], [1], [1], [1], [1]]}')]),
         "configurations of 6 numbers",
     ),
-    "deep": (mcap([(0, "/page/q", b"[" * 100_000)]), "a recording of a connection (MCAP)"),
+    "deep": (mcap([(0, "/page/q", b"[" * 100_000)]), "at most 16384 bytes"),
     "lz4 bomb": (bomb("lz4", lz4.frame.compress(HUGE), 10), "bytes when unpacked"),
     "zstd bomb": (bomb("zstd", zstandard.compress(HUGE), 10), "bytes when unpacked"),
     "table: other joints": (
@@ -224,6 +225,90 @@ def test_a_file_that_is_none_is_refused_and_loses_nothing(opened_page, case):
     assert words(page) == "opened", "the recording that was there"
     assert "Play recording" in labels(page)
     assert page.tool_pose() == pytest.approx(before)
+
+
+EMPTY = b'{"name": [' + b"{}," * 30_000 + b"{}]}"
+LONG_ROW = f"{TABLE}\n0.0".encode() + b"," * 20_000
+UNPACKED: dict[str, tuple[bytes, str]] = {
+    "a message with many values": (
+        mcap([(0, "/page/q", b'{"q": [' + b"0," * 600 + b"0]}")]),
+        "recording, /page/q: got 'more than 512 values', expected at most 512 values",
+    ),
+    "a long message": (
+        mcap([(0, "/sent/measured", b'{"measured": "' + b"x" * 20_000 + b'"}')]),
+        "recording, /sent/measured: got '20016 bytes', expected at most 16384 bytes",
+    ),
+    "a message that is nested deeply": (
+        mcap([(0, "/page/q", b'{"q": ' + b"[" * 100 + b"]" * 100 + b"}")]),
+        "recording, /page/q: got 'nested more than 4 deep', expected at most 4 deep",
+    ),
+    "an arm of many values": (
+        mcap([], robot=json.loads(EMPTY)),
+        "recording, robot.json: got 'more than 20000 values', expected at most 20000 values",
+    ),
+    "an arm that is nested deeply": (
+        mcap([], robot=json.loads("[" * 100 + "]" * 100)),
+        "recording, robot.json: got 'nested more than 16 deep', expected at most 16 deep",
+    ),
+    "table: a row without end": (
+        LONG_ROW,
+        "recording: got 'a row of more than 16384 characters', expected at most 16384 characters",
+    ),
+    "table: quotation marks without end": (
+        f"{TABLE}\n".encode() + b'"\n",' * 5000,
+        "recording: got 'a row of more than 16384 characters', expected at most 16384 characters",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", UNPACKED)
+def test_what_is_in_a_file_is_bounded_before_it_is_parsed(case):
+    data, message = UNPACKED[case]
+    with pytest.raises(kin.InputError, match=re.escape(message)):
+        read(data, ARM)
+
+
+@pytest.mark.parametrize(
+    "packed", [("lz4", lz4.frame.compress(HUGE)), ("zstd", zstandard.compress(HUGE))], ids=["lz4", "zstd"]
+)
+def test_a_chunk_is_bounded_while_it_is_unpacked(packed):
+    data = bomb(*packed, 10)
+    tracemalloc.start()
+    try:
+        with pytest.raises(kin.InputError, match="more than 1000000 bytes when unpacked"):
+            read(data, ARM, Bounds(size=1_000_000))
+        assert tracemalloc.get_traced_memory()[1] < 6_000_000
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_chunk_that_looks_far_back_is_refused():
+    """zstandard would take as much memory as the chunk asks for, up to 128 MB."""
+    wide = zstandard.ZstdCompressionParameters(window_log=26)
+    packed = zstandard.ZstdCompressor(compression_params=wide).compressobj()
+    with pytest.raises(kin.InputError, match=r"a recording of a connection \(MCAP\)"):
+        read(bomb("zstd", packed.compress(bytes(1000)) + packed.flush(), 1000), ARM)
+
+
+def test_records_are_bounded_in_number_and_those_of_others_are_not_read():
+    """An index of 16 MB took 60 MB and three seconds, records without content as much."""
+    plain = to_mcap(recording())
+
+    def with_record(code: int, content: bytes, count: int = 1) -> bytes:
+        return plain[:8] + (bytes([code]) + struct.pack("<Q", len(content)) + content) * count + plain[8:]
+
+    index = struct.pack("<HI", 1, 1_600_000) + bytes(1_600_000)
+    names = b"".join(struct.pack("<II", 0, 0) for _ in range(10_000))
+    metadata = struct.pack("<I", 0) + struct.pack("<I", len(names)) + names
+    tracemalloc.start()
+    try:
+        for code, content in ((7, index), (12, metadata)):
+            assert len(read(with_record(code, content), ARM).entries) == len(read(plain, ARM).entries)
+        assert tracemalloc.get_traced_memory()[1] < 8_000_000
+    finally:
+        tracemalloc.stop()
+    with pytest.raises(kin.InputError, match=r"more than 0\.1 MB in memory"):
+        read(with_record(0x90, b"", 2000), ARM, Bounds(size=100_000))
 
 
 @pytest.mark.parametrize(
@@ -273,7 +358,7 @@ def test_a_refused_recording_leaves_its_room_at_once():
     gc.disable()
     try:
         for _ in range(5):
-            with pytest.raises(kin.InputError, match="recording of a connection"):
+            with pytest.raises(kin.InputError, match="at most 16384 bytes"):
                 read(mcap([(0, "/page/q", b"[" * 100_000)]), ARM, bounds)
     finally:
         gc.enable()
