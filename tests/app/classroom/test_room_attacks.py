@@ -109,6 +109,14 @@ def test_messages_with_half_a_letter_are_not_read() -> None:
     assert script.read('[[1, "fields", [["\\ud83d\\ude00"]]]]') == [(1, "fields", [["😀"]])]
 
 
+@pytest.mark.parametrize("argument", ["[" * 40 + "]" * 40, "[" + "0," * 20_001 + "0]", '"' + "x" * 65_536 + '"'])
+def test_messages_beyond_the_limits_are_not_read(argument: str) -> None:
+    script = PageScript.__new__(PageScript)
+    script._last = 0
+    assert script.read(f'[[1, "fields", {argument}]]') == []
+    assert script.read(f'[[1, "fields", {json.dumps(argument[:40])}]]') == [(1, "fields", argument[:40])]
+
+
 @pytest.mark.parametrize("alias", ["a;=1+1", "a;  @SUM(A1)", "a\t-2"])
 def test_no_part_between_semicolons_is_a_formula(alias: str) -> None:
     texts = csv_of([[Attempt("s", alias, "x", 3, alias, alias, 0.5, 0.0, 1.0)]], {"x": alias})

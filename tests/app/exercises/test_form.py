@@ -22,6 +22,7 @@ from app.exercises.form import (
     Rows,
     entries,
     groups,
+    read,
     to_toml,
     with_cell,
     with_row,
@@ -35,6 +36,13 @@ ALL = Exercises()
 FILES = [Path(one.file) for one in ALL.all]
 UNITS = Units()
 REACH = tomllib.loads(next(path for path in FILES if path.stem == "elbow-angle").read_text())
+
+
+@pytest.mark.parametrize("text", ["a" + ".a" * 500 + " = 1", "a = " + "[" * 20 + "]" * 20])
+def test_a_draft_that_is_nested_deeply_is_none(text: str) -> None:
+    assert read(text) == {}
+    with pytest.raises(ExerciseFileError, match="mine: file: got '.* more than 16 (parts|deep)', expected at most 16"):
+        parse_exercise(text, "mine")
 
 
 def cell(draft: Draft, path: str) -> Entry:

@@ -39,6 +39,8 @@ def test_right_answers_of_all_exercises_have_words(exercise) -> None:
         ("9" * 400, None),
         ("-1", "-1"),
         ("null", "None"),
+        ("[" * 5000, "[" * (LONGEST - 1) + "…"),
+        ("[" * 20 + "]" * 20, "[" * 20 + "]" * 20),
     ],
 )
 def test_anything_that_is_stored_has_words(answer: str, words: str | None) -> None:

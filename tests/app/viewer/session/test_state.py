@@ -243,6 +243,12 @@ def test_states_that_differ_only_in_what_has_no_room_are_not_equal():
     assert equal(one, replace(one))
 
 
+@pytest.mark.parametrize("lesson", ["[" * 40 + "]" * 40, "[" + "0," * 20_001 + "0]"])
+def test_a_link_beyond_the_limits_is_not_read(lesson):
+    packed = zlib.compress(f'{{"v":1,"lesson":{lesson}}}'.encode(), 9)
+    assert decode("z" + base64.urlsafe_b64encode(packed).decode().rstrip("="), ROBOTS).unreadable
+
+
 def bomb(size: int, keep: slice = slice(None), after: bytes = b"") -> str:
     raw = zlib.compress(b'{"v":1,"lesson":"' + b"x" * size + b'"}', 9)
     return "z" + base64.urlsafe_b64encode(raw[keep] + after).rstrip(b"=").decode()
