@@ -179,7 +179,7 @@ class Exercises:
                     if other is not None and Path(other.file).name != name and Path(other.file).exists():
                         raise ExerciseFileError(one.file, "id", one.id, "an id that no other exercise has")
                 except ExerciseFileError as error:
-                    log.warning("an exercise is left out: %s", error)
+                    log.warning("an exercise is left out: %s", error, extra={"kind": name})  # each file is logged
                 else:
                     own[one.id] = one
             self._set(own)

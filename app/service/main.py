@@ -38,6 +38,7 @@ from app.exercises import ExerciseFileError, Exercises
 from app.live import Lines
 from app.service import status
 from app.service.gauges import update_gauges
+from app.service.log import guard_log
 from app.service.handover import SUPPORTED, Member, Phase, Role, members
 from app.service.server import STOP_TIMEOUT, Greeting, Server, is_loopback, listen, url_of
 from app.service.startup import Startup
@@ -304,6 +305,7 @@ def _serve(
         bench: folder for runs of the benchmark, if there are any.
         processor: on which the first of several processes is kept, and the others on those that follow.
     """
+    guard_log()
     if settings.pin:
         pin(None if line is None else processor + member.number)
     if line is not None:

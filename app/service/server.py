@@ -56,6 +56,7 @@ def server_config(app: FastAPI, settings: Settings, files: int | None = None) ->
         backlog=ACCEPTED,
         loop="asyncio",  # faster here than uvloop: see `http_protocol.GuardedConfig`
         log_level="warning",
+        log_config=None,  # see `app.service.log`
         access_log=False,
         server_header=False,
         http=HttpProtocol,

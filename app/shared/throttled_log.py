@@ -6,6 +6,8 @@ import asyncio
 import logging
 
 LOG_EVERY = 60.0  # seconds between two lines of the same kind
+KIND = "kind"  # attribute of a record, for `app.service.log`: what counts as the same event; None: nothing does
+_COUNTED = {KIND: None}  # here
 
 
 class ThrottledLog:
@@ -20,7 +22,7 @@ class ThrottledLog:
         if kind in self._latest:
             self._latest[kind] = line, self._latest[kind][1] + 1
         else:
-            self._logger.warning("%s", line, exc_info=error)
+            self._logger.warning("%s", line, exc_info=error, extra=_COUNTED)
             self._begin(kind, line)
 
     def _begin(self, kind: str, line: str) -> None:
@@ -30,5 +32,5 @@ class ThrottledLog:
     def _end(self, kind: str) -> None:
         line, more = self._latest.pop(kind)
         if more:
-            self._logger.warning("%s (%d more times in %g s)", line, more, LOG_EVERY)
+            self._logger.warning("%s (%d more times in %g s)", line, more, LOG_EVERY, extra=_COUNTED)
             self._begin(kind, line)

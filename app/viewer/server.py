@@ -29,7 +29,12 @@ from app.viewer.scene.lights import light_scene
 from app.viewer.scene.motion import Pace
 from app.viewer.session.page import VisitorPage
 from app.viewer.session.services import Services
-from app.viewer.viser_patches import cache_type_hints, keep_sent_values, set_events_in_their_loop
+from app.viewer.viser_patches import (
+    cache_type_hints,
+    keep_sent_values,
+    log_callback_errors,
+    set_events_in_their_loop,
+)
 from app.viewer.viser_server import PortlessServer, client_page, start_viser
 from kin.warmup.preparation import Preparation
 
@@ -91,6 +96,7 @@ class ViewerServer:
         if self._server is not None:
             raise RuntimeError("the viewer is already running")
         cache_type_hints()
+        log_callback_errors()
         set_events_in_their_loop()
         keep_sent_values()
         server, self._connections = start_viser(loop, label="Kinboard")

@@ -23,6 +23,8 @@ Pages: viser evaluates the type hints of a class for each of its objects, a quar
 Parts of a scene: viser can hide one node or all of them. A `SceneFilter` hides all but some, including nodes that
 are added later. It knows which to show again.
 
+Errors: viser prints what a callback raises. `log_callback_errors` logs it.
+
 Wake-ups: messages from other threads than the event loop's wake their reader in an unsafe way; now and then a
 visitor's connection was lost. `set_events_in_their_loop` fixes that.
 
@@ -36,10 +38,12 @@ import asyncio
 import contextvars
 import functools
 import inspect
+import logging
 import threading
 import time
 import typing
 from collections.abc import Callable, Coroutine, Sequence
+from types import SimpleNamespace, TracebackType
 from typing import Any
 
 import msgspec
@@ -47,10 +51,13 @@ import numpy as np
 import viser
 from viser import _assignable_props_api as props
 from viser import _messages as messages
+from viser import _threadpool_exceptions as printing
 from viser.infra import ClientId
 from viser.infra import _async_message_buffer as buffers
 
 from kin.transforms import Array
+
+log = logging.getLogger(__name__)
 
 
 def assign(
@@ -308,6 +315,15 @@ def set_events_in_their_loop() -> None:
 
     make.sets_events_in_its_loop = True  # type: ignore[attr-defined]
     buffers.AsyncMessageBuffer.__init__ = make  # type: ignore[method-assign]
+
+
+def log_callback_errors() -> None:
+    """Make viser log what callbacks raise, which it prints: messages of visitors may be in it."""
+
+    def log_error(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        log.error("a callback of the viewer failed", exc_info=(kind, error, trace))
+
+    vars(printing).update(print=lambda *_, **__: None, traceback=SimpleNamespace(print_exception=log_error))
 
 
 def cache_type_hints() -> None:
