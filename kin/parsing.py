@@ -5,9 +5,9 @@ run before it has finished, and sixteen megabytes of nested lists take it half a
 memory that grow with the square of the parts of a dotted key. A row of a CSV file may have as many cells as the
 file has commas.
 
-So the texts are measured first, in linear time, by what is left of them without strings and comments: the marks that
-separate values (commas, colons, equals signs, opening brackets), how deep brackets and dotted keys are nested.
-A parser stops at the first error of a text, and up to there both see the same structure.
+So the texts are measured first, in linear time, by what is left of them without strings and comments: the marks
+that separate values (commas, colons, equals signs, opening brackets), and how deep brackets and dotted keys are
+nested. A parser stops at the first error of a text, and up to there both see the same structure.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Every place that parses text, unpacks or decodes it says whose text that is.
 
-What a visitor sends is read by the bounded readers of `kin.parsing`, by pydantic's parser of JSON (`app.api.body`), which
-is not looked for here, and by the few modules in `GUARDED`, which bound it themselves. The others in `TRUSTED` read what the service, its operator or the user of this machine has written.
+What a visitor sends is read by the bounded readers of `kin.parsing`, by pydantic's parser of JSON, which
+`app.api.body` calls and which is not looked for here, and by the few modules in `GUARDED`, which bound it
+themselves. The others in `TRUSTED` read what the service, its operator or the user of this machine has written.
 """
 
 from __future__ import annotations
@@ -15,10 +16,17 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 PARSERS = {
-    *("json.load", "json.loads", "json.JSONDecoder", "tomllib.load", "tomllib.loads", "csv.reader", "csv.DictReader"),
-    *("zipfile.ZipFile", "zlib.decompress", "zlib.decompressobj", "gzip.decompress", "gzip.open", "bz2.decompress"),
-    *("lzma.decompress", "expat.ParserCreate", "ElementTree.fromstring", "ElementTree.parse", "yaml.safe_load"),
-    *("pickle.load", "pickle.loads", "np.load", "ast.parse", "ast.literal_eval", "eval", "exec"),
+    *("json.load", "json.loads", "json.JSONDecoder", "tomllib.load", "tomllib.loads", "csv.reader"),
+    *(
+        "csv.DictReader",
+        "zipfile.ZipFile",
+        "zlib.decompress",
+        "zlib.decompressobj",
+        "gzip.decompress",
+        "gzip.open",
+    ),
+    *("bz2.decompress", "lzma.decompress", "expat.ParserCreate", "ElementTree.fromstring", "ElementTree.parse"),
+    *("yaml.safe_load", "pickle.load", "pickle.loads", "np.load", "ast.parse", "ast.literal_eval", "eval", "exec"),
     *("base64.b64decode", "base64.urlsafe_b64decode", "urlsafe_b64decode", "b64decode", "Fraction", "Decimal"),
     *("ZstdDecompressor", "LZ4FrameDecompressor", "msgspec.msgpack.Decoder", "msgspec.json.Decoder", "parse_qs"),
 }

@@ -1,9 +1,10 @@
 """The log of a process that strangers reach: no line of it is theirs, and none comes more than once a minute.
 
-What a visitor sends ends up in the log in ways that nobody foresees: in a warning of a library, in the message of an
-exception, in a traceback. So one handler writes everything, the warnings of Python, and errors of threads and of
-callbacks too. Control characters, line breaks among them, are escaped; lines are cut; and of one kind, which is the
-place in the code that logs and the place of the error, the first is written and those of the next minute are counted.
+What a visitor sends ends up in the log in ways that nobody foresees: in a warning of a library, in the message of
+an exception, in a traceback. So one handler writes everything, warnings of Python and errors of threads and of
+callbacks too. Control characters, line breaks among them, are escaped, and long lines are cut. The kind of a record is
+the place in the code that logs and the place of the error: of each kind the first is written, and those of the next
+minute are counted.
 """
 
 from __future__ import annotations
@@ -110,7 +111,7 @@ class LogHandler(logging.StreamHandler[TextIO]):
         self.addFilter(LogFilter(clock))
         self.setFormatter(LogFormatter())
 
-    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802
+    def handleError(self, record: logging.LogRecord) -> None:
         """Nothing: Python would print the record as it is, to the stream that has just failed."""
 
 

@@ -38,8 +38,8 @@ from app.exercises import ExerciseFileError, Exercises
 from app.live import Lines
 from app.service import status
 from app.service.gauges import update_gauges
-from app.service.log import guard_log
 from app.service.handover import SUPPORTED, Member, Phase, Role, members
+from app.service.log import guard_log
 from app.service.server import STOP_TIMEOUT, Greeting, Server, is_loopback, listen, url_of
 from app.service.startup import Startup
 from app.service.web.access import Access

@@ -126,8 +126,8 @@ def test_looking_for_strings_and_keys_takes_linear_time(unit, monkeypatch):
     assert time.thread_time() - began < 3.0
 
 
-def rows(data: bytes, limits: Limits = Limits(1000, 100)) -> list[tuple[int, list[str]]]:
-    return list(read_csv(data, limits))
+def rows(data: bytes) -> list[tuple[int, list[str]]]:
+    return list(read_csv(data, Limits(1000, 100)))
 
 
 def test_rows_of_csv_have_the_numbers_of_their_last_lines():
@@ -155,18 +155,20 @@ def test_a_row_of_csv_is_bounded(data, message):
 
 def test_a_robot_file_with_a_key_of_many_parts_is_refused():
     """`tomllib` needs memory that grows with the square of their number: 200 MB for 16 kB."""
-    with pytest.raises(kin.RobotFileError, match="mine: file: got 'a key of more than 16 parts', expected at most 16"):
+    with pytest.raises(
+        kin.RobotFileError, match="mine: file: got 'a key of more than 16 parts', expected at most"
+    ):
         kin.parse_robot("a" + ".a" * 500 + " = 1", "mine")
 
 
 @pytest.mark.parametrize("text", ["a" + ".a" * 500 + " = 1", '{"a": ' + "[" * 500 + "]" * 500 + "}"])
 def test_a_program_that_is_nested_deeply_is_refused(text):
-    with pytest.raises(kin.InputError, match="program: got '.* more than 16 (parts|deep)', expected at most 16"):
+    with pytest.raises(kin.InputError, match=r"program: got '.* more than 16 (parts|deep)', expected at most 16"):
         kin.parse_program(text)
 
 
 def test_a_calibration_that_is_nested_deeply_is_refused():
-    with pytest.raises(kin.InputError, match="calibration: got 'nested more than 4 deep', expected at most 4 deep"):
+    with pytest.raises(kin.InputError, match="calibration: got 'nested more than 4 deep', expected at most"):
         kin.motors_from_lerobot("so101", '{"a": ' + "[" * 100 + "]" * 100 + "}")
     with pytest.raises(kin.InputError, match="expected LeRobot's calibration"):
         kin.motors_from_lerobot("so101", "{")

@@ -146,8 +146,8 @@ def _robot(data: bytes) -> Robot:
 def _records(data: bytes, most: int) -> Iterator[Any]:
     """The records of a file that are needed, those in its chunks too, read one at a time.
 
-    A few bytes may be made to become gigabytes in a chunk, so `most` bounds what all chunks have when unpacked, and
-    the number of records. The library would read all records of a chunk at once, and indexes without a bound.
+    A few bytes may be made to become gigabytes in a chunk, so `most` bounds what all chunks have when unpacked,
+    and the number of records. The library would read all records of a chunk at once, and indexes without a bound.
     """
     from mcap.data_stream import ReadDataStream
     from mcap.opcode import Opcode

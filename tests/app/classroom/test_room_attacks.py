@@ -101,18 +101,21 @@ def test_half_a_letter_does_not_keep_the_results_from_the_teacher(tmp_path: Path
     hub.close()
 
 
-def test_messages_with_half_a_letter_are_not_read() -> None:
-    script = PageScript.__new__(PageScript)
-    script._last = 0
+@pytest.fixture
+def script() -> PageScript:
+    made = PageScript.__new__(PageScript)
+    made._last = 0
+    return made
+
+
+def test_messages_with_half_a_letter_are_not_read(script: PageScript) -> None:
     assert script.read('[[1, "fields", [["\\ud800"]]]]') == []
     assert script.read('[[1, "fields", NaN]]') == []
     assert script.read('[[1, "fields", [["\\ud83d\\ude00"]]]]') == [(1, "fields", [["😀"]])]
 
 
 @pytest.mark.parametrize("argument", ["[" * 40 + "]" * 40, "[" + "0," * 20_001 + "0]", '"' + "x" * 65_536 + '"'])
-def test_messages_beyond_the_limits_are_not_read(argument: str) -> None:
-    script = PageScript.__new__(PageScript)
-    script._last = 0
+def test_messages_beyond_the_limits_are_not_read(script: PageScript, argument: str) -> None:
     assert script.read(f'[[1, "fields", {argument}]]') == []
     assert script.read(f'[[1, "fields", {json.dumps(argument[:40])}]]') == [(1, "fields", argument[:40])]
 

@@ -41,7 +41,7 @@ REACH = tomllib.loads(next(path for path in FILES if path.stem == "elbow-angle")
 @pytest.mark.parametrize("text", ["a" + ".a" * 500 + " = 1", "a = " + "[" * 20 + "]" * 20])
 def test_a_draft_that_is_nested_deeply_is_none(text: str) -> None:
     assert read(text) == {}
-    with pytest.raises(ExerciseFileError, match="mine: file: got '.* more than 16 (parts|deep)', expected at most 16"):
+    with pytest.raises(ExerciseFileError, match=r"file: got '.* more than 16 (parts|deep)', expected at most 16"):
         parse_exercise(text, "mine")
 
 
