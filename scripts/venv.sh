@@ -33,23 +33,42 @@ apt_unpack() {
   )
 }
 
+# Whether $1 is Python 3.11 or newer and, with a second argument, older than Python 3.$2.
+fits() {
+  command -v "$1" >/dev/null && "$1" -c 'import sys
+sys.exit(not (3, 11) <= sys.version_info < (3, int(sys.argv[1])))' "${2:-99}" 2>/dev/null
+}
+
+has_venv() { "$1" -c 'import venv, ensurepip' 2>/dev/null; }
+
+# The one that $PYTHON names, else the newest that works: one that has the module venv before one that lacks it.
+# 3.15 is not among them yet: it waits for wheels of zstandard, which viser needs.
 find_python() {
-  for candidate in ${PYTHON:-} python3 python3.13 python3.12 python3.11 python; do
-    if command -v "$candidate" >/dev/null && "$candidate" -c \
-      'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' 2>/dev/null; then
-      echo "$candidate"
-      return
+  if [ -n "${PYTHON:-}" ]; then
+    fits "$PYTHON" || fail "PYTHON=$PYTHON is no Python 3.11 or newer"
+    echo "$PYTHON"
+    return
+  fi
+  found= others=
+  for candidate in python3.14 python3.13 python3.12 python3.11 python3 python; do
+    if fits "$candidate" 15; then
+      has_venv "$candidate" && echo "$candidate" && return
+      found=${found:-$candidate}
+    elif version=$("$candidate" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null); then
+      others="${others:+$others, }$candidate is $version"
     fi
   done
-  fail "needs Python 3.11, 3.12 or 3.13 and found none. Install one, or name it: PYTHON=/path/to/python3.12 sh $0"
+  [ -n "$found" ] || fail "needs Python 3.11 to 3.14 and found none${others:+ ($others)}." \
+    "Install one, or name it: PYTHON=/path/to/python3.13 sh $0"
+  echo "$found"
 }
 
 make_venv() {
   python=$(find_python) || exit 1
-  if ! "$python" -c 'import venv, ensurepip' 2>/dev/null; then
+  if ! has_venv "$python"; then
     version=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
     apt_install "python$version-venv" ||
-      fail "$python lacks the venv module. On Debian or Ubuntu: sudo apt-get install python$version-venv"
+      fail "$python lacks the module venv. On Debian or Ubuntu: sudo apt-get install python$version-venv"
   fi
   "$python" -m venv "$root/.venv" || fail "$python could not make $root/.venv"
 }

@@ -105,5 +105,5 @@ def _ompl() -> tuple[ModuleType, ModuleType, ModuleType]:
     try:
         from ompl import base, geometric, util
     except ImportError:
-        raise InputError("find_way", "ompl", "the package ompl: pip install 'kinboard[ways]'") from None
+        raise InputError("find_way", "ompl", "the package ompl: pip install 'kinboard[ways]' (Python 3.11 to 3.13)") from None
     return base, geometric, util
