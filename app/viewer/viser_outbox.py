@@ -6,16 +6,16 @@ flush. A generator, a timer and two tasks then wait for the next message. That c
 that is pushed within `in_one_frame` leaves in one frame and wakes the loop once. A `LoopWaker` wakes it once for
 all visitors who are waiting.
 
-It relies on private names of viser, which `missing_names` lists; `app.viewer.viser_server.start_viser` refuses a
-version that lacks one. Tests compare the bytes with those of viser's own `_message_producer`. Upstream offers no
-way to replace its producer yet; https://github.com/viser-project/viser/issues is the place to ask for one.
+It relies on private names of viser, which `app.viewer.viser_names.OUTBOX` lists; where one is missing, viser's
+buffer and its producer take its place. Tests compare the bytes with those of viser's own `_message_producer`.
+Upstream offers no way to replace its producer yet; https://github.com/viser-project/viser/issues is the place to
+ask for one.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import dataclasses
 import itertools
 import logging
 import math
@@ -34,6 +34,7 @@ from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.shared.connection import Connection
 from app.shared.throttled_log import ThrottledLog
+from app.viewer import viser_names
 
 logger = logging.getLogger("kinboard.viewer")
 _encode = msgspec.msgpack.Encoder().encode
@@ -311,34 +312,9 @@ def _plain(updates: dict[str, Any]) -> bool:
 @contextlib.contextmanager
 def in_one_frame(client: viser.ClientHandle) -> Iterator[None]:
     """Send all that is pushed and flushed for a visitor within this context together, at its end."""
-    buffer = client._websock_connection.get_message_buffer()
+    buffer = client._websock_connection.get_message_buffer() if viser_names.OUTBOX.is_there else None
     if isinstance(buffer, Outbox):
         with buffer.hold():
             yield
-    else:  # a viser server with a port of its own
+    else:  # viser's own buffer
         yield
-
-
-def missing_names() -> list[str]:
-    """What an `Outbox` uses of viser and the installed version does not have, or not in this form."""
-    fields = AsyncMessageBuffer.__dataclass_fields__
-    wanted = (
-        *("event_loop", "message_event", "flush_event", "message_from_id", "buffer_lock", "atomic_counter"),
-        *("max_window_size", "window_duration_sec", "done", "id_from_redundancy_key", "ids_from_entity_state_key"),
-    )
-    found = [f"AsyncMessageBuffer.{name}" for name in wanted if name not in fields]
-    methods = ("push", "atomic_start", "atomic_end", "flush", "set_done", "pop_message_locked")
-    found += [f"AsyncMessageBuffer.{name}" for name in methods if not hasattr(AsyncMessageBuffer, name)]
-    if not hasattr(_infra, "_append_aligned_buffers"):
-        found.append("_infra._append_aligned_buffers")
-    kinds: dict[type[Any], tuple[str, ...]] = {
-        messages.SetOrientationMessage: ("name", "wxyz", "owner"),
-        messages.SetPositionMessage: ("name", "position", "owner"),
-        messages.GuiUpdateMessage: ("uuid", "updates"),
-        messages.GuiRemoveMessage: ("uuid",),
-        messages.SceneNodeUpdateMessage: ("name", "updates", "owner"),
-    }
-    for kind, names in kinds.items():
-        if tuple(field.name for field in dataclasses.fields(kind)) != names:
-            found.append(f"{kind.__name__}({', '.join(names)})")
-    return found

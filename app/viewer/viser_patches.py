@@ -1,6 +1,7 @@
 """Faster and safer versions of some of viser's operations.
 
-The private names of viser that Kinboard uses are in this module and in :mod:`app.viewer.viser_server`.
+:mod:`app.viewer.viser_names` lists the private names of viser that these use. Where one is missing, each function
+does the same in viser's own way, as far as there is one.
 
 Poses: viser's own setters ignore poses within 1e-5 of the last one, so an arm would end near its solution and not
 on it. That comparison (`np.allclose`) takes most of their time, and a moving arm sets one pose per joint and
@@ -28,8 +29,7 @@ Errors: viser prints what a callback raises. `log_callback_errors` logs it.
 Wake-ups: messages from other threads than the event loop's wake their reader in an unsafe way; now and then a
 visitor's connection was lost. `set_events_in_their_loop` fixes that.
 
-This is why ``pyproject.toml`` allows a narrow range of viser versions, and why tests compare these functions with
-viser's own.
+Tests compare these functions with viser's own.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ from typing import Any
 import msgspec
 import numpy as np
 import viser
-from viser import _assignable_props_api as props
 from viser import _messages as messages
 from viser import _threadpool_exceptions as printing
 from viser.infra import ClientId
 from viser.infra import _async_message_buffer as buffers
 
+from app.viewer import viser_names
 from kin.transforms import Array
 
 log = logging.getLogger(__name__)
@@ -73,6 +73,12 @@ def assign(
     Raises:
         RuntimeError: the node has been removed.
     """
+    if not viser_names.POSES.is_there:
+        if position is not None:
+            node.position = position
+        if wxyz is not None:
+            node.wxyz = wxyz
+        return
     state = node._impl
     if state.removed:
         raise RuntimeError(f"{state.name} was removed and cannot be posed")
@@ -94,6 +100,9 @@ def show_value(handle: Any, value: object, again: bool = False) -> None:
     Raises:
         RuntimeError: the element has been removed.
     """
+    if not viser_names.VALUES.is_there:
+        handle.value = value
+        return
     state = handle._impl
     if state.removed:
         raise RuntimeError(f"a {type(handle).__name__} was removed and cannot be set")
@@ -109,6 +118,8 @@ _SENT = contextvars.ContextVar[dict[str, Any] | None]("sent", default=None)
 
 def keep_sent_values() -> None:
     """Let callbacks ask for the value that a browser has sent, with `sent_value`. It may be called again."""
+    if not viser_names.SENT_VALUES.is_there:
+        return
     original = viser.GuiApi._handle_gui_updates
     if getattr(original, "keeps_sent_values", False):
         return
@@ -142,6 +153,9 @@ def show_content(element: viser.GuiHtmlHandle, content: str) -> None:
     Raises:
         RuntimeError: the element has been removed.
     """
+    if not viser_names.VALUES.is_there:
+        element.content = content
+        return
     state = element._impl
     if state.removed:
         raise RuntimeError("a GuiHtmlHandle was removed and cannot be set")
@@ -157,6 +171,9 @@ def show_text(label: viser.LabelHandle, text: str) -> None:
     Raises:
         RuntimeError: the label has been removed.
     """
+    if not viser_names.POSES.is_there:
+        label.text = text
+        return
     state = label._impl
     if state.removed:
         raise RuntimeError(f"{state.name} was removed and cannot be written")
@@ -167,8 +184,8 @@ def show_text(label: viser.LabelHandle, text: str) -> None:
 
 
 def is_removed(node: viser.SceneNodeHandle) -> bool:
-    """Whether a node is no longer in the scene, so that its properties cannot be set."""
-    return bool(node._impl.removed)
+    """Whether a node is no longer in the scene, so that its properties cannot be set; True: perhaps."""
+    return not viser_names.IDENTITY.is_there or bool(node._impl.removed)
 
 
 class SceneFilter:
@@ -184,7 +201,9 @@ class SceneFilter:
     def __init__(self, scene: viser.SceneApi, kept: str) -> None:
         self._scene = typing.cast(Any, scene)
         self._kept = kept
-        self._open = False
+        self._open = not viser_names.FILTER.is_there
+        if self._open:
+            return
         self._send = self._scene._queue_scene_message
         for node in self._hidden():
             self._send(messages.SetSceneNodeVisibilityMessage(node.name, False))
@@ -192,6 +211,8 @@ class SceneFilter:
 
     def open(self) -> None:
         """Show again what is visible, as far as no other filter hides it."""
+        if self._open:
+            return
         self._open = True
         if self._scene._queue_scene_message is self._queues:
             self._scene._queue_scene_message = self._send
@@ -218,8 +239,8 @@ _LIGHTS = viser.AmbientLightHandle, viser.DirectionalLightHandle, viser.Hemisphe
 
 
 def uuid_of(handle: Any) -> str:
-    """The id of a control: of its message, and of its element in the page."""
-    return str(handle._impl.uuid)
+    """The id of a control: of its message, and of its element in the page; empty where that is not known."""
+    return str(handle._impl.uuid) if viser_names.IDENTITY.is_there else ""
 
 
 class _Drag(msgspec.Struct, tag_field="type", tag="TransformControlsUpdateMessage", forbid_unknown_fields=True):
@@ -241,7 +262,7 @@ def drag_gizmo(client: viser.ClientHandle, data: bytes) -> bool:
 
     Callbacks of such a gizmo are coroutines that do not wait.
     """
-    if len(data) > _LARGEST or _DRAG not in data:
+    if len(data) > _LARGEST or _DRAG not in data or not viser_names.DRAGS.is_there:
         return False
     try:
         drag = _read_drag(data)
@@ -277,7 +298,8 @@ def _run(call: Callable[[Any], Coroutine[Any, Any, None]], event: Any) -> None:
 
 def keep_private(gizmo: viser.TransformControlsHandle) -> None:
     """Stop viser from copying a gizmo's motion to other visitors: a visitor's own scene has no others."""
-    gizmo._impl_aux.sync_cb = None
+    if viser_names.DRAGS.is_there:
+        gizmo._impl_aux.sync_cb = None
 
 
 def _floats(values: Array | Sequence[float]) -> list[float]:
@@ -304,6 +326,8 @@ def set_events_in_their_loop() -> None:
     connected at once, some failed ("deque mutated during iteration") or waited forever. viser also asks the loop
     to set the event, at once or at the end of an atomic block, so no wake-up is lost.
     """
+    if not viser_names.WAKE_UPS.is_there:
+        return
     original = buffers.AsyncMessageBuffer.__init__
     if getattr(original, "sets_events_in_its_loop", False):
         return
@@ -328,4 +352,7 @@ def log_callback_errors() -> None:
 
 def cache_type_hints() -> None:
     """Make viser evaluate the type hints of each class once."""
-    props.get_type_hints = functools.cache(typing.get_type_hints)  # type: ignore[attr-defined, assignment]
+    if viser_names.TYPE_HINTS.is_there:
+        from viser import _assignable_props_api as props
+
+        props.get_type_hints = functools.cache(typing.get_type_hints)  # type: ignore[attr-defined, assignment]

@@ -5,8 +5,8 @@ that port without a token, and each message would pass through a second websocke
 connections that the service has already accepted and inspected; nothing listens.
 
 `PortlessServer` replaces the part of `viser.infra.WebsockServer` that listens and accepts (its
-``_background_worker``). It relies on private names of viser; `missing_names` lists those that a version lacks, and
-`start_viser` refuses such a version. A test fails when viser changes the method that is replaced. Upstream offers
+``_background_worker``). It relies on the private names of viser in `app.viewer.viser_names.SERVER`; `start_viser`
+refuses a version that lacks one. A test fails when viser changes the method that is replaced. Upstream offers
 no such entry point yet; https://github.com/viser-project/viser/issues is the place to ask for one.
 """
 
@@ -15,7 +15,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
-import inspect
 import io
 import itertools
 import logging
@@ -34,7 +33,7 @@ from viser.infra._async_message_buffer import AsyncMessageBuffer
 from app.shared.connection import Connection, ConnectionEnded
 from app.shared.security import Rights
 from app.shared.throttled_log import ThrottledLog
-from app.viewer import viser_outbox
+from app.viewer import viser_names
 from app.viewer.session.worker.threads import THREADS
 from app.viewer.viser_outbox import LoopWaker, Outbox, Packer
 from app.viewer.viser_patches import drag_gizmo
@@ -109,7 +108,8 @@ class PortlessServer(infra.WebsockServer):
 
     async def _visit(self, connection: Connection) -> ConnectionEnded:
         number = infra.ClientId(next(self._ids))
-        buffer = Outbox(number, self._waker, self._packer)
+        visitor: Any = connection  # viser only calls its `send`
+        buffer, sends = self._outgoing(number, visitor)
         client = infra.WebsockClientConnection(number, _infra._ClientHandleState(buffer, self._loop))
         self._client_state_from_id[number] = client._state
         self.rights[number], self.clients[number] = connection.rights, connection.client
@@ -119,11 +119,10 @@ class PortlessServer(infra.WebsockServer):
         flows: list[asyncio.Task[Any]] = []
         try:
             await _call(self._client_connect_cb, client)
-            visitor: Any = connection  # viser only calls its `send`
             flows = [
                 self._loop.create_task(flow)
                 for flow in (
-                    buffer.send_to(connection),
+                    sends(),
                     _infra._message_producer(visitor, self._broadcast_buffer, number, self._backlog_done_message),
                     self._consume(connection, client),
                 )
@@ -142,6 +141,16 @@ class PortlessServer(infra.WebsockServer):
             self.silences.pop(number, None)
             self._broadcast_buffer.generator_cursors.pop(number, None)
             await _call(self._client_disconnect_cb, client)
+
+    def _outgoing(
+        self, number: infra.ClientId, visitor: Any
+    ) -> tuple[AsyncMessageBuffer, Callable[[], Coroutine[Any, Any, None]]]:
+        """The buffer of a visitor's messages, and what sends them until the connection ends."""
+        if viser_names.OUTBOX.is_there:
+            outbox = Outbox(number, self._waker, self._packer)
+            return outbox, functools.partial(outbox.send_to, visitor)
+        buffer = AsyncMessageBuffer(self._loop, persistent_messages=False)
+        return buffer, functools.partial(_infra._message_producer, visitor, buffer, number)
 
     async def _consume(self, connection: Connection, client: infra.WebsockClientConnection) -> None:
         number = infra.ClientId(client.client_id)
@@ -209,8 +218,8 @@ def start_viser(loop: asyncio.AbstractEventLoop, label: str) -> tuple[viser.Vise
     Raises:
         RuntimeError: the installed version of viser cannot be driven in this way.
     """
-    if missing := missing_names():
-        raise RuntimeError(f"viser {viser.__version__} lacks {', '.join(missing)}; install viser>=1.1,<1.2")
+    if missing := viser_names.SERVER.missing():
+        raise RuntimeError(f"viser {viser.__version__} lacks {', '.join(missing)}. {viser_names.SERVER.without}")
     # viser prints its own address, which does not exist.
     with contextlib.redirect_stdout(io.StringIO()), _replaced(functools.partial(PortlessServer, loop=loop)):
         server = viser.ViserServer(host="127.0.0.1", port=0, label=label, verbose=False)
@@ -218,7 +227,8 @@ def start_viser(loop: asyncio.AbstractEventLoop, label: str) -> tuple[viser.Vise
     if not isinstance(portless, PortlessServer):
         server.stop()
         raise RuntimeError(f"viser {viser.__version__} listens on a port; install viser>=1.1,<1.2")
-    portless.visitors = server._connected_clients
+    if viser_names.DRAGS.is_there:
+        portless.visitors = server._connected_clients
     # Visitors leave while something is drawn for them or asked of their page.
     warnings.filterwarnings("ignore", r"Queued a \w+ on a closed connection", UserWarning)
     # A visitor could ask viser for a public tunnel to this service.
@@ -239,47 +249,6 @@ def _replaced(make: Callable[..., PortlessServer]) -> Iterator[None]:
             yield
         finally:
             infra.WebsockServer = original  # type: ignore[misc]
-
-
-def missing_names() -> list[str]:
-    """What `PortlessServer` uses of viser and the installed version does not have, or not in this form."""
-    wanted: list[tuple[object, str, tuple[str, ...]]] = [
-        (_infra, "_message_producer", ("websocket", "buffer", "client_id", "backlog_done_message")),
-        (_infra, "_ClientHandleState", ("message_buffer", "event_loop")),
-        (infra, "WebsockClientConnection", ("client_id", "client_state")),
-        (infra.WebsockServer, "_background_worker", ("self", "ready_sem")),
-        (infra.WebsockServer, "_handle_incoming_message", ("self", "client_id", "message")),
-        (infra.WebsockServer, "unregister_handler", ("self", "message_cls", "callback")),
-        (messages.Message, "deserialize", ("message",)),
-        (AsyncMessageBuffer, "set_done", ("self",)),
-    ]
-    found = [
-        f"{getattr(owner, '__name__', owner)}.{name}({', '.join(parameters)})"
-        for owner, name, parameters in wanted
-        if _parameters(getattr(owner, name, None))[: len(parameters)] != parameters
-    ]
-    server = infra.WebsockServer("", 0)
-    attributes = (
-        "_backlog_done_message",
-        "_client_connect_cb",
-        "_client_disconnect_cb",
-        "_client_state_from_id",
-        "_incoming_handlers",
-        "_message_class",
-        "_server_thread",
-    )
-    found += [f"WebsockServer.{name}" for name in attributes if not hasattr(server, name)]
-    fields = AsyncMessageBuffer.__dataclass_fields__
-    found += [f"AsyncMessageBuffer.{name}" for name in ("generator_cursors", "done") if name not in fields]
-    drags = ("_handle_transform_controls_updates", "_fire_transform_controls_callbacks")  # see `drag_gizmo`
-    found += [f"SceneApi.{name}" for name in drags if not hasattr(viser.SceneApi, name)]
-    if not hasattr(viser.SceneApi, "_queue_scene_message"):  # see `SceneFilter`
-        found.append("SceneApi._queue_scene_message")
-    return found + viser_outbox.missing_names()
-
-
-def _parameters(function: Any) -> tuple[str, ...]:
-    return () if function is None else tuple(inspect.signature(function).parameters)
 
 
 @functools.cache

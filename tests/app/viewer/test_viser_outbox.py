@@ -22,7 +22,7 @@ from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.shared.connection import ConnectionEnded
 from app.viewer import viser_outbox
-from app.viewer.viser_outbox import LoopWaker, Outbox, Packer, in_one_frame, missing_names
+from app.viewer.viser_outbox import LoopWaker, Outbox, Packer, in_one_frame
 
 WAIT = 5.0  # s for what takes milliseconds
 
@@ -363,13 +363,6 @@ def test_a_visitor_of_a_viser_server_with_a_port_is_served_as_before() -> None:
     client: Any = SimpleNamespace(_websock_connection=SimpleNamespace(get_message_buffer=lambda: buffer))
     with in_one_frame(client):
         pass
-
-
-def test_a_version_of_viser_that_lacks_something_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert missing_names() == []
-    monkeypatch.delattr(_infra, "_append_aligned_buffers")
-    monkeypatch.delattr(AsyncMessageBuffer, "pop_message_locked")
-    assert missing_names() == ["AsyncMessageBuffer.pop_message_locked", "_infra._append_aligned_buffers"]
 
 
 TEXTS = st.text(st.characters(codec=None))  # half letters too

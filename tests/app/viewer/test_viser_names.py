@@ -1,0 +1,192 @@
+"""viser's private names: all that are used are listed, and without each group of them Kinboard works on."""
+
+from __future__ import annotations
+
+import ast
+import asyncio
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from private_names import asked_again, leave_out, take_away
+from test_viser_server import CAMERA, Visit, drag, gizmo, loop, serve, server  # noqa: F401 - fixtures
+from viser.infra._async_message_buffer import AsyncMessageBuffer
+
+from app.viewer import viser_names
+from app.viewer.viser_outbox import Outbox, in_one_frame
+from app.viewer.viser_patches import (
+    SceneFilter,
+    assign,
+    cache_type_hints,
+    drag_gizmo,
+    is_removed,
+    keep_sent_values,
+    sent_value,
+    set_events_in_their_loop,
+    show_content,
+    show_text,
+    show_value,
+    uuid_of,
+)
+from app.viewer.viser_server import PortlessServer
+
+ROOT = Path(__file__).parents[3]
+VIEWER = ROOT / "app" / "viewer"
+USERS = {VIEWER / f"viser_{name}.py" for name in ("patches", "outbox", "server")}
+LISTED = {re.split(r"[:.]", name.partition("(")[0])[-1] for use in viser_names.ALL for name in use.names}
+VIEW = CAMERA | {"type": "ViewerCameraMessage"}
+
+
+def uses(path: Path) -> Iterator[str]:
+    """What a module uses of others' private names: attributes of what is not `self`, and imports."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Attribute) and re.match("_[^_]", node.attr):
+            if ast.unparse(node.value) not in ("self", "cls"):
+                yield node.attr
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "viser":
+            yield from (each for each in (node.module or "").split(".") if re.match("_[^_]", each))
+            yield from (alias.name for alias in node.names if re.match("_[^_]", alias.name))
+
+
+def test_the_installed_version_has_all_names() -> None:
+    assert [use.missing() for use in viser_names.ALL] == [[]] * len(viser_names.ALL)
+
+
+def test_all_that_is_used_is_listed_and_used_nowhere_else() -> None:
+    modules = {"_messages", "_infra", "_async_message_buffer", "_assignable_props_api"}
+    for path in USERS:
+        assert set(uses(path)) <= LISTED | modules, path.name
+    private = {name for name in LISTED if name.startswith("_")} | modules
+    for path in (ROOT / "app").rglob("*.py"):
+        if path not in USERS and re.search(
+            "|".join(map(r"\b{}\b".format, private)), path.read_text(encoding="utf-8")
+        ):
+            assert not private & set(uses(path)), path
+
+
+@pytest.mark.parametrize("name", sorted({name for use in viser_names.ALL for name in use.names}))
+def test_each_name_is_missed(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    concerned = [use for use in viser_names.ALL if name in use.names]
+    take_away(monkeypatch, name)
+    for use in concerned:
+        assert name in use.missing()
+        assert not asked_again(monkeypatch, use)()
+
+
+@pytest.fixture
+def visited(server, serve):  # noqa: F811
+    """Lets a visitor come, for whom a function is called; returns the visit when it has ended."""
+
+    def visit(act: Callable[[viser.ClientHandle], None], made: Visit) -> Visit:
+        failed: list[Exception] = []
+
+        async def connected(client: viser.ClientHandle) -> None:
+            try:
+                await asyncio.to_thread(act, client)
+            except Exception as error:  # noqa: BLE001 - raised below
+                failed.append(error)
+
+        server[0].on_client_connect(connected)
+        assert serve(made) == (1001, "left")
+        for error in failed:
+            raise error
+        return made
+
+    return visit
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_without_the_outbox_viser_s_own_buffer_sends(
+    monkeypatch: pytest.MonkeyPatch, visited: Callable[..., Visit], there: bool
+) -> None:
+    if not there:
+        leave_out(monkeypatch, viser_names.OUTBOX)
+    kinds: list[type[AsyncMessageBuffer]] = []
+
+    def act(client: viser.ClientHandle) -> None:
+        with in_one_frame(client):
+            client.scene.add_frame("/a")
+        kinds.append(type(client._websock_connection.get_message_buffer()))
+
+    visit = visited(act, Visit(VIEW))
+    assert kinds == [Outbox if there else AsyncMessageBuffer]
+    assert visit.sent >= 2, "what all see, and what this one sees"
+
+
+def test_without_the_handling_of_drags_viser_handles_them(
+    monkeypatch: pytest.MonkeyPatch, visited: Callable[..., Visit]
+) -> None:
+    leave_out(monkeypatch, viser_names.DRAGS)
+    seen: list[Any] = []
+    visits: list[Visit] = []
+
+    def act(client: viser.ClientHandle) -> None:
+        gizmo(client, seen)
+        owner = client.scene._owner_id
+        assert not drag_gizmo(client, msgspec.msgpack.encode(drag(owner)))
+        visits[0]._messages.append(drag(owner))
+
+    visits.append(Visit(VIEW))
+    visit = visited(act, visits[0])
+    assert visit.at_once == 0
+    assert seen == [("update", True, 0, [1.0, 2.5, 3.0]), [0.0, 1.0, 0.0, 0.0]]
+
+
+def test_without_the_private_names_of_nodes_viser_s_setters_pose_them(
+    monkeypatch: pytest.MonkeyPatch, visited: Callable[..., Visit]
+) -> None:
+    for use in (viser_names.POSES, viser_names.IDENTITY, viser_names.FILTER):
+        leave_out(monkeypatch, use)
+
+    def act(client: viser.ClientHandle) -> None:
+        node, label = client.scene.add_frame("/a"), client.scene.add_label("/b", "old")
+        assign(node, np.array([1.0, 2.0, 3.0]), (0.0, 1.0, 0.0, 0.0))
+        assert (node.position.tolist(), node.wxyz.tolist()) == ([1.0, 2.0, 3.0], [0.0, 1.0, 0.0, 0.0])
+        show_text(label, "new")
+        assert label.text == "new"
+        assert is_removed(node), "not known: it is left alone"
+        everything = SceneFilter(client.scene, "/b")
+        assert node.visible
+        everything.open()
+        assert node.visible
+
+    visited(act, Visit(VIEW))
+
+
+def test_without_the_private_names_of_controls_viser_s_setters_show_values(
+    monkeypatch: pytest.MonkeyPatch, visited: Callable[..., Visit]
+) -> None:
+    leave_out(monkeypatch, viser_names.VALUES)
+    leave_out(monkeypatch, viser_names.IDENTITY)
+
+    def act(client: viser.ClientHandle) -> None:
+        number, element = client.gui.add_number("a", 1.0), client.gui.add_html("<b>old</b>")
+        show_value(number, 2.0)
+        show_content(element, "<b>new</b>")
+        assert (number.value, element.content, uuid_of(number)) == (2.0, "<b>new</b>", "")
+
+    visited(act, Visit(VIEW))
+
+
+def test_without_the_names_of_what_is_patched_nothing_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in (
+        "viser:GuiApi._handle_gui_updates",
+        "viser._assignable_props_api:get_type_hints",
+        "viser.infra._async_message_buffer:AsyncMessageBuffer.message_event",
+    ):
+        take_away(monkeypatch, name)
+    for use in (viser_names.SENT_VALUES, viser_names.TYPE_HINTS, viser_names.WAKE_UPS):
+        asked_again(monkeypatch, use)
+    before = AsyncMessageBuffer.__init__
+    for patch in (keep_sent_values, cache_type_hints, set_events_in_their_loop):
+        patch()
+    assert not hasattr(viser.GuiApi, "_handle_gui_updates")
+    assert AsyncMessageBuffer.__init__ is before
+    shown = SimpleNamespace(target=SimpleNamespace(value=2.5))
+    assert sent_value(shown) == 2.5
