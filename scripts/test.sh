@@ -25,12 +25,24 @@ end() {
 trap end EXIT
 trap 'exit 130' INT TERM HUP
 
+# The package of WebKitWebDriver: its name since Debian 14, if apt knows it, else that of older releases.
+webkit_driver() {
+  [ "$(id -u)" != 0 ] || apt_update >&2 || :
+  for package in webkitgtk-webdriver webkit2gtk-driver; do
+    if apt-cache show $package >/dev/null 2>&1; then
+      echo $package
+      return
+    fi
+  done
+  echo webkit2gtk-driver
+}
+
 # Three browsers, a screen for two of them, PostgreSQL, shells, a C++ compiler, curl and the two proxies, if they are missing.
 install_programs() {
   missing=
   [ -x "$chromium" ] || missing=chromium
   command -v firefox-esr >/dev/null || missing="${missing:+$missing }firefox-esr"
-  command -v WebKitWebDriver >/dev/null || missing="${missing:+$missing }webkit2gtk-driver"
+  command -v WebKitWebDriver >/dev/null || missing="${missing:+$missing }$(webkit_driver)"
   command -v Xvfb >/dev/null || missing="${missing:+$missing }xvfb"
   command -v initdb >/dev/null || ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 || \
     missing="${missing:+$missing }postgresql"

@@ -87,13 +87,15 @@ RULES: dict[str, set[str]] = {
             "app.shared",
         ),
     },
-    "app/viewer/viser_patches.py": {"msgspec", "numpy", "viser", "kin.transforms"},
+    "app/viewer/viser_names.py": {"app.shared.private_names"},
+    "app/viewer/viser_patches.py": {"msgspec", "numpy", "viser", "app.viewer.viser_names", "kin.transforms"},
     "app/viewer/viser_outbox.py": {
         "msgspec",
         "viser",
         "zstandard",
         "app.shared.connection",
         "app.shared.throttled_log",
+        "app.viewer.viser_names",
     },
     "app/viewer/meshes": {
         *("fast_simplification", "trimesh", "numpy", "kin", "app.shared", "app.viewer.meshes", "app.viewer.scene"),
