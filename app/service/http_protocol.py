@@ -8,29 +8,29 @@ A request in chunks may have more than its body: extensions of chunks, and trail
 uvicorn adds trailers to the header fields. Here both are counted, bounded as the head is, and dropped. A request
 whose end or host is ambiguous is refused: httptools checks its length, `_check_head` the rest. One that offers
 another protocol than websockets is read as if it did not.
+
+:mod:`app.service.uvicorn_names` lists what it uses of uvicorn; only where all of it is there, this is imported.
 """
 
 from __future__ import annotations
 
 import asyncio
-import selectors
 import socket
 import urllib.parse
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import httptools
-import uvicorn
 from pydantic_core import to_json
 from starlette.types import Message, Receive, Scope, Send
 from uvicorn.protocols.http.flow_control import FlowControl
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol, RequestResponseCycle
 
 from app.api.problems import ProblemError
-from app.service.guard import Guard, Outflow
-from app.service.handover import LARGEST, Handover
+from app.service.config import GuardedConfig
+from app.service.guard import Outflow
+from app.service.handover import LARGEST
 from app.shared.problems import MEDIA_TYPE
-from app.shared.threads.turns import urgent
 
 if TYPE_CHECKING:
     from uvicorn._types import ASGI3Application
@@ -43,71 +43,6 @@ MIN_RATE: Final = 1024.0  # bytes per second, on average, at which a body must a
 PIECE: Final = (
     LARGEST - MAX_HEAD
 )  # bytes read at once: with a head that came before, one message to another process
-
-
-def require_shape(kind: type, *names: str) -> None:
-    """Raises `ImportError` if one of uvicorn's classes lacks an attribute that is overridden or used here."""
-    present = set(dir(kind)) | set(kind.__init__.__code__.co_names)  # type: ignore[misc]
-    if missing := sorted(set(names) - present):
-        raise ImportError(f"uvicorn {uvicorn.__version__} is not supported: {kind.__name__} has no {missing}")
-
-
-require_shape(
-    HttpToolsProtocol,
-    *("connection_made", "connection_lost", "data_received", "resume_writing", "_unset_keepalive_if_required"),
-    "timeout_keep_alive_handler",
-    *("on_message_begin", "on_header", "on_headers_complete", "on_body", "on_message_complete"),
-    "on_response_complete",
-    *("_start_asgi_task", "handle_websocket_upgrade", "_should_upgrade"),
-    *("cycle", "flow", "headers", "parser", "pipeline", "server_state"),
-)
-require_shape(
-    RequestResponseCycle,
-    *("keep_alive", "response_started", "response_complete", "chunked_encoding", "expected_content_length"),
-    *("transport", "disconnected", "message_event"),
-)
-
-
-class GuardedConfig(uvicorn.Config):
-    """uvicorn's configuration, the guard of its connections, and other processes to hand them to."""
-
-    guard: Guard
-    handover: Handover | None = None
-
-    def get_loop_factory(self) -> Callable[[], asyncio.AbstractEventLoop] | None:
-        """asyncio's event loop, for which computations wait. Others, as uvloop, do not tell when they sleep."""
-        factory = super().get_loop_factory()
-        return _courteous_loop if factory is asyncio.SelectorEventLoop else factory
-
-
-class _Selector(selectors.DefaultSelector):
-    """Counts its event loop among those for whom computations wait, except while the loop sleeps.
-
-    A loop with something to do does not sleep: if computations went on between two of its rounds, each round would
-    wait for the interpreter, and an event takes several rounds.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        urgent.enter()
-
-    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        ready = super().select(0.0)
-        if ready or (timeout is not None and timeout <= 0.0):
-            return ready
-        urgent.leave()
-        try:
-            return super().select(timeout)
-        finally:
-            urgent.enter()
-
-    def close(self) -> None:
-        super().close()
-        urgent.leave()
-
-
-def _courteous_loop() -> asyncio.AbstractEventLoop:
-    return asyncio.SelectorEventLoop(_Selector())
 
 
 class _Flow(FlowControl):

@@ -36,7 +36,7 @@ from app.classroom import Hub, clock
 from app.classroom.courses import Courses
 from app.exercises import ExerciseFileError, Exercises
 from app.live import Lines
-from app.service import status
+from app.service import status, uvicorn_names
 from app.service.gauges import update_gauges
 from app.service.handover import SUPPORTED, Member, Phase, Role, members
 from app.service.log import guard_log
@@ -214,6 +214,8 @@ def run(settings: Settings, open_browser: bool = False, page: str = "", words: s
     Args:
         open_browser, page, words: as for `Greeting`.
     """
+    if not uvicorn_names.HTTP.is_there:  # several processes hand connections over by our own protocol
+        settings = settings.model_copy(update={"workers": 1, "rest_workers": 0})
     try:
         listeners = listen(settings)
     except OSError as error:

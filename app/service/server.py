@@ -15,21 +15,24 @@ import threading
 import webbrowser
 from collections.abc import Callable
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import uvicorn
 from fastapi import FastAPI
 
+from app.service import uvicorn_names
+from app.service.config import GuardedConfig
 from app.service.guard import Guard
 from app.service.handover import AT_ONCE, Handover, Member, Phase
-from app.service.http_protocol import GuardedConfig, HttpProtocol, SupervisorLine
 from app.service.web.inspection import MAX_MESSAGE
 from app.service.web.prefix import clean_prefix
-from app.service.websocket_protocol import WebSocketProtocol
 from app.service.workers import is_orphan
 from app.shared.settings import Settings
 from app.shared.threads import end_process
 from kin import __version__
+
+if TYPE_CHECKING:
+    from app.service.http_protocol import HttpProtocol
 
 if sys.platform != "win32":
     import resource
@@ -50,17 +53,18 @@ def server_config(app: FastAPI, settings: Settings, files: int | None = None) ->
     Args:
         files: how many files this process may have open; None: not limited.
     """
+    http, ws = protocols()
     config = GuardedConfig(
         app,
         lifespan="on",
         backlog=ACCEPTED,
-        loop="asyncio",  # faster here than uvloop: see `http_protocol.GuardedConfig`
+        loop="asyncio",  # faster here than uvloop: see `GuardedConfig`
         log_level="warning",
         log_config=None,  # see `app.service.log`
         access_log=False,
         server_header=False,
-        http=HttpProtocol,
-        ws=WebSocketProtocol,
+        http=http,
+        ws=ws,
         # Compressing a 12 MB point cloud would take half a second; viser compresses what is worth it.
         ws_per_message_deflate=False,
         ws_max_size=MAX_MESSAGE + 1024,
@@ -73,6 +77,19 @@ def server_config(app: FastAPI, settings: Settings, files: int | None = None) ->
     )
     config.guard = Guard(settings, files)
     return config
+
+
+def protocols() -> tuple[Any, Any]:
+    """What speaks HTTP and websockets: ours, or uvicorn's own where it lacks what ours are made of."""
+    if not uvicorn_names.HTTP.is_there:
+        return "auto", "auto"
+    from app.service.http_protocol import HttpProtocol
+
+    if not uvicorn_names.WEBSOCKET.is_there:
+        return HttpProtocol, "auto"
+    from app.service.websocket_protocol import WebSocketProtocol
+
+    return HttpProtocol, WebSocketProtocol
 
 
 class Server(uvicorn.Server):
@@ -113,7 +130,7 @@ class Server(uvicorn.Server):
             listener.listen(QUEUE)  # asyncio has just made the queue as short as `ACCEPTED`
         self._handover.start(self._adopt)
         if self._line is not None:
-            self._take(self._line, lambda: self._protocol(SupervisorLine))
+            self._take(self._line, lambda: self._protocol(supervised=True))
         if self._member.away(self._member.number):
             self._member.report(Phase.SERVING)
         if self._greeting is not None:
@@ -146,7 +163,10 @@ class Server(uvicorn.Server):
         elif not away and self.servers:
             self.servers.pop().close()
 
-    def _protocol(self, kind: type[HttpProtocol] = HttpProtocol, first: bytes = b"") -> HttpProtocol:
+    def _protocol(self, supervised: bool = False, first: bytes = b"") -> HttpProtocol:
+        from app.service.http_protocol import HttpProtocol, SupervisorLine
+
+        kind = SupervisorLine if supervised else HttpProtocol
         return kind(self._config, server_state=self.server_state, app_state=self.lifespan.state, first=first)
 
     def _adopt(self, connection: socket.socket, data: bytes) -> None:

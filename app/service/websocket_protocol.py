@@ -4,6 +4,8 @@ uvicorn parses all that has arrived at once, answers each ping, and keeps every 
 client could fill the event loop with frames that never become a message. Here every frame counts against a budget;
 when it is spent, the rest stays unread until there is more. A client that answers no ping, or takes
 nothing of what it is sent, is disconnected after ``KINBOARD_SEND_TIMEOUT``.
+
+:mod:`app.service.uvicorn_names` lists what it uses of uvicorn; only where all of it is there, this is imported.
 """
 
 from __future__ import annotations
@@ -14,9 +16,8 @@ import struct
 import sys
 import time
 from collections.abc import Callable
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
 from uvicorn.protocols.utils import ClientDisconnected
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.exceptions import InvalidState
@@ -26,10 +27,14 @@ from websockets.http11 import Request
 from app.api.problems import ProblemError
 from app.classroom import COOKIE
 from app.live.codes import PATH as LIVE
+from app.service.config import GuardedConfig
 from app.service.guard import Outflow
-from app.service.http_protocol import GuardedConfig, raw_answer, require_shape
+from app.service.http_protocol import raw_answer
 from app.service.web.inspection import BURST, RATE, MessageLimit
 from app.shared.connection import DELAY, LINE, SILENCE
+
+if TYPE_CHECKING:
+    from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
 
 if sys.platform == "linux":
     import fcntl
@@ -45,19 +50,6 @@ SMALL: Final = 64 * 1024  # bytes of a message that costs no more than any other
 LARGE_COST: Final = 1 / 8192  # of each byte of a larger one, in messages: 1 MiB costs half a second of them
 AT_ONCE: Final = 4  # messages of a client that are handled in a row, before others have their turn
 LINGER: Final = 5.0  # seconds between two looks whether a line is still slow
-
-
-require_shape(
-    WebSocketsSansIOProtocol,
-    *("connection_made", "connection_lost", "data_received", "resume_writing", "receive", "send"),
-    *("handle_connect",),
-    *("handle_text", "handle_bytes", "handle_cont", "handle_ping", "handle_pong", "handle_parser_exception"),
-    *("send_receive_event_to_app", "curr_msg_data_type"),
-    *("send_keepalive_ping", "keepalive_timeout", "conn", "queue", "frames", "transport"),
-    *("read_paused", "close_sent", "handshake_initiated", "handshake_complete", "pong_timer"),
-    *("writable", "disconnected"),
-    "last_ping_rtt",
-)
 
 
 class WebSocketProtocol(WebSocketsSansIOProtocol):

@@ -105,5 +105,6 @@ def _ompl() -> tuple[ModuleType, ModuleType, ModuleType]:
     try:
         from ompl import base, geometric, util
     except ImportError:
-        raise InputError("find_way", "ompl", "the package ompl: pip install 'kinboard[ways]' (Python 3.11 to 3.13)") from None
+        needed = "the package ompl: pip install 'kinboard[ways]' (Python 3.11 to 3.13)"
+        raise InputError("find_way", "ompl", needed) from None
     return base, geometric, util

@@ -28,7 +28,8 @@ def find_python(folder: Path, versions: dict[str, str], named: str = "") -> subp
             lines.append("sys.modules['venv'] = None")
         lines.append("del sys.argv[:1]; exec(sys.argv[0])")
         program = folder / name
-        program.write_text(f'#!/bin/sh\nshift\nexec {sys.executable} -SEc {shlex.quote(chr(10).join(lines))} "$@"\n')
+        code = shlex.quote("\n".join(lines))
+        program.write_text(f'#!/bin/sh\nshift\nexec {sys.executable} -SEc {code} "$@"\n')
         program.chmod(0o755)
     script = f"root={folder}; . {ROOT}/scripts/venv.sh; find_python"
     variables = {"PATH": str(folder), "PYTHON": named}
@@ -68,7 +69,8 @@ def test_all_that_names_versions_names_the_same_ones() -> None:
     oldest, newest = CLASSIFIERS[0], CLASSIFIERS[-1]
     assert PROJECT["requires-python"] == f">={oldest}"
     script = (ROOT / "scripts" / "venv.sh").read_text(encoding="utf-8")
-    assert re.findall(r"python(3\.\d+)", re.search(r"for candidate in (.*);", script).group(1)) == CLASSIFIERS[::-1]
+    tried = re.search(r"for candidate in (.*);", script).group(1)
+    assert re.findall(r"python(3\.\d+)", tried) == CLASSIFIERS[::-1]
     for name in ("README.md", "docs/index.md", "docs/running.md", "scripts/venv.sh"):
         text = (ROOT / name).read_text(encoding="utf-8")
         assert set(re.findall(r"Python (3\.\d+ to 3\.\d+)", text)) == {f"{oldest} to {newest}"}, name

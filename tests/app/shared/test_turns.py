@@ -9,8 +9,8 @@ import pytest
 from fastapi import FastAPI
 from live_server import wait_for
 
-from app.service import http_protocol
-from app.service.http_protocol import GuardedConfig
+from app.service import config
+from app.service.config import GuardedConfig
 from app.service.server import server_config
 from app.shared.settings import Settings
 from app.shared.threads import turns
@@ -22,7 +22,7 @@ def urgent(monkeypatch) -> Urgent:
     """Of this test alone: servers of other tests may still run."""
     own = Urgent()
     monkeypatch.setattr(turns, "urgent", own)
-    monkeypatch.setattr(http_protocol, "urgent", own)
+    monkeypatch.setattr(config, "urgent", own)
     return own
 
 
@@ -202,7 +202,7 @@ def test_computations_wait_for_a_busy_event_loop(urgent):
 
 def test_computations_do_not_come_between_two_rounds_of_a_busy_event_loop(urgent, monkeypatch):
     pauses = []
-    loop = http_protocol._courteous_loop()
+    loop = config._courteous_loop()
     monkeypatch.setattr(urgent, "leave", lambda: pauses.append(rounds))
     rounds = 0
 
@@ -219,8 +219,8 @@ def test_computations_do_not_come_between_two_rounds_of_a_busy_event_loop(urgent
 
 
 def test_the_service_runs_on_the_loop_for_which_computations_wait():
-    config = server_config(FastAPI(), Settings())
-    assert config.get_loop_factory() is http_protocol._courteous_loop
+    made = server_config(FastAPI(), Settings())
+    assert made.get_loop_factory() is config._courteous_loop
 
 
 def test_outside_of_a_turn_an_offer_is_nothing(urgent):

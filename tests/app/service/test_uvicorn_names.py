@@ -1,0 +1,85 @@
+"""uvicorn's undocumented names: without one, uvicorn's own protocols serve, and several processes are one."""
+
+from __future__ import annotations
+
+import logging
+import socket
+from typing import Any
+
+import httpx2
+import pytest
+from fastapi import FastAPI, WebSocket
+from live_server import serve
+from private_names import asked_again, leave_out, take_away
+from websockets.sync.client import connect
+
+from app.service import main, uvicorn_names
+from app.service.http_protocol import HttpProtocol
+from app.service.server import protocols
+from app.service.websocket_protocol import WebSocketProtocol
+from app.shared.settings import Settings
+
+
+def test_the_installed_version_has_all_names() -> None:
+    assert [use.missing() for use in uvicorn_names.ALL] == [[]] * len(uvicorn_names.ALL)
+    assert protocols() == (HttpProtocol, WebSocketProtocol)
+
+
+@pytest.mark.parametrize("name", [name for use in uvicorn_names.ALL for name in use.names])
+def test_without_a_name_uvicorn_s_own_protocol_is_taken(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, name: str
+) -> None:
+    (use,) = (use for use in uvicorn_names.ALL if name in use.names)
+    take_away(monkeypatch, name)
+    asked_again(monkeypatch, use)
+    with caplog.at_level(logging.WARNING, "kinboard.libraries"):
+        found = [protocols() for _ in range(2)]
+    assert found == 2 * [("auto", "auto") if use is uvicorn_names.HTTP else (HttpProtocol, "auto")]
+    (line,) = caplog.messages
+    assert name in line
+    assert line.endswith(use.without)
+
+
+@pytest.fixture
+def app() -> FastAPI:
+    app = FastAPI()
+
+    @app.get("/double")
+    async def _(number: int) -> int:
+        return 2 * number
+
+    @app.websocket("/echo")
+    async def _(visitor: WebSocket) -> None:
+        await visitor.accept()
+        await visitor.send_bytes(await visitor.receive_bytes())
+        await visitor.close()
+
+    return app
+
+
+@pytest.mark.parametrize("lacking", [(), (uvicorn_names.WEBSOCKET,), uvicorn_names.ALL])
+def test_requests_and_websockets_are_served_all_the_same(
+    monkeypatch: pytest.MonkeyPatch, app: FastAPI, lacking: tuple[Any, ...]
+) -> None:
+    for use in lacking:
+        leave_out(monkeypatch, use)
+    with serve(app) as port:
+        assert httpx2.get(f"http://127.0.0.1:{port}/double?number=21").json() == 42
+        with connect(f"ws://127.0.0.1:{port}/echo") as websocket:
+            websocket.send(b"a message")
+            assert websocket.recv() == b"a message"
+
+
+@pytest.mark.parametrize("lacking", [False, True])
+def test_without_our_protocol_there_is_one_process(monkeypatch: pytest.MonkeyPatch, lacking: bool) -> None:
+    if lacking:
+        leave_out(monkeypatch, uvicorn_names.HTTP)
+    seen: list[tuple[int, int]] = []
+
+    def listen(settings: Settings) -> list[socket.socket]:
+        seen.append((settings.workers, settings.rest_workers))
+        raise OSError("not in this test")
+
+    monkeypatch.setattr(main, "listen", listen)
+    assert main.run(Settings(workers=3, rest_workers=2)) == 1
+    assert seen == [(1, 0) if lacking else (3, 2)]
