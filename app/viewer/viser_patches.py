@@ -75,9 +75,9 @@ def assign(
     """
     if not viser_names.POSES.is_there:
         if position is not None:
-            node.position = position
+            node.position = np.asarray(position)
         if wxyz is not None:
-            node.wxyz = wxyz
+            node.wxyz = np.asarray(wxyz)
         return
     state = node._impl
     if state.removed:

@@ -219,7 +219,8 @@ def _with_base(robot: Robot, frames: Array) -> Array:
 def aside(robot: Robot) -> Array:
     """The place ``(3,)`` of the other arm: to the left of the arm in the default view, out of its reach."""
     left = np.array([DIRECTION[1], -DIRECTION[0], 0.0])
-    return 1.4 * body(robot).radius * left / np.linalg.norm(left)
+    place: Array = 1.4 * body(robot).radius * left / np.linalg.norm(left)
+    return place
 
 
 @lru_cache(maxsize=64)
