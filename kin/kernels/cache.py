@@ -1,10 +1,17 @@
-"""The disk cache of compiled kernels: what its machine code depends on, damaged files, quick loading.
+"""The disk cache of compiled kernels: where it is, what its machine code depends on, damaged files, quick loading.
 
-numba compiles a kernel on first use and caches the machine code on disk. Its cache key is the text of the kernel's
-own file only, although the machine code contains the kernels it calls: after an upgrade a cached kernel could
-contain functions of the previous version. The cache here uses the text of that file and of all modules of the core
-that it imports, directly or not, as its key: a change recompiles what depends on it and nothing else.
+numba compiles a kernel on first use and caches the machine code on disk, beside the source. Its cache key is the
+text of the kernel's own file only, although the machine code contains the kernels it calls: after an upgrade a
+cached kernel could contain functions of the previous version. The cache here uses the text of that file and of
+all modules of the core that it imports, directly or not, as its key: a change recompiles what depends on it and
+nothing else. The place of the source is no part of it, so all copies of the core on a machine share one folder.
+Only tracebacks of errors that kernels raise, and numba's annotations, name the copy that was compiled.
 
+There is one file for each kernel, signature, text, processor, numba and Python. It is written beside its place and
+moved there, and never changed: processes need no lock. Files that were not used for longest are removed when all
+together exceed `CAPACITY`.
+
+Machine code and pickles are executed, so the folder must belong to the user, and to nobody else (`kernel_folder`).
 Damaged files are recognised by a checksum. The cache is optional: if it cannot be read, kernels are compiled
 again; if it cannot be written, they are compiled in every process. A process warns of each once.
 
@@ -21,21 +28,36 @@ import io
 import os
 import pickle
 import re
+import stat
 import sys
+import time
+import uuid
 import warnings
 import zlib
 from collections.abc import Callable, Iterable
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numba
 from llvmlite import binding as llvm
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile, NullCache
+from numba import config
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompileResult
 from numba.core.environment import Environment, _rebuild_env, lookup_environment
 from numba.core.runtime.nrt import rtsys
+from numba.core.serialize import dumps
 
+CAPACITY = 512 << 20  # bytes; all kernels of one version take 25 MB
+_DAY = 86400.0  # s: a file that is used says so at most once a day
+_FORMAT = 1  # of the files: a change of what is written, or of how, needs another number
+_OPTIONS = (
+    "OPT",
+    "LOOP_VECTORIZE",
+    "SLP_VECTORIZE",
+    "BOUNDSCHECK",
+    "DEBUGINFO_DEFAULT",
+)  # they change machine code
 _ROOT = str(Path(__file__).parents[2])
 _LEVEL = 4  # of compression: higher ones take longer and save 2 % more
 _IMPORT = re.compile(r"^from (kin[\w.]*) import (?:\(([^)]*)\)|([^(\n]*))", re.MULTILINE)
@@ -71,37 +93,57 @@ def _file_of(module: str) -> str | None:
     return next((file for file in (f"{place}.py", f"{place}/__init__.py") if os.path.isfile(file)), None)  # noqa: PTH113
 
 
+def kernel_folder() -> Path | None:
+    """The folder of machine code, made if it is missing; None if there is none that can be trusted.
+
+    It is `kernels` in the user's cache folder, or in the folder that KINBOARD_CACHE names. NUMBA_CACHE_DIR takes
+    precedence, as for numba's own cache: whoever sets it answers for that folder, which may be read-only.
+    """
+    given = str(vars(config)["CACHE_DIR"])
+    hint = "set KINBOARD_CACHE to another folder"
+    try:
+        folder = Path(given, "kinboard") if given else user_folder() / "kernels"
+        folder.mkdir(mode=0o777 if given else 0o700, parents=True, exist_ok=True)
+        found = folder.lstat()
+    except (OSError, RuntimeError) as error:
+        _warn(f"there is no folder to keep machine code in: {error}; {hint}")
+        return None
+    if given or sys.platform == "win32":  # there, the user's cache folder is private by its access list
+        return folder
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & 0o077:
+        owned = f"owner {found.st_uid}, {stat.filemode(found.st_mode)}"
+        _warn(f"{folder} may be changed or read by others ({owned}) and is not used: chmod 700, or {hint}")
+        return None
+    return folder
+
+
+def user_folder() -> Path:
+    """The user's cache folder for Kinboard, that of `platformdirs`, which the core does without."""
+    if named := os.environ.get("KINBOARD_CACHE"):
+        return Path(named)
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "kinboard" / "Cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "kinboard"
+    return Path(os.environ.get("XDG_CACHE_HOME", "").strip() or Path.home() / ".cache") / "kinboard"
+
+
+def _prune(folder: Path) -> None:
+    """Remove the files that were not used for longest, until all together take at most `CAPACITY`."""
+    found = []
+    for path in folder.glob("*.nbc*"):
+        with contextlib.suppress(FileNotFoundError):  # another process has moved or removed it
+            about = path.stat()
+            found.append((about.st_mtime, about.st_size, path))
+    total = 0
+    for _, size, path in sorted(found, reverse=True):
+        total += size
+        if total > CAPACITY:
+            path.unlink(missing_ok=True)
+
+
 class DamagedFileError(Exception):
     """A file of the cache is not as it was written."""
-
-
-class _CheckedFile(IndexDataCacheFile):
-    """numba's files of one kernel, with a checksum at the end: damaged machine code would end the process.
-
-    Machine code is compressed, which takes less than half the room.
-    """
-
-    def _dump(self, obj: Any) -> bytes:
-        return _sealed(super()._dump(obj))  # unpickling ignores what follows
-
-    def _save_data(self, name: str, data: Any) -> None:
-        with self._open_for_write(self._data_path(name)) as file:
-            file.write(_sealed(zlib.compress(super()._dump(data), _LEVEL)))
-
-    def _load_index(self) -> Any:
-        with contextlib.suppress(FileNotFoundError), Path(self._index_path).open("rb") as file:
-            version, data = pickle.load(file), file.read()
-            # Files of another version are not used, and may have no checksum.
-            if version == self._version and not _intact(data) and pickle.loads(data)[0] == self._source_stamp:
-                raise DamagedFileError(self._index_path)
-        return super()._load_index()
-
-    def _load_data(self, name: str) -> Any:
-        path = self._data_path(name)
-        data = Path(path).read_bytes()
-        if not _intact(data):
-            raise DamagedFileError(path)
-        return _Unpickler(io.BytesIO(zlib.decompress(data[:-4]))).load()
 
 
 def _sealed(data: bytes) -> bytes:
@@ -157,98 +199,121 @@ class _Library(JITCodeLibrary):
         return self._shared_module
 
 
-class _Loading(CompileResultCacheImpl):
-    """What is kept of a kernel, which numba decides, and how it is loaded."""
-
-    def rebuild(self, target_context: Any, payload: tuple[Any, ...]) -> Any:
-        """As numba's `CompileResult._rebuild`, with a library that parses its bitcode when that is needed."""
-        state, described, environment, signature, objects, lifted, annotation, again, referenced = payload
-        for each in again:
-            each()
-        codegen = target_context.codegen()
-        wrapper = described.llvm_cpython_wrapper_name
-        library = _Library.of(
-            codegen, state, (described.llvm_func_name, wrapper, described.llvm_cfunc_wrapper_name)
-        )
-        fields: dict[str, Any] = {
-            "target_context": target_context,
-            "typing_context": target_context.typing_context,
-            "library": library,
-            "environment": environment,
-            "entry_point": target_context.get_executable(library, described, environment),
-            "fndesc": described,
-            "type_annotation": annotation,
-            "signature": signature,
-            "objectmode": objects,
-            "lifted": lifted,
-            "typing_error": None,
-            "call_helper": None,
-            "metadata": None,
-            "reload_init": again,
-            "referenced_envs": referenced,
-        }
-        for each in referenced:
-            codegen.set_env(each.env_name, each)
-        return CompileResult(**fields)
+def _rebuild(target_context: Any, payload: tuple[Any, ...]) -> Any:
+    """As numba's `CompileResult._rebuild`, with a library that parses its bitcode when that is needed."""
+    state, described, environment, signature, objects, lifted, annotation, again, referenced = payload
+    for each in again:
+        each()
+    codegen = target_context.codegen()
+    wrapper = described.llvm_cpython_wrapper_name
+    symbols = described.llvm_func_name, wrapper, described.llvm_cfunc_wrapper_name
+    library = _Library.of(codegen, state, symbols)
+    fields: dict[str, Any] = {
+        "target_context": target_context,
+        "typing_context": target_context.typing_context,
+        "library": library,
+        "environment": environment,
+        "entry_point": target_context.get_executable(library, described, environment),
+        "fndesc": described,
+        "type_annotation": annotation,
+        "signature": signature,
+        "objectmode": objects,
+        "lifted": lifted,
+        "typing_error": None,
+        "call_helper": None,
+        "metadata": None,
+        "reload_init": again,
+        "referenced_envs": referenced,
+    }
+    for each in referenced:
+        codegen.set_env(each.env_name, each)
+    return CompileResult(**fields)
 
 
-class _Cache(FunctionCache):
-    """numba's cache of one kernel, keyed by `fingerprint`; disk errors become warnings.
-
-    It uses private attributes of numba; tests check that they still work.
-    """
-
-    _impl_class = _Loading
+class LaterCache:
+    """What numba asks of the cache of a kernel; errors of the disk become warnings."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)
-        file = self._cache_file
-        base = file._index_name.removesuffix(".nbi")
-        self._cache_file = _CheckedFile(file._cache_path, base, fingerprint(function.__code__.co_filename))
+        self._function = function
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The cached machine code, or None if the kernel has to be compiled.
 
         numba would prepare its compiler first (`target_context.refresh`), which it also does when it compiles.
         """
+        folder = kernel_folder()
+        if folder is None:
+            return None
+        path = folder
         try:
             rtsys.initialize(target_context)  # allocation of arrays, which machine code calls
-            with self._guard_against_spurious_io_errors():
-                return self._load_overload(sig, target_context)
-        except Exception as error:  # noqa: BLE001 - unpickling a damaged file may raise anything
-            _warn("cached machine code cannot be read and is compiled again", f"{self.cache_path}: {error!r}")
-            # New entries could not be added to a damaged index either.
-            with contextlib.suppress(OSError):
-                Path(self._cache_file._index_path).unlink()
+            path = folder / self._name(sig, target_context.codegen())
+            data = path.read_bytes()
+            if not _intact(data):
+                raise DamagedFileError("damaged")
+            written_for, payload = _Unpickler(io.BytesIO(zlib.decompress(data[:-4]))).load()
+            found = _rebuild(target_context, payload) if written_for == sig else None
+        except FileNotFoundError:
             return None
+        except Exception as error:  # noqa: BLE001 - unpickling a damaged file may raise anything
+            _warn("cached machine code cannot be read and is compiled again", f"{path}: {error!r}")
+            return None
+        with contextlib.suppress(OSError):  # removed meanwhile, or a folder that is only read
+            if time.time() - path.stat().st_mtime > _DAY:
+                os.utime(path)
+        return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Write machine code to the cache."""
+        """Write machine code to the cache, unless it contains addresses of this process."""
+        folder = kernel_folder()
+        if folder is None or data.lifted or data.library.has_dynamic_globals:
+            return
         try:
-            super().save_overload(sig, data)
+            path = folder / self._name(sig, data.codegen)
+            content = _sealed(zlib.compress(dumps((sig, data._reduce())), _LEVEL))
+            beside = path.with_name(f"{path.name}.{uuid.uuid4().hex}")
+            try:
+                beside.write_bytes(content)
+                beside.replace(path)
+            finally:
+                beside.unlink(missing_ok=True)
+            _prune(folder)
         except Exception as error:  # noqa: BLE001 - as above
-            self.disable()
-            _warn("machine code cannot be written to the cache", f"{self.cache_path}: {error!r}")
+            _warn("machine code cannot be written to the cache", f"{folder}: {error!r}")
+
+    @property
+    def cache_path(self) -> str | None:
+        """The folder, for numba's statistics."""
+        return None if (folder := kernel_folder()) is None else str(folder)
+
+    def flush(self) -> None:
+        """numba asks for it when a kernel is compiled again by hand: the file is then written again."""
+
+    def stem(self, codegen: Any) -> str:
+        """What the names of all files of this kernel begin with: its text, and what the machine code is for."""
+        function = self._function
+        code = function.__code__
+        parts = (fingerprint(code.co_filename), function.__module__, function.__qualname__, code.co_firstlineno)
+        name = re.sub(r"[^\w.]", "", f"{function.__module__}.{function.__qualname__}")[-100:]
+        return f"{name}-{_hash(parts, _target(codegen.magic_tuple()))}"
+
+    def _name(self, sig: Any, codegen: Any) -> str:
+        """The name of the file for a signature. Functions of one line differ in their code, closures in cells."""
+        cells = [cell.cell_contents for cell in self._function.__closure__ or ()]
+        parts = *map(str, sig), self._function.__code__.co_code, dumps(cells) if cells else b""
+        return f"{self.stem(codegen)}-{_hash(*parts)}.nbc"
 
 
-class LaterCache:
-    """The cache of a kernel, opened when the kernel is first used: a process uses few of them."""
+@cache
+def _target(processor: tuple[str, ...]) -> str:
+    """What all machine code of this process depends on besides its text."""
+    python = sys.implementation.cache_tag, getattr(sys, "abiflags", "")
+    options = [vars(config).get(name) for name in _OPTIONS]
+    return _hash(_FORMAT, processor, numba.__version__, python, options)
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
 
-    @cached_property
-    def opened(self) -> Any:
-        """The cache; one that is always empty if there is no place for it."""
-        try:
-            return _Cache(self._function)
-        except RuntimeError:  # numba found no writable folder
-            _warn("no cache folder for machine code is writable; set NUMBA_CACHE_DIR to one that is")
-            return NullCache()
-
-    def __getattr__(self, name: str) -> Any:
-        """What numba asks of a cache."""
-        return getattr(self.opened, name)
+def _hash(*parts: object) -> str:
+    return hashlib.blake2b(repr(parts).encode(), digest_size=12).hexdigest()
 
 
 _warned: set[str] = set()  # what this process has warned of
@@ -266,13 +331,10 @@ def _warn(what: str, where: str = "") -> None:
 def is_cached(kernel: Any) -> bool:
     """Whether the cache has machine code of a kernel as its text is today; True without a cache to write to."""
     cache = getattr(kernel, "_cache", None)
-    if isinstance(cache, LaterCache):
-        cache = cache.opened
-    if not isinstance(cache, _Cache) or not os.access(cache.cache_path, os.W_OK):
+    if not isinstance(cache, LaterCache) or (folder := kernel_folder()) is None or not os.access(folder, os.W_OK):
         return True
-    file: Any = cache._cache_file
     try:
-        names = file._load_index().values()
-        return bool(names) and all(_intact(Path(file._data_path(name)).read_bytes()) for name in names)
-    except Exception:  # noqa: BLE001 - unpickling a damaged file may raise anything, and it is compiled again
+        files = [path.read_bytes() for path in folder.glob(f"{cache.stem(kernel.targetctx.codegen())}-*.nbc")]
+    except OSError:  # removed meanwhile
         return False
+    return bool(files) and all(map(_intact, files))

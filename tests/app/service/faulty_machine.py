@@ -37,7 +37,6 @@ from attacks import ROOT, Victim, victim
 from cryptography.hazmat.primitives.asymmetric import rsa
 from fake_browser import FakeBrowser
 from live_server import wait_for
-from numba.core.caching import UserProvidedCacheLocator
 from websockets.exceptions import WebSocketException
 
 from app.classroom import COOKIE
@@ -46,6 +45,7 @@ from app.classroom.tables import Attempt
 from app.exports.robots import robot_file
 from app.viewer.session.state import PageState, encode
 from kin import get_robot
+from kin.kernels.cache import LaterCache, kernel_folder
 
 MOST = 8 << 20  # bytes of each folder, besides compiled kernels
 SILENCE = 10.0  # s: KINBOARD_WORKER_TIMEOUT
@@ -297,13 +297,27 @@ def seed(folder: Path, kernels: bool) -> int:
     for name, text in SEEDS.items():
         (folder / name / "in" / "of-this-machine.toml").write_text(text)
     size = 0
-    for file in (ROOT / "kin").rglob("__pycache__/*.nb?") if kernels else ():
-        module = file.parents[1] / "any.py"
-        to = folder / "cache" / "in" / UserProvidedCacheLocator.get_suitable_cache_subpath(str(module))
+    to = folder / "cache" / "in" / "kinboard"
+    for file in compiled_kernels() if kernels else ():
         to.mkdir(parents=True, exist_ok=True)
         shutil.copy(file, to)
         size += -(-file.stat().st_size // mmap.PAGESIZE) * mmap.PAGESIZE
     return size
+
+
+def compiled_kernels() -> Iterator[Path]:
+    """The files of the kernels of today's core, among those of other versions."""
+    place = kernel_folder()
+    assert place is not None
+    functions = (
+        each
+        for name, module in sorted(sys.modules.items())
+        if name.startswith("kin.")
+        for each in vars(module).values()
+    )
+    kernels = {id(each): each for each in functions if isinstance(getattr(each, "_cache", None), LaterCache)}
+    for kernel in kernels.values():
+        yield from place.glob(f"{kernel._cache.stem(kernel.targetctx.codegen())}-*.nbc")
 
 
 @contextmanager

@@ -292,7 +292,14 @@ DECLARED = {
 # How a module declares it: what it calls.
 CALLS = {
     "processes": {"Popen", "Process", "fork", "run_subprocess"},
-    "folders": {"mkdtemp", "mkstemp", "TemporaryDirectory", "TemporaryFile", "NamedTemporaryFile", "_Cache"},
+    "folders": {
+        "mkdtemp",
+        "mkstemp",
+        "TemporaryDirectory",
+        "TemporaryFile",
+        "NamedTemporaryFile",
+        "kernel_folder",
+    },
     "peers": {"create_server", "create_engine", "HTTPConnection", "HTTPSConnection", "urlopen", "build_opener"},
 }
 

@@ -56,7 +56,8 @@ ROWS, ERROR = [1.5, 5.0, 9.0], "more than three"
 def run(folder: Path) -> dict[str, object]:
     (folder / "kernels.py").write_text(KERNELS)
     path = f"{Path(kin.__file__).parents[1]}{os.pathsep}{folder}"
-    environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | {"PYTHONPATH": path}
+    environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
+    environment |= {"PYTHONPATH": path, "KINBOARD_CACHE": str(folder / "cache")}
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True, timeout=120, env=environment
     )
@@ -70,7 +71,7 @@ def test_loaded_machine_code_works_without_the_compiler_and_callers_can_be_compi
     assert (first["inner"], first["outer"]) == ([ROWS, ERROR, 0], [ROWS[::-1], ERROR, 0])
     assert first["prepared"], "names of modules have changed: the next assertion would say nothing"
 
-    for file in (tmp_path / "__pycache__").glob("kernels.outer*"):
+    for file in (tmp_path / "cache" / "kernels").glob("kernels.outer-*"):
         file.unlink()
     second = run(tmp_path)
     assert (second["inner"], second["prepared"]) == ([ROWS, ERROR, 1], [])
