@@ -53,7 +53,6 @@ COPY --from=build /opt/kinboard /opt/kinboard
 # the level and falls back to its generic one.
 ARG CPU_LEVEL=x86-64-v2
 ENV PATH=/opt/kinboard/bin:$PATH \
-    PYTHONPATH=/opt/kinboard/image \
     PYTHONUNBUFFERED=1 \
     NUMBA_CPU_NAME=$CPU_LEVEL \
     NUMBA_CPU_FEATURES="" \
@@ -65,9 +64,9 @@ RUN groupadd --gid 10001 kinboard \
     && useradd --uid 10001 --gid 10001 --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin kinboard \
     && python /opt/kinboard/image/prepare.py \
     && install --directory --owner=10001 --group=10001 --mode=700 /data
-# From here on all of this is only read; deploy/image/kernel_store.py tells how numba is content with that.
-ENV PYTHONDONTWRITEBYTECODE=1 \
-    NUMBA_CACHE_LOCATOR_CLASSES=kernel_store.LinkedCacheLocator
+# From here on all of this is only read. It belongs to root, as Python does: the user's own folder (KINBOARD_CACHE) would
+# have to belong to the user, which may be any.
+ENV PYTHONDONTWRITEBYTECODE=1
 # The user kinboard, as a number: Kubernetes' runAsNonRoot does not look names up.
 USER 10001:10001
 WORKDIR /
