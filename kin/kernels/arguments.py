@@ -22,17 +22,14 @@ import ctypes
 import sysconfig
 import warnings
 from collections.abc import Iterator
+from functools import reduce
 from typing import Any
 
 import numpy as np
 from llvmlite import binding, ir
 from numba import types
-from numba.core import cgutils
-from numba.core.datamodel import models
-from numba.core.imputils import lower_cast
-from numba.core.pythonapi import NativeValue, unbox
-from numba.extending import register_model
 
+from kin.kernels.private import CALLS, MISSING, NativeValue, cgutils, lower_cast, models, register_model, unbox
 from kin.transforms import is_plain
 
 _FLOAT = np.dtype(np.float64)
@@ -91,7 +88,7 @@ if _why := _unreadable():
     warnings.warn(
         f"NumPy {np.__version__}: {_why}. Calls of kernels take longer, with the same answers.", stacklevel=2
     )
-READABLE = not _why
+READABLE = not _why and CALLS not in MISSING
 
 
 class Borrowed(types.Array):
@@ -127,20 +124,13 @@ class Borrowed(types.Array):
         return all(wanted in (None, there) for wanted, there in zip(self.wanted, value.shape, strict=True))
 
 
-register_model(Borrowed)(models.ArrayModel)
-
-
-@lower_cast(Borrowed, types.Array)
 def _lend(context: Any, builder: Any, borrowed: Borrowed, owned: types.Array, value: Any) -> Any:
     """The same array for a function that is called by compiled code."""
     return value
 
 
-@unbox(Borrowed)
 def _borrow(kind: Borrowed, array: Any, c: Any) -> NativeValue:
     """Machine code that copies the fields of a Python object if it is the array that is wanted."""
-    from numba.np.arrayobj import populate_array  # a part of numba's compiler, which most processes do not need
-
     builder, address = c.builder, cgutils.voidptr_t
     int32, intp = ir.IntType(32), c.context.get_value_type(types.intp)
 
@@ -170,11 +160,19 @@ def _borrow(kind: Borrowed, array: Any, c: Any) -> NativeValue:
                 if wanted is not None:
                     right = builder.and_(right, builder.icmp_signed("==", there, intp(wanted)))
             with builder.if_then(right, likely=True):
-                native = c.context.make_array(kind)(c.context, builder)
-                data = builder.bitcast(field(_DATA, address), native.data.type)
-                populate_array(native, data, shape, numbers(_STRIDES), intp(_FLOAT.itemsize), meminfo=None)
+                native = cgutils.create_struct_proxy(kind)(c.context, builder)  # other fields are zero
+                native.data = builder.bitcast(field(_DATA, address), native.data.type)
+                native.itemsize, native.nitems = intp(_FLOAT.itemsize), reduce(builder.mul, shape, intp(1))
+                native.shape = cgutils.pack_array(builder, shape, intp)
+                native.strides = cgutils.pack_array(builder, numbers(_STRIDES), intp)
                 builder.store(native._getvalue(), result)
                 builder.store(cgutils.false_bit, failed)
     with builder.if_then(builder.load(failed), likely=False):
         c.pyapi.err_set_string("PyExc_TypeError", f"not a {kind}")
     return NativeValue(builder.load(result), is_error=builder.load(failed))
+
+
+if CALLS not in MISSING:
+    register_model(Borrowed)(models.ArrayModel)
+    lower_cast(Borrowed, types.Array)(_lend)
+    unbox(Borrowed)(_borrow)

@@ -34,7 +34,7 @@ import time
 import uuid
 import warnings
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -42,11 +42,16 @@ from typing import Any
 import numba
 from llvmlite import binding as llvm
 from numba import config
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompileResult
-from numba.core.environment import Environment, _rebuild_env, lookup_environment
-from numba.core.runtime.nrt import rtsys
-from numba.core.serialize import dumps
+
+from kin.kernels.private import (
+    CompileResult,
+    Environment,
+    JITCodeLibrary,
+    dumps,
+    lookup_environment,
+    rebuild_environment,
+    rtsys,
+)
 
 CAPACITY = 512 << 20  # bytes; all kernels of one version take 25 MB
 _DAY = 86400.0  # s: a file that is used says so at most once a day
@@ -160,7 +165,7 @@ class _Unpickler(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> Any:
         """A class or function by its name."""
         found = super().find_class(module, name)
-        return _environment if found is _rebuild_env else found
+        return _environment if found is rebuild_environment else found
 
 
 def _environment(module: str, constants: list[Any], name: str) -> Environment:
@@ -174,29 +179,31 @@ def _environment(module: str, constants: list[Any], name: str) -> Environment:
     return found
 
 
-class _Library(JITCodeLibrary):
+class _Library(JITCodeLibrary):  # type: ignore[misc]
     """Machine code from the cache. Its bitcode, which only callers that are compiled need, is parsed for them."""
 
     _bitcode = b""
+    _parsed: Any = None
+    _engine: Any
 
     @classmethod
     def of(cls, codegen: Any, state: tuple[str, str, tuple[bytes, bytes]], symbols: Iterable[str]) -> _Library:
         """The library of what numba has written; `symbols` are the functions in it that others look up."""
         name, _, (machine_code, bitcode) = state
         library = cls(codegen, name)
-        library._bitcode = bitcode
+        library._bitcode, library._engine = bitcode, codegen._engine
         library.enable_object_caching()
         library._set_compiled_object(machine_code)
         library._finalize_final_module()
-        codegen._engine._defined_symbols |= set(symbols)
+        library._engine._defined_symbols |= set(symbols)
         return library
 
     def _get_module_for_linking(self) -> Any:
-        if self._shared_module is None:
-            self._shared_module = llvm.parse_bitcode(self._bitcode)
-            self._codegen._engine._load_defined_symbols(self._shared_module)
+        if self._parsed is None:
+            self._parsed = llvm.parse_bitcode(self._bitcode)
+            self._engine._load_defined_symbols(self._parsed)
             self._bitcode = b""
-        return self._shared_module
+        return self._parsed
 
 
 def _rebuild(target_context: Any, payload: tuple[Any, ...]) -> Any:
@@ -230,7 +237,7 @@ def _rebuild(target_context: Any, payload: tuple[Any, ...]) -> Any:
     return CompileResult(**fields)
 
 
-class LaterCache:
+class KernelCache:
     """What numba asks of the cache of a kernel; errors of the disk become warnings."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -304,6 +311,22 @@ class LaterCache:
         return f"{self.stem(codegen)}-{_hash(*parts)}.nbc"
 
 
+@contextlib.contextmanager
+def numbas_own(function: Callable[..., Any]) -> Iterator[bool]:
+    """Within the context, numba's own cache of a kernel goes to a folder for all of the text that it depends on.
+
+    Yields whether there is a place for such folders: numba raises an error where it can write to none.
+    """
+    folder, before = kernel_folder(), vars(config)["CACHE_DIR"]
+    usable = folder is not None and os.access(folder, os.W_OK)
+    if folder is not None and usable:
+        vars(config)["CACHE_DIR"] = str(folder / fingerprint(function.__code__.co_filename))
+    try:
+        yield usable
+    finally:
+        vars(config)["CACHE_DIR"] = before
+
+
 @cache
 def _target(processor: tuple[str, ...]) -> str:
     """What all machine code of this process depends on besides its text."""
@@ -331,7 +354,7 @@ def _warn(what: str, where: str = "") -> None:
 def is_cached(kernel: Any) -> bool:
     """Whether the cache has machine code of a kernel as its text is today; True without a cache to write to."""
     cache = getattr(kernel, "_cache", None)
-    if not isinstance(cache, LaterCache) or (folder := kernel_folder()) is None or not os.access(folder, os.W_OK):
+    if not isinstance(cache, KernelCache) or (folder := kernel_folder()) is None or not os.access(folder, os.W_OK):
         return True
     try:
         files = [path.read_bytes() for path in folder.glob(f"{cache.stem(kernel.targetctx.codegen())}-*.nbc")]

@@ -1,6 +1,7 @@
 """Compile kernels, and call them without dispatch.
 
-Their machine code is cached on disk (:mod:`kin.kernels.cache`).
+Their machine code is cached on disk (:mod:`kin.kernels.cache`). Where numba lacks what these modules use of it
+(:mod:`kin.kernels.private`), kernels are cached and called as numba does by itself.
 
 With NUMBA_DISABLE_JIT=1 kernels are plain Python functions, which is faster for a command that computes one pose.
 """
@@ -8,13 +9,15 @@ With NUMBA_DISABLE_JIT=1 kernels are plain Python functions, which is faster for
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from functools import partial
 from typing import Any, TypeVar, cast
 
 from numba import config, njit, types
 
 from kin.kernels.arguments import READABLE, Borrowed
-from kin.kernels.cache import LaterCache
+from kin.kernels.cache import KernelCache, numbas_own
+from kin.kernels.private import CACHE, CALLS, MISSING
 
 MODEL = "model"
 PLAIN = bool(vars(config)["DISABLE_JIT"])
@@ -24,9 +27,12 @@ _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 def _compiled(function: _Kernel, kept: bool = True, **options: Any) -> _Kernel:
     if PLAIN:
         return function
-    kernel: Any = njit(**{"nogil": True, "error_model": "numpy", **options})(function)
-    if kept:
-        kernel._cache = LaterCache(function)
+    with numbas_own(function) if kept and CACHE in MISSING else nullcontext(False) as cached:
+        kernel: Any = njit(**{"nogil": True, "error_model": "numpy", "cache": cached, **options})(function)
+    if kept and CACHE not in MISSING:
+        kernel._cache = KernelCache(function)
+    if CALLS in MISSING:
+        return cast(_Kernel, kernel)
     template = kernel.get_call_template
 
     def plain(arguments: tuple[types.Type, ...], keywords: dict[str, types.Type]) -> Any:
@@ -78,7 +84,7 @@ def direct(kernel: Any, *arguments: Any) -> Callable[..., Any]:
         it, and deal with whatever else they accept when that happens.
     """
     wanted = tuple(map(_argument, arguments))
-    if PLAIN:
+    if PLAIN or CALLS in MISSING:
         return partial(_checked, kernel, wanted)
     passed = wanted if READABLE else tuple(map(_settled, wanted))
     entry: Callable[..., Any] = kernel.compile(passed)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Protocol
 
-from numba.core.event import Event, Listener, register
+from kin.kernels.private import EVENTS, MISSING, Listener, install_recorder, register_listener
 
 
 class Observer(Protocol):
@@ -18,16 +20,27 @@ class Observer(Protocol):
 
 
 def observe_compiler(observer: Observer) -> None:
-    """Call the observer from now on, until the end of the process."""
-    register("numba:compiler_lock", _Adapter(observer))  # type: ignore[no-untyped-call]
+    """Call the observer from now on, until the end of the process; never if numba does not say who compiles."""
+    if EVENTS not in MISSING:
+        register_listener("numba:compiler_lock", _Adapter(observer))
 
 
-class _Adapter(Listener):
+@contextmanager
+def record_compilations() -> Iterator[Sequence[object]]:
+    """Within the context, what is compiled is added to the sequence, which has an entry if unknown."""
+    if EVENTS in MISSING:
+        yield ("unknown",)
+        return
+    with install_recorder("numba:compile") as recorder:
+        yield recorder.buffer
+
+
+class _Adapter(Listener):  # type: ignore[misc]
     def __init__(self, observer: Observer) -> None:
         self._observer = observer
 
-    def on_start(self, event: Event) -> None:
+    def on_start(self, event: Any) -> None:
         self._observer.enter()
 
-    def on_end(self, event: Event) -> None:
+    def on_end(self, event: Any) -> None:
         self._observer.leave()

@@ -18,7 +18,6 @@ from functools import cache, partial
 from types import MappingProxyType
 
 import numpy as np
-from numba.core.event import install_recorder
 
 from kin.collision import Obstacle, clearance, nearest_links
 from kin.collision.contacts import surroundings
@@ -31,6 +30,7 @@ from kin.ik.batch import solve_ik_many
 from kin.ik.candidates import unchecked
 from kin.ik.table import Table
 from kin.kernels.cache import is_cached
+from kin.kernels.compiler import record_compilations
 from kin.kernels.fk import fk_one
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion
 from kin.path import path_postures, solve_path
@@ -80,9 +80,9 @@ def warm_up(everything: bool = False) -> None:
             that takes minutes.
     """
     first, *others = one_of_each_family()
-    with install_recorder("numba:compile") as compiled:
+    with record_compilations() as compiled:
         _move(first)
-    if compiled.buffer:
+    if compiled:
         for robot in others:
             _move(robot)
         for robot in (first, *others):

@@ -45,7 +45,7 @@ from app.classroom.tables import Attempt
 from app.exports.robots import robot_file
 from app.viewer.session.state import PageState, encode
 from kin import get_robot
-from kin.kernels.cache import LaterCache, kernel_folder
+from kin.kernels.cache import KernelCache, kernel_folder
 
 MOST = 8 << 20  # bytes of each folder, besides compiled kernels
 SILENCE = 10.0  # s: KINBOARD_WORKER_TIMEOUT
@@ -315,7 +315,7 @@ def compiled_kernels() -> Iterator[Path]:
         if name.startswith("kin.")
         for each in vars(module).values()
     )
-    kernels = {id(each): each for each in functions if isinstance(getattr(each, "_cache", None), LaterCache)}
+    kernels = {id(each): each for each in functions if isinstance(getattr(each, "_cache", None), KernelCache)}
     for kernel in kernels.values():
         yield from place.glob(f"{kernel._cache.stem(kernel.targetctx.codegen())}-*.nbc")
 

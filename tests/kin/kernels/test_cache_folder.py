@@ -76,6 +76,19 @@ def test_numbas_own_setting_takes_precedence_and_need_not_be_private(folder, tmp
     assert not folder.exists()
 
 
+def test_numbas_own_cache_has_a_folder_for_each_text(folder, monkeypatch):
+    for text in ("one", "two"):
+        monkeypatch.setattr(cache, "fingerprint", lambda file, text=text: text)
+        with cache.numbas_own(kernel) as usable:
+            assert usable
+            assert vars(config)["CACHE_DIR"] == str(folder / text)
+        assert vars(config)["CACHE_DIR"] == ""
+    monkeypatch.setattr(os, "access", lambda place, mode: False)
+    with cache.numbas_own(kernel) as usable:
+        assert not usable
+        assert vars(config)["CACHE_DIR"] == ""
+
+
 # -- whose it is -----------------------------------------------------------------------------------------------
 
 
@@ -99,7 +112,7 @@ OTHERS = [of_somebody_else, linked, *map(mode, (0o720, 0o702, 0o777, 0o755))]
 @pytest.mark.parametrize("make", OTHERS)
 def test_a_folder_that_others_may_have_written_is_not_read(folder, monkeypatch, make):
     """The file would be loaded if the folder were trusted: reading it raises an error."""
-    of = cache.LaterCache(kernel)
+    of = cache.KernelCache(kernel)
     assert cache.kernel_folder() == folder
     monkeypatch.setattr(cache, "_intact", lambda data: pytest.fail("read"))
     (folder / of._name((), CODEGEN)).write_bytes(b"anything")
@@ -155,7 +168,7 @@ def name(monkeypatch):
 
     def found(signature: tuple[Any, ...] = (numba.float64,), codegen: Any = CODEGEN) -> str:
         cache._target.cache_clear()
-        return cache.LaterCache(kernel)._name(signature, codegen)
+        return cache.KernelCache(kernel)._name(signature, codegen)
 
     yield found
     cache._target.cache_clear()
