@@ -3,8 +3,8 @@
 What a visitor sends ends up in the log in ways that nobody foresees: in a warning of a library, in the message of
 an exception, in a traceback. So one handler writes everything, warnings of Python and errors of threads and of
 callbacks too. Control characters, line breaks among them, are escaped, and long lines are cut. The kind of a
-record is the place in the code that logs and the place of the error: of each kind the first is written, and those of
-the next minute are counted.
+record is the place in the code that logs and the place of the error: of each kind the first is written, and those
+of the next minute are counted.
 """
 
 from __future__ import annotations

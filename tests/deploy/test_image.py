@@ -76,7 +76,9 @@ def test_a_container_uses_the_kernels_that_the_image_brought_and_says_if_it_comp
     assert (first, second) == ("2 1", "0 3.0 1")
     assert state(brought) == before
     # scripts/image.sh looks for it in the log.
-    (looked_for,) = re.findall(r'podman logs .* grep "([^"]+)"', (ROOT / "scripts" / "image.sh").read_text("utf-8"))
+    (looked_for,) = re.findall(
+        r'podman logs .* grep "([^"]+)"', (ROOT / "scripts" / "image.sh").read_text("utf-8")
+    )
     assert looked_for in message
 
 
