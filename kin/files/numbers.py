@@ -1,7 +1,7 @@
 r"""Numbers as files and programs write them, in ASCII digits.
 
 Python's `int`, `float`, `str.isdecimal` and regular expressions take the digits of every script, and `int` fails
-beyond 4300 of them. Numbers that people type are read by :mod:`kin.typed`, which translates other digits on purpose.
+beyond 4300 of them. Numbers that people type are read by :mod:`kin.typed`, which translates other digits.
 """
 
 from __future__ import annotations

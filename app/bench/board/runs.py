@@ -33,8 +33,10 @@ LIMIT = 900.0  # seconds until a run is given up
 # Tries to lock, and seconds between two: a process that asks how far a run is has the lock for a moment, and a run
 # that has said its last word for a moment longer.
 _LOOKS, _TRIES, _WAIT = 4, 250, 0.02
-_KEPT = ("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR", "XDG_CACHE_HOME", "KINBOARD_CACHE", "NUMBA_CACHE_DIR")
-_KEPT += ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
+_KEPT = (
+    *("PATH", "HOME", "LANG", "LC_ALL", "TMPDIR"),
+    *("XDG_CACHE_HOME", "KINBOARD_CACHE", "NUMBA_CACHE_DIR", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"),
+)
 
 State = Literal["idle", "running", "done", "failed", "cancelled"]
 
