@@ -15,11 +15,12 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import re
 import tomllib
 from collections.abc import Iterator
 from itertools import accumulate
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from kin.errors import shorten
 
@@ -71,7 +72,8 @@ def read_json(text: str | bytes, limits: Limits, finite: bool = False) -> Any:
     Args:
         text: a text, or its bytes in UTF-8; a byte order mark is skipped.
         limits: what it may have.
-        finite: refuse ``NaN`` and ``Infinity``, which are no JSON, but which Python reads.
+        finite: refuse ``NaN`` and ``Infinity``, which are no JSON, but which Python reads, and what is beyond the
+            range of floats.
 
     Raises:
         TextError: it exceeds a limit, or is no JSON.
@@ -79,7 +81,7 @@ def read_json(text: str | bytes, limits: Limits, finite: bool = False) -> Any:
     given = _decoded(text, limits, "JSON").removeprefix("\ufeff")
     _measure(_JSON_STRING.sub("_", given), ",:[{", limits)
     try:
-        return json.loads(given, parse_constant=_refuse if finite else None)
+        return json.loads(given, **(_FINITE if finite else {}))
     except (ValueError, RecursionError) as error:  # an integer of too many digits is a ValueError
         raise TextError(str(error), "valid JSON", syntax=True) from None
 
@@ -155,5 +157,12 @@ def _measure(bare: str, marks: str, limits: Limits) -> None:
         raise TextError(f"nested more than {limits.depth} deep", f"at most {limits.depth} deep")
 
 
-def _refuse(constant: str) -> object:
-    raise ValueError(f"{shorten(constant)} is no number of JSON")
+def _refuse(constant: str) -> float:
+    raise ValueError(f"{shorten(constant)} is no finite number")
+
+
+def _finite(text: str) -> float:
+    return value if math.isfinite(value := float(text)) else _refuse(text)
+
+
+_FINITE: Final[dict[str, Any]] = {"parse_constant": _refuse, "parse_float": _finite}

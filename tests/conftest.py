@@ -104,6 +104,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: place[item.path])
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Iterator[None]:
+    """Escape what a test prints that no UTF-8 can hold: pytest-xdist sends all of it to another process."""
+    report: pytest.TestReport = yield  # type: ignore[assignment, misc]
+    report.sections = [(name, text.encode(errors="backslashreplace").decode()) for name, text in report.sections]
+    return report  # type: ignore[return-value]
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option that renews ``tests/data/snapshots``."""
     parser.addoption(

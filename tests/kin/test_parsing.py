@@ -109,7 +109,7 @@ def test_what_is_no_toml_is_refused_with_its_reason(text):
 
 def test_numbers_that_are_no_json_are_refused_where_that_is_asked_for():
     assert read_json("[Infinity]", SMALL) == [float("inf")]
-    with pytest.raises(TextError, match="'NaN' is no number of JSON"):
+    with pytest.raises(TextError, match="'NaN' is no finite number"):
         read_json("[NaN]", SMALL, finite=True)
 
 

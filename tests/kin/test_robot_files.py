@@ -166,9 +166,13 @@ def test_a_byte_order_mark_is_accepted(tmp_path):
     assert kin.load_robot(tmp_path / "arm.toml") == kin.parse_robot(GOOD)
 
 
-@pytest.mark.parametrize("text", ["x = " + "9" * 5000, "x = " + "[" * 100_000], ids=["digits", "brackets"])
-def test_endless_toml_is_rejected(text):
-    with pytest.raises(RobotFileError, match="valid TOML") as caught:
+@pytest.mark.parametrize(
+    ("text", "valid"),
+    [("x = " + "9" * 5000, "valid TOML"), ("x = " + "[" * 100_000, "at most 20000 values")],
+    ids=["digits", "brackets"],
+)
+def test_endless_toml_is_rejected(text, valid):
+    with pytest.raises(RobotFileError, match=valid) as caught:
         kin.parse_robot(text, "arm.toml")
     assert len(str(caught.value)) < 300
 

@@ -400,4 +400,13 @@ def _units(data: dict[str, Any]) -> Units:
 
 def _features(value: object) -> dict[str, dict[str, object]]:
     states = value if isinstance(value, dict) else {}
-    return {key: state for key, state in states.items() if isinstance(state, dict)}
+    return {key: state for key, state in states.items() if isinstance(state, dict) and _is_finite(state)}
+
+
+def _is_finite(state: object) -> bool:
+    """Whether it can be written into a link: Python reads numbers beyond all floats as infinity."""
+    try:
+        json.dumps(state, allow_nan=False)
+    except ValueError:
+        return False
+    return True

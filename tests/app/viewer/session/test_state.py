@@ -362,6 +362,7 @@ def texts_of(value: object) -> Iterator[str]:
 @example(packed({"v": 1, "robot": "\ud800"}))
 @example(packed({"v": 1, "robot": "own", "own": {**OWN, "n": "\ud83d"}}))
 @example(packed({"v": 1, "features": {"\udfff": {"a": 10**400}}}))
+@example(packed({"v": 1, "features": {"a": math.inf}}))
 def test_every_text_of_a_state_can_be_sent_to_a_page(text):
     state = decode(text, ROBOTS)
     names = [] if state.own is None else [state.own.start, *vars(state.own.robot).values()]
