@@ -65,9 +65,8 @@ from app.shared.memory.process import MemoryKeeper
 from app.shared.memory.shared import shared_bytes
 from app.shared.metrics import count_together, forget_process
 from app.shared.security import SecurityHeaders
-from app.shared.settings import Settings
+from app.shared.settings import Settings, static_folder
 from app.shared.slots import Slots
-from app.shared.static_folder import static_folder
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.shared.threads import end_process, pin
@@ -88,6 +87,7 @@ DESCRIPTION = (
     "A target out of reach is an answer with a `status` and a `reason`, not an error."
 )
 
+NO_PORT = "kinboard: cannot listen on {}:{}: {}.\nChoose another port with --port (0 takes any free one)."
 NEWER_DATABASE = """\
 kinboard: the database of classrooms in {} was written by a newer version of Kinboard. Rooms cannot be used:
 install that version, or set KINBOARD_DATA to another folder. Everything else works."""
@@ -220,11 +220,7 @@ def run(settings: Settings, open_browser: bool = False, page: str = "", words: s
         listeners = listen(settings)
     except OSError as error:
         reason = error.strerror or str(error)
-        print(
-            f"kinboard: cannot listen on {settings.host}:{settings.port}: {reason}.\n"
-            "Choose another port with --port (0 takes any free one).",
-            file=sys.stderr,
-        )
+        print(NO_PORT.format(settings.host, settings.port, reason), file=sys.stderr)
         return 1
     with contextlib.ExitStack() as stack:
         for listener in listeners:

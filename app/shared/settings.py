@@ -210,3 +210,10 @@ class Settings(BaseSettings):
     def data_folder(self) -> Path:
         """The folder for the database of classrooms, whether or not it exists."""
         return self.data or Path(platformdirs.user_data_dir("kinboard", appauthor=False))
+
+
+def static_folder() -> Path:
+    """The folder of the pages' static files: next to the package in a checkout, inside it when installed."""
+    package = Path(__file__).parents[1]
+    installed = package / "_static"
+    return installed if installed.is_dir() else package.parent / "static"

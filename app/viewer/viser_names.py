@@ -162,4 +162,14 @@ TYPE_HINTS = PrivateUse(
     ("viser._assignable_props_api:get_type_hints",),
 )
 
-ALL = (SERVER, OUTBOX, POSES, VALUES, SENT_VALUES, IDENTITY, FILTER, DRAGS, WAKE_UPS, TYPE_HINTS)
+CALLBACK_ERRORS = PrivateUse(
+    "viser",
+    "Errors of callbacks in the log, where control characters are escaped.",
+    "viser prints what callbacks raise, which may contain what a visitor has sent.",
+    ("viser._threadpool_exceptions:traceback", "viser._threadpool_exceptions:print_awaited_callback_error(exc)"),
+)
+
+ALL = (
+    *(SERVER, OUTBOX, POSES, VALUES, SENT_VALUES, IDENTITY, FILTER, DRAGS),
+    *(WAKE_UPS, TYPE_HINTS, CALLBACK_ERRORS),
+)

@@ -50,7 +50,6 @@ import msgspec
 import numpy as np
 import viser
 from viser import _messages as messages
-from viser import _threadpool_exceptions as printing
 from viser.infra import ClientId
 from viser.infra import _async_message_buffer as buffers
 
@@ -343,6 +342,9 @@ def set_events_in_their_loop() -> None:
 
 def log_callback_errors() -> None:
     """Make viser log what callbacks raise, which it prints: messages of visitors may be in it."""
+    if not viser_names.CALLBACK_ERRORS.is_there:
+        return
+    from viser import _threadpool_exceptions as printing
 
     def log_error(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         log.error("a callback of the viewer failed", exc_info=(kind, error, trace))

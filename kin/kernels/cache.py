@@ -35,7 +35,7 @@ import uuid
 import warnings
 import zlib
 from collections.abc import Callable, Iterable, Iterator
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -102,7 +102,7 @@ def kernel_folder() -> Path | None:
     """The folder of machine code, made if it is missing; None if there is none that can be trusted.
 
     It is `kernels` in the user's cache folder, or in the folder that KINBOARD_CACHE names. NUMBA_CACHE_DIR takes
-    precedence, as for numba's own cache: whoever sets it answers for that folder, which may be read-only.
+    precedence, as for numba's own cache. Its owner and mode are not checked, and it may be read-only.
     """
     given = str(vars(config)["CACHE_DIR"])
     hint = "set KINBOARD_CACHE to another folder"
@@ -327,7 +327,7 @@ def numbas_own(function: Callable[..., Any]) -> Iterator[bool]:
         vars(config)["CACHE_DIR"] = before
 
 
-@cache
+@lru_cache(maxsize=8)
 def _target(processor: tuple[str, ...]) -> str:
     """What all machine code of this process depends on besides its text."""
     python = sys.implementation.cache_tag, getattr(sys, "abiflags", "")

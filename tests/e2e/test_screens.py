@@ -15,7 +15,7 @@ from page import Tab, save_picture
 from playwright.sync_api import Browser, Page, expect
 
 import kin
-from app.shared.static_folder import static_folder
+from app.shared.settings import static_folder
 
 pytestmark = [pytest.mark.browser, pytest.mark.full]
 

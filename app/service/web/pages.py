@@ -16,7 +16,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import Message, Receive, Scope, Send
 
 from app.api.problems import ProblemError, respond
-from app.shared.static_folder import static_folder
+from app.shared.settings import static_folder
 from kin import __version__, builtin_robots, classic_robots
 
 

@@ -24,7 +24,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import ArrayLike, NDArray
 
-from app.shared.static_folder import static_folder
+from app.shared.settings import static_folder
 from app.viewer.panel.posture import short
 from app.viewer.scene.bodies.drawing import Drawing, drawing
 from app.viewer.scene.bodies.parts import Part, joint_color

@@ -16,12 +16,13 @@ import msgspec
 import pytest
 from fastapi import FastAPI
 from uvicorn.logging import DefaultFormatter
+from viser._threadpool_exceptions import print_awaited_callback_error
 
 from app.service.log import FIRST, LAST, LONGEST, LogFormatter, LogHandler, escaped, guard_log
 from app.service.server import server_config
 from app.shared.settings import Settings
 from app.shared.throttled_log import LOG_EVERY, ThrottledLog
-from app.viewer.viser_patches import log_callback_errors, messages, printing
+from app.viewer.viser_patches import log_callback_errors, messages
 
 FORGED = "\x1b[31m\x07red\r\nworker 12 ended\u2028and\u202eback\x9b1m\ud800"
 RAW = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028\u202e\ud800]")
@@ -161,7 +162,7 @@ def raise_in_del() -> None:
 
 def raise_in_callback() -> None:
     log_callback_errors()
-    printing.print_awaited_callback_error(ValueError(FORGED))
+    print_awaited_callback_error(ValueError(FORGED))
 
 
 def raise_in_task() -> None:

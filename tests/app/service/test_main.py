@@ -25,8 +25,7 @@ from websockets.sync.client import ClientConnection, connect
 import app.service.compiler
 import app.service.startup
 from app.service.main import create_app, run
-from app.shared.settings import Settings
-from app.shared.static_folder import static_folder
+from app.shared.settings import Settings, static_folder
 from app.viewer.server import ViewerServer
 from kin import builtin_robots
 from kin.warmup import first_family, parts

@@ -58,7 +58,7 @@ def test_the_installed_version_has_all_names() -> None:
 
 
 def test_all_that_is_used_is_listed_and_used_nowhere_else() -> None:
-    modules = {"_messages", "_infra", "_async_message_buffer", "_assignable_props_api"}
+    modules = {"_messages", "_infra", "_async_message_buffer", "_assignable_props_api", "_threadpool_exceptions"}
     for path in USERS:
         assert set(uses(path)) <= LISTED | modules, path.name
     private = {name for name in LISTED if name.startswith("_")} | modules

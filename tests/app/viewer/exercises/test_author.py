@@ -20,8 +20,7 @@ from app.exercises import Exercises, parse_exercise
 from app.exercises.files import MOST_BYTES
 from app.exercises.form import to_toml
 from app.shared.clouds import Clouds
-from app.shared.settings import Settings
-from app.shared.static_folder import static_folder
+from app.shared.settings import Settings, static_folder
 from app.shared.store import Store
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode

@@ -13,8 +13,7 @@ from live_server import serve_viewer
 
 import kin
 from app.shared.clouds import Clouds
-from app.shared.settings import Settings
-from app.shared.static_folder import static_folder
+from app.shared.settings import Settings, static_folder
 from app.shared.store import Store
 from app.viewer.own_arm import label, own_arm
 from app.viewer.server import ViewerServer

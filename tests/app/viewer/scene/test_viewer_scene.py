@@ -13,7 +13,7 @@ from arms import CLASSICS
 from bare_page import nodes_of
 
 import kin
-from app.shared.static_folder import static_folder
+from app.shared.settings import static_folder
 from app.shared.store import Store
 from app.viewer.panel import joints, readout, rotations, status
 from app.viewer.scene import camera
