@@ -256,6 +256,7 @@ def test_each_line_is_answered_before_the_next_one_is_sent():
         ("fk", lines([[[1, 2, 3, 4, 5, 6]]]), "a list of 6 joint values"),
         ("fk", lines([{"x": 1}]), "a list of 6 joint values"),
         ("fk", "1,2,3,4,5,inf\n", r"--configurations\[0\]"),
+        ("fk", "1,2,3,4,5,6\n１,2,3,4,5,6\n", r"--configurations\[1\]"),
         ("fk", array(np.array([[1, 2, 3, 4, 5, 6], [np.nan, 0, 0, 0, 0, 0]])), r"--configurations\[1\]"),
         ("fk", array(np.zeros((0, 6))), "at least one row"),
         ("fk", "x" * (1 << 21), "shorter lines"),
