@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from versions import needs_ompl
 
 import kin
 from kin.way import find_way
@@ -28,6 +29,7 @@ def test_a_scene_needs_a_way_around(scene: Scene) -> None:
     assert kin.clearance(UR5, straight, scene.obstacles).min() < 0.0
 
 
+@needs_ompl
 def test_a_way_in_a_scene_is_free_and_no_shorter_than_straight() -> None:
     scene = SCENES[0]
     start, goal = ends(UR5, scene)  # type: ignore[misc]  # the test above

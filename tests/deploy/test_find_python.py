@@ -10,6 +10,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from versions import needs_ompl
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -74,3 +76,11 @@ def test_all_that_names_versions_names_the_same_ones() -> None:
     for name in ("README.md", "docs/index.md", "docs/running.md", "scripts/venv.sh"):
         text = (ROOT / name).read_text(encoding="utf-8")
         assert set(re.findall(r"Python (3\.\d+ to 3\.\d+)", text)) == {f"{oldest} to {newest}"}, name
+
+
+def test_extras_without_wheels_are_left_out_where_the_tests_leave_them_out() -> None:
+    (ompl,) = map(Requirement, PROJECT["optional-dependencies"]["ways"])
+    wanted = [version for version in CLASSIFIERS if ompl.marker.evaluate({"python_version": version})]
+    assert wanted == [version for version in CLASSIFIERS if version != "3.14"]
+    here = ".".join(map(str, sys.version_info[:2]))
+    assert needs_ompl.args[0] == (here not in wanted)

@@ -11,6 +11,7 @@ from app.shared.answers.fk import FkAnswer
 from app.shared.answers.ik import Brief, IkAnswer, ReachableAnswer
 from app.shared.answers.jacobian import JacobianAnswer
 from kin.motion.program import KINDS
+from kin.way import is_installed
 
 
 @pytest.fixture(scope="session")
@@ -189,6 +190,8 @@ def test_answers_have_examples_that_are_answered(client, document, request):
     for path, _, operation in operations(document):
         name, answer = operation["operationId"], operation["responses"]["200"]["content"].get("application/json")
         if answer is None or name in WITHOUT_EXAMPLE or name.removesuffix("_sent") in WITHOUT_EXAMPLE:
+            continue
+        if name.removesuffix("_sent") == "way" and not is_installed():
             continue
         if not name.endswith("_sent"):
             found[name] = rounded(answered(client, path, operation))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from versions import needs_ompl
 
 import kin
 
@@ -20,6 +21,7 @@ def post(client, body, status=200):
     return response.json()
 
 
+@needs_ompl
 def test_a_way_comes_with_a_program_that_motion_drives_without_touching(client):
     answer = post(client, BODY)
     assert answer["found"], answer["reason"]
@@ -36,6 +38,7 @@ def test_a_way_comes_with_a_program_that_motion_drives_without_touching(client):
     assert post(client, BODY)["q"] == answer["q"], "the same seed"
 
 
+@needs_ompl
 def test_what_cannot_be_is_an_answer(client):
     ball = {"shape": "sphere", "xyz": kin.fk(UR5, GOAL)[:3, 3].tolist(), "radius": 0.1, "name": "ball"}
     inside = post(client, {**BODY, "obstacles": [ball]})

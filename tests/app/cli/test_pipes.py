@@ -15,6 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from versions import needs_ompl
 
 import kin
 from app.cli import parser
@@ -371,8 +372,8 @@ def test_an_unknown_robot_is_refused_as_in_rest(run, client):
     assert {**document, "hint": ""} == {**rest, "hint": ""}
 
 
+@needs_ompl
 def test_a_way_is_piped_to_the_motion_of_its_program(run):
-    pytest.importorskip("ompl")
     words = ("way", "ur5", "--start", 0, -90, 90, 0, 90, 0, "--goal", 60, -90, 90, 0, 90, 0, "-o", "-")
     code, program, err = run(*words)
     assert code == 0

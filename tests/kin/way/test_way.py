@@ -10,6 +10,7 @@ from threading import Thread
 
 import numpy as np
 import pytest
+from versions import needs_ompl
 
 import kin
 import kin.way
@@ -38,6 +39,7 @@ def fine(q: np.ndarray) -> np.ndarray:
     return np.concatenate(parts)
 
 
+@needs_ompl
 @pytest.mark.parametrize("robot", [UR5, PANDA, IIWA], ids=lambda robot: robot.id)
 def test_a_way_leads_around_a_post_and_its_program_touches_nothing(robot):
     start, goal, obstacle = scene(robot)
@@ -56,6 +58,7 @@ def test_a_way_leads_around_a_post_and_its_program_touches_nothing(robot):
     assert all(peak.ratio < 1.0 + 1e-9 for peak in motion.peaks if peak.ratio is not None)
 
 
+@needs_ompl
 def test_the_same_seed_finds_the_same_way():
     start, goal, obstacle = scene(UR5)
     ways = [find_way(UR5, start, goal, obstacles=[obstacle], seed=seed, time_limit=60.0).q for seed in (5, 5, 6)]
@@ -100,6 +103,7 @@ def test_what_cannot_be_is_an_answer_with_its_reason():
     assert "out of reach" in unreachable.reason.lower()
 
 
+@needs_ompl
 def test_none_found_in_time_is_not_called_none_and_a_search_reports_and_is_cancelled():
     start, goal, obstacle = scene(UR5)
     way = find_way(UR5, start, goal, obstacles=[obstacle], time_limit=1e-6)
@@ -121,6 +125,7 @@ def test_none_found_in_time_is_not_called_none_and_a_search_reports_and_is_cance
     assert parts[-1] >= parts[0] >= 0.0
 
 
+@needs_ompl
 def test_a_search_that_waits_for_another_one_keeps_its_time_and_is_cancelled():
     start, goal, obstacle = scene(UR5)
 
@@ -142,6 +147,7 @@ def test_a_search_that_waits_for_another_one_keeps_its_time_and_is_cancelled():
     assert found[0].seconds < 60.0
 
 
+@needs_ompl
 def test_a_program_has_the_speeds_that_are_asked_for_and_stays_free_with_them():
     start, goal, obstacle = scene(UR5)
     way = find_way(UR5, start, goal, obstacles=[obstacle], seed=3, time_limit=60.0)

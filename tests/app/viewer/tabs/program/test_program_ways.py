@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fake_browser import FakeBrowser
+from versions import needs_ompl
 
 import kin
 from app.shared.store import Store
@@ -74,6 +75,7 @@ def around_a_post() -> tuple[np.ndarray, np.ndarray, kin.Obstacle]:
     return start, goal, kin.Obstacle("box", (x, y, z), size=(0.12, 0.12, 0.9), name="post")
 
 
+@needs_ompl
 def test_a_way_around_a_post_is_put_into_the_program_in_one_step(port: int) -> None:
     start, goal, post = around_a_post()
     line = ["p", [round(value, 7) for value in goal.tolist()], "above", 0.5]
@@ -116,6 +118,7 @@ def programs(tab: FakeBrowser) -> list[list[object]]:
     return found  # type: ignore[no-any-return]
 
 
+@needs_ompl
 def test_none_found_in_time_is_not_called_none_and_loses_nothing(blocked: FakeBrowser) -> None:
     press(blocked, "way", 1)
     press(blocked, "way-seconds", value="0.1")
@@ -128,6 +131,7 @@ def test_none_found_in_time_is_not_called_none_and_loses_nothing(blocked: FakeBr
 
 
 @pytest.mark.full
+@needs_ompl
 def test_a_search_shows_its_progress_and_is_cancelled(blocked: FakeBrowser) -> None:
     press(blocked, "way", 1)
     press(blocked, "way-seconds", value=f"{DURATION:g}")
@@ -150,6 +154,7 @@ def test_a_search_shows_its_progress_and_is_cancelled(blocked: FakeBrowser) -> N
     assert rows(blocked) == 1
 
 
+@needs_ompl
 @pytest.mark.parametrize(
     ("name", "text", "valid"),
     [
@@ -172,6 +177,7 @@ def test_what_cannot_be_a_time_limit_or_a_seed_is_refused(
 
 
 @pytest.mark.full
+@needs_ompl
 def test_a_waypoint_inside_an_obstacle_and_a_start_that_touches_are_answers(port: int) -> None:
     goal = UR5.q_home.copy()
     goal[0] += 1.0
@@ -191,6 +197,7 @@ def test_a_waypoint_inside_an_obstacle_and_a_start_that_touches_are_answers(port
         assert rows(tab) == 3
 
 
+@needs_ompl
 def test_units_that_are_changed_while_a_search_goes_on_neither_end_it_nor_lose_anything(port: int) -> None:
     start, goal, post = around_a_post()
     line = ["p", goal.tolist(), "above", 1.0, {"v": 0.25}]
@@ -216,6 +223,7 @@ def test_units_that_are_changed_while_a_search_goes_on_neither_end_it_nor_lose_a
 
 
 @pytest.mark.full
+@needs_ompl
 def test_units_that_are_changed_while_a_form_is_open_leave_what_was_typed(blocked: FakeBrowser) -> None:
     press(blocked, "way", 1)
     press(blocked, "way-seconds", value=f"{DURATION:g}")
@@ -262,6 +270,7 @@ def test_where_the_search_is_not_installed_the_page_says_how_to_install_it(
     assert "<progress" not in part(blocked, "way")
 
 
+@needs_ompl
 def test_without_obstacles_there_is_nothing_to_go_around(port: int) -> None:
     with FakeBrowser(port, memory=opened(PLANAR, (), [["p", START], ["p", GOAL]])) as tab:
         tab.wait(lambda: rows(tab) == 2)
@@ -270,6 +279,7 @@ def test_without_obstacles_there_is_nothing_to_go_around(port: int) -> None:
         assert 'data-program-do="search" aria-disabled="true"' in part(tab, "way")
 
 
+@needs_ompl
 def test_a_way_that_has_no_room_in_the_program_is_said(port: int) -> None:
     start, goal, post = around_a_post()
     program = [["p", start.tolist()]] * (MOST - 1) + [["p", goal.tolist()]]
