@@ -1,4 +1,7 @@
-"""What the programs that move a real arm share: a confirmation, a limit on its speed, and reasons to stop.
+"""What the programs that move a real arm share: a confirmation, limits on its motion, and reasons to stop.
+
+An arm stays where it was measured until the page commands it. Then each joint moves towards its command and never
+away from it, no faster than allowed, and no farther than the limits of the page's arm and of the real one.
 
 None of it is a safety function: keep an emergency stop within reach.
 """
@@ -24,6 +27,8 @@ BEHIND, PATIENCE = (
     np.radians(25.0),
     0.5,
 )  # rad (for slides: m / 10), s: an arm so far behind for so long is blocked
+AWAY: Final = np.radians(10.0)  # rad (for slides: m / 10) that a joint may move away from where it is asked to be
+LATEST: Final = 0.1  # s that count at most between two steps: nothing is caught up after a pause
 LONGEST: Final = 60  # characters of the name of what is driven
 SAME: Final = 1e-3  # rad (m)
 SLOW, SLOW_SLIDE = 20.0, 0.05  # deg/s, m/s
@@ -65,29 +70,40 @@ def confirm(what: str, options: argparse.Namespace) -> None:
 class Guide:
     """Leads an arm to the configuration that its page shows, at a limited speed.
 
+    A joint stays where it was measured until the page shows another value of it than the one it has taken over. If
+    it was measured outside its limits, it may stay there and move inside.
+
     Args:
         page: the page, which gets a red frame with the name of the arm.
         what: that name.
-        speed: of each joint, deg/s.
+        speed: of each joint, deg/s; less where the page's arm has a lower limit.
         measured: where the arm is ``(n,)``; the page takes it over, so that nothing moves at first.
-        limits: lower and upper configurations ``(n,)`` that the arm itself has, beside those of the page.
+        limits: lower and upper configurations ``(n,)`` of the arm itself; those of the page's arm count, too.
+
+    Attributes:
+        asked: where the arm is to be now ``(n,)``.
+        commanded: which joints the page has moved since ``(n,)``.
 
     Raises:
-        StoppedError: the page did not take it over.
+        StoppedError: the page did not take it over, or the limits leave a joint no room.
     """
 
     def __init__(
         self, page: Any, what: str, speed: float, measured: Array, limits: tuple[Array, Array] | None = None
     ) -> None:
         self._page, self._what, self._robot = page, what[:LONGEST], page.robot
-        self._limits = limits or (self._robot.lower, self._robot.upper)
-        self._speed = np.where(self._robot.revolute, np.radians(speed), SLOW_SLIDE)
-        self._behind = np.where(self._robot.revolute, BEHIND, 0.1 * BEHIND)
+        self._limits = _common(self._robot, limits)
+        wanted = np.where(self._robot.revolute, np.radians(speed), SLOW_SLIDE)
+        self._speed = np.minimum(wanted, kin.motion_limits(self._robot).velocity)
+        self._size = np.where(self._robot.revolute, 1.0, 0.1)  # of what is far for a joint
         self.asked = measured.copy()
+        self._moved, self._gap, self._away = (np.zeros(self._robot.n) for _ in range(3))
+        self.commanded = np.zeros(self._robot.n, dtype=bool)
         page.drives = self._what
         page.q = self._robot.clip(measured)
         page.stop()  # a program that is played; answered when the page has taken q, too
-        if np.abs(page.q - self._robot.clip(measured)).max() > SAME:
+        self._shown = page.q
+        if np.abs(self._shown - self._robot.clip(measured)).max() > SAME:
             raise StoppedError(
                 "the page has not taken over where the arm is: is its target held? Nothing was moved"
             )
@@ -116,7 +132,7 @@ class Guide:
             StoppedError: a reason to move it no further.
         """
         now = time.monotonic()
-        elapsed, self._before = now - self._before, now
+        elapsed, self._before = min(now - self._before, LATEST), now
         if not self._page.connected or now - self._alive > PAGE_LOST:
             raise StoppedError("the page does not answer: the arm is not moved any further")
         if now - heard > ARM_LOST:
@@ -124,21 +140,63 @@ class Guide:
         q = self._page.q
         if self._page.robot != self._robot or q.shape != self.asked.shape:
             raise StoppedError("the page shows another arm: this one is not moved any further")
-        behind = np.abs(self.asked - measured)
-        if (behind < self._behind).all():
+        self._compare(measured, now)
+        commanded = self.commanded | (np.abs(q - self._shown) > SAME)
+        if commanded.any() and not self.commanded.any():  # the arm may have given way a little until now
+            self.asked, self._gap = measured.copy(), np.zeros(self._robot.n)
+        self.commanded = commanded
+        low, high = np.minimum(self._limits[0], self.asked), np.maximum(self._limits[1], self.asked)
+        way = np.where(self.commanded, np.clip(q, low, high) - self.asked, 0.0)
+        longest = float(np.max(np.abs(way) / (self._speed * max(elapsed, 1e-6)), initial=0.0))
+        self._moved = way / max(longest, 1.0)  # all joints arrive together
+        self.asked = self.asked + self._moved
+        return self.asked
+
+    def _compare(self, measured: Array, now: float) -> None:
+        """Raise `StoppedError` where the arm is far behind, or goes elsewhere than it was asked to.
+
+        What the difference grows by in a step beyond what was asked for in it, the arm has moved away by itself.
+        """
+        gap = np.abs(self.asked - measured)
+        self._away = np.maximum(0.0, self._away + gap - self._gap - np.abs(self._moved))
+        self._gap = gap
+        i = int(np.argmax(self._away / self._size))
+        if self._away[i] > AWAY * self._size[i]:
+            raise StoppedError(
+                f"{self._robot.joints[i].name} has moved {said(self._robot, i, self._away[i])} away from where it "
+                "was asked to be: something pushes it, its motor is too weak, or its calibration is wrong. "
+                "The arm is not moved any further"
+            )
+        if (gap < BEHIND * self._size).all():
             self._followed = now
         elif now - self._followed > PATIENCE:
-            i = int(np.argmax(behind / self._behind))
+            i = int(np.argmax(gap / self._size))
             raise StoppedError(
-                f"{self._robot.joints[i].name} is {said(self._robot, i, behind[i])} behind: something holds it, "
+                f"{self._robot.joints[i].name} is {said(self._robot, i, gap[i])} behind: something holds it, "
                 "or its motor is too weak. The arm is not moved any further"
             )
-        way = np.clip(q, *self._limits) - self.asked
-        longest = float(np.max(np.abs(way) / (self._speed * max(elapsed, 1e-6)), initial=0.0))
-        self.asked = self.asked + way / max(longest, 1.0)  # all joints arrive together
-        return self.asked
 
     def end(self) -> None:
         """End the signs of life; the page's frame goes with the connection."""
         self._over.set()
         self._heart.join(PAGE_LOST)
+
+
+def _common(robot: kin.Robot, limits: tuple[Array, Array] | None) -> tuple[Array, Array]:
+    """The limits of the page's arm and of the real one; raises `StoppedError` where nothing is inside both."""
+    low, high = (robot.lower, robot.upper) if limits is None else limits
+    both = np.maximum(low, robot.lower), np.minimum(high, robot.upper)
+    for i in np.flatnonzero(both[0] > both[1]).tolist():
+        own, page = (
+            f"{_value(robot, i, a[i])} to {_value(robot, i, b[i])}"
+            for a, b in ((low, high), (robot.lower, robot.upper))
+        )
+        raise StoppedError(
+            f"{robot.joints[i].name}: the arm's own limits are {own}, those of the page's arm {page}; no value is "
+            "inside both. Is the sign or the zero of its motor wrong? Nothing was moved"
+        )
+    return both
+
+
+def _value(robot: kin.Robot, joint: int, value: float) -> str:
+    return f"{'−' if value < 0 else ''}{said(robot, joint, value)}"

@@ -45,11 +45,15 @@ BAUD: Final = 1_000_000
 CYCLE: Final = 0.02  # s
 TRIES: Final = 3  # of a packet, before its servo counts as lost
 RESTING: Final = 0.5  # s between two tries of a bus whose servos do not answer
+MARGIN: Final = (
+    23  # ticks (2°) outside its range at which a servo may be switched on: it moves to the range itself
+)
 
 # Registers of the STS series, two bytes little-endian but for the first.
 TORQUE_ENABLE, GOAL_POSITION, PRESENT_POSITION = 40, 42, 56
 MODELS: Final = {777: "STS3215", 2825: "STS3250"}
 TURN: Final = 4096  # ticks
+TAU: Final = 2.0 * np.pi
 # Bits of a status packet, in the order of their values.
 ERRORS: Final = ("voltage", "encoder", "temperature", "current", "", "load")
 
@@ -209,6 +213,70 @@ def motors_of(robot: kin.Robot, options: Namespace) -> kin.Robot:
     return robot
 
 
+class Scale:
+    """Joint values of a driven arm by the ticks of its servos, in a straight line over their calibrated ranges.
+
+    A reading tells a joint value only up to whole turns, and `kin.q_from_readings` chooses the one that fits the
+    limits best. Two ticks side by side may then be a turn apart, and the ends of a full turn, 0 and 4095, may both
+    become 180°. To a servo its goals are numbers on one line: it goes from 4095 to 0 all the way back. So the turn
+    is chosen once here, for all readings, goals and limits.
+
+    Args:
+        robot: the arm with its motors.
+        motors: those that move a joint.
+        ticks: where they are ``(m,)``. If that is inside the limits on some turn, that turn is chosen; otherwise
+            the one on which the middle of the range is.
+
+    Attributes:
+        limits: the configurations ``(n,)`` at the ends of the calibrated ranges: lower and upper ones.
+
+    Raises:
+        KinematicsError: a servo is outside its calibrated range.
+    """
+
+    def __init__(self, robot: kin.Robot, motors: Sequence[kin.Motor], ticks: Array) -> None:
+        self._low, self._high = np.array([motor.range or (0, motor.ticks - 1) for motor in motors], dtype=float).T
+        for motor, tick, low, high in zip(motors, ticks, self._low, self._high, strict=True):
+            if not low - MARGIN <= tick <= high + MARGIN:
+                raise kin.KinematicsError(
+                    f"{named(motor)} is at {tick:.0f} ticks, outside its calibrated range from {low:.0f} to "
+                    f"{high:.0f}: is the calibration of another arm, or older? Nothing was moved"
+                )
+        self._ends = np.minimum(self._low, ticks), np.maximum(self._high, ticks)
+        self._middle = 0.5 * (self._low + self._high)
+        first, last = kin.readings_from_ticks(motors, np.array([self._low, self._high]))
+        scale = [motor.sign * motor.scale for motor in motors]
+        self._slope = scale * (self._high - self._low) / (last - first)  # ticks of a radian (metre)
+        names = [joint.name for joint in robot.joints]
+        self._joints = np.array([names.index(motor.joint) for motor in motors])
+        self._n = robot.n
+        self._zero = kin.q_from_readings(robot, 0.5 * (first + last))
+        q = kin.q_from_readings(robot, kin.readings_from_ticks(motors, ticks))
+        turns = np.round((q - self.q(ticks)) / TAU)
+        self._zero += TAU * np.where(robot.revolute & (q >= robot.lower) & (q <= robot.upper), turns, 0.0)
+        ends = [self._each(end) for end in (self._low, self._high)]
+        self.limits = (
+            np.array([np.minimum(*ends)[self._joints == j].max() for j in range(self._n)]),
+            np.array([np.maximum(*ends)[self._joints == j].min() for j in range(self._n)]),
+        )
+
+    def _each(self, ticks: Array) -> Array:
+        """What each motor says of its joint ``(m,)``."""
+        found: Array = self._zero[self._joints] + (ticks - self._middle) / self._slope
+        return found
+
+    def q(self, ticks: Array) -> Array:
+        """The configuration ``(n,)`` at these ticks ``(m,)``; a joint with two motors has the mean of both."""
+        each = self._each(ticks)
+        return np.array([each[self._joints == j].mean() for j in range(self._n)])
+
+    def ticks(self, q: Array) -> Array:
+        """The goals of the servos ``(m,)`` for a configuration ``(n,)``, whole numbers within their ranges."""
+        goals = self._middle + self._slope * (q - self._zero)[self._joints]
+        found: Array = np.rint(np.clip(goals, *self._ends))
+        return found
+
+
 class Servos:
     """The servos of an arm, in joint values.
 
@@ -220,19 +288,18 @@ class Servos:
     def __init__(self, bus: Bus, robot: kin.Robot) -> None:
         self._bus, self._robot = bus, robot
         self._motors = moving(robot)
-        ends = [motor.range or (0, motor.ticks - 1) for motor in self._motors]
-        self._ends = np.array(ends, dtype=float).T
 
-    def read(self) -> Array:
+    def scale(self) -> Scale:
+        """The scale on which they are driven from where they are now."""
+        return Scale(self._robot, self._motors, self._bus.positions())
+
+    def read(self, scale: Scale) -> Array:
         """The configuration of the arm ``(n,)``, radians."""
-        return kin.q_from_readings(self._robot, self._readings())
-
-    def _readings(self) -> Array:
-        return kin.readings_from_ticks(self._motors, self._bus.positions())
+        return scale.q(self._bus.positions())
 
     def show(self, page: Any, shown: kin.Robot) -> None:
         """Send where the arm is: as readings, for *Match motors*, where the page's arm has these motors."""
-        readings = self._readings()
+        readings = kin.readings_from_ticks(self._motors, self._bus.positions())
         own = {
             (motor.id, motor.joint, motor.unit): value for motor, value in zip(self._motors, readings, strict=True)
         }
@@ -242,17 +309,11 @@ class Servos:
         else:
             page.measured = kin.q_from_readings(self._robot, readings)
 
-    def write(self, q: Array) -> None:
-        """Lead the servos to a configuration ``(n,)``, within their calibrated ranges."""
-        ticks = kin.ticks_from_readings(self._motors, kin.readings_from_q(self._robot, q))
-        ids = [motor.id for motor in self._motors]
-        self._bus.move(dict(zip(ids, np.clip(ticks, *self._ends).tolist(), strict=True)))
-
-    @property
-    def limits(self) -> tuple[Array, Array]:
-        """The configurations ``(n,)`` at the ends of the calibrated ranges: lower and upper ones."""
-        ends = kin.q_from_readings(self._robot, kin.readings_from_ticks(self._motors, self._ends))
-        return ends.min(axis=0), ends.max(axis=0)
+    def write(self, scale: Scale, q: Array, joints: NDArray[np.bool_]) -> None:
+        """Lead the servos of these joints ``(n,)`` to a configuration ``(n,)``, within their calibrated ranges."""
+        moved = {joint.name for joint, moves in zip(self._robot.joints, joints, strict=True) if moves}
+        goals = zip(self._motors, scale.ticks(q).tolist(), strict=True)
+        self._bus.move({motor.id: goal for motor, goal in goals if motor.joint in moved})
 
 
 def work(page: Any, options: Namespace) -> None:
@@ -311,18 +372,22 @@ def hide(page: Any, shown: kin.Robot) -> None:
 def drive(page: Any, arm: kin.Robot, bus: Bus, servos: Servos, options: Namespace) -> None:
     """Let the arm follow the page, from where it is."""
     driving.confirm(f"The arm at {options.port}", options)
+    scale = servos.scale()
     if lost := bus.hold():  # the goal first: a servo that is switched on goes to its last one
         raise BusError("; ".join(lost))
     bus.switch(True)
     guide: driving.Guide | None = None
     began = time.monotonic()
     try:
-        guide = driving.Guide(page, f"{arm.name} at {options.port}", options.speed, servos.read(), servos.limits)
+        q = servos.read(scale)
+        guide = driving.Guide(page, f"{arm.name} at {options.port}", options.speed, q, scale.limits)
         print("The arm follows the page.", flush=True)
         while options.seconds is None or time.monotonic() - began < options.seconds:
-            q, heard = servos.read(), time.monotonic()
+            q, heard = servos.read(scale), time.monotonic()
             page.measured = q
-            servos.write(guide.step(q, heard))
+            before = guide.asked
+            if not np.array_equal(guide.step(q, heard), before):
+                servos.write(scale, guide.asked, guide.commanded)
             time.sleep(CYCLE)
     finally:
         if guide is not None:
