@@ -86,6 +86,7 @@ class Line:
         missing: ids of servos that do not answer.
         written: instructions that change something: when, of which servo, at which address, which bytes.
         refused: packets that no servo could read.
+        gone: whether a line in memory has been unplugged.
     """
 
     def __init__(self, positions: dict[int, float]) -> None:
@@ -95,6 +96,7 @@ class Line:
         self.written: list[tuple[float, int, int, bytes]] = []
         self.refused: list[bytes] = []
         self.answers = b""
+        self.gone = False
         self.monotonic = time.monotonic
 
     def advance(self, seconds: float) -> None:

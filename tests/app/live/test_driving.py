@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import serial
 import so101_arm
-from feetech_bus import GOAL, TORQUE, TURN, Line
+from feetech_bus import GOAL, MODEL, TORQUE, TURN, Line
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -83,6 +83,8 @@ class Serial:
         return found
 
     def write(self, data: bytes) -> int:
+        if self._line.gone:
+            raise serial.SerialException("write failed: Input/output error")
         assert self._line.take(bytes(data)) == b""
         return len(data)
 
@@ -354,6 +356,86 @@ def test_an_arm_whose_limits_exclude_each_other_is_not_driven(rig):
     assert "shoulder lift: the arm's own limits are" in rig.said
     assert "no value is inside both" in rig.said
     assert rig.positions == rig.began
+
+
+def stops(rig: Rig, cause: Callable[[], None], seconds: float = 20.0) -> Rig:
+    """Let something happen while the first joint is on its way."""
+    begun = shoulder(80.0)(rig)
+
+    def move(t: float) -> None:
+        begun(t)
+        if t > 1.5:
+            cause()
+
+    rig.clock.each = move
+    rig.drive(CALIBRATIONS["full turn"], seconds=seconds)
+    assert 5.0 < (rig.positions[0] - START[0]) * 360.0 / 4095.0 < 25.0, "on its way, and no farther"
+    return rig
+
+
+def rests(rig: Rig, *numbers: int) -> bool:
+    """Whether these servos stay where they are, switched on."""
+    before = [rig.line.servos[i].position for i in numbers]
+    rig.line.advance(1.0)
+    return before == pytest.approx([rig.line.servos[i].position for i in numbers], abs=0.5) and all(rig.torque)
+
+
+def test_a_servo_that_is_lost_stops_all_others(rig, capsys):
+    stops(rig, lambda: rig.line.missing.add(5))
+    assert rig.said == "motor 5 (wrist_roll) does not answer"
+    assert rests(rig, 1, 2, 3, 4)
+    assert "motor 5 (wrist_roll) does not answer. It goes on to its last goal" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("missing", "words"),
+    [
+        ({3}, "motor 3 (elbow_flex) does not answer. motor 1 (shoulder_pan), motor 2 (shoulder_lift)"),
+        ({1, 2, 3, 4, 5}, "No servo answered: is the arm's power on?"),
+    ],
+)
+def test_a_missing_servo_is_named(rig, missing, words):
+    rig.line.missing |= missing
+    rig.drive(CALIBRATIONS["full turn"])
+    assert words in rig.said
+    assert rig.line.written == []
+
+
+def test_servos_of_another_kind_are_refused(rig):
+    rig.line.servos[2].put(MODEL, (1284).to_bytes(2, "little"))
+    rig.drive(CALIBRATIONS["full turn"])
+    assert "motor 2 (shoulder_lift) is of model 1284, expected STS3215 (777)" in rig.said
+    assert rig.line.written == []
+
+
+def test_an_overloaded_servo_stops_the_arm(rig):
+    def overload() -> None:
+        rig.line.servos[2].error = 1 << 5
+
+    stops(rig, overload)
+    assert rig.said == "motor 2 (shoulder_lift) reports an error: load"
+    assert rests(rig, *range(1, 6))
+
+
+def test_a_page_that_is_lost_stops_the_arm(rig):
+    stops(rig, lambda: setattr(rig.page, "connected", False))
+    assert "the page does not answer: the arm is not moved any further" in rig.said
+    assert rests(rig, *range(1, 6))
+
+
+def test_a_page_that_shows_another_arm_stops_this_one(rig):
+    stops(rig, lambda: setattr(rig.page, "robot", kin.get_robot("so100")))
+    assert "the page shows another arm" in rig.said
+    assert rests(rig, *range(1, 6))
+
+
+def test_a_bus_that_is_unplugged_ends_the_program(rig, capsys):
+    def unplug() -> None:
+        rig.line.gone = True
+
+    stops(rig, unplug)
+    assert "the bus at /dev/ttyACM0 is gone" in rig.said
+    assert "the bus at /dev/ttyACM0 is gone" in capsys.readouterr().err, "and nothing can be told to the servos"
 
 
 def test_motors_are_released_when_asked(rig):

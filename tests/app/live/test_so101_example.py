@@ -1,4 +1,7 @@
-"""`examples/so101_arm.py` with a bus on a pseudo-terminal: mirror, drive, broken packets, whatever can be lost."""
+"""`examples/so101_arm.py` with a bus on a pseudo-terminal: mirror, drive, broken packets, what can be lost.
+
+What stops a driven arm, and where it may go, is in `test_driving.py`, without waiting for time to pass.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,9 @@ def degrees(ticks: dict[int, float]) -> np.ndarray:
 
 
 @pytest.fixture
-def bus() -> Iterator[FeetechBus]:
+def bus(monkeypatch) -> Iterator[FeetechBus]:
+    # Half of the ms that a servo may take to answer: on a busy machine this one's thread may wait.
+    monkeypatch.setattr("scservo_sdk.port_handler.LATENCY_TIMER", 150)
     with FeetechBus(dict(enumerate(TICKS, 1))) as bus:
         yield bus
 
@@ -141,30 +146,6 @@ def test_a_servo_that_comes_and_goes_hides_the_ghost(page, bus, run, capsys):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(
-    ("missing", "words"),
-    [
-        ({3}, "motor 3 (elbow_flex) does not answer. motor 1 (shoulder_pan), motor 2 (shoulder_lift)"),
-        ({1, 2, 3, 4, 5}, "No servo answered: is the arm's power on?"),
-    ],
-)
-def test_a_missing_servo_is_named(page, bus, run, capsys, missing, words):
-    bus.missing |= missing
-    started = run()
-    started.wait()
-    assert started.codes == [1]
-    assert words in capsys.readouterr().err
-
-
-@pytest.mark.full
-def test_servos_of_another_kind_are_refused(page, bus, run, capsys):
-    bus.servos[2].put(3, (1284).to_bytes(2, "little"))
-    started = run()
-    started.wait()
-    assert "motor 2 (shoulder_lift) is of model 1284, expected STS3215 (777)" in capsys.readouterr().err
-
-
-@pytest.mark.full
 def test_a_driven_arm_starts_where_it_is_and_follows_slowly(page, bus, run, patient, capsys):
     started = run("--drive", "--yes", "--speed", SPEED)
     page.wait(lambda: "The arm follows the page." in capsys.readouterr().out)
@@ -236,50 +217,12 @@ def test_a_page_that_is_silent_stops_the_arm(page, bus, run, patient, monkeypatc
 
 
 @pytest.mark.full
-def test_a_servo_that_is_lost_stops_all_others(page, bus, run, patient, capsys):
-    started = on_its_way(page, bus, run, capsys)
-    bus.missing.add(5)
-    started.wait()
-    assert started.codes == [1]
-    assert rests(bus)
-    said = capsys.readouterr().err
-    assert said.count("motor 5 (wrist_roll) does not answer") == 2
-    assert "It goes on to its last goal" in said
-
-
-@pytest.mark.full
-def test_an_overloaded_servo_stops_the_arm(page, bus, run, patient, capsys):
-    started = on_its_way(page, bus, run, capsys)
-    bus.servos[2].error = 1 << 5
-    started.wait()
-    assert "motor 2 (shoulder_lift) reports an error: load" in capsys.readouterr().err
-    assert rests(bus)
-
-
-@pytest.mark.full
 def test_a_bus_that_is_unplugged_ends_the_program(page, bus, run, patient, capsys):
     started = on_its_way(page, bus, run, capsys)
     bus.unplug()
     started.wait()
     assert started.codes == [1]
     assert f"the bus at {bus.port} is gone" in capsys.readouterr().err
-
-
-@pytest.mark.full
-def test_a_servo_that_is_held_is_not_pushed_for_long(page, bus, run, patient, capsys):
-    started = on_its_way(page, bus, run, capsys, "--speed", 90)
-    bus.servos[1].stuck = True
-    started.wait()
-    assert "shoulder pan is" in (said := capsys.readouterr().err)
-    assert "behind: something holds it" in said
-    assert abs(bus.servos[1].word(GOAL) - bus.servos[1].position) < 3, "its goal is where it is"
-
-
-@pytest.mark.full
-def test_the_motors_are_released_when_asked(page, bus, run, patient, capsys):
-    started = on_its_way(page, bus, run, capsys, "--release")
-    started.end(page)
-    assert not any(servo.memory[TORQUE] for servo in bus.servos.values())
 
 
 def test_without_a_yes_nothing_is_written(page, bus, run, monkeypatch, capsys):
