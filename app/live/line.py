@@ -8,6 +8,7 @@ all methods are thread-safe.
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 from collections import deque
@@ -131,10 +132,16 @@ class Line:
             0.0,
         )  # what the program has heard of last, and when
 
-    def note(self, way: str, message: Mapping[str, Any]) -> None:
-        """Record a message of the connection, if it is recorded."""
-        if self.recording is not None:
-            self.recording.take(way, message)
+    def note(self, way: str, text: str | bytes) -> None:
+        """Record a message of the connection, if it is recorded.
+
+        Args:
+            way: ``"sent"`` or ``"heard"``, as the program sees it.
+            text: the message as it crosses the network: an object in JSON.
+        """
+        recording = self.recording  # once: the page's worker may take it away meanwhile
+        if recording is not None and recording.ended is None:
+            recording.take(way, json.loads(text))
 
     # The program
 
@@ -239,8 +246,9 @@ class Line:
             self._count += 1
             self._values[name] = self._count, value
             program = self._program
-        if name == "q" and self.recording is not None:
-            self.recording.add(SHOWN, {"q": value.tolist()})  # type: ignore[attr-defined]
+        recording = self.recording
+        if name == "q" and recording is not None:
+            recording.add(SHOWN, {"q": value.tolist()})  # type: ignore[attr-defined]
         if program is not None and (name in program.wants or name == "robot"):
             program.wake()
 

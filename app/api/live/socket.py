@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 from collections import deque
 from collections.abc import Callable
@@ -205,8 +204,7 @@ class Conversation:
                 logger.exception("a message of a program failed")
                 self._say(id_of(text), internal_error().problem)
             else:
-                if self._line.recording is not None:
-                    self._line.note("sent", json.loads(text))
+                self._line.note("sent", text)
                 if message.subscription is not None:
                     self._program.wants = frozenset(message.subscription.values)
                     self._interval = 1.0 / message.subscription.rate
@@ -269,8 +267,9 @@ class Conversation:
                 await self._send(self._own.popleft())
 
     async def _send(self, message: dict[str, Any]) -> None:
-        self._line.note("heard", message)
-        await self._visitor.send_text(as_json(message).decode())
+        text = as_json(message)
+        self._line.note("heard", text)
+        await self._visitor.send_text(text.decode())
 
 
 def _letter(

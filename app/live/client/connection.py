@@ -2,7 +2,8 @@
 
 What streams, as configurations do, waits in one message: the newest value of each field counts, so that a fast
 program is never ahead of the network. Other messages wait in order, and are answered. After a lost connection the
-program comes back by itself, with the word by which the page knows it.
+program comes back by itself, with the word by which the page knows it: at once, and more slowly each time that the
+new connection does not last either. It gives up where the service says again and again that it has failed.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from contextlib import suppress
 from typing import Any, Final
 from urllib.parse import quote, urlsplit
 
@@ -24,7 +26,10 @@ from kin import KinematicsError
 
 PACE: Final = 0.01  # s between two messages; the service reads 120 a second
 MOST_BYTES: Final = 64 * 1024  # of a message
-RETRY, LONGEST_RETRY = 0.2, 5.0  # s between two tries to come back
+RETRY, LONGEST_RETRY = 0.2, 5.0  # s between two tries to come back, first and at most
+STEADY: Final = 30.0  # s that a connection lasts which is not one more failure
+FAILURES: Final = 6  # of the service without a steady connection between them, after which the program gives up
+INTERNAL_ERROR: Final = 1011  # with which the service closes a connection when it has failed
 OPENING: Final = 10.0  # s for a connection
 CLOSING: Final = 2.0  # s for the end of the threads
 LOCAL: Final = ("localhost", "127.0.0.1", "::1")
@@ -80,6 +85,9 @@ class Connection:
         self._number = 0
         self._socket: ClientConnection | None = None
         self._prepared = -math.inf  # when the page last said that it compiles something for us
+        self._opened = -math.inf  # when the connection was opened
+        self._lost = 0  # connections since the last steady one
+        self._failed = 0  # how often the service has failed since then
         self.ended = ""  # why it has ended for good
         self._open()
         self._threads = [
@@ -175,8 +183,8 @@ class Connection:
                 continue
             try:
                 self._take(json.loads(socket.recv()))
-            except (ConnectionClosed, OSError, EOFError):
-                self._lose(socket)
+            except (ConnectionClosed, OSError, EOFError) as error:
+                self._lose(socket, error)
 
     def _take(self, message: Message) -> None:
         number = message.get("id")
@@ -194,26 +202,49 @@ class Connection:
             else:
                 answer.set_result(None)
 
-    def _lose(self, socket: ClientConnection) -> None:
+    def _lose(self, socket: ClientConnection, error: Exception) -> None:
         with self._lock:
             self._socket = None
         socket.close()
+        if time.monotonic() - self._opened >= STEADY:
+            self._lost = self._failed = 0
+        self._lost += 1
+        self._count(error)
         if not self.ended:
             self._heard({"type": "disconnected"})
 
+    def _count(self, error: Exception) -> None:
+        """Count what has ended a connection, if it is an error of the service."""
+        if isinstance(error, ConnectionClosed) and error.rcvd is not None and error.rcvd.code == INTERNAL_ERROR:
+            self._failed += 1
+
     def _come_back(self) -> None:
-        wait = RETRY
+        tries = self._lost - 1
         while not self.ended:
+            if self._failed >= FAILURES:
+                self._give_up(
+                    f"the service has failed {self._failed} times in a row (internal error, {INTERNAL_ERROR}). "
+                    "Its log says why; connect again when that is mended"
+                )
+                return
+            with self._lock:
+                self._lock.wait_for(lambda: bool(self.ended), retry_after(tries))
+            if self.ended:
+                return
+            tries += 1
             try:
                 self._open()
             except RefusedError as error:
-                self.end(str(error))
+                self._give_up(str(error))
             except KinematicsError:
-                with self._lock:
-                    self._lock.wait_for(lambda: bool(self.ended), wait)
-                wait = min(2.0 * wait, LONGEST_RETRY)
+                continue
             else:
                 return
+
+    def _give_up(self, why: str) -> None:
+        """End the connection, and let those know who wait for something to happen in the page."""
+        self.end(why)
+        self._heard({"type": "end", "reason": why})
 
     def _open(self) -> None:
         try:
@@ -226,17 +257,19 @@ class Connection:
                 {"status": status, "detail": f"The service refused the connection with {status}.", "hint": why}
             ) from None
         except (OSError, WebSocketException, TimeoutError, EOFError) as error:
+            self._count(error)
             place = urlsplit(self._uri).netloc
             raise KinematicsError(f"no connection to {place}: {error or type(error).__name__}") from None
         if first["type"] == "problem":
             socket.close()
             raise RefusedError(first["problem"])
         self._heard(first)
-        for message in self._again():
-            socket.send(json.dumps(message))
-            self._sent(message)
+        with suppress(ConnectionClosed, OSError):  # the thread that receives finds it lost
+            for message in self._again():
+                socket.send(json.dumps(message))
+                self._sent(message)
         with self._lock:
-            self._socket = socket
+            self._socket, self._opened = socket, time.monotonic()
             self._lock.notify_all()
 
     # The end
@@ -262,6 +295,11 @@ class Connection:
         for thread in self._threads:
             if thread is not threading.current_thread():
                 thread.join(CLOSING)
+
+
+def retry_after(tries: int) -> float:
+    """Seconds to wait before coming back, after so many connections or tries that have failed before the last."""
+    return 0.0 if tries <= 0 else min(RETRY * 2.0 ** min(tries - 1, 30), LONGEST_RETRY)
 
 
 def _where(address: str, code: str, name: str, token: str | None) -> tuple[str, dict[str, Any]]:

@@ -122,7 +122,12 @@ class Recording:
         return min(time.monotonic() - self._began, self.bounds.seconds) if self.ended is None else self._end
 
     def take(self, way: str, message: Mapping[str, Any]) -> None:
-        """Record a message of the connection, ``"sent"`` or ``"heard"``: each value under its own topic."""
+        """Record a message of the connection, ``"sent"`` or ``"heard"``: each value under its own topic.
+
+        Args:
+            way: which of both, as the program sees it.
+            message: as `json.loads` returns it.
+        """
         if self.ended is not None:
             return
         number = {} if message.get("id") is None else {"id": message["id"]}

@@ -6,6 +6,7 @@ import json
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,9 @@ from websockets.sync.client import ClientConnection, connect
 import kin
 from app.api import ComputeSlots, api_routes
 from app.classroom.tokens import show_code
-from app.live import Door, Lines
+from app.live import VALUES, Door, Line, Lines
 from app.live.codes import code_in, home_of, unused_code
+from app.live.recording import Recording
 from app.service.web.rooms.limits import Limits
 from app.shared.problems import problem
 from app.shared.settings import Settings
@@ -329,6 +331,89 @@ def test_a_subscriber_hears_what_changes_and_nothing_else(page, port):
         assert "program" not in seen
         page.line.publish("target", None)
         assert heard(program, "news")["target"] is None
+
+
+FAR = np.eye(4) + np.outer([0, 0, 1, 0], [0, 0, 0, 9.0])  # a pose out of reach
+# Of each value that a page publishes, what it may be.
+PUBLISHED: dict[str, list[Any]] = {
+    "robot": [kin.get_robot("scara"), replace(ARM, name="A “quoted” \u2028 name")],
+    "q": [np.zeros(6), np.array([1e-17, -0.0, 1e16, np.pi, -1.2, 5.0])],
+    "target": [None, kin.fk(ARM, np.full(6, 0.5))],
+    "result": [None, kin.solve_ik(ARM, kin.fk(ARM, np.full(6, 0.5))), kin.solve_ik(ARM, FAR)],
+    "contacts": [
+        (),
+        (kin.Contact(-0.01, 6, 2), kin.Contact(-0.002, 3, None, 0, 'a "table"', True), kin.Contact(-1e-9, 2, 0)),
+    ],
+    "program": [{"items": 2, "playing": True, "time": 0.25, "duration": 1.5, "complete": False}],
+}
+
+
+def test_a_recording_has_every_message_that_the_program_hears(page, port):
+    """Each value, and each message that is said once: as the program received it, and the connection goes on."""
+    assert PUBLISHED.keys() == {"robot", *VALUES}, "a value that is published is recorded here, too"
+    recording = page.line.recording = Recording(ARM)
+    received: list[dict[str, Any]] = []
+    with call(port, page.line.code) as program:
+
+        def until(kind: str, number: int | None = None) -> None:
+            while True:
+                received.append(json.loads(program.recv(timeout=10.0)))
+                if received[-1]["type"] == kind and received[-1].get("id") == number:
+                    return
+
+        until("welcome")
+        say(program, subscribe={"values": list(VALUES), "rate": 60}, id=1)
+        until("done", 1)
+        for k in range(max(map(len, PUBLISHED.values()))):
+            for name, values in PUBLISHED.items():
+                page.line.publish(name, values[k % len(values)])
+            say(program, id=100 + k, play=False)  # the news come before its answer
+            until("done", 100 + k)
+        page.line.prepare("UR5", 1, 3)
+        page.line.write(3)
+        page.line.write(4, problem(422, "invalid-input", "q[0]: “7”", "Send less."))
+        page.line.write(problem=problem(409, "not-allowed", "The target is held."))
+        say(program, id=200, q="no configuration")
+        until("problem", 200)
+        page.door.close()
+        until("end")
+    told = [(f"/heard/{topic}", content) for message in received for topic, content in spread(message)]
+    found = [(e.topic, json.loads(e.data)) for e in recording.entries if e.topic.startswith("/heard/")]
+    assert found == told
+    assert {topic for topic, _ in found} == {
+        f"/heard/{name}" for name in ("welcome", "done", "preparing", "problem", "end", "robot", *VALUES)
+    }
+    assert recording.ended is None
+
+
+def spread(message: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The topics of a message, each with what is recorded under it."""
+    content = {name: value for name, value in message.items() if name != "type"}
+    if message["type"] == "news":
+        yield from ((name, {name: value}) for name, value in content.items())
+    else:
+        yield message["type"], content
+
+
+def test_a_recording_may_be_discarded_at_any_moment(page):
+    """The page's worker takes it away while another thread is about to write to it."""
+
+    class Fading(Line):
+        """Its recording is there when it is asked for the first time."""
+
+        asked = 0
+
+        @property
+        def recording(self) -> Recording | None:
+            self.asked += 1
+            return Recording(ARM) if self.asked == 1 else None
+
+        @recording.setter
+        def recording(self, value: Recording | None) -> None:
+            pass
+
+    for act in (lambda line: line.note("heard", b'{"type":"done"}'), lambda line: line.publish("q", np.zeros(6))):
+        act(Fading("K7QF2M4A", ARM, lambda *_: None))
 
 
 def test_news_come_at_the_rate_that_was_asked_for_and_the_last_one_comes(page, port):
