@@ -195,7 +195,9 @@ def ticks_from_readings(motors: Sequence[Motor], readings: ArrayLike) -> Array:
         readings: ``(..., m)``, one of each of these motors, in its unit.
 
     Returns:
-        ``(..., m)`` whole numbers, rounded towards zero as LeRobot does; inside the range where the unit is one.
+        ``(..., m)`` whole numbers, rounded towards zero as LeRobot does; inside the range where the unit is one. In
+        other units they may be outside it, or a turn away from where the servo is: what drives an arm compares
+        them with both before it sends them.
 
     Raises:
         InputError: a motor without a range, or readings of another shape or that are not finite.

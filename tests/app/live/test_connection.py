@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from live_server import wait_for
 from websockets.exceptions import ConnectionClosedError
 from websockets.frames import Close
 
@@ -102,14 +103,10 @@ def assert_set(event: threading.Event) -> None:
 
 
 def test_a_service_that_fails_again_and_again_is_left(monkeypatch):
-    taken: list[str] = []
-    take = Page._take
-    monkeypatch.setattr(Page, "_take", lambda page, message: (taken.append(message["type"]), take(page, message)))
     reader = Reader()
     service = Service(monkeypatch, reader.first, failing)
     page = Page("http://localhost:8000", "K7QF-2M4A")
     assert reader.ends(page)
-    assert taken[-1] == "end", "those who wait are woken after the last failure, too"
     with pytest.raises(kin.KinematicsError, match=r"has ended: the service has failed 6 times in a row .*1011"):
         page.q = ARM.q_home
     assert service.opened == FAILURES
@@ -127,6 +124,15 @@ def test_a_service_that_fails_at_once_is_left_too(monkeypatch, said):
         _ = page.robot
     assert service.opened == FAILURES
     page.close()
+
+
+def test_those_who_wait_are_woken_at_the_end(monkeypatch):
+    Service(monkeypatch, failing)
+    heard: list[dict[str, Any]] = []
+    line = connection.Connection("localhost:8000", "K7QF-2M4A", "", None, heard.append, list, lambda _: None)
+    wait_for(lambda: bool(line.ended) and heard[-1] == {"type": "end", "reason": line.ended})
+    assert [message["type"] for message in heard].count("disconnected") == FAILURES
+    line.close()
 
 
 def test_a_request_that_waits_hears_that_there_will_be_no_answer(monkeypatch):
@@ -159,8 +165,7 @@ def test_failures_with_steady_connections_between_them_are_no_row(monkeypatch):
 
     service = Service(monkeypatch, *[steady] * (3 * FAILURES), lambda: Socket([WELCOME, NEWS], None))
     page = Page("http://localhost:8000", "K7QF-2M4A")
-    with page._lock:
-        assert page._lock.wait_for(lambda: service.opened > 3 * FAILURES and page.connected, PATIENCE)
+    wait_for(lambda: service.opened > 3 * FAILURES and page.connected)
     assert set(service.pauses) == {0}, "after a steady connection it comes back at once"
     page.close()
 
@@ -171,8 +176,7 @@ def test_a_network_that_fails_is_tried_for_as_long_as_it_takes(monkeypatch):
 
     service = Service(monkeypatch, *[torn] * (3 * FAILURES), lambda: Socket([WELCOME, NEWS], None))
     page = Page("http://localhost:8000", "K7QF-2M4A")
-    with page._lock:
-        assert page._lock.wait_for(lambda: service.opened > 3 * FAILURES and page.connected, PATIENCE)
+    wait_for(lambda: service.opened > 3 * FAILURES and page.connected)
     assert service.pauses == list(range(3 * FAILURES)), "more and more slowly"
     page.close()
 

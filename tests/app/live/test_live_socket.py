@@ -377,9 +377,9 @@ def test_a_recording_has_every_message_that_the_program_hears(page, port):
         until("problem", 200)
         page.door.close()
         until("end")
-    told = [(f"/heard/{topic}", content) for message in received for topic, content in spread(message)]
+    expected = [(f"/heard/{topic}", content) for message in received for topic, content in spread(message)]
     found = [(e.topic, json.loads(e.data)) for e in recording.entries if e.topic.startswith("/heard/")]
-    assert found == told
+    assert found == expected
     assert {topic for topic, _ in found} == {
         f"/heard/{name}" for name in ("welcome", "done", "preparing", "problem", "end", "robot", *VALUES)
     }
