@@ -214,8 +214,6 @@ def run(settings: Settings, open_browser: bool = False, page: str = "", words: s
     Args:
         open_browser, page, words: as for `Greeting`.
     """
-    if not uvicorn_names.HTTP.is_there:  # several processes hand connections over by our own protocol
-        settings = settings.model_copy(update={"workers": 1, "rest_workers": 0})
     try:
         listeners = listen(settings)
     except OSError as error:
@@ -244,7 +242,7 @@ def run(settings: Settings, open_browser: bool = False, page: str = "", words: s
         port = listeners[0].getsockname()[1]
         others = url_for_others(settings.host, port, clean_prefix(settings.root_path))
         greeting = Greeting(url_of(settings, port), open_browser, others, page, words)
-        partners = settings.rest_workers if SUPPORTED else 0
+        partners = settings.rest_workers if SUPPORTED and uvicorn_names.HTTP.is_there else 0
         try:
             parts = members(listeners, partners, shared_bytes)
         except OSError as error:

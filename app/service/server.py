@@ -240,7 +240,10 @@ class Greeting:
 
 
 def listen(settings: Settings) -> list[socket.socket]:
-    """One socket per worker, all on one address; raises `OSError` if the address is in use."""
+    """One socket per worker, all on one address; raises `OSError` if the address is in use.
+
+    With uvicorn's own HTTP there is one: only our protocol answers the supervisor and hands connections over.
+    """
     family, *_, address = socket.getaddrinfo(
         settings.host or None, settings.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
     )[0]
@@ -252,7 +255,7 @@ def listen(settings: Settings) -> list[socket.socket]:
         )
 
     alone = bind(address[1], False)
-    if settings.workers == 1:
+    if settings.workers == 1 or not uvicorn_names.HTTP.is_there:
         return [alone]
     # Sockets with SO_REUSEPORT would share the port with any other service of this user. Binding without it first
     # has shown that the port is free.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import socket
+from collections.abc import Callable
 from typing import Any
 
 import httpx2
@@ -14,6 +15,7 @@ from private_names import asked_again, leave_out, take_away
 from websockets.sync.client import connect
 
 from app.service import main, uvicorn_names
+from app.service.handover import Member
 from app.service.http_protocol import HttpProtocol
 from app.service.server import protocols
 from app.service.websocket_protocol import WebSocketProtocol
@@ -76,10 +78,11 @@ def test_without_our_protocol_there_is_one_process(monkeypatch: pytest.MonkeyPat
         leave_out(monkeypatch, uvicorn_names.HTTP)
     seen: list[tuple[int, int]] = []
 
-    def listen(settings: Settings) -> list[socket.socket]:
-        seen.append((settings.workers, settings.rest_workers))
+    def members(listeners: list[socket.socket], partners: int, _: Callable[[int], object]) -> list[Member]:
+        seen.append((len(listeners), partners))
         raise OSError("not in this test")
 
-    monkeypatch.setattr(main, "listen", listen)
-    assert main.run(Settings(workers=3, rest_workers=2)) == 1
+    monkeypatch.setattr(main, "SUPPORTED", True)
+    monkeypatch.setattr(main, "members", members)
+    assert main.run(Settings(port=0, workers=3, rest_workers=2)) == 1
     assert seen == [(1, 0) if lacking else (3, 2)]

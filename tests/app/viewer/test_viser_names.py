@@ -18,8 +18,8 @@ from private_names import asked_again, leave_out, take_away
 from test_viser_server import CAMERA, Visit, drag, gizmo, loop, serve, server  # noqa: F401 - fixtures
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
-from app.viewer import viser_names
-from app.viewer.viser_outbox import Outbox, in_one_frame
+from app.viewer import viser_names, viser_server
+from app.viewer.viser_outbox import in_one_frame
 from app.viewer.viser_patches import (
     SceneFilter,
     assign,
@@ -98,22 +98,17 @@ def visited(server, serve):  # noqa: F811
     return visit
 
 
-@pytest.mark.parametrize("there", [True, False])
 def test_without_the_outbox_viser_s_own_buffer_sends(
-    monkeypatch: pytest.MonkeyPatch, visited: Callable[..., Visit], there: bool
+    monkeypatch: pytest.MonkeyPatch, visited: Callable[..., Visit]
 ) -> None:
-    if not there:
-        leave_out(monkeypatch, viser_names.OUTBOX)
-    kinds: list[type[AsyncMessageBuffer]] = []
+    leave_out(monkeypatch, viser_names.OUTBOX)
+    monkeypatch.setattr(viser_server, "Outbox", None)
 
     def act(client: viser.ClientHandle) -> None:
         with in_one_frame(client):
             client.scene.add_frame("/a")
-        kinds.append(type(client._websock_connection.get_message_buffer()))
 
-    visit = visited(act, Visit(VIEW))
-    assert kinds == [Outbox if there else AsyncMessageBuffer]
-    assert visit.sent >= 2, "what all see, and what this one sees"
+    assert visited(act, Visit(VIEW)).sent >= 2, "what all see, and what this one sees"
 
 
 def test_without_the_handling_of_drags_viser_handles_them(
@@ -121,16 +116,12 @@ def test_without_the_handling_of_drags_viser_handles_them(
 ) -> None:
     leave_out(monkeypatch, viser_names.DRAGS)
     seen: list[Any] = []
-    visits: list[Visit] = []
 
     def act(client: viser.ClientHandle) -> None:
         gizmo(client, seen)
-        owner = client.scene._owner_id
-        assert not drag_gizmo(client, msgspec.msgpack.encode(drag(owner)))
-        visits[0]._messages.append(drag(owner))
+        assert not drag_gizmo(client, msgspec.msgpack.encode(drag("0")))
 
-    visits.append(Visit(VIEW))
-    visit = visited(act, visits[0])
+    visit = visited(act, Visit(VIEW, drag("0")))  # of the first visitor's own scene
     assert visit.at_once == 0
     assert seen == [("update", True, 0, [1.0, 2.5, 3.0]), [0.0, 1.0, 0.0, 0.0]]
 
@@ -145,11 +136,13 @@ def test_without_the_private_names_of_nodes_viser_s_setters_pose_them(
         node, label = client.scene.add_frame("/a"), client.scene.add_label("/b", "old")
         assign(node, np.array([1.0, 2.0, 3.0]), (0.0, 1.0, 0.0, 0.0))
         assert (node.position.tolist(), node.wxyz.tolist()) == ([1.0, 2.0, 3.0], [0.0, 1.0, 0.0, 0.0])
+        assign(node, (1.0, 2.0, 3.0 + 1e-7))
+        assert node.position.tolist() == [1.0, 2.0, 3.0], "viser's own setter takes it for the same"
         show_text(label, "new")
         assert label.text == "new"
         assert is_removed(node), "not known: it is left alone"
         everything = SceneFilter(client.scene, "/b")
-        assert node.visible
+        assert "_queue_scene_message" not in vars(client.scene)
         everything.open()
         assert node.visible
 
@@ -164,7 +157,10 @@ def test_without_the_private_names_of_controls_viser_s_setters_show_values(
 
     def act(client: viser.ClientHandle) -> None:
         number, element = client.gui.add_number("a", 1.0), client.gui.add_html("<b>old</b>")
+        called: list[Any] = []
+        number.on_update(called.append)
         show_value(number, 2.0)
+        assert [event.client for event in called] == [None], "viser's own setter calls callbacks"
         show_content(element, "<b>new</b>")
         assert (number.value, element.content, uuid_of(number)) == (2.0, "<b>new</b>", "")
 

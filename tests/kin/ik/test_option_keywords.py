@@ -92,8 +92,8 @@ def test_the_documentation_of_a_call_names_its_keywords_in_the_order_of_the_clas
 
 def test_every_field_is_described_with_its_choices_and_unit():
     for kind in (IKOptions, JointConstraints):
-        section = (kind.__doc__ or "").partition("Attributes:")[2].partition("Raises:")[0]
-        described = re.findall(r"^ {8}(\w+): ", section, re.M)
+        section = (inspect.getdoc(kind) or "").partition("Attributes:")[2].partition("Raises:")[0]
+        described = re.findall(r"^ {4}(\w+): ", section, re.M)
         assert described == [field.name for field in fields(kind)]
     text = " ".join((IKOptions.__doc__ or "").split())
     hints = get_type_hints(IKOptions, include_extras=True)
