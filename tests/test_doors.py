@@ -34,9 +34,9 @@ PARSERS = {
 GUARDED = {
     "kin/parsing.py": "the readers",
     "kin/files/urdf/xml.py": "bytes, elements and depth, while it is parsed",
-    "app/api/live/socket.py": "64 kB, and read by `app.api.live.messages` before",
     "app/classroom/courses/sealing.py": "bytes, while it is unpacked; only what the service has sealed",
     "app/exercises/expressions.py": "characters",
+    "app/live/line.py": "64 kB, and read by `app.api.live.messages` before",
     "app/live/recording/files.py": "bytes, while it is unpacked",
     "app/service/web/access.py": "bytes",
     "app/service/web/embedding.py": "bytes of the head of a request",

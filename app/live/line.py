@@ -127,10 +127,8 @@ class Line:
         self.ended = ""  # why, once it has
         self.readings: Sequence[float] | None = None  # the newest ones of the motors of a real arm
         self.recording: Recording | None = None
-        self._prepared: tuple[tuple[str, int, int], float] = (
-            ("", 0, 0),
-            0.0,
-        )  # what the program has heard of last, and when
+        # What the program has heard of last, and when.
+        self._prepared: tuple[tuple[str, int, int], float] = (("", 0, 0), 0.0)
 
     def note(self, way: str, text: str | bytes) -> None:
         """Record a message of the connection, if it is recorded.

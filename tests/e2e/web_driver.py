@@ -22,7 +22,7 @@ from typing import Any, Protocol
 
 import pytest
 
-WAIT = 60.0  # s; both draw in software
+WAIT = 150.0  # s; both draw in software, WebKit much more slowly
 # Firefox asks nothing of its makers, and says nothing about being new.
 PREFERENCES = {
     "app.update.disabledForTesting": True,
