@@ -195,8 +195,8 @@ def ticks_from_readings(motors: Sequence[Motor], readings: ArrayLike) -> Array:
         readings: ``(..., m)``, one of each of these motors, in its unit.
 
     Returns:
-        ``(..., m)`` whole numbers, rounded towards zero as LeRobot does; inside the range where the unit is one. In
-        other units they may be outside it, or a turn away from where the servo is: what drives an arm compares
+        ``(..., m)`` whole numbers, rounded towards zero as LeRobot does; inside the range where the unit is one.
+        In other units they may be outside it, or a turn away from where the servo is: what drives an arm compares
         them with both before it sends them.
 
     Raises:
