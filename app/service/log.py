@@ -123,8 +123,6 @@ def guard_log(clock: Callable[[], float] = time.monotonic) -> LogHandler:
     handler = LogHandler(clock)
     logging.getLogger().handlers[:] = [handler]
     warnings.showwarning = _show_warning
-    # Python would keep the text of each warning of viser for ever, to show it once.
-    warnings.filterwarnings("always", category=UserWarning, module=r"viser\.")
     threading.excepthook = _log_thread_error
     sys.unraisablehook = _log_unraisable
     return handler

@@ -32,7 +32,7 @@ from app.viewer.session.services import Services
 from app.viewer.viser_patches import (
     cache_type_hints,
     keep_sent_values,
-    log_callback_errors,
+    log_what_viser_prints,
     set_events_in_their_loop,
 )
 from app.viewer.viser_server import PortlessServer, client_page, start_viser
@@ -96,7 +96,7 @@ class ViewerServer:
         if self._server is not None:
             raise RuntimeError("the viewer is already running")
         cache_type_hints()
-        log_callback_errors()
+        log_what_viser_prints()
         set_events_in_their_loop()
         keep_sent_values()
         server, self._connections = start_viser(loop, label="Kinboard")

@@ -24,7 +24,8 @@ Pages: viser evaluates the type hints of a class for each of its objects, a quar
 Parts of a scene: viser can hide one node or all of them. A `SceneFilter` hides all but some, including nodes that
 are added later. It knows which to show again.
 
-Errors: viser prints what a callback raises. `log_callback_errors` logs it.
+Log: viser prints what a callback raises, and warns of messages with all that is in them.
+`log_what_viser_prints` logs both.
 
 Wake-ups: messages from other threads than the event loop's wake their reader in an unsafe way; now and then a
 visitor's connection was lost. `set_events_in_their_loop` fixes that.
@@ -39,9 +40,11 @@ import contextvars
 import functools
 import inspect
 import logging
+import sys
 import threading
 import time
 import typing
+import warnings
 from collections.abc import Callable, Coroutine, Sequence
 from types import SimpleNamespace, TracebackType
 from typing import Any
@@ -340,16 +343,27 @@ def set_events_in_their_loop() -> None:
     buffers.AsyncMessageBuffer.__init__ = make  # type: ignore[method-assign]
 
 
-def log_callback_errors() -> None:
-    """Make viser log what callbacks raise, which it prints: messages of visitors may be in it."""
-    if not viser_names.CALLBACK_ERRORS.is_there:
-        return
-    from viser import _threadpool_exceptions as printing
+def log_what_viser_prints() -> None:
+    """Make viser log its warnings, and what callbacks raise: messages of visitors may be in both.
+
+    Python's own `warnings` would keep the text of each for ever. While another thread is in a block of
+    `warnings.catch_warnings`, as numba often is, it would give them to that thread, and with two such threads to
+    nobody from then on.
+    """
+
+    def warn(message: object, category: type[Warning] = UserWarning, stacklevel: int = 1, **_: Any) -> None:
+        log.warning("%s: %s", category.__name__, message, stacklevel=stacklevel + 1)
 
     def log_error(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         log.error("a callback of the viewer failed", exc_info=(kind, error, trace))
 
-    vars(printing).update(print=lambda *_, **__: None, traceback=SimpleNamespace(print_exception=log_error))
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] == "viser" and vars(module).get("warnings") is warnings:
+            vars(module)["warnings"] = SimpleNamespace(warn=warn)
+    if viser_names.CALLBACK_ERRORS.is_there:
+        from viser import _threadpool_exceptions as printing
+
+        vars(printing).update(print=lambda *_, **__: None, traceback=SimpleNamespace(print_exception=log_error))
 
 
 def cache_type_hints() -> None:

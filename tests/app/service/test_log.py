@@ -22,7 +22,7 @@ from app.service.log import FIRST, LAST, LONGEST, LogFormatter, LogHandler, esca
 from app.service.server import server_config
 from app.shared.settings import Settings
 from app.shared.throttled_log import LOG_EVERY, ThrottledLog
-from app.viewer.viser_patches import log_callback_errors, messages
+from app.viewer.viser_patches import log_what_viser_prints, messages
 
 FORGED = "\x1b[31m\x07red\r\nworker 12 ended\u2028and\u202eback\x9b1m\ud800"
 RAW = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028\u202e\ud800]")
@@ -59,6 +59,7 @@ def log(monkeypatch) -> Iterator[Log]:
 
 def mismatch(text: str) -> None:
     """A message as a visitor may send it, a text in the place of three numbers, on viser's own way."""
+    log_what_viser_prints()
     sent = {"type": "ViewerCameraMessage", "wxyz": (1, 0, 0, 0), "position": text, "image_height": 1}
     sent |= {"image_width": 1, "fov": 1.0, "near": 0.1, "far": 9.0, "look_at": text, "up_direction": (0, 0, 1)}
     messages.Message.deserialize(msgspec.msgpack.encode(sent))
@@ -78,14 +79,20 @@ def test_what_viser_warns_of_is_one_clean_line_a_minute(log):
     assert len(log.lines[1]) < LONGEST + 60
 
 
-def test_python_keeps_no_text_of_what_viser_warns_of(log):
-    """Else each of them stays in memory for ever."""
-    mismatch("first")
-    kept = sys.modules[messages.Message.deserialize.__func__.__module__].__dict__.get("__warningregistry__", {})
-    before = len(kept)
-    for k in range(20):
-        mismatch(f"{k} and more")
-    assert len(kept) == before
+def test_viser_warns_past_blocks_of_other_threads_that_catch_warnings(log):
+    with warnings.catch_warnings(record=True) as caught:
+        mismatch(FORGED.replace("\ud800", ""))
+    assert caught == []
+    assert log.clean()
+
+
+def test_warnings_of_python_are_logged_once_a_minute(log):
+    for k in range(3):
+        warnings.warn(f"{FORGED}{k}", RuntimeWarning, stacklevel=1)
+    assert len(log.lines) == 1
+    assert log.clean()
+    assert log.lines[0].startswith(f"{__file__}:")
+    assert "RuntimeWarning: " in log.lines[0]
 
 
 def failing(text: str) -> None:
@@ -161,7 +168,7 @@ def raise_in_del() -> None:
 
 
 def raise_in_callback() -> None:
-    log_callback_errors()
+    log_what_viser_prints()
     print_awaited_callback_error(ValueError(FORGED))
 
 
