@@ -103,8 +103,8 @@ def settings_of(request: Request) -> Settings:
 
 
 def is_warm(request: Request) -> bool:
-    """Whether the kernels of forward kinematics are compiled."""
-    return bool(request.app.state.startup.status == "ready")
+    """Whether all kernels are loaded, so that a short computation may run on the event loop."""
+    return bool(request.app.state.startup.complete)
 
 
 RobotId = Annotated[str, Path(description="Id of the robot, as listed by GET /robots.", examples=["pioneer5"])]

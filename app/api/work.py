@@ -13,6 +13,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import Future
 from contextlib import asynccontextmanager, contextmanager
+from contextvars import ContextVar
 from typing import Annotated, TypeVar
 
 from fastapi import Depends, Request
@@ -22,7 +23,6 @@ from app.api.problems import ClientLeftError, ProblemError
 from app.shared.clients import client_of
 from app.shared.memory.answers import AnswerMemory
 from app.shared.slots import Slot, Slots
-from app.shared.threads.compiling import queued
 from app.shared.threads.turns import MOST, Turn, Turns, offer
 
 T = TypeVar("T")
@@ -100,8 +100,12 @@ class ComputeSlots:
 
     @contextmanager
     def watched(self, request: Request) -> Iterator[Deadline]:
-        """A deadline without a slot; within the context it also ends when the client leaves."""
+        """A deadline without a slot; within the context it also ends when the client leaves.
+
+        It is the `current_deadline` of the task and of the threads that work for it.
+        """
         deadline = Deadline(self)
+        current_deadline.set(deadline)
         watching: list[asyncio.Task[None]] = []
         loop = asyncio.get_running_loop()
         timer = loop.call_later(
@@ -110,6 +114,7 @@ class ComputeSlots:
         try:
             yield deadline
         finally:
+            current_deadline.set(None)
             timer.cancel()
             for task in watching:
                 task.cancel()
@@ -140,8 +145,7 @@ class ComputeSlots:
         try:
             async with asyncio.timeout(self.seconds) as waiting:
                 deadline.on_left = lambda: waiting.reschedule(0.0)
-                with queued():
-                    await slots.wait(client)
+                await slots.wait(client)
         except TimeoutError:
             deadline.check_client()
             detail = f"{slots.taken} requests are being {act}, which is the maximum or your share of it."
@@ -173,6 +177,11 @@ class Deadline:
         return self._work.memory
 
     @property
+    def seconds(self) -> float:
+        """The time limit."""
+        return self._work.seconds
+
+    @property
     def left(self) -> float:
         """Seconds until the deadline."""
         return self._ends - time.monotonic()
@@ -183,6 +192,10 @@ class Deadline:
         Other threads may take their turn meanwhile.
         """
         offer()
+        self.check_now(advice)
+
+    def check_now(self, advice: str = ADVICE) -> None:
+        """As `check`, for a thread that has no turn at the moment."""
         self.check_client()
         if self._work.closed:
             raise stopping()
@@ -199,6 +212,9 @@ class Deadline:
         self._left = True
         if self.on_left is not None:
             self.on_left()
+
+
+current_deadline: ContextVar[Deadline | None] = ContextVar("current_deadline", default=None)
 
 
 async def _until_left(request: Request, deadline: Deadline) -> None:

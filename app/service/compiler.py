@@ -1,29 +1,48 @@
-"""Another process that compiles kernels: a compiler keeps a gigabyte of memory as long as its process lives."""
+"""Other processes that compile kernels: a compiler keeps a gigabyte of memory as long as its process lives.
+
+A thread that calls a kernel which is in no cache waits here until such a process has compiled it
+(:mod:`kin.kernels.elsewhere`), and then loads it. What requests and visitors wait for does not queue behind what
+is compiled ahead: each of the two has a process. A request that waits leaves its turn to others, and ends when its
+client leaves or its time is over; the compilation goes on, and the next request finds the kernel.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import logging
 import os
+import queue
 import subprocess
 import sys
 import threading
+from concurrent.futures import Future
+from contextvars import ContextVar
 
-from kin.warmup.preparation import Preparation
+from app.api.problems import ProblemError
+from app.api.work import TooSlowError, current_deadline, stopping
+from app.shared.threads import NICENESS, lower_priority
+from app.shared.threads.turns import paused
+from kin.kernels.elsewhere import DONE
 
 STEP = 0.02  # s between two looks at the processes
+LOOK = 0.2  # s between two looks at the client and the time of a request that waits
+IDLE = 20.0  # s without a kernel to compile, after which a process ends
+RETRY_AFTER = 5  # s
+ASKED_NICENESS = NICENESS // 2  # before what is compiled ahead, behind requests and visitors
 
-_PARTS = (
-    "import sys\nfrom kin import warmup\n"
-    "for line in sys.stdin:\n"
-    "    name, step = line.split()\n"
-    "    warmup.parts()[name][int(step)]()\n"
-    "    print(name, step, flush=True)\n"
-)
+logger = logging.getLogger("kinboard.compiler")
+ahead: ContextVar[bool] = ContextVar("ahead", default=False)
+"""Whether a thread has kernels compiled before anybody asks for them."""
+
+
+class CompilerStoppedError(RuntimeError):
+    """The service is being stopped, so nothing is compiled any more."""
 
 
 def compile_first(*calls: str, stopping: threading.Event) -> None:
-    """Let other processes, one per call of `kin.warmup`, fill the cache; this one compiles what they leave out."""
-    children = [_start(f"from kin import warmup; warmup.{call}", subprocess.DEVNULL) for call in calls]
+    """Let other processes, one per call of `kin.warmup`, fill the cache, which this one then loads."""
+    children = [start_process(f"from kin import warmup; warmup.{call}", subprocess.DEVNULL) for call in calls]
     try:
         while any(child.poll() is None for child in children) and not stopping.wait(STEP):
             pass
@@ -32,52 +51,160 @@ def compile_first(*calls: str, stopping: threading.Event) -> None:
             _end(child)
 
 
-class PartsCompiler:
-    """Compiles the parts of the core in one other process, those that visitors wait for first."""
+class KernelCompiler:
+    """One other process that compiles kernels, one after the other. It starts with the first, and ends when idle.
 
-    def __init__(self, preparation: Preparation) -> None:
-        self._preparation = preparation
+    Args:
+        niceness: of the process.
+
+    Attributes:
+        running: whether there are kernels to compile, or were a moment ago.
+        child: the process; None: there is none.
+    """
+
+    def __init__(self, niceness: int = NICENESS) -> None:
+        self._niceness = niceness
         self._lock = threading.Lock()
-        self._child: subprocess.Popen[str] | None = None
-        self._stopped = False
+        self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._answers: dict[str, Future[bool]] = {}  # to lines that wait or are being compiled
+        self.running = self._stopped = self._warned = False
+        self.child: subprocess.Popen[str] | None = None
 
-    def run(self) -> bool:
-        """Compile until everything is done or `stop` is called. False: the process ended before that."""
+    def submit(self, line: str) -> Future[bool]:
+        """Have the kernel of a line compiled. False: the process has ended. Do not cancel it: others may wait."""
+        with self._lock:
+            if self._stopped:
+                raise CompilerStoppedError
+            if (answer := self._answers.get(line)) is None:
+                answer = self._answers[line] = Future()
+                self._lines.put(line)
+            if not self.running:
+                self.running = True
+                threading.Thread(target=self._run, name="kinboard-compiler", daemon=True).start()
+        return answer
+
+    def stop(self) -> None:
+        """End the process, whatever it compiles. Any thread may call."""
+        with self._lock:
+            self._stopped = True
+            answers, self._answers = self._answers, {}
+            if self.child is not None:
+                self.child.kill()
+        self._lines.put("")  # so that the thread looks
+        for answer in answers.values():
+            answer.set_exception(CompilerStoppedError())
+
+    def _run(self) -> None:
+        lower_priority(self._niceness)  # which the process inherits
+        while (line := self._next()) is not None:
+            done = self._ask(line)
+            with self._lock:
+                answer = self._answers.pop(line, None)
+                stopped = self._stopped
+            if not (done or stopped or self._warned):
+                self._warned = True
+                logger.warning("a compiling process ended early; another one is started when it is needed")
+            if answer is not None:
+                answer.set_result(done)
+
+    def _next(self) -> str | None:
+        """The next line; None, without a process, when nothing is left to do."""
+        with contextlib.suppress(queue.Empty):
+            if not self._stopped:
+                return self._lines.get(timeout=IDLE)
+        with self._lock:
+            if not self._stopped and not self._lines.empty():
+                return self._lines.get()
+            self._end_child()
+            self.running = False
+        return None
+
+    def _ask(self, line: str) -> bool:
         with self._lock:
             if self._stopped:
                 return False
-            child = self._child = _start(_PARTS, subprocess.PIPE)
+            if self.child is None:
+                self.child = start_process("from kin.kernels.elsewhere import serve; serve()", subprocess.PIPE)
+            child = self.child
+        done = _answer(child, line) == DONE
+        if not done:
+            with self._lock:
+                self._end_child()
+        return done
+
+    def _end_child(self) -> None:
+        if self.child is not None:
+            _end(self.child)
+            self.child = None
+
+
+class Compilers:
+    """The compiling processes of one process of the service.
+
+    Attributes:
+        asked: compiles what requests and visitors wait for.
+        ahead: compiles what nobody has asked for yet.
+    """
+
+    def __init__(self) -> None:
+        self.asked, self.ahead = KernelCompiler(ASKED_NICENESS), KernelCompiler()
+
+    def compile(self, line: str) -> bool:
+        """Wait until a kernel is compiled; False: its process has ended before that.
+
+        Raises `ClientLeftError` and 503 as `Deadline.check`. An event loop does not wait: it gets 503.
+        """
+        deadline = current_deadline.get()
         try:
-            while (task := self._preparation.next()) is not None:
-                name, step = task
-                if not _ask(child, f"{name} {step}"):
-                    return False
-                self._preparation.done(name)
-            return True
-        finally:
-            _end(child)
+            answer = (self.ahead if ahead.get() else self.asked).submit(line)
+            if _on_event_loop():
+                raise _preparing("")
+            with paused():
+                while True:
+                    with contextlib.suppress(TimeoutError):
+                        return answer.result(LOOK)
+                    if deadline is not None:
+                        deadline.check_now()
+        except TooSlowError:
+            raise _preparing(f", and is not ready after {deadline.seconds:g} s" if deadline else "") from None
+        except CompilerStoppedError:
+            if deadline is None:
+                raise
+            raise stopping() from None
 
     def stop(self) -> None:
-        """End the other process, whatever it compiles. Any thread may call."""
-        with self._lock:
-            self._stopped = True
-            if self._child is not None:
-                self._child.kill()
+        """End both processes; threads that wait for them get `CompilerStoppedError`."""
+        self.asked.stop()
+        self.ahead.stop()
 
 
-def _ask(child: subprocess.Popen[str], task: str) -> bool:
-    """Have a task done, and wait for that; False: the process has ended."""
+def _on_event_loop() -> bool:
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return False
+    return True
+
+
+def _preparing(how_long: str) -> ProblemError:
+    detail = f"What this request needs is being compiled for the first time on this machine{how_long}."
+    hint = f"This continues by itself. Try again in {RETRY_AFTER} s."
+    return ProblemError(503, "preparing", detail, hint, headers={"Retry-After": str(RETRY_AFTER)})
+
+
+def _answer(child: subprocess.Popen[str], line: str) -> str:
+    """The answer of a process to a line; empty: it has ended."""
     if child.stdin is None or child.stdout is None:
         raise ValueError("the process has no pipes")
     try:
-        child.stdin.write(task + "\n")
+        child.stdin.write(line + "\n")
         child.stdin.flush()
     except OSError:
-        return False
-    return child.stdout.readline().strip() == task
+        return ""
+    return child.stdout.readline().strip()
 
 
-def _start(program: str, pipe: int) -> subprocess.Popen[str]:
+def start_process(program: str, pipe: int) -> subprocess.Popen[str]:
     """A Python process in a session of its own, so that it gets no Ctrl-C."""
     return subprocess.Popen(
         [sys.executable, "-c", program],

@@ -43,7 +43,6 @@ from app.service.log import guard_log
 from app.service.server import STOP_TIMEOUT, Greeting, Server, is_loopback, listen, url_of
 from app.service.startup import Startup
 from app.service.web.access import Access
-from app.service.web.compiling import Compiling
 from app.service.web.embedding import embedding_routes
 from app.service.web.failures import Failures
 from app.service.web.hosts import LOCAL_NAMES, Hosts
@@ -182,8 +181,7 @@ def _described(lifespan: Callable[[FastAPI], AbstractAsyncContextManager[None]])
 
 
 def _add_middleware(app: FastAPI, settings: Settings, guests: Guests) -> None:
-    """What refuses to wait for the compiler innermost, the path prefix outermost."""
-    app.add_middleware(Compiling)
+    """Access innermost, the path prefix outermost."""
     app.add_middleware(
         Access,
         token=None if settings.token is None else settings.token.get_secret_value(),

@@ -4,7 +4,8 @@ The landing page is served at once and shows "warming up" until ``/readyz`` repo
 numba's cache in milliseconds, or are compiled, which takes seconds. The service is ready when those of the first
 arm are; all others are compiled after that, part by part (:mod:`kin.warmup.preparation`), by another process
 (:mod:`app.service.compiler`). Of several processes of a service the first one has the kernels compiled, and
-the others wait and load them. Those of the first arm are compiled by two such processes at once.
+the others wait and load them. Those of the first arm are compiled by two such processes at once. A request that
+needs a kernel before its turn has it compiled at once, by a process of its own.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Literal
 from app.classroom import Hub
 from app.classroom.courses import Courses
 from app.live import Lines
-from app.service.compiler import STEP, PartsCompiler, compile_first
+from app.service.compiler import STEP, Compilers, CompilerStoppedError, ahead, compile_first
 from app.service.handover import Member, Phase, Role
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.clouds import Clouds
@@ -28,6 +29,7 @@ from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.shared.threads import lower_priority, processors, unpin
+from kin.kernels.elsewhere import compile_elsewhere
 from kin.warmup import compiled, parts, rest_compiled, warm_up_first, warm_up_rest
 from kin.warmup.preparation import Preparation
 
@@ -50,6 +52,7 @@ class Startup:
 
     Attributes:
         preparation: which kernels are compiled, for all processes of the service.
+        named: whether this process knows the parts of the preparation, for which it looks at all families of arms.
     """
 
     def __init__(
@@ -82,7 +85,8 @@ class Startup:
         self._viewer: ViewerServer | None = None
         self._loop: asyncio.AbstractEventLoop
         self.preparation = Preparation(None if member is None else member.kernels)
-        self._compiler = PartsCompiler(self.preparation)
+        self.named = False
+        self.compilers = Compilers()
         self._stopping = threading.Event()
         self._viewer_settled = threading.Event()
         # A daemon, so that Ctrl-C need not wait for the end of a compilation.
@@ -109,12 +113,14 @@ class Startup:
     def start(self) -> None:
         """Start; returns at once. The viewer serves its visitors in the running event loop."""
         self._loop = asyncio.get_running_loop()
+        compile_elsewhere(self.compilers.compile)
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop the viewer, and start no further kernel. One that is being compiled ends with the process."""
+        """Stop the viewer and the compilation of kernels."""
         self._stopping.set()
-        self._compiler.stop()
+        self.compilers.stop()
+        compile_elsewhere(None)
         self._viewer_settled.wait(timeout=5.0)
         self._bridge.viewer = None
         if self._viewer is not None:
@@ -135,6 +141,8 @@ class Startup:
                 self.status = "ready"
                 self._report(Phase.READY)
                 self._rest.start()
+        except CompilerStoppedError:  # by `stop`
+            return
         except Exception:
             # REST goes on working; /readyz reports the failure.
             logger.exception("the viewer could not be started, or a kernel could not be compiled")
@@ -159,23 +167,37 @@ class Startup:
 
     def _warm_up_rest(self) -> None:
         lower_priority()
-        self._wait_for_first(Phase.COMPLETE)
+        ahead.set(True)
         try:
-            if self._compiles and not rest_compiled():
-                parts()  # here and not where it is first asked for: it looks at all families of arms
-                self.preparation.begin()
-                if not self._compiler.run() and not self._stopping.is_set():
-                    logger.warning("the compiling process ended early: kernels are compiled where they are used")
+            parts()  # here and not where they are first asked for
+            self.named = True
+            self._wait_for_first(Phase.COMPLETE)
             if self._compiles:
-                self.preparation.finish()
+                self._prepare_parts()
             warm_up_rest(self._stopping.is_set)
             if self._viewer is not None and not self._stopping.is_set():
                 importlib.import_module("trimesh.creation")  # before a visitor opens a lesson that draws a sphere
             self._complete = not self._stopping.is_set()
             self._report(Phase.COMPLETE)
+        except CompilerStoppedError:  # by `stop`
+            return
         except Exception:
             # Requests that need this kernel fail; everything else works.
             logger.exception("a kernel could not be compiled ahead of its use")
+
+    def _prepare_parts(self) -> None:
+        """Load or compile the parts one after the other, those that visitors wait for first."""
+        try:
+            if not rest_compiled():
+                self.preparation.begin()
+            while not (self._stopping.is_set() or self.preparation.complete):
+                if (task := self.preparation.next()) is None:
+                    break
+                name, step = task
+                parts()[name][step]()
+                self.preparation.done(name)
+        finally:
+            self.preparation.finish()
 
     def _start_viewer(self) -> None:
         if self._member is not None and self._member.role is Role.REST:

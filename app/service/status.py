@@ -12,7 +12,6 @@ from starlette.responses import PlainTextResponse
 
 from app.classroom import Hub
 from app.service.startup import Status
-from app.service.web.compiling import known_soon
 from app.shared.metrics import CONTENT_TYPE, exposition
 from kin.warmup.preparation import Preparation
 
@@ -44,7 +43,7 @@ class Readiness(BaseModel):
     )
     kernels: Kernels | None = Field(
         description="Those besides the first arm's, while they are compiled; null before that, and when all are, "
-        "and while this process has to wait for the compiler to name them."
+        "and while this process does not know their names yet."
     )
     classrooms: Literal["ready", "off", "read-only", "missing", "newer-database"] = Field(
         description="Whether rooms can be opened: not if KINBOARD_MAX_ROOMS is 0 (off), if the folder "
@@ -72,19 +71,18 @@ async def livez() -> Alive:
 async def readyz(request: Request, response: Response) -> Readiness:
     startup = request.app.state.startup
     status: Status = startup.readiness
-    done = startup.preparation.complete
     response.headers["cache-control"] = "no-store"
     response.status_code = 200 if status == "ready" else 503
     return Readiness(
         status=status,
         complete=startup.complete,
-        kernels=None if status != "ready" or done else await known_soon(lambda: _kernels(startup.preparation)),
+        kernels=_kernels(startup.preparation) if status == "ready" and startup.named else None,
         classrooms=await run_in_threadpool(_classrooms, request),
     )
 
 
 def _kernels(preparation: Preparation) -> Kernels | None:
-    if preparation.complete:  # it may have become so since
+    if preparation.complete:
         return None
     ready, preparing, waiting = preparation.state
     return Kernels(ready=ready, preparing=preparing, waiting=waiting)

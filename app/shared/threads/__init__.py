@@ -44,7 +44,7 @@ def unpin() -> None:
         os.sched_setaffinity(0, _processors)
 
 
-def lower_priority() -> None:
+def lower_priority(niceness: int = NICENESS) -> None:
     """Let the threads of visitors run before this one, and this one on any processor.
 
     Linux has a niceness per thread. Elsewhere niceness belongs to the process, so only `unpin` is done.
@@ -53,7 +53,7 @@ def lower_priority() -> None:
     if sys.platform == "linux":
         thread = threading.get_native_id()
         own = os.getpriority(os.PRIO_PROCESS, thread)  # who started the process may have lowered it farther
-        os.setpriority(os.PRIO_PROCESS, thread, max(own, NICENESS))
+        os.setpriority(os.PRIO_PROCESS, thread, max(own, niceness))
 
 
 def end_process(code: int) -> NoReturn:

@@ -5,7 +5,7 @@ visitors would get a seventeenth of the interpreter: a drag would take half a se
 So a thread has a turn while it computes, and offers it to others between two steps. A short request is next soon,
 however many long ones there are. Computations wait while a visitor's event is answered and while the event loop is
 busy, as each of its calls to the system would have to wait for the interpreter again. A thread inside the compiler
-of kernels has no turn, perhaps for a minute.
+of kernels has no turn, nor has one that waits for a compiling process (`paused`), perhaps for a minute.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ import heapq
 import itertools
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from app.shared.threads import background_threads
-from app.shared.threads.compiling import queued
 from kin.kernels.compiler import observe_compiler
 
 SLICE = 0.01  # seconds of a turn before it is offered to others
@@ -83,9 +84,8 @@ class Turns:
         return mine
 
     def _wait(self, mine: threading.Event) -> None:
-        with queued():
-            while not mine.wait(STUCK):
-                self._add_turn()
+        while not mine.wait(STUCK):
+            self._add_turn()
 
     def _add_turn(self) -> None:
         with self._lock:
@@ -217,6 +217,19 @@ observe_compiler(_Breaks())
 def _turn_of_thread() -> Turn | None:
     turn: Turn | None = getattr(_current, "turn", None)
     return turn
+
+
+@contextmanager
+def paused() -> Iterator[None]:
+    """Within the context others have the turn of this thread, if it has one; it must not call `offer`."""
+    turn = _turn_of_thread()
+    if turn is not None:
+        turn.enter()
+    try:
+        yield
+    finally:
+        if turn is not None:
+            turn.leave()
 
 
 def offer() -> None:

@@ -1,52 +1,131 @@
-"""The process that compiles the parts of the core one after the other."""
+"""The processes that compile kernels, and the threads that wait for them; a short program stands for one."""
 
 from __future__ import annotations
 
+import asyncio
 import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
+from compiling import kernel, stand_in_for_the_compiler
 from live_server import wait_for
 
+from app.api.problems import ProblemError
 from app.service import compiler
-from app.service.compiler import PartsCompiler
-from kin.warmup import COLLISIONS, parts
-from kin.warmup.preparation import Preparation
+from app.service.compiler import Compilers, CompilerStoppedError, KernelCompiler, ahead
+
+
+@pytest.fixture(autouse=True)
+def program(monkeypatch: pytest.MonkeyPatch) -> None:
+    stand_in_for_the_compiler(monkeypatch)
 
 
 @pytest.fixture
-def preparation() -> Preparation:
-    """Only the collisions are left to compile."""
-    made = Preparation()
-    made.begin()
-    for name in parts():
-        while name != COLLISIONS and not made.ready((name,)):
-            made.done(name)
-    return made
+def made() -> Iterator[KernelCompiler]:
+    found = KernelCompiler()
+    yield found
+    found.stop()
 
 
-@pytest.mark.full
-def test_the_other_process_does_every_step_that_is_left(preparation):
-    assert PartsCompiler(preparation).run()
-    assert preparation.ready(parts())
+@pytest.fixture
+def compilers() -> Iterator[Compilers]:
+    found = Compilers()
+    yield found
+    found.stop()
 
 
-@pytest.mark.full
-def test_a_process_that_ends_early_does_not_count_as_done(preparation, monkeypatch):
-    program = compiler._PARTS.replace("()\n", "()\n    if step == '2': sys.exit()\n")
-    assert program != compiler._PARTS
-    monkeypatch.setattr(compiler, "_PARTS", program)
-    assert not PartsCompiler(preparation).run()
-    assert preparation.next() == (COLLISIONS, 2)
+def test_kernels_are_compiled_in_their_order_and_each_once_for_all_that_wait(made, tmp_path):
+    first, second = kernel(tmp_path, "first", False), kernel(tmp_path, "second")
+    answers = [made.submit(line) for line in (first, second, first)]
+    assert answers[0] is answers[2]
+    assert not answers[1].done()
+    Path(first).touch()
+    assert answers[1].result(20)
+    assert answers[0].done()
+    assert made.submit(first) is not answers[0], "what was asked for earlier is not kept"
 
 
-def test_a_stop_ends_the_other_process_and_what_waits_for_it(preparation, monkeypatch):
-    monkeypatch.setattr(compiler, "_PARTS", "import time; time.sleep(300)")
-    compiling, answers = PartsCompiler(preparation), []
-    thread = threading.Thread(target=lambda: answers.append(compiling.run()))
+def test_a_process_that_ends_says_so_and_the_next_kernel_has_a_new_one(made, tmp_path, caplog):
+    for _ in range(2):
+        assert not made.submit(str(tmp_path / "end")).result(20)
+    assert made.submit(kernel(tmp_path, "next")).result(20)
+    assert [record.message.partition(";")[0] for record in caplog.records] == ["a compiling process ended early"]
+
+
+def test_a_process_that_is_killed_says_so_too(made, tmp_path):
+    answer = made.submit(kernel(tmp_path, "first", False))
+    wait_for(lambda: made.child is not None)
+    made.child.kill()
+    assert not answer.result(20)
+    assert made.submit(kernel(tmp_path, "next")).result(20)
+
+
+def test_an_idle_process_ends_with_its_memory_and_the_next_kernel_has_a_new_one(made, tmp_path, monkeypatch):
+    monkeypatch.setattr(compiler, "IDLE", 0.01)
+    for name in ("first", "second"):
+        assert made.submit(kernel(tmp_path, name)).result(20)
+        wait_for(lambda: not made.running)
+        assert made.child is None
+
+
+def test_a_stop_ends_the_process_and_all_waiting(made, tmp_path):
+    answers = [made.submit(kernel(tmp_path, name, False)) for name in ("first", "second")]
+    wait_for(lambda: made.child is not None)
+    child = made.child
+    made.stop()
+    for answer in answers:
+        with pytest.raises(CompilerStoppedError):
+            answer.result(0)
+    wait_for(lambda: not made.running)
+    assert child.poll() is not None
+    with pytest.raises(CompilerStoppedError):
+        made.submit(kernel(tmp_path, "third"))
+
+
+def test_what_is_asked_for_does_not_wait_for_what_is_compiled_ahead(compilers, tmp_path):
+    later = kernel(tmp_path, "later", False)
+
+    def compile_ahead() -> bool:
+        ahead.set(True)
+        return compilers.compile(later)
+
+    with ThreadPoolExecutor() as threads:
+        waiting = threads.submit(compile_ahead)
+        wait_for(lambda: compilers.ahead.child is not None)
+        assert compilers.compile(kernel(tmp_path, "now"))
+        assert not waiting.done()
+        Path(later).touch()
+        assert waiting.result(20)
+
+
+def test_an_event_loop_does_not_wait_and_the_kernel_is_compiled_all_the_same(compilers, tmp_path):
+    line = kernel(tmp_path, "kernel", False)
+
+    async def ask() -> None:
+        compilers.compile(line)
+
+    with pytest.raises(ProblemError) as refused:
+        asyncio.run(ask())
+    assert refused.value.problem.type == "urn:kinboard:problem:preparing"
+    answer = compilers.asked.submit(line)
+    Path(line).touch()
+    assert answer.result(20)
+
+
+def test_a_thread_that_waits_when_the_service_stops_gets_an_error(compilers, tmp_path):
+    raised: list[BaseException] = []
+
+    def ask() -> None:
+        try:
+            compilers.compile(kernel(tmp_path, "kernel", False))
+        except CompilerStoppedError as error:
+            raised.append(error)
+
+    thread = threading.Thread(target=ask, daemon=True)
     thread.start()
-    wait_for(lambda: compiling._child is not None)
-    compiling.stop()
+    wait_for(lambda: compilers.asked.child is not None)
+    compilers.stop()
     thread.join(10)
-    assert answers == [False]
-    assert compiling._child.poll() is not None
-    assert not compiling.run(), "it does not start again"
+    assert len(raised) == 1
