@@ -133,7 +133,7 @@ def user_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", "").strip() or Path.home() / ".cache") / "kinboard"
 
 
-def _prune(folder: Path) -> None:
+def prune(folder: Path) -> None:
     """Remove the files that were not used for longest, until all together take at most `CAPACITY`."""
     found = []
     for path in folder.glob("*.nbc*"):
@@ -254,7 +254,7 @@ class KernelCache:
         path = folder
         try:
             rtsys.initialize(target_context)  # allocation of arrays, which machine code calls
-            path = folder / self._name(sig, target_context.codegen())
+            path = folder / self.file_name(sig, target_context.codegen())
             data = path.read_bytes()
             if not _intact(data):
                 raise DamagedFileError("damaged")
@@ -276,7 +276,7 @@ class KernelCache:
         if folder is None or data.lifted or data.library.has_dynamic_globals:
             return
         try:
-            path = folder / self._name(sig, data.codegen)
+            path = folder / self.file_name(sig, data.codegen)
             content = _sealed(zlib.compress(dumps((sig, data._reduce())), _LEVEL))
             beside = path.with_name(f"{path.name}.{uuid.uuid4().hex}")
             try:
@@ -284,7 +284,7 @@ class KernelCache:
                 beside.replace(path)
             finally:
                 beside.unlink(missing_ok=True)
-            _prune(folder)
+            prune(folder)
         except Exception as error:  # noqa: BLE001 - as above
             _warn("machine code cannot be written to the cache", f"{folder}: {error!r}")
 
@@ -304,7 +304,7 @@ class KernelCache:
         name = re.sub(r"[^\w.]", "", f"{function.__module__}.{function.__qualname__}")[-100:]
         return f"{name}-{_hash(parts, _target(codegen.magic_tuple()))}"
 
-    def _name(self, sig: Any, codegen: Any) -> str:
+    def file_name(self, sig: Any, codegen: Any) -> str:
         """The name of the file for a signature. Functions of one line differ in their code, closures in cells."""
         cells = [cell.cell_contents for cell in self._function.__closure__ or ()]
         parts = *map(str, sig), self._function.__code__.co_code, dumps(cells) if cells else b""

@@ -26,7 +26,7 @@ import numba
 CACHE: Final = "cache"
 CALLS: Final = "calls"
 EVENTS: Final = "events"
-_WITHOUT = {
+WITHOUT = {
     CACHE: "compiled kernels are kept by numba's own cache and load more slowly",
     CALLS: "calls of kernels take longer",
     EVENTS: "a request may wait while a kernel is compiled, and kin.warm_up takes longer",
@@ -93,4 +93,4 @@ register_listener = _find(EVENTS, "numba.core.event", "register")
 install_recorder = _find(EVENTS, "numba.core.event", "install_recorder")
 
 for _gain, _name in MISSING.items():
-    warnings.warn(f"numba {numba.__version__}: {_name}. Answers stay; {_WITHOUT[_gain]}.", stacklevel=2)
+    warnings.warn(f"numba {numba.__version__}: {_name}. Answers stay; {WITHOUT[_gain]}.", stacklevel=2)

@@ -115,7 +115,7 @@ def test_a_folder_that_others_may_have_written_is_not_read(folder, monkeypatch, 
     of = cache.KernelCache(kernel)
     assert cache.kernel_folder() == folder
     monkeypatch.setattr(cache, "_intact", lambda data: pytest.fail("read"))
-    (folder / of._name((), CODEGEN)).write_bytes(b"anything")
+    (folder / of.file_name((), CODEGEN)).write_bytes(b"anything")
     make(folder, monkeypatch)
     target = SimpleNamespace(codegen=lambda: CODEGEN)
     with pytest.warns(UserWarning, match="is not used.*chmod 700.*KINBOARD_CACHE"):
@@ -141,10 +141,10 @@ def test_files_that_were_not_used_for_longest_are_removed_when_there_are_too_man
     cache.kernel_folder()
     files(folder, {"a.nbc": 3 * DAY, "b.nbc": DAY, "c.nbc": 2 * DAY, "d.nbc.0123": 9 * DAY, "not ours": 10 * DAY})
     monkeypatch.setattr(cache, "CAPACITY", 400)
-    cache._prune(folder)
+    cache.prune(folder)
     assert len(list(folder.iterdir())) == 5
     monkeypatch.setattr(cache, "CAPACITY", 299)
-    cache._prune(folder)
+    cache.prune(folder)
     assert sorted(file.name for file in folder.iterdir()) == ["b.nbc", "c.nbc", "not ours"]
 
 
@@ -154,7 +154,7 @@ def test_files_that_another_process_removes_meanwhile_are_no_error(folder, monke
     glob = Path.glob
     monkeypatch.setattr(Path, "glob", lambda self, pattern: [*glob(self, pattern), folder / "gone.nbc"])
     monkeypatch.setattr(cache, "CAPACITY", 100)
-    cache._prune(folder)
+    cache.prune(folder)
     assert [file.name for file in folder.iterdir()] == ["a.nbc"]
 
 
@@ -168,7 +168,7 @@ def name(monkeypatch):
 
     def found(signature: tuple[Any, ...] = (numba.float64,), codegen: Any = CODEGEN) -> str:
         cache._target.cache_clear()
-        return cache.KernelCache(kernel)._name(signature, codegen)
+        return cache.KernelCache(kernel).file_name(signature, codegen)
 
     yield found
     cache._target.cache_clear()
