@@ -190,3 +190,60 @@ def test_files_of_other_texts_processors_versions_and_signatures_have_other_name
             patch.setattr(place, changed, value)
             assert before != name(), changed
     assert before == name()
+
+
+# -- a file is written, read, and said to be used --------------------------------------------------------------
+
+TARGET = SimpleNamespace(codegen=lambda: CODEGEN)
+COMPILED = SimpleNamespace(
+    lifted=(),
+    library=SimpleNamespace(has_dynamic_globals=False),
+    codegen=CODEGEN,
+    _reduce=lambda: "machine code",
+)
+
+
+@pytest.fixture
+def kept(monkeypatch):
+    """The cache of one kernel, whose machine code is a text."""
+    monkeypatch.setattr(cache, "_rebuild", lambda target, payload: payload)
+    monkeypatch.setattr(cache.rtsys, "initialize", lambda target: None)
+    return cache.KernelCache(kernel)
+
+
+def test_what_is_written_is_read_for_the_same_signature(kept, folder):
+    assert kept.load_overload(("float64",), TARGET) is None
+    kept.save_overload(("float64",), COMPILED)
+    assert kept.load_overload(("float64",), TARGET) == "machine code"
+    assert kept.load_overload(("int64",), TARGET) is None
+    (file,) = folder.iterdir()
+    file.rename(folder / kept._name(("int64",), CODEGEN))
+    assert kept.load_overload(("int64",), TARGET) is None, "the file says what it is for"
+
+
+def test_machine_code_with_addresses_of_this_process_is_not_written(kept, folder):
+    kept.save_overload(
+        (), SimpleNamespace(**{**vars(COMPILED), "library": SimpleNamespace(has_dynamic_globals=True)})
+    )
+    assert list(folder.iterdir()) == []
+
+
+def test_a_file_that_is_used_says_so_once_a_day(kept, folder):
+    kept.save_overload((), COMPILED)
+    (file,) = folder.iterdir()
+    now = file.stat().st_mtime
+    for age, renewed in ((0.5 * DAY, False), (2.0 * DAY, True)):
+        os.utime(file, (now - age, now - age))
+        assert kept.load_overload((), TARGET) == "machine code"
+        assert (file.stat().st_mtime >= now - 1.0) is renewed
+
+
+def test_a_file_that_cannot_be_moved_to_its_place_leaves_nothing(kept, folder, monkeypatch):
+    def refuse(self: Path, target: Path) -> None:
+        assert self.read_bytes(), "it is complete before it is moved"
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", refuse)
+    with pytest.warns(UserWarning, match="cannot be written.*No space left"):
+        kept.save_overload((), COMPILED)
+    assert list(folder.iterdir()) == []
