@@ -30,6 +30,7 @@ PARSERS = {
     *("base64.b64decode", "base64.urlsafe_b64decode", "urlsafe_b64decode", "b64decode", "Fraction", "Decimal"),
     *("ZstdDecompressor", "LZ4FrameDecompressor", "msgspec.msgpack.Decoder", "msgspec.json.Decoder", "parse_qs"),
 }
+LAST = {name.rpartition(".")[2] for name in PARSERS}
 # Modules that a visitor's text reaches, and what bounds it there.
 GUARDED = {
     "kin/parsing.py": "the readers",
@@ -80,11 +81,12 @@ TRUSTED = {
 
 def parsers(source: str) -> Iterator[str]:
     """The parsers that a source calls or passes on."""
+    if not any(name in source for name in PARSERS):
+        return
     for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Attribute | ast.Name):
-            name = ast.unparse(node)
-            if name in PARSERS:
-                yield name
+        last = node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+        if last in LAST and (name := ast.unparse(node)) in PARSERS:
+            yield name
 
 
 def unknown(sources: dict[str, str]) -> set[str]:
