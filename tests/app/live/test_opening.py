@@ -287,7 +287,7 @@ def test_a_chunk_that_looks_far_back_is_refused():
     wide = zstandard.ZstdCompressionParameters(window_log=26)
     packed = zstandard.ZstdCompressor(compression_params=wide).compressobj()
     with pytest.raises(kin.InputError, match=r"a recording of a connection \(MCAP\)"):
-        read(bomb("zstd", packed.compress(bytes(1000)) + packed.flush(), 1000), ARM)
+        read(bomb("zstd", packed.compress(bytes(900)) + packed.flush(), 900), ARM)  # a hundred empty records
 
 
 def test_records_are_bounded_in_number_and_those_of_others_are_not_read():
