@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -29,18 +30,32 @@ _SHAPES = ("sphere", "capsule", "box", "cylinder")
 _X, _Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
 
-def as_urdf(root: Element, file: str) -> Element:
+class Converted(NamedTuple):
+    """The `<robot>` of a URDF, and what of the file is not read though it may change the arm.
+
+    Attributes:
+        robot: the root of a URDF.
+        ignored: sentences, each with the name of the link of `robot` that it concerns; "" for the whole file.
+    """
+
+    robot: Element
+    ignored: Sequence[tuple[str, str]]
+
+
+def as_urdf(root: Element, file: str) -> Converted:
     """The `<robot>` of a URDF with the bodies, joints and shapes of a `<mujoco>`.
 
     Raises:
         RobotFileError: naming the element and what would be valid.
     """
-    return _Converter(root, file).robot
+    converter = _Converter(root, file)
+    return Converted(converter.robot, converter.ignored)
 
 
 class _Converter:
     def __init__(self, root: Element, file: str) -> None:
         self._file = file
+        self.ignored: list[tuple[str, str]] = []
         for element in root.iter():
             if element.tag in ("include", "attach", "replicate", "composite", "flexcomp"):
                 words = "one file without it: MuJoCo writes one with mj_saveLastXML"
@@ -225,9 +240,11 @@ class _Converter:
 
     def _limits(self, values: dict[str, str], where: str, unit: float) -> tuple[float, float] | None:
         limited = values.get("limited", "auto")
-        if limited == "false" or (limited == "auto" and not (self._auto and "range" in values)):
+        if limited == "false":
             return None
         low, high = self._numbers(values, "range", where, 2, "0 0")
+        if limited == "auto" and not (self._auto and "range" in values and low != high):
+            return None  # MuJoCo's "0 0" resets the range of a class
         return low * unit, high * unit
 
     # Shapes and followers

@@ -24,7 +24,6 @@ from kin.files.urdf.visuals import Box, Cylinder, MeshFile, Shape, Sphere, shape
 from kin.fitting import MOST, Segment, capsules_around, radius_of, tubes
 from kin.fitting import bodies as solids
 from kin.fk import link_frames
-from kin.frames import matrix_of
 from kin.robot import Capsule, Robot
 from kin.transforms import Array
 
@@ -136,7 +135,7 @@ def _collision(fields: UrdfElement) -> tuple[Shape | Pill, Array]:
     shape: Shape | Pill | None = shape_of(inner) if pill is None else _pill(inner)
     if shape is None:
         raise fields.refuse("geometry", "another shape", "a box, cylinder, sphere, capsule or mesh")
-    return shape, np.array(matrix_of(*fields.origin()))
+    return shape, np.array(fields.pose())
 
 
 def _pill(fields: UrdfElement) -> Pill:

@@ -6,7 +6,6 @@ import numpy as np
 
 from kin.errors import RobotFileError
 from kin.files.urdf.tree import MOVING, UrdfJoint, UrdfTree
-from kin.frames import matrix_of
 from kin.transforms import Array
 
 
@@ -21,7 +20,7 @@ def poses_of(tree: UrdfTree, chain: tuple[UrdfJoint, ...]) -> tuple[dict[str, in
     for link in links:  # grows meanwhile
         for joint in tree.children.get(link, ()):
             try:
-                T = poses[link] @ np.array(matrix_of(*joint.origin()))
+                T = poses[link] @ np.array(joint.pose())
                 if joint.type in MOVING and joint.name not in moving:
                     T = T @ motion_of(joint, np.array([joint.resting()]))[0]
             except RobotFileError:

@@ -24,6 +24,7 @@ from kin.files.home import default_home
 from kin.files.names import unused
 from kin.files.numbers import LARGEST, number_of
 from kin.files.read import MAX_REACH, MAX_ROWS
+from kin.files.urdf.causes import LFS
 from kin.files.urdf.collisions import (
     Fit,
     UrdfBody,
@@ -33,14 +34,15 @@ from kin.files.urdf.collisions import (
     with_free_home,
     without_meshes,
 )
+from kin.files.urdf.fields import ignored_of
 from kin.files.urdf.poses import motion_of
-from kin.files.urdf.tree import Tip, UrdfJoint, UrdfTree, read_tree
+from kin.files.urdf.tree import FREE, UNLIMITED, Tip, UrdfJoint, UrdfTree, read_tree
 from kin.fk import fk
-from kin.frames import matrix_of
 from kin.robot import DEFAULT_LIMITS, MOUNTINGS, Joint, Mounting, Robot
 from kin.transforms import Array
 
 _UPRIGHT = 0.7  # of the height of a vertical axis of unit length
+MOST_IGNORED = 20  # notes about what is not read
 EXACT = 1e-12  # a larger difference, per metre of reach, is noted
 
 
@@ -175,7 +177,7 @@ def _tree(source: Path | str, file: str) -> UrdfTree:
     if not isinstance(source, str | Path):
         raise InputError("source", source, "the text of a URDF as str, or the Path of a file")
     if isinstance(source, str):
-        if "<" not in source:
+        if "<" not in source and not source.startswith(LFS):
             wanted = "the text of a URDF, or the Path of a file: pathlib.Path(…)"
             raise RobotFileError(file or "URDF", "file", source, wanted)
         return read_tree(source, file or "URDF")
@@ -190,8 +192,9 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
     moving = [joint for joint in chain if joint.moves]
     if len(moving) > MAX_ROWS:
         raise RobotFileError(tree.file, "joint", f"{len(moving)} moving joints", f"at most {MAX_ROWS}")
-    notes: list[str] = []
+    notes = [*tree.notes, *_above(tree, chain), *(joint.note for joint in chain if joint.note)]
     joints = [_joint(joint, notes) for joint in moving]
+    notes += _ignored(tree, chain)
     table = table_of_chain(joints, _transforms(chain))
     rows = _with_distinct_tilts(table.rows)
     if len(rows) > MAX_ROWS:
@@ -212,7 +215,7 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
     )
     if robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3])) > MAX_REACH:
         expected = f"at most {MAX_REACH:g} m with the base"
-        raise RobotFileError(tree.file, "joint", f"a reach of {robot.reach:g} m", expected)
+        raise RobotFileError(tree.file, _farthest(chain), f"a reach of {robot.reach:g} m", expected)
     robot = replace(robot, home=default_home(robot))
     used = {joint.name for joint in chain}
     difference = _difference(robot, chain)
@@ -235,6 +238,43 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
     return UrdfRobot(robot, report)
 
 
+def _farthest(chain: Sequence[UrdfJoint]) -> str:
+    """The field of the joint that makes the arm longest."""
+
+    def slide(joint: UrdfJoint) -> float:
+        return max(map(abs, joint.limits() or (0.0,))) if joint.kind == "prismatic" and joint.moves else 0.0
+
+    def offset(joint: UrdfJoint) -> float:
+        return math.hypot(*(row[3] for row in joint.pose()[:3]))
+
+    joint = max(chain, key=lambda joint: max(slide(joint), offset(joint)))
+    return f"joint {joint.name}: {'limit' if slide(joint) > offset(joint) else 'origin xyz'}"
+
+
+def _above(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> list[str]:
+    """Where the arm begins, if the link that it begins with floats in the root."""
+    joint = tree.parents.get(chain[0].parent)
+    if joint is None or joint.type not in FREE:
+        return []
+    return [f"Joint {joint.name} is {joint.type}: the arm begins behind it, at link {joint.child}."]
+
+
+def _ignored(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> list[str]:
+    """What of the file, and of the joints and links of the arm, is not read, though it may have been meant."""
+    if tree.format != "URDF":
+        there = {"", chain[0].parent, *(joint.child for joint in chain)}
+        return [words for link, words in tree.ignored if link in there]
+    names = {chain[0].parent, *(joint.child for joint in chain)}
+    links = [link for link in tree.root.findall("link") if link.get("name", "").strip() in names]
+    found = []
+    for element in [tree.root, *links, *(joint.element for joint in chain)]:
+        name = "" if element is tree.root else f" {element.get('name', '').strip()}"
+        what = "The file" if element is tree.root else element.tag.capitalize() + name
+        found += [f"{what}: {each.words}." for each in ignored_of(element)]
+    more = len(found) - MOST_IGNORED
+    return found if more <= 0 else [*found[:MOST_IGNORED], f"{more} more elements and attributes are not read."]
+
+
 def _stated(tree: UrdfTree, first: UrdfJoint) -> tuple[Mounting | None, float | None]:
     """What the arm is mounted on, and the height of the floor: as `robot_to_urdf` writes them, or assumed."""
     stated = tree.root.find("kinboard")
@@ -255,7 +295,7 @@ def _mounting(first: UrdfJoint) -> Mounting:
     """What the arm is mounted on: the floor, unless a fixed joint of the link `world` turns its root."""
     if first.moves or first.parent != "world":
         return "floor"
-    up = matrix_of(*first.origin())[2][2]
+    up = first.pose()[2][2]
     return "floor" if up > _UPRIGHT else "ceiling" if up < -_UPRIGHT else "wall"
 
 
@@ -271,30 +311,50 @@ def _file_name(file: str) -> str:
 
 
 def _joint(joint: UrdfJoint, notes: list[str]) -> Joint:
-    limits = joint.limits()
-    if limits == (-math.inf, math.inf):
-        limits = None
-        notes.append(f"Joint {joint.name} has limits of a million or more: it is read as unlimited.")
-    elif limits is None and joint.type != "continuous":
-        if joint.kind == "prismatic":
-            raise joint.refuse("limit", "no lower and upper", "the limits of the slide in metres")
-        limits = DEFAULT_LIMITS["revolute"]
-        notes.append(f"Joint {joint.name} states no limits: it gets −180° to 180°.")
     return Joint(
         joint.name,
         kind=joint.kind,
-        limits=limits,
-        velocity=_known(joint, "velocity", notes),
-        effort=_known(joint, "effort", notes),
+        limits=_limits(joint, notes),
+        velocity=_peak(joint, "velocity", notes),
+        effort=_peak(joint, "effort", notes),
+        acceleration=_acceleration(joint, notes),
+        jerk=_peak(joint, "jerk", notes),
     )
 
 
-def _known(joint: UrdfJoint, key: str, notes: list[str]) -> float | None:
-    value = joint.positive(key)
-    if value is None or value < LARGEST:
+def _limits(joint: UrdfJoint, notes: list[str]) -> tuple[float, float] | None:
+    limits, unit = joint.limits(), "m" if joint.kind == "prismatic" else "rad"
+    if joint.type == "continuous" or (limits is not None and -math.inf < limits[0] < limits[1]):
+        return limits
+    why = "states no limits"
+    if limits == (0.0, 0.0):
+        why = "has limits that are both zero, which stand for none"
+    elif limits is not None:
+        why = f"has limits of {UNLIMITED[joint.kind]:g} {unit} or more both ways, which stand for none"
+        if joint.kind == "revolute":
+            notes.append(f"Joint {joint.name} {why}: it is read as unlimited.")
+            return None
+    assumed = DEFAULT_LIMITS[joint.kind]
+    gets = "0 to 1 m" if joint.kind == "prismatic" else "−180° to 180°"
+    notes.append(f"Joint {joint.name} {why}: it gets {gets}.")
+    return assumed
+
+
+def _peak(joint: UrdfJoint, key: str, notes: list[str]) -> float | None:
+    value = joint.peak(key)
+    if value is None or 0.0 < value < LARGEST:
         return value
-    notes.append(f"Joint {joint.name} has {key} {value:g}: it is read as unknown.")
+    if value:  # zero is how a URDF says that it is not known
+        notes.append(f"Joint {joint.name} has {key} {value:g}: it is read as unknown.")
     return None
+
+
+def _acceleration(joint: UrdfJoint, notes: list[str]) -> float | None:
+    """The largest acceleration; a row has one for speeding up and slowing down, so the smaller one counts."""
+    up, down = (_peak(joint, key, notes) for key in ("acceleration", "deceleration"))
+    if up is not None and down is not None and up != down:
+        notes.append(f"Joint {joint.name} has acceleration {up:g} and deceleration {down:g}: the smaller counts.")
+    return min((value for value in (up, down) if value is not None), default=None)
 
 
 def _with_distinct_tilts(rows: Sequence[Joint]) -> tuple[Joint, ...]:
@@ -311,7 +371,7 @@ def _transforms(chain: Sequence[UrdfJoint]) -> list[Array]:
     """The constant transforms before, between and after the moving joints, each joint along z of its frame."""
     found, T = [], np.eye(4)
     for joint in chain:
-        T = T @ np.array(matrix_of(*joint.origin()))
+        T = T @ np.array(joint.pose())
         if joint.moves:
             turn = _turn_to(np.array(joint.axis()))
             found.append(T @ turn)
@@ -331,7 +391,7 @@ def _difference(robot: Robot, chain: Sequence[UrdfJoint]) -> float:
     q = robot.random_q(np.random.default_rng(0), SAMPLES)
     T, i = np.broadcast_to(np.eye(4), (SAMPLES, 4, 4)), 0
     for joint in chain:
-        T = T @ np.array(matrix_of(*joint.origin()))
+        T = T @ np.array(joint.pose())
         if joint.moves:
             T = T @ motion_of(joint, q[:, i])
             i += 1

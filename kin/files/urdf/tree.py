@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -12,13 +12,20 @@ from xml.etree.ElementTree import Element
 from kin.errors import RobotFileError
 from kin.files.mjcf.convert import as_urdf
 from kin.files.numbers import LARGEST, number_of
-from kin.files.urdf.xml import parse_xml
-from kin.robot import Kind
+from kin.files.urdf.causes import parse_mended
+from kin.frames import matrix_of
+from kin.robot import Kind, Matrix
+from kin.transforms import pose_from_position_wxyz
 
 MOVING = ("revolute", "continuous", "prismatic")
-TYPES = (*MOVING, "fixed", "floating", "planar")
+FREE = ("floating", "planar")  # not of a serial arm, which may stand on a link that floats
+TYPES = (*MOVING, "fixed", *FREE)
+XACRO_DEFINITIONS = ("xacro:property", "xacro:arg", "xacro:macro")  # which add nothing by themselves
 MOST = 12  # names in a message
 MAX_LINKS = 5000
+UNLIMITED = {"revolute": 9e5, "prismatic": 1e4}  # rad and m: limits beyond it both ways stand for none
+UNIT = 0.01  # by how much the length of a quaternion may differ from 1: it is written with few digits
+_COUNTS = {3: "three", 4: "four"}
 _ONCE = "a name that no other {} has"
 
 
@@ -37,16 +44,33 @@ class UrdfElement:
     element: Element
     name: str
 
-    def origin(self) -> tuple[list[float], list[float]]:
-        """xyz in metres and rpy in radians of its frame in its parent's."""
-        return self.triple("origin", "xyz", "0 0 0"), self.triple("origin", "rpy", "0 0 0")
+    def pose(self) -> Matrix:
+        """Its frame in its parent's: `xyz` in metres, and `rpy` in radians or `quat_xyzw` (URDF 1.1)."""
+        origin = self.element.find("origin")
+        xyz = self.triple("origin", "xyz", "0 0 0")
+        if origin is None or "quat_xyzw" not in origin.keys():  # noqa: SIM118 - an Element iterates over children
+            return matrix_of(xyz, self.triple("origin", "rpy", "0 0 0"))
+        if "rpy" in origin.keys():  # noqa: SIM118
+            raise self.refuse("origin", "rpy and quat_xyzw", "one of them")
+        x, y, z, w = quaternion = self.numbers("origin", "quat_xyzw", "", 4)
+        length = math.hypot(*quaternion)
+        if not abs(length - 1.0) <= UNIT:
+            expected = "a quaternion x y z w of length 1" + (", and this one has no direction" * (length == 0.0))
+            raise self.refuse("origin quat_xyzw", f"{origin.get('quat_xyzw')} (length {length:.3g})", expected)
+        T = pose_from_position_wxyz(xyz, [w, x, y, z]).tolist()
+        return tuple(map(tuple, T))
 
     def triple(self, tag: str, key: str, default: str) -> list[float]:
         """Three numbers of an attribute."""
+        return self.numbers(tag, key, default, 3)
+
+    def numbers(self, tag: str, key: str, default: str, count: int) -> list[float]:
+        """So many numbers of an attribute."""
         child = self.element.find(tag)
         parts = (default if child is None else child.get(key, default)).split()
-        if len(parts) != 3:
-            raise self.refuse(f"{tag} {key}", " ".join(parts), "three numbers separated by spaces")
+        if len(parts) != count:
+            words = f"{_COUNTS[count]} numbers separated by spaces"
+            raise self.refuse(f"{tag} {key}", " ".join(parts), words)
         return [self.number(tag, f"{key}[{i}]", part) for i, part in enumerate(parts)]
 
     def number(self, tag: str, key: str, text: str) -> float:
@@ -69,6 +93,7 @@ class UrdfJoint(UrdfElement):
     type: str
     parent: str
     child: str
+    note: str = ""  # what had to be understood
 
     @property
     def moves(self) -> bool:
@@ -91,17 +116,17 @@ class UrdfJoint(UrdfElement):
     def limits(self) -> tuple[float, float] | None:
         """Lower and upper limit; None if it states none, as a continuous joint does.
 
-        Both limits of a revolute joint may be huge or infinite, as some files write that there are none.
+        Limits that stand for none are infinite: some files write huge ones, or infinity.
         """
         limit = self.element.find("limit")
         if self.type == "continuous" or limit is None or not {"lower", "upper"} & set(limit.keys()):
             return None
         texts = {key: limit.get(key, "0") for key in ("lower", "upper")}
         lower, upper = map(number_of, texts.values())
-        if self.kind == "revolute" and lower <= -LARGEST and upper >= LARGEST:
+        if lower <= -UNLIMITED[self.kind] and upper >= UNLIMITED[self.kind]:
             return -math.inf, math.inf
         lower, upper = (self.number("limit", key, text) for key, text in texts.items())
-        if not lower < upper:
+        if lower > upper or lower == upper != 0.0:
             raise self.refuse("limit", [lower, upper], "lower below upper; a joint that does not move is fixed")
         return lower, upper
 
@@ -117,17 +142,18 @@ class UrdfJoint(UrdfElement):
         low, high = (number_of(limit.get(key, "0")) for key in ("lower", "upper"))
         return min(max(0.0, low), high) if -LARGEST < low <= high < LARGEST else 0.0
 
-    def positive(self, key: str) -> float | None:
-        """A limit of velocity or effort; None if it is not stated or zero, which stands for unknown.
+    def peak(self, key: str) -> float | None:
+        """A limit of velocity, acceleration, deceleration, jerk or effort as it stands; None if it is not stated.
 
-        It may be huge or infinite, as some files write that it is not known.
+        Zero and negative numbers stand for unknown, and so do huge and infinite ones.
         """
         limit = self.element.find("limit")
         given = None if limit is None else limit.get(key)
-        value = 0.0 if given is None else number_of(given)
-        if given is not None and not value >= 0.0:
-            raise self.refuse(f"limit {key}", given, "a positive number")
-        return value or None
+        if given is None:
+            return None
+        if math.isnan(value := number_of(given)):
+            raise self.refuse(f"limit {key}", given, "a number; 0 stands for unknown")
+        return value
 
 
 class Unread(NamedTuple):
@@ -158,6 +184,8 @@ class UrdfTree:
         joints: those with a parent and a child.
         unread: what is wrong with links, joints, and joints that were left out.
         format: of the file.
+        notes: what had to be understood of the file, a sentence each.
+        ignored: of an MJCF file, what of a body or joint is not read, with the link; "" for the whole file.
     """
 
     file: str
@@ -167,6 +195,8 @@ class UrdfTree:
     root: Element
     unread: tuple[Unread, ...] = ()
     format: Literal["URDF", "MJCF"] = "URDF"
+    notes: tuple[str, ...] = ()
+    ignored: tuple[tuple[str, str], ...] = ()
 
     @cached_property
     def parents(self) -> dict[str, UrdfJoint]:
@@ -184,12 +214,16 @@ class UrdfTree:
 
     @cached_property
     def depths(self) -> dict[str, int]:
-        """For each link, the moving joints from its root to it; links of or behind a cycle are missing."""
+        """For each link, the moving joints from its root to it; links of or behind a cycle are missing.
+
+        A floating or planar joint below the root counts as none: the arm begins behind it.
+        """
         found = {link: 0 for link in self.links if link not in self.parents}
         links = list(found)
         for link in links:  # grows meanwhile
             for joint in self.children.get(link, ()):
-                found[joint.child] = found[link] + joint.moves
+                floats = joint.type in FREE and not found[link]
+                found[joint.child] = 0 if floats else found[link] + joint.moves
                 links.append(joint.child)
         return found
 
@@ -237,8 +271,16 @@ class UrdfTree:
                 raise RobotFileError(self.file, "base", base, f"a link on the way to {tip}: {names}")
             found = found[above[0] :]
         self._check_whole(found, tip, base)
+        if base is None:
+            found = self._behind_free(found)
         self._check(found, tip)
         return tuple(found)
+
+    def _behind_free(self, found: list[UrdfJoint]) -> list[UrdfJoint]:
+        """The joints behind those with which the root floats: a serial arm stands on what they move."""
+        moving = (i for i, joint in enumerate(found) if joint.moves and joint.type not in FREE)
+        first = next(moving, len(found))
+        return found[max((i + 1 for i, joint in enumerate(found[:first]) if joint.type in FREE), default=0) :]
 
     def _check_all(self) -> None:
         """Without a tip, the whole file is the arm."""
@@ -282,10 +324,9 @@ class UrdfTree:
         if not any(joint.moves for joint in chain):
             raise RobotFileError(self.file, "tip", tip, f"a link that joints move, such as {self.choices()}")
         for joint in chain:
-            if joint.type not in TYPES:
-                raise joint.refuse("type", joint.type, "one of " + ", ".join(TYPES))
             if joint.moves and joint.type not in MOVING:
-                raise joint.refuse("type", joint.type, "one of " + ", ".join((*MOVING, "fixed")))
+                behind = f", or an arm behind it: base {joint.child}" if joint.type in FREE else ""
+                raise joint.refuse("type", joint.type, "one of " + ", ".join((*MOVING, "fixed")) + behind)
             if joint.element.find("mimic") is not None:
                 raise joint.refuse("mimic", "a joint that follows another", "joints that move on their own")
 
@@ -301,18 +342,19 @@ class UrdfTree:
 
 def read_tree(text: bytes | str, file: str) -> UrdfTree:
     """The links and joints of a URDF; raises `RobotFileError`. See `UrdfTree` for what is left out."""
-    return tree_of(parse_xml(text, file), file)
+    root, _, causes = parse_mended(text, file)
+    notes = [f"The file has {cause.what}; right is {cause.expected}. It is read all the same." for cause in causes]
+    return tree_of(root, file, notes)
 
 
-def tree_of(root: Element, file: str) -> UrdfTree:
+def tree_of(root: Element, file: str, notes: Sequence[str] = ()) -> UrdfTree:
     """The links and joints below the root element of a URDF, or of an MJCF file; raises `RobotFileError`."""
     if root.tag == "mujoco":
-        return replace(tree_of(as_urdf(root, file), file), format="MJCF")
+        converted = as_urdf(root, file)
+        return replace(tree_of(converted.robot, file, notes), format="MJCF", ignored=tuple(converted.ignored))
     if root.tag != "robot":
         raise RobotFileError(file, "root element", root.tag, "<robot>, the root of a URDF, or <mujoco>")
-    if any(element.tag.startswith("xacro:") for element in root.iter()):
-        expected = "plain URDF; `xacro FILE.xacro > FILE.urdf`, or `kinboard import FILE.xacro`, expands it"
-        raise RobotFileError(file, "file", "xacro elements", expected)
+    notes = [*notes, *_leftover_xacro(root, file)]
     elements = root.findall("link")
     if len(elements) > MAX_LINKS:
         raise RobotFileError(file, "link", f"{len(elements)} links", f"at most {MAX_LINKS} links")
@@ -346,7 +388,25 @@ def tree_of(root: Element, file: str) -> UrdfTree:
         names.add(joint.name)
         children.setdefault(joint.child, joint.name)
         joints.append(joint)
-    return UrdfTree(file, root.get("name", ""), tuple(links), tuple(joints), root, tuple(unread))
+    return UrdfTree(
+        file, root.get("name", ""), tuple(links), tuple(joints), root, tuple(unread), notes=tuple(notes)
+    )
+
+
+def _leftover_xacro(root: Element, file: str) -> list[str]:
+    """A note about definitions of xacro that nothing in the file uses; what would add to the arm is refused."""
+    left = [element.tag for element in root.iter() if element.tag.startswith("xacro:")]
+    outside = [element for child in root if child.tag not in XACRO_DEFINITIONS for element in child.iter()]
+    values = (value for each in [root, *outside] for value in each.attrib.values())
+    used = next((value for value in values if "${" in value or "$(" in value), None)
+    other = next((each.tag for each in outside if each.tag.startswith("xacro:")), None)
+    if not left:
+        return []
+    if other is None and used is None:
+        names = ", ".join(f"<{tag}>" for tag in dict.fromkeys(left))
+        return [f"The file has elements of xacro that nothing in it uses ({names}): they are left out."]
+    expected = "plain URDF; `xacro FILE.xacro > FILE.urdf`, or `kinboard import FILE.xacro`, expands it"
+    raise RobotFileError(file, "file", f"xacro that is not expanded: {used or f'<{other}>'}", expected)
 
 
 def _joint(element: Element, file: str, links: Collection[str]) -> UrdfJoint:
@@ -357,7 +417,11 @@ def _joint(element: Element, file: str, links: Collection[str]) -> UrdfJoint:
         if child is None:
             raise RobotFileError(file, f"joint {name}: {tag}", "nothing", f'<{tag} link="…"/>')
         ends.append(_attribute(child, "link", file, f"joint {name}: {tag}"))
-    joint = UrdfJoint(file, element, name, element.get("type", ""), *ends)
+    given = element.get("type", "")
+    meant = given.strip().lower()
+    kind = meant if meant in TYPES else given
+    note = f"Joint {name} has the type {given}: it is read as {kind}." if kind != given else ""
+    joint = UrdfJoint(file, element, name, kind, *ends, note=note)
     for field, link in (("parent", joint.parent), ("child", joint.child)):
         if link not in links:
             raise joint.refuse(field, link, "the name of a link of this file")

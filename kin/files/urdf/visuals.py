@@ -11,7 +11,6 @@ import numpy as np
 from kin.errors import RobotFileError
 from kin.files.urdf.poses import poses_of
 from kin.files.urdf.tree import UrdfElement, UrdfTree, read_tree
-from kin.frames import matrix_of
 from kin.transforms import Array
 
 MAX_VISUALS = 300
@@ -105,7 +104,7 @@ def _visual(
     shape = shape_of(UrdfElement(fields.file, geometry, fields.name))
     if shape is None:
         return []
-    T = T_root_link @ np.array(matrix_of(*fields.origin()))
+    T = T_root_link @ np.array(fields.pose())
     material = fields.element.find("material")
     color = None if material is None else (_color(material, fields.file) or colors.get(material.get("name", "")))
     return [Visual(link, carrier, T, shape, color)]

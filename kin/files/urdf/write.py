@@ -15,6 +15,7 @@ from kin.robot import Joint, Robot
 from kin.transforms import Array
 
 _UNKNOWN = 0.0  # velocity and effort are required by URDF
+_URDF_1_2 = ("acceleration", "jerk")  # which older readers ignore
 
 
 def robot_to_urdf(robot: Robot | str) -> str:
@@ -85,7 +86,8 @@ def _joint(row: Joint, name: str, parent: str, child: str, T: Array) -> list[str
         elif row.kind == "prismatic":
             raise InputError(f"limits of {row.name}", None, "limits: URDF has no slide without them")
         effort, velocity = (_UNKNOWN if value is None else value for value in (row.effort, row.velocity))
-        lines.append(f'    <limit {limits}effort="{effort!r}" velocity="{velocity!r}"/>')
+        more = "".join(f' {key}="{value!r}"' for key in _URDF_1_2 if (value := getattr(row, key)) is not None)
+        lines.append(f'    <limit {limits}effort="{effort!r}" velocity="{velocity!r}"{more}/>')
     return [*lines, "  </joint>"]
 
 

@@ -13,6 +13,10 @@ MAX_DEPTH = 64
 MAX_ELEMENTS = 100_000
 
 
+class MalformedXmlError(RobotFileError):
+    """A text is no well-formed XML."""
+
+
 class TagPosition(NamedTuple):
     """Where an element is in a text.
 
@@ -73,7 +77,7 @@ def parse_xml(text: bytes | str, file: str, places: dict[Element, TagPosition] |
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        raise RobotFileError(file, "file", str(error), "well-formed XML") from None
+        raise MalformedXmlError(file, "file", str(error), "well-formed XML") from None
     except (LookupError, ValueError) as error:  # an unknown encoding
         if isinstance(error, RobotFileError):
             raise

@@ -280,7 +280,6 @@ def test_capsules_of_mjcf_are_those_of_the_arm():
         ('quat="1 0.2 0.3 0"', 'quat="0 0 0 0"', "body boom: quat"),
         ('name="roll" range="-3 3"', 'name="roll" type="ball"', "joint roll: type"),
         ('name="roll" range="-3 3"', 'name="roll" type="screw"', "joint roll: type"),
-        ('range="0 0.3"', 'range="0 0.3" limited="false"', "joint boom: limit"),
         ('range="0 0.3"', 'range="0.3 0"', "joint boom: limit"),
         ('<compiler angle="degree"/>', '<compiler eulerseq="abc"/>', "compiler eulerseq"),
         ('<compiler angle="degree"/>', '<compiler coordinate="global"/>', "compiler coordinate"),
@@ -299,13 +298,21 @@ def test_what_is_no_serial_arm_is_refused_with_its_place(old, new, field):
     assert caught.value.field == field
 
 
-def test_several_ends_are_offered():
-    text = RICH.format(compiler='angle="degree"').replace(
-        "</worldbody>", '<body name="cup"><freejoint/></body></worldbody>'
-    )
-    with pytest.raises(RobotFileError, match=r"tip: got .*tcp \(4 joints\)"):
-        kin.load_urdf(text)
-    assert kin.load_urdf(text, tip="tcp").n == 4
+def test_a_cup_on_the_table_is_no_end_of_the_arm_but_a_camera_on_a_pole_is():
+    text = RICH.format(compiler='angle="degree"')
+    cup = text.replace("</worldbody>", '<body name="cup"><freejoint/></body></worldbody>')
+    assert kin.load_urdf(cup) == kin.load_urdf(text)
+    pole = text.replace("</worldbody>", '<body name="pole"><joint/></body></worldbody>')
+    with pytest.raises(RobotFileError, match=r"tip: got .*tcp \(4 joints\), pole \(1 joint\)"):
+        kin.load_urdf(pole)
+    assert kin.load_urdf(pole, tip="tcp").n == 4
+
+
+def test_a_slide_may_be_unlimited():
+    text = RICH.format(compiler='angle="degree"').replace('range="0 0.3"', 'range="0 0.3" limited="false"')
+    robot, report = kin.read_urdf(text)
+    assert "Joint boom states no limits: it gets 0 to 1 m." in report.notes
+    assert (0.0, 1.0) in [joint.limits for joint in robot.joints]
 
 
 def test_deep_and_large_files_are_bounded():

@@ -13,12 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from kin.errors import InputError, RobotFileError
+from kin.files.urdf.causes import Cause, decoded
 from kin.files.urdf.doctor.bodies import MeshFiles, check_link
 from kin.files.urdf.doctor.findings import RANKS, Symptom, UrdfExamination, UrdfFinding
 from kin.files.urdf.doctor.joints import check_joint
 from kin.files.urdf.doctor.notes import FindingLog, cut
-from kin.files.urdf.doctor.source import Edit, SourceText, decoded
-from kin.files.urdf.doctor.tree import LISTED, check_elements, check_tree
+from kin.files.urdf.doctor.source import Edit, SourceText
+from kin.files.urdf.doctor.tree import LISTED, check_elements, check_root, check_tree
 from kin.files.urdf.read import UrdfRobot, read_urdf
 from kin.files.urdf.tree import UrdfTree, tree_of
 from kin.fk import fk
@@ -68,10 +69,12 @@ def examine_urdf(
     if not isinstance(source, str | Path):
         raise InputError("source", source, "the text of a URDF as str, or the Path of a file")
     file = file or (str(source) if isinstance(source, Path) else "URDF")
-    text = source if isinstance(source, str) else decoded(_content(source), file)
+    text, causes = (source, ()) if isinstance(source, str) else decoded(_content(source), file)
     look = partial(_examined, base=base, tip=tip, file=file, files=files)
-    first = look(text)
+    first = look(text, causes=causes)
     chosen = _chosen(first.found.findings, mends)
+    if chosen:  # no other mend is possible without these
+        chosen |= {i for i, each in enumerate(first.found.findings) if each.automatic and each.symptom == "file"}
     findings = tuple(replace(each, done=i in chosen) for i, each in enumerate(first.found.findings))
     found = replace(first.found, findings=findings)
     mended = _mended(first, look, None if mends is None else chosen)
@@ -139,16 +142,27 @@ class _Round(NamedTuple):
         return self.source.changed(edits) if self.source is not None and edits else None
 
 
-def _examined(text: str, base: str | None, tip: str | None, file: str, files: MeshFiles | None) -> _Round:
-    """One look at a text."""
+def _examined(
+    text: str,
+    base: str | None,
+    tip: str | None,
+    file: str,
+    files: MeshFiles | None,
+    causes: Sequence[Cause] = (),
+) -> _Round:
+    """One look at a text; `causes` are why it was read in another encoding than it should be."""
     try:
         source = SourceText(text, file)
         if source.root.tag == "mujoco":
-            raise RobotFileError(file, "root element", "mujoco", "<robot>: the doctor examines URDFs")
+            expected = "<robot>: the doctor examines URDFs; a MuJoCo file is imported, or checked by MuJoCo itself"
+            raise RobotFileError(file, "root element", "mujoco", expected)
         tree = tree_of(source.root, file)
     except RobotFileError as error:
         return _Round(UrdfExamination(file, (), (_unreadable(error),), None, str(error)))
     notes, refusal = FindingLog(source), ""
+    for cause in (*causes, *source.causes):
+        words, mend = f"The file has {cause.what}.", f"Right is {cause.expected}."
+        notes.add(None, "file", "file", "wrong", words, mend, source.unchanged(), line=cause.line)
     arms: dict[str, UrdfRobot | str] = {}
     several = tip is None and len(tree.tips) > 1 and not tree.unread
     for each in [each.link for each in tree.tips[:LISTED]] if several else [tip]:
@@ -161,6 +175,7 @@ def _examined(text: str, base: str | None, tip: str | None, file: str, files: Me
     if not known:
         refusal = str(next(iter(arms.values())))
     check_tree(notes, tree)
+    check_root(notes, tree.root)
     joints = {joint.name: joint.element for joint in tree.joints}
     for element in tree.root.findall("joint"):
         check_joint(notes, element, f"joint {element.get('name', '').strip()}", joints)

@@ -10,9 +10,12 @@ from xml.etree.ElementTree import Element
 from kin.files.numbers import LARGEST, number_of
 from kin.files.urdf.doctor.notes import FindingLog, cut, spelled
 from kin.files.urdf.doctor.source import Edit
-from kin.files.urdf.tree import MOVING, TYPES
+from kin.files.urdf.fields import ignored_of
+from kin.files.urdf.tree import MOVING, TYPES, UNIT, UNLIMITED
 from kin.units import general
 
+REQUIRED = ("velocity", "effort")
+PEAKS = (*REQUIRED, "acceleration", "deceleration", "jerk")
 TURN = 2.0 * math.pi
 DEGREE = math.pi / 180.0
 _MOST_TURNS = 2.0 * TURN + 0.01  # limits of a joint in radians are seldom beyond two turns
@@ -39,6 +42,9 @@ def check_joint(notes: FindingLog, joint: Element, place: str, known: Mapping[st
     origin = joint.find("origin")
     if origin is not None:
         check_origin(notes, origin, f"{place}: origin")
+    for each in ignored_of(joint):
+        words = each.words[0].upper() + each.words[1:]
+        notes.add(each.element, place, "element", "suspicious", f"{words}.", "Correct it, or leave it out.")
 
 
 def _check_type(notes: FindingLog, joint: Element, place: str) -> str:
@@ -63,27 +69,37 @@ def _check_limits(notes: FindingLog, joint: Element, place: str, kind: str) -> b
         return False
     if limit is None or not {"lower", "upper"} & set(limit.attrib):
         if kind == "prismatic":
-            words = "It slides without lower and upper limits, which URDF requires."
-            notes.add(joint, place, "limit", "wrong", words, "State them in metres.")
+            words = "It slides without lower and upper limits, which URDF requires; 0 to 1 m are assumed."
+            notes.add(joint, place, "limit", "suspicious", words, "State them in metres.")
         else:
             words = "It states no limits, which URDF requires of a revolute joint; −180° to 180° are assumed."
             notes.add(joint, place, "limit", "suspicious", words, 'Write type="continuous", which has none.', free)
         return False
-    if all(abs(number_of(limit.get(key, "0"))) >= LARGEST for key in ("lower", "upper")):
+    least, most = (number_of(limit.get(key, "0")) for key in ("lower", "upper"))
+    if least <= -UNLIMITED[kind] and most >= UNLIMITED[kind]:
         if kind == "revolute":
             words = "Limits of a million or more stand for none."
             notes.add(limit, place, "limit", "suspicious", words, 'Write type="continuous".', free)
+        else:
+            words = "Limits of kilometres both ways stand for none; 0 to 1 m are assumed."
+            notes.add(limit, place, "limit", "suspicious", words, "State them in metres.")
         return False
     found = [notes.numbers(limit, place, key) if key in limit.attrib else [0.0] for key in ("lower", "upper")]
     if found[0] is None or found[1] is None:
         return False
     lower, upper = found[0][0], found[1][0]
     shown = f"{general(lower)} to {general(upper)}"
+    if lower == upper == 0.0:
+        assumed = "0 to 1 m are" if kind == "prismatic" else "−180° to 180° are"
+        words = f"Both limits are 0, as exporters write where nothing was entered; {assumed} assumed."
+        mend = 'State them; if it cannot move, write type="fixed"'
+        mend += "." if kind == "prismatic" else ', and if it turns without end, type="continuous".'
+        notes.add(limit, place, "limit", "suspicious", words, mend)
+        return False
     if lower == upper:
         words = f"Both limits are {general(lower)}: it cannot move."
-        fix = (source.with_attribute(joint, "type", "fixed"),) if lower == 0.0 else ()
-        mend = 'Write type="fixed".' if fix else "Make it fixed, and its value a part of the origin."
-        notes.add(limit, place, "limit", "suspicious", words, mend, *fix)
+        mend = "State its limits, or make it fixed, and its value a part of the origin."
+        notes.add(limit, place, "limit", "wrong", words, mend)
         return False
     if lower > upper:
         low = source.with_attribute(limit, "lower", spelled(upper))
@@ -134,23 +150,26 @@ def _check_speeds(notes: FindingLog, joint: Element, place: str, turns: bool, in
     limit, source = joint.find("limit"), notes.source
     if limit is None:
         return
-    for key in ("velocity", "effort"):
+    for key in PEAKS:
         text = limit.get(key)
-        if text is None:
+        if text is None and key in REQUIRED:
             words = f"Its limit states no {key}, which URDF requires."
             edit = source.with_attribute(limit, key, "0")
             notes.add(limit, place, "limit", "suspicious", words, "Write 0 if it is not known.", edit)
-            continue
-        if abs(number_of(text)) >= LARGEST and not text.strip().startswith("-"):
+        if text is None or (abs(number_of(text)) >= LARGEST and not text.strip().startswith("-")):
             continue  # it stands for none
         values = notes.numbers(limit, place, key)
         if values is None:
             continue
         value = values[0]
-        if value < 0.0:
-            edit = source.with_attribute(limit, key, spelled(-value))
-            words = f"The largest {key} is {general(value)}, which is negative."
-            notes.add(limit, place, "limit", "wrong", words, f"Write {general(-value)}.", edit)
+        if value == -1.0:
+            words = f"Its {key} is -1, as some exporters write where it is not known."
+            mend = "Write 0, which stands for that in a URDF."
+            notes.add(limit, place, "limit", "suspicious", words, mend, source.with_attribute(limit, key, "0"))
+        elif value < 0.0:
+            words = f"Its largest {key} is {general(value)}, which is negative: it counts as not known."
+            mend = f"Write {general(-value)} if only the sign is wrong, and 0 if it is not known."
+            notes.add(limit, place, "limit", "suspicious", words, mend)
         elif key == "velocity" and turns and _FASTEST < value <= _MOST_DEGREES:
             words = f"It may turn at {general(value)} rad/s, {round(value / TURN)} turns in a second."
             mend = f"Write {general(value * DEGREE)} if degrees per second were meant, and 0 if it is not known."
@@ -187,6 +206,7 @@ def check_origin(notes: FindingLog, origin: Element, place: str) -> None:
     """Look at an origin: lengths in millimetres, angles in degrees, right angles with a few digits."""
     source = notes.source
     xyz, rpy = (notes.numbers(origin, place, key, 3) for key in ("xyz", "rpy"))
+    _check_quaternion(notes, origin, place)
     if xyz is not None and max(map(abs, xyz)) > _FARTHEST:
         words = f"Its xyz is {' '.join(general(value) for value in xyz)}, in metres: this looks like millimetres."
         metres = [value / 1000.0 for value in xyz]
@@ -216,6 +236,22 @@ def check_origin(notes: FindingLog, origin: Element, place: str) -> None:
         ]
         edit = source.with_attribute(origin, "rpy", " ".join(texts))
         notes.add(origin, place, "rounded", "suspicious", words, f"Write {' '.join(texts)}.", edit)
+
+
+def _check_quaternion(notes: FindingLog, origin: Element, place: str) -> None:
+    quaternion = notes.numbers(origin, place, "quat_xyzw", 4)
+    if quaternion is None:
+        return
+    length = math.hypot(*quaternion)
+    if "rpy" in origin.attrib:
+        words, mend = "It has both rpy and quat_xyzw, and only one can count.", "Leave out one of them."
+        notes.add(origin, place, "origin", "wrong", words, mend)
+    elif length == 0.0:
+        words, mend = "Its quaternion is zero, which is no rotation.", "Write 0 0 0 1 for none."
+        notes.add(origin, place, "origin", "wrong", words, mend)
+    elif abs(length - 1.0) > UNIT:
+        words = f"Its quaternion has the length {general(length, 3)}, not 1: one of its numbers is wrong."
+        notes.add(origin, place, "origin", "wrong", words, "Write the right one: x y z w.")
 
 
 def _off(angle: float) -> str:

@@ -28,9 +28,10 @@ class FindingLog:
         text: str,
         mend: str = "",
         *edits: Edit,
+        line: int | None = None,
     ) -> None:
-        """A finding; with `edits` it is mended by them."""
-        line = None if element is None else self.source.line(element)
+        """A finding; with `edits` it is mended by them. Its line is that of the element, if there is one."""
+        line = line if element is None else self.source.line(element)
         self.findings.append(UrdfFinding(line, cut(place), symptom, rank, text, mend, bool(edits)))
         self.edits.append(edits)
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import codecs
 import re
 from collections.abc import Iterable
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
-from kin.errors import RobotFileError
-from kin.files.urdf.xml import TagPosition, parse_xml
+from kin.files.urdf.causes import parse_mended, with_utf8
+from kin.files.urdf.xml import TagPosition
 
 _ATTRIBUTE = re.compile(rb"\s+([^\s=<>/]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 _TAG = re.compile(rb"<[^\s<>/]+")
-_DECLARED = re.compile(r"""(<\?xml\b[^>]*?\bencoding\s*=\s*)(["'])([\w.:-]+)\2""")
-_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 
 
 class Edit(NamedTuple):
@@ -35,12 +32,20 @@ class SourceText:
 
     Raises:
         RobotFileError: no well-formed XML, or beyond the limits of `parse_xml`.
+
+    Attributes:
+        root: the root element.
+        causes: why it was no well-formed XML, if only one thing can be meant; edits begin from the mended text.
     """
 
     def __init__(self, text: str, file: str) -> None:
-        self._bytes = text.encode("utf-8", "replace")
         self._places: dict[Element, TagPosition] = {}
-        self.root = parse_xml(text, file, self._places)
+        self.root, mended, self.causes = parse_mended(text, file, self._places)
+        self._bytes = (text if mended is None else mended).encode("utf-8", "replace")
+
+    def unchanged(self) -> Edit:
+        """The text as it is parsed, which mends the causes."""
+        return Edit(0, 0, b"")
 
     def line(self, element: Element) -> int:
         """The line of an element, from 1."""
@@ -89,18 +94,4 @@ class SourceText:
             parts += [self._bytes[at : edit.start], edit.new]
             at = edit.end
         text = b"".join([*parts, self._bytes[at:]]).decode("utf-8")
-        return _DECLARED.sub(r'\1"utf-8"', text, count=1)
-
-
-def decoded(content: bytes, file: str) -> str:
-    """The text of a file in the encoding that it declares; raises `RobotFileError`."""
-    encoding = next((name for mark, name in _MARKS if content.startswith(mark)), "")
-    if not encoding:
-        declared = _DECLARED.search(content[:200].decode("ascii", "replace"))
-        encoding = declared[3] if declared else "utf-8"
-    try:
-        return content.decode(encoding)
-    except (LookupError, UnicodeError) as error:
-        raise RobotFileError(
-            file, "file", str(error), "XML in UTF-8, or in the encoding that it declares"
-        ) from None
+        return with_utf8(text)

@@ -8,6 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 from kin.files.names import unused
 from kin.files.urdf.doctor.notes import FindingLog, cut
+from kin.files.urdf.fields import ELEMENTS, ignored_of
 from kin.files.urdf.tree import Unread, UrdfTree
 
 LISTED = 6  # names in a sentence
@@ -22,15 +23,15 @@ _UNREAD = {
     ("link", "contact"): "friction, which kinematics does not need",
     ("link", "verbose"): "nothing but words",
     ("link", "self_collision_checking"): "an old way of bodies for collisions",
+    ("link", "sensor"): "sensors, which kinematics does not need",
     ("joint", "dynamics"): "friction and damping, which kinematics does not need",
     ("joint", "safety_controller"): "limits of a controller; those in <limit> count",
     ("joint", "calibration"): "where a joint finds its reference",
     ("joint", "hardwareInterface"): "for the controllers of ROS",
 }
 _READ = {
-    "robot": {"link", "joint", "material"},
-    "link": {"visual", "collision"},
-    "joint": {"parent", "child", "origin", "axis", "limit", "mimic"},
+    "robot": {"link", "joint", "material", "kinboard"},
+    **{tag: {name for name, use in ELEMENTS[tag].items() if use == "read"} for tag in ("link", "joint")},
 }
 
 
@@ -109,7 +110,8 @@ def check_elements(notes: FindingLog, root: Element) -> None:
     found: dict[tuple[str, str], list[Element]] = {}
     for parent in [root, *root.findall("link"), *root.findall("joint")]:
         for child in parent:
-            if child.tag not in _READ[parent.tag]:
+            named = parent.tag == "joint" and child.tag not in ELEMENTS["joint"]  # as a finding of the joint
+            if child.tag not in _READ[parent.tag] and not named:
                 found.setdefault((parent.tag, child.tag), []).append(child)
     for (above, tag), several in found.items():
         many = f"<{cut(tag)}>"
@@ -117,6 +119,13 @@ def check_elements(notes: FindingLog, root: Element) -> None:
             many = f"{len(several)} {many}" if above == "robot" else f"{len(several)} elements {many} of {above}s"
         why = _UNREAD.get((above, tag), "URDF does not define it")
         notes.add(several[0], above, "element", "left out", f"{many}: {why}.")
+
+
+def check_root(notes: FindingLog, root: Element) -> None:
+    """Look at the attributes of the whole file."""
+    for each in ignored_of(root):
+        words = each.words[0].upper() + each.words[1:]
+        notes.add(root, "robot", "element", "suspicious", f"{words}.", "Correct it, or leave it out.")
 
 
 def _listed(names: list[str]) -> str:

@@ -1,0 +1,217 @@
+"""Files as people brought them: one arm of three joints, each with one thing that makers and exporters do."""
+
+from __future__ import annotations
+
+import re
+import time
+from pathlib import Path
+from xml.etree.ElementTree import fromstring, tostring
+
+import pytest
+
+import kin
+from kin import RobotFileError
+from kin.files.urdf.causes import cause_of
+from kin.files.urdf.fields import ATTRIBUTES
+
+FILES = Path(__file__).parents[2] / "data" / "urdf" / "reports"
+OK = (FILES / "ok.urdf").read_text(encoding="utf-8")
+Q = [0.3, 0.5, 0.1]
+TOOL = [0.514727, 0.159224, 0.060287]
+
+# Each file of the same arm, and the note of its import.
+READ = {
+    "ok": "",
+    "quat_v11": "",
+    "xacro_property": "elements of xacro that nothing in it uses (<xacro:property>)",
+    "comment_first": "<?xml …?> in line 2",
+    "blank_first": "<?xml …?> in line 2",
+    "amp": "an ampersand in line 2",
+    "latin1_undeclared": "no UTF-8",
+    "vel_neg": "Joint j1 has velocity -1: it is read as unknown.",
+    "lower_eq_upper": "Joint j2 has limits that are both zero, which stand for none: it gets −180° to 180°.",
+    "floating_root": "Joint fb is floating: the arm begins behind it, at link base_link.",
+    "planar_root": "Joint fb is planar: the arm begins behind it, at link base_link.",
+    "type_case": "Joint j1 has the type Revolute: it is read as revolute.",
+}
+
+
+@pytest.mark.parametrize(("name", "note"), READ.items())
+def test_what_has_one_meaning_is_read(name, note):
+    robot, report = kin.read_urdf(FILES / f"{name}.urdf")
+    assert report.joints == ("j1", "j2", "j3")
+    assert kin.fk(robot, Q)[:3, 3] == pytest.approx(TOOL, abs=1e-6)
+    assert robot.joints[0].velocity == (None if name == "vel_neg" else 1.0)
+    assert note in " ".join(report.notes)
+    assert bool(note) == bool(report.notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("merge", "a conflict marker of Git, <<<<<<<, in line 1"), ("lfs", "a pointer of Git LFS")],
+)
+def test_what_is_no_file_of_an_arm_is_named(name, words):
+    path = FILES / f"{name}.urdf"
+    for source in (path, path.read_text(encoding="utf-8")):
+        with pytest.raises(RobotFileError, match=words):
+            kin.read_urdf(source)
+    assert words in kin.examine_urdf(path).findings[0].text
+
+
+@pytest.mark.parametrize("name", ["comment_first", "blank_first", "amp", "latin1_undeclared", "type_case"])
+def test_the_doctor_mends_what_has_one_meaning(name):
+    found = kin.examine_urdf(FILES / f"{name}.urdf")
+    assert found.count("wrong") == (2 if name == "type_case" else 1)
+    assert all(each.automatic and each.line for each in found.findings if each.rank == "wrong")
+    again = kin.examine_urdf(found.mended)
+    assert again.count("wrong") == again.count("suspicious") == 0
+    assert found.moved == 0.0
+    assert kin.examine_urdf(FILES / f"{name}.urdf", mends=[]).mended is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('lower="-2" upper="2"', 'lower="0" upper="0"'),
+        ('velocity="1"/>', 'velocity="-3"/>'),
+        ('lower="0" upper="0.2"', ""),
+        ('lower="0" upper="0.2"', 'lower="-999999" upper="999999"'),
+    ],
+)
+def test_the_doctor_asks_where_two_things_may_be_meant(old, new):
+    assert old in OK
+    found = kin.examine_urdf(OK.replace(old, new, 1))
+    suspicious = [each for each in found.findings if each.rank == "suspicious"]
+    assert [each.automatic for each in suspicious] == [False]
+    assert suspicious[0].mend
+    assert found.mended is None
+    assert found.arm.robot.n == 3
+
+
+def test_a_speed_that_is_not_known_stays_unknown_when_it_is_mended():
+    found = kin.examine_urdf(FILES / "vel_neg.urdf")
+    assert 'velocity="0"' in found.mended
+    assert found.mended_arm.robot.joints[0].velocity is None
+
+
+def test_a_slide_without_limits_is_read():
+    robot, report = kin.read_urdf(FILES / "slide.urdf")
+    assert kin.fk(robot, [10.0])[0, 3] == pytest.approx(20.0)
+    assert report.notes == ("Joint m1 states no limits: it gets 0 to 1 m.",)
+    huge = OK.replace('lower="0" upper="0.2"', 'lower="-999999" upper="999999"')
+    assert kin.read_urdf(huge).report.notes == (
+        "Joint j3 has limits of 10000 m or more both ways, which stand for none: it gets 0 to 1 m.",
+    )
+
+
+def test_acceleration_and_jerk_are_kept():
+    limit = 'velocity="1" acceleration="2" deceleration="3" jerk="5"/>'
+    robot, report = kin.read_urdf(OK.replace('velocity="1"/>', limit, 1))
+    assert (robot.joints[0].acceleration, robot.joints[0].jerk) == (2.0, 5.0)
+    assert report.notes == ("Joint j1 has acceleration 2 and deceleration 3: the smaller counts.",)
+    again = kin.load_urdf(kin.robot_to_urdf(robot))
+    assert [(j.acceleration, j.jerk) for j in again.joints] == [(j.acceleration, j.jerk) for j in robot.joints]
+    limits = kin.motion_limits(robot)
+    assert (limits.acceleration[0], limits.jerk[0]) == (2.0, 5.0)
+    assert limits.assumed[0] == ()
+
+
+# URDF 1.0 to 1.2, https://wiki.ros.org/urdf/XML and the schema of urdfdom.
+URDF_1_2 = {
+    "robot": "name version",
+    "link": "name type",
+    "joint": "name type",
+    "parent": "link",
+    "child": "link",
+    "origin": "xyz rpy quat_xyzw",
+    "axis": "xyz",
+    "limit": "lower upper effort velocity acceleration deceleration jerk",
+    "mimic": "joint multiplier offset",
+    "dynamics": "damping friction",
+    "calibration": "rising falling reference_position",
+    "safety_controller": "soft_lower_limit soft_upper_limit k_position k_velocity",
+}
+BESIDE = {"link type", "dynamics damping", "dynamics friction"}
+BESIDE |= {f"calibration {key}" for key in URDF_1_2["calibration"].split()}
+BESIDE |= {f"safety_controller {key}" for key in URDF_1_2["safety_controller"].split()}
+
+
+@pytest.mark.parametrize(("tag", "key"), [(tag, key) for tag, keys in URDF_1_2.items() for key in keys.split()])
+def test_each_attribute_of_urdf_is_read_or_beside_the_geometry(tag, key):
+    """What is read changes the arm, its names, or is refused if it cannot be a value of it."""
+    assert ATTRIBUTES[tag][key] == ("beside" if f"{tag} {key}" in BESIDE else "read")
+    if f"{tag} {key}" in BESIDE:
+        return
+    root = fromstring(OK)
+    joint = root.findall("joint")[1]
+    element = root if tag == "robot" else joint if tag == "joint" else next(iter(root)) if tag == "link" else None
+    if element is None:
+        element = joint.find(tag)
+    if element is None:
+        element = joint.makeelement(tag, {"joint": "j1"})
+        joint.append(element)
+    element.attrib.pop("rpy", None)
+    element.set(key, "?")
+    written = tostring(root, encoding="unicode")
+    try:
+        changed = kin.read_urdf(written)
+    except RobotFileError:
+        return
+    was = kin.read_urdf(OK)
+    assert (changed.robot.name, changed.report.joints, changed.report.notes) != (
+        was.robot.name,
+        was.report.joints,
+        was.report.notes,
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('xyz="0.1 0 0" rpy=', 'xyz="0.1 0 0" RPY=', "Joint j2: RPY of <origin> is not read, "),
+        ('<axis xyz="0 0 1"/><limit lower="-2"', '<axis rpy="0 0 1"/><limit lower="-2"', "rpy of <axis>"),
+        ('<limit lower="-2"', '<limit soft="1" lower="-2"', "Joint j2: soft of <limit>"),
+        ('<child link="l2"/>', '<child link="l2"/><orgin xyz="0 0 1"/>', "<orgin> is not read, .*; origin may be"),
+        ('<child link="l2"/>', '<child link="l2"/><axis xyz="1 0 0"/>', "of 2 elements <axis> only the first"),
+        ('<child link="l2"/>', '<child link="l2"><origin xyz="0 0 1"/></child>', "<origin> in <child>"),
+        ('<link name="l2"/>', '<link name="l2"><origin xyz="0 0 1"/></link>', "Link l2: <origin> is not read"),
+        ('<link name="l2"/>', '<link name="l2" scale="2"/>', "Link l2: scale of <link>"),
+        ('<robot name="r"', '<robot name="r" version="2.0"', "The file: version 2.0 is read as 1.2"),
+        ('<robot name="r"', '<robot name="r" unit="mm"', "The file: unit of <robot>"),
+    ],
+)
+def test_what_is_not_read_is_named(old, new, words):
+    assert old in OK
+    text = OK.replace(old, new, 1)
+    (note,) = kin.read_urdf(text).report.notes
+    assert re.search(words, note), note
+    if "<link" not in new:
+        suspicious = [each for each in kin.examine_urdf(text).findings if each.rank == "suspicious"]
+        assert any(each.symptom == "element" for each in suspicious)
+
+
+def test_many_notes_about_what_is_not_read_are_bounded():
+    extra = "".join(f' x{k}="1"' for k in range(50))
+    notes = kin.read_urdf(OK.replace('<robot name="r"', f'<robot name="r"{extra}')).report.notes
+    assert (len(notes), notes[-1]) == (21, "30 more elements and attributes are not read.")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        OK.replace("<robot", '<xacro:property name="a" value="1"/><robot'),
+        OK.replace('<link name="l1"/>', '<link name="${p}l1"/><xacro:property name="p" value=""/>'),
+        OK.replace('<link name="l1"/>', '<link name="l1"/><xacro:arm prefix=""/>'),
+        OK.replace('<link name="l1"/>', '<link name="l1"/><xacro:include filename="arm.xacro"/>'),
+    ],
+)
+def test_xacro_that_adds_to_the_arm_is_refused(text):
+    with pytest.raises(RobotFileError, match=r"xacro|well-formed"):
+        kin.read_urdf(text)
+
+
+@pytest.mark.parametrize("part", ["<!--", "<![CDATA[", "<?", "<?xml ", "&", "&a", "<" * 7 + " "])
+def test_a_cause_is_found_in_linear_time(part):
+    start = time.process_time()
+    cause_of(part * (900_000 // len(part)))
+    assert time.process_time() - start < 3.0
