@@ -90,13 +90,13 @@ def read_toml(text: str | bytes, limits: Limits) -> dict[str, Any]:
     """The table of a TOML text.
 
     Args:
-        text: a text, or its bytes in UTF-8.
+        text: a text, or its bytes in UTF-8; a byte order mark is skipped.
         limits: what it may have.
 
     Raises:
         TextError: it exceeds a limit, or is no TOML.
     """
-    given = _decoded(text, limits, "TOML")
+    given = _decoded(text, limits, "TOML").removeprefix("\ufeff")
     bare = _TOML_STRING.sub("_", given)
     _measure(bare, ",=[{", limits)
     if re.search(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{limits.depth}}}", bare):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from urllib.parse import unquote
@@ -98,11 +99,26 @@ class MeshFilesBeside:
 
     def elsewhere(self, path: str) -> str | None:
         """A file of the same name in the folder of the URDF or of its package, as a path from the URDF."""
-        name, folder = unquote(path).rpartition("/")[2], self.urdf.resolve().parent
-        for root in (folder, folder.parent):
-            found = [
-                file for file in islice(root.rglob("*"), MOST_SEARCHED) if file.name == name and file.is_file()
-            ]
-            if len(found) == 1:
-                return os.path.relpath(found[0], folder).replace(os.sep, "/")
+        name = unquote(path).rpartition("/")[2]
+        for places in (self._beside, self._above):
+            if len(found := places.get(name, [])) == 1:
+                file = Path(found[0]) / name
+                return os.path.relpath(file, self.urdf.resolve().parent).replace(os.sep, "/")
         return None
+
+    @cached_property
+    def _beside(self) -> dict[str, list[str]]:
+        return _places(self.urdf.resolve().parent)
+
+    @cached_property
+    def _above(self) -> dict[str, list[str]]:
+        return _places(self.urdf.resolve().parent.parent)
+
+
+def _places(root: Path) -> dict[str, list[str]]:
+    """The folders in which files of each name are, of the first `MOST_SEARCHED` files and folders."""
+    entries = ((folder, name) for folder, _, names in os.walk(root) for name in ("", *names))
+    found: dict[str, list[str]] = {}
+    for folder, name in islice(entries, MOST_SEARCHED):
+        found.setdefault(name, []).append(folder)
+    return found

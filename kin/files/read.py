@@ -32,6 +32,9 @@ from kin.robot import (
     Robot,
 )
 from kin.transforms import as_transform
+from kin.typed import ReadError, cut, read, valid
+from kin.units import ANGLES as ANGLE_UNITS
+from kin.units import LENGTH_UNITS
 
 ANGLES = {"deg": math.pi / 180, "rad": 1.0}
 MAX_ROWS, MAX_CAPSULES, MAX_MOTORS = 32, 64, 64
@@ -433,11 +436,25 @@ class Reader:
         """A number in the unit of the file, or a text with a unit of its own such as ``"0.13 m"``."""
         if isinstance(value, str):
             found = _QUANTITY.fullmatch(value) if len(value) <= _LONGEST else None
-            if found is None or found[2] not in units or (found[3] or "").translate(_POWERS) not in ("", per):
-                example = f'"1.5 {next(iter(units))}{per}"'
-                raise self.refuse(field, value, f"a finite number, or a text with its unit such as {example}")
-            value, scale = float(found[1]), units[found[2]]
+            if found is not None and found[2] in units and (found[3] or "").translate(_POWERS) in ("", per):
+                value, scale = float(found[1]), units[found[2]]
+            else:
+                value, scale = self.expression(field, value, "rad" in units, per), 1.0
         return self.number(field, value, scale, " radians" if "rad" in units else " metres")
+
+    def expression(self, field: str, text: str, turns: bool, per: str) -> float:
+        """A text such as ``"-pi/2"`` or ``"2*400"`` in radians or metres, by default in the unit of the file."""
+        names = ANGLES if turns else LENGTHS
+        scale = self.angle if turns else self.length
+        unit = (ANGLE_UNITS if turns else LENGTH_UNITS)[next(name for name in names if names[name] == scale)]
+        try:
+            if "/s" in text and not text.translate(_POWERS).endswith(per or " "):
+                raise ReadError(f"“{cut(text)}” has another unit of time")
+            return read(text.translate(_POWERS).removesuffix(per) if per else text, unit)
+        except ReadError as error:
+            example = f'"1.5 {next(iter(names))}{per}", or {valid(unit)}'
+            expected = f"a finite number, a text with its unit such as {example} ({error.reason})"
+            raise self.refuse(field, text, expected) from None
 
     def number(self, field: str, value: object, scale: float = 1.0, unit: str = "") -> float:
         """A number times the scale of its unit."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -30,6 +31,7 @@ Form = Literal["csv", "npy", "ndjson"]
 AT_ONCE = 4096  # rows of one piece
 LONGEST_LINE = 1 << 20
 _CHUNK = 1 << 16
+_UNIT = 0.1  # by how much a quaternion's length may differ from 1: further away, one of its numbers is wrong
 _NUMPY = b"\x93NUMPY"
 _EXAMPLE = '{"position": [0.4, 0.1, 0.3], "wxyz": [0, 1, 0, 0]}'
 _GIVEN = ("position", "wxyz", "approach", "matrix", "frame")
@@ -174,11 +176,13 @@ class Source:
             yield from self._parquet(names)
             return
         columns: Columns | None = None
-        done = 0
+        done, separator = 0, ","
         for _, lines in self._lines():
-            rows = list(csv.reader(lines))
             if columns is None:
-                columns = Columns.of(rows[0], names, self.field)
+                separator = Columns.separator(lines[0])
+            rows = list(csv.reader(lines, delimiter=separator))
+            if columns is None:
+                columns = Columns.of(rows[0], names, self.field, "." if separator == "," else ",")
                 rows = rows[columns.has_heading :]
             some = [columns.numbers(row, f"{self.field}[{done + i}]") for i, row in enumerate(rows)]
             if some:
@@ -249,6 +253,11 @@ def opened_source(path: str, field: str) -> Iterator[Source]:
 
 def pose_of(numbers: list[float], field: str) -> Array:
     """Seven numbers of a row as a pose ``(4, 4)``."""
+    length = math.hypot(*numbers[3:])
+    if abs(length - 1.0) > _UNIT:
+        what = "is zero" if length == 0.0 else f"has the length {length:.3g}"
+        expected = f"qw, qx, qy, qz of length 1: this quaternion {what}"
+        raise InputError(field, numbers, expected + ("; 1, 0, 0, 0 is no rotation" if length == 0.0 else ""))
     try:
         return pose_from_position_wxyz(numbers[:3], numbers[3:])
     except InputError:

@@ -16,6 +16,7 @@ from kin import Robot, jacobian
 from kin.axes import Pair, generic_q, pairs, parallel_groups, size, spherical_groups
 from kin.collision.bodies import bodies_of
 from kin.files.home import candidates, margins
+from kin.files.units import suspicious_angles
 from kin.solvers import closed_form_of, family_of
 
 NEAR_SINGULAR, SINGULAR = 0.1, 1e-6  # of the best margin among the candidates for a home pose
@@ -158,6 +159,7 @@ def _odd_table(robot: Robot, taken: bool) -> list[str]:
         found.append(f'The id "{robot.id}" is that of a built-in robot; robot files in a folder need another id.')
     if not SHORT <= robot.reach <= LONG:
         found.append(f"The arm reaches {robot.reach:g} m: check units.length.")
+    found += [f"{words[0].upper()}{words[1:]}" for words in suspicious_angles(robot)]
     for i, joint in enumerate(robot.joints):
         if joint.kind == "revolute" and joint.limits and joint.limits[1] - joint.limits[0] > 4 * math.pi + 1e-9:
             span = math.degrees(joint.limits[1] - joint.limits[0])

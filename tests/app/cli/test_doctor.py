@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import struct
 from pathlib import Path
@@ -128,3 +129,34 @@ def test_findings_are_mended_by_their_numbers(sick: Path, tmp_path: Path, capsys
     assert mended.read_text() == text.replace('xyz="0 1.5 0"', 'xyz="0.0 1.0 0.0"')
     assert main(["doctor", str(sick), "--tip", "tool0", "--mend", "77"]) == 2
     assert "--mend: got 77, expected numbers of the report:" in capsys.readouterr().err
+
+
+def test_missing_meshes_cost_one_look_per_folder(tmp_path: Path, monkeypatch, capsys) -> None:
+    """A hundred meshes beside many files: each folder is read once for each of the two places."""
+    urdf, meshes = tmp_path / "arm" / "urdf" / "arm.urdf", 100
+    urdf.parent.mkdir(parents=True)
+    for folder in range(5):
+        there = tmp_path / "arm" / f"other{folder}"
+        there.mkdir()
+        for k in range(40):
+            (there / f"{folder}-{k}.stl").touch()
+    links = "".join(
+        f'<link name="l{k}"><visual><geometry><mesh filename="package://arm/lost/{k // 40}-{k % 40}.stl"/>'
+        "</geometry></visual></link>"
+        for k in range(meshes)
+    )
+    joint = '<joint name="j" type="continuous"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>'
+    urdf.write_text(f'<robot name="r">{links}{joint}</robot>', encoding="utf-8")
+    read: list[str] = []
+    scandir = os.scandir
+
+    def counted(path):
+        read.append(str(path))
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", counted)
+    main(["doctor", str(urdf), "--tip", "l1", "--json"])
+    assert len(read) == len(set(read)) + 1 <= 8  # the folder of the URDF is also below the one above it
+    mends = [each["mend"] for each in json.loads(capsys.readouterr().out)["findings"] if each["symptom"] == "mesh"]
+    assert mends.count("Write “../other2/2-3.stl”: there it is.") == 1
+    assert len(mends) == meshes

@@ -198,6 +198,17 @@ def test_the_form_of_a_file_is_seen_from_its_content_and_written_when_complete(r
     assert sorted(path.name for path in tmp_path.iterdir()) == ["in.txt", "out.npy"]
 
 
+@pytest.mark.parametrize("mark", [";", "\t"])
+@pytest.mark.parametrize("heading", [True, False])
+def test_a_table_with_decimal_commas_is_the_table_with_points(run, mark, heading):
+    """As spreadsheets write it in most of Europe."""
+    names, row = "x,y,z,qw,qx,qy,qz\n" * heading, "0.4,0.1,0.3,0,1,0,0\n"
+    expected = run("ik", "ur5", "--targets", "-", given=names + row)
+    given = names.replace(",", mark) + row.replace(",", mark).replace(".", ",")
+    assert run("ik", "ur5", "--targets", "-", given=given) == expected
+    assert expected[0] == 0
+
+
 def test_more_rows_than_one_piece_are_answered_in_order(run, monkeypatch):
     monkeypatch.setattr(source, "AT_ONCE", 4)
     monkeypatch.setattr(source, "_CHUNK", 100)
@@ -229,7 +240,10 @@ def test_each_line_is_answered_before_the_next_one_is_sent():
         ("ik", "x,y,z,qw,qx,qy,qz\n", "at least one row"),
         ("ik", "a,b\n1,2\n", "a heading with the columns x, y, z, qw, qx, qy, qz"),
         ("ik", "0.4,0.1,0.3,0,1,0,0\n0.4,0.1,0.3,0,1,0,b\n", r"--targets\[1\]"),
-        ("ik", "0.4,0.1,0.3,0,0,0,0\n", r"--targets\[0\].*seven numbers"),
+        ("ik", "0.4,0.1,0.3,0,0,0,0\n", r"--targets\[0\].*this quaternion is zero; 1, 0, 0, 0 is no rotation"),
+        ("ik", "0.4,0.1,0.3,0,0.24,0,0\n", r"--targets\[0\].*this quaternion has the length 0.24"),
+        ("ik", "0,4,0,1,0,3,0,0,1,0,0,0,0,0\n", "semicolons separate the numbers"),
+        ("ik", "x;y;z;qw;qx;qy;qz\n0,4;0.1;0,3;0;1;0;b\n", r"--targets\[0\]"),
         ("ik", "0.4,0.1,nan,0,1,0,0\n", r"--targets\[0\].*seven numbers"),
         ("ik", lines([TARGETS[0], {"position": [1, 2]}]), r"--targets\[1\]\.position"),
         ("ik", lines([TARGETS[0], [1, 2]]), r"--targets\[1\]: .*a target such as"),
