@@ -11,6 +11,7 @@ arrive, and a body with too many is refused before it is parsed.
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections import Counter
 from collections.abc import Callable, Coroutine
 from email.message import Message
@@ -218,9 +219,9 @@ def versioned(tag: str) -> APIRouter:
 
 
 def parsed(body: bytes) -> Any:
-    """The value of a JSON text; raises 400 naming the position of a syntax error."""
+    """The value of a JSON text; raises 400 naming the position of a syntax error. A byte order mark is skipped."""
     try:
-        return from_json(body)
+        return from_json(body.removeprefix(BOM_UTF8))
     except ValueError as error:
         hint = "Check quotes, commas and brackets there; JSON keys need double quotes."
         raise ProblemError(400, "malformed-json", f"The body is not valid JSON: {error}.", hint) from None

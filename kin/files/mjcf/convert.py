@@ -17,6 +17,7 @@ import numpy as np
 
 from kin.axes import frame_of, inverse
 from kin.errors import RobotFileError
+from kin.files.mjcf.fields import ignored_of
 from kin.files.names import unused
 from kin.files.numbers import number_of
 from kin.files.write import rpy_of
@@ -61,6 +62,8 @@ class _Converter:
                 words = "one file without it: MuJoCo writes one with mj_saveLastXML"
                 raise self._refuse(f"<{element.tag}>", element.get("file", "") or element.tag, words)
         compilers = root.findall("compiler")
+        for compiler in compilers:
+            self._note("", "The file", compiler)
         settings = {key: value for compiler in compilers for key, value in compiler.attrib.items()}
         if settings.get("coordinate", "local") != "local":
             raise self._refuse("compiler coordinate", settings["coordinate"], "local coordinates")
@@ -84,6 +87,10 @@ class _Converter:
         stated = {"mounting": found.get(MOUNTING), "floor": found.get(FLOOR)}
         if any(value is not None for value in stated.values()):
             SubElement(self.robot, "kinboard", {key: value for key, value in stated.items() if value is not None})
+
+    def _note(self, link: str, what: str, element: Element) -> None:
+        """Keep what is not read of an element on the way to a link."""
+        self.ignored += [(link, f"{what}: {words}.") for words in ignored_of(element)]
 
     def _refuse(self, field: str, value: object, expected: str) -> RobotFileError:
         return RobotFileError(self._file, field, value, expected)
@@ -147,6 +154,15 @@ class _Converter:
         T[:3, 3] = p
         return T
 
+    def _site(self, values: dict[str, str], where: str) -> Array:
+        """The frame of a site: one from a point to another is in the middle, its z axis towards the first."""
+        if "fromto" not in values or values.get("type", "sphere") == "sphere":
+            return self._pose(values, where)
+        ends = np.array(self._numbers(values, "fromto", where, 6, "")).reshape(2, 3)
+        T = _turned_to(self._unit(ends[0] - ends[1], f"{where}: fromto")).copy()
+        T[:3, 3] = ends.mean(axis=0)
+        return T
+
     def _unit(self, values: Sequence[float] | Array, field: str) -> Array:
         vector = np.array(values)
         length = float(np.linalg.norm(vector))
@@ -186,7 +202,7 @@ class _Converter:
             elif child.tag == "site" and child.get("name"):
                 values = self._values(child, inherited)
                 name = self._link(child.get("name", ""))
-                self._fixed(link, name, T @ self._pose(values, f"site {name}"))
+                self._fixed(link, name, T @ self._site(values, f"site {name}"))
             elif child.tag == "geom":
                 self._geom(self._values(child, inherited), link, T)
 
@@ -202,6 +218,7 @@ class _Converter:
                 joint, own, link, T, inherited, f"{name} {k + 1}" if not last else f"{own} of {name}"
             )
         here = self._link(name)
+        self._note(here, f"Body {name}", body)
         self._fixed(link, here, T)
         self._body(body, here, np.eye(4), inherited)
 
@@ -222,10 +239,12 @@ class _Converter:
         limits = self._limits(values, where, unit)
         urdf = "continuous" if kind == "hinge" and limits is None else _KINDS[kind]
         link = self._link(child)
+        self._note(link, f"Joint {name}", element)
         joint = self._add_joint(name, urdf, parent, link, T @ at)
         SubElement(joint, "axis", xyz=_spelled(axis))
         force = [number_of(part) for part in values.get("actuatorfrcrange", "").split()]
-        effort = max(map(abs, force)) if len(force) == 2 and all(map(math.isfinite, force)) else 0.0
+        limited = values.get("actuatorfrclimited", "auto") != "false" and len(force) == 2
+        effort = max(map(abs, force)) if limited and all(map(math.isfinite, force)) else 0.0
         limit = SubElement(joint, "limit", effort=repr(effort), velocity="0")
         if limits is not None:
             limit.set("lower", repr(limits[0]))

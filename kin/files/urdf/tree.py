@@ -421,8 +421,7 @@ def _joint(element: Element, file: str, links: Collection[str]) -> UrdfJoint:
     meant = given.strip().lower()
     kind = meant if meant in TYPES else given
     note = f"Joint {name} has the type {given}: it is read as {kind}." if kind != given else ""
-    parent, child = ends
-    joint = UrdfJoint(file, element, name, kind, parent, child, note)
+    joint = UrdfJoint(file, element, name, kind, ends[0], ends[1], note)
     for field, link in (("parent", joint.parent), ("child", joint.child)):
         if link not in links:
             raise joint.refuse(field, link, "the name of a link of this file")

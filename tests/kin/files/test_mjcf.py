@@ -322,3 +322,41 @@ def test_deep_and_large_files_are_bounded():
     many = "<mujoco><worldbody>" + "<body><joint/></body>" * 6000 + "</worldbody></mujoco>"
     with pytest.raises(RobotFileError, match="at most 5000 links"):
         kin.load_urdf(many)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('name="roll" range', 'name="roll" rnage="1 2" range', "Joint roll: rnage of <joint> is not read"),
+        ('<body name="foot"', '<body mocap="true" name="foot"', "Body foot: mocap of <body> is not read: a body"),
+        ('<body name="foot"', '<body rpy="0 0 1" name="foot"', "Body foot: rpy of <body> is not read"),
+        ('<compiler angle="degree"', '<compiler unit="mm" angle="degree"', "The file: unit of <compiler>"),
+    ],
+)
+def test_what_is_not_read_of_the_arm_is_named(old, new, words):
+    text = RICH.format(compiler='angle="degree"')
+    assert old in text
+    robot, report = kin.read_urdf(text.replace(old, new, 1))
+    assert sum(words in note for note in report.notes) == 1
+    assert np.allclose(kin.fk(robot, robot.q_home), kin.fk(kin.load_urdf(text), robot.q_home), atol=1e-12)
+
+
+def test_a_range_of_zeros_is_none_and_an_unlimited_force_is_unknown():
+    text = RICH.format(compiler='angle="degree"').replace(
+        'name="roll" range="-3 3"', 'name="roll" range="0 0" actuatorfrcrange="-5 5" actuatorfrclimited="false"'
+    )
+    joint = next(each for each in kin.load_urdf(text).joints if each.name == "roll")
+    assert (joint.limits, joint.effort) == (None, None)
+
+
+def test_a_site_from_a_point_to_another_is_where_mujoco_has_it():
+    text = (
+        '<mujoco><worldbody><body name="b"><joint name="a"/><geom size="1"/>'
+        '<site name="s" type="capsule" size=".1" fromto="0.1 0.2 0.3 1 0 0.5"/></body></worldbody></mujoco>'
+    )
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    T = kin.fk(kin.load_urdf(text, tip="s"), [0.0])
+    assert np.allclose(T[:3, 3], data.site_xpos[0], atol=1e-12)
+    assert np.allclose(T[:3, :3], data.site_xmat[0].reshape(3, 3), atol=1e-12)
