@@ -32,7 +32,9 @@ RULES: dict[str, set[str]] = {
     "kin/kernels": {"numpy", "numba", "llvmlite", "kin.kernels", "kin.tolerances", "kin.transforms"},
     "kin/comparison": {"numpy", "kin.comparison", "kin.dh", *MODEL},
     "kin/differential": {"numpy", "kin.axes", "kin.differential", "kin.fk", "kin.robot", "kin.transforms"},
-    "kin/files": {"numpy", "kin.collision", "kin.dh", "kin.files", "kin.fitting", "kin.frames", *MODEL},
+    "kin/files": {
+        *("numpy", "kin.collision", "kin.dh", "kin.files", "kin.fitting", "kin.frames", "kin.typed", *MODEL),
+    },
     "kin/fitting": {"numpy", "kin.fitting", "kin.robot", "kin.transforms"},
     "kin/readings": {"numpy", "kin.collision", "kin.readings", *MODEL},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},

@@ -363,7 +363,7 @@ def test_base_and_tool_as_matrices():
 @pytest.mark.parametrize(
     ("change", "field", "valid"),
     [
-        ({"rows": [{"alpha": "π"}]}, "rows[0].alpha", "1.5 deg"),
+        ({"rows": [{"alpha": "ninety"}]}, "rows[0].alpha", "1.5 deg"),
         ({"rows": [{"alpha": "3 mm"}]}, "rows[0].alpha", "1.5 deg"),
         ({"rows": [{"alpha": "3 rad/s"}]}, "rows[0].alpha", "1.5 deg"),
         ({"rows": [{"a": math.nan}]}, "rows[0].a", "finite"),

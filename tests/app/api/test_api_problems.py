@@ -339,3 +339,8 @@ def test_an_unforeseen_error_tells_nothing_of_our_insides(monkeypatch, caplog):
     assert response.headers["x-request-id"] in caplog.text
     assert "default-src 'self'" in response.headers["content-security-policy"]
     assert response.headers["x-content-type-options"] == "nosniff"
+
+
+def test_a_body_may_begin_with_a_byte_order_mark():
+    """PowerShell and some editors write one; RFC 8259, section 8.1 lets a reader skip it."""
+    assert body_module.parsed(b'\xef\xbb\xbf{"q": [1.5]}') == {"q": [1.5]}
