@@ -59,7 +59,7 @@ def run(folder: Path) -> dict[str, object]:
     environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
     environment |= {"PYTHONPATH": path, "KINBOARD_CACHE": str(folder / "cache")}
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True, timeout=120, env=environment
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=True, timeout=240, env=environment
     )
     answer: dict[str, object] = json.loads(done.stdout)
     return answer
