@@ -91,6 +91,7 @@ def test_packets_are_those_of_the_manual():
     assert packet(1, 1).hex(" ") == "ff ff 01 02 01 fb"
 
 
+@pytest.mark.full
 def test_the_mirror_shows_the_encoders_and_writes_nothing(page, bus, run):
     run()
     page.wait(lambda: shows(page, bus))
@@ -225,6 +226,7 @@ def test_a_bus_that_is_unplugged_ends_the_program(page, bus, run, patient, capsy
     assert f"the bus at {bus.port} is gone" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_without_a_yes_nothing_is_written(page, bus, run, monkeypatch, capsys):
     monkeypatch.setattr("builtins.input", lambda _: "y")
     started = run("--drive")

@@ -133,6 +133,7 @@ def test_only_the_last_reader_who_leaves_cancels_the_map(maps, slowly):
     assert maps.bytes == 0
 
 
+@pytest.mark.full
 def test_a_queued_map_can_be_cancelled(slowly):
     maps = Maps(threads=1, at_once=1)
     busy = maps.subscribe(SEVERAL)

@@ -217,7 +217,7 @@ def test_what_is_written_is_read_for_the_same_signature(kept, folder):
     assert kept.load_overload(("float64",), TARGET) == "machine code"
     assert kept.load_overload(("int64",), TARGET) is None
     (file,) = folder.iterdir()
-    file.rename(folder / kept._name(("int64",), CODEGEN))
+    file.rename(folder / kept.file_name(("int64",), CODEGEN))
     assert kept.load_overload(("int64",), TARGET) is None, "the file says what it is for"
 
 
