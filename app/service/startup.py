@@ -158,17 +158,23 @@ class Startup:
         """Whether this process has the kernels compiled."""
         return self._member is None or self._member.number == 0
 
-    def _wait_for_first(self, phase: Phase) -> None:
-        """Wait until the first process of the service, which has the kernels compiled, is so far."""
+    def _wait_for_first(self, phase: Phase, or_begun: bool = False) -> None:
+        """Wait until the first process of the service, which has the kernels compiled, is so far.
+
+        Args:
+            or_begun: do not wait any longer once it compiles the parts.
+        """
         member = self._member
         while member is not None and not self._compiles and member.phases[0] < phase:
-            if self._stopping.wait(STEP):
+            if (or_begun and not self.preparation.complete) or self._stopping.wait(STEP):
                 return
 
     def _warm_up_rest(self) -> None:
         lower_priority()
         ahead.set(True)
         try:
+            # Those of the first process, which names the parts before it begins with them, are loaded here.
+            self._wait_for_first(Phase.COMPLETE, or_begun=True)
             parts()  # here and not where they are first asked for
             self.named = True
             self._wait_for_first(Phase.COMPLETE)
