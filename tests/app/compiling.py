@@ -10,11 +10,14 @@ from app.service import compiler
 
 # Lines name files. It ends at one that is called "end", and otherwise waits until the file is there.
 PROGRAM = (
-    "import pathlib, sys, time\n"
+    "import os, pathlib, sys, time\n"
+    "parent = os.getppid()\n"
     "for line in sys.stdin:\n"
     "    file = pathlib.Path(line.strip())\n"
     "    if file.name == 'end': sys.exit()\n"
-    "    while not file.exists(): time.sleep(0.01)\n"
+    "    while not file.exists():\n"
+    "        if os.getppid() != parent: sys.exit()  # the test was killed\n"
+    "        time.sleep(0.01)\n"
     "    print('done', flush=True)\n"
 )
 
