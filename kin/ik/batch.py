@@ -25,7 +25,7 @@ from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.answers import answer
 from kin.ik.branches import candidates_of
-from kin.ik.candidates import nearest_rows
+from kin.ik.candidates import nearest_rows, take_seeds
 from kin.ik.options import Frame, IKOptions, Images, Limits, Locks, Preference, Solver, Values, WiderLimits
 from kin.ik.problem import FAR, IKProblem, listed, never_cancel, prepare, read_poses, read_seed
 from kin.ik.results import IKResult, Status
@@ -248,11 +248,13 @@ class _Stack:
             # Neighbours need not be copied, which takes as long as a tenth of the rest.
             some = slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] < len(rows) else rows
             seeds = self.seeds if len(self.seeds) == 1 else self.seeds[some]
-            q[some] = (
-                _chosen(prepared, form, self.poses[some], seeds)
-                if quick
-                else self._chosen_one_by_one(rows.tolist(), self.poses[some], seeds)
+            T = self.poses[some]
+            found = (
+                _chosen(prepared, form, T, seeds) if quick else self._chosen_one_by_one(rows.tolist(), T, seeds)
             )
+            if not prepared.requested:
+                take_seeds(prepared.requirement, T, seeds, found)
+            q[some] = found
         return q
 
     def _chosen_one_by_one(self, rows: list[int], T: Array, seeds: Array) -> Array:

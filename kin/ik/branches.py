@@ -9,14 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from kin.fk import fk
+from kin.ik.candidates import DISTANCE, Rows, accept, measure_rows, ranges, select, unchecked
 from kin.ik.candidates import Flags as Flags
-from kin.ik.candidates import Rows, accept, measure_rows, ranges, unchecked
 from kin.ik.details import JointKind, LimitViolation, Redundancy
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKSolution
+from kin.solvers.common import TURN
 from kin.solvers.contract import (
     APPROACH,
     Candidates,
+    ClosedForm,
     Completeness,
     Obstacle,
     RedundancyParameter,
@@ -86,10 +88,41 @@ def solve_branches(
     k = len(q)
     rows = Rows(q, _empty((k, 5)), _empty(k, _BOOL), _empty(k, _BOOL), _empty(k, _WHOLE))
     count = unchecked()(problem.requirement, problem.T, problem.seed if seed is None else seed, problem.seed, rows)
-    return Branches(
+    on_seed, count = count < 0, max(count, -1 - count)
+    branches = Branches(
         q, rows.stats, rows.closed, rows.good, rows.order[:count].tolist(), redundancies, found.values,
         list(found.arcs), found.gap, found.obstacle, found.completeness, found.further,
     )  # fmt: skip
+    if on_seed and values is None and not problem.requested:
+        _put_seed(problem, closed_form, branches)
+    return branches
+
+
+def _put_seed(problem: IKProblem, form: ClosedForm, branches: Branches) -> None:
+    """Make the seed, which meets the target, the row of the branch that it is on, and the first solution.
+
+    Where branches merge, the formulas miss it by the root of the rounding error, or find it outside the limits.
+    """
+    q, stats = measure(problem, problem.seed[None])
+    apart = np.where(branches.good, np.abs(branches.q - q).max(axis=1), math.inf)
+    row = int(np.argmin(apart))
+    if not apart[row] < TOLERANCES.same_branch:
+        row = form.branch_of(problem.seed) if form.named else int(np.argmin(branches.good))
+        if not (form.named and branches.closed[row]):
+            branches.completeness = "unknown"  # a posture was missed
+    branches.q[row], branches.stats[row] = q[0], stats[0]
+    branches.closed[row] = branches.good[row] = True
+    branches.values = branches.values.copy()
+    for k, parameter in enumerate(branches.redundancies):
+        if parameter.joint >= 0 and not (parameter.rare and math.isnan(branches.values[row, k])):
+            value = branches.values[row, k] = q[0, parameter.joint]
+            arcs = branches.arcs[k]
+            _, low, high = arcs[arcs[:, 0] == row].T
+            past = (value - low) % TURN if parameter.circular else value - low
+            if problem.respect and not ((past >= 0.0) & (past <= high - low)).any():
+                branches.arcs[k] = np.concatenate([arcs, [[row, value, value]]])
+    kept, count = select(branches.q, np.where(branches.good, branches.stats[:, DISTANCE], math.inf))
+    branches.order = kept[:count].tolist()
 
 
 def candidates_of(

@@ -258,11 +258,35 @@ def select(q: Array, key: Array) -> tuple[Whole, int]:
 
 
 @jit
+def meets_exactly(requirement: Requirement, q: Array, at: Array, target: Array, e: Array) -> bool:
+    """Whether q ``(n,)``, whose tool is at `at` ``(4, 4)``, is inside the limits and meets the target.
+
+    Larger tolerances than those of exact answers do not count. e ``(6,)`` is scratch.
+    """
+    if requirement.respect:
+        for i in range(q.shape[0]):
+            if not requirement.lower[i] - _LIMIT <= q[i] <= requirement.upper[i] + _LIMIT:
+                return False
+    close, turned, _ = residuals(at, target, requirement.task, requirement.mask, e)
+    return bool(close <= min(requirement.position, _POSITION) and turned <= min(requirement.rotation, _ROTATION))
+
+
+@jit
 def measure_and_sort(requirement: Requirement, target: Array, near: Array, seed: Array, rows: Rows) -> int:
     """`measure_rows`, `accept`, and `select` of the accepted rows by distance to the seed; returns their number.
 
+    −1 − their number if the seed itself meets the target: then it is a solution, whether or not it is among them.
     One kernel, since every target passes through it and a call from Python costs as much as a row.
     """
+    count = _sorted(requirement, target, near, seed, rows)
+    T = np.empty((4, 4))
+    fk_into(requirement.model, seed, T)
+    return -1 - count if meets_exactly(requirement, seed, T, target, np.empty(6)) else count
+
+
+@jit
+def _sorted(requirement: Requirement, target: Array, near: Array, seed: Array, rows: Rows) -> int:
+    """`measure_and_sort` but for the seed."""
     measure_rows(requirement, target, near, seed, rows.q, rows.stats)
     if accept(requirement, rows.stats, requirement.respect, rows.closed, rows.good) == 0:
         return 0
@@ -293,6 +317,23 @@ def nearest_rows(requirement: Requirement, T: Array, seeds: Array, rows: Array, 
             rows[i, chosen[i], 0] = math.nan
             chosen[i] = _nearest_row(requirement, seeds, min(i, last), rows, i, q)
             fk_into(requirement.model, q[i], at[i])
+
+
+@jit
+def take_seeds(requirement: Requirement, T: Array, seeds: Array, q: Array) -> None:
+    """q ``(N, n)`` ← the seed of each target T ``(N, 4, 4)`` that its own seed meets, see `meets_exactly`.
+
+    seeds ``(N, n)``, or ``(1, n)`` for all.
+    """
+    at, e, last = np.empty((seeds.shape[0], 4, 4)), np.empty(6), seeds.shape[0] - 1
+    fk_many(requirement.model, seeds, at)
+    for i in range(T.shape[0]):
+        k = min(i, last)
+        if meets_exactly(requirement, seeds[k], at[k], T[i], e):
+            for j in range(q.shape[1]):
+                q[i, j] = min(max(seeds[k, j], requirement.lower[j]), requirement.upper[j])
+                if not requirement.respect:
+                    q[i, j] = seeds[k, j]
 
 
 @inlined

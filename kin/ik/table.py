@@ -153,6 +153,8 @@ def _tabulate(
             if to_image(requirement, seed, seed, rows[i, k])[1] > 0.0 and requirement.respect:
                 rows[i, k, 0] = math.nan
         found = measure_and_sort(requirement, T[i], seed, seed, Rows(rows[i], stats, closed, good, order))
+        on_seed = found < 0
+        found = max(found, 0)
         postures = 0
         for k in range(found):
             new = True
@@ -165,7 +167,7 @@ def _tabulate(
         suspect = 0
         if free.shape[0] > 0:
             suspect = nearly_singular(requirement.model, requirement.task, scale, free, ordered[:found])
-        if found == 0 or suspect != 0:
+        if found == 0 or suspect != 0 or on_seed:
             kinds[i] = -1
         count[i] = min(found, q.shape[1])
         for k in range(count[i]):

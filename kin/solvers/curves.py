@@ -310,7 +310,8 @@ def curves_among(
             continue
         direction, points = found
         curves.append(Curve(row, direction))
-        gone |= {other for other in singular if other != row and _beside(robot, points, q[other])}
+        standing = {curve.row for curve in curves}  # where curves cross, a row may be on several
+        gone |= {other for other in singular if other not in standing and _beside(robot, points, q[other])}
     return curves, [row for row in rows if row not in gone]
 
 

@@ -96,14 +96,17 @@ def test_singular_targets_are_left_to_results(robot, task):
         for joint, value in wrist.met_at:
             row[joint] = value + (0.0, 1e-9, 5e-5, 0.05)[k // 10]
     T = kin.fk(robot, q)
-    # Without limits the seed itself is the best solution.
-    table = Table.of(robot, T, IKOptions(task=task, respect_limits=False), q)
+    # Without limits the solution beside the seed is the best one.
+    near = q + 1e-3
+    table = Table.of(robot, T, IKOptions(task=task, respect_limits=False), near)
     for i in range(40):
-        result = kin.solve_ik(robot, T[i], q_seed=q[i], task=task, respect_limits=False)
+        result = kin.solve_ik(robot, T[i], q_seed=near[i], task=task, respect_limits=False)
         if result.singularities or result.details.infinite or result.redundancy:
             assert table.kinds[i] == -1
     assert (table.kinds[:30] == -1).all()
     assert (table.kinds[30:] >= 0).any()
+    on_seed = Table.of(robot, T[30:], IKOptions(task=task, respect_limits=False), q[30:])
+    assert all(on_seed.result(i).solutions[0].distance == 0.0 for i in range(10))
 
 
 def test_rounded_targets_and_choices_among_postures_are_left_to_results():
