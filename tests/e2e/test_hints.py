@@ -54,6 +54,12 @@ def covered_by(page: Page, hint: FloatRect) -> list[str]:
     return found
 
 
+BESIDE_THE_PANEL = """() => {
+  const edge = document.querySelector("canvas[data-engine]").getBoundingClientRect().right;
+  return [...document.querySelectorAll(".kb-hint")].every((hint) => hint.getBoundingClientRect().right <= edge);
+}"""
+
+
 def test_hints_come_once(browser: Browser, address: str) -> None:
     page = browser.new_page(viewport={"width": 1280, "height": 720})
     page.add_init_script(PLAIN)
@@ -61,6 +67,7 @@ def test_hints_come_once(browser: Browser, address: str) -> None:
     page.goto(address + "viewer/")
     hints = page.locator(".kb-hint")
     expect(hints).to_have_count(3, timeout=WAIT)
+    page.wait_for_function(BESIDE_THE_PANEL)  # they follow the picture, which the panel makes narrower as it comes
     boxes = {hint.get_attribute("data-hint"): hint.bounding_box() for hint in hints.all()}
     area = page.locator("canvas[data-engine]").bounding_box()
     assert area is not None
