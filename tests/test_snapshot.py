@@ -323,6 +323,9 @@ IK: dict[str, Request] = {
     "redundant7: above the stop of a joint": ik("redundant7", pose(0.15, -0.1, 0.11, 0.0, -0.1, -1.2, -1.4)),
     "pioneer5: example of the page": ik("pioneer5", along(0.045, 0.191, -0.211, -0.31, -0.164, -0.936)),
     "pioneer5: point and direction, not the roll": ik(
+        "pioneer5", pose(0.045, 0.191, -0.211, 0.0243, 0.9252, 0.3348, -0.1767)
+    ),
+    "pioneer5: a quaternion of three digits": ik(
         "pioneer5", pose(0.045, 0.191, -0.211, 0.022, 0.921, 0.347, -0.177)
     ),
     "pioneer5: point and direction, a large roll": ik("pioneer5", pose(0.045, 0.191, -0.211, 0.0, 0.9, 0.4, -0.2)),

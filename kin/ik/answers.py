@@ -25,7 +25,20 @@ _SUSPICIOUS = 1e3  # times the rounding: where the formulas of a rounded table m
 
 
 def answer(problem: IKProblem, found: Candidates | None = None) -> IKResult:
-    """The answer to a checked problem; found: what its closed form finds for it, if it has been asked."""
+    """The answer to a checked problem; found: what its closed form finds for it, if it has been asked.
+
+    Where there is no exact solution, a target that looks rounded is met as closely as its digits say.
+    """
+    exact = _as_given(problem, found)
+    rounded = None if exact.status is Status.SOLVED else problem.as_rounded()
+    if rounded is None:
+        return exact
+    close = _as_given(rounded)
+    return close if close.status is Status.SOLVED else exact
+
+
+def _as_given(problem: IKProblem, found: Candidates | None = None) -> IKResult:
+    """The answer within the tolerances of the problem."""
     if not problem.options.avoids:
         return _answer(problem, found)
     most = problem.options.max_solutions

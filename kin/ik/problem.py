@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.ik.candidates import Requirement, Whole
+from kin.ik.digits import EXACT, SINGLE, missing_digits
 from kin.ik.options import IKOptions, shape_of
 from kin.kernels.checks import straighten, straighten_many
 from kin.kernels.compile import direct
@@ -33,9 +34,8 @@ _FLOAT = np.dtype(np.float64)
 _POSE = (4, 4)
 _empty, _ndarray = np.empty, np.ndarray
 _LEVER = 0.1  # metres
-_SINGLE = float(np.finfo(np.float32).eps)
-_DOUBLE = 1e-9  # deviation of RᵀR from I that does not matter
-_ROUNDED = 1e-2  # the largest one of a rotation that is typed with few digits
+_ROUNDED = 1e-2  # the largest deviation of RᵀR from I of a rotation that is typed with few digits
+_NEARLY = 0.1  # the same of what may have been meant as a rotation: its size is named
 
 
 def never_cancel() -> None:
@@ -59,7 +59,7 @@ class IKProblem:
         redundancies: the redundancy parameters of the closed form in this task.
         values: one per redundancy parameter, NaN to let it be chosen.
         branches: the requested rows, None for all.
-        target_error: how rounded the target is, if that matters; then its rotation was made one.
+        target_error: how rounded the target is, if that matters.
         stop: called now and then by long computations; raises to cancel them.
     """
 
@@ -183,6 +183,16 @@ class IKProblem:
         """The same problem with another seed."""
         return replace(self, seed=seed)
 
+    def as_rounded(self) -> IKProblem | None:
+        """The same problem with as much tolerance as the few digits of a quaternion ask for; None if it had many.
+
+        An arm with few joints does not meet a rounded pose exactly. `read_pose` tells the same of a matrix.
+        """
+        if self.robot.n >= 6 or self.code == POSITION or self.target_error > 0.0:
+            return None
+        error = _rounding(self.T)
+        return replace(self, target_error=error) if error > 0.0 else None
+
 
 @lru_cache(maxsize=1024)
 def prepare(robot: Robot, options: IKOptions) -> IKProblem:
@@ -234,14 +244,15 @@ def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool 
     `TOLERANCES.rotation_matrix`.
 
     For the task POSITION it may also be a point ``(3,)``. An `InputError` names `field`.
-    With `always`, whatever is more than rounding of doubles counts: an arm with few joints meets few poses
-    exactly, and the digits of a target decide which of them are meant.
+    With `always`, a rotation counts as rounded that looks as if digits were left out (`kin.ik.digits`), however
+    small the deviation: an arm with few joints meets few poses exactly, and the digits of a target decide which of
+    them are meant. A quaternion leaves no deviation: see `IKProblem.as_rounded`.
     """
     if type(target) is _ndarray and target.shape == _POSE and target.dtype is _FLOAT and target.flags.carray:
         T = _empty(_POSE)
         error = _straighten()(target, FAR, T)
         if error >= 0.0:
-            return T, _rounding(target) if always and error > 0.5 * _DOUBLE else 0.0
+            return T, _rounding(target) if always and error > EXACT else 0.0
     if code == POSITION and shape_of(target) == (3,):
         T = np.eye(4)
         T[:3, 3] = finite_array(field, target, (3,))
@@ -283,7 +294,7 @@ def read_poses(targets: Sequence[ArrayLike] | Array, code: int, always: bool = F
         straighten_many(np.ascontiguousarray(targets), FAR, poses, errors)
     exact = errors >= 0.0
     if always:
-        exact &= errors <= 0.5 * _DOUBLE
+        exact &= errors <= EXACT
     errors[exact] = 0.0
     for i in np.flatnonzero(~exact).tolist():
         poses[i], errors[i] = read_pose(targets[i], code, f"targets[{i}]", always)
@@ -300,27 +311,40 @@ def _nearest_pose(target: ArrayLike, field: str, always: bool) -> tuple[Array, f
         return as_transform(T, field), 0.0
     R = T[:3, :3]
     error = float(np.abs(R.T @ R - np.eye(3)).max())
-    if TOLERANCES.rotation_matrix < error <= _ROUNDED and np.linalg.det(R) > 0.0:
+    if TOLERANCES.rotation_matrix < error <= _NEARLY and np.linalg.det(R) > 0.0:
+        rounding = _rounding(T) if error <= _ROUNDED else 0.0
+        if rounding == 0.0:
+            raise _no_rotation(R, error, field)
         U, _, V = np.linalg.svd(R)
         found = T.copy()
         found[:3, :3], found[3] = U @ V, (0.0, 0.0, 0.0, 1.0)
-        return found, _rounding(T)
-    return as_transform(T, field), _rounding(T) if always else 0.0
+        return found, rounding
+    return as_transform(T, field), _rounding(T) if always and error > EXACT else 0.0
+
+
+def _no_rotation(R: Array, error: float, field: str) -> InputError:
+    """Says by how much a matrix ``(3, 3)`` misses a rotation, and in which way."""
+    gram = R.T @ R
+    factor = math.sqrt(float(np.trace(gram)) / 3.0)
+    scaled = np.abs(gram - factor * factor * np.eye(3)).max() < 0.1 * error
+    what = f"this one is a rotation times {factor:.6g}" if scaled else f"RᵀR of this one is off by {error:.2g}"
+    expected = f"an orthonormal rotation matrix (RᵀR = I), or one that is rounded to some decimals; {what}"
+    return InputError(f"{field} rotation", R.tolist(), expected)
 
 
 def _rounding(T: Array) -> float:
-    """How rounded the entries of a pose ``(4, 4)`` are: at least the largest entry of RᵀR − I.
+    """How rounded the entries of a pose ``(4, 4)`` are, 0.0 if nothing says that they are.
 
-    0.0 if that vanishes up to the rounding of doubles: nothing is known of the digits of such a matrix.
+    The point of a rounded rotation has the same decimals, or as many digits as an entry of the rotation.
     """
-    R = T[:3, :3]
-    error = float(np.abs(R.T @ R - np.eye(3)).max())
-    if error < _DOUBLE:
-        return 0.0
-    if np.array_equal(T, T.astype(np.float32)):
-        return max(error, _SINGLE * max(1.0, float(np.abs(T[:3, 3]).max())))
-    digits = next((k for k in range(2, 9) if np.abs(T - T.round(k)).max() < 1e-14), None)
-    return error if digits is None else max(error, 10.0**-digits)
+    found = missing_digits(T[:3, :3])
+    largest = float(np.abs(T[:3, 3]).max())
+    if found == 0.0 or largest <= 1.0:
+        return found
+    if found == SINGLE:
+        return found * largest
+    coarser = found * 10.0 ** math.ceil(math.log10(largest))
+    return coarser if abs(largest / coarser - round(largest / coarser)) < 1e-9 / coarser * largest else found
 
 
 def read_seed(robot: Robot, q_seed: ArrayLike, field: str = "q_seed") -> Array:

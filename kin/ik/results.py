@@ -145,7 +145,8 @@ class IKResult(Deferred):
             found the same, or ``"unknown"``, as after a numeric search, which may miss some.
         tolerances: errors that count as none, metres and radians; larger than 1e-9 if that was asked for, or for a
             target of few digits.
-        target_error: how rounded the entries of the target are, if its rotation had to be made one; else 0.
+        target_error: how rounded the entries of the target are, if its rotation had to be made one or, for an arm
+            with fewer than six joints, if it is not met more closely; else 0.
         solver, solver_reason: name of the method that found the answer, and why it was chosen.
         task: the task that was solved for.
         distance: metres by which the point is out of reach, 0 if the point can be reached.

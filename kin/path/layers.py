@@ -40,6 +40,7 @@ def layered(problems: list[IKProblem], grid: float) -> list[Waypoint]:
 def _by_answer(requested: IKProblem) -> Waypoint:
     """A waypoint whose layer stays empty, as `kin.solve_ik` answers it."""
     result = answer(requested)
+    requested = replace(requested, target_error=result.target_error)
     q = np.array([s.q for s in result.solutions]).reshape(-1, requested.robot.n)
     if result.status is not Status.SOLVED:
         return Waypoint(requested, requested, q[:0], result)
@@ -51,6 +52,10 @@ def _by_answer(requested: IKProblem) -> Waypoint:
 
 def _sampled_waypoint(requested: IKProblem, grid: float) -> Waypoint:
     waypoint = Waypoint(requested, requested, sampled(requested, False, grid))
+    rounded = None if len(waypoint.layer) else requested.as_rounded()
+    if rounded is not None:
+        close = Waypoint(rounded, rounded, sampled(rounded, False, grid))
+        waypoint = close if len(close.layer) else waypoint
     if not len(waypoint.layer) and requested.robot.n < 6 and requested.code == POSE:
         assert requested.closed_form is not None  # as for every sampled waypoint
         redundancies = requested.closed_form.redundancies(APPROACH)

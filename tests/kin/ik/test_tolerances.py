@@ -54,9 +54,7 @@ def test_what_is_no_rotation_is_refused():
     for bad in (scaled, mirrored, last, np.full((4, 4), np.nan), np.eye(3)):
         with pytest.raises(InputError, match="target"):
             solve_ik(robot, bad)
-    scaled = T.copy()
-    scaled[:3, :3] *= 1.004
-    assert solve_ik(robot, scaled).status is Status.SOLVED
+    assert solve_ik(robot, T.round(3)).status is Status.SOLVED
 
 
 def test_a_tolerance_that_is_asked_for():
@@ -123,7 +121,7 @@ def test_a_path_of_rounded_targets_has_no_gaps(name, digits):
     assert (path.position_error <= path.tolerances[0]).all()
     assert (path.rotation_error <= path.tolerances[1]).all()
     if digits == 4:
-        assert 1e-6 < path.target_error < 1e-3
+        assert 1e-6 < path.target_error <= 1e-3
         assert "Targets are rounded" in path.reason
     exact = kin.solve_path(robot, line, q_start=robot.q_home)
     assert (exact.target_error, exact.tolerances) == (0.0, EXACT)
