@@ -1,8 +1,10 @@
-"""Every arm of the library against what others publish of it.
+"""Every maker's arm against what others publish of it, to the flange.
 
-``tests/data/library`` holds one file per maker's arm: origins, axes and limits of the joints as a published
-description has them, with its source and licence. Where there are two descriptions, it is not the one that the
-arm's own numbers are from. Forward kinematics is multiplied out here, by nothing of Kinboard's.
+``tests/data/library`` holds one file per arm: origins, axes and limits of the joints as a published description has
+them, with its source and licence, and where the arm ends. `before` and `after` are constant transforms by which the
+description differs from the arm, `signs` joints that count otherwise, each with the reason. Where there are two
+descriptions, it is not the one that the arm's own numbers are from. Forward kinematics is multiplied out here, by
+nothing of Kinboard's.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ PUBLISHED = {
     file.stem: json.loads(file.read_text(encoding="utf-8"))
     for file in sorted((Path(__file__).parents[1] / "data" / "library").glob("*.json"))
 }
-LIBRARY = {name: robot for name, robot in kin.builtin_robots().items() if name not in kin.classic_robots()}
+ROBOTS = kin.builtin_robots()
+LIBRARY = {name: robot for name, robot in ROBOTS.items() if name not in kin.classic_robots()}
 FAMILIES = {
     "ur3 ur10 ur3e ur5e ur10e ur16e ur20 z1": "parallel6",
     "so100 so101 vx300 wx250": "parallel5",
@@ -65,11 +68,14 @@ def published_pose(about, q):
     for joint in about["joints"]:
         T = T @ placed(joint)
         if joint["type"] != "fixed":
-            moved = np.eye(4)
-            moved[:3, :3] = turn(joint["axis"], next(values))
+            moved, value = np.eye(4), joint.get("sign", 1) * next(values)
+            if joint["type"] == "prismatic":
+                moved[:3, 3] = value * np.array(joint["axis"])
+            else:
+                moved[:3, :3] = turn(joint["axis"], value)
             T = T @ moved
     assert next(values, None) is None
-    return T
+    return T @ placed(about["after"]) if "after" in about else T
 
 
 def anywhere(robot, count, seed=0):
@@ -81,7 +87,7 @@ def anywhere(robot, count, seed=0):
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_the_tool_is_where_a_published_description_has_it(name):
-    robot, about = LIBRARY[name], PUBLISHED[name]
+    robot, about = ROBOTS[name], PUBLISHED[name]
     q = anywhere(robot, 100)
     expected = np.array([published_pose(about, each) for each in q])
     found = kin.fk(robot, q)
@@ -92,11 +98,12 @@ def test_the_tool_is_where_a_published_description_has_it(name):
 def differing_limits(name):
     """The joints whose limits or speeds are not the published ones."""
     moving = [joint for joint in PUBLISHED[name]["joints"] if joint["type"] != "fixed"]
-    for ours, theirs in zip(LIBRARY[name].joints, moving, strict=True):
+    for ours, theirs in zip(ROBOTS[name].joints, moving, strict=True):
         if "limits" not in theirs or theirs["type"] == "continuous":
             same = ours.limits is None
         else:
-            same = ours.limits == pytest.approx(theirs["limits"], abs=2e-3)
+            limits = sorted(theirs.get("sign", 1) * value for value in theirs["limits"])
+            same = ours.limits == pytest.approx(limits, abs=2e-3)
         speed = theirs.get("velocity")
         if not same or (speed and ours.velocity and ours.velocity != pytest.approx(speed, rel=2e-3)):
             yield ours.name
@@ -108,12 +115,31 @@ def test_joint_limits_are_the_published_ones_or_it_says_why_not(name):
 
 
 def test_every_makers_arm_is_checked_and_every_check_names_its_source():
-    assert {name for name, robot in LIBRARY.items() if robot.maker} == set(PUBLISHED)
+    assert {name for name, robot in ROBOTS.items() if robot.maker} == set(PUBLISHED)
     assert len(LIBRARY) >= 25
     for about in PUBLISHED.values():
         assert about["source"]
         assert about["licence"]
-        assert "before" not in about or about["before"]["why"]
+        assert all(about[key]["why"] for key in ("before", "after") if key in about)
+        assert any("sign" in joint for joint in about["joints"]) == bool(about.get("signs"))
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_z_of_the_tool_points_out_along_the_last_axis(name):
+    """So that `--approach` and capability maps mean what the flange or the fingers point at."""
+    robot = ROBOTS[name]
+    for q in anywhere(robot, 5):
+        z, J = kin.fk(robot, q)[:3, 2], kin.jacobian(robot, q)
+        before, last = J[:, -2], J[:, -1]
+        assert abs(z @ last[3:]) == pytest.approx(1.0, abs=1e-5)
+        if name != "scara":  # whose axes are all parallel; its flange is checked against the description
+            assert z @ np.cross(before[:3], before[3:]) > 0.02, "m ahead of the axis before the last"
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_an_arm_that_ends_elsewhere_than_in_its_flange_says_so_first(name):
+    end = PUBLISHED[name]["end"]
+    assert end == "the flange" or end in ROBOTS[name].description.partition(":")[0].partition(".")[0]
 
 
 @each_arm
