@@ -77,6 +77,12 @@ from kin.motion import (
 from kin.motor import Motor
 from kin.notebook import connect, save_page, show
 from kin.path import PathGap, PathJump, PathPostures, PathResult, path_postures, solve_path
+from kin.poses import (
+    pose_from_position_wxyz,
+    pose_from_text,
+    pose_to_text,
+    rotation_from_wxyz,
+)
 from kin.readings import (
     MotorFinding,
     MotorMatch,
@@ -91,7 +97,7 @@ from kin.readings import (
 )
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
-from kin.transforms import pose_from_position_wxyz, rotation_from_wxyz, wxyz_from_rotation
+from kin.transforms import wxyz_from_rotation
 from kin.warmup import warm_up
 from kin.workspace import (
     CapabilityMap,
@@ -203,7 +209,9 @@ __all__ = [
     "path_postures",
     "plan_motion",
     "pose_from_position_wxyz",
+    "pose_from_text",
     "pose_from_xyz_rpy",
+    "pose_to_text",
     "program_from_dict",
     "program_to_dict",
     "q_from_readings",

@@ -87,6 +87,15 @@ class ReadError(KinematicsError):
         return f"{self.reason[:1].upper()}{self.reason[1:]}."
 
 
+class EntryError(ReadError):
+    """A typed text has no valid value: a headline, and a sentence that says what is valid."""
+
+    def __init__(self, title: str, detail: str, readings: tuple[str, ...] = ()) -> None:
+        self.title = title
+        self.detail = detail
+        super().__init__(f"{title}: {detail}", readings)
+
+
 def read(
     text: str, unit: Unit, limits: tuple[float, float] = (-math.inf, math.inf), largest: float = math.inf
 ) -> float:
@@ -102,7 +111,7 @@ def read(
     """
     if len(text) > LONGEST:
         raise ReadError(f"“{cut(text)}” is too long; valid are {LONGEST} characters")
-    cleaned = _clean(_GROUPED.sub("", text))
+    cleaned = clean(_GROUPED.sub("", text))
     low, high = _plausible(unit, limits)
     decimal = cleaned.replace(",", ".")
     plain = _tried(decimal, unit)
@@ -132,7 +141,7 @@ def elements(text: str) -> list[str]:
     Raises:
         ReadError: an unknown character, or a sign between spaces.
     """
-    tokens = _tokens(_ARRAY.sub(" ", _clean(text)), (), text)
+    tokens = _tokens(_ARRAY.sub(" ", clean(text)), (), text)
     for token in tokens:
         if token.text[0].isalpha() and token.text not in _WORDS:
             raise ReadError(f"“{cut(token.text)}” is not a number")
@@ -159,9 +168,8 @@ def interpret(text: str, evaluate: Callable[[str], T], same: Callable[[T, T], bo
     Raises:
         ReadError: of `evaluate`, or because several readings are valid.
     """
-    if len(text) > LONGEST_LIST:
-        raise ReadError(f"the text is too long; valid are {LONGEST_LIST} characters")
-    cleaned = _clean(text)
+    bound(text)
+    cleaned = clean(text)
     found: list[tuple[str, T]] = []
     errors: list[ReadError] = []
     for way in _list_ways(cleaned):
@@ -177,6 +185,12 @@ def interpret(text: str, evaluate: Callable[[str], T], same: Callable[[T, T], bo
     readings = tuple(" ".join(elements(way)) for way, _ in found)
     shown = " or as ".join(f"“{each if len(each) <= _READING else each[:_READING] + '…'}”" for each in readings)
     raise ReadError(f"“{cut(text)}” can be read as {shown}; type the one that you mean", readings)
+
+
+def bound(text: str) -> None:
+    """Raises `ReadError` for a text that is too long for a list of numbers."""
+    if len(text) > LONGEST_LIST:
+        raise ReadError(f"the text is too long; valid are {LONGEST_LIST} characters")
 
 
 def unit_at_end(text: str) -> str:
@@ -249,7 +263,7 @@ def _without(mark: str, pattern: re.Pattern[str], text: str) -> Iterator[str]:
     yield text[at:]
 
 
-def _clean(text: str) -> str:
+def clean(text: str) -> str:
     """A text in lower-case ASCII, as far as its characters have a counterpart there."""
     text = _POWER.sub(lambda raised: "^" + raised[0].translate(_RAISED), text)
     return "".join(map(_plain, text)).lower().strip()
@@ -379,7 +393,7 @@ class _Reader:
 
     def __init__(self, text: str, unit: Unit, typed: str) -> None:
         self._unit, self._typed = unit, typed
-        self._units = {_clean(name): each for name, each in family(unit).items()}
+        self._units = {clean(name): each for name, each in family(unit).items()}
         compound = tuple(name for name in self._units if name and not re.fullmatch(_WORD, name))
         self._tokens = [token.text for token in _tokens(text, compound, typed)]
 

@@ -12,12 +12,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from app.exercises.typed import EntryError, read_number
+from app.exercises.typed import read_number
 from kin import InputError
 from kin.axes import screw_x, screw_z
 from kin.robot import Convention
 from kin.transforms import Array
-from kin.typed import LONGEST
+from kin.typed import LONGEST, EntryError
 from kin.units import Units
 
 Factor = Literal["theta", "d", "a", "alpha"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 
-from kin.typed import ReadError, read, valid
+from kin.typed import EntryError, ReadError, read, valid
 from kin.units import PLAIN, Unit
 
 # Units of one quantity each, and what one of them is in SI units. Angles and lengths are in `kin.units`.
@@ -19,15 +19,6 @@ QUANTITIES: tuple[dict[str, float], ...] = (
     {"kg": 1.0, "g": 1e-3},
     {"J": 1.0, "kJ": 1e3},
 )
-
-
-class EntryError(ReadError):
-    """A typed text has no valid value: a headline, and a sentence that says what is valid."""
-
-    def __init__(self, title: str, detail: str, readings: tuple[str, ...] = ()) -> None:
-        self.title = title
-        self.detail = detail
-        super().__init__(f"{title}: {detail}", readings)
 
 
 def read_number(text: str, unit: Unit) -> float:

@@ -16,15 +16,14 @@ from number_cases import DEGREES, MM, READ, REFUSED
 import kin
 from app.cli.terminal import configuration, quantity, units_of
 from app.exercises.questions import Number
-from app.exercises.typed import EntryError
-from app.viewer.panel.entry import read_cell, read_pose, read_value
+from app.viewer.panel.entry import read_cell, read_value
 from app.viewer.panel.readout import html
-from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.tabs.program.items import Item
 from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.robot.edits import quantity as quantity_of_cell
 from kin import KinematicsError
-from kin.typed import ReadError
+from kin.poses import read_pose, roll_pitch_yaw
+from kin.typed import EntryError, ReadError
 from kin.units import PLAIN, Unit, Units
 
 UR5 = kin.get_robot("ur5")

@@ -10,11 +10,11 @@ from page import WAIT, Tab
 from playwright.sync_api import Browser, expect
 
 import kin
-from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.scene import viewpoints
 from app.viewer.scene.arm.arm_scene import GIZMO
 from app.viewer.scene.meshes import body
 from app.viewer.session.state import PageState, encode
+from kin.poses import roll_pitch_yaw
 
 pytestmark = pytest.mark.browser
 

@@ -12,11 +12,12 @@ import kin
 from app.exercises.contract import Kind
 from app.exercises.fields import Fields
 from app.exercises.questions import Asked, Verdict, index, texts
-from app.exercises.typed import EntryError, read_number
+from app.exercises.typed import read_number
 from app.exercises.variant import Variant
 from kin import Singularity
 from kin.ik.messages.singularity import CONDITIONS, LOSSES, short
 from kin.transforms import Array
+from kin.typed import EntryError
 from kin.units import PLAIN, Units, fixed, general
 
 AT = 1e-6  # rad, m or SI: closer than this is at the singularity

@@ -13,13 +13,13 @@ from app.exercises.contract import Kind, typed
 from app.exercises.fields import Fields
 from app.exercises.poses import errors
 from app.exercises.questions import Asked, Verdict
-from app.exercises.typed import EntryError, read_number
+from app.exercises.typed import read_number
 from app.exercises.variant import Variant
 from kin import IKOptions, InputError, Task
 from kin.ik.details import Solved
 from kin.ik.options import TASKS
 from kin.transforms import Array, vector_angle
-from kin.typed import LONGEST
+from kin.typed import LONGEST, EntryError
 from kin.units import Units
 
 MOST_ROWS = 16

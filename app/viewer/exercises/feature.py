@@ -11,7 +11,6 @@ import viser
 
 import kin
 from app.exercises import Asked, Exercise, Variant, VariantError, Verdict
-from app.exercises.typed import EntryError
 from app.viewer.activity.activity import EXERCISES
 from app.viewer.activity.practice import Practice, Record
 from app.viewer.exercises import views
@@ -23,6 +22,7 @@ from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import round_points
 from kin import InputError
 from kin.transforms import Array, pose_from_position_wxyz
+from kin.typed import EntryError
 
 LONGEST_SENDING = 40  # characters
 

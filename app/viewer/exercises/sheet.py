@@ -15,9 +15,8 @@ import numpy as np
 
 from app.exercises import Verdict
 from app.exercises.contract import LONGEST_PROGRAM
-from app.viewer.panel.entry import read_pose
-from app.viewer.panel.rotations import roll_pitch_yaw
 from kin import InputError
+from kin.poses import read_pose, roll_pitch_yaw
 from kin.transforms import Array, wxyz_from_rotation
 from kin.typed import LONGEST
 from kin.units import Units

@@ -14,10 +14,10 @@ import numpy as np
 
 import kin
 from app.viewer.own_arm import clean
-from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.scene.meshes import body
 from kin import InputError, Obstacle, Robot
 from kin.collision.obstacles import LARGEST, MOST_OBSTACLES, SHAPES, SMALLEST, Shape
+from kin.poses import roll_pitch_yaw
 from kin.transforms import Array
 
 Obstacles = tuple[Obstacle, ...]

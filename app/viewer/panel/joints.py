@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.exercises.typed import EntryError
 from app.viewer.panel import Post, assign, listen, listen_click
 from app.viewer.panel.crossing import Crossings
 from app.viewer.panel.entry import read_value
@@ -23,6 +22,7 @@ from app.viewer.viser_patches import show_value
 from kin import InputError, Robot
 from kin.files.numbers import index_of
 from kin.transforms import Array
+from kin.typed import EntryError
 from kin.units import Unit, Units, general
 
 DIGITS = 2

@@ -13,10 +13,10 @@ from markupsafe import Markup
 
 from app.viewer.frames import TITLES, Frames
 from app.viewer.panel import update_html
-from app.viewer.panel.rotations import DEFAULT, Notation, Rotations
 from app.viewer.views.templates import render
 from app.viewer.viser_patches import show_content
 from kin.frames import WORLD
+from kin.poses import DEFAULT, Notation, Rotations
 from kin.transforms import Array
 from kin.units import Unit, Units, fixed
 

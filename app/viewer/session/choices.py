@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.viewer.declared.fields import Settings, choice, flag, part
-from app.viewer.panel.rotations import ANGLES, QUATERNIONS, Rotations
 from app.viewer.scene.arm.looks import AxesShown, Look
 from kin import Task
+from kin.poses import ANGLES, QUATERNIONS, Rotations
 from kin.units import DEFAULT_UNITS, LENGTHS, Length, Units
 
 SCHEMES: Final[dict[str, bool | None]] = {"Like the system": None, "Light": False, "Dark": True}

@@ -7,7 +7,6 @@ from dataclasses import replace
 import viser
 
 import kin
-from app.exercises.typed import EntryError
 from app.viewer.feature import Stage
 from app.viewer.panel import Post
 from app.viewer.panel.posture import BranchChoice, RedundancySliders, short
@@ -17,6 +16,7 @@ from kin import IKResult, IKSolution, Redundancy
 from kin.ik import solve
 from kin.ik.messages.values import listed, need, ranges
 from kin.transforms import Array
+from kin.typed import EntryError
 from kin.units import typeset
 
 

@@ -29,11 +29,11 @@ from app.viewer.labels import TEXT_SIZES
 from app.viewer.obstacles import placed
 from app.viewer.obstacles.placed import Obstacles
 from app.viewer.own_arm import OwnArm
-from app.viewer.panel.entry import FARTHEST
 from app.viewer.panel.script import read_page_json
 from app.viewer.scene.viewpoints import UP
 from app.viewer.session.choices import ViewState
 from kin import KinematicsError, Robot, Task, branch_names, robot_to_dict
+from kin.poses import FARTHEST
 from kin.transforms import Array, pose_from_position_wxyz, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS, LENGTHS, Units
 

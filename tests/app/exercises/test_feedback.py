@@ -8,7 +8,8 @@ import pytest
 
 from app.exercises.kinds.number import OTHER
 from app.exercises.questions import Mistake, Number, apart, count
-from app.exercises.typed import QUANTITIES, EntryError, read_number, units_like
+from app.exercises.typed import QUANTITIES, read_number, units_like
+from kin.typed import EntryError
 from kin.units import DEGREES, PLAIN, RADIANS, Unit
 
 SPEED, TORQUE = Unit("m/s", 1.0, 3), Unit("N·m", 1.0, 2)

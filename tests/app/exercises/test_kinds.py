@@ -17,10 +17,10 @@ from app.exercises.exercise import VariantError
 from app.exercises.fields import ExerciseFileError
 from app.exercises.kinds import KINDS
 from app.exercises.questions import Number, count
-from app.exercises.typed import EntryError
 from app.viewer.exercises.views import Sheet, question_html
 from kin import InputError
 from kin.dh import convert_dh
+from kin.typed import EntryError
 from kin.units import PLAIN, Unit, Units
 
 UNITS, RADIANS = Units(), Units(degrees=False, length="m")

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 import kin
 from app.exercises import Exercise, Variant, parse_exercise
 from app.exercises.fields import ExerciseFileError
-from app.exercises.typed import EntryError
 from kin import InputError
+from kin.typed import EntryError
 from kin.units import Units
 
 UNITS = Units()

@@ -15,7 +15,7 @@ from app.exercises.contract import Posed
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.lessons.guide.outline import Choice, Number, Question
-from app.viewer.panel.rotations import roll_pitch_yaw
+from kin.poses import roll_pitch_yaw
 from kin.transforms import pose_from_position_wxyz
 from kin.units import Units
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from app.exercises.rows import FACTORS, Factor, Row, turns
-from app.exercises.typed import EntryError, read_number
+from app.exercises.typed import read_number
 from app.viewer.declared.fields import numbers, ordinal, record, rows
 from app.viewer.lessons.dh import choices
 from app.viewer.lessons.dh.assignment import ACCEPTED, Assignment, Verdict, judge, opposite_x, read_row
@@ -22,7 +22,7 @@ from app.viewer.lessons.dh.choices import PARTS, Choice, Part
 from app.viewer.lessons.dh.steps import MOVED, ORDERS, low
 from kin import InputError, Robot
 from kin.transforms import Array, as_transform
-from kin.typed import LONGEST
+from kin.typed import LONGEST, EntryError
 from kin.units import Units
 
 _DIGITS = 9  # of metres and radians in a link

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.exercises.typed import EntryError
 from app.viewer.declared.scene import Node, SceneView, ends
 from app.viewer.exercises.drawing import GHOST, Drawing
 from app.viewer.exercises.sheet import Sheet
@@ -30,6 +29,7 @@ from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.status import Notice
 from kin import InputError, Robot
 from kin.transforms import Array, pose_from_position_wxyz
+from kin.typed import EntryError
 
 JOINTS_HINT = "The sliders of the tab Move, here as well. A target is typed with Type a target, above the tabs."
 

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from app.exercises.typed import EntryError
 from app.exports.worksheet import Left
 from app.viewer.declared.feature import DeclaredFeature
 from app.viewer.declared.panel import Buttons, Control, Folder, Html, Node
@@ -31,6 +30,7 @@ from app.viewer.panel.status import Notice
 from app.viewer.scene.meshes import body
 from kin import Robot
 from kin.transforms import Array
+from kin.typed import EntryError
 
 ACT_HINT = "Set: take the typed numbers. From tool: the orientation of the tool. To target: turn the target so."
 TURN_HINT = "Shows this turn of the frame beside the arm, or all three. A click on the frame shows all."

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from app.exercises.typed import EntryError
 from app.viewer.lessons.rotations.conventions import Convention
-from app.viewer.panel.entry import read_pose
+from kin.poses import read_pose
 from kin.transforms import Array
-from kin.typed import ReadError, elements, interpret, read_element
+from kin.typed import EntryError, ReadError, elements, interpret, read_element
 from kin.units import Units
 
 LONGEST = 400  # characters

@@ -10,12 +10,12 @@ from markupsafe import Markup
 
 from app.viewer.lessons.rotations.conventions import LOCKED, NEAR, PAGE, Angles, Convention, axis_angle
 from app.viewer.lessons.rotations.frames import Motion, factors, places, swapped
-from app.viewer.panel.rotations import RPY
 from app.viewer.views.mathml import ident, number, op, row, sub, text
 from app.viewer.views.mathml import math as formula
 from app.viewer.views.mathml import matrix as matrix_of
 from app.viewer.views.templates import render
 from kin.axes import inverse
+from kin.poses import RPY
 from kin.transforms import Array, rotation_angle, wxyz_from_rotation
 from kin.units import Units, fixed
 

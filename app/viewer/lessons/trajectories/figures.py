@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from markupsafe import Markup
 
-from app.exercises.typed import EntryError, read_number
+from app.exercises.typed import read_number
 from app.viewer.lessons.figure_shapes import GREEN, VERMILION
 from app.viewer.lessons.guide.outline import Answered
 from app.viewer.lessons.trajectories.chart import Curve, Row, chart
@@ -15,6 +15,7 @@ from app.viewer.lessons.trajectories.motions import Sketched, Ways, example, fam
 from kin import Robot
 from kin.motion import profiles
 from kin.transforms import Array
+from kin.typed import EntryError
 from kin.units import Unit, Units
 
 RIGHT, WRONG = (f"rgb{color}" for color in (GREEN, VERMILION))

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 
 import kin
-from app.exercises.typed import EntryError
-from app.viewer.panel.entry import PoseKind, read_pose
 from app.viewer.panel.jog import STEPS
 from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice
 from app.viewer.scene.gizmo import FINE_STEP, FINE_TURN, STEP, TURN
 from app.viewer.session.parts import Page
 from kin.axes import inverse
+from kin.poses import FORMS, PoseKind, read_pose
+from kin.typed import EntryError
 
 _NO_FURTHER = Notice("unreachable", "No further in this direction", "The tool does not follow the target there.")
 _AT_LIMIT = Notice("limits", "The joint is at its limit", "It goes no further in this direction.")
@@ -22,6 +23,7 @@ BY_HAND = Notice("hand", "Joints moved by hand", "The target follows the tool.")
 
 
 LONGEST_LABEL = 40  # characters
+_UNIT = re.compile(r"(?<=[\d)\]] )(?:mm|cm|m|deg|rad|°)(?![a-z])")
 
 
 def _amount(step: int, turn: bool) -> float:
@@ -30,8 +32,11 @@ def _amount(step: int, turn: bool) -> float:
 
 
 def _label(reading: str) -> str:
-    """What a button says that takes a reading. A long one is a matrix, and its last word the unit."""
-    return reading if len(reading) <= LONGEST_LABEL else f"Lengths in {reading.split()[-1]}"
+    """What a button says that takes a reading: a form in front of it, or the units of a long one."""
+    form, units = FORMS.get(reading.split()[0]), " and ".join(dict.fromkeys(_UNIT.findall(reading)))
+    if form is not None:
+        return f"{form.title}, in {units}" if units and form.units is None else form.title
+    return reading if len(reading) <= LONGEST_LABEL else f"Lengths in {units}"
 
 
 class TypedInput:
@@ -73,7 +78,8 @@ class TypedInput:
         tool = kin.fk(page.now.robot, arm.goal)
         frame = page.frames.pose(page.now.robot, arm.goal, relative)
         present = inverse(frame) @ (tool if relative or arm.target is None else arm.target)
-        T, given = read_pose(kind, text, page.units, present, page.view.rotations)
+        maker = page.now.robot.maker
+        T, given = read_pose(kind, text, page.units, present, page.view.rotations, maker)
         T = frame @ T
         arm.target = None  # a changed task must not solve for the target of before
         if given != "pose" and page.now.task != given:

@@ -14,7 +14,6 @@ from dataclasses import replace
 import numpy as np
 
 import kin
-from app.exercises.typed import EntryError
 from app.exports.motion_snippets import SNIPPETS
 from app.exports.program_toml import toml_of
 from app.exports.snippets import named
@@ -39,6 +38,7 @@ from app.viewer.takehome.sending import send_page
 from kin import InputError, KinematicsError
 from kin.files.numbers import index_of
 from kin.motion import Motion, Program
+from kin.typed import EntryError
 from kin.warmup import MOTIONS
 
 REPLAN = 0.2  # s without a change of the obstacles until the motion is planned again

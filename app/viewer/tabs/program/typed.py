@@ -9,17 +9,16 @@ from typing import Any
 import numpy as np
 
 import kin
-from app.exercises.typed import EntryError
 from app.viewer.own_arm import clean
-from app.viewer.panel.entry import PoseKind, read_pose, read_value
-from app.viewer.panel.rotations import roll_pitch_yaw
+from app.viewer.panel.entry import read_value
 from app.viewer.tabs.program.items import LEAST, NAME, Item, configuration, point
 from kin import InputError, Robot, Task
 from kin.axes import inverse
 from kin.files.numbers import index_of
 from kin.motion.program import LONGEST_DWELL
+from kin.poses import PoseKind, read_pose, roll_pitch_yaw
 from kin.transforms import Array
-from kin.typed import ReadError, cut, read
+from kin.typed import EntryError, ReadError, cut, read
 from kin.units import Unit, Units, general
 
 FARTHEST, FASTEST = 1000.0, 1000.0  # m; m/s or rad/s

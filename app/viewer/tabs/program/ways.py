@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from app.exercises.typed import EntryError
 from app.shared.threads.turns import Turn, Turns
 from app.viewer.arm import Arm
 from app.viewer.feature import Stage
@@ -25,6 +24,7 @@ from app.viewer.tabs.program.typed import SECONDS, read_number
 from app.viewer.tabs.workspace.background import run_in_background
 from app.viewer.views.templates import render
 from kin.motion import JointTarget, Ptp
+from kin.typed import EntryError
 from kin.units import Unit, Units
 from kin.way import MOST_SEED, find_way, is_installed, way_program
 

@@ -15,11 +15,11 @@ import kin
 from app.viewer.meshes.links import capsules_for
 from app.viewer.own_arm import NAME, OF_MAKER, OwnArm, own_arm
 from app.viewer.panel.entry import read_cell
-from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.scene.meshes import body
 from app.viewer.scene.mounting import turn_of
 from kin import InputError, KinematicsError, Motor, Robot, RobotFileError
 from kin.files.read import PER
+from kin.poses import roll_pitch_yaw
 from kin.robot import MOUNTINGS, PEAK_FIELDS
 from kin.typed import ReadError, cut
 from kin.units import Units

@@ -19,7 +19,6 @@ from live_server import serve_viewer
 
 import kin
 from app.exercises.contract import Posed
-from app.exercises.typed import EntryError
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -49,6 +48,7 @@ from kin import InputError, Robot
 from kin.axes import pairs
 from kin.differential.task import natural_task, usual_rank
 from kin.transforms import Array
+from kin.typed import EntryError
 from kin.units import PLAIN, Unit, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")

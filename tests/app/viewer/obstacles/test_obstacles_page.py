@@ -12,13 +12,13 @@ from fake_browser import FakeBrowser
 
 import kin
 from app.viewer.obstacles.feature import ObstaclesFeature
-from app.viewer.panel.entry import read_pose
 from app.viewer.panel.joints import label
 from app.viewer.scene.bodies.nodes import TOUCHING
 from app.viewer.scene.meshes import body
 from app.viewer.session import events
 from app.viewer.session.choices import ViewState
 from app.viewer.session.state import PageState, decode, encode
+from kin.poses import read_pose
 from kin.units import DEFAULT_UNITS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kin
-from app.exercises.typed import EntryError
-from app.viewer.panel.entry import read_pose, read_value
+from app.viewer.panel.entry import read_value
 from app.viewer.panel.fields import shown
-from app.viewer.panel.rotations import roll_pitch_yaw
+from kin.poses import read_pose, roll_pitch_yaw
 from kin.transforms import wxyz_from_rotation
+from kin.typed import EntryError
 from kin.units import Units
 
 DEGREES, RADIANS = Units(), Units(degrees=False, length="m")

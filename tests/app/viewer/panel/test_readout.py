@@ -10,7 +10,7 @@ import pytest
 
 import kin
 from app.viewer.panel.readout import html
-from app.viewer.panel.rotations import ANGLES, QUATERNIONS, Rotations
+from kin.poses import ANGLES, QUATERNIONS, Rotations
 from kin.units import DEFAULT_UNITS, Units
 
 PUMA = kin.get_robot("puma560")

@@ -119,6 +119,28 @@ def test_a_typed_redundancy_parameter_holds_the_tool(port: int) -> None:
         assert "“abc” is not a number" in tab.script["reply"][1]
 
 
+def test_a_target_is_pasted_as_it_stands_on_a_pendant(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.choose(UR5.name)
+        T = HOME.copy()
+        T[:3, 3] += (0.02, -0.03, 0.01)
+        tab.say("target", ["pose", kin.pose_to_text(T, "polyscope")])  # Stäubli and others have RX RY RZ as well
+        arrives(tab, T, 3e-6)
+        number = tab.say("target", ["pose", "X 400 Y 100 Z 300 A 10 B 20 C 30"])
+        tab.wait(lambda: tab.script["reply"][0] == number)
+        assert "KUKA, Doosan or Mitsubishi" in tab.script["reply"][1]
+        assert [label for label, _ in tab.script["reply"][2]] == ["KUKA", "Doosan", "Mitsubishi"]
+        number = tab.say("target", ["pose", "400.25 100.5 300.125 0 3.1416 0"])
+        tab.wait(lambda: tab.script["reply"][0] == number)
+        assert [label for label, _ in tab.script["reply"][2]] == [
+            *("roll pitch yaw, in rad", "roll pitch yaw, in °", "UR (pendant)")
+        ]
+        tab.say("target", ["pose", tab.script["reply"][2][2][1]])
+        down = np.diag([-1.0, 1.0, -1.0, 1.0])
+        down[:3, 3] = 0.40025, 0.1005, 0.300125
+        arrives(tab, down, 1e-5)
+
+
 def test_a_typed_target_is_solved_like_a_dragged_one(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.choose(UR5.name)

@@ -17,7 +17,6 @@ from live_server import serve_viewer
 from scipy.spatial.transform import Rotation
 
 import kin
-from app.exercises.typed import EntryError
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings as ServiceSettings
 from app.shared.store import Store
@@ -26,10 +25,11 @@ from app.viewer.lessons.rotations import questions, views
 from app.viewer.lessons.rotations.conventions import CONVENTIONS, PAGE, Angles, Convention, axis_angle
 from app.viewer.lessons.rotations.frames import MOST, Motion, as_json, factors, from_json, places, swapped
 from app.viewer.lessons.rotations.typed import read_rotation
-from app.viewer.panel.rotations import roll_pitch_yaw
 from app.viewer.server import ViewerServer
 from kin import InputError, Robot
+from kin.poses import roll_pitch_yaw
 from kin.transforms import pose_from_position_wxyz
+from kin.typed import EntryError
 from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")

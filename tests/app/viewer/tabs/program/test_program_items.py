@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import kin
-from app.exercises.typed import EntryError
 from app.exports.program_toml import toml_of
 from app.viewer.own_arm import clean
 from app.viewer.tabs.program import items as lists
@@ -28,6 +27,7 @@ from kin import InputError
 from kin.ik.details import OrientationNotMet
 from kin.motion import motion_limits
 from kin.motion.details import NotReached
+from kin.typed import EntryError
 from kin.units import DEFAULT_UNITS
 
 PIONEER, UR5, SCARA = (kin.get_robot(name) for name in ("pioneer5", "ur5", "scara"))

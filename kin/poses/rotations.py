@@ -1,26 +1,28 @@
-"""How rotations are written: in the read-out, in the form for a typed target, and in what is copied from them.
+"""How rotations are written: angles, rotation vectors and quaternions, of textbooks and on makers' pendants.
 
 A notation is a row of numbers. `values` takes them from a rotation matrix ``(3, 3)``, and `matrix` reads them.
+Makers agree on few things: KUKA's and Mitsubishi's A B C are the same three turns in opposite orders, Doosan's are
+others, and Stäubli's Rx Ry Rz turn about moving axes where Yaskawa's turn about fixed ones.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from app.exercises.typed import EntryError
-from kin import pose_from_xyz_rpy
-from kin.transforms import Array, rotation_about, rotation_from_wxyz, rotation_vector, wxyz_from_rotation
+from kin.errors import InputError
+from kin.frames import pose_from_xyz_rpy
+from kin.poses.quaternions import rotation_from_wxyz
+from kin.transforms import Array, rotation_about, rotation_vector, wxyz_from_rotation
+from kin.typed import EntryError
 from kin.units import general
 
 _LEVEL = 1e-8  # sine of an angle at which two axes coincide; joint values in links have nine decimals
 _SHORTEST = 1e-9  # of an axis
-# A quaternion typed with three decimals is normalised; one that is further off was mistyped.
-_NORM_SLACK = 0.01
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,15 @@ def z_y_z(R: Array) -> tuple[float, float, float]:
     return math.atan2(R[1, 2], R[0, 2]), beta, math.atan2(R[2, 1], -R[2, 0])
 
 
+def x_y_z(R: Array) -> tuple[float, float, float]:
+    """Angles in radians with ``R = Rx(α) Ry(β) Rz(γ)``; γ is 0 where β is ±90°."""
+    level = math.hypot(R[0, 0], R[0, 1])
+    beta = math.atan2(R[0, 2], level)
+    if level < _LEVEL:
+        return math.atan2(R[2, 1], R[1, 1]), beta, 0.0
+    return math.atan2(-R[1, 2], R[2, 2]), beta, math.atan2(-R[0, 1], R[0, 0])
+
+
 def _axis_angle(R: Array) -> tuple[float, ...]:
     vector = rotation_vector(R)
     angle = float(np.linalg.norm(vector))
@@ -82,6 +93,18 @@ def _vector(values: Sequence[float]) -> Array:
     return rotation_about(np.array(values), angle) if angle > _SHORTEST else np.eye(3)
 
 
+def _product(axes: str) -> Callable[[Sequence[float]], Array]:
+    """The rotation of angles about these axes, each about the axes that the turns before it have moved."""
+
+    def matrix(given: Sequence[float]) -> Array:
+        R = np.eye(3)
+        for axis, angle in zip(axes, given, strict=True):
+            R = R @ rotation_about(np.eye(3)["xyz".index(axis)], angle)
+        return R
+
+    return matrix
+
+
 def _quaternion(order: str) -> Notation:
     first = order.index("w")
 
@@ -90,10 +113,11 @@ def _quaternion(order: str) -> Notation:
         return (w, *xyz) if first == 0 else (*xyz, w)
 
     def matrix(given: Sequence[float]) -> Array:
-        norm = math.hypot(*given)
-        if abs(norm - 1.0) > _NORM_SLACK:
-            raise EntryError("Not a unit quaternion", f"The norm of {order} is {general(norm, 4)}; valid is 1.")
-        return rotation_from_wxyz(np.roll(given, 1 if first else 0))
+        try:
+            return rotation_from_wxyz(np.roll(given, 1 if first else 0))
+        except InputError:
+            norm = general(math.hypot(*given), 4)
+            raise EntryError("Not a unit quaternion", f"The norm of {order} is {norm}; valid is 1.") from None
 
     where = "last" if first else "first"
     none = "0 0 0 1" if first else "1 0 0 0"
@@ -110,17 +134,10 @@ RPY: Final = Notation(
     "0 0 0",
 )
 ZYZ: Final = Notation(
-    "Euler Z-Y-Z",
-    "α β γ",
-    "R = Rz(α)·Ry(β)·Rz(γ)",
-    (True,) * 3,
-    z_y_z,
-    lambda given: (
-        rotation_about(np.eye(3)[2], given[0])
-        @ rotation_about(np.eye(3)[1], given[1])
-        @ rotation_about(np.eye(3)[2], given[2])
-    ),
-    "0 0 0",
+    "Euler Z-Y-Z", "α β γ", "R = Rz(α)·Ry(β)·Rz(γ)", (True,) * 3, z_y_z, _product("zyz"), "0 0 0"
+)
+XYZ: Final = Notation(
+    "Euler X-Y-Z", "α β γ", "R = Rx(α)·Ry(β)·Rz(γ)", (True,) * 3, x_y_z, _product("xyz"), "0 0 0"
 )
 AXIS: Final = Notation(
     "axis and angle",
@@ -140,7 +157,35 @@ VECTOR: Final = Notation(
     _vector,
     "0 0 0",
 )
-ANGLES: Final = {"rpy": RPY, "zyz": ZYZ, "axis": AXIS, "vector": VECTOR}
+KUKA: Final = replace(
+    RPY,
+    title="A B C (KUKA)",
+    names="A B C",
+    definition="R = Rz(A)·Ry(B)·Rx(C)",
+    values=lambda R: roll_pitch_yaw(R)[::-1],
+    matrix=lambda given: RPY.matrix(given[::-1]),
+)
+FANUC: Final = replace(RPY, title="W P R (FANUC)", names="W P R", definition="R = Rz(R)·Ry(P)·Rx(W)")
+FIXED: Final = replace(
+    RPY, title="Rx Ry Rz (Yaskawa, Denso)", names="Rx Ry Rz", definition="R = Rz(Rz)·Ry(Ry)·Rx(Rx)"
+)
+STAUBLI: Final = replace(XYZ, title="Rx Ry Rz (Stäubli)", names="Rx Ry Rz", definition="R = Rx(Rx)·Ry(Ry)·Rz(Rz)")
+MITSUBISHI: Final = replace(RPY, title="A B C (Mitsubishi)", names="A B C", definition="R = Rz(C)·Ry(B)·Rx(A)")
+DOOSAN: Final = replace(ZYZ, title="A B C (Doosan)", names="A B C", definition="R = Rz(A)·Ry(B)·Rz(C)")
+KAWASAKI: Final = replace(ZYZ, title="O A T (Kawasaki)", names="O A T", definition="R = Rz(O)·Ry(A)·Rz(T)")
+ANGLES: Final = {
+    "rpy": RPY,
+    "zyz": ZYZ,
+    "axis": AXIS,
+    "vector": VECTOR,
+    "kuka": KUKA,
+    "fanuc": FANUC,
+    "fixed": FIXED,
+    "staubli": STAUBLI,
+    "mitsubishi": MITSUBISHI,
+    "doosan": DOOSAN,
+    "kawasaki": KAWASAKI,
+}
 WXYZ, XYZW = _quaternion("w x y z"), _quaternion("x y z w")
 QUATERNIONS: Final = {"wxyz": WXYZ, "xyzw": XYZW}
 
@@ -154,10 +199,12 @@ class Rotations:
 
     @property
     def notation(self) -> Notation:
+        """That of the angles."""
         return ANGLES[self.angles]
 
     @property
     def quaternion(self) -> Notation:
+        """That of quaternions."""
         return QUATERNIONS[self.quaternions]
 
 
