@@ -28,8 +28,8 @@ ROOT = Path(__file__).parents[1]
 DATA = ROOT / "tests" / "data" / "releases"
 RELEASES = sorted(path.name for path in DATA.iterdir())
 ROBOTS = sorted(path.relative_to(DATA).as_posix() for path in DATA.glob("*/robots/*.toml"))
-# Built-in arms that did not end in their maker's flange, or whose z axis did not point out: where the tool is now, in
-# the frame that the releases before had as xyz (m) and rpy (rad).
+# Built-in arms that did not end in their maker's flange, or whose z axis did not point out: where the tool is now,
+# in the frame that the releases before had as xyz (m) and rpy (rad).
 HALF = np.pi / 2
 ENDS: dict[str, dict[str, tuple[list[float], list[float]]]] = {
     "1.0.0": {

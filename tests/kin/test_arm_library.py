@@ -1,10 +1,10 @@
 """Every maker's arm against what others publish of it, to the flange.
 
-``tests/data/library`` holds one file per arm: origins, axes and limits of the joints as a published description has
-them, with its source and licence, and where the arm ends. `before` and `after` are constant transforms by which the
-description differs from the arm, `signs` joints that count otherwise, each with the reason. Where there are two
-descriptions, it is not the one that the arm's own numbers are from. Forward kinematics is multiplied out here, by
-nothing of Kinboard's.
+``tests/data/library`` holds one file per arm: origins, axes and limits of the joints as a published description
+has them, with its source and licence, and where the arm ends. `before` and `after` are constant transforms by
+which the description differs from the arm, `signs` joints that count otherwise, each with the reason. Where
+there are two descriptions, it is not the one that the arm's own numbers are from. Forward kinematics is
+multiplied out here, by nothing of Kinboard's.
 """
 
 from __future__ import annotations
