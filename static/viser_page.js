@@ -135,8 +135,11 @@ const viserPage = (() => {
     return uuid === earlier.uuid && (typeof value === "number" || Array.isArray(value) || value === filled);
   }
   const SENDER = /\.sendMessage!==null&&\(([\w$]+)=([\w$]+),[\w$]+\?\(([\w$]+)\.sendMessage\(\2\),([\w$]+)=!1,/;
-  const mendSender = (script) => script.replace(SENDER, (found, latest, change, page, waits) =>
-    found.replace("(", () => `(viserPage.pass(${change},()=>{${waits}&&(${waits}=!1,${page}.sendMessage?.(${latest}))}),`));
+  let mended = false;
+  const mendSender = (script) => script.replace(SENDER, (found, latest, change, page, waits) => {
+    mended = true;
+    return found.replace("(", () => `(viserPage.pass(${change},()=>{${waits}&&(${waits}=!1,${page}.sendMessage?.(${latest}))}),`);
+  });
   const { get: readText, set: writeText } = Object.getOwnPropertyDescriptor(Node.prototype, "textContent");
   Object.defineProperty(HTMLScriptElement.prototype, "textContent", {
     configurable: true,
@@ -355,15 +358,15 @@ const viserPage = (() => {
 
   // viser places the labels of a frame before it draws, where their parents were drawn last: a label came a frame after
   // what it names, and a new one stood elsewhere for a frame. The parent it asks for is here moved to its present place.
+  // viser puts its own state of the scene into `window.__viserMutable`, for its tests.
 
   const placed = new WeakSet(); // tables of nodes that move what they are asked for
   function enterViewer() {
     const canvas = document.querySelector(PARTS.scene);
-    let fiber = canvas?.[Object.keys(canvas).find((key) => key.startsWith("__reactFiber$"))]; // what React keeps of it
-    while (fiber && !fiber.memoizedProps?.value?.mutable?.current?.nodeRefFromName) fiber = fiber.return;
-    const viewer = fiber?.memoizedProps.value.mutable.current;
-    if (!viewer || placed.has(viewer.nodeRefFromName)) return;
-    queue = viewer.messageQueue;
+    const viewer = window.__viserMutable;
+    if (!canvas || !viewer) return;
+    queue = viewer.messageQueue ?? null;
+    if (!viewer.nodeRefFromName || placed.has(viewer.nodeRefFromName)) return;
     viewer.nodeRefFromName = new Proxy(viewer.nodeRefFromName, {
       get(nodes, name) {
         const node = nodes[name];
@@ -374,9 +377,30 @@ const viserPage = (() => {
     });
     placed.add(viewer.nodeRefFromName);
     // A picture that rests is empty when viser changes its resolution, until it is drawn again.
-    new MutationObserver(() => viewer.requestRender()).observe(canvas, { attributeFilter: ["width", "height"] });
+    new MutationObserver(() => viewer.requestRender?.()).observe(canvas, { attributeFilter: ["width", "height"] });
   }
   watch(enterViewer, { delay: 50 });
+
+  // What another version of viser may lack, and what suffers. The page goes on without it, and says so.
+
+  const NEEDED = [
+    ["__viserMutable.nodeRefFromName", () => window.__viserMutable?.nodeRefFromName, "labels in the scene may come a moment late"],
+    ["__viserMutable.messageQueue", () => window.__viserMutable?.messageQueue, "the browser’s console may show errors of removed controls"],
+    ["__viserMutable.requestRender", () => window.__viserMutable?.requestRender, "the picture may be empty for a second"],
+    ["the sender of changes", () => mended, "of controls that are pressed at once, one may be lost"],
+  ];
+  const lacks = () => NEEDED.filter(([, test]) => !test()).map(([what, , suffers]) => `${what}: ${suffers}`);
+  addEventListener("kinboard-there", () => {
+    const found = lacks();
+    if (!found.length) return;
+    const note = document.createElement("div"), close = document.createElement("button");
+    Object.assign(note, { id: "kb-lacks", role: "status", textContent: `This version of viser lacks ${found.join("; ")}. ` });
+    Object.assign(close, { type: "button", textContent: "Close" });
+    close.addEventListener("click", () => note.remove());
+    note.append(close);
+    document.body.append(note);
+    console.warn(note.firstChild.textContent);
+  }, { once: true });
 
   // Tabs
 
@@ -510,6 +534,8 @@ const viserPage = (() => {
   return {
     parts: PARTS,
     hooks: HOOKS,
+    /** What this version of viser lacks, each with what suffers. */
+    lacks,
     COLOURS,
     /** Call `act` after changes of the page of the kinds `on`: childList, characterData or an attribute of ATTRIBUTES.
      *  With a delay in ms, changes until then are one. */

@@ -19,7 +19,7 @@ _HANDLE = "viser._assignable_props_api:AssignablePropsBase._impl"
 SERVER = PrivateUse(
     "viser",
     "Its message server without a port, in the service's own event loop: nobody connects past the service.",
-    "The viewer cannot be served; install viser>=1.1,<1.2.",
+    "The viewer cannot be served; install viser==1.1.*.",
     (
         f"{_INFRA}:_message_producer(websocket, buffer, client_id, backlog_done_message)",
         f"{_INFRA}:_ClientHandleState(message_buffer, event_loop)",

@@ -226,7 +226,7 @@ def start_viser(loop: asyncio.AbstractEventLoop, label: str) -> tuple[viser.Vise
     portless = server._websock_server
     if not isinstance(portless, PortlessServer):
         server.stop()
-        raise RuntimeError(f"viser {viser.__version__} listens on a port; install viser>=1.1,<1.2")
+        raise RuntimeError(f"viser {viser.__version__} listens on a port; install viser==1.1.*")
     if viser_names.DRAGS.is_there:
         portless.visitors = server._connected_clients
     # Visitors leave while something is drawn for them or asked of their page.

@@ -6,7 +6,7 @@ import re
 
 import pytest
 from page import DrawnTab, Tab
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, ConsoleMessage, expect
 
 import kin
 from app.viewer.panel.theme import SYSTEM_IS_DARK
@@ -214,14 +214,64 @@ def test_labels_of_the_scene_follow_the_colours_of_the_page(browser: Browser, ad
     tab.close()
 
 
-FIND_VIEWER = """
-function findViewer() {  // viser's own state of the scene
-  const canvas = document.querySelector("canvas[data-engine]");
-  let fiber = canvas?.[Object.keys(canvas).find((key) => key.startsWith("__reactFiber$"))];
-  while (fiber && !fiber.memoizedProps?.value?.mutable?.current?.nodeRefFromName) fiber = fiber.return;
-  return fiber?.memoizedProps.value;
+# Another version of viser, which lacks a hook: what static/viser_page.js says of it → what takes it away.
+WITHOUT_STATE = """
+Object.defineProperty(window, "__viserMutable", { get: () => undefined, set: () => {}, configurable: true });
+"""
+WITHOUT_SENDER = """
+{
+  const { replace } = String.prototype; // which mends viser's script
+  String.prototype.replace = function (found, ...rest) {
+    return this.length > 1e6 && found instanceof RegExp ? String(this) : replace.call(this, found, ...rest);
+  };
 }
 """
+WITHOUT_ONE = """
+{
+  let viewer;
+  const set = (given) => {
+    viewer = new Proxy(given, { get: (all, name) => (name === "%s" ? undefined : all[name]) });
+  };
+  Object.defineProperty(window, "__viserMutable", { get: () => viewer, set, configurable: true });
+}
+"""
+TAKEN = {
+    "__viserMutable.nodeRefFromName": WITHOUT_STATE,
+    "__viserMutable.messageQueue": WITHOUT_ONE % "messageQueue",
+    "__viserMutable.requestRender": WITHOUT_ONE % "requestRender",
+    "the sender of changes": WITHOUT_SENDER,
+}
+
+
+def test_this_version_of_viser_lacks_nothing(desktop: Tab) -> None:
+    assert desktop.page.evaluate("viserPage.lacks()") == []
+    expect(desktop.page.locator("#kb-lacks")).to_have_count(0)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("hook", TAKEN)
+def test_a_page_without_a_hook_names_it_and_moves_the_arm_by_slider_and_gizmo(
+    browser: Browser, address: str, hook: str
+) -> None:
+    class Without(Tab):
+        scripts = Tab.scripts + TAKEN[hook]
+
+        def _listen(self, message: ConsoleMessage) -> None:
+            if "This version of viser lacks" not in message.text:
+                super()._listen(message)
+
+    tab = Without(browser, address, 1280, 720)
+    note = tab.page.locator("#kb-lacks")
+    expect(note).to_contain_text(f"This version of viser lacks {hook}")
+    note.get_by_role("button", name="Close").click()
+    expect(note).to_have_count(0)
+    tab.show(PIONEER)
+    q = PIONEER.q_home.copy()
+    tab.drag_arrow(PIONEER, kin.fk(PIONEER, q), axis=2, lengths=0.5)
+    expect(tab.page.locator("[data-send=undo]")).to_have_attribute("title", re.compile("Drag of the target"))
+    tab.type_number("1 rotating base", "20")
+    tab.wait_for_link(PIONEER, 0, 20)
+    tab.close()
 
 
 class LabelsTab(DrawnTab):
@@ -234,20 +284,19 @@ class LabelsTab(DrawnTab):
 
     scripts = (
         DrawnTab.scripts
-        + FIND_VIEWER
         + """
 {
   window.strayed = [];
   const gl = WebGL2RenderingContext.prototype;
   const look = (data) => {
-    const viewer = findViewer();
+    const viewer = window.__viserMutable;
     if (!viewer) return;
-    const { nodeRefFromName: nodes, nodePoseData: poses } = viewer.mutable.current;
+    const { nodeRefFromName: nodes, nodePoseData: poses } = viewer;
     const drawn = [];
     for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 0) drawn.push([data[i], data[i + 1], data[i + 2]]);
     const off = [];
     for (const name of Object.keys(nodes)) {
-      const { message, effectiveVisibility } = viewer.useSceneTree.get(name) ?? {};
+      const { message, effectiveVisibility } = window.__viserSceneTree.getState()[name] ?? {};
       const parent = nodes[name.slice(0, name.lastIndexOf("/"))];
       if (message?.type !== "LabelMessage" || !effectiveVisibility || !parent) continue;
       const at = parent.position.clone().set(...(poses[name]?.position ?? [0, 0, 0]));
@@ -289,17 +338,16 @@ def test_labels_are_drawn_where_they_belong_while_the_arm_moves_and_another_come
     tab.close()
 
 
-RESIZED = f"""async () => {{
-  {FIND_VIEWER}
-  const viewer = findViewer().mutable.current, draw = viewer.requestRender;
+RESIZED = """async () => {
+  const viewer = window.__viserMutable, draw = viewer.requestRender;
   let asked = 0;
-  viewer.requestRender = () => {{ asked++; draw(); }};
+  viewer.requestRender = () => { asked++; draw(); };
   // As viser does where it draws slowly: the picture is empty now.
   document.querySelector("canvas[data-engine]").width -= 1;
   await Promise.resolve();
   viewer.requestRender = draw;
   return asked;
-}}"""
+}"""
 
 
 def test_a_picture_of_another_resolution_is_drawn_at_once(desktop: Tab) -> None:
