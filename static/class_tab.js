@@ -59,9 +59,9 @@
   }
   function deliver() {
     for (const one of answers) {
-      if (sent.has(one.id) || one.place !== place() || !student() || !viserPage.messageField()) continue;
+      if (sent.has(one.id) || one.place !== place() || !student() || !channel.isOpen()) continue;
       sent.add(one.id);
-      viserPage.send("feature", ["exercises", [one.kind, one.id, Date.now()], one.value], () => {
+      channel.send("feature", ["exercises", [one.kind, one.id, Date.now()], one.value], () => {
         answers = answers.filter((each) => each !== one);
         keep(ANSWERS, answers);
         tell();
@@ -103,11 +103,12 @@
   // and nothing has come, after the connection has ended, and after a long silence.
 
   const EVERY = 800; // ms between two looks at the connection, and two questions while it is in doubt
-  const SILENCE = 5000; // ms
+  const SILENCE = 5000; // ms; the service gives a sign every two seconds
   const PATIENCE = 1500; // ms for an answer of the service
   const WAITING = 2500; // ms after which it is said that an answer waits
   let online = true;
   let sure = 0; // until when (ms) the connection is not in doubt
+  let asked = 0; // since when (ms) a sign of the service is awaited; 0: it is not
   const note = document.createElement("div");
   note.className = "kb-class-offline";
   note.role = "status";
@@ -128,25 +129,23 @@
   }
   function heard() {
     sure = Date.now() + SILENCE;
+    asked = 0;
     if (!online) become(true);
   }
   function doubt() { sure = 0; }
-  async function look() {
+  function look() {
     if (member() && !document.hidden && Date.now() >= sure) {
-      try {
-        await fetch("../livez", { cache: "no-store", signal: AbortSignal.timeout(PATIENCE) });
-        heard();
-      } catch {
-        become(false);
-      }
+      if (!asked) channel.ask();
+      else if (Date.now() - asked >= PATIENCE) become(false);
+      asked ||= Date.now();
     }
     tell(); // the page may have come into a room, or left it
-    setTimeout(look, EVERY);
   }
-  viserPage.watchLine((what) => { if (what === "heard") heard(); else doubt(); });
+  viserPage.watchLine((what) => { if (what !== "heard") doubt(); });
+  channel.watchLine((what) => { if (what === "heard") heard(); else doubt(); });
   addEventListener("offline", () => { doubt(); become(false); });
   addEventListener("online", () => tell());
-  setTimeout(look, EVERY);
+  setInterval(look, EVERY);
 
   // A new connection counts from the beginning.
   addEventListener("kinboard-connect", () => { opened = ""; sent = new Set(); filled = null; });

@@ -1,12 +1,13 @@
 "use strict";
 // Runs in viser's page, before viser's own script: keys, typed values, and buttons of our own HTML. The server
-// decides what they mean; app/viewer/panel/script.py describes how.
+// decides what they mean (app/viewer/session/events.py).
 (() => {
   const HOLD = 600; // ms without a key until the next press counts as another step of the history
   const DECIMALS = 1e9;
   // Letters that move the target: axis and direction. The same places on QWERTY, QWERTZ and AZERTY keyboards.
   const MOVES = { KeyL: [0, 1], KeyJ: [0, -1], KeyI: [1, 1], KeyK: [1, -1], KeyO: [2, 1], KeyU: [2, -1] };
-  const { send, type, thumbOf: thumb } = viserPage;
+  const { type, thumbOf: thumb } = viserPage;
+  const { send } = channel;
 
   // Answers
 
@@ -17,7 +18,7 @@
     // The panel, and its buttons, are built anew where a phone is turned.
     if (!text || (text === answered && buttons.every((button) => !button || button.shows === text))) return;
     answered = text;
-    const { undo, redo, reply: [to, error, readings] } = JSON.parse(text);
+    const { undo, redo } = JSON.parse(text);
     for (const [name, label] of [["undo", undo], ["redo", redo]]) {
       const button = buttons[name === "undo" ? 0 : 1];
       if (!button) { answered = ""; continue; }
@@ -25,7 +26,6 @@
       button.ariaDisabled = String(!label);
       button.title = label ? `${name[0].toUpperCase() + name.slice(1)}: ${label} (${button.dataset.keys})` : `Nothing to ${name}`;
     }
-    viserPage.answer(to, error, readings);
   }
 
   // Number fields beside sliders

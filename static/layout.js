@@ -207,13 +207,13 @@
   }
 
   /** Labels in the scene have the size of the text too: the server draws them. A new panel has not heard of it. */
-  let told = { field: null, size: "" };
+  let told = { session: "", size: "" };
   function tellSize() {
-    const field = viserPage.messageField();
+    const session = channel.name();
     const now = root.dataset.kbText;
-    if (!field || (told.field === field && told.size === now)) return;
-    told = { field, size: now };
-    viserPage.send("text-size", now);
+    if (!session || (told.session === session && told.size === now)) return;
+    told = { session, size: now };
+    channel.send("text-size", now);
   }
 
   function markSize() {

@@ -12,7 +12,7 @@
     if (feature === "exercises" && ANSWERS.includes(kind)
       && !dispatchEvent(new CustomEvent("kinboard-answer", { detail, cancelable: true }))) return;
     expectWords(node, kind);
-    viserPage.send("feature", [feature, [kind, ...rest, ++serial], value]);
+    channel.send("feature", [feature, [kind, ...rest, ++serial], value]);
   }
 
   function press(button) {

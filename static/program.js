@@ -6,7 +6,7 @@
 
   const part = (name) => document.querySelector(`[data-program="${name}"]`);
   const all = (selector) => [...document.querySelectorAll(`[data-program] ${selector}`)];
-  const send = (key, value, done) => viserPage.send("feature", ["program", key, value], done);
+  const send = (key, value, done) => channel.send("feature", ["program", key, value], done);
   let serial = 0; // each press is a step of its own in the history
   const act = (name, value, ...rest) => send([name, ...rest, ++serial], value);
   const setText = (node, text) => { if (node && node.textContent !== text) node.textContent = text; };

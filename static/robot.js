@@ -12,7 +12,7 @@
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
   const cells = () => [...document.querySelectorAll("[data-arm] input[data-cell]")];
   const revision = () => Number(part("table")?.dataset.revision ?? 0);
-  const send = (key, value, done) => viserPage.send("feature", ["robot", key, value], done);
+  const send = (key, value, done) => channel.send("feature", ["robot", key, value], done);
 
   // Typed cells
 
@@ -127,7 +127,7 @@
     if (button && name === focus) return; // `restore` gave it back: that is no field that was left
     clearTimeout(left);
     if (cell?.matches("input") && name !== focus) cell.select();
-    if (focus && name !== focus) { flush(); viserPage.send("released"); }
+    if (focus && name !== focus) { flush(); channel.send("released"); }
     if (focus && !cell) left = setTimeout(leave, LEFT);
     focus = name;
   });
@@ -195,7 +195,7 @@
     if (undo === "z" || undo === "y") {
       flush();
       if (wrong?.any) send(["discard"], null);
-      else viserPage.send(undo === "y" || event.shiftKey ? "redo" : "undo");
+      else channel.send(undo === "y" || event.shiftKey ? "redo" : "undo");
     } else if (event.altKey && inTable && ["ArrowUp", "ArrowDown", "Enter"].includes(event.key)) {
       const action = { ArrowUp: "up", ArrowDown: "down", Enter: "add" }[event.key];
       if (part("table").querySelector(`[data-arm-do="${action}"]`).ariaDisabled !== "true") change(action);

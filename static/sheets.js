@@ -4,7 +4,7 @@
 (() => {
   let serial = 0;
   let opened = null; // the window of the last page, with the number of its request
-  const send = (kind) => viserPage.send("feature", ["sheet", [kind, ++serial], null]);
+  const send = (kind) => channel.send("feature", ["sheet", [kind, ++serial], null]);
 
   function hand() {
     if (!opened?.ready) return;

@@ -18,7 +18,7 @@
   const WANTED = /\.(urdf|xacro|xml|toml|stl|obj|mtl|dae|glb)$/i; // what is worth sending of a folder
   const HIDDEN = /(^|\/)(\.|__MACOSX)/;
 
-  const send = (kind, value, done, direct = false, key = "upload") => viserPage.send("feature", [kind.feature, [key], value], done, direct);
+  const send = (kind, value, done, key = "upload") => channel.send("feature", [kind.feature, [key], value], done);
 
   /** Which kind of file this is, as it begins, and what its name says where that tells nothing. */
   async function kindOf(name, file, usual) {
@@ -176,7 +176,6 @@
   function sendBytes(kind, name, bytes, mine) {
     let from = 0;
     let begun = false;
-    let direct = false;
     const next = () => {
       if (mine !== uploading || (begun && from >= bytes.length)) return;
       begun = true;
@@ -184,9 +183,9 @@
       const to = from = Math.min(start + PART_OF_BYTES, bytes.length);
       const part = btoa(String.fromCharCode(...bytes.subarray(start, to)));
       const first = start === 0;
-      direct = send(kind, [name, first, to >= bytes.length, part, "base64", start, bytes.length], first ? begin : next, true);
+      send(kind, [name, first, to >= bytes.length, part, "base64", start, bytes.length], first ? begin : next);
     };
-    const begin = () => { for (let k = 0; k < (direct ? AT_ONCE : 1); k++) next(); };
+    const begin = () => { for (let k = 0; k < AT_ONCE; k++) next(); };
     next();
   }
   /** The end of the part that begins at `from`: a short enough message, and no character is cut in two. */
@@ -200,6 +199,6 @@
     if (mine !== uploading) return;
     const to = endOfPart(text, from);
     const next = () => { if (to < text.length) sendText(name, text, to, mine, key); };
-    send(KINDS.arm, [name, from === 0, to >= text.length, text.slice(from, to)], next, false, key);
+    send(KINDS.arm, [name, from === 0, to >= text.length, text.slice(from, to)], next, key);
   }
 })();

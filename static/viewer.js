@@ -92,7 +92,6 @@
 
   function read() {
     openTab(performance.now() + 30000);
-    dispatchEvent(new Event("kinboard-connect"));
     return JSON.stringify({
       address: location.origin + location.pathname.replace(/viewer\/?$/, ""),
       state,

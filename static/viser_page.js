@@ -32,7 +32,7 @@ const viserPage = (() => {
   };
   // What viser calls, and how often it has since this page was loaded.
   const HOOKS = {
-    readItem: 0, writeItem: 0, replaceAddress: 0, change: 0, sendToWorker: 0, reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0,
+    readItem: 0, writeItem: 0, replaceAddress: 0, change: 0, reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0,
     findParent: 0,
   };
 
@@ -148,22 +148,24 @@ const viserPage = (() => {
     set(text) { writeText.call(this, mendSender(text)); },
   });
 
-  // Messages to the server travel in a hidden field of viser's; app/viewer/panel/script.py describes them.
+  // Messages whose order with changes of controls matters go in a hidden field of viser's, the last few at once;
+  // app/viewer/panel/script.py describes it.
 
   const KEPT = 20; // messages in the field at once
   const LONGEST = 56000; // bytes in the field; the service closes a connection that sends more than 64 KiB at once
-  let number = Date.now();
   let messages = [];
-  const waiting = new Map(); // number of a message → what to do with its reply
+  let filled = ""; // the field, as it was filled last
   let field = null;
-  function messageField() {
-    if (!field?.isConnected) field = document.querySelector(PARTS.messages);
-    return field;
-  }
   const bytes = (value) => new TextEncoder().encode(JSON.stringify(value)).length;
-
-  // A new connection has a new page on the server, which must not act on old messages.
-  addEventListener("kinboard-connect", () => { messages = []; waiting.clear(); link = null; });
+  /** Send a message after the changes of controls so far; returns whether there is a field to do so. */
+  function writeField(message) {
+    if (!field?.isConnected) field = document.querySelector(PARTS.messages);
+    if (!field) return false;
+    messages = [...messages.slice(1 - KEPT), message];
+    while (bytes(messages) > LONGEST) messages.shift();
+    type(field, filled = JSON.stringify(messages));
+    return true;
+  }
 
   const setValue = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
   function type(input, text) {
@@ -171,10 +173,7 @@ const viserPage = (() => {
     input.dispatchEvent(new Event("input", { bubbles: true }));
   }
 
-  // viser's connection is in a worker, and a field sends one change per 50 ms. Parts of files go to the worker directly,
-  // as changes of the same field; `link` is the worker and the field's name, known from the first message.
-  let link = null;
-  let filled = ""; // the field, as it was filled last
+  // viser's connection is in a worker.
   const cameraWatchers = [];
   const htmlWatchers = new Map(); // what HTML of the panel begins with → what to call
   const workers = new WeakSet(); // that are listened to
@@ -210,11 +209,6 @@ const viserPage = (() => {
       workers.add(this);
       this.addEventListener("message", hear);
     }
-    const change = data?.type === "send" && data.message?.type === "GuiUpdateMessage" ? data.message : null;
-    if (filled && change?.updates?.value === filled) {
-      HOOKS.sendToWorker++;
-      link = { worker: this, uuid: change.uuid };
-    }
     if (data?.type === "send" && data.message?.type === "ViewerCameraMessage") {
       HOOKS.reportCamera++;
       for (const act of cameraWatchers) act(data.message.wxyz);
@@ -222,34 +216,6 @@ const viserPage = (() => {
     if (data?.type === "send") tellLine("sent");
     return postMessage.call(this, data, ...rest);
   };
-  function sendDirectly(message) {
-    const before = messages.slice(-4); // the field may not have sent them yet; what was read already is ignored
-    const value = JSON.stringify(bytes([...before, message]) < LONGEST ? [...before, message] : [message]);
-    postMessage.call(link.worker, { type: "send", message: { type: "GuiUpdateMessage", uuid: link.uuid, updates: { value } } });
-    tellLine("sent");
-  }
-
-  function send(name, argument = null, done = null, direct = false) {
-    if (!messageField()) return false;
-    const message = [++number, name, argument];
-    if (bytes([message]) > LONGEST) { done?.("This text is too long."); return false; }
-    if (done) waiting.set(number, done);
-    if (direct && link) { sendDirectly(message); return true; }
-    messages = [...messages.slice(1 - KEPT), message];
-    while (bytes(messages) > LONGEST) messages.shift();
-    type(field, filled = JSON.stringify(messages));
-    return false;
-  }
-
-  function answer(to, error, readings) {
-    for (const [sent, done] of waiting) {
-      if (sent > to) continue;
-      waiting.delete(sent);
-      if (sent === to) done(error, readings);
-      else done("", []);
-    }
-  }
-
   // HTML that the server sends again: the control that is in use stays where it is, and all around it is new. So a text
   // that is being typed stays, and a button that is held down is still there when it is released.
 
@@ -558,13 +524,9 @@ const viserPage = (() => {
     /** What `history.replaceState` does, which viser's calls no longer do. */
     replaceState,
 
-    /** Send a message to the server. done(error, readings) gets its answer. `direct`: it may pass others in the field.
-     *  Returns whether it did. */
-    send,
-    /** Hand on the server's answer to message `to`; earlier ones without an answer are done too. */
-    answer,
-    /** Whether messages can be sent, and another value for each new panel. */
-    messageField,
+    writeField,
+    /** Forget what the field had: a new session must not act on it. */
+    emptyField: () => { messages = []; },
 
     /** Type into one of viser's fields, as if the visitor did. */
     type,

@@ -283,7 +283,7 @@ class Lines:
     """
 
     def __init__(self, place: int = 0, places: int = 1) -> None:
-        self._place, self._places = place, places
+        self.place, self._places = place, places
         self._lock = threading.Lock()
         self._lines: dict[str, Line] = {}
 
@@ -291,7 +291,7 @@ class Lines:
         """A new line of a page that shows this robot; with a reserved code, in place of an earlier page."""
         with self._lock:
             if code not in RESERVED:
-                code = unused_code({*self._lines, *RESERVED}, self._place, self._places)
+                code = unused_code({*self._lines, *RESERVED}, self.place, self._places)
             before = self._lines.get(code)
             line = self._lines[code] = Line(code, robot, post)
         if before is not None:

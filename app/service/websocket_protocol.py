@@ -25,7 +25,6 @@ from websockets.frames import CloseCode, Frame
 from websockets.http11 import Request
 
 from app.api.problems import ProblemError
-from app.classroom import COOKIE
 from app.live.codes import PATH as LIVE
 from app.service.config import GuardedConfig
 from app.service.guard import Outflow
@@ -43,7 +42,6 @@ if sys.platform == "linux":
 CONTROL_COST: Final = 8.0  # of a frame that is no whole message, in messages
 PIECE: Final = 512  # bytes parsed before frames are counted: at most 85 frames
 MAX_FRAGMENTS: Final = 64  # of one message
-ROOM_PING: Final = 2.0  # seconds from an answer to the next ping, of a browser in a room: who is away is soon seen
 LIVE_PING: Final = 2.0  # the same of a page's program: the page shows how long an answer takes
 MAX_LIVE: Final = 2 << 20  # bytes of a program's message: what is too large is refused in words, up to this size
 SMALL: Final = 64 * 1024  # bytes of a message that costs no more than any other
@@ -165,8 +163,6 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
                 if LIVE in event.path:
                     self.conn.max_message_size = MAX_LIVE
                     self.ping_interval = min(LIVE_PING, self.ping_interval or LIVE_PING)
-                if any(COOKIE in value for value in event.headers.get_all("Cookie")):
-                    self.ping_interval = min(ROOM_PING, self.ping_interval or ROOM_PING)
 
     def _silence(self) -> float:
         """For how many seconds the client has sent nothing, not even an answer to a ping. Thread-safe."""

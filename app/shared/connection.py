@@ -67,6 +67,18 @@ class Connection(Protocol):
         """Send a message if that needs no wait; False: nothing was sent, and `send` may wait or raise."""
 
 
+class PageConnection(Protocol):
+    """A connection of a page's channel, beside the visitor's `Connection`: texts, which nobody has inspected."""
+
+    rights: Rights
+
+    async def receive(self) -> str:
+        """The page's next text; raises `ConnectionEnded`."""
+
+    async def send(self, text: str) -> None:
+        """Send a text; returns when the connection takes the next one. Raises `ConnectionEnded`."""
+
+
 class Viewer(Protocol):
     """Serves the connections of all visitors, in the event loop that it was started with."""
 
@@ -75,3 +87,6 @@ class Viewer(Protocol):
 
     async def serve(self, connection: Connection) -> ConnectionEnded:
         """Serve one visitor until the connection ends; returns why."""
+
+    async def serve_channel(self, connection: PageConnection, name: str) -> ConnectionEnded:
+        """Serve the channel of this name until the connection ends; returns why. Another name: code 1008."""

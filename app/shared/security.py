@@ -1,10 +1,10 @@
 """What a client may cause, content security policies, cookies, and the check of a websocket's origin.
 
-`Rights` decides for every door, REST, the viewer's messages and what a link restores. Who has the access token, or
-everybody if there is none and the service is not read-only, may do everything, but for one thing: exercises are
-saved on the service only by who has the token or, without one, by browsers on the same machine. A read-only
-visitor may look: read pages and robots, and see the arm of a link from all sides. Nothing is moved, solved,
-sampled or mapped for a visitor who may only look.
+`Rights` decides for every door, REST, both websockets of a page and what a link restores. Who has the access
+token, or everybody if there is none and the service is not read-only, may do everything, but for one thing:
+exercises are saved on the service only by who has the token or, without one, by browsers on the same machine. A
+read-only visitor may look: read pages and robots, and see the arm of a link from all sides. Nothing is moved,
+solved, sampled or mapped for a visitor who may only look.
 
 The query of the viewer's address can name another server (``?websocket=ws://elsewhere``), which could then run
 scripts in our origin: ``connect-src 'self'`` prevents that. Browsers do not apply the same-origin rule to
@@ -33,6 +33,8 @@ SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 CAMERA = "ViewerCameraMessage"
 MEMORY = "LocalStorageGetItemResponseMessage"
 
+# Of a page's channel, with the number of the process that has the page: below the prefix of the service.
+_CHANNEL = re.compile(r"/viewer/channel/(\d{1,3})")
 _COMPUTING = re.compile(r"/(workspace|capability)\b")
 
 
@@ -50,11 +52,15 @@ class Rights(Enum):
         return method in SAFE_METHODS and path != "/metrics" and _COMPUTING.search(path) is None
 
     def allow_websocket(self, path: str) -> bool:
-        """Whether a websocket is accepted: that of the viewer, or a cloud."""
-        return self.compute or path.rstrip("/") == "/viewer"
+        """Whether a websocket is accepted: one of a page, or a cloud."""
+        return self.compute or is_page_socket(path)
 
     def allow_message(self, kind: object) -> bool:
-        """Whether a message of the viewer's page, which is known and well-formed, is passed on."""
+        """Whether a message of a page, which is known and well-formed, is passed on.
+
+        Args:
+            kind: its kind in viser's protocol, or its name in the page's channel.
+        """
         return self.compute or kind in (CAMERA, MEMORY)
 
     @property
@@ -66,6 +72,17 @@ class Rights(Enum):
     def save(self) -> bool:
         """Whether a page may save exercises in the folder of the service."""
         return self is Rights.SAVE
+
+
+def place_of_channel(path: str) -> int | None:
+    """Which of the processes with pages has the page whose channel has this address; None: another address."""
+    found = _CHANNEL.fullmatch(path)
+    return None if found is None else int(found[1])
+
+
+def is_page_socket(path: str) -> bool:
+    """Whether a page opens a websocket there: viser's, or its channel."""
+    return path.rstrip("/") == "/viewer" or place_of_channel(path) is not None
 
 
 # Swagger UI sets inline styles and data: images; scripts come from our own files only.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hmac
 import logging
 import threading
 import time
@@ -14,7 +15,7 @@ from app.classroom.courses import Courses
 from app.exercises import Exercises
 from app.live import Lines
 from app.shared.clouds import Clouds
-from app.shared.connection import Connection, ConnectionEnded, never_silent
+from app.shared.connection import Connection, ConnectionEnded, PageConnection, never_silent
 from app.shared.maps import Maps
 from app.shared.security import Rights
 from app.shared.settings import Settings
@@ -113,6 +114,13 @@ class ViewerServer:
     async def serve(self, connection: Connection) -> ConnectionEnded:
         """Serve one visitor until the connection ends; returns why."""
         return await self._connections.serve(connection)
+
+    async def serve_channel(self, connection: PageConnection, name: str) -> ConnectionEnded:
+        """Serve the channel of this name until the connection ends; returns why."""
+        for page in list(self.pages.values()):
+            if hmac.compare_digest(page.channel.name.encode(), name.encode()):
+                return await page.channel.serve(connection, self._connections.waker.call)
+        return ConnectionEnded(1008, "there is no page of this name any more; reload it")
 
     def stop(self) -> None:
         """End every page and the server; returns when their threads have ended."""

@@ -66,7 +66,7 @@ class PortlessServer(infra.WebsockServer):
         self.visitors: dict[int, viser.ClientHandle] = {}  # viser's own, by client id
         self._open = 0  # connections
         self._throttled = ThrottledLog(log)
-        self._waker, self._packer = LoopWaker(loop, THREADS.after_steps), Packer()
+        self.waker, self._packer = LoopWaker(loop, THREADS.after_steps), Packer()
         self._stopping: asyncio.Future[None]
         self._all_ended: asyncio.Event
 
@@ -147,7 +147,7 @@ class PortlessServer(infra.WebsockServer):
     ) -> tuple[AsyncMessageBuffer, Callable[[], Coroutine[Any, Any, None]]]:
         """The buffer of a visitor's messages, and what sends them until the connection ends."""
         if viser_names.OUTBOX.is_there:
-            outbox = Outbox(number, self._waker, self._packer)
+            outbox = Outbox(number, self.waker, self._packer)
             return outbox, functools.partial(outbox.send_to, visitor)
         buffer = AsyncMessageBuffer(self._loop, persistent_messages=False)
         return buffer, functools.partial(_infra._message_producer, visitor, buffer, number)

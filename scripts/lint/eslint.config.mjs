@@ -16,16 +16,16 @@ export default [
     languageOptions: {
       ecmaVersion: 2023,
       sourceType: "script",
-      // static/viser_page.js comes first in viser's page, docs.js after the library of docs.html, and three.js first in
+      // static/viser_page.js and channel.js come first in viser's page, docs.js after the library of docs.html, and three.js first in
       // a saved page.
-      globals: { ...globals.browser, viserPage: "readonly", SwaggerUIBundle: "readonly", THREE: "readonly" },
+      globals: { ...globals.browser, viserPage: "readonly", channel: "readonly", SwaggerUIBundle: "readonly", THREE: "readonly" },
     },
     linterOptions: { reportUnusedDisableDirectives: "error" },
     rules: {
       eqeqeq: "error",
       "no-implicit-globals": ["error", { lexicalBindings: true }],
       "no-shadow": "error",
-      "no-unused-vars": ["error", { varsIgnorePattern: "^viserPage$" }],
+      "no-unused-vars": ["error", { varsIgnorePattern: "^(viserPage|channel)$" }],
       "no-use-before-define": ["error", { functions: false, variables: false }],
       "no-var": "error",
       "object-shorthand": "error",
@@ -41,10 +41,10 @@ export default [
     },
   },
   { files: ALONE, rules: { "no-implicit-globals": "off" } },
-  // Its one constant is what the other scripts call.
-  {
-    files: ["static/viser_page.js"],
-    languageOptions: { globals: { viserPage: "off" } },
+  // The one constant of each is what the other scripts call.
+  ...["viserPage", "channel"].map((name) => ({
+    files: [`static/${{ viserPage: "viser_page", channel: "channel" }[name]}.js`],
+    languageOptions: { globals: { [name]: "off" } },
     rules: { "no-implicit-globals": "off" },
-  },
+  })),
 ];

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import html
 import json
+import threading
 import time
 import weakref
 from collections.abc import Callable, Hashable
+from pathlib import Path
+from queue import Empty, Queue
 from typing import Any
 
 import msgspec
@@ -15,9 +19,10 @@ import viser
 import zstandard
 from starlette.types import Message
 from starlette.websockets import WebSocket
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from app.service.web.viewer_proxy import VisitorConnection
+from app.service.web.viewer_proxy import CHANNEL_PROTOCOL, ChannelConnection, VisitorConnection, _SocketConnection
 from app.viewer.panel.script import LABEL
 from app.viewer.session.persistence import SAVE_AFTER
 from app.viewer.session.state import KEY_LAST
@@ -34,6 +39,7 @@ _workers: weakref.WeakSet[Worker] = weakref.WeakSet()
 _acting: weakref.WeakSet[Worker] = weakref.WeakSet()
 _handled: dict[int, int] = {}
 _post, _act, _connect = Worker.post, Worker._act_once, VisitorConnection.__init__
+_connect_channel = ChannelConnection.__init__
 
 
 def _watched_post(self: Worker, key: Hashable, value: object = None) -> None:
@@ -49,28 +55,46 @@ def _watched_act(self: Worker) -> float | None:
         _acting.discard(self)
 
 
-def _watched_connect(self: VisitorConnection, visitor: WebSocket) -> None:
-    _connect(self, visitor)
+def _watched_channel(self: ChannelConnection, visitor: WebSocket) -> None:
+    _connect_channel(self, visitor)
+    _count_messages(self, visitor)
+
+
+def _count_messages(self: _SocketConnection, visitor: WebSocket) -> Callable[[], None]:
+    """Note how many messages of a connection have been handled; returns what counts one more."""
     receive, received = visitor.receive, 0
     port = visitor.client.port if visitor.client else 0
 
-    async def watched() -> Message:
+    def count() -> None:
         nonlocal received
+        received += 1
+
+    async def watched() -> Message:
         _handled[port] = received  # it asks for the next one
         event = await receive()
-        received += event["type"] == "websocket.receive"
+        if event["type"] == "websocket.receive":
+            count()
         return event
 
     visitor.receive = watched  # type: ignore[method-assign]
+
+    def count_now() -> None:
+        count()
+        _handled[port] = received
+
+    return count_now
+
+
+def _watched_connect(self: VisitorConnection, visitor: WebSocket) -> None:
+    _connect(self, visitor)
+    count = _count_messages(self, visitor)
     hear = self.hear
 
     def watched_hear(take: Callable[[bytes], bool]) -> None:
         def counted(data: bytes) -> bool:
-            nonlocal received
             taken = take(data)
-            received += taken
             if taken:
-                _handled[port] = received
+                count()
             return taken
 
         hear(counted)
@@ -80,6 +104,7 @@ def _watched_connect(self: VisitorConnection, visitor: WebSocket) -> None:
 
 Worker.post, Worker._act_once = _watched_post, _watched_act  # type: ignore[method-assign]
 VisitorConnection.__init__ = _watched_connect  # type: ignore[method-assign]
+ChannelConnection.__init__ = _watched_channel  # type: ignore[method-assign]
 
 
 def working() -> bool:
@@ -87,13 +112,64 @@ def working() -> bool:
     return bool(list(_acting)) or any(not each.join(0.0) and each._inbox.waits for each in list(_workers))
 
 
+# Messages that go in viser's connection, as static/channel.js has it.
+_SCRIPT = (Path(__file__).parents[2] / "static" / "channel.js").read_text(encoding="utf-8")
+_BESIDE = _SCRIPT.split("BESIDE_CONTROLS = new Set(", 1)[1].split(")", 1)[0]
+BESIDE_CONTROLS = frozenset(json.loads(_BESIDE))
+
+
+class _Wire:
+    """A websocket whose messages, and its end, go into a queue as ``(wire, data)``."""
+
+    def __init__(self, url: str, protocols: list[str], queue: Queue[tuple[_Wire, Any]], options: Any) -> None:
+        self._socket = connect(
+            url,
+            subprotocols=protocols,  # type: ignore[arg-type]
+            max_size=None,
+            max_queue=None,  # or its end would wait ten seconds for messages that nobody has read
+            compression=None,
+            **options,
+        )
+        self.port: int = self._socket.local_address[1]
+        self.sent = 0  # messages
+        self.ended = False
+        self._queue = queue
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        try:
+            while True:
+                self._queue.put((self, self._socket.recv()))
+        except ConnectionClosed as end:
+            self.ended = True
+            self._queue.put((self, end))
+
+    def send(self, data: bytes | str) -> None:
+        self._socket.send(data)
+        self.sent += 1
+
+    def close(self) -> None:
+        self._socket.close()
+
+    @property
+    def is_handled(self) -> bool:
+        """Whether a service in this process has handled all that was sent; of another process: True."""
+        return self.ended or _handled.get(self.port, self.sent) >= self.sent
+
+    def wait_until_handled(self) -> None:
+        """For a moment: what comes over the other connection must not pass what was sent over this one."""
+        end = time.monotonic() + WORK
+        while not self.is_handled and time.monotonic() < end:
+            time.sleep(0.0005)
+
+
 class FakeBrowser:
     """One visitor of a local port or of any URL, which may need more `options` to connect.
 
     `read` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`. `memory` is the content
     of the page's storage, `kept` what the service has stored there, and `left_off` what it has stored for the next
-    page of the browser. `said` has the last messages of the page's own script. `camera` is where the service has
-    moved it; unlike a real page, this one reports it only with `look`.
+    page of the browser. `said` has the last messages in the hidden field. `camera` is where the service has
+    moved it; unlike a real page, this one reports it only with `look`. It opens the page's channel when it comes.
     """
 
     def __init__(
@@ -109,22 +185,21 @@ class FakeBrowser:
         self.said: list[list[Any]] = []
         self.kept: list[str] = []
         self.left_off: list[str] = []
-        self._socket = connect(
-            where if isinstance(where, str) else f"ws://127.0.0.1:{where}{path}",
-            subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
-            max_size=None,
-            max_queue=None,  # or its end would wait ten seconds for messages that nobody has read
-            compression=None,
-            **options,
-        )
-        self._port: int = self._socket.local_address[1]
+        self._url = where if isinstance(where, str) else f"ws://127.0.0.1:{where}{path}"
+        self._options = options
+        self._queue: Queue[tuple[_Wire, Any]] = Queue()
+        self._wire = _Wire(self._url, [f"viser-v{viser.__version__}"], self._queue, options)
+        self.channel: _Wire | None = None
+        self._place = self._name = ""  # of the channel
+        self._number = self._noted = 0  # of the last message and the last notice
+        self.shown: dict[str, Any] = {}  # by the channel
+        self.replied: list[Any] = [0, "", []]
         self.gui: dict[str, dict[str, Any]] = {}
         self.values: dict[str, Any] = {}
         self.poses: dict[str, dict[str, tuple[float, ...]]] = {}
         self.visible: dict[str, bool] = {}
         self.nodes: dict[str, dict[str, Any]] = {}
         self.log: list[dict[str, Any]] = []
-        self._sent = 0  # messages
         self._owed = False  # whether one was sent that may still be answered
         self.answers = True  # whether the page reports its storage, as a page in the foreground does
         self.camera: dict[str, Any] = {"position": (3, 3, 3), "look_at": (0, 0, 0), "up_direction": (0, 0, 1)}
@@ -136,17 +211,20 @@ class FakeBrowser:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._socket.close()
+        self.close()
 
     def close(self) -> None:
-        self._socket.close()
+        self._wire.close()
+        if self.channel is not None:
+            self.channel.close()
 
     def send(self, type_: str, **fields: Any) -> None:
         self.send_raw(msgspec.msgpack.encode({"type": type_, **fields}))
 
     def send_raw(self, data: bytes | str) -> None:
-        self._socket.send(data)
-        self._sent += 1
+        if self.channel is not None:
+            self.channel.wait_until_handled()
+        self._wire.send(data)
         self._owed = True
 
     # What is shown
@@ -204,20 +282,57 @@ class FakeBrowser:
         self.send("GuiUpdateMessage", uuid=uuid, updates={"value": value})
 
     def say(self, name: str, argument: Any = None) -> int:
-        """Send a message as the page's own script does; returns its number."""
-        number = self.said[-1][0] + 1 if self.said else 1
-        self.said = [*self.said[-19:], [number, name, argument]]
-        self.set(LABEL, json.dumps(self.said))
-        return int(number)
+        """Send a message as the page's own scripts do; returns its number."""
+        self.wait(lambda: self.channel is not None)
+        assert self.channel is not None
+        self._number += 1
+        message = [self._number, name, argument]
+        if name in BESIDE_CONTROLS:
+            self.said = [*self.said[-19:], message]
+            self.set(LABEL, json.dumps(self.said))
+        else:
+            self._wire.wait_until_handled()
+            self.channel.send(json.dumps(message))
+            self._owed = True
+        return self._number
 
     @property
     def script(self) -> dict[str, Any]:
-        """What the page's own script knows: next steps of the history, the last reply."""
+        """What the page's own scripts know: next steps of the history, the last reply."""
         shown = next(
             m["props"]["content"] for m in self.gui.values() if "data-answers" in m["props"].get("content", "")
         )
         answers: dict[str, Any] = json.loads(html.unescape(shown.split('data-answers="', 1)[1].split('"', 1)[0]))
-        return answers
+        return {**answers, "reply": self.replied}
+
+    def open_channel(self) -> None:
+        """Open the channel of the present session, or open it anew."""
+        before, protocols = self.channel, [CHANNEL_PROTOCOL, self._name]
+        self.channel = _Wire(
+            f"{self._url.rstrip('/')}/channel/{self._place}", protocols, self._queue, self._options
+        )
+        if before is not None:
+            before.close()
+
+    def _note_channel(self, content: str) -> None:
+        place, name = content.split('data-channel="', 1)[1].split('"', 1)[0].split("/")
+        if name != self._name:
+            self._place, self._name, self.said = place, name, []
+            self._number, self._noted, self.replied = 0, 0, [0, "", []]
+            self.open_channel()
+
+    def _hear(self, wire: _Wire, text: str) -> bool:
+        """Take what came by the channel; returns whether it was more than a beat."""
+        heard = json.loads(text)
+        self.shown |= heard.get("set", {})
+        for number, name, value in heard.get("notices", []):
+            if number > self._noted:
+                self._noted = number
+                if name == "reply":
+                    self.replied = value
+        with contextlib.suppress(ConnectionClosed):  # the service has ended it since
+            wire.send(json.dumps(["heard", self._noted]))
+        return "set" in heard or "notices" in heard
 
     def updates_without_component(self) -> list[dict[str, Any]]:
         """Updates of the panel that came before their component, or after its removal."""
@@ -316,14 +431,16 @@ class FakeBrowser:
         self._owed = False
         while True:
             now = time.monotonic()
-            if now > answered and self._port in _handled:
-                self._sent = _handled[self._port]  # some messages are not passed on
-            if self._port in _handled:
-                rests = now > late or (_handled[self._port] >= self._sent and not working())
+            wires = [self._wire, *([] if self.channel is None else [self.channel])]
+            if now > answered:
+                for wire in wires:
+                    wire.sent = _handled.get(wire.port, wire.sent)  # some messages are not passed on
+            if self._wire.port in _handled:
+                rests = now > late or (all(wire.is_handled for wire in wires) and not working())
             else:
                 rests = now > answered
             if self.read(quiet if rests else 0.02):
-                answered = answered if self._port in _handled else 0.0
+                answered = answered if self._wire.port in _handled else 0.0
             elif rests:
                 return
             assert time.monotonic() < end, f"the page did not come to rest within {timeout} s"
@@ -336,11 +453,21 @@ class FakeBrowser:
 
     def read(self, timeout: float) -> bool:
         """Read one frame of messages; returns whether one came in time."""
-        try:
-            data = self._socket.recv(timeout=timeout)
-        except TimeoutError:
-            return False
-        assert isinstance(data, bytes)
+        end = time.monotonic() + timeout
+        while True:
+            try:
+                wire, data = self._queue.get(timeout=max(0.0, end - time.monotonic()))
+            except Empty:
+                return False
+            if wire is self._wire and isinstance(data, ConnectionClosed):
+                self._queue.put((wire, data))  # for the next time
+                raise data
+            if wire is self._wire:
+                break
+            if wire is self.channel and isinstance(data, ConnectionClosed):
+                self.channel = None
+            elif wire is self.channel and self._hear(wire, data):
+                return True
         size, packed = (int.from_bytes(data[i : i + 8], "little") for i in (0, 8))
         inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
         decoded = msgspec.msgpack.decode(inner)
@@ -398,6 +525,8 @@ class FakeBrowser:
                 self.gui.pop(m["uuid"], None)
             case kind if kind.startswith("Gui") and "props" in m and "uuid" in m:
                 self.gui[m["uuid"]] = m
+                if "data-channel=" in m["props"].get("content", ""):
+                    self._note_channel(m["props"]["content"])
                 self.values[m["uuid"]] = m.get("value")
             case _ if "props" in m and "name" in m:
                 self.nodes[m["name"]] = m

@@ -2,7 +2,8 @@
 
 The page and the viewer's messages come from :mod:`app.viewer`, which listens on no port: `ViewerBridge` accepts a
 websocket, and the viewer receives and sends through `VisitorConnection`, by function calls in the same event loop.
-The page connects to its own address without the trailing slash, so both forms are routes.
+viser's page connects to its own address without the trailing slash, so both forms are routes. Our own scripts in
+it have a second websocket, their channel (:mod:`app.viewer.session.channel`).
 
 Messages of visitors are inspected first (:mod:`app.service.web.inspection`); a visitor who sends invalid ones is
 disconnected without affecting others. A slow visitor must not fill our memory: sending waits until the socket
@@ -17,7 +18,9 @@ import contextlib
 import gzip
 import hashlib
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
+from typing import Any
 
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
@@ -47,6 +50,7 @@ _FULL_PAGE = short_page(
     again=10,
 )
 
+CHANNEL_PROTOCOL = "kinboard-1"  # the first subprotocol of a channel
 ADDRESSES = 8  # of the service, for which a page with an address of its own is kept
 
 # Codes that describe a lost connection and may not travel in a close frame (RFC 6455, 7.4.1).
@@ -56,6 +60,7 @@ _UNSENDABLE = {1005: 1000, 1006: 1011, 1015: 1011}
 _SCRIPTS = (
     b"start",  # says so if one of the others fails
     b"viser_page",  # the others call it
+    b"channel",  # the others send by it
     b"keys",  # may keep keys from the others
     b"viewer",
     b"input",
@@ -91,12 +96,13 @@ class ViewerBridge:
         self._pages: dict[str, _Page] = {}  # by what depends on the service's address
 
     def routes(self) -> list[BaseRoute]:
-        """The page and the websocket, each with and without the trailing slash."""
+        """The page and viser's websocket, each with and without the trailing slash, and the page's channel."""
         return [
             Route("/viewer", _add_slash),
             Route("/viewer/", self.page),
             WebSocketRoute("/viewer", self.websocket),
             WebSocketRoute("/viewer/", self.websocket),
+            WebSocketRoute("/viewer/channel/{place:int}", self.channel),
         ]
 
     async def page(self, request: Request) -> Response:
@@ -114,8 +120,7 @@ class ViewerBridge:
 
     async def websocket(self, visitor: WebSocket) -> None:
         """One visitor's connection, from the handshake to whichever side ends first."""
-        if not origin_allowed(visitor.headers, self._allowed_origins):
-            logger.warning("refused a websocket from a page of %.200r", visitor.headers.get("origin"))
+        if not self._is_ours(visitor):
             await visitor.close()  # before the handshake: a 403
             return
         if self.viewer is None:
@@ -127,14 +132,45 @@ class ViewerBridge:
             await _turn_away(visitor, "All places are taken.")
             return
         with Slot(self.slots, client), VISITORS.track_inprogress():
-            await _serve(visitor, self.viewer)
+            connection = VisitorConnection(visitor)
+            await _serve(visitor, connection, connection.subprotocol, partial(self.viewer.serve, connection))
+
+    async def channel(self, visitor: WebSocket) -> None:
+        """The channel of a page, whose name is the second of the subprotocols: addresses are logged, it is not.
+
+        Its address says which process has the page (`app.service.handover`). It takes no place of a visitor: the
+        page has one, and its channel one connection at a time.
+        """
+        protocols = list(visitor.scope["subprotocols"])
+        if not self._is_ours(visitor):
+            await visitor.close()
+        elif self.viewer is None:
+            await _turn_away(visitor, "The viewer is warming up.")
+        elif protocols[:1] != [CHANNEL_PROTOCOL] or len(protocols) != 2:
+            await visitor.close()
+        else:
+            connection = ChannelConnection(visitor)
+            serve = partial(self.viewer.serve_channel, connection, protocols[1])
+            await _serve(visitor, connection, CHANNEL_PROTOCOL, serve)
+
+    def _is_ours(self, visitor: WebSocket) -> bool:
+        """Whether a websocket may be opened by the page that does."""
+        if origin_allowed(visitor.headers, self._allowed_origins):
+            return True
+        logger.warning("refused a websocket from a page of %.200r", visitor.headers.get("origin"))
+        return False
 
 
-async def _serve(visitor: WebSocket, viewer: Viewer) -> None:
-    connection = VisitorConnection(visitor)
-    await visitor.accept(connection.subprotocol)
+async def _serve(
+    visitor: WebSocket,
+    connection: _SocketConnection,
+    protocol: str | None,
+    serve: Callable[[], Awaitable[ConnectionEnded]],
+) -> None:
+    """Accept a websocket, and close it as the viewer says that its connection has ended."""
+    await visitor.accept(protocol)
     try:
-        end = await viewer.serve(connection)
+        end = await serve()
     except Exception:
         logger.exception("a visitor's connection failed")
         end = ConnectionEnded(1011, "internal error")
@@ -146,33 +182,72 @@ async def _serve(visitor: WebSocket, viewer: Viewer) -> None:
             await visitor.close(end.code, end.reason)
 
 
-class VisitorConnection:
-    """A visitor's websocket for the viewer, whose messages are inspected."""
+class _SocketConnection:
+    """A websocket of a page."""
 
     def __init__(self, visitor: WebSocket) -> None:
-        self.subprotocol: str | None = next(iter(visitor.scope.get("subprotocols", ())), None)
         self._visitor = visitor
         self.rights = rights_of(visitor.scope)
-        self.client = client_of(visitor.scope)
-        self.silence: Callable[[], float] = visitor.scope.get("state", {}).get(SILENCE, never_silent)
-        self.room_token: str = visitor.cookies.get(ROOM_COOKIE, "")
-        self._streamed = STREAMED.labels("viewer")
-        self._line: Line | None = visitor.scope.get("state", {}).get(LINE)
 
     @property
     def is_open(self) -> bool:
         """Whether nothing has failed to be sent: after that Starlette takes no more, not even the close frame."""
         return self._visitor.application_state is WebSocketState.CONNECTED
 
+    async def _receive(self, kind: str) -> Any:
+        """The next message of this kind, bytes or text; raises `ConnectionEnded`."""
+        event = await self._visitor.receive()
+        if event["type"] == "websocket.disconnect":
+            raise ConnectionEnded(_sendable(event["code"]))
+        data = event.get(kind)
+        if data is None:
+            raise ConnectionEnded(1003, f"{'binary' if kind == 'bytes' else kind} messages only")
+        return data
+
+    async def _send(self, kind: str, data: bytes | str) -> None:
+        """Send a message; raises `ConnectionEnded`."""
+        if not self.is_open:
+            raise ConnectionEnded(1001)
+        try:
+            await self._visitor.send({"type": "websocket.send", kind: data})
+        except WebSocketDisconnect:
+            raise ConnectionEnded(1001) from None
+
+
+class ChannelConnection(_SocketConnection):
+    """A websocket of a page's channel."""
+
+    def __init__(self, visitor: WebSocket) -> None:
+        super().__init__(visitor)
+        self._streamed = STREAMED.labels("channel")
+
+    async def receive(self) -> str:
+        """The page's next text; raises `ConnectionEnded`."""
+        text: str = await self._receive("text")
+        return text
+
+    async def send(self, text: str) -> None:
+        """Send a text; raises `ConnectionEnded`."""
+        await self._send("text", text)
+        self._streamed.inc(len(text))
+
+
+class VisitorConnection(_SocketConnection):
+    """A visitor's websocket for the viewer, whose messages are inspected."""
+
+    def __init__(self, visitor: WebSocket) -> None:
+        super().__init__(visitor)
+        self.subprotocol: str | None = next(iter(visitor.scope.get("subprotocols", ())), None)
+        self.client = client_of(visitor.scope)
+        self.silence: Callable[[], float] = visitor.scope.get("state", {}).get(SILENCE, never_silent)
+        self.room_token: str = visitor.cookies.get(ROOM_COOKIE, "")
+        self._streamed = STREAMED.labels("viewer")
+        self._line: Line | None = visitor.scope.get("state", {}).get(LINE)
+
     async def receive(self) -> bytes:
         """The visitor's next message that is passed on; raises `ConnectionEnded`."""
         while True:
-            event = await self._visitor.receive()
-            if event["type"] == "websocket.disconnect":
-                raise ConnectionEnded(_sendable(event["code"]))
-            data: bytes | None = event.get("bytes")
-            if data is None:
-                raise ConnectionEnded(1003, "binary messages only")
+            data: bytes = await self._receive("bytes")
             try:
                 passes = admitted(data, self.rights)
             except MalformedMessageError as error:
@@ -183,12 +258,7 @@ class VisitorConnection:
 
     async def send(self, data: bytes) -> None:
         """Send a message of the viewer; raises `ConnectionEnded`."""
-        if not self.is_open:
-            raise ConnectionEnded(1001)
-        try:
-            await self._visitor.send({"type": "websocket.send", "bytes": data})
-        except WebSocketDisconnect:
-            raise ConnectionEnded(1001) from None
+        await self._send("bytes", data)
         self._streamed.inc(len(data))
 
     def hear(self, take: Callable[[bytes], bool]) -> None:

@@ -12,7 +12,7 @@ from app.viewer.panel.jog import JogPad
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.robots import RobotMenu
-from app.viewer.panel.script import PageScript
+from app.viewer.panel.script import Messages, PageScript
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.theme import SYSTEM_IS_DARK
@@ -32,9 +32,10 @@ class Panel:
         own: the visitor's own arm.
         system_dark: whether the visitor's system is dark.
         tabs: titles of the features' tabs.
+        messages: takes what comes in the hidden field.
 
     Attributes:
-        script: the connection to the page's own script.
+        script: the hidden field, and what the page's own scripts are shown.
         jog: buttons that move the arm in steps.
         joints, posture: folders that are filled for each robot.
         obstacles: the folder of the obstacles. Like that of `jog` it is closed at first, so that the rest fits a
@@ -60,10 +61,11 @@ class Panel:
         welcome: Notice,
         tabs: Sequence[str],
         post: Post,
+        messages: Messages,
     ) -> None:
         self.status = StatusLine(gui, welcome)
         listen(gui.add_checkbox(SYSTEM_IS_DARK, system_dark), post, "system-dark")
-        self.script = PageScript(gui, post)
+        self.script = PageScript(gui, messages)
         gui.add_html(render("panel/head"))
         self.robots = RobotMenu(gui, robots, own, robot, post)
         self.readout = PoseReadout(gui, fk(robot, robot.q_home), units)

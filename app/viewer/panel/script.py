@@ -1,19 +1,19 @@
-"""The connection to the page's own scripts: ``static/viser_page.js`` sends, ``static/input.js`` reads the answers.
+"""Messages of the page's own scripts that come in viser's connection, and what these scripts are shown.
 
-viser reports changes of its own controls only. Keys, typed fields, the buttons of our own HTML and the browser's
-*Back* button are handled by our scripts, which write messages into a hidden text field of viser's. Each message
-has a number, and the field always holds the last few: viser sends at most one change of a control per 50 ms and
-drops older ones. The answers are in a hidden HTML element, as JSON.
+The page's scripts send by their channel (:mod:`app.viewer.session.channel`). A message whose order with changes of
+viser's controls matters, such as *Undo* after a slider was moved, has to come behind these:
+``static/viser_page.js`` writes it into a hidden text field of viser's. Each message has a number, and the field
+always holds the last few: viser sends at most one change of a control per 50 ms and drops older ones.
 """
 
 from __future__ import annotations
 
 import json
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import viser
 
-from app.viewer.panel import Post, update_html
+from app.viewer.panel import update_html
 from app.viewer.views.templates import render
 from kin.parsing import Limits, read_json
 
@@ -47,15 +47,19 @@ class Reply(NamedTuple):
     readings: tuple[tuple[str, str], ...] = ()
 
 
+class Messages(Protocol):
+    """Takes messages of the page that come in viser's connection, in the order of their numbers."""
+
+    def take(self, number: int, name: str, argument: object) -> bool:
+        """Take a message. False: too many before it are missing."""
+
+
 class PageScript:
-    """Posts ``("message", name, number)`` with the argument of each message.
+    """Passes on the messages in the hidden field, and shows what the page starts with and what can be undone."""
 
-    Buttons of our own HTML post their ``data-send`` as a message without an argument.
-    """
-
-    def __init__(self, gui: viser.GuiApi, post: Post) -> None:
+    def __init__(self, gui: viser.GuiApi, messages: Messages) -> None:
         self._last = 0
-        self._answers: dict[str, object] = {"undo": "", "redo": "", "start": "", "tab": "", "reply": Reply(0, "")}
+        self._answers: dict[str, object] = {"undo": "", "redo": "", "start": "", "tab": ""}
         self._shown = gui.add_html(self._html())
         field = gui.add_text(LABEL, "")
 
@@ -64,7 +68,7 @@ class PageScript:
             if event.client is None:
                 return
             for number, name, argument in self.read(event.target.value):
-                post(("message", name, number), argument)
+                messages.take(number, name, argument)
 
     def read(self, text: str) -> list[tuple[int, str, object]]:
         """The messages in `text` that have not been read yet, as number, name and argument, in order."""
@@ -88,11 +92,6 @@ class PageScript:
     def show_start(self, state: str, tab: str) -> None:
         """Tell the page the state with which it starts, and the tab where a link to it opens; empty: the first."""
         self._answers |= {"start": state, "tab": tab}
-        update_html(self._shown, self._html())
-
-    def reply(self, reply: Reply) -> None:
-        """Answer a message that the script waits for."""
-        self._answers["reply"] = reply
         update_html(self._shown, self._html())
 
     def _html(self) -> str:

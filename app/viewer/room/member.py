@@ -189,7 +189,7 @@ class Member(Feature):
             self.page.put_back()
             self.page.status.show(Notice("advice", "Not now", why))
             if isinstance(key, tuple) and key[0] == "message":
-                self.page.panel.script.reply(Reply(int(key[2]), why))
+                self.page.channel.reply(Reply(int(key[2]), why))
         self._dirty |= self.leader != leader
         self.due = 0.0
         return not why

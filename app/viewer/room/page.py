@@ -32,7 +32,9 @@ class ClassroomPage(MemberPage):
             return
         # Not while the page is built: a database that does not answer would hold up the pages of everybody.
         news = ("news", Member.key, NEWS)
-        self.attendance = self._hub.attend(self._ticket, lambda: self.post(news), self._silence)
+        self.attendance = self._hub.attend(
+            self._ticket, lambda: self.post(news), lambda: min(self._silence(), self.channel.silence())
+        )
 
     def _build(self) -> None:
         super()._build()

@@ -37,6 +37,7 @@ from app.viewer.scene.camera import Sphere, VisitorCamera
 from app.viewer.scene.chain import center_line
 from app.viewer.session.actions.actions import Actions
 from app.viewer.session.actions.typed import BY_HAND
+from app.viewer.session.channel import Channel
 from app.viewer.session.choices import ViewState
 from app.viewer.session.controller import ArmController
 from app.viewer.session.events import LINK
@@ -104,6 +105,8 @@ class VisitorPage(ShownArm, Worker):
         self.arm = ArmController(client, services.pace, self.post, self)
         self.view, self.units, self.system_dark = ViewState(), DEFAULT_UNITS, False
         self.client, self._pace = client, services.pace
+        self.channel = Channel(self.post, rights)
+        client.gui.add_html(render("panel/channel", place=services.lines.place, name=self.channel.name))
         self._welcome, self._looking, self.may_save = welcome, rights is Rights.LOOK, rights.save
         self.door = Door(services.lines, self.post, self._looking)
         self._persistence = Persistence(self, token, self._guard, rights)
@@ -347,6 +350,7 @@ class VisitorPage(ShownArm, Worker):
         self.client.flush()
 
     def _leave(self) -> None:
+        self.channel.close()
         self.arm.leave()
         self.for_features(lambda feature: feature.on_leave())
 
@@ -441,6 +445,7 @@ class VisitorPage(ShownArm, Worker):
                 self._welcome,
                 [tab.title for tab in self.offered],
                 self.post,
+                self.channel.sequence,
             )
             self.panel.readout.use_rotations(self.view.rotations)
             self.panel.fit(gui.main_panel, self._persistence.embedded)

@@ -11,6 +11,7 @@ from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import StatusLine
 from app.viewer.scene.camera import VisitorCamera
+from app.viewer.session.channel import Channel
 from app.viewer.session.choices import ViewState
 from app.viewer.session.controller import ArmController
 from app.viewer.session.forms import Forms
@@ -31,6 +32,7 @@ class Page(Stage, Protocol):
     view: ViewState
     system_dark: bool
     looks: Looks
+    channel: Channel
     panel: Panel
     forms: Forms
     sliders: JointSliders

@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.skipif(not SUPPORTED, reason="one process on this syst
 Q = np.array([1.0, 0.5, 0.5, 0.5, 0.5])  # of the first arm
 
 
-def test_each_program_gets_to_its_page_and_no_other_request_goes_astray():
+def test_each_program_and_channel_gets_to_its_page_and_no_other_request_goes_astray():
     arm = kin.get_robot("pioneer5")
     with victim(ready=True, KINBOARD_WORKERS="2", KINBOARD_TOKEN="very secret") as service, ExitStack() as stack:
         token = {"Authorization": "Bearer very secret"}
@@ -33,6 +33,8 @@ def test_each_program_gets_to_its_page_and_no_other_request_goes_astray():
             )
             page.send("GuiUpdateMessage", uuid=page.element("Connect a program"), updates={"value": True})
             page.wait(lambda page=page: "data-live-code" in page.html)
+            page.say("axes")
+            page.wait(lambda page=page: page.value("Arrows along") == "Base axes")
             code = re.findall(r"data-live-code>([A-Z0-9-]+)<", page.html)[0]
             homes.add(home_of(code, 2))
             q = Q + 0.001 * k

@@ -8,6 +8,7 @@ import threading
 
 import pytest
 from fastapi.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
 from stored_bytes import stored_bytes
 
 from app.classroom import COOKIE, ClassroomUnavailable, RefusedError, clock
@@ -281,6 +282,14 @@ def test_with_a_token_students_join_but_do_not_open_rooms(make):
     assert student.post("/room", data={"hours": "2"}).status_code == 401
     assert stranger.get("/viewer/").status_code == 401
     guest = student.cookies["kinboard_guest"]
+    for path in ("/viewer", "/viewer/channel/0"):
+        options = {"subprotocols": ["kinboard-1", "name"]}
+        headers = {"cookie": f"kinboard_guest={guest}"}
+        with make().websocket_connect(path, **options, headers=headers) as line:
+            assert line.receive()["code"] == 1013, "admitted too"
+        with pytest.raises(WebSocketDisconnect) as refused, stranger.websocket_connect(path, **options):
+            pass
+        assert refused.value.code == 1008
     for cookie, status in ((guest, 503), (guest.replace(".", "x.", 1), 401), ("x.y", 401)):
         headers = {"cookie": f"kinboard_guest={cookie}"}
         assert make().get("/viewer/", headers=headers).status_code == status

@@ -8,6 +8,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from functools import partial
 
 import httpx2
 import msgspec
@@ -21,8 +22,8 @@ from websockets.sync.client import connect
 
 from app.service.web.inspection import BURST, RATE, MessageLimit
 from app.service.web.negotiation import accepts_gzip, is_current
-from app.service.web.viewer_proxy import ViewerBridge, VisitorConnection, _serve
-from app.shared.connection import Connection, ConnectionEnded
+from app.service.web.viewer_proxy import CHANNEL_PROTOCOL, ViewerBridge, VisitorConnection, _serve
+from app.shared.connection import Connection, ConnectionEnded, PageConnection
 from app.shared.settings import Settings
 from app.shared.slots import Slots
 
@@ -68,6 +69,16 @@ class StandIn:
                         await connection.send(bytes(range(256)) * 20_000)
                     case _:
                         await connection.send(message)
+        except ConnectionEnded as end:
+            self.endings.append(end.code)
+            return end
+
+    async def serve_channel(self, connection: PageConnection, name: str) -> ConnectionEnded:
+        """Says the name, and echoes every text."""
+        try:
+            await connection.send(name)
+            while True:
+                await connection.send(await connection.receive())
         except ConnectionEnded as end:
             self.endings.append(end.code)
             return end
@@ -480,9 +491,67 @@ def test_a_visitor_whose_connection_breaks_while_something_is_sent_leaves_no_err
         "client": ("::1", 5),
     }
     visitor = WebSocket(scope, receive, send)
-    asyncio.run(_serve(visitor, viser))
+    connection = VisitorConnection(visitor)
+    asyncio.run(_serve(visitor, connection, PROTOCOL, partial(viser.serve, connection)))
     assert viser.endings == [1001]
     assert sent == ["websocket.accept", "websocket.send"]
     late = VisitorConnection(visitor)
     with pytest.raises(ConnectionEnded):  # of another message that was on its way
         asyncio.run(late.send(HELLO))
+
+
+# The channel of a page
+
+
+def visit_channel(port: int, *protocols: str, **options):
+    return visit(
+        port, "/viewer/channel/0", subprotocols=list(protocols) or [CHANNEL_PROTOCOL, "name-1_x"], **options
+    )
+
+
+def test_a_channel_passes_texts_and_its_name_stands_in_no_address(port, viser):
+    with visit_channel(port) as page:
+        assert page.subprotocol == CHANNEL_PROTOCOL
+        assert page.recv(timeout=10) == "name-1_x"
+        page.send('[1, "é"]')
+        assert page.recv(timeout=10) == '[1, "é"]'
+
+
+@pytest.mark.parametrize(
+    "protocols", [[], ["kinboard-1"], ["name"], ["kinboard-2", "name"], ["kinboard-1", "a", "b"]]
+)
+def test_a_channel_without_one_name_is_refused(port, protocols):
+    with pytest.raises(InvalidStatus, match="403"):
+        visit(port, "/viewer/channel/0", subprotocols=protocols or None)
+
+
+def test_pages_of_other_sites_open_no_channel(port, caplog):
+    with pytest.raises(InvalidStatus, match="403"):
+        visit_channel(port, additional_headers={"Origin": "https://evil.example"})
+    assert [record.levelname for record in caplog.records if record.name != "websockets.server"] == ["WARNING"]
+
+
+@pytest.mark.parametrize(("message", "code"), [(b"[1]", 1003), ("x" * (65 * 1024 + 1), 1009)])
+def test_a_channel_takes_texts_of_at_most_64_kib(port, viser, message, code):
+    with visit_channel(port) as page:
+        assert page.recv(timeout=10) == "name-1_x"
+        page.send(message)
+        with pytest.raises(ConnectionClosed) as end:
+            page.recv(timeout=10)
+        assert end.value.rcvd is not None
+        assert end.value.rcvd.code == code
+
+
+def test_a_channel_waits_for_the_viewer_and_takes_no_place(viser):
+    bridge = ViewerBridge(slots=Slots(1))
+    app = FastAPI()
+    app.router.routes.extend(bridge.routes())
+    with serve(app) as port:
+        with visit_channel(port) as page, pytest.raises(ConnectionClosed) as end:
+            page.recv(timeout=10)
+        assert end.value.rcvd is not None
+        assert end.value.rcvd.code == 1013
+        bridge.viewer = viser
+        with visit(port), visit_channel(port) as page:
+            assert page.recv(timeout=10) == "name-1_x"
+            assert bridge.slots.taken == 1

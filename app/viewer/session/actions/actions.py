@@ -80,7 +80,7 @@ class Actions:
                     *arguments, value = message_of(self._page.features, value)
                     self._act(name, arguments, value)
                 finally:
-                    self._page.panel.script.reply(Reply(number, ""))
+                    self._page.channel.reply(Reply(number, ""))
                 return
         self._act(name, arguments, value)
 

@@ -96,9 +96,9 @@ class TypedInput:
         except EntryError as error:
             self._page.status.show(Notice("error", error.title, error.detail))
             readings = tuple((_label(text), text) for text in error.readings)
-            self._page.panel.script.reply(Reply(number, f"{error.title}. {error.detail}", readings))
+            self._page.channel.reply(Reply(number, f"{error.title}. {error.detail}", readings))
         else:
-            self._page.panel.script.reply(Reply(number, ""))
+            self._page.channel.reply(Reply(number, ""))
 
     def nudge(self, value: object) -> None:
         """Move the target by one step along, or about, an axis of the gizmo."""

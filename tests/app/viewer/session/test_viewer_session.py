@@ -379,3 +379,52 @@ def wait_for(condition: object, timeout: float = 10.0) -> None:
     while not condition():  # type: ignore[operator]
         assert time.monotonic() < end, [t.name for t in threading.enumerate()]
         time.sleep(0.02)
+
+
+# The channel
+
+
+def test_a_page_goes_on_over_another_connection_of_its_channel(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        assert tab.say("axes") == 1
+        tab.settle()
+        assert tab.value("Arrows along") == "Base axes"
+        first = tab.channel
+        tab.open_channel()
+        assert first is not None
+        tab.wait(lambda: first.ended)
+        tab.say("axes")
+        tab.settle()
+        assert tab.value("Arrows along") == "Tool axes"
+        number = tab.say("field", ["nothing", "1"])
+        tab.say("target", ["position", "?"])
+        tab.wait(lambda: tab.replied[0] == number + 1)
+
+
+def test_only_the_name_of_a_page_opens_its_channel(port: int) -> None:
+    with FakeBrowser(port) as tab:
+        tab.settle()
+        name = tab._name
+        for wrong in (name[:-1], name + "A", name.swapcase()):
+            tab._name = wrong
+            tab.open_channel()
+            opened = tab.channel
+            tab.wait(lambda opened=opened: opened.ended)  # type: ignore[misc]
+        tab._name = name
+        tab.open_channel()
+        tab.say("axes")
+        tab.settle()
+        assert tab.value("Arrows along") == "Base axes"
+
+
+def test_the_channel_of_a_page_ends_with_it(port: int) -> None:
+    tab = FakeBrowser(port)
+    tab.wait(lambda: tab.channel is not None)
+    channel = tab.channel
+    assert channel is not None
+    tab._wire.close()
+    end = time.monotonic() + 30.0
+    while not channel.ended:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    tab.close()

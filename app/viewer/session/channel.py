@@ -1,0 +1,296 @@
+"""The channel of a page: one websocket between its own scripts and its session, beside viser's connection.
+
+viser reports changes of its own controls only. Keys, typed targets and the buttons of our own HTML come by the
+channel, as texts of JSON (``static/channel.js``). The page opens it when it has read its name in hidden HTML. The
+name cannot be guessed, so it proves which session a connection belongs to; it stands in no address, because
+proxies log these.
+
+The page sends ``[number, name, argument]``, or ``["heard", k]`` for the notices that have arrived, up to the k-th,
+or ``["ask"]`` for a sign of life. The session sends ``{"heard": n, "set": {key: value}, "notices": [[k, name,
+value]]}``: the number of the last message that has come; the newest value of each key, which may skip older ones;
+notices, each once and in order. What was lost with a connection is sent again over the next one, and counts once.
+At least every `BEAT` seconds there is a text, which the page answers: so each side notices a line that is dead.
+
+A message counts up from the one before, on whatever way it comes: those whose order with viser's controls matters
+come beside these, in viser's connection (:mod:`app.viewer.panel.script`). `Sequence` puts both in order again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import secrets
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Hashable
+from typing import Final
+
+from app.shared.connection import ConnectionEnded, PageConnection
+from app.shared.metrics import DROPPED
+from app.shared.security import Rights
+from app.viewer.panel import Post
+from app.viewer.panel.script import MAX_NUMBER, Reply, read_page_json
+from app.viewer.session.events import MESSAGES
+
+log = logging.getLogger(__name__)
+
+BEAT: Final = 2.0  # s
+KEPT: Final = 500  # notices that a page has not confirmed; the oldest are dropped
+EARLY: Final = 64  # messages that wait for one before them
+PATIENCE: Final = 2.0  # s that they wait
+REPLACED: Final = 4000  # code of a connection that a newer one of the same page replaces
+MAY_LOOK: Final = "You may look here, and change nothing."
+
+Call = Callable[[Callable[[], None]], None]  # calls a function in the event loop
+
+
+class Channel:
+    """The channel of one session. `show`, `notify`, `reply`, `close` and `silence` are thread-safe.
+
+    Args:
+        post: takes ``("message", name, number)`` with the argument of each message.
+        rights: of the page.
+
+    Attributes:
+        name: what a connection has to know.
+        sequence: where messages that come another way go.
+    """
+
+    def __init__(self, post: Post, rights: Rights = Rights.FULL) -> None:
+        self.name = secrets.token_urlsafe(16)
+        self.sequence = Sequence(self._deliver)
+        self._post, self._rights = post, rights
+        self._received = 0  # the last number
+        self._heard_at = time.monotonic()
+        self._lock = threading.Lock()
+        self._values: dict[str, str] = {}  # in JSON, by key
+        self._notices: deque[tuple[int, str]] = deque(maxlen=KEPT)  # in JSON, with their numbers
+        self._count = 0  # of notices
+        self._line: _Line | None = None
+        self._closed = False
+
+    def show(self, key: str, value: object) -> None:
+        """The value of a key from now on; raises `ValueError` for one that JSON cannot hold, such as NaN."""
+        text = json.dumps(value, allow_nan=False)
+        with self._lock:
+            if self._values.get(key) == text:
+                return
+            self._values[key] = text
+            if self._line is not None:
+                self._line.changed.add(key)
+        self._wake()
+
+    def notify(self, name: str, value: object) -> None:
+        """Have the page do something once; raises `ValueError` as `show`."""
+        text = json.dumps([name, value], allow_nan=False)
+        with self._lock:
+            self._count += 1
+            self._notices.append((self._count, f"[{self._count}, {text[1:]}"))
+        self._wake()
+
+    def reply(self, reply: Reply) -> None:
+        """Answer a message that the page waits for."""
+        self.notify("reply", reply)
+
+    def close(self) -> None:
+        """The session has ended."""
+        self._closed = True
+        self._wake()
+
+    def silence(self) -> float:
+        """For how many seconds nothing has come from the page."""
+        return time.monotonic() - self._heard_at
+
+    def _wake(self) -> None:
+        line = self._line
+        if line is not None:
+            line.wake()
+
+    # The event loop
+
+    async def serve(self, connection: PageConnection, call: Call) -> ConnectionEnded:
+        """Serve a connection of the page until it ends or a newer one takes its place; returns why.
+
+        Args:
+            call: calls a function in the event loop, soon; any thread may use it.
+        """
+        line = _Line(call)
+        with self._lock:
+            line.changed.update(self._values)
+            before, self._line = self._line, line
+        if before is not None:
+            before.end_with(ConnectionEnded(REPLACED, "another connection of this page took its place"))
+        flows = [asyncio.create_task(flow(line, connection)) for flow in (self._speak, self._hear)]
+        for flow in flows:
+            flow.add_done_callback(line.note_end)
+        try:
+            return await line.ended
+        finally:
+            for flow in flows:
+                flow.cancel()
+            await asyncio.gather(*flows, return_exceptions=True)
+            with self._lock:
+                if self._line is line:
+                    self._line = None
+
+    async def _speak(self, line: _Line, connection: PageConnection) -> None:
+        while not self._closed:
+            await connection.send(self._text(line))
+            try:
+                async with asyncio.timeout(BEAT):
+                    await line.woken.wait()
+            except TimeoutError:
+                pass  # a beat
+            line.woken.clear()
+        raise ConnectionEnded(1001, "the page has ended")
+
+    def _text(self, line: _Line) -> str:
+        """What the page has not been sent over this line."""
+        with self._lock:
+            values = ", ".join(f"{json.dumps(key)}: {self._values[key]}" for key in sorted(line.changed))
+            notices = ", ".join(text for number, text in self._notices if number > line.sent)
+            line.changed.clear()
+            line.sent = self._count
+        parts = [f'"heard": {self._received}']
+        parts += [f'"set": {{{values}}}'] if values else []
+        parts += [f'"notices": [{notices}]'] if notices else []
+        return "{" + ", ".join(parts) + "}"
+
+    async def _hear(self, line: _Line, connection: PageConnection) -> None:
+        while True:
+            text = await connection.receive()
+            self._heard_at = time.monotonic()
+            try:
+                message = read_page_json(text, finite=True)
+            except ValueError:
+                raise ConnectionEnded(1007, "not a message of the page") from None
+            match message:
+                case ["heard", int(number)]:
+                    self._confirm(number)
+                case ["ask"]:
+                    line.woken.set()
+                case [int(number), str(name), argument] if type(number) is int and 0 < number < MAX_NUMBER:
+                    self._take(number, name, argument, connection.rights)
+                case _:
+                    raise ConnectionEnded(1007, "not a message of the page")
+
+    def _confirm(self, number: int) -> None:
+        with self._lock:
+            while self._notices and self._notices[0][0] <= number:
+                self._notices.popleft()
+
+    def _take(self, number: int, name: str, argument: object, rights: Rights) -> None:
+        if number <= self._received:
+            return  # it has come over an earlier connection
+        if name not in MESSAGES:
+            raise ConnectionEnded(1008, "the page has no message of this name")
+        if not (rights.allow_message(name) and self._rights.allow_message(name)):
+            DROPPED.labels("refused").inc()
+            self._received = number
+            self.sequence.leave_out(number)
+            self.reply(Reply(number, MAY_LOOK))
+        elif not self.sequence.take(number, name, argument):
+            raise ConnectionEnded(1008, f"more than {EARLY} messages are missing before this one")
+        self._received = number
+
+    def _deliver(self, number: int, name: str, argument: object) -> None:
+        key: Hashable = ("message", name, number)
+        self._post(key, argument)
+
+
+class _Line:
+    """One connection of a channel.
+
+    Attributes:
+        changed: keys whose values the page has not been sent over it.
+        sent: the last notice that was.
+        woken: something is to be sent.
+        ended: why it has ended.
+    """
+
+    def __init__(self, call: Call) -> None:
+        self.changed: set[str] = set()
+        self.sent = 0
+        self.woken = asyncio.Event()
+        self.ended: asyncio.Future[ConnectionEnded] = asyncio.get_running_loop().create_future()
+        self._call = call
+
+    def wake(self) -> None:
+        """Have what is new sent. Any thread may call it."""
+        self._call(self.woken.set)
+
+    def end_with(self, end: ConnectionEnded) -> None:
+        """End it, unless it has ended."""
+        if not self.ended.done():
+            self.ended.set_result(end)
+
+    def note_end(self, flow: asyncio.Task[None]) -> None:
+        """One of its two directions has ended."""
+        if flow.cancelled():
+            return
+        error = flow.exception()
+        if not isinstance(error, ConnectionEnded):
+            log.error("a page's channel failed", exc_info=error)
+            error = ConnectionEnded(1011, "internal error")
+        self.end_with(error)
+
+
+class Sequence:
+    """Puts messages that come in two ways into the order of their numbers, from 1. The event loop uses it.
+
+    A message waits up to `PATIENCE` for those before it. What comes later than that is passed on all the same.
+
+    Args:
+        deliver: takes number, name and argument of each message, once.
+    """
+
+    def __init__(self, deliver: Callable[[int, str, object], None]) -> None:
+        self._deliver = deliver
+        self._last = 0  # the number up to which nothing is awaited
+        self._early: dict[int, tuple[str, object] | None] = {}  # None: it is left out
+        self._missing: set[int] = set()  # up to `last`
+        self._timer: asyncio.TimerHandle | None = None
+
+    def take(self, number: int, name: str, argument: object) -> bool:
+        """Pass a message on, now or in its turn; what has come before is ignored. False: too many are missing."""
+        return self._put(number, (name, argument))
+
+    def leave_out(self, number: int) -> None:
+        """Wait for this number no longer: nothing is passed on for it."""
+        self._put(number, None)
+
+    def _put(self, number: int, message: tuple[str, object] | None) -> bool:
+        if number in self._missing:
+            self._missing.discard(number)
+            self._give(number, message)
+        elif number > self._last + EARLY:
+            return False
+        elif number > self._last:
+            self._early.setdefault(number, message)
+            self._go_on()
+        return True
+
+    def _give(self, number: int, message: tuple[str, object] | None) -> None:
+        if message is not None:
+            self._deliver(number, *message)
+
+    def _go_on(self) -> None:
+        while self._last + 1 in self._early:
+            self._last += 1
+            self._give(self._last, self._early.pop(self._last))
+        if not self._early and self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        elif self._early and self._timer is None:
+            self._timer = asyncio.get_running_loop().call_later(PATIENCE, self._skip)
+
+    def _skip(self) -> None:
+        """Wait no longer for what is missing before the first message that has come."""
+        self._timer = None
+        first = min(self._early)
+        self._missing.update(range(self._last + 1, first))
+        self._missing = set(sorted(self._missing)[-EARLY:])
+        self._last = first - 1
+        self._go_on()

@@ -1,0 +1,149 @@
+"use strict";
+// The page's own connection to its session (app/viewer/session/channel.py says what both send): messages of our scripts and
+// their answers. viser brings its name, in hidden HTML, with each new session. A connection that is lost is opened again, and
+// what was not confirmed is sent again: each message counts once. A new session must not act on messages to the one before.
+const channel = (() => {
+  const PROTOCOL = "kinboard-1";
+  const REPLACED = 4000; // code of a connection that a newer one of this page replaces
+  const LONGEST = 56000; // bytes of a message; the service closes a connection that sends more than 64 KiB at once
+  const MOST = 200; // messages that wait for the connection; later ones are refused
+  const AGAIN = 500, SELDOM = 4000; // ms until another try to connect
+  const DEAD = 6500; // ms without a sign of the service, which gives one every two seconds
+  // Their order with changes of viser's controls matters: they go with these, in viser's connection.
+  const BESIDE_CONTROLS = new Set(["undo", "redo", "travel", "released", "field", "lesson"]);
+
+  let [place, name] = ["", ""]; // of the channel: which process of the service has the session, and what proves that it is ours
+  let socket = null;
+  let opened = false; // whether this session has been connected
+  let tries = 0;
+  let timer = 0; // of the next try
+  let heardAt = 0; // ms
+  let number = 0; // of the last message
+  let unconfirmed = []; // [number, text]
+  let noted = 0; // the last notice
+  const waiting = new Map(); // number of a message → what to do with its reply
+  const values = new Map(); // by key
+  const watchers = new Map(); // key → what to call with its value
+  const doers = new Map(); // name of a notice → what to call with its value
+  const lineWatchers = [];
+  const tellLine = (what) => { for (const act of lineWatchers) act(what); };
+
+  const bytes = (text) => new TextEncoder().encode(text).length;
+  const isOpen = () => socket?.readyState === WebSocket.OPEN;
+  function attempt(act, ...given) { // the others are called all the same
+    try { act(...given); } catch (error) { reportError(error); }
+  }
+
+  /** Send a message to the session. done(error, readings) gets its answer. Returns whether there is a session. */
+  function send(message, argument = null, done = null) {
+    if (!name) return false;
+    const text = JSON.stringify([number + 1, message, argument]);
+    const refused = bytes(text) > LONGEST ? "This text is too long." : unconfirmed.length >= MOST ? "There is no connection." : "";
+    if (refused) { done?.(refused, []); return true; }
+    number++;
+    if (done) waiting.set(number, done);
+    if (BESIDE_CONTROLS.has(message) && viserPage.writeField([number, message, argument])) return true;
+    unconfirmed.push([number, text]);
+    sendText(text);
+    return true;
+  }
+  function sendText(text) {
+    if (!isOpen()) return;
+    socket.send(text);
+    tellLine("sent");
+  }
+
+  /** The session's answer to message `to`; earlier ones without an answer are done too. */
+  doers.set("reply", ([to, error, readings]) => {
+    for (const [sent, done] of [...waiting]) {
+      if (sent > to) continue;
+      waiting.delete(sent);
+      if (sent === to) attempt(done, error, readings);
+      else attempt(done, "", []);
+    }
+  });
+
+  function hear({ data }) {
+    const { set = {}, notices = [], heard } = JSON.parse(data);
+    heardAt = performance.now();
+    unconfirmed = unconfirmed.filter(([sent]) => sent > heard);
+    for (const [key, value] of Object.entries(set)) {
+      values.set(key, value);
+      for (const act of watchers.get(key) ?? []) attempt(act, value);
+    }
+    for (const [count, what, value] of notices) {
+      if (count <= noted) continue;
+      noted = count;
+      const act = doers.get(what);
+      if (act) attempt(act, value);
+    }
+    if (isOpen()) socket.send(JSON.stringify(["heard", noted]));
+    tellLine("heard");
+  }
+
+  function open() {
+    clearTimeout(timer);
+    const address = new URL(`channel/${place}`, location.href);
+    address.protocol = address.protocol.replace("http", "ws");
+    address.search = address.hash = "";
+    heardAt = performance.now();
+    const made = socket = new WebSocket(address, [PROTOCOL, name]);
+    made.addEventListener("open", () => {
+      if (socket !== made) return;
+      tries = 0;
+      heardAt = performance.now();
+      if (!opened) { opened = true; dispatchEvent(new Event("kinboard-connect")); }
+      for (const [, text] of unconfirmed) made.send(text);
+    });
+    made.addEventListener("message", (event) => { if (socket === made) hear(event); });
+    made.addEventListener("close", ({ code }) => {
+      if (socket !== made) return;
+      socket = null;
+      tellLine("closed");
+      if (code !== REPLACED) timer = setTimeout(open, Math.min(AGAIN * 2 ** tries++, SELDOM));
+    });
+  }
+  function leave() {
+    const left = socket;
+    socket = null;
+    left?.close();
+  }
+  setInterval(() => {
+    if (!socket || performance.now() - heardAt < DEAD) return;
+    leave();
+    open();
+  }, 1000);
+
+  viserPage.watchHtml("<div hidden data-channel", (html) => {
+    const found = new DOMParser().parseFromString(html, "text/html").body.firstElementChild.dataset.channel.split("/");
+    if (found[1] === name) return;
+    leave();
+    [place, name] = found;
+    [opened, tries, number, noted, unconfirmed] = [false, 0, 0, 0, []];
+    waiting.clear();
+    values.clear();
+    viserPage.emptyField();
+    open();
+  });
+
+  return {
+    send,
+    /** Whether messages reach the session now. */
+    isOpen,
+    /** The name of the present session's channel, "" before the first one. */
+    name: () => name,
+    /** Ask the service for a sign of life. */
+    ask: () => { if (isOpen()) socket.send('["ask"]'); },
+    /** Call `act` with the value of a key, now if there is one and whenever it changes. */
+    watch(key, act) {
+      watchers.set(key, [...(watchers.get(key) ?? []), act]);
+      if (values.has(key)) act(values.get(key));
+    },
+    /** The value of a key, or undefined. */
+    value: (key) => values.get(key),
+    /** Call `act` with the value of each notice of this name. */
+    on: (what, act) => { doers.set(what, act); },
+    /** Call `act` with "sent" or "heard" when a text goes to the service or comes from it, and with "closed". */
+    watchLine: (act) => { lineWatchers.push(act); },
+  };
+})();

@@ -1,0 +1,302 @@
+"""The channel of a page: what it takes, what it refuses, and what comes through a lost connection."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import json
+import math
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from app.shared.connection import ConnectionEnded
+from app.shared.security import Rights
+from app.viewer.panel.script import Reply
+from app.viewer.session import channel as module
+from app.viewer.session.channel import EARLY, MAY_LOOK, REPLACED, Channel, Sequence
+from app.viewer.session.events import MESSAGES
+
+
+class Line:
+    """A page's end of a connection: what it says, and what it has been sent."""
+
+    def __init__(self, rights: Rights = Rights.FULL) -> None:
+        self.rights = rights
+        self.sent: list[dict[str, Any]] = []
+        self._says: asyncio.Queue[str | ConnectionEnded] = asyncio.Queue()
+
+    def say(self, *message: object) -> None:
+        self._says.put_nowait(json.dumps(message))
+
+    def say_text(self, text: str) -> None:
+        self._says.put_nowait(text)
+
+    def cut(self) -> None:
+        self._says.put_nowait(ConnectionEnded(1006))
+
+    async def receive(self) -> str:
+        found = await self._says.get()
+        if isinstance(found, ConnectionEnded):
+            raise found
+        return found
+
+    async def send(self, text: str) -> None:
+        self.sent.append(json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON")))
+
+    @property
+    def notices(self) -> list[tuple[int, str, Any]]:
+        return [tuple(each) for text in self.sent for each in text.get("notices", [])]
+
+
+class Page:
+    """A channel with what it has posted."""
+
+    def __init__(self, rights: Rights = Rights.FULL) -> None:
+        self.posted: list[tuple[Any, object]] = []
+        self.channel = Channel(lambda key, value: self.posted.append((key, value)), rights)
+        self.ends: list[asyncio.Task[ConnectionEnded]] = []
+
+    def connect(self, rights: Rights = Rights.FULL) -> Line:
+        line = Line(rights)
+        loop = asyncio.get_running_loop()
+        self.ends.append(loop.create_task(self.channel.serve(line, loop.call_soon_threadsafe)))
+        return line
+
+    async def end(self, which: int = -1) -> ConnectionEnded:
+        return await asyncio.wait_for(self.ends[which], 5)
+
+    async def leave(self) -> None:
+        self.channel.close()
+        await asyncio.wait(self.ends, timeout=5)
+
+
+async def rest() -> None:
+    """Let everything happen that waits for nothing."""
+    for _ in range(20):
+        await asyncio.sleep(0)
+
+
+def run(play: Callable[[Page], Coroutine[Any, Any, None]], rights: Rights = Rights.FULL) -> Page:
+    async def whole() -> Page:
+        page = Page(rights)
+        await play(page)
+        await page.leave()
+        return page
+
+    return asyncio.run(whole())
+
+
+def test_messages_are_posted_once_and_in_order_over_two_connections() -> None:
+    async def play(page: Page) -> None:
+        first = page.connect()
+        first.say(1, "jog", ["tool", 0, 1, 10])
+        first.say(2, "snap", True)
+        await rest()
+        assert page.channel.silence() < 5.0
+        first.cut()
+        assert (await page.end()).code == 1006
+        second = page.connect()
+        second.say(2, "snap", True)  # its confirmation was lost
+        second.say(3, "snap", False)
+        await rest()
+        assert [text["heard"] for text in second.sent][:1] == [2], "what has arrived is said first"
+
+    assert run(play).posted == [
+        (("message", "jog", 1), ["tool", 0, 1, 10]),
+        (("message", "snap", 2), True),
+        (("message", "snap", 3), False),
+    ]
+
+
+def test_notices_come_again_until_they_are_confirmed_and_values_are_the_newest() -> None:
+    async def play(page: Page) -> None:
+        first = page.connect()
+        await rest()
+        page.channel.show("history", ["a", ""])
+        page.channel.show("history", ["b", ""])
+        page.channel.reply(Reply(1, "no"))
+        page.channel.reply(Reply(2, ""))
+        await rest()
+        assert [text["set"] for text in first.sent if "set" in text] == [{"history": ["b", ""]}]
+        assert first.notices == [(1, "reply", [1, "no", []]), (2, "reply", [2, "", []])]
+        first.say("heard", 1)
+        await rest()
+        first.cut()
+        await page.end()
+        second = page.connect()
+        await rest()
+        assert second.sent[0]["set"] == {"history": ["b", ""]}
+        assert second.notices == [(2, "reply", [2, "", []])]
+        page.channel.show("history", ["b", ""])
+        await rest()
+        assert len(second.sent) == 1, "an equal value is not sent"
+
+    run(play)
+
+
+def test_the_newest_connection_of_a_page_is_served_also_where_the_old_one_ends_later() -> None:
+    async def play(page: Page) -> None:
+        page.connect()
+        await rest()
+        new = page.connect()
+        assert (await page.end(0)).code == REPLACED
+        await rest()
+        page.channel.show("key", 1)
+        new.say(1, "axes", None)
+        await rest()
+        assert new.sent[-1]["set"] == {"key": 1}
+
+    assert run(play).posted == [(("message", "axes", 1), None)]
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("", 1007),
+        ("{}", 1007),
+        ("[]", 1007),
+        ('[1, "snap"]', 1007),
+        ('[true, "snap", 1]', 1007),
+        ('[0, "snap", 1]', 1007),
+        ('[1.0, "snap", 1]', 1007),
+        (f'[{2**53}, "snap", 1]', 1007),
+        (f'[{"9" * 5000}, "snap", 1]', 1007),
+        ('[1, ["snap"], 1]', 1007),
+        ('[1, "snap", NaN]', 1007),
+        ('[1, "snap", Infinity]', 1007),
+        ('[1, "snap", 1e999]', 1007),
+        ('[1, "snap", "\\ud800"]', 1007),
+        (f'[1, "snap", {"[" * 40}{"]" * 40}]', 1007),
+        (f'[1, "snap", {"[" * 60_000}]', 1007),
+        (f'[1, "snap", [{"0," * 20_001}0]]', 1007),
+        (f'[1, "snap", "{"x" * 65_536}"]', 1007),
+        ('[1, "hold", 1]', 1008),
+        ('[1, "gizmo", 1]', 1008),
+        ('[1, "robot", "ur5"]', 1008),
+        (f'[{EARLY + 1}, "snap", 1]', 1008),
+    ],
+    ids=lambda value: f"{value!s:.30}",
+)
+def test_bad_input_ends_its_connection_in_words_and_reaches_neither_page_nor_log(
+    text: str, code: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def play(page: Page) -> None:
+        line = page.connect()
+        line.say_text(text)
+        end = await page.end()
+        assert end.code == code
+        assert end.reason
+        assert len(end.reason.encode()) <= 123, "a close frame takes no more"
+        again = page.connect()
+        again.say(1, "snap", True)
+        await rest()
+
+    assert run(play).posted == [(("message", "snap", 1), True)], "the page goes on"
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("door", ["page", "connection"])
+def test_who_may_only_look_is_answered_and_changes_nothing(door: str) -> None:
+    looking = Rights.LOOK
+
+    async def play(page: Page) -> None:
+        line = page.connect(looking if door == "connection" else Rights.FULL)
+        for number, name in enumerate(MESSAGES, 1):
+            line.say(number, name, "hello")
+        await rest()
+        replies = [value for _, _, value in line.notices]
+        assert replies == [[number, MAY_LOOK, []] for number in range(1, len(MESSAGES) + 1)]
+
+    assert run(play, looking if door == "page" else Rights.FULL).posted == []
+
+
+def test_a_value_that_no_page_could_read_is_the_error_of_who_shows_it() -> None:
+    channel = Channel(lambda *_: None)
+    with pytest.raises(ValueError, match="JSON"):
+        channel.show("key", math.nan)
+    with pytest.raises(ValueError, match="JSON"):
+        channel.notify("reply", [math.inf])
+
+
+def test_a_page_that_confirms_nothing_fills_no_memory() -> None:
+    channel = Channel(lambda *_: None)
+    for k in range(2 * module.KEPT):
+        channel.reply(Reply(k, ""))
+    assert len(channel._notices) == module.KEPT
+
+
+def test_a_beat_comes_by_itself_and_when_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def play(page: Page) -> None:
+        line = page.connect()
+        await rest()
+        assert len(line.sent) == 1
+        line.say("ask")
+        await rest()
+        assert line.sent[1] == {"heard": 0}
+        monkeypatch.setattr(module, "BEAT", 0.0)
+        line.say("ask")
+        await rest()
+        await asyncio.sleep(0.001)
+        await rest()
+        assert len(line.sent) > 4
+
+    run(play)
+
+
+def test_a_closed_session_ends_its_connections() -> None:
+    async def play(page: Page) -> None:
+        page.connect()
+        await rest()
+        page.channel.close()
+        assert (await page.end()).code == 1001
+        page.connect()
+        assert (await page.end()).code == 1001
+
+    run(play)
+
+
+# Messages that come in two ways
+
+
+@contextmanager
+def sequence(loop: asyncio.AbstractEventLoop) -> Iterator[tuple[Sequence, list[int]]]:
+    found: list[int] = []
+    yield Sequence(lambda number, name, argument: found.append(number)), found
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations((1, 2, 3, 4))))
+def test_messages_of_both_ways_are_in_the_order_in_which_they_were_sent(order: tuple[int, ...]) -> None:
+    async def play() -> None:
+        with sequence(asyncio.get_running_loop()) as (put, found):
+            for number in (*order, *order):
+                assert put.take(number, "jog", None)
+            assert found == [1, 2, 3, 4]
+
+    asyncio.run(play())
+
+
+def test_what_is_missing_is_waited_for_a_while_and_passed_on_when_it_comes_late(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "PATIENCE", 0.0)
+
+    async def play() -> None:
+        with sequence(asyncio.get_running_loop()) as (put, found):
+            put.take(2, "undo", None)
+            put.take(5, "undo", None)
+            assert found == []
+            while len(found) < 2:
+                await asyncio.sleep(0)
+            assert found == [2, 5]
+            for number in (4, 3, 1, 3, 2):
+                put.take(number, "jog", None)
+            assert found == [2, 5, 4, 3, 1]
+            put.leave_out(6)
+            put.take(7, "jog", None)
+            assert found[-1] == 7
+            assert not put.take(7 + EARLY + 1, "jog", None)
+
+    asyncio.run(play())
