@@ -113,7 +113,8 @@ def pytest_runtest_makereport() -> Iterator[None]:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option that renews ``tests/data/snapshots``."""
+    """Add options: to renew ``tests/data/snapshots``, and to let another process compute for REST."""
+    parser.addoption("--compute", action="store_true", help="another process computes answers of REST")
     parser.addoption(
         "--snapshot-update", action="store_true", help="rewrite tests/data/snapshots with today's answers"
     )

@@ -122,33 +122,57 @@ def held_json(content: object, batch: Batch, reservation: Reservation, memory: A
 
 def held_response(pieces: list[bytes], reservation: Reservation) -> Response:
     """A JSON response of these pieces."""
+    size = sum(map(len, pieces))
+    head = [(b"content-type", MEDIA_TYPE.encode()), (b"content-length", b"%d" % size)]
+    return response_of(200, head, pieces, reservation)
+
+
+def response_of(
+    status: int, headers: list[tuple[bytes, bytes]], pieces: list[bytes], reservation: Reservation
+) -> Response:
+    """A response of these pieces.
+
+    Args:
+        status: of the response.
+        headers: all of them, with its length.
+        pieces: of its body.
+        reservation: room for them.
+    """
     if sum(map(len, pieces)) <= SENT:
         reservation.release()
-        return Response(b"".join(pieces), media_type=MEDIA_TYPE)
-    return HeldResponse(pieces, reservation)
+        response = Response(b"".join(pieces), status)
+    else:
+        response = HeldResponse(pieces, reservation, status)
+    response.raw_headers = headers
+    return response
 
 
 class HeldResponse(Response):
-    """A computed response that is sent in pieces; what has been sent is dropped."""
+    """A computed response that is sent in pieces; what has been sent is dropped. Headers are set afterwards."""
 
-    def __init__(self, pieces: Iterable[bytes], reservation: Reservation) -> None:
-        super().__init__(media_type=MEDIA_TYPE)
+    def __init__(self, pieces: Iterable[bytes], reservation: Reservation, status: int) -> None:
+        super().__init__(status_code=status)
         self._pieces = deque(pieces)
         self._reservation = reservation
-        self.headers["content-length"] = str(sum(map(len, self._pieces)))
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
         try:
-            for piece in self._in_order():
+            for piece in self.taken():
                 await send({"type": "http.response.body", "body": piece, "more_body": True})
             await send({"type": "http.response.body", "body": b"", "more_body": False})
         finally:
             self._pieces.clear()
             self._reservation.release()
 
-    def _in_order(self) -> Iterator[bytes]:
-        left = sum(map(len, self._pieces))
+    @property
+    def size(self) -> int:
+        """Bytes of the pieces that are left."""
+        return sum(map(len, self._pieces))
+
+    def taken(self) -> Iterator[bytes]:
+        """The pieces, joined to larger ones. Each is dropped when the next one is asked for."""
+        left = self.size
         while self._pieces:
             together = [self._pieces.popleft()]
             size = len(together[0])

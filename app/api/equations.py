@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
+import threading
 from functools import partial
 from typing import Literal
 
@@ -23,18 +23,20 @@ from app.api.schemas import (
     reply,
     settings_of,
 )
-from app.api.work import TooSlowError, busy, compute_slots, computed
+from app.api.work import Deadline, TooSlowError, busy, computed
 from app.equations import Book, DerivationError, Equation, Symbol, book_later, typeset
 from app.equations.expression import Expression
 from app.shared.answers.answer import Answer
 from app.shared.computations import TooManyPendingError
 from app.shared.problems import FieldError
+from app.shared.threads.turns import paused
 from kin import Robot
 from kin.transforms import Array
 
 router = versioned("robots")
 
 GOES_ON = "The derivation goes on: repeat the request later"
+LOOK = 0.1  # s between two looks at the client and the time of a request that waits for a derivation
 ENTRIES, VALUE = 13, 240  # equations of an arm, and bytes of one's values, about
 
 EXAMPLES = {
@@ -169,7 +171,11 @@ async def equations(request: Request, robot: Robot) -> Response:
     any other arm: a closed form derived from its DH table, checked against forward kinematics before it is shown.
     The first request for such an arm may take some seconds. It has at most 16 rows.
     """
-    found = await _book(request, robot)
+    return await computed(request, partial(_formulas, robot))
+
+
+def _formulas(robot: Robot, deadline: Deadline) -> Response:
+    found = _book(robot, deadline)
     return reply(
         EquationsAnswer(
             source=found.source,
@@ -202,29 +208,36 @@ async def equation_values(request: Request, robot: Robot, body: EquationsRequest
 
     One configuration gets one answer; a list gets `{"results": [...]}` in the same order.
     """
-    found = await _book(request, robot)
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
-    batch = Batch("q", len(q), single, VALUE * ENTRIES)
-    return await computed(request, partial(one_or_all, lambda some: _values(found, q[some]), batch))
+    return await computed(request, partial(_all_values, robot, q, Batch("q", len(q), single, VALUE * ENTRIES)))
 
 
-async def _book(request: Request, robot: Robot) -> Book:
-    """The equations of an arm; the request waits for them with a slot."""
-    work = compute_slots(request)
-    async with work.slot(request) as deadline:
-        with contextlib.ExitStack() as subscriptions:
-            try:
-                waiting = subscriptions.enter_context(book_later(robot, limited=True))
-                return await work.wait(waiting.future, deadline, GOES_ON)
-            except TooManyPendingError as error:
-                raise busy(f"The equations of {error.pending} arms are being derived already.") from None
-            except DerivationError as error:
-                expected = f"another arm: {error}"
-                raise invalid(FieldError(field="robot", value=robot.id, expected=expected)) from None
-            except TooSlowError:
-                # The client may come back for it.
-                asyncio.get_running_loop().call_later(work.seconds, subscriptions.pop_all().close)
-                raise
+def _all_values(robot: Robot, q: Array, batch: Batch, deadline: Deadline) -> Response:
+    found = _book(robot, deadline)
+    return one_or_all(lambda some: _values(found, q[some]), batch, deadline)
+
+
+def _book(robot: Robot, deadline: Deadline) -> Book:
+    """The equations of an arm, for which this thread waits."""
+    with contextlib.ExitStack() as subscriptions:
+        try:
+            waiting = subscriptions.enter_context(book_later(robot, limited=True))
+            with paused():
+                while True:
+                    with contextlib.suppress(TimeoutError):
+                        return waiting.future.result(LOOK)
+                    deadline.check_now(GOES_ON)
+        except TooManyPendingError as error:
+            raise busy(f"The equations of {error.pending} arms are being derived already.") from None
+        except DerivationError as error:
+            expected = f"another arm: {error}"
+            raise invalid(FieldError(field="robot", value=robot.id, expected=expected)) from None
+        except TooSlowError:
+            # The client may come back for it.
+            leaving = threading.Timer(deadline.seconds, subscriptions.pop_all().close)
+            leaving.daemon = True
+            leaving.start()
+            raise
 
 
 def _equation(found: Book, equation: Equation) -> EquationAnswer:

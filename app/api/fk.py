@@ -99,7 +99,13 @@ async def forward_kinematics(request: Request, robot: Robot, body: FkRequest) ->
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
     axes = body.axes(robot)
     batch = Batch("q", len(q), single, POSE + FRAME * len(robot.rows) * body.frames, "frames false")
-    answer = partial(one_or_all, lambda some: fk_answers(robot, q[some], body.frames, body.frame, axes), batch)
+    answer = partial(_answers, robot, q, (body.frames, body.frame, axes), batch)
     if is_warm(request) and len(q) <= FEW:
         return answer(Deadline(compute_slots(request)))
     return await computed(request, answer)
+
+
+def _answers(
+    robot: Robot, q: Array, options: tuple[bool, str, Array | None], batch: Batch, deadline: Deadline
+) -> Response:
+    return one_or_all(lambda some: fk_answers(robot, q[some], *options), batch, deadline)

@@ -26,8 +26,9 @@ from app.api.schemas import (
     example,
     reply,
     settings_of,
+    store_of,
 )
-from app.api.work import Deadline, computed
+from app.api.work import Deadline, compute_slots, computed, computed_here
 from app.shared.answers.answer import Answer
 from app.shared.answers.ik import Brief, IkAnswer, WholeAnswers, ik_answer, ik_renewed
 from app.shared.metrics import SOLVE_SECONDS
@@ -131,34 +132,56 @@ async def inverse_kinematics(request: Request, robot: Robot, body: IkRequest, fi
     """
     names, settings = names_of(fields), settings_of(request)
     if not isinstance(body.target, list):
-        answered = _at_once(robot, body, body.target, names, settings)
+        answered = await _alone(request, robot, body, body.target, names)
         if answered is not None:
             return answered
-    return await computed(request, partial(_solve, robot, body, names, settings))
+    return await computed(request, partial(_solve, robot, body, names, settings), _observe)
 
 
-def _at_once(
-    robot: Robot, body: IkRequest, target: Target, names: tuple[str, ...], settings: Settings
+async def _alone(
+    request: Request, robot: Robot, body: IkRequest, target: Target, names: tuple[str, ...]
 ) -> Response | None:
-    """The answer to one target if it is there sooner than a thread could be asked for it; else None.
+    """The answer to one target if it is there sooner than a thread or process could be asked for it; else None.
 
-    So the arm has been asked before, and joints are not locked: neither kernels nor formulas are made now.
+    So the arm has been asked before, and joints are not locked: neither kernels nor formulas are made now. Where
+    other processes compute, an arm of this service is asked by a thread of this process the first time.
     """
     given = body.keywords
     avoids = given["avoid_self_collision"] or given["obstacles"]
     if given["locked"] is not None or avoids or body.constant_frames:
         return None
-    (seed,) = _seeds(robot, body, 1, settings)
+    (seed,) = _seeds(robot, body, 1, settings_of(request))
     goal = body.resolve(robot, target, "target", seed)
-    if _ANSWERED.get((id(robot), goal.task)) is not robot:
+    if _ANSWERED.get((id(robot), goal.task)) is robot:
+        return _at_once(robot, body, goal, seed, names)
+    if compute_slots(request).pool is None or robot not in store_of(request):
         return None
+    return await computed_here(request, lambda _: _first(robot, body, goal, seed, names))
+
+
+def _first(
+    robot: Robot, body: IkRequest, goal: Goal, seed: Array | None, names: tuple[str, ...]
+) -> Response | None:
+    """`_at_once`, which loads what solves the arm; later ones are answered by the event loop."""
+    answer = _at_once(robot, body, goal, seed, names)
+    _ANSWERED[id(robot), goal.task] = robot
+    return answer
+
+
+def _observe(seconds: float) -> None:
+    SOLVE_SECONDS.labels("rest").observe(seconds)
+
+
+def _at_once(
+    robot: Robot, body: IkRequest, goal: Goal, seed: Array | None, names: tuple[str, ...]
+) -> Response | None:
     began = time.perf_counter()
     result = solve_at_once(robot, goal.T, body.options(goal.task), seed, goal.rounding)
-    if result is None:  # the thread that is asked next counts the request
+    if result is None:  # what is asked next counts the request
         return None
     whole = ik_answer(result)
     answer = reply(brief(whole, names) if names else whole)
-    SOLVE_SECONDS.labels("rest").observe(time.perf_counter() - began)
+    _observe(time.perf_counter() - began)
     return answer
 
 
@@ -183,10 +206,9 @@ def _solve(
     def answers(some: slice) -> list[IkAnswer | dict[str, Any]]:
         return [answer(goal, seed) for goal, seed in zip(targets[some], seeds[some], strict=True)]
 
-    with SOLVE_SECONDS.labels("rest").time():
-        first = options[targets[0].task]
-        batch = Batch("target", len(targets), single, _size(robot, first), _advice(first))
-        return one_or_all(answers, batch, deadline)
+    first = options[targets[0].task]
+    batch = Batch("target", len(targets), single, _size(robot, first), _advice(first))
+    return one_or_all(answers, batch, deadline)
 
 
 def _solve_together(
@@ -215,10 +237,7 @@ def _solve_together(
         return [brief(each, names) for each in found] if names else found
 
     size = size_of(robot, names) if quick(names) else _size(robot, options)
-    with SOLVE_SECONDS.labels("rest").time():
-        return one_or_all(
-            answers, Batch("target", len(T), False, size, "" if names else _advice(options)), deadline
-        )
+    return one_or_all(answers, Batch("target", len(T), False, size, "" if names else _advice(options)), deadline)
 
 
 def _whole(robot: Robot, task: Task, result: IKResult) -> IkAnswer:

@@ -14,10 +14,11 @@ from app.api.arms.operation import operation
 from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
 from app.api.schemas import POST_REFUSALS, Configurations, example, settings_of
-from app.api.work import computed
+from app.api.work import Deadline, computed
 from app.shared.answers.answer import Answer
 from app.shared.answers.jacobian import JacobianAnswer, jacobian_answers
 from kin import Robot
+from kin.transforms import Array
 
 router = versioned("kinematics")
 
@@ -67,6 +68,8 @@ async def geometric_jacobian(request: Request, robot: Robot, body: JacobianReque
     """
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
     batch = Batch("q", len(q), single, REST + ENTRY * 6 * robot.n)
-    return await computed(
-        request, partial(one_or_all, lambda some: jacobian_answers(robot, q[some], body.frame), batch)
-    )
+    return await computed(request, partial(_answers, robot, q, body.frame, batch))
+
+
+def _answers(robot: Robot, q: Array, frame: Literal["base", "tool"], batch: Batch, deadline: Deadline) -> Response:
+    return one_or_all(lambda some: jacobian_answers(robot, q[some], frame), batch, deadline)

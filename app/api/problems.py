@@ -74,8 +74,8 @@ def install_problem_handlers(app: FastAPI) -> None:
     """Make every error response of `app`, unhandled exceptions included, a problem document."""
     app.add_exception_handler(StarletteHTTPException, _http_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
-    app.add_exception_handler(UnknownRobotError, _unknown_robot)
-    app.add_exception_handler(InputError, _input_error)
+    app.add_exception_handler(UnknownRobotError, _core_error)
+    app.add_exception_handler(InputError, _core_error)
     app.add_exception_handler(ClientLeftError, _client_left)
     app.add_exception_handler(Exception, _internal_error)
 
@@ -126,14 +126,17 @@ async def _validation_error(request: Request, error: Exception) -> Response:
     return respond(invalid(*(field_error(item) for item in error.errors())))
 
 
-async def _unknown_robot(request: Request, error: Exception) -> Response:
-    assert isinstance(error, UnknownRobotError)
-    return respond(unknown_robot(error))
+def as_problem(error: Exception) -> ProblemError | None:
+    """The error of the core that a client has caused, as a problem; None: it is another error."""
+    if isinstance(error, UnknownRobotError):
+        return unknown_robot(error)
+    return invalid(from_input_error(error)) if isinstance(error, InputError) else None
 
 
-async def _input_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, InputError)
-    return respond(invalid(from_input_error(error)))
+async def _core_error(request: Request, error: Exception) -> Response:
+    problem = as_problem(error)
+    assert problem is not None
+    return respond(problem)
 
 
 async def _client_left(request: Request, error: Exception) -> Response:

@@ -1,7 +1,8 @@
 """Limits of computation: how many requests compute at a time, for how long, and only while the client is there.
 
-Requests that compute run in threads, of which there are few. So each needs a slot, and waits for a free one
-without occupying a thread. Its time starts when it has a slot. A thread cannot be ended from outside: the
+Requests are computed by other processes (:mod:`app.service.pool`), or in threads where there are none, and for
+answers that are sent while they are computed. Of both there are few. So each request needs a slot, and waits for a
+free one without occupying a thread. Its time starts when it has a slot. A thread cannot be ended from outside: the
 computation calls `Deadline.check` between targets, and ends when that raises. It also raises once the client has
 left, which is watched for after a moment: most answers are there before.
 """
@@ -14,7 +15,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import Future
 from contextlib import asynccontextmanager, contextmanager
 from contextvars import ContextVar
-from typing import Annotated, TypeVar
+from typing import Annotated, Protocol, TypeVar
 
 from fastapi import Depends, Request
 from starlette.concurrency import run_in_threadpool
@@ -56,32 +57,65 @@ class TooSlowError(ProblemError):
         super().__init__(503, "too-slow", detail, hint, headers={"Retry-After": str(RETRY_SLOW)})
 
 
+class ProcessPool(Protocol):
+    """Processes that compute."""
+
+    count: int
+
+    async def run(
+        self, answer: Callable[[Deadline], T], deadline: Deadline, took: Callable[[float], object] | None
+    ) -> T:
+        """What `answer` returns in another process, or raises there; it is called with a deadline of that process.
+
+        Args:
+            answer: can be pickled, and so can what it returns, unless that is a response.
+            took: called with the seconds that the other process took.
+        """
+
+    def cancel(self) -> None:
+        """End all computations soon."""
+
+
 class ComputeSlots:
-    """The slots of one process. All but `closed` is used by the event loop only, so nothing is locked.
+    """The slots of the service. All but `closed` is used by the event loop only, so nothing is locked.
 
     Args:
-        most: how many requests compute at a time.
+        most: how many requests compute at a time, in threads.
         seconds: time limit of each, and the longest time to wait for a slot.
         share: of one client.
         memory: room for their answers; by default without limits.
+        pool: the processes that compute, of which each is a slot too; None: threads do.
     """
 
-    def __init__(self, most: int, seconds: float, share: float = 1.0, memory: AnswerMemory | None = None) -> None:
+    def __init__(
+        self,
+        most: int,
+        seconds: float,
+        share: float = 1.0,
+        memory: AnswerMemory | None = None,
+        pool: ProcessPool | None = None,
+    ) -> None:
         self.seconds = seconds
         self.memory = memory or AnswerMemory(1 << 62, 1 << 62)
+        self.pool = pool
         self.closed = False
         self.waiting = 0  # requests that wait for a slot
         self.turns = Turns()
         self._slots = Slots(most, share)
+        self._processes = self._slots if pool is None else Slots(pool.count, share)
         self._reading = Slots(MOST)  # of threads that validate large bodies
 
     @asynccontextmanager
-    async def slot(self, request: Request) -> AsyncIterator[Deadline]:
-        """A slot for as long as the context lasts, and its deadline; raises 503 if none becomes free in time."""
-        client = client_of(request.scope)
+    async def slot(self, request: Request, process: bool = False) -> AsyncIterator[Deadline]:
+        """A slot for as long as the context lasts, and its deadline; raises 503 if none becomes free in time.
+
+        Args:
+            process: whether it is that of a process, if there are any.
+        """
+        client, slots = client_of(request.scope), self._processes if process else self._slots
         with self.watched(request) as deadline:
-            await self._acquire(self._slots, client, deadline, "computed")
-            with Slot(self._slots, client) as slot:
+            await self._acquire(slots, client, deadline, "computed")
+            with Slot(slots, client) as slot:
                 deadline.start(slot)
                 yield deadline
 
@@ -122,11 +156,13 @@ class ComputeSlots:
     @property
     def used(self) -> int:
         """How many requests compute."""
-        return self._slots.taken
+        return self._slots.taken + (self._processes.taken if self.pool is not None else 0)
 
     def close(self) -> None:
         """End all computations that check their deadline, and all waiting."""
         self.closed = True
+        if self.pool is not None:
+            self.pool.cancel()
 
     async def wait(self, answer: Future[T], deadline: Deadline, advice: str = ADVICE) -> T:
         """The result of another thread; raises 503 with an advice if that takes too long."""
@@ -166,10 +202,10 @@ class Deadline:
         self._left = False
         self.start()
 
-    def start(self, slot: Slot | None = None) -> None:
-        """The time of the request begins now."""
+    def start(self, slot: Slot | None = None, left: float | None = None) -> None:
+        """The time of the request begins now, or ends in `left` seconds."""
         self.slot = slot
-        self._ends = time.monotonic() + self._work.seconds
+        self._ends = time.monotonic() + (self._work.seconds if left is None else left)
 
     @property
     def memory(self) -> AnswerMemory:
@@ -230,13 +266,39 @@ def compute_slots(request: Request) -> ComputeSlots:
     return work
 
 
-async def computed(request: Request, answer: Callable[[Deadline], T]) -> T:
-    """Result of `answer`, computed in a thread; raises 503 if there is no slot, or after the deadline."""
+async def computed(
+    request: Request, answer: Callable[[Deadline], T], took: Callable[[float], object] | None = None
+) -> T:
+    """Result of `answer`, computed by another process, or in a thread if there are none.
+
+    Args:
+        answer: a function of a module, or `partial` of one, so that it can be sent to another process.
+        took: called with the seconds of the computation.
+
+    Raises:
+        ProblemError: 503 if there is no slot, or after the deadline.
+    """
+    work = compute_slots(request)
+    if work.pool is None:
+        return await computed_here(request, answer, took)
+    async with work.slot(request, process=True) as deadline:
+        return await work.pool.run(answer, deadline, took)
+
+
+async def computed_here(
+    request: Request, answer: Callable[[Deadline], T], took: Callable[[float], object] | None = None
+) -> T:
+    """The same in a thread of this process."""
 
     def in_turn() -> T:
         with deadline.turn:
             deadline.check()  # the thread may have waited for its turn
-            return answer(deadline)
+            began = time.perf_counter()
+            try:
+                return answer(deadline)
+            finally:
+                if took is not None:
+                    took(time.perf_counter() - began)
 
     async with compute_slots(request).slot(request) as deadline:
         return await run_in_threadpool(in_turn)

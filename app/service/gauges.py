@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from app.service.compute.pool import Pool
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.memory.process import resident_bytes
 from app.shared.metrics import HELD_BYTES, PENDING, PLACES, RESIDENT
 
 
-def update_gauges(state: Any, bridge: ViewerBridge) -> None:
+def update_gauges(state: Any, bridge: ViewerBridge, pool: Pool | None) -> None:
     """Set the gauges to the present values; `state` is that of the application."""
     PLACES.labels("requests").set(state.compute.used)
     PLACES.labels("streams").set(state.streams.open)
@@ -21,4 +22,4 @@ def update_gauges(state: Any, bridge: ViewerBridge) -> None:
     HELD_BYTES.labels("answers").set(state.compute.memory.held)
     HELD_BYTES.labels("clouds").set(state.clouds.bytes)
     HELD_BYTES.labels("maps").set(state.maps.bytes)
-    RESIDENT.set(resident_bytes())
+    RESIDENT.set(resident_bytes() + (0 if pool is None else pool.resident))

@@ -37,6 +37,7 @@ from app.classroom.courses import Courses
 from app.exercises import ExerciseFileError, Exercises
 from app.live import Lines
 from app.service import status, uvicorn_names
+from app.service.compute.pool import Pool
 from app.service.gauges import update_gauges
 from app.service.handover import SUPPORTED, Member, Phase, Role, members
 from app.service.log import guard_log
@@ -105,6 +106,7 @@ def create_app(
     on_ready: Callable[[], None] | None = None,
     bench: Path | None = None,
     courses: Courses | None = None,
+    pool: Pool | None = None,
 ) -> FastAPI:
     """The whole service as one ASGI application; `on_ready` is called when it has warmed up.
 
@@ -112,6 +114,7 @@ def create_app(
         member: what its process is among those of the service.
         bench: folder that these share for runs of the benchmark; None: one of its own.
         courses: those of the operator, and exercises, which all processes share; None: they are read when needed.
+        pool: processes that compute, with these settings and this store; None: threads do.
 
     Raises:
         RobotFileError: a file in the operator's folder of robots is invalid.
@@ -121,12 +124,12 @@ def create_app(
     clouds, summaries = Clouds(settings.cloud_memory), Summaries()
     maps = Maps(settings.map_memory, seconds=settings.map_time)
     memory = AnswerMemory(settings.max_answer, settings.answer_memory)
-    work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share, memory)
-    scoreboard = Scoreboard(settings, bench)
-    classroom = Hub.of(settings)
+    work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share, memory, pool)
+    scoreboard, classroom = Scoreboard(settings, bench), Hub.of(settings)
     known = cache(lambda: courses or _courses(settings, store))
     lines = Lines(*((0, 1) if member is None else member.place))
-    startup = Startup(settings, store, clouds, maps, summaries, classroom, known, bridge, lines, member, on_ready)
+    begin = settings, store, clouds, maps, summaries, classroom
+    startup = Startup(*begin, known, bridge, lines, pool, member, on_ready)
 
     def idle() -> bool:
         return not (bridge.slots.taken or work.used or state.streams.open or summaries.pending or maps.pending)
@@ -142,14 +145,12 @@ def create_app(
         for step in (startup.stop, scoreboard.close, clouds.close, maps.close, summaries.close):
             await run_in_threadpool(step)
 
-    app = _described(lifespan)
-    state = app.state
-    state.store, state.settings, state.startup, state.classroom = store, settings, startup, classroom
-    state.clouds, state.maps, state.summaries = clouds, maps, summaries
-    state.lines, state.tries = lines, Limits()
+    state = (app := _described(lifespan)).state
+    state.settings, state.store, state.clouds, state.maps, state.summaries, state.classroom = begin
+    state.lines, state.tries, state.startup = lines, Limits(), startup
     state.streams, state.compute = StreamLimit(settings.max_streams, settings.client_share), work
     state.uploads = UploadMemory(max(settings.upload_memory, settings.max_body), settings.client_share)
-    state.update_gauges = partial(update_gauges, state, bridge)
+    state.update_gauges = partial(update_gauges, state, bridge, pool)
     install_problem_handlers(app)
     complete_document(app, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
@@ -311,7 +312,10 @@ def _serve(
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.set_threshold(*COLLECTIONS)
     # Kernels and routes live as long as the process: one collection among them would stop all visitors for 50 ms.
-    app = create_app(settings, store, member, gc.freeze, bench, courses)
+    store = store or Store(settings.robots)
+    computes = settings.compute if member.role is not Role.VIEWER else 0
+    pool = Pool(settings.compute, settings, store) if computes else None
+    app = create_app(settings, store, member, gc.freeze, bench, courses, pool)
     server = Server(app, settings, member, greeting, line)
     # uvicorn shuts down in order and then raises the signal again, which is the expected end here.
     before = signal.signal(signal.SIGTERM, server.handle_exit)

@@ -21,6 +21,8 @@ from app.classroom import Hub
 from app.classroom.courses import Courses
 from app.live import Lines
 from app.service.compiler import STEP, Compilers, CompilerStoppedError, ahead, compile_first
+from app.service.compute.child import load_first, load_rest
+from app.service.compute.pool import Pool
 from app.service.handover import Member, Phase, Role
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.clouds import Clouds
@@ -47,6 +49,7 @@ class Startup:
     Args:
         courses: those that pages offer, and their exercises.
         lines: of the pages, to the programs that are connected to them.
+        pool: processes that compute, if there are any.
         member: what this process is among those of the service.
         on_ready: called by that thread when everything is ready, just before `status` says so.
 
@@ -66,6 +69,7 @@ class Startup:
         courses: Callable[[], Courses],
         bridge: ViewerBridge,
         lines: Lines,
+        pool: Pool | None = None,
         member: Member | None = None,
         on_ready: Callable[[], None] | None = None,
     ) -> None:
@@ -81,6 +85,7 @@ class Startup:
         self._courses = courses
         self._bridge = bridge
         self._lines = lines
+        self._pool = pool
         self._on_ready = on_ready
         self._viewer: ViewerServer | None = None
         self._loop: asyncio.AbstractEventLoop
@@ -114,12 +119,16 @@ class Startup:
         """Start; returns at once. The viewer serves its visitors in the running event loop."""
         self._loop = asyncio.get_running_loop()
         compile_elsewhere(self.compilers.compile)
+        if self._pool is not None:
+            self._pool.start()
         self._thread.start()
 
     def stop(self) -> None:
         """Stop the viewer and the compilation of kernels."""
         self._stopping.set()
         self.compilers.stop()
+        if self._pool is not None:
+            self._pool.stop()
         compile_elsewhere(None)
         self._viewer_settled.wait(timeout=5.0)
         self._bridge.viewer = None
@@ -136,6 +145,8 @@ class Startup:
                 compile_first("warm_up_first()", *second, stopping=self._stopping)
             if not self._stopping.is_set():
                 warm_up_first()
+                if self._pool is not None:
+                    self._pool.prepare(load_first)
                 if self._on_ready is not None:
                     self._on_ready()
                 self.status = "ready"
@@ -183,6 +194,8 @@ class Startup:
             warm_up_rest(self._stopping.is_set)
             if self._viewer is not None and not self._stopping.is_set():
                 importlib.import_module("trimesh.creation")  # before a visitor opens a lesson that draws a sphere
+            if self._pool is not None and self._compiles and not self._stopping.is_set():
+                self._pool.prepare(load_rest)
             self._complete = not self._stopping.is_set()
             self._report(Phase.COMPLETE)
         except CompilerStoppedError:  # by `stop`

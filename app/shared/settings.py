@@ -119,6 +119,13 @@ class Settings(BaseSettings):
         description="Number of further processes beside each of these, which answer REST instead of it, so that "
         "visitors do not wait for programs; on Linux. 0: none.",
     )
+    compute: int = Field(
+        0,
+        ge=0,
+        le=64,
+        description="Number of processes that compute for REST, so that visitors do not wait for programs. "
+        "0: threads of the service compute.",
+    )
     worker_timeout: float = Field(
         30.0,
         ge=2,

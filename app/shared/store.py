@@ -33,6 +33,10 @@ class Store:
         """All robots, in the order they are offered."""
         return tuple(self._robots.values())
 
+    def __contains__(self, robot: Robot) -> bool:
+        """Whether it is one of these, and not another of the same description."""
+        return self._robots.get(robot.id) is robot
+
     def get(self, robot_id: str) -> Robot:
         """One robot; raises `UnknownRobotError`, which lists the ids there are."""
         try:

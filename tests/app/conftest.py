@@ -7,14 +7,27 @@ from fastapi.testclient import TestClient
 
 import kin
 from app.service.main import create_app
+from app.service.compute.pool import Pool
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 
 
 @pytest.fixture(scope="session")
-def app():
-    return create_app(Settings(max_batch=2000, max_body=1_000_000, time_budget=300))
+def app(request):
+    settings, store = Settings(max_batch=2000, max_body=1_000_000, time_budget=300), Store()
+    if not request.config.getoption("--compute"):
+        yield create_app(settings, store)
+        return
+    pool = Pool(1, settings, store)
+    yield create_app(settings, store, pool=pool)
+    pool.stop()
+
+
+@pytest.fixture
+def computes_here(app, monkeypatch):
+    """Answers are computed in this process, for tests that replace parts of it."""
+    monkeypatch.setattr(app.state.compute, "pool", None)
 
 
 @pytest.fixture(scope="session")

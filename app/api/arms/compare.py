@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Literal
 
 from fastapi import Request, Response
@@ -12,7 +13,7 @@ from app.api.arms.description import EXAMPLE, RobotDescription
 from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.schemas import POST_REFUSALS, example, reply, robot_of
-from app.api.work import computed
+from app.api.work import Deadline, computed
 from app.shared.answers.comparison import ComparisonAnswer, comparison_answer
 from kin import Robot, compare
 
@@ -63,10 +64,18 @@ async def compare_robots(request: Request, robot: Robot, body: CompareRequest) -
     every explanation is confirmed by forward kinematics.
     """
 
-    def answer() -> ComparisonAnswer:
-        other = robot_of(request, body.other) if isinstance(body.other, str) else body.other.robot("other")
-        allowed = None if body.tolerance is None else (body.tolerance.position, body.tolerance.rotation)
-        found = compare(robot, other, frames=body.frames, tolerance=allowed)
-        return comparison_answer(found, robot, other)
+    other = robot_of(request, body.other) if isinstance(body.other, str) else body.other
+    tolerance = None if body.tolerance is None else (body.tolerance.position, body.tolerance.rotation)
+    return await computed(request, partial(_compared, robot, other, body.frames, tolerance))
 
-    return await computed(request, lambda _: reply(answer()))
+
+def _compared(
+    robot: Robot,
+    other: Robot | RobotDescription,
+    frames: Literal["fixed", "free"],
+    tolerance: tuple[float, float] | None,
+    _: Deadline,
+) -> Response:
+    if isinstance(other, RobotDescription):
+        other = other.robot("other")
+    return reply(comparison_answer(compare(robot, other, frames=frames, tolerance=tolerance), robot, other))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Literal
 
 from fastapi import Body, Request, Response
@@ -11,15 +12,13 @@ from app.api import schemas
 from app.api.arms.description import invalid_file
 from app.api.arms.operation import operation
 from app.api.body import versioned
-from app.api.problems import invalid
 from app.api.schemas import POST_REFUSALS, example, refusals, reply
-from app.api.work import computed
+from app.api.work import Deadline, computed
 from app.exports.robots import FORMATS, robot_file
 from app.shared.answers.examination import ExaminationAnswer, examination_answer
 from app.shared.answers.exchange import ConvertAnswer, ImportAnswer, convert_answer, import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
-from app.shared.problems import from_input_error
-from kin import InputError, Robot, RobotFileError, UrdfRobot, examine_urdf, read_urdf
+from kin import Robot, RobotFileError, examine_urdf, read_urdf
 from kin.files.urdf.xml import MAX_BYTES
 
 router = versioned("robots")
@@ -44,7 +43,11 @@ IMPORT_EXAMPLES = {"one": example("Two links", {"urdf": _URDF, "tip": "hand"})}
 )
 async def inspect_robot(request: Request, robot: Robot) -> Response:
     """How the joint axes lie, which solver the arm gets and why, its motions, and likely mistakes in its table."""
-    return await computed(request, lambda _: reply(inspect(robot)))
+    return await computed(request, partial(_inspected, robot))
+
+
+def _inspected(robot: Robot, _: Deadline) -> Response:
+    return reply(inspect(robot))
 
 
 class ConvertQuery(schemas.Body):
@@ -72,7 +75,11 @@ async def convert_robot(request: Request, robot: Robot, query: ConvertQuery) -> 
     wanted = query.convention
     if wanted == "other":
         wanted = "modified" if robot.convention == "standard" else "standard"
-    return await computed(request, lambda _: reply(convert_answer(robot, wanted)))
+    return await computed(request, partial(_converted, robot, wanted))
+
+
+def _converted(robot: Robot, convention: Literal["standard", "modified"], _: Deadline) -> Response:
+    return reply(convert_answer(robot, convention))
 
 
 class ImportRequest(schemas.Body):
@@ -113,7 +120,7 @@ async def import_robot(
     Joint values, directions and limits are those of the URDF. The report proves it: the tool's poses are compared
     with the product of the URDF's own transforms. If several tips are possible, the problem document lists them.
     """
-    return await computed(request, lambda _: reply(import_answer(_read(body))))
+    return await computed(request, partial(_imported, body))
 
 
 @router.post(
@@ -126,19 +133,21 @@ async def examine(
 
     A file that cannot be read is no error here: that is a finding. Meshes are not sent along, and not looked at.
     """
-    return await computed(
-        request,
-        lambda _: reply(examination_answer(examine_urdf(body.urdf, body.base, body.tip, mends=body.mends))),
-    )
+    return await computed(request, partial(_examined, body))
 
 
-def _read(body: ImportRequest) -> UrdfRobot:
+def _examined(body: DoctorRequest, _: Deadline) -> Response:
+    return reply(examination_answer(examine_urdf(body.urdf, body.base, body.tip, mends=body.mends)))
+
+
+def _imported(body: ImportRequest, _: Deadline) -> Response:
     try:
         if "<" not in body.urdf:  # kin says how to read a file in Python instead
             raise RobotFileError("URDF", "file", body.urdf, "the text of a URDF")
-        return read_urdf(body.urdf, body.base, body.tip)
+        found = read_urdf(body.urdf, body.base, body.tip)
     except RobotFileError as error:
         raise invalid_file(error, "urdf") from None
+    return reply(import_answer(found))
 
 
 class ExportQuery(schemas.Body):
@@ -167,10 +176,11 @@ class ExportQuery(schemas.Body):
 async def export_robot(request: Request, robot: Robot, query: ExportQuery) -> Response:
     """The arm as a robot file in its own or another convention, as URDF without bodies, or as MJCF."""
     kind = FORMATS[query.format]
-    try:
-        text = await computed(request, lambda _: robot_file(robot, query.format))
-    except InputError as error:
-        raise invalid(from_input_error(error)) from None
+    text = await computed(request, partial(_exported, robot, query.format))
     name = f"{robot.id}{kind.suffix}"
     headers = {"content-disposition": f'attachment; filename="{name}"'}
     return Response(text, media_type=kind.media_type, headers=headers)
+
+
+def _exported(robot: Robot, kind: str, _: Deadline) -> str:
+    return robot_file(robot, kind)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import Request, Response
@@ -13,10 +14,11 @@ from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.problems import invalid
 from app.api.schemas import POST_REFUSALS, Configuration, as_configurations, example, reply, settings_of
-from app.api.work import computed
+from app.api.work import Deadline, computed
 from app.shared.answers.motors import MotorMatchAnswer, motor_match_answer
 from app.shared.problems import from_input_error
-from kin import InputError, Motor, Robot, RobotFileError, match_motors, robot_from_dict, robot_to_dict
+from kin import Motor, Robot, RobotFileError, match_motors, robot_from_dict, robot_to_dict
+from kin.transforms import Array
 
 router = versioned("robots")
 
@@ -78,13 +80,18 @@ async def match_motors_of(request: Request, robot: Robot, body: MatchRequest) ->
     motors = None if body.motors is None else _motors_of(robot, body.motors)
     options = {} if body.tolerance is None else {"tolerance": body.tolerance}
 
-    def answer() -> MotorMatchAnswer:
-        try:
-            return motor_match_answer(match_motors(robot, poses, body.readings, motors, **options))
-        except InputError as error:
-            raise invalid(from_input_error(error)) from None
+    return await computed(request, partial(_matched, robot, poses, body.readings, motors, options))
 
-    return await computed(request, lambda _: reply(answer()))
+
+def _matched(
+    robot: Robot,
+    poses: Array,
+    readings: list[list[float]],
+    motors: tuple[Motor, ...] | None,
+    options: dict[str, float],
+    _: Deadline,
+) -> Response:
+    return reply(motor_match_answer(match_motors(robot, poses, readings, motors, **options)))
 
 
 def _motors_of(robot: Robot, described: list[dict[str, Any]]) -> tuple[Motor, ...]:

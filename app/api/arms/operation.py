@@ -10,6 +10,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from copy import copy
+from functools import partial
 from typing import Annotated, Any, get_type_hints
 
 from fastapi import APIRouter, Body, Query, Request
@@ -19,7 +20,7 @@ from app.api import schemas
 from app.api.arms.description import EXAMPLE, SENT, RobotDescription
 from app.api.arms.frames import FramesBody
 from app.api.schemas import POST_REFUSALS, RobotId, example, integral, robot_of
-from app.api.work import computed
+from app.api.work import Deadline, computed
 from kin import Robot
 
 Handler = Callable[..., Any]
@@ -76,6 +77,7 @@ def operation(
             handler,
             {"request": Request, **others, "body": Annotated[body, Body(openapi_examples=given)]},
             part if model else None,
+            model,
         )
         more = {**route, "operation_id": f"{short}_sent", "summary": f"{route['summary']} (arm sent along)"}
         more["description"] = f"{inspect.getdoc(handler)}\n\n{_SENT_ALONG}"
@@ -101,27 +103,37 @@ def _by_id(handler: Handler, parameters: dict[str, Any]) -> Handler:
     return _endpoint(later if inspect.iscoroutinefunction(handler) else at_once, handler, "", parameters)
 
 
-def _of_sent(handler: Handler, parameters: dict[str, Any], part: str | None) -> Handler:
-    """The endpoint of an arm that is sent along; its table is read in a thread, in turn."""
+def _of_sent(
+    handler: Handler, parameters: dict[str, Any], part: str | None, model: type[schemas.Body] | None
+) -> Handler:
+    """The endpoint of an arm that is sent along; its table is read as an answer is computed."""
 
-    def read(body: Any) -> Robot:
-        sent: RobotDescription = body.robot
-        return _framed(sent.robot(), body)
-
-    def prepared(given: dict[str, Any], robot: Robot) -> dict[str, Any]:
-        body = given.pop("body")
+    def prepared(given: dict[str, Any], robot: Robot, body: Any) -> dict[str, Any]:
         return given | {"robot": robot} | ({part: body} if part else {})
 
     async def later(**given: Any) -> Any:
-        robot = await computed(given["request"], lambda _: read(given["body"]))
-        return await handler(**prepared(given, robot))
+        sent, body = _parted(given.pop("body"), model)
+        robot = _framed(await computed(given["request"], partial(_read, sent)), body)
+        return await handler(**prepared(given, robot, body))
 
     def at_once(**given: Any) -> Any:
+        sent, body = _parted(given.pop("body"), model)
         with given["deadline"].turn:
-            robot = read(given["body"])
-        return handler(**prepared(given, robot))
+            robot = _framed(sent.robot(), body)
+        return handler(**prepared(given, robot, body))
 
     return _endpoint(later if inspect.iscoroutinefunction(handler) else at_once, handler, "_sent", parameters)
+
+
+def _parted(body: Any, model: type[schemas.Body] | None) -> tuple[RobotDescription, schemas.Body | None]:
+    """The arm, and what else was sent, as the model without an arm: its class can be found by its name."""
+    if model is None:
+        return body.robot, None
+    return body.robot, model.model_construct(**{name: getattr(body, name) for name in model.model_fields})
+
+
+def _read(sent: RobotDescription, _: Deadline) -> Robot:
+    return sent.robot()
 
 
 def _framed(robot: Robot, body: object) -> Robot:

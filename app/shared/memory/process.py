@@ -18,13 +18,14 @@ from pathlib import Path
 
 INTERVAL = 5.0  # s between two looks
 IDLE_GROWTH, BUSY_GROWTH = 16 << 20, 256 << 20  # bytes since the last release that make the next one worthwhile
-_STATM = Path("/proc/self/statm")
+_PROCESSES = Path("/proc")
 
 
-def resident_bytes() -> int:
-    """Memory that this process takes at the moment; 0 where the system does not say."""
+def resident_bytes(process: int | None = None) -> int:
+    """Memory that a process, by default this one, takes at the moment; 0 where the system does not say."""
+    statm = _PROCESSES / ("self" if process is None else str(process)) / "statm"
     try:
-        return int(_STATM.read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
+        return int(statm.read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except OSError:
         return 0
 

@@ -44,6 +44,11 @@ def unpin() -> None:
         os.sched_setaffinity(0, _processors)
 
 
+def every_processor() -> frozenset[int]:
+    """The processors that were available before this process was pinned; empty: it is not pinned."""
+    return frozenset(_processors)
+
+
 def lower_priority(niceness: int = NICENESS) -> None:
     """Let the threads of visitors run before this one, and this one on any processor.
 

@@ -16,7 +16,7 @@ from starlette.types import Message
 
 import kin
 from app.api import ik
-from app.api.batches import SENT, HeldResponse
+from app.api.batches import SENT, HeldResponse, held_response
 from app.service.main import create_app
 from app.shared.memory import answers
 from app.shared.memory.answers import SMALL, AnswerMemory, AnswerTooLargeError, MemoryFullError, MemoryShare
@@ -143,7 +143,8 @@ def test_a_response_is_sent_in_pieces_and_gives_memory_back_as_it_is_read():
         sent.append(message)
         held.append(memory.held)
 
-    response = HeldResponse(pieces, reservation)
+    response = held_response(pieces, reservation)
+    assert isinstance(response, HeldResponse)
     asyncio.run(response({"type": "http"}, lambda: pytest.fail("received"), send))
     bodies = [message["body"] for message in sent[1:]]
     assert b"".join(bodies) == whole

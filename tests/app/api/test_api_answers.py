@@ -303,6 +303,7 @@ def test_extreme_but_finite_numbers_never_put_nan_into_an_answer(client):
 
 
 @pytest.mark.parametrize(("complete", "count", "inline"), [(True, 3, True), (False, 3, False), (True, 40, False)])
+@pytest.mark.usefixtures("computes_here")
 def test_few_poses_run_on_the_event_loop_and_more_in_a_thread(app, client, monkeypatch, complete, count, inline):
     """Only short computations run on the event loop, and none while kernels may be compiling."""
     on_the_loop = []

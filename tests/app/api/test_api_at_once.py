@@ -16,13 +16,13 @@ def target(robot, seed):
 
 
 @pytest.fixture
-def threads(monkeypatch):
+def threads(computes_here, monkeypatch):
     """The requests that threads compute; none has been answered before."""
     asked = []
 
-    async def counted(request, answer):
+    async def counted(request, answer, took):
         asked.append(request.url.path)
-        return await computed(request, answer)
+        return await computed(request, answer, took)
 
     ik._ANSWERED.clear()
     monkeypatch.setattr(ik, "computed", counted)

@@ -121,6 +121,7 @@ def test_an_unknown_robot_is_refused(client):
     assert client.get("/api/v1/robots/nobody/equations").status_code == 404
 
 
+@pytest.mark.usefixtures("computes_here")
 def test_a_full_queue_is_said(client, monkeypatch):
     released = threading.Event()
     monkeypatch.setattr(books, "derive", lambda robot: released.wait(30) and derive(robot))

@@ -218,6 +218,7 @@ def test_what_is_malformed_is_refused_by_its_field(client, body, field):
     assert problem["errors"][0]["field"].startswith(field), problem["errors"]
 
 
+@pytest.mark.usefixtures("computes_here")
 def test_programs_and_answers_have_a_largest_size(client, app, monkeypatch):
     narrow = app.state.settings.model_copy(update={"max_path": 2})
     with monkeypatch.context() as patched:

@@ -106,7 +106,7 @@ def test_without_glibc_nothing_happens(monkeypatch):
     release_free_memory()
     assert memory._malloc_trim() is None
     memory._malloc_trim.cache_clear()
-    monkeypatch.setattr(memory, "_STATM", Path("/nowhere"))
+    monkeypatch.setattr(memory, "_PROCESSES", Path("/nowhere"))
     assert resident_bytes() == 0
 
 

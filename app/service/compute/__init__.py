@@ -1,0 +1,1 @@
+"""Processes that compute for REST beside the process of the service."""

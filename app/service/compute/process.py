@@ -1,0 +1,182 @@
+"""One process of the pool: how it is started, asked, cancelled and replaced."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from typing import IO, Any
+
+from app.api.batches import response_of
+from app.api.work import busy
+from app.service.compute import child
+from app.service.compute.child import CANCEL, Failure, Head, read, write
+from app.shared.memory.answers import AnswerMemory, MemoryFullError
+
+APART = 1.0  # s between two starts of a process, at least
+
+logger = logging.getLogger("kinboard.compute")
+
+
+class LostError(Exception):
+    """The process that computed has ended."""
+
+
+@dataclass(eq=False)
+class Job:
+    """What a process is asked for. `cancelled` is set by the event loop, the rest by the thread that asks."""
+
+    message: bytes
+    sent: bool = False
+    cancelled: bool = False
+    seconds: float = 0.0  # that the process took
+
+
+class Process:
+    """One process and those that replace it.
+
+    Args:
+        begin: the first message to each.
+
+    Attributes:
+        job: what it computes; None: nothing.
+    """
+
+    def __init__(self, begin: bytes) -> None:
+        self._begin = begin
+        self._asking = threading.Lock()  # held while something is asked
+        self._lock = threading.Lock()  # protects what follows
+        self.job: Job | None = None
+        self._child: subprocess.Popen[bytes] | None = None
+        self._started = -APART
+        self._stopped = False
+
+    @property
+    def pid(self) -> int | None:
+        """Of the present process."""
+        child = self._child
+        return None if child is None else child.pid
+
+    def start(self) -> None:
+        """Start a process if there is none."""
+        with self._asking, contextlib.suppress(LostError):  # the next job tries again
+            self._running()
+
+    def ask(self, job: Job, memory: AnswerMemory | None = None) -> Any:
+        """Wait for the answer to a job; raises what the process raises, `LostError`, or 503 if memory is full."""
+        with self._asking:
+            running = self._running()
+            began = time.perf_counter()
+            with self._lock:
+                self.job = job
+            try:
+                write(running.stdin, job.message)
+                with self._lock:
+                    job.sent = True
+                    if job.cancelled:
+                        write(running.stdin, CANCEL)
+                return self._answer(running.stdout, memory)
+            except (OSError, EOFError):
+                self._bury(running, expected=job.cancelled)
+                threading.Thread(target=self.start, name="kinboard-pool-start", daemon=True).start()
+                raise LostError from None
+            finally:
+                job.seconds = time.perf_counter() - began
+                with self._lock:
+                    self.job = None
+
+    def cancel(self, job: Job | None) -> None:
+        """Tell the process that nobody waits for this job any more, if it is at it. Does not block."""
+        with self._lock, contextlib.suppress(OSError):  # it has ended: the thread that asks sees that too
+            if job is not None and not job.cancelled:
+                job.cancelled = True
+                if job.sent and job is self.job and self._child is not None:
+                    write(self._child.stdin, CANCEL)
+
+    def kill(self, job: Job | None) -> None:
+        """Kill the process if it is still at this job."""
+        with self._lock:
+            if job is not None and job is self.job and self._child is not None:
+                job.cancelled = True
+                self._child.kill()
+
+    def stop(self) -> None:
+        """End the process, and start no other one."""
+        with self._lock:
+            self._stopped = True
+            running = self._child
+            if running is not None:
+                running.kill()
+        if running is not None and self._asking.acquire(timeout=1.0):  # else the thread that asks buries it
+            if self._child is running:
+                self._bury(running, expected=True)
+            self._asking.release()
+
+    def _answer(self, answers: IO[bytes] | None, memory: AnswerMemory | None) -> Any:
+        found = pickle.loads(read(answers))
+        if isinstance(found, Failure):
+            raise found.error
+        if not isinstance(found, Head):
+            return found
+        pieces, room = [], None
+        with contextlib.suppress(MemoryFullError):
+            room = (memory or AnswerMemory(1 << 62, 1 << 62)).reserve(found.size)
+        left = found.size
+        while left:
+            piece = read(answers)
+            left -= len(piece)
+            if room is not None:
+                pieces.append(piece)
+        if room is None:
+            raise busy("Other answers that have not been read yet take all memory.", "KINBOARD_ANSWER_MEMORY")
+        return response_of(found.status, found.headers, pieces, room)
+
+    def _running(self) -> subprocess.Popen[bytes]:
+        """The process, started if there is none; raises `LostError` if it ends at once or may not start."""
+        running = self._child
+        if running is not None and running.poll() is None:
+            return running
+        if running is not None:
+            self._bury(running, expected=False)
+        time.sleep(max(0.0, self._started + APART - time.monotonic()))
+        self._started = time.monotonic()
+        with self._lock:
+            if self._stopped:
+                raise LostError
+            started = self._child = _start()
+        try:
+            write(started.stdin, self._begin)
+        except OSError:
+            self._bury(started, expected=False)
+            raise LostError from None
+        return started
+
+    def _bury(self, ended: subprocess.Popen[bytes], expected: bool) -> None:
+        with self._lock:
+            self._child = None
+            silent = expected or self._stopped
+        ended.kill()
+        code = ended.wait()
+        for pipe in (ended.stdin, ended.stdout):
+            if pipe is not None:
+                with contextlib.suppress(OSError):  # what was not read by the process is lost
+                    pipe.close()
+        if not silent:
+            logger.error("a process that computes has ended with code %s; another one takes its place", code)
+
+
+def _start() -> subprocess.Popen[bytes]:
+    """A process in a session of its own, so that it gets no Ctrl-C."""
+    return subprocess.Popen(
+        [sys.executable, "-c", f"from {child.__name__} import main; main()"],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+    )
