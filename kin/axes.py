@@ -102,6 +102,7 @@ def lines_of(robot: Robot, as_counted: bool = False) -> Lines:
 
     The direction of an axis that is antiparallel to the previous one is reversed, and so is that of the first axis
     if it points down in the robot's base: these joints have sign −1. With `as_counted` no direction is reversed.
+    What follows a joint is where it is with that joint at 0.
     """
     T = robot.T_world_base.copy()
     z, points, sign = np.empty((robot.n, 3)), np.empty((robot.n, 3)), np.ones(robot.n)
@@ -110,7 +111,7 @@ def lines_of(robot: Robot, as_counted: bool = False) -> Lines:
         parts = [screw_z(row.theta, row.d), screw_x(row.a, row.alpha)]
         turning = 0 if robot.convention == "standard" else 1
         for k, part in enumerate(parts if turning == 0 else parts[::-1]):
-            if k == turning and row.kind != "fixed":
+            if k == turning and row.driven:
                 z[joint], points[joint] = T[:3, 2], T[:3, 3]
                 joint += 1
             T = T @ part
@@ -295,7 +296,7 @@ def _links_of_table(robot: Robot) -> Links | None:
         z_part, x_part = ("z", row.theta, row.d), ("x", row.a, row.alpha)
         for axis, first, second in (z_part, x_part) if robot.convention == "standard" else (x_part, z_part):
             constant = screw_z(first, second) if axis == "z" else screw_x(first, second)
-            if axis == "z" and row.kind != "fixed":
+            if axis == "z" and row.driven:
                 joint += 1
                 theta[joint], d[joint] = first, second
             elif joint < 0:

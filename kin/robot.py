@@ -8,7 +8,8 @@ are in use, and the same table read in both orders gives two *different* arms:
 - ``modified`` (proximal, Craig 1986): ``A = Rx(α) Tx(a) Rz(θ) Tz(d)``; frame i sits on joint i and joint i
   turns about z of frame i.
 
-A revolute joint adds its value to θ, a prismatic one to d; a ``fixed`` row is constant (a tool, an adapter).
+A revolute joint adds its value to θ, a prismatic one to d; a ``fixed`` row is constant (a tool, an adapter). A row
+may *follow* a joint instead of being one: it adds so many times that joint's value (:mod:`kin.following`).
 ``T_world_tool = base · A_1 … A_m · tool``. Lengths are metres and angles radians.
 """
 
@@ -25,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kin.checks import finite_number, one_of
 from kin.errors import InputError
+from kin.following import check_followers, effective, expansion
 from kin.motor import Motor, checked_motors
 from kin.transforms import Array, as_transform, finite_array
 
@@ -35,6 +37,7 @@ CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
 MOUNTINGS: tuple[Mounting, ...] = get_args(Mounting)
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 KIND_CODES: dict[Kind, float] = {"fixed": 0.0, "revolute": 1.0, "prismatic": 2.0}
+FOLLOWS = 2.0  # added to the code of a row that follows a joint
 # Fields of a joint that hold the largest value of a quantity.
 PEAK_FIELDS = ("velocity", "acceleration", "jerk", "effort")
 # Where none are stated: one turn about zero, or one metre of stroke.
@@ -57,9 +60,12 @@ class Joint:
         limits: (lower, upper) in radians or metres; None for a fixed row or an unlimited joint.
         velocity, acceleration, jerk: largest values (rad or m, per second, s² and s³), None if they are not known.
         effort: largest torque or force (N·m or N), None if it is not known.
+        follows: name of the row whose joint moves this one; "" for a joint, which moves by itself.
+        ratio: by how many times that joint's value it moves (rad or m for each rad or m).
 
     Raises:
-        InputError: a kind that does not exist, a number that is not finite, limits that are not lower and upper.
+        InputError: a kind that does not exist, a number that is not finite, limits that are not lower and upper, a
+            fixed row that follows, or a ratio of a row that follows none.
     """
 
     name: str
@@ -73,6 +79,8 @@ class Joint:
     effort: float | None = None
     acceleration: float | None = None
     jerk: float | None = None
+    follows: str = ""
+    ratio: float = 1.0
 
     def __post_init__(self) -> None:
         """Check the row; numbers of any type become floats."""
@@ -86,6 +94,7 @@ class Joint:
                 if self.kind == "fixed" or not (limit := finite_number(where, value)) > 0.0:
                     raise InputError(where, value, "a positive number, or None for a fixed row")
                 object.__setattr__(self, key, limit)
+        self._check_following()
         if self.limits is None:
             return
         where = f"limits of {self.name}"
@@ -99,6 +108,27 @@ class Joint:
         if lower > upper:
             raise InputError(where, self.limits, "the lower limit first")
         object.__setattr__(self, "limits", (lower, upper))
+
+    def _check_following(self) -> None:
+        if not isinstance(self.follows, str) or (self.follows and self.kind == "fixed"):
+            expected = "the name of a row" if self.kind != "fixed" else "none, because the row is fixed"
+            raise InputError(f"follows of {self.name}", self.follows, expected)
+        where = f"ratio of {self.name}"
+        ratio = finite_number(where, self.ratio)
+        if ratio == 0.0 or (ratio != 1.0 and not self.follows):
+            expected = "a number that is not 0" if self.follows else "1, because the row follows no joint"
+            raise InputError(where, self.ratio, expected)
+        object.__setattr__(self, "ratio", ratio)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is not fixed."""
+        return self.kind != "fixed"
+
+    @property
+    def driven(self) -> bool:
+        """Whether it is a joint: it moves, and by itself."""
+        return self.kind != "fixed" and not self.follows
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,8 +171,9 @@ class Robot:
             moves nothing: an arm that is made from another may keep its motors.
 
     Raises:
-        InputError: an unknown convention, unit or mounting, no moving joint, a home of another length, a floor
-            that is no finite number, a base or tool that is no rigid transform, or motors of one id.
+        InputError: an unknown convention, unit or mounting, no moving joint, a row that follows what is no joint
+            or leaves it no value, a home of another length, a floor that is no finite number, a base or tool that
+            is no rigid transform, or motors of one id.
     """
 
     id: str
@@ -176,11 +207,12 @@ class Robot:
         if not isinstance(self.units, str) or self.units not in LENGTHS:
             raise InputError("units", self.units, one_of(*LENGTHS))
         rows = tuple(self.rows) if isinstance(self.rows, Iterable) else ()
-        if not any(isinstance(row, Joint) and row.kind != "fixed" for row in rows):
+        if not any(isinstance(row, Joint) and row.driven for row in rows):
             raise InputError("rows", self.rows, "Joint rows, at least one of them revolute or prismatic")
         for i, row in enumerate(rows):
             if not isinstance(row, Joint):
                 raise InputError(f"rows[{i}]", row, "a Joint")
+        check_followers(rows)
         object.__setattr__(self, "rows", rows)
         home = self.check_q(self.home, "home")
         if home.ndim != 1:
@@ -221,7 +253,8 @@ class Robot:
 
         Args:
             rows: each ``(theta, d, a, alpha)`` of a revolute joint, or a dict with fields of `Joint`, or a
-                `Joint`. Without limits a revolute joint turns ±π and a prismatic one slides 0 to 1 m.
+                `Joint`. Without limits a revolute joint turns ±π and a prismatic one slides 0 to 1 m; what
+                follows a joint has those that the joint leaves it.
             convention: ``"standard"`` or ``"modified"`` (Craig).
             robot_id, name, source: as in a robot file.
             home: one value per moving joint, radians (metres); by default the middle of the limits.
@@ -241,7 +274,7 @@ class Robot:
         """
         table = tuple(_row(i, row) for i, row in enumerate(rows))
         if home is None:
-            home = [0.5 * sum(row.limits or (0.0,)) for row in table if row.kind != "fixed"]
+            home = [0.5 * sum(joint.limits or (0.0,)) for joint in joints_of(table)]
         transforms: dict[str, Any] = {"base": base, "tool": tool}
         return cls(robot_id, name, source, convention, table, tuple(home), **transforms)
 
@@ -319,12 +352,15 @@ class Robot:
 
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
-        """The moving rows in order; q[i] is the value of joints[i]."""
-        return tuple(row for row in self.rows if row.kind != "fixed")
+        """The rows that move by themselves, in order; q[i] is the value of joints[i].
+
+        Their limits are the *effective* ones, which keep the limits of the rows that follow them too.
+        """
+        return joints_of(self.rows)
 
     @property
     def n(self) -> int:
-        """Number of moving joints."""
+        """Number of joints: rows that move by themselves."""
         return len(self.joints)
 
     @cached_property
@@ -334,8 +370,64 @@ class Robot:
 
     @cached_property
     def joint_rows(self) -> tuple[int, ...]:
-        """Row index of each moving joint."""
-        return tuple(i for i, row in enumerate(self.rows) if row.kind != "fixed")
+        """Row index of each joint."""
+        return tuple(i for i, row in enumerate(self.rows) if row.driven)
+
+    @cached_property
+    def moving_rows(self) -> tuple[int, ...]:
+        """Indices of all rows that move: of the joints, and of what follows them."""
+        return tuple(i for i, row in enumerate(self.rows) if row.moves)
+
+    @property
+    def coupled(self) -> bool:
+        """Whether some rows follow joints."""
+        return len(self.moving_rows) > self.n
+
+    @cached_property
+    def expansion(self) -> Array:
+        """A ``(m, n)``: ``A q`` are the values of all moving rows; the identity if none follows a joint."""
+        return _frozen(expansion(self.rows))
+
+    @cached_property
+    def free(self) -> Robot:
+        """The arm in which every moving row moves by itself, with m joints; itself if none follows a joint.
+
+        Its poses at `expand(q)` are those of this arm at q.
+        """
+        if not self.coupled:
+            return self
+        rows = tuple(replace(row, follows="", ratio=1.0) if row.follows else row for row in self.rows)
+        return replace(self, rows=rows, home=tuple(self.expand(self.q_home).tolist()))
+
+    def expand(self, q: Array) -> Array:
+        """The values of all moving rows.
+
+        Args:
+            q: ``(..., n)`` configurations, radians (metres).
+
+        Returns:
+            ``(..., m)``: those of the joints, and of the rows that follow them, in the order of the rows.
+        """
+        return q if not self.coupled else np.asarray(q) @ self.expansion.T
+
+    @cached_property
+    def leads(self) -> NDArray[np.bool_]:
+        """Whether rows follow each joint ``(n,)``."""
+        return _flags(any(row.follows == joint.name for row in self.rows) for joint in self.joints)
+
+    @property
+    def turns_as_one(self) -> bool:
+        """Whether joint 1 turns the whole arm about its axis: it is revolute, and no other row follows it."""
+        return self.joints[0].kind == "revolute" and not self.leads[0]
+
+    @cached_property
+    def whole_turns(self) -> NDArray[np.bool_]:
+        """Whether a whole turn of each joint changes no pose ``(n,)``: what follows it makes whole turns too."""
+        turns = {joint.name: joint.kind == "revolute" for joint in self.joints}
+        for row in self.rows:
+            if row.follows:
+                turns[row.follows] &= row.kind == "revolute" and row.ratio.is_integer()
+        return _flags(turns.values())
 
     @cached_property
     def lower(self) -> Array:
@@ -350,9 +442,7 @@ class Robot:
     @cached_property
     def revolute(self) -> NDArray[np.bool_]:
         """Whether each joint is revolute ``(n,)``."""
-        mask = np.array([j.kind == "revolute" for j in self.joints])
-        mask.flags.writeable = False
-        return mask
+        return _flags(joint.kind == "revolute" for joint in self.joints)
 
     @cached_property
     def q_home(self) -> Array:
@@ -374,13 +464,17 @@ class Robot:
         """The arm as one flat array for the compiled kernels; for its layout see `kin.kernels.fk`."""
         header = [float(len(self.rows)), float(self.n), float(self.convention == "modified")]
         header += self.T_world_base[:3].ravel().tolist() + self.T_last_tool[:3].ravel().tolist()
+        indices = {joint.name: float(i) for i, joint in enumerate(self.joints)}
         q_index = 0
         body: list[float] = []
         for row in self.rows:
             ca, sa = exact_cos_sin(row.alpha)
-            body += [row.theta, row.d, row.a, ca, sa, KIND_CODES[row.kind]]
-            body += [float(q_index) if row.kind != "fixed" else -1.0, 0.0]
-            q_index += row.kind != "fixed"
+            body += [row.theta, row.d, row.a, ca, sa]
+            if row.follows:
+                body += [KIND_CODES[row.kind] + FOLLOWS, indices[row.follows], row.ratio]
+            else:
+                body += [KIND_CODES[row.kind], float(q_index) if row.driven else -1.0, 0.0]
+                q_index += row.driven
         return _frozen(header + body)
 
     @cached_property
@@ -390,9 +484,17 @@ class Robot:
         for row in self.rows:
             stroke = 0.0
             if row.kind == "prismatic":
-                stroke = max(map(abs, row.limits)) if row.limits else math.inf
+                stroke = self.stroke(row)
             total += math.hypot(row.a, abs(row.d) + stroke)
         return total
+
+    def stroke(self, row: Joint) -> float:
+        """How far a slide, one of the rows, goes from zero at most (m); infinite without limits."""
+        own = max(map(abs, row.limits)) if row.limits else math.inf
+        if not row.follows:
+            return own
+        leader = next(joint for joint in self.joints if joint.name == row.follows)
+        return min(own, abs(row.ratio) * max(map(abs, leader.limits))) if leader.limits else own
 
     def check_q(self, q: ArrayLike, field: str = "q") -> Array:
         """Joint values as an array.
@@ -474,6 +576,16 @@ class Robot:
         return rng.uniform(lower, upper, (*shape, self.n))
 
 
+def joints_of(rows: Sequence[Joint]) -> tuple[Joint, ...]:
+    """The rows that move by themselves, with the limits that they and what follows them keep."""
+    followed = {row.follows for row in rows}
+    return tuple(
+        effective(row, [each for each in rows if each.follows == row.name]) if row.name in followed else row
+        for row in rows
+        if row.driven
+    )
+
+
 def _row(index: int, row: Joint | Mapping[str, Any] | Sequence[float]) -> Joint:
     """One row of `Robot.from_dh`."""
     if isinstance(row, Joint):
@@ -489,7 +601,8 @@ def _row(index: int, row: Joint | Mapping[str, Any] | Sequence[float]) -> Joint:
         if key not in known:
             raise InputError(f"rows[{index}].{key}", row[key], "only the fields " + ", ".join(known))
     kind = row.get("kind", "revolute")
-    defaults = {"name": f"joint {index + 1}", "limits": DEFAULT_LIMITS.get(str(kind))}
+    limits = None if row.get("follows") else DEFAULT_LIMITS.get(str(kind))
+    defaults = {"name": f"joint {index + 1}", "limits": limits}
     return Joint(**{**defaults, **row})
 
 
@@ -499,6 +612,12 @@ def exact_cos_sin(angle: float) -> tuple[float, float]:
     if abs(quarter - round(quarter)) < 1e-15 * max(1.0, abs(quarter)):
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[round(quarter) % 4]
     return math.cos(angle), math.sin(angle)
+
+
+def _flags(values: Iterable[bool]) -> NDArray[np.bool_]:
+    mask = np.array(list(values), dtype=bool)
+    mask.flags.writeable = False
+    return mask
 
 
 def _frozen(values: ArrayLike) -> Array:

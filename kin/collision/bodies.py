@@ -144,7 +144,7 @@ def _with_tool(robot: Robot) -> tuple[Capsule, ...]:
         return robot.capsules
     radius = min([radius_of(tubes(robot)), *(each.radius for each in own)])
     x, y, z = tool.tolist()
-    return (*robot.capsules, Capsule(robot.n, last, ORIGIN, (x, y, z), radius, True))
+    return (*robot.capsules, Capsule(len(robot.moving_rows), last, ORIGIN, (x, y, z), radius, True))
 
 
 def _distance(capsule: Capsule, point: Array) -> float:

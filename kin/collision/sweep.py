@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from kin.collision.contacts import Contact, Surroundings
 from kin.collision.solids import margins
-from kin.robot import Joint
 from kin.transforms import Array
 
 CLOSE = 1e-5  # m; a motion that comes closer, but is never seen to touch, counts as touching
@@ -101,29 +100,29 @@ def _paces(near: Surroundings, moves: Array, farthest: Array) -> tuple[Rows, Arr
 def levers(near: Surroundings, farthest: Array) -> Array:
     """How far a point of the axis of each capsule can be from the axis of each joint ``(m, n)``, m.
 
-    1 for a prismatic joint, 0 for a joint that does not carry the capsule. `farthest`: the largest absolute joint
-    values ``(n,)``.
+    1 for a prismatic joint, 0 for a joint that does not carry the capsule. Rows that follow a joint add theirs,
+    times their ratios. `farthest`: the largest absolute joint values ``(n,)``.
     """
     robot, body = near.robot, near.bodies
     modified = robot.convention == "modified"
     out = np.zeros((len(body.rows), robot.n))
     ends = np.maximum(*(np.linalg.norm(body.shape[:, k : k + 3], axis=1) for k in (0, 3)))
-    lengths: list[float] = []
-    joints: list[tuple[int, Joint]] = []
-    for row in robot.rows:
-        slides = farthest[len(joints)] if row.kind == "prismatic" else 0.0
-        lengths.append(math.hypot(row.a, abs(row.d) + slides))
-        if row.kind != "fixed":
-            joints.append((len(lengths) - 1, row))
-    sums = np.concatenate([[0.0], np.cumsum(lengths)])
-    for j, (index, row) in enumerate(joints):
-        carried = body.rows >= index
+    moved = np.abs(robot.expansion)  # how much of each joint's motion each moving row makes
+    most = moved @ farthest
+    lengths = [math.hypot(row.a, row.d) for row in robot.rows]
+    for k, index in enumerate(robot.moving_rows):
+        row = robot.rows[index]
         if row.kind == "prismatic":
-            out[carried, j] = 1.0
-            continue
-        # From the axis to the frame behind the row, then along the rows after it.
-        start = 0.0 if modified else abs(row.a)
-        out[carried, j] = start + sums[body.rows[carried] + 1] - sums[index + 1] + ends[carried]
+            lengths[index] = math.hypot(row.a, abs(row.d) + most[k])
+    sums = np.concatenate([[0.0], np.cumsum(lengths)])
+    for k, index in enumerate(robot.moving_rows):
+        row, carried = robot.rows[index], body.rows >= index
+        lever = np.ones(int(carried.sum()))
+        if row.kind == "revolute":
+            # From the axis to the frame behind the row, then along the rows after it.
+            start = 0.0 if modified else abs(row.a)
+            lever = start + sums[body.rows[carried] + 1] - sums[index + 1] + ends[carried]
+        out[carried] += lever[:, None] * moved[k]
     return out
 
 

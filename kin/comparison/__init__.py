@@ -86,6 +86,13 @@ def compare(
         'identical'
     """
     a, b = robot_of(a), robot_of(b)
+    if a.coupled or b.coupled:
+        if a.expansion.shape != b.expansion.shape or not np.allclose(
+            a.expansion, b.expansion, rtol=0.0, atol=1e-9
+        ):
+            expected = "an arm whose rows follow its joints as those of a do: `Robot.free` has none that follow"
+            raise InputError("b", b.id, expected)
+        a, b = a.free, b.free
     for name, arm in (("a", a), ("b", b)):
         if arm.n > _MAX_JOINTS or len(arm.rows) > _MAX_ROWS:
             size_of = f"{arm.n} joints in {len(arm.rows)} rows"

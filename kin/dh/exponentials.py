@@ -123,7 +123,7 @@ def screws(robot: Robot | str, q: ArrayLike | None = None) -> Screws:
         The screws in space and body form, and the pose of the tool at zero.
 
     Raises:
-        InputError: q is not one configuration.
+        InputError: q is not one configuration, or rows follow joints.
 
     Examples:
         >>> import kin
@@ -131,6 +131,9 @@ def screws(robot: Robot | str, q: ArrayLike | None = None) -> Screws:
         (6, 6)
     """
     robot = robot_of(robot)
+    if robot.coupled:
+        expected = "an arm without rows that follow joints, which have no screw of their own; `Robot.free` is one"
+        raise InputError("robot", robot.id, expected)
     zero = robot.check_q(np.zeros(robot.n) if q is None else q)
     if zero.ndim != 1:
         raise InputError("q", f"shape {zero.shape}", f"one configuration of {robot.n} values")

@@ -15,6 +15,7 @@ import numpy as np
 from kin.errors import InputError, KinematicsError, RobotFileError, shorten
 from kin.files.home import default_home
 from kin.files.numbers import LARGEST, NUMBER, scaled
+from kin.following import check_followers
 from kin.frames import matrix_of
 from kin.motor import MOTOR_UNITS, Motor, checked_motors, fit_joints
 from kin.parsing import Limits, TextError, read_toml
@@ -30,11 +31,12 @@ from kin.robot import (
     Joint,
     Matrix,
     Robot,
+    joints_of,
 )
 from kin.transforms import as_transform
 from kin.typed import ReadError, cut, read, valid
 from kin.units import ANGLES as ANGLE_UNITS
-from kin.units import LENGTH_UNITS
+from kin.units import LENGTH_UNITS, PLAIN
 
 ANGLES = {"deg": math.pi / 180, "rad": 1.0}
 MAX_ROWS, MAX_CAPSULES, MAX_MOTORS = 32, 64, 64
@@ -48,7 +50,7 @@ _CAPSULE = {"row", "start", "end", "radius", "assumed"}
 _MOTOR = {
     *("joint", "id", "name", "sign", "offset", "unit", "ticks", "lead", "range", "drive_mode", "homing_offset"),
 }
-_ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", *PEAK_FIELDS}
+_ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", "follows", "ratio", *PEAK_FIELDS}
 _QUANTITY = re.compile(rf"\s*({NUMBER})\s*(rad|deg|°|m|cm|mm)(/s[23²³]?)?\s*")
 PER = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
 _POWERS = str.maketrans("²³", "23")
@@ -218,13 +220,13 @@ class Reader:
         if not isinstance(raw_rows, list) or not 1 <= len(raw_rows) <= MAX_ROWS:
             raise self.refuse("rows", raw_rows, f"1 to {MAX_ROWS} [[rows]] tables, one per DH row")
         rows = tuple(self.row(i, row) for i, row in enumerate(raw_rows))
-        joints = [row for row in rows if row.kind != "fixed"]
-        if not joints:
-            raise self.refuse("rows", "only fixed rows", "at least one revolute or prismatic row")
+        if not any(row.driven for row in rows):
+            raise self.refuse("rows", "no row that moves by itself", "at least one revolute or prismatic row")
         names = [row.name for row in rows]
         for name in names:
             if names.count(name) > 1:
                 raise self.refuse("rows[].name", name, "a different name for each row")
+        joints = self.joints(rows, raw_rows)
         robot = Robot(
             id=robot_id,
             name=self.text(data, "name"),
@@ -251,16 +253,28 @@ class Reader:
             )
         return robot if "home" in data else replace(robot, home=default_home(robot))
 
+    def joints(self, rows: Sequence[Joint], given: Sequence[Any]) -> tuple[Joint, ...]:
+        """The rows that move by themselves, with what the rows that follow them leave of their limits."""
+        try:
+            check_followers(rows)
+            return joints_of(rows)
+        except InputError as error:
+            key, _, name = error.field.partition(" of ")
+            index = [row.name for row in rows].index(name)
+            raise self.refuse(f"rows[{index}].{key}", given[index].get(key), error.expected) from None
+
     def row(self, index: int, data: object) -> Joint:
         where = f"rows[{index}]."
         if not isinstance(data, dict):
             raise self.refuse(f"rows[{index}]", data, "a table with theta, d, a, alpha")
         self.only_known_fields(where, data, _ROW)
         kind = self.choice(data, "kind", tuple(KIND_CODES), where, default="revolute")
-        for key in ("limits", *PEAK_FIELDS):
+        for key in ("limits", "follows", *PEAK_FIELDS):
             if kind == "fixed" and key in data:
                 raise self.refuse(where + key, data[key], f"no {key}, because the row is fixed")
         slides = kind == "prismatic"
+        follows = self.text(data, "follows", None, where) if "follows" in data else ""
+        unstated = None if follows else DEFAULT_LIMITS[kind]
         return Joint(
             name=self.text(data, "name", f"joint {index + 1}", where),
             theta=self.angle_of(where + "theta", data.get("theta", 0)),
@@ -268,12 +282,27 @@ class Reader:
             a=self.length_of(where + "a", data.get("a", 0)),
             alpha=self.angle_of(where + "alpha", data.get("alpha", 0)),
             kind=kind,  # type: ignore[arg-type]  # checked by choice()
-            limits=self.limits(data["limits"], where, slides) if "limits" in data else DEFAULT_LIMITS[kind],
+            limits=self.limits(data["limits"], where, slides) if "limits" in data else unstated,
             velocity=self.positive(data, "velocity", where, slides),
             effort=self.positive(data, "effort", where, None),
             acceleration=self.positive(data, "acceleration", where, slides),
             jerk=self.positive(data, "jerk", where, slides),
+            follows=follows,
+            ratio=self.ratio(data, follows, where),
         )
+
+    def ratio(self, data: dict[str, Any], follows: str, where: str) -> float:
+        """By how many times the value of its joint a row moves: a number, or a text such as ``"-1/2"``."""
+        given = data.get("ratio", 1)
+        if "ratio" in data and not follows:
+            raise self.refuse(where + "ratio", given, "no ratio, because the row follows no joint")
+        try:
+            value = read(given, PLAIN) if isinstance(given, str) and len(given) <= _LONGEST else given
+        except ReadError as error:
+            raise self.refuse(where + "ratio", given, f"a number that is not 0 ({error.reason})") from None
+        if (found := self.number(where + "ratio", value)) == 0.0:
+            raise self.refuse(where + "ratio", given, "a number that is not 0")
+        return found
 
     def limits(self, pair: object, where: str, slides: bool) -> tuple[float, float] | None:
         where += "limits"
@@ -310,7 +339,7 @@ class Reader:
             raise self.refuse(key, data[key], "a positive number of kg")
         return value
 
-    def home(self, data: dict[str, Any], joints: list[Joint]) -> tuple[float, ...]:
+    def home(self, data: dict[str, Any], joints: Sequence[Joint]) -> tuple[float, ...]:
         if "home" not in data:
             return tuple(0.5 * sum(j.limits) if j.limits else 0.0 for j in joints)
         table = self.table(data, "home", "q")
@@ -352,7 +381,7 @@ class Reader:
             assumed = each.get("assumed", False)
             if not isinstance(assumed, bool):
                 raise self.refuse(where + ".assumed", assumed, "true or false")
-            link = sum(joint.kind != "fixed" for joint in rows[: row + 1])
+            link = sum(joint.moves for joint in rows[: row + 1])
             found.append(Capsule(link, row, start, end, radius, assumed))
         return tuple(sorted(found, key=lambda capsule: capsule.row))
 

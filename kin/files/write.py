@@ -191,7 +191,10 @@ class _Writer:
         if row.kind == "fixed":
             return data
         slides = row.kind == "prismatic"
-        data["limits"] = UNLIMITED if row.limits is None else [self.value(v, slides) for v in row.limits]
+        if row.follows:
+            data |= {"follows": row.follows, "ratio": _plain(row.ratio)}
+        if not row.follows or row.limits is not None:
+            data["limits"] = UNLIMITED if row.limits is None else [self.value(v, slides) for v in row.limits]
         for key, per in PER.items():
             if (largest := getattr(row, key)) is not None:
                 data[key] = self.value(largest, slides, per)

@@ -44,13 +44,13 @@ def tubes(robot: Robot) -> list[Tube]:
 
     link = 0
     for i, row in enumerate(robot.rows):
-        rod = _rod(row)
+        rod = _rod(robot, row)
         if robot.convention == "modified":
             add(link, i - 1, ORIGIN, (row.a, 0.0, 0.0))
-            link += row.kind != "fixed"
+            link += row.moves
             add(link, i, (0.0, 0.0, -row.d - rod), ORIGIN)
             continue
-        link += row.kind != "fixed"
+        link += row.moves
         # Seen from the frame behind Tx(a) Rx(α).
         c, s = exact_cos_sin(row.alpha)
         corner = (-row.a, 0.0, 0.0)
@@ -61,6 +61,7 @@ def tubes(robot: Robot) -> list[Tube]:
     return found
 
 
-def _rod(row: Joint) -> float:
+def _rod(robot: Robot, row: Joint) -> float:
     """Length of what slides: as far as it is drawn out at most."""
-    return max(map(abs, row.limits)) if row.kind == "prismatic" and row.limits else 0.0
+    stroke = robot.stroke(row) if row.kind == "prismatic" else 0.0
+    return stroke if math.isfinite(stroke) else 0.0

@@ -288,7 +288,7 @@ def side_of(problem: IKProblem, q: Array) -> Cause:
     away = float(out @ target) / far if far > TOLERANCES.geometry else math.inf
     off_axis = [float(np.linalg.norm(v - axis * float(axis @ v))) for v in (target, reached)]
     if (
-        robot.joints[0].kind == "revolute"
+        robot.turns_as_one
         and off_axis[1] > off_axis[0] + TOLERANCES.same_distance
         and np.linalg.norm(radial) > away - TOLERANCES.geometry
     ):

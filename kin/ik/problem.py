@@ -203,7 +203,7 @@ def prepare(robot: Robot, options: IKOptions) -> IKProblem:
     handled = closed_form is not None and closed_form.handles(code)
     redundancies = closed_form.redundancies(code) if closed_form is not None and handled else ()
     values = _requested_values(robot, options, redundancies)
-    turns = np.where(robot.revolute, TURN, 0.0)
+    turns = np.where(robot.whole_turns, TURN, 0.0)
     for parameter, value in zip(redundancies, values, strict=True):
         if parameter.joint >= 0 and not math.isnan(value):
             turns[parameter.joint] = 0.0

@@ -7,7 +7,8 @@ is one flat float64 array (`Robot.model`):
 ``model[0:3]``        number of rows, number of joints, 1.0 if the convention is modified
 ``model[3:15]``       base transform, three rows of four
 ``model[15:27]``      tool transform, three rows of four
-``model[27+8i: …]``   row i: θ, d, a, cos α, sin α, kind (0 fixed, 1 revolute, 2 prismatic), index into q, 0
+``model[27+8i: …]``   row i: θ, d, a, cos α, sin α, kind (0 fixed, 1 revolute, 2 prismatic, 3 and 4 the
+                      same of a row that follows a joint), index into q, ratio (of one that follows)
 ====================  =======================================================================
 
 A row is applied as two plane rotations of the columns of the running pose instead of a 4×4 product: a rotation
@@ -128,6 +129,10 @@ def z_part(model: Array, i: int, q: Array) -> tuple[float, float, float]:
         theta += q[int(model[k + 6])]
     elif kind == 2.0:
         d += q[int(model[k + 6])]
+    elif kind == 3.0:
+        theta += model[k + 7] * q[int(model[k + 6])]
+    elif kind == 4.0:
+        d += model[k + 7] * q[int(model[k + 6])]
     s, c = sine_cosine(theta)
     return s, c, d
 
@@ -195,6 +200,10 @@ def fk_into(model: Array, q: Array, T: Array) -> None:
             theta += q[int(model[k + 6])]
         elif model[k + 5] == 2.0:
             d += q[int(model[k + 6])]
+        elif model[k + 5] == 3.0:
+            theta += model[k + 7] * q[int(model[k + 6])]
+        elif model[k + 5] == 4.0:
+            d += model[k + 7] * q[int(model[k + 6])]
         # `z_part` expanded by hand: a call would double the time of the loop.
         if abs(theta) <= WIDE:
             s, c = sin_cos(theta)
@@ -224,9 +233,14 @@ def _joint_block(model: Array, i: int, q: Array, first: int, count: int, S: Arra
     widest()
     wide = 0
     bad = 0
-    if kind == 1.0:
-        for b in range(count):
-            S[_ANGLE + b] = theta + q[first + b, j]
+    ratio = model[k + 7]
+    if kind == 1.0 or kind == 3.0:
+        if kind == 1.0:
+            for b in range(count):
+                S[_ANGLE + b] = theta + q[first + b, j]
+        else:
+            for b in range(count):
+                S[_ANGLE + b] = theta + ratio * q[first + b, j]
         for b in range(count):
             angle = S[_ANGLE + b]
             wide += 0 if abs(angle) <= WIDE else 1
@@ -244,7 +258,7 @@ def _joint_block(model: Array, i: int, q: Array, first: int, count: int, S: Arra
         for b in range(count):
             S[_SIN + b] = s
             S[_COS + b] = c
-            S[_D + b] = d + (q[first + b, j] if kind == 2.0 else 0.0)
+            S[_D + b] = d + (q[first + b, j] if kind == 2.0 else ratio * q[first + b, j] if kind == 4.0 else 0.0)
             bad += 0 if abs(S[_D + b]) < math.inf else 1
     return bad
 

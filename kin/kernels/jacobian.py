@@ -1,8 +1,9 @@
 """Compiled geometric Jacobian and manipulability.
 
-Column j of the Jacobian is the twist of the tool point for a unit speed of joint j. For a revolute joint with the
-unit axis z through the point o it is (z × (p − o), z), for a prismatic joint (z, 0), with p the tool point. The
-axes are collected in the same pass that computes the pose of the tool.
+Column j of the Jacobian is the twist of the tool point for a unit speed of joint j. For a revolute joint with
+the unit axis z through the point o it is (z × (p − o), z), for a prismatic joint (z, 0), with p the tool point.
+The axes are collected in the same pass that computes the pose of the tool. A row that follows a joint adds the
+same for its own axis, times its ratio; arms with such rows take a second pass for them.
 
 The layout of an arm's array is described in :mod:`kin.kernels.fk`.
 """
@@ -25,11 +26,14 @@ def jacobian_into(model: Array, q: Array, J: Array, T: Array, axes: Array) -> No
     The joint axis is the z axis of the frame in which Rz/Tz of its row acts; Rz and Tz leave that line unchanged.
     """
     ahead = 0 if model[2] == 0.0 else 1
+    follows = False
     x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = base_rows(model, ahead)
     for i in range(int(model[0])):
         k = HEADER + WIDTH * i
         j = int(model[k + 6])
-        if j >= 0:
+        if model[k + 5] > 2.0:
+            follows = True
+        elif j >= 0:
             axes[j, 0], axes[j, 1], axes[j, 2] = z0, z1, z2
             axes[j, 3], axes[j, 4], axes[j, 5] = p0, p1, p2
             axes[j, 6] = model[k + 5]
@@ -56,6 +60,35 @@ def jacobian_into(model: Array, q: Array, J: Array, T: Array, axes: Array) -> No
             J[3, j] = 0.0
             J[4, j] = 0.0
             J[5, j] = 0.0
+    if follows:
+        _add_followers(model, q, J, T)
+
+
+@jit
+def _add_followers(model: Array, q: Array, J: Array, T: Array) -> None:
+    """J ← J + what the rows that follow joints add; T is T_base_tool(q)."""
+    ahead = 0 if model[2] == 0.0 else 1
+    x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2 = base_rows(model, ahead)
+    for i in range(int(model[0])):
+        k = HEADER + WIDTH * i
+        j, ratio = int(model[k + 6]), model[k + 7]
+        if model[k + 5] == 3.0:
+            rx, ry, rz = T[0, 3] - p0, T[1, 3] - p1, T[2, 3] - p2
+            J[0, j] += ratio * (z1 * rz - z2 * ry)
+            J[1, j] += ratio * (z2 * rx - z0 * rz)
+            J[2, j] += ratio * (z0 * ry - z1 * rx)
+            J[3, j] += ratio * z0
+            J[4, j] += ratio * z1
+            J[5, j] += ratio * z2
+        elif model[k + 5] == 4.0:
+            J[0, j] += ratio * z0
+            J[1, j] += ratio * z1
+            J[2, j] += ratio * z2
+        s, c, d = z_part(model, i, q)
+        a, ca, sa = x_part(model, i + ahead)
+        x0, y0, z0, p0 = advance((x0, y0, z0, p0), s, c, d, a, ca, sa)
+        x1, y1, z1, p1 = advance((x1, y1, z1, p1), s, c, d, a, ca, sa)
+        x2, y2, z2, p2 = advance((x2, y2, z2, p2), s, c, d, a, ca, sa)
 
 
 @jit

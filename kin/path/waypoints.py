@@ -64,7 +64,7 @@ class PathSettings:
         return cls(
             problem=problem,
             weight=np.where(problem.robot.revolute, 1.0, _PRISMATIC_WEIGHT),
-            circle=np.where(problem.robot.revolute & wide, TURN, 0.0),
+            circle=np.where(problem.robot.whole_turns & wide, TURN, 0.0),
             max_step=max_step,
             start_weight=1.0 if started else _START_WEIGHT,
             grid=GRID * min(max(count / 60.0, 0.5), 1.0),

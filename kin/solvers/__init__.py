@@ -13,6 +13,7 @@ from functools import lru_cache
 from kin.robot import Robot
 from kin.solvers import (
     collinear7,
+    coupled,
     general5,
     general6,
     general7,
@@ -69,9 +70,10 @@ def closed_form_of(robot: Robot) -> ClosedForm | None:
     """The closed form of the first family that fits the robot's axes, None if there is none.
 
     A table that is rounded gets the family that was meant. Where no family fits then either, or the table is far
-    from it, a general solver takes the arm.
+    from it, a general solver takes the arm. One with rows that follow joints is solved by that of its free arm,
+    where the joints decide which of its configurations they can make.
     """
-    return _closed_form(robot, GENERAL)
+    return coupled.match(robot, closed_form_of) if robot.coupled else _closed_form(robot, GENERAL)
 
 
 def family_of(robot: Robot) -> str:

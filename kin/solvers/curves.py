@@ -351,7 +351,7 @@ def _fan(null: Array) -> Array:
 def _beside(robot: Robot, points: Array, q: Array) -> bool:
     """Whether a configuration is on the polyline through points ``(m, n)``, whole turns aside."""
     gap = points - q
-    gap = np.where(robot.revolute, (gap + math.pi) % (2.0 * math.pi) - math.pi, gap)
+    gap = np.where(robot.whole_turns, (gap + math.pi) % (2.0 * math.pi) - math.pi, gap)
     along = gap[1:] - gap[:-1]
     lengths = (along * along).sum(axis=1)
     share = np.clip(-(gap[:-1] * along).sum(axis=1) / np.maximum(lengths, 1e-30), 0.0, 1.0)

@@ -26,7 +26,6 @@ from kin.solvers.common import UNBOUNDED, wrap
 from kin.solvers.contract import (
     APPROACH,
     POSE,
-    BatchKernels,
     Candidates,
     ClosedForm,
     RedundancyParameter,
@@ -34,7 +33,7 @@ from kin.solvers.contract import (
     weakest,
 )
 from kin.solvers.reduced import fixed
-from kin.solvers.reversed import WrappedKernels
+from kin.solvers.reversed import kernels_by_solving
 from kin.solvers.singular import JointValue, Singularity
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -83,26 +82,6 @@ def _place(q: Array, branch: int) -> int | None:
     return next((row for row in range(first, first + _PER_BRANCH) if math.isnan(q[row, 0])), None)
 
 
-def _kernels(form: ClosedForm, inner: BatchKernels) -> BatchKernels:
-    """Batch kernels that call `form.solve`, with the parameters of `inner`."""
-
-    def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
-        if not np.isfinite(T).all():
-            out[:] = math.nan
-            return False
-        values = (value,) + (math.nan,) * len(form.redundancies(POSE))
-        open_ended = np.full(len(near), UNBOUNDED)
-        asked = SolverInput(T, POSE, values[: len(form.redundancies(POSE))], False, near, -open_ended, open_ended)
-        out[:] = form.solve(asked).q
-        return True
-
-    def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
-        for k, value in enumerate(np.broadcast_to(values, len(T)).tolist()):
-            one(params, T[k], value, near, out[k])
-
-    return WrappedKernels(inner.params, one, many, lambda _: _kernels(form, inner), inner)
-
-
 def _single_values(arcs: Array) -> list[tuple[int, float]]:
     """The (branch, value) of intervals ``(k, 3)`` of width 0; of values that are whole turns apart only one."""
     found: list[tuple[int, float]] = []
@@ -121,7 +100,7 @@ class SingleValues(ClosedForm):
         self.name, self.title, self.reason, self.lengths = form.name, form.title, form.reason, form.lengths
         self.off = form.off
         self.branches, self.meanings, self.named = _several(form.branches), form.meanings, form.named
-        self.kernels = _kernels(self, form.kernels)
+        self.kernels = kernels_by_solving(self, form.kernels)
 
     def handles(self, task: int) -> bool:
         """The tasks of the closed form."""
@@ -179,7 +158,7 @@ class LockedJoints(ClosedForm):
         self.form, self.inner, self.values = form, inner, values
         self.others = [i for i in range(robot.n) if i not in values]
         self.name, self.title, self.lengths, self.off = inner.name, inner.title, inner.lengths, inner.off
-        self.kernels = _kernels(self, inner.kernels)
+        self.kernels = kernels_by_solving(self, inner.kernels)
         numbers = ", ".join(str(i + 1) for i in values)
         self.reason = f"joint{'s' * (len(values) > 1)} {numbers} locked: {inner.reason}"
         self.named = inner.named

@@ -25,7 +25,7 @@ import numpy as np
 
 from kin.axes import Links, is_along, is_zero, links_of, screw_z
 from kin.robot import Joint, Robot
-from kin.solvers.common import TURN
+from kin.solvers.common import TURN, UNBOUNDED
 from kin.solvers.contract import POSE, BatchKernels, Candidates, ClosedForm, RedundancyParameter, SolverInput
 from kin.solvers.singular import JointValue, Singularity
 from kin.transforms import Array
@@ -216,6 +216,26 @@ class WrappedKernels(BatchKernels):
     def unchecked(self) -> BatchKernels:
         """The same with the unchecked kernels of the other closed form."""
         return self.rebuild(self.form.unchecked())
+
+
+def kernels_by_solving(form: ClosedForm, inner: BatchKernels) -> BatchKernels:
+    """Batch kernels that call `form.solve`, with the parameters of `inner`."""
+
+    def one(params: Array, T: Array, value: float, near: Array, out: Array) -> bool:
+        if not np.isfinite(T).all():
+            out[:] = math.nan
+            return False
+        values = (value,) + (math.nan,) * len(form.redundancies(POSE))
+        open_ended = np.full(len(near), UNBOUNDED)
+        asked = SolverInput(T, POSE, values[: len(form.redundancies(POSE))], False, near, -open_ended, open_ended)
+        out[:] = form.solve(asked).q
+        return True
+
+    def many(params: Array, T: Array, values: Array, near: Array, out: Array) -> None:
+        for k, value in enumerate(np.broadcast_to(values, len(T)).tolist()):
+            one(params, T[k], value, near, out[k])
+
+    return WrappedKernels(inner.params, one, many, lambda _: kernels_by_solving(form, inner), inner)
 
 
 def _reversed_kernels(form: BatchKernels, signs: Array, joints: Joints, requested: list[int]) -> BatchKernels:

@@ -73,4 +73,4 @@ def workspace_facts(
 def _turns(region: Region) -> bool:
     """Whether joint 1 turns all the way."""
     low, high = region.bounds[0]
-    return region.robot.joints[0].kind == "revolute" and high - low >= TURN - 1e-9
+    return region.robot.turns_as_one and high - low >= TURN - 1e-9

@@ -115,7 +115,6 @@ def test_base_and_tip_may_be_any_links_of_the_chain(tmp_path):
         ('type="continuous"', 'type="spherical"', "joint wrist: type", "continuous"),
         ('type="continuous"', 'type="floating"', "joint wrist: type", "base hand"),
         ('type="continuous"', 'type="planar"', "joint wrist: type", "base hand"),
-        ('<parent link="rail"/>', '<parent link="rail"/><mimic joint="slide"/>', "joint wrist: mimic", "move"),
         ('<parent link="rail"/>', "", "joint wrist: parent", "parent"),
         ('<parent link="rail"/>', "<parent/>", "joint wrist: parent link", "text"),
         ('<parent link="rail"/>', '<parent link="nail"/>', "joint wrist: parent", "link of this file"),

@@ -25,6 +25,7 @@ from kin.frames import pose_from_xyz_rpy
 from kin.transforms import Array, pose_from_position_wxyz
 
 MOUNTING, FLOOR = "kinboard_mounting", "kinboard_floor"  # names of custom data: text, and metres
+POLYNOMIAL = "polycoef"  # attribute of `<mimic>` that keeps a relation of two joints which is not linear
 MOST_SHAPES = 240  # shapes that are drawn
 _KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "floating", "free": "floating"}
 _SHAPES = ("sphere", "capsule", "box", "cylinder")
@@ -72,6 +73,7 @@ class _Converter:
         if len(self._order) != 3 or set(self._order.lower()) - set("xyz"):
             raise self._refuse("compiler eulerseq", self._order, "three of x, y, z, X, Y and Z")
         self._auto = settings.get("autolimits", "true") == "true"
+        self._references: dict[str, float] = {}  # by joint, its value in the first configuration
         self._defaults: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         for each in root.findall("default"):
             self._read_defaults(each, {}, "main")
@@ -236,6 +238,7 @@ class _Converter:
         axis = self._unit(self._numbers(values, "axis", where, 3, "0 0 1"), f"{where}: axis")
         unit = self._angle if kind == "hinge" else 1.0
         reference = self._numbers(values, "ref", where, 1, "0")[0] * unit
+        self._references[name] = reference
         limits = self._limits(values, where, unit)
         urdf = "continuous" if kind == "hinge" and limits is None else _KINDS[kind]
         link = self._link(child)
@@ -300,13 +303,23 @@ class _Converter:
                 self._shapes += 1
 
     def _follow(self, root: Element) -> None:
-        """Joints that an equality ties to another one."""
+        """Joints that an equality ties to another one, as `<mimic>`; one that is not linear is refused later."""
         joints = {joint.get("name"): joint for joint in self.robot.findall("joint")}
         for equality in root.findall("equality"):
             for each in equality.findall("joint"):
                 follower, leader = joints.get(each.get("joint1")), each.get("joint2")
-                if follower is not None and leader in joints and each.get("active", "true") == "true":
-                    SubElement(follower, "mimic", joint=str(leader))
+                if follower is None or each.get("active", "true") != "true":
+                    continue
+                mimic = SubElement(follower, "mimic", joint=leader or "")
+                curve = each.get("polycoef", "0 1")
+                terms = [number_of(part) for part in curve.split()]
+                if len(terms) < 2 or any(terms[2:]) or not all(map(math.isfinite, terms)):
+                    mimic.set(POLYNOMIAL, curve)
+                    continue
+                # How far the follower is from its first value, by how far the leader is.
+                own, others = (self._references.get(str(name), 0.0) for name in (follower.get("name"), leader))
+                mimic.set("multiplier", repr(terms[1]))
+                mimic.set("offset", repr(own + terms[0] - terms[1] * others))
 
 
 def _pieces(

@@ -35,7 +35,8 @@ def robot_to_mjcf(robot: Robot | str) -> str:
     A floor whose height is stated is a plane. All links but the first, which turns close to it, touch it. The
     height, and what the arm is mounted on, are custom data too, which `load_urdf` reads.
 
-    The values of the joints are those of the arm. Links that are not compared for collisions here are
+    The values of the joints are those of the arm. A row that follows a joint is a joint of its own there, with an
+    equality. Links that are not compared for collisions here are
     excluded from contacts. An effort limits the force of its joint.
 
     Args:
@@ -55,7 +56,8 @@ def robot_to_mjcf(robot: Robot | str) -> str:
     """
     robot = robot_of(robot)
     bodies = bodies_of(robot)
-    names = distinct([row.name for row in robot.joints])
+    moving = [robot.rows[index] for index in robot.moving_rows]
+    names = distinct([row.name for row in moving])
     base = unused("base", set(names))
     links = [base, *names]
     lines = [
@@ -72,7 +74,7 @@ def robot_to_mjcf(robot: Robot | str) -> str:
     ]
     frames = _frames(robot)
     before = np.eye(4)
-    for k, (joint, name) in enumerate(zip(robot.joints, names, strict=True), 1):
+    for k, (joint, name) in enumerate(zip(moving, names, strict=True), 1):
         indent = "    " + "  " * k
         lines += [
             f"{indent}<body name={quoted(name)}{_placed(inverse(before) @ frames[k - 1])}>",
@@ -83,11 +85,12 @@ def robot_to_mjcf(robot: Robot | str) -> str:
             lines.append(f"{indent}  {_ball()}")
         before = frames[k - 1]
     tool = link_frames(robot, np.zeros(robot.n))[-1] @ robot.T_last_tool
-    indent = "    " + "  " * (robot.n + 1)
+    indent = "    " + "  " * (len(moving) + 1)
     lines.append(f'{indent}<site name="tool"{_placed(inverse(before) @ tool)}/>')
-    lines += ["    " + "  " * k + "</body>" for k in range(robot.n, -1, -1)]
-    lines += ["  </worldbody>", *_contacts(bodies, links, robot.floor is not None), "  <keyframe>"]
-    lines.append(f'    <key name="home" qpos="{_numbers(robot.home)}"/>')
+    lines += ["    " + "  " * k + "</body>" for k in range(len(moving), -1, -1)]
+    lines += ["  </worldbody>", *_contacts(bodies, links, robot.floor is not None)]
+    lines += [*_equalities(robot, moving, names), "  <keyframe>"]
+    lines.append(f'    <key name="home" qpos="{_numbers(robot.expand(robot.q_home))}"/>')
     return "\n".join([*lines, "  </keyframe>", "</mujoco>", ""])
 
 
@@ -98,7 +101,7 @@ def _frames(robot: Robot) -> list[Array]:
         x, z = screw_x(row.a, row.alpha), screw_z(row.theta, row.d)
         standard = robot.convention == "standard"
         at = T @ z if standard else T @ x @ z
-        if row.kind != "fixed":
+        if row.moves:
             found.append(at)
         T = at @ x if standard else at
     return found
@@ -170,6 +173,17 @@ def _contacts(bodies: Bodies, links: Sequence[str], floor: bool) -> list[str]:
     if floor:
         lines.append(f'    <exclude body1="world" body2={quoted(links[1])}/>')
     return ["  <contact>", *lines, "  </contact>"] if lines else []
+
+
+def _equalities(robot: Robot, moving: Sequence[Joint], names: Sequence[str]) -> list[str]:
+    """The rows that follow joints."""
+    places = {row.name: name for row, name in zip(moving, names, strict=True) if row.driven}
+    lines = [
+        f'    <joint joint1={quoted(name)} joint2={quoted(places[row.follows])} polycoef="0 {row.ratio!r} 0 0 0"/>'
+        for row, name in zip(moving, names, strict=True)
+        if row.follows
+    ]
+    return ["  <equality>", *lines, "  </equality>"] if lines else []
 
 
 def _placed(T: Array) -> str:

@@ -102,7 +102,7 @@ def collisions_of(robot: Robot, tree: UrdfTree, chain: tuple[UrdfJoint, ...]) ->
     """The collision bodies of all URDF links that belong to an arm, in the order of the file."""
     carriers, poses = poses_of(tree, chain)
     frames = link_frames(robot, np.zeros(robot.n))
-    rows = [inverse(robot.T_world_base), *(inverse(frames[row]) for row in robot.joint_rows)]
+    rows = [inverse(robot.T_world_base), *(inverse(frames[row]) for row in robot.moving_rows)]
     found, count = [], 0
     for element in tree.root.findall("link"):
         name = element.get("name", "").strip()
@@ -209,7 +209,7 @@ def with_bodies(
 
     A tube is added where something is missing; without any capsule of the file all bodies are left to be assumed.
     """
-    rows = (-1, *robot.joint_rows)
+    rows = (-1, *robot.moving_rows)
     found: list[Capsule] = []
     bodies = []
     pieces = tubes(robot)
@@ -225,7 +225,7 @@ def with_bodies(
     known = any(not each.assumed for each in found)
     if len(found) > MAX_CAPSULES:
         words = f"{len(found)} capsules would be needed, and a robot has at most {MAX_CAPSULES}"
-        return robot, tuple(UrdfBody(k, (), 0, (words,), True) for k in range(1, robot.n + 1))
+        return robot, tuple(UrdfBody(k, (), 0, (words,), True) for k in range(1, len(rows)))
     if not known:
         return robot, tuple(bodies)
     source = said(bodies)[:MAX_SOURCE]

@@ -35,10 +35,11 @@ from kin.files.urdf.collisions import (
     without_meshes,
 )
 from kin.files.urdf.fields import ignored_of
+from kin.files.urdf.following import Followers, followers_of, left_of
 from kin.files.urdf.poses import motion_of
 from kin.files.urdf.tree import FREE, UNLIMITED, Tip, UrdfJoint, UrdfTree, read_tree
 from kin.fk import fk
-from kin.robot import DEFAULT_LIMITS, MOUNTINGS, Joint, Mounting, Robot
+from kin.robot import DEFAULT_LIMITS, MOUNTINGS, Joint, Mounting, Robot, joints_of
 from kin.transforms import Array
 
 _UPRIGHT = 0.7  # of the height of a vertical axis of unit length
@@ -54,6 +55,7 @@ class UrdfReport:
         base, tip: the links between which the arm was read.
         tips: the links that could have been chosen as the tip.
         joints: the moving joints, in the order of q.
+        following: the joints of the chain that follow one of those.
         merged: the fixed joints of the chain, which became part of its constant transforms.
         ignored: the joints that are no part of the chain.
         tilts: the fixed rows that hold the small angle between two almost parallel axes.
@@ -74,6 +76,7 @@ class UrdfReport:
     difference: float
     samples: int
     bodies: tuple[UrdfBody, ...] = ()
+    following: tuple[str, ...] = ()
 
     @property
     def about_bodies(self) -> str:
@@ -193,21 +196,24 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
     if len(moving) > MAX_ROWS:
         raise RobotFileError(tree.file, "joint", f"{len(moving)} moving joints", f"at most {MAX_ROWS}")
     notes = [*tree.notes, *_above(tree, chain), *(joint.note for joint in chain if joint.note)]
-    joints = [_joint(joint, notes) for joint in moving]
+    followers = followers_of(tree, chain)
+    joints = [_joint(joint, notes, followers) for joint in moving]
+    joints = [_in_place(joint, tree, followers, notes) for joint in joints]
     notes += _ignored(tree, chain)
-    table = table_of_chain(joints, _transforms(chain))
+    table = table_of_chain(joints, _transforms(chain, followers))
     rows = _with_distinct_tilts(table.rows)
     if len(rows) > MAX_ROWS:
         raise RobotFileError(tree.file, "joint", f"{len(rows)} DH rows", f"at most {MAX_ROWS}")
     name = tree.name.strip() or "robot"
     mounting, floor = _stated(tree, chain[0])
+    leaders = _leaders(tree, joints)
     robot = Robot(
         id=re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40].strip("-") or "robot",
         name=name[:200].strip(),
         source=f"{_source(tree)}, from link {chain[0].parent} to link {chain[-1].child}",
         convention="standard",
         rows=rows,
-        home=tuple(0.5 * sum(joint.limits or (0.0,)) for joint in joints),
+        home=tuple(0.5 * sum(joint.limits or (0.0,)) for joint in leaders),
         base=table.base,
         tool=table.tool,
         mounting=mounting,
@@ -218,7 +224,7 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
         raise RobotFileError(tree.file, _farthest(chain), f"a reach of {robot.reach:g} m", expected)
     robot = replace(robot, home=default_home(robot))
     used = {joint.name for joint in chain}
-    difference = _difference(robot, chain)
+    difference = _difference(robot, chain, followers)
     if difference > EXACT * max(1.0, robot.reach):
         notes.append(
             f"The poses of the table differ from those of the URDF by up to {difference:.1e}, more than usual."
@@ -227,7 +233,8 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
         base=chain[0].parent,
         tip=chain[-1].child,
         tips=tree.tips,
-        joints=tuple(joint.name for joint in moving),
+        joints=tuple(joint.name for joint in leaders),
+        following=tuple(followers.relations),
         merged=tuple(joint.name for joint in chain if not joint.moves),
         ignored=tuple(joint.name for joint in tree.joints if joint.name not in used),
         tilts=tuple(row.name for row in rows if row.kind == "fixed"),
@@ -310,11 +317,14 @@ def _file_name(file: str) -> str:
     return Path(file).name.encode("utf-8", "replace").decode()
 
 
-def _joint(joint: UrdfJoint, notes: list[str]) -> Joint:
+def _joint(joint: UrdfJoint, notes: list[str], followers: Followers) -> Joint:
+    relation = followers.relations.get(joint.name)
     return Joint(
         joint.name,
         kind=joint.kind,
-        limits=_limits(joint, notes),
+        follows="" if relation is None else relation.leader,
+        ratio=1.0 if relation is None else relation.multiplier,
+        limits=_limits(joint, notes) if relation is None else _limits_of_follower(joint, relation.offset),
         velocity=_peak(joint, "velocity", notes),
         effort=_peak(joint, "effort", notes),
         acceleration=_acceleration(joint, notes),
@@ -340,6 +350,39 @@ def _limits(joint: UrdfJoint, notes: list[str]) -> tuple[float, float] | None:
     return assumed
 
 
+def _limits_of_follower(joint: UrdfJoint, offset: float) -> tuple[float, float] | None:
+    """The limits of a follower, counted from its offset; without any, its leader decides."""
+    limits = joint.limits()
+    if limits is None or not -math.inf < limits[0] < limits[1]:
+        return None
+    return limits[0] - offset, limits[1] - offset
+
+
+def _in_place(joint: Joint, tree: UrdfTree, followers: Followers, notes: list[str]) -> Joint:
+    """A joint that stands for its leader beside the arm keeps that one's limits too."""
+    relation = followers.replaced.get(joint.name)
+    if relation is None:
+        return joint
+    notes.append(
+        f"Joint {joint.name} follows {relation.leader}, which is beside the arm: {joint.name} is the joint here."
+    )
+    leader = next(each for each in tree.joints if each.name == relation.leader)
+    limits = left_of(joint.limits, leader, relation)
+    if limits is not None and limits[0] > limits[1]:
+        text = f"[{joint.limits[0]:g}, {joint.limits[1]:g}]" if joint.limits else "none"
+        expected = f"limits that those of {leader.name}, which it follows, leave a value"
+        raise RobotFileError(tree.file, f"joint {joint.name}: limit", text, expected)
+    return replace(joint, limits=limits)
+
+
+def _leaders(tree: UrdfTree, joints: Sequence[Joint]) -> tuple[Joint, ...]:
+    """The joints that move by themselves, with what their followers leave of their limits."""
+    try:
+        return joints_of(joints)
+    except InputError as error:
+        raise RobotFileError(tree.file, f"joint {error.field}", error.value, error.expected) from None
+
+
 def _peak(joint: UrdfJoint, key: str, notes: list[str]) -> float | None:
     value = joint.peak(key)
     if value is None or 0.0 < value < LARGEST:
@@ -359,7 +402,7 @@ def _acceleration(joint: UrdfJoint, notes: list[str]) -> float | None:
 
 def _with_distinct_tilts(rows: Sequence[Joint]) -> tuple[Joint, ...]:
     """The rows of a table; the name made for a tilt may be that of a joint."""
-    taken = {row.name for row in rows if row.kind != "fixed"}
+    taken = {row.name for row in rows if row.moves}
     found = []
     for row in rows:
         found.append(replace(row, name=unused(row.name, taken)) if row.kind == "fixed" else row)
@@ -367,11 +410,16 @@ def _with_distinct_tilts(rows: Sequence[Joint]) -> tuple[Joint, ...]:
     return tuple(found)
 
 
-def _transforms(chain: Sequence[UrdfJoint]) -> list[Array]:
-    """The constant transforms before, between and after the moving joints, each joint along z of its frame."""
+def _transforms(chain: Sequence[UrdfJoint], followers: Followers) -> list[Array]:
+    """The constant transforms before, between and after the moving joints, each joint along z of its frame.
+
+    The offset of a follower is a part of the transform before it.
+    """
     found, T = [], np.eye(4)
     for joint in chain:
         T = T @ np.array(joint.pose())
+        if (relation := followers.relations.get(joint.name)) is not None and relation.offset:
+            T = T @ motion_of(joint, np.array([relation.offset]))[0]
         if joint.moves:
             turn = _turn_to(np.array(joint.axis()))
             found.append(T @ turn)
@@ -386,13 +434,16 @@ def _turn_to(axis: Array) -> Array:
     return frame_of(perpendicular_to(axis), axis, np.zeros(3))
 
 
-def _difference(robot: Robot, chain: Sequence[UrdfJoint]) -> float:
+def _difference(robot: Robot, chain: Sequence[UrdfJoint], followers: Followers) -> float:
     """Largest difference of the robot's tool poses from the product of the URDF's transforms."""
     q = robot.random_q(np.random.default_rng(0), SAMPLES)
-    T, i = np.broadcast_to(np.eye(4), (SAMPLES, 4, 4)), 0
+    names = [joint.name for joint in robot.joints]
+    values = dict(zip(names, q.T, strict=True))
+    T = np.broadcast_to(np.eye(4), (SAMPLES, 4, 4))
     for joint in chain:
         T = T @ np.array(joint.pose())
-        if joint.moves:
-            T = T @ motion_of(joint, q[:, i])
-            i += 1
+        if (relation := followers.relations.get(joint.name)) is not None:
+            T = T @ motion_of(joint, relation.multiplier * values[relation.leader] + relation.offset)
+        elif joint.moves:
+            T = T @ motion_of(joint, values[joint.name])
     return float(np.abs(fk(robot, q) - T).max())

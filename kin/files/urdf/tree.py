@@ -327,8 +327,6 @@ class UrdfTree:
             if joint.moves and joint.type not in MOVING:
                 behind = f", or an arm behind it: base {joint.child}" if joint.type in FREE else ""
                 raise joint.refuse("type", joint.type, "one of " + ", ".join((*MOVING, "fixed")) + behind)
-            if joint.element.find("mimic") is not None:
-                raise joint.refuse("mimic", "a joint that follows another", "joints that move on their own")
 
     def choices(self) -> str:
         """The tips, for a message."""

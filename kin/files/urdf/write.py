@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,6 +22,7 @@ _URDF_1_2 = ("acceleration", "jerk")  # which older readers ignore
 def robot_to_urdf(robot: Robot | str) -> str:
     """The arm as a URDF without bodies: links ``base``, one per row, and ``tool``.
 
+    A row that follows a joint has `<mimic>`.
     A velocity or effort that is not known is written as 0. An arm whose mounting or floor is stated has a link
     ``world`` too, to which a fixed joint mounts its base. An element ``<kinboard>`` states what it is mounted on,
     and how high the floor is. Other programs ignore that element, and `load_urdf` reads it.
@@ -53,11 +55,24 @@ def robot_to_urdf(robot: Robot | str) -> str:
     for k, (row, name) in enumerate(zip(robot.rows, names, strict=True)):
         x, z = screw_x(row.a, row.alpha), screw_z(row.theta, row.d)
         standard = robot.convention == "standard"
-        lines += _joint(row, name, links[k], links[k + 1], T @ z if standard else T @ x @ z)
+        lines += _joint(_bounded(robot, row), name, links[k], links[k + 1], T @ z if standard else T @ x @ z)
+        if row.follows:
+            leader = names[[each.name for each in robot.rows].index(row.follows)]
+            mimic = f'    <mimic joint={quoted(leader)} multiplier={quoted(repr(row.ratio))} offset="0.0"/>'
+            lines.insert(len(lines) - 1, mimic)
         T = x if standard else np.eye(4)
     end = unused("tool" if "tool" not in taken else "tool end", taken)
     lines += _joint(Joint(end, kind="fixed"), end, links[-2], links[-1], T @ robot.T_last_tool)
     return "\n".join([*lines, "</robot>", ""])
+
+
+def _bounded(robot: Robot, row: Joint) -> Joint:
+    """The row; a slide that follows a joint has the limits which that leaves it."""
+    if not row.follows or row.kind != "prismatic" or row.limits is not None:
+        return row
+    leader = next(joint for joint in robot.joints if joint.name == row.follows)
+    ends = None if leader.limits is None else sorted(row.ratio * end for end in leader.limits)
+    return row if ends is None else replace(row, limits=(ends[0], ends[1]))
 
 
 def _stated(robot: Robot) -> str:

@@ -69,7 +69,7 @@ class Evaluator:
         high = np.where(np.isfinite(self.upper), self.upper, math.pi)
         self.region = Region(robot, tuple(zip(low.tolist(), high.tolist(), strict=True)))
         self.home = robot.q_home.copy()  # kernels take writable arrays only
-        self.turns = np.where(robot.revolute, TURN, 0.0)
+        self.turns = np.where(robot.whole_turns, TURN, 0.0)
         self.rolls = _rolls(robot)
         self.frames = np.stack([frame_from_approach(direction) for direction in spherical_design(directions)])
         self.form: ClosedForm | None = None
@@ -165,4 +165,4 @@ def _rolls(robot: Robot) -> bool:
     axis = fk(robot, robot.q_home)[:3, 2]
     J = jacobian(robot, robot.q_home)[:, -1]
     moved = np.concatenate([J[:3], np.cross(J[3:], axis)])
-    return bool(robot.revolute[-1] and np.abs(moved).max() < TOLERANCES.geometry)
+    return bool(robot.revolute[-1] and not robot.leads[-1] and np.abs(moved).max() < TOLERANCES.geometry)

@@ -102,12 +102,22 @@ def sample_points(arm: BoundedArm, streams: Streams, start: int, out: Points) ->
                 continue
             x = key[j] + np.uint64(start + first) * step[j]
             span = high[j] - low[j]
+            if kind == 4.0:
+                s, c = sine_cosine(theta)
+                ratio = model[k + 7]
+                for b in range(BLOCK):
+                    value = ratio * _value(x + offsets[j, b], quasi, low[j], span, high[j])
+                    _move(S, b, s, c, d + value, a, ca, sa)
+                continue
             if kind == 2.0:
                 s, c = sine_cosine(theta)
                 for b in range(BLOCK):
                     _move(S, b, s, c, d + _value(x + offsets[j, b], quasi, low[j], span, high[j]), a, ca, sa)
                 continue
             least = (theta + low[j]) * _QUARTERS
+            if kind == 3.0:
+                least = (theta + model[k + 7] * low[j]) * _QUARTERS
+                span *= model[k + 7]
             span *= _QUARTERS
             # Numbers and kinematics in two loops: a processor cannot look ahead far enough to overlap the steps of
             # one loop that does both.

@@ -79,7 +79,7 @@ def base_axis(region: Region) -> tuple[Array, Array, Array]:
     """
     robot = region.robot
     before = _frames_before(region)
-    revolute = robot.joints[0].kind == "revolute"
+    revolute = robot.turns_as_one
     base = robot.T_world_base
     point, axis = (before[0][:3, 3], before[0][:3, 2]) if revolute else (base[:3, 3], base[:3, 2])
     shoulder = point

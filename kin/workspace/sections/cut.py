@@ -80,8 +80,10 @@ def workspace_section(
     region = Region.finite(robot_of(robot), JointConstraints.of(limits, locked, constraints))
     count = checked_integer("resolution", resolution, 8, 1000, "a whole number from 8 to 1000")
     if plane is None:
-        if region.robot.joints[0].kind != "revolute":
-            raise InputError("plane", None, f"a point and a normal: joint 1 of {region.robot.id} slides")
+        if not region.robot.turns_as_one:
+            slides = region.robot.joints[0].kind == "prismatic"
+            why = "slides" if slides else "does not turn the whole arm about its axis"
+            raise InputError("plane", None, f"a point and a normal: joint 1 of {region.robot.id} {why}")
         return profile(region, count, signed, stop)
     if not isinstance(plane, Sequence) or len(plane) != 2:
         raise InputError("plane", plane, "a point and a normal, three numbers each")

@@ -58,6 +58,22 @@ def test_a_built_in_arm_is_loaded_by_mujoco_and_read_back(robot):
     assert kin.fk(back, q) == pytest.approx(kin.fk(robot, q), abs=1e-11)
 
 
+def test_an_arm_with_rows_that_follow_is_loaded_by_mujoco_with_equalities():
+    rows = [
+        kin.Joint("lead", d=0.2, a=0.3, alpha=1.2, limits=(-1.0, 1.0)),
+        kin.Joint("rod", kind="prismatic", alpha=0.4, follows="lead", ratio=0.1),
+        kin.Joint("back", a=0.2, follows="lead", ratio=-2.0),
+    ]
+    robot = Robot.from_dh(rows)
+    model, data = loaded(kin.robot_to_mjcf(robot))
+    assert (model.nq, model.neq) == (3, 2)
+    for q in robot.random_q(np.random.default_rng(2), 5):
+        assert np.abs(pose(model, data, robot.expand(q)) - kin.fk(robot, q)).max() < NEAR
+        data.qvel[:] = 0.0
+        mujoco.mj_forward(model, data)
+        assert np.abs(data.efc_pos[: model.neq]).max() < NEAR, "both equalities hold there"
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_any_arm_is_loaded_by_mujoco(seed):
     robot = random_robot(np.random.default_rng(seed))
@@ -285,8 +301,8 @@ def test_capsules_of_mjcf_are_those_of_the_arm():
         ('<compiler angle="degree"/>', '<compiler coordinate="global"/>', "compiler coordinate"),
         (
             "</worldbody>",
-            '</worldbody><equality><joint joint1="roll" joint2="pan"/></equality>',
-            "joint roll: mimic",
+            '</worldbody><equality><joint joint1="roll" joint2="pan" polycoef="0 1 0.1"/></equality>',
+            "joint roll: equality polycoef",
         ),
     ],
 )

@@ -136,7 +136,6 @@ CASES = [
     ('<joint name="grip"', '<joint name="elbow"', "name", "wrong", '<joint name="elbow_2" type="prismatic">'),
     ('<link name="claw"/>', '<link name="claw"/><link name="claw"/>', "name", "wrong", '<link name="claw"/>\n'),
     ('<mimic joint="slide"', '<mimic joint="slid"', "mimic", "wrong", '<mimic joint="slide"'),
-    ('<mimic joint="slide"', '<mimic joint="grip"', "mimic", "wrong", 'effort="4"/>\n  </joint>'),
     ('ixx="0.02"', 'ixx="0.05"', "inertia", "suspicious", None),
     ('ixx="0.02"', 'ixx="-0.02"', "inertia", "suspicious", None),
     (' ixy="0"', "", "inertia", "wrong", 'ixy="0"'),
@@ -240,12 +239,25 @@ def test_a_chain_of_followers_becomes_one_step():
 
 
 @pytest.mark.full
-def test_a_follower_on_the_way_to_the_tool_is_offered_to_move_on_its_own():
+def test_a_follower_on_the_way_to_the_tool_follows():
     found = kin.examine_urdf(WELL, base="foot", tip="claw")
+    assert worth_saying(found) == []
+    assert (found.arm.report.joints, found.arm.report.following) == (("shoulder", "elbow", "slide"), ("grip",))
+    assert "Following one of them: grip." in found.read
+
+
+@pytest.mark.parametrize(
+    ("leader", "said"), [("motor", "“motor”, which does not exist"), ("grip", "follows itself")]
+)
+def test_a_follower_on_the_way_to_the_tool_is_never_mended_into_a_joint(leader, said):
+    """It would be another arm, with a joint that nobody drives."""
+    text = WELL.replace('<mimic joint="slide"', f'<mimic joint="{leader}"')
+    found = kin.examine_urdf(text, base="foot", tip="claw")
     (finding,) = worth_saying(found)
-    assert (finding.symptom, finding.line) == ("mimic", line_of(WELL, "<mimic"))
-    assert found.arm is None
-    assert found.mended_arm.robot.n == 4
+    assert (finding.symptom, finding.line) == ("mimic", line_of(text, "<mimic"))
+    assert said in finding.text
+    assert "Write the joint that it follows" in finding.mend
+    assert (found.arm, found.mended) == (None, None)
 
 
 @pytest.mark.full
@@ -279,7 +291,7 @@ def test_every_end_is_tried():
         )
     )
     assert found.arm is None
-    assert "claw (refused: joint grip: mimic" in found.read[1]
+    assert "claw (3 joints)" in found.read[1]
     assert "eye (3 joints)" in found.read[1]
 
 

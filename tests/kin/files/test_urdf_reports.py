@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from pathlib import Path
@@ -44,6 +45,20 @@ def test_what_has_one_meaning_is_read(name, note):
     assert robot.joints[0].velocity == (None if name == "vel_neg" else 1.0)
     assert note in " ".join(report.notes)
     assert bool(note) == bool(report.notes)
+
+
+def test_a_joint_that_follows_is_read_and_its_arm_is_solved():
+    robot, report = kin.read_urdf(FILES / "mimic_chain.urdf")
+    assert (report.joints, report.following) == (("j1", "j2"), ("j3",))
+    # q3 = 0.05 q2 + 0.1, along x of a frame that j1 and j2 turn.
+    q = [0.3, 0.5]
+    reach = 0.4 + 0.05 * 0.5 + 0.1
+    across = 0.1 + reach * math.cos(0.5)
+    tool = [across * math.cos(0.3), across * math.sin(0.3), 0.3 - reach * math.sin(0.5)]
+    assert kin.fk(robot, q)[:3, 3] == pytest.approx(tool, abs=1e-12)
+    result = kin.solve_ik(robot, tool, task="position")
+    assert result.solutions[0].q == pytest.approx(q, abs=1e-6)
+    assert (result.solver, result.completeness) == ("numeric", "unknown")
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from kin.files.urdf.doctor.joints import check_joint
 from kin.files.urdf.doctor.notes import FindingLog, cut
 from kin.files.urdf.doctor.source import Edit, SourceText
 from kin.files.urdf.doctor.tree import LISTED, check_elements, check_root, check_tree
-from kin.files.urdf.read import UrdfRobot, read_urdf
+from kin.files.urdf.read import UrdfReport, UrdfRobot, read_urdf
 from kin.files.urdf.tree import UrdfTree, tree_of
 from kin.fk import fk
 
@@ -223,6 +223,7 @@ def _read(tree: UrdfTree, arm: UrdfRobot | None, arms: Mapping[str, UrdfRobot | 
             f"Read: {report.base} to {report.tip}, {len(report.joints)} moving joints ({', '.join(report.joints)})"
             f"{f', and {len(report.merged)} fixed ones' if report.merged else ''}."
         )
+        lines += _following(report)
         lines += report.notes
         lines.append(f"Collisions: {report.about_bodies}")
     elif len(arms) > 1:
@@ -230,6 +231,14 @@ def _read(tree: UrdfTree, arm: UrdfRobot | None, arms: Mapping[str, UrdfRobot | 
         ends = [f"{cut(tip)} ({_result(each)})" for tip, each in arms.items()]
         lines.append(f"It has several ends, and one has to be chosen as the tip: {', '.join(ends)}{more}.")
     return tuple(lines)
+
+
+def _following(report: UrdfReport) -> list[str]:
+    """What follows the joints of the arm."""
+    if not report.following:
+        return []
+    names = ", ".join(cut(name) for name in report.following)
+    return [f"Following one of them: {names}."]
 
 
 def _result(arm: UrdfRobot | str) -> str:
@@ -254,22 +263,6 @@ def _note_refusal(notes: FindingLog, tree: UrdfTree, refusal: str) -> None:
     named = [e for e in tree.root if place and e.tag == place[1] and e.get("name", "").strip() == place[2]]
     known = {each.place for each in notes.findings if each.rank == "wrong"}
     if place and any(each.startswith(f"{place[1]} {cut(place[2])}") for each in known):
-        return
-    mimic = named[0].find("mimic") if named else None
-    if mimic is not None and "mimic" in refusal:
-        words = (
-            "It follows another joint, but lies on the way to the tool: a table has joints that move on their own."
-        )
-        mend = "Let it move on its own, or choose another tip."
-        notes.add(
-            mimic,
-            f"{place[1]} {place[2]}" if place else "",
-            "mimic",
-            "wrong",
-            words,
-            mend,
-            notes.source.without(mimic),
-        )
         return
     words, mend = f"No arm is read. {refusal}.", "Mend what is wrong, or choose another base or tip."
     notes.add(named[0] if named else tree.root, "robot", "tree", "wrong", words, mend)

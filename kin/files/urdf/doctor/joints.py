@@ -267,11 +267,14 @@ def _meant(text: str, value: float) -> float:
     return exact if exact and digits >= 2 and _EXACT < abs(value - exact) <= near else value
 
 
+# No edit: on the way to the tool, a follower that moves by itself makes another arm.
+_FOLLOWS = "Write the joint that it follows, or leave out <mimic> if it has a motor of its own."
+
+
 def _check_mimic(notes: FindingLog, joint: Element, place: str, known: Mapping[str, Element]) -> None:
     mimic, source = joint.find("mimic"), notes.source
     if mimic is None:
         return
-    alone = source.without(mimic)
     leader = mimic.get("joint", "").strip()
     if leader not in known:
         near = get_close_matches(leader, known, 1)
@@ -280,7 +283,7 @@ def _check_mimic(notes: FindingLog, joint: Element, place: str, known: Mapping[s
             edit = source.with_attribute(mimic, "joint", near[0])
             notes.add(mimic, place, "mimic", "wrong", words, f"Let it follow {near[0]}.", edit)
         else:
-            notes.add(mimic, place, "mimic", "wrong", words, "Let it move on its own.", alone)
+            notes.add(mimic, place, "mimic", "wrong", words, _FOLLOWS)
         return
     numbers = [notes.numbers(mimic, place, key) if key in mimic.attrib else [default]
                for key, default in (("multiplier", 1.0), ("offset", 0.0))]  # fmt: skip
@@ -288,7 +291,7 @@ def _check_mimic(notes: FindingLog, joint: Element, place: str, known: Mapping[s
     while (name := mimic.get("joint", "").strip()) in known and len(seen) <= _MOST_ROUNDS:
         if name in seen:
             words = f"It follows itself: {', '.join([*seen, name])}."
-            notes.add(joint.find("mimic"), place, "mimic", "wrong", words, "Let it move on its own.", alone)
+            notes.add(joint.find("mimic"), place, "mimic", "wrong", words, _FOLLOWS)
             return
         offset += multiplier * number_or(mimic.get("offset"), 0.0)
         multiplier *= number_or(mimic.get("multiplier"), 1.0)
