@@ -1,8 +1,9 @@
 """The classroom's database: SQLite in a folder, or PostgreSQL.
 
 Nothing happens before the first transaction: then the folder and the file are made, and migrations are run.
-Several processes may do so at the same time; the database makes them wait for each other. Every error of the
-database becomes `ClassroomUnavailable`, with a sentence for the page and the error itself in the log.
+Several processes may do so at the same time; the database makes them wait for each other. An error of the database
+becomes `ClassroomUnavailable`, and one that is due to the values alone `RefusedError`: each with a sentence for a
+page, and the error itself in the log.
 
 SQLite lets one transaction write at a time. The others look again after pauses that grow to a tenth of a second,
 and while many come, one of them may find the database locked each time until its patience ends. So the threads of
@@ -23,13 +24,13 @@ from typing import Any
 
 from sqlalchemy import URL, Connection, Engine, create_engine, event, insert, inspect, select, text
 from sqlalchemy.engine import make_url
-from sqlalchemy.exc import SQLAlchemyError
+from sqlalchemy.exc import DataError, IntegrityError, SQLAlchemyError
 
 from app.classroom import erasure, marks
 from app.classroom.clock import steady
 from app.classroom.revisions import REVISIONS
 from app.classroom.tables import REVISION, Setting
-from app.classroom.views import ClassroomUnavailable
+from app.classroom.views import BUSY, ClassroomUnavailable, RefusedError
 
 logger = logging.getLogger("kinboard.classroom")
 
@@ -39,11 +40,11 @@ ERASE_WAIT = 100  # milliseconds for short readers; writers wait too
 LOG_EVERY = 10.0  # seconds between two lines about errors
 _MIGRATION_LOCK = 0x6B696E  # of PostgreSQL
 _KEY = "key"
-BUSY = "The classroom's database has too much to do at present. Try again in a moment."
 NEWER = (
     "The classroom's database was written by a newer version of Kinboard than this one. "
     "Tell the operator of this service; everything else works."
 )
+UNFIT = "The classroom's database refuses what was sent: it cannot be stored. Other things can."
 
 
 class NewerDatabaseError(Exception):
@@ -87,14 +88,17 @@ class Database:
         """
         end = steady() + (WAIT if wait is None else wait)
         with self._words(), self._turn(end), self._ready().connect() as connection:
+            milliseconds = max(1, int(1000 * (end - steady())))
             if self._file is not None:
                 connection.execution_options(kinboard_write=True)
                 level = "FULL" if durable else "NORMAL"
                 raw = connection.connection.driver_connection
                 assert raw is not None
                 raw.execute(f"PRAGMA synchronous={level}")
-                raw.execute(f"PRAGMA busy_timeout={max(1, int(1000 * (end - steady())))}")
+                raw.execute(f"PRAGMA busy_timeout={milliseconds}")
             with connection.begin():
+                if self._file is None:
+                    connection.exec_driver_sql(f"SET LOCAL lock_timeout = {milliseconds}")
                 yield connection
                 self._still_there()
 
@@ -119,7 +123,7 @@ class Database:
             found = connection.scalar(query)
         if found is not None:
             return found
-        with contextlib.suppress(ClassroomUnavailable), self.write() as connection:
+        with contextlib.suppress(ClassroomUnavailable, RefusedError), self.write() as connection:
             if connection.scalar(query) is None:
                 connection.execute(insert(Setting).values(name=_KEY, value=secrets.token_hex(32)))
         with self.read() as connection:  # another process may have been the first
@@ -231,6 +235,9 @@ class Database:
             self.newer = True
             self._log(f"{error}")
             raise ClassroomUnavailable(NEWER) from error
+        except (DataError, IntegrityError) as error:  # these values, and no others
+            self._log(_brief(error))
+            raise RefusedError(UNFIT) from None  # what caused it names the values
         except (SQLAlchemyError, sqlite3.Error, OSError) as error:
             if isinstance(error, OSError):
                 self.close()  # the next transaction opens the file that is there then

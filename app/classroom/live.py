@@ -1,238 +1,306 @@
-"""The live copy of a room in one process: what the database last said, and what it does not know yet.
+"""A room in memory: what its pages see of each other, and what they report.
 
-No locks and no threads here: `app.classroom.hub` sees to both.
+What must not be lost, such as a seat or an answer, is stored first and then taken over (`take`). What pages report
+all the time, such as arms, is seen at once and stored soon after: `unsaved` names what the database does not have.
+No SQL and no threads here, but locks: pages call from theirs.
 """
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import math
-from collections.abc import Hashable, Mapping, Set
-from dataclasses import dataclass, field
+import threading
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from app.classroom.clock import steady
-from app.classroom.views import Poll, RoomView, SeatView, Shown, Task, Ticket
+from app.classroom.views import BUSY, ClassroomUnavailable, Poll, RoomView, SeatView, Shown, Task, Ticket
 
-AWAY = 7.0  # seconds without a beat after which nobody is assumed to be there
-SILENT_AWAY = 2.5  # the same where a page is connected and silent: the beats of other processes come every 2 s
+logger = logging.getLogger("kinboard.classroom")
+
+AWAY = 7.0  # seconds without a sign of a page's browser, which is asked for one every two seconds
 REMOVED = "The teacher has removed you."
-MOST_OWN = 40_000  # characters of the texts of own exercises: the state is read with each change of the room
+MOST_OWN = 40_000  # characters of the texts of own exercises: the state is stored with each change of it
 MOST_VERSIONS = 4  # of one of them
-_UNSEEN = {"beat", "version", "tries"}  # columns that no page shows
-_PAGE = {"page"}
+REPORTED = ("hand", "task", "gone", "driven", "voted", "vote", "page", "beat")  # columns of a seat
 
 
 @dataclass
-class LiveSeat:
-    """One seat: the columns of its row with its work by exercise, and when its beat was last seen to grow."""
+class Place:
+    """One page in the room.
 
-    row: dict[str, Any]
-    heard: float = field(default_factory=steady)
+    Attributes:
+        changed: called after each change that the page can see, from any thread.
+        silence: for how many seconds nothing has come from the page's browser.
+        stamp: of what the page was last notified of.
+    """
 
-
-@dataclass
-class Pending:
-    """What the database does not know yet."""
-
-    page: str | None = None
-    state: dict[str, Any] = field(default_factory=dict)
-    seats: dict[str, dict[str, Any]] = field(default_factory=dict)
-
-    def __bool__(self) -> bool:
-        return self.page is not None or bool(self.state or self.seats)
-
-    def add_older(self, older: Pending) -> None:
-        """Put back what could not be stored."""
-        self.page = older.page if self.page is None else self.page
-        self.state = {**older.state, **self.state}
-        for seat, values in older.seats.items():
-            self.seats[seat] = {**values, **self.seats.get(seat, {})}
+    ticket: Ticket
+    changed: Callable[[], None]
+    silence: Callable[[], float]
+    stamp: Hashable = None
 
 
 class LiveRoom:
-    """The room's row, its seats, and what is pending."""
+    """The room's row, its seats' rows with the work of each, and its pages.
+
+    Attributes:
+        row: empty until it has been read.
+        unsaved: columns that were reported and are not stored, by seat; for "", the room's `page` and names of its
+            `state`.
+        retry_at: when (`steady`'s) the database is asked again after an error.
+        looked_at: when it was last asked what other programs have changed.
+    """
 
     def __init__(self, room: str) -> None:
         self.id = room
         self.row: dict[str, Any] = {}
-        self.state: dict[str, Any] = {}
-        self.seats: dict[str, LiveSeat] = {}
-        self.pending = Pending()
-        self.flying = Pending()  # on its way into the database
-        self.retry_at = -math.inf  # when `pending` is tried again, after an error that is this room's alone
-        self.pages: dict[str, str] = {}  # newest states of students' pages, for the next time they are due
-        self._paged = -math.inf  # when they were last taken
-        self._seen_by_all = self._seen_by_teacher = 0  # counts of changes
-        self.heard = steady()  # when the teacher's beat was last seen to grow
-        self.here: set[str] = set()  # seats with a page in this process; the teacher's is ""
-        self.silent: set[str] = set()  # seats whose pages in this process are connected and say nothing
+        self.seats: dict[str, dict[str, Any]] = {}
+        self.places: list[Place] = []
+        self.unsaved: dict[str, set[str]] = {}
+        self.retry_at = self.looked_at = -math.inf
         self.away: frozenset[str] = frozenset()
-        self.closed = ""
-        self.problem = ""
+        self.closed = self.problem = ""
+        self.lock = threading.RLock()
+        self._turn = threading.Lock()
+        self._arms: dict[str, str] = {}  # newest states of students' pages, for the next `take_arms`
+        self._since, self._heard = steady(), dict[str, float]()  # when a page of a seat gave its last sign
+        self._seen_by_all = self._seen_by_teacher = 0  # counts of changes
 
     @property
     def version(self) -> int:
-        """The version up to which everything is known; -1: nothing is."""
+        """The version of the database's room that is in memory; -1: none is."""
         return int(self.row.get("version", -1))
 
-    def stamp(self, ticket: Ticket) -> Hashable:
-        """Another one whenever what `view` returns has changed, but for the own page of a seat.
+    @property
+    def following(self) -> bool:
+        """Whether pages follow the teacher's."""
+        return bool(self.row.get("state", {}).get("follow"))
+
+    def knows(self, seat: str) -> bool:
+        """Whether the room has been read, and a seat ("" for the teacher's) was in it."""
+        with self.lock:
+            return bool(self.row) and (not seat or seat in self.seats)
+
+    @property
+    def present(self) -> list[dict[str, Any]]:
+        """The rows of the seats that were not removed, in the order of joining."""
+        with self.lock:
+            rows = [row for row in self.seats.values() if _there(row)]
+        return sorted(rows, key=lambda row: (row["joined"], row["id"]))
+
+    @contextlib.contextmanager
+    def turn(self, wait: float) -> Iterator[None]:
+        """Held while this room is read or stored; raises `ClassroomUnavailable`."""
+        if not self._turn.acquire(timeout=wait):
+            raise ClassroomUnavailable(BUSY)
+        try:
+            yield
+        finally:
+            self._turn.release()
+
+    # What the database says
+
+    def load(self, row: Mapping[str, Any], seats: Iterable[Mapping[str, Any]]) -> None:
+        """Take over everything; reports that are not stored yet are newer."""
+        with self.lock:
+            known, state = self.seats, self.row.get("state", {})
+            state = {**row["state"], **self._newer("", state)}
+            self.row = {**row, **self._newer("", self.row), "state": state}
+            self.seats = {one["id"]: {**one, **self._newer(one["id"], known.get(one["id"], {}))} for one in seats}
+            self._seen_by_all += 1
+
+    def _newer(self, seat: str, row: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: row[name] for name in self.unsaved.get(seat, ()) if name in row}
+
+    def take(self, version: int, seats: Mapping[str, Mapping[str, Any]]) -> None:
+        """Take over columns of seats that have been stored."""
+        with self.lock:
+            self.row["version"] = version
+            for seat, columns in seats.items():
+                self.seats.setdefault(seat, {}).update(columns)
+            self._seen_by_all += bool(seats)
+
+    def reports(self) -> tuple[dict[str, set[str]], dict[str, Any], list[dict[str, Any]]]:
+        """What is to be stored now: what was unsaved, columns of the room, and columns of each student's seat."""
+        with self.lock:
+            taken, self.unsaved = self.unsaved, {}
+            room = {name: self.row[name] for name in ("state", "page")} if "" in taken else {}
+            rows = [self.seats[seat] for seat in sorted(taken.keys() & self.seats.keys())]
+            return taken, room, [{name: row[name] for name in ("id", *REPORTED)} for row in rows if _there(row)]
+
+    def put_back(self, taken: Mapping[str, set[str]]) -> None:
+        """What was taken by `reports` could not be stored."""
+        with self.lock:
+            for seat, names in taken.items():
+                self.unsaved.setdefault(seat, set()).update(names)
+
+    # What pages report
+
+    def report(self, page: str | None, own: Mapping[str, str], **state: object) -> None:
+        """The teacher's page, and what the teacher has set; `own` as in `with_own`."""
+        with self.lock:
+            if not self.row or self.closed:
+                return
+            unsaved = self.unsaved.setdefault("", set())
+            if page is not None:
+                self.row["page"] = page
+                unsaved.add("page")
+            if own:
+                state["own"] = with_own(self.row["state"].get("own") or {}, own)
+            self.row["state"] = {**self.row["state"], **state}
+            unsaved.update(state)
+            self._seen_by_all += 1
+        self.notify()
+
+    def report_seat(self, seat: str, **columns: object) -> None:
+        """What a student did."""
+        with self.lock:
+            self._report_seat(seat, columns)
+        self.notify()
+
+    def _report_seat(self, seat: str, columns: Mapping[str, object]) -> None:
+        row = self.seats.get(seat)
+        if row is None or not _there(row) or self.closed or columns.items() <= row.items():
+            return
+        row.update(columns)
+        self.unsaved.setdefault(seat, set()).update(columns)
+        if columns.keys() == {"page"} and not self._is_shown(seat):
+            self._seen_by_teacher += 1
+        else:
+            self._seen_by_all += 1
+
+    def report_arm(self, seat: str, page: str) -> None:
+        """The state of a student's page: at once if all see it, otherwise with those of others."""
+        with self.lock:
+            if not self._is_shown(seat):
+                self._arms[seat] = page
+                return
+        self.report_seat(seat, page=page)
+
+    def take_arms(self) -> None:
+        """Show the newest states of students' pages, all together."""
+        with self.lock:
+            arms, self._arms = self._arms, {}
+            for seat, page in arms.items():
+                self._report_seat(seat, {"page": page})
+
+    # Who is there
+
+    def enter(self, place: Place) -> None:
+        """A page takes part from now on."""
+        with self.lock:
+            self.places.append(place)
+        self.look_who_is_there()
+
+    def leave(self, place: Place) -> None:
+        """A page has gone; the seat remains."""
+        with self.lock:
+            if place in self.places:
+                self.places.remove(place)
+
+    def look_who_is_there(self) -> None:
+        """Find out who is away, and note who has come for the first time."""
+        with self.lock:
+            time = steady()
+            for place in self.places:
+                seat = place.ticket.seat
+                self._heard[seat] = max(self._heard.get(seat, -math.inf), time - place.silence())
+                if seat in self.seats and not self.seats[seat]["beat"]:
+                    self._report_seat(seat, {"beat": 1})
+            seats = ["", *self.seats]
+            away = frozenset(seat for seat in seats if self._heard.get(seat, self._since) < time - AWAY)
+            self._seen_by_all += away != self.away
+            self.away = away
+
+    def close(self, words: str) -> None:
+        """The room has ended, or what is said of that has changed."""
+        with self.lock:
+            self.closed = words
+            self.unsaved.clear()
+        self.notify()
+
+    def retry(self, pause: float, problem: str) -> None:
+        """Leave the database alone for a while, and say why on all pages; 0 and "": all is well."""
+        with self.lock:
+            self.retry_at = steady() + pause if pause else -math.inf
+            self.problem = problem
+        self.notify()
+
+    def notify(self) -> None:
+        """Let those pages know for whom something has changed.
 
         Most changes in a class are arms that move, which concern the teacher's page alone.
         """
-        return self._seen_by_all, self.closed, self.problem, 0 if ticket.seat else self._seen_by_teacher
+        with self.lock:
+            seen, changed = (self._seen_by_all, self.closed, self.problem), []
+            for place in self.places:
+                stamp = (*seen, 0 if place.ticket.seat else self._seen_by_teacher)
+                if stamp != place.stamp:
+                    place.stamp = stamp
+                    changed.append(place.changed)
+        for each in changed:
+            try:
+                each()
+            except Exception:
+                logger.exception("a page could not be notified that its room has changed")
 
-    def is_shown(self, seat: str) -> bool:
-        """Whether the teacher shows the arm of this seat to all."""
-        shown = self.state.get("shown")
-        return shown is not None and shown["seat"] == seat
-
-    def _note(self, seat: str, columns: Set[str]) -> None:
-        """Count a change of these columns of a seat. The page of a seat is for the teacher to see."""
-        if columns - _PAGE or (columns and self.is_shown(seat)):
-            self._seen_by_all += 1
-        elif columns:
-            self._seen_by_teacher += 1
-
-    def load(self, row: Mapping[str, Any], seats: list[dict[str, Any]]) -> None:
-        """Take over what the database says; what is pending or on its way is newer."""
-        if self.row and row["beat"] != self.row["beat"]:
-            self.heard = steady()
-        newer = self.pending.page is not None or self.flying.page is not None
-        page = self.row.get("page", "") if newer else row["page"]
-        before = self.row, self.state
-        self.row = {**row, "page": page}
-        self.state = {**row["state"], **self.flying.state, **self.pending.state}
-        if self.state != before[1] or _changed(before[0], self.row) - {"state"}:
-            self._seen_by_all += 1
-        for new in seats:
-            known = self.seats.get(new["id"])
-            pending = {**self.flying.seats.get(new["id"], {}), **self.pending.seats.get(new["id"], {})}
-            if known is None:
-                self.seats[new["id"]] = LiveSeat({"work": {}, **new, **pending})
-                self._seen_by_all += 1
-                continue
-            if new["beat"] != known.row["beat"]:
-                known.heard = steady()
-            before_seat, known.row = known.row, {"work": known.row["work"], **new, **pending}
-            self._note(new["id"], _changed(before_seat, known.row))
-
-    def tell_page(self, page: str) -> None:
-        """The teacher's page, shared with all."""
-        self.row["page"] = self.pending.page = page
-        self._seen_by_all += 1
-
-    def tell_state(self, values: dict[str, Any]) -> None:
-        """What the teacher has set."""
-        self.state.update(values)
-        self.pending.state.update(values)
-        self._seen_by_all += 1
-
-    def tell_own(self, own: Mapping[str, str]) -> None:
-        """Keep the texts of exercises that only the teacher has: results name them after another one was sent.
-
-        Of each there is a list of its different texts, the newest at the end. Where older ones were left out, it
-        begins with an empty text. If there are too many, those that were sent longest ago are forgotten.
-        """
-        if not own:
-            return
-        kept: dict[str, list[str]] = dict(self.state.get("own") or {})
-        for key, text in own.items():
-            texts = [*(one for one in kept.pop(key, []) if one != text), text]
-            kept[key] = texts if len(texts) <= MOST_VERSIONS else ["", *texts[1 - MOST_VERSIONS :]]
-        while len(kept) > len(own) and sum(len(one) for texts in kept.values() for one in texts) > MOST_OWN:
-            del kept[next(iter(kept))]
-        self.tell_state({"own": kept})
-
-    def tell_seat(self, seat: str, values: dict[str, Any]) -> None:
-        """What a student did."""
-        if seat in self.seats and not self.seats[seat].row["removed"]:
-            self.seats[seat].row.update(values)
-            self.pending.seats.setdefault(seat, {}).update(values)
-            self._note(seat, set(values))
-
-    def note_beats(self, seats: Set[str]) -> None:
-        """These have a page in this process, and the database knows."""
-        for seat in seats & self.seats.keys():
-            self.seats[seat].heard = steady()
-        if "" in seats:
-            self.heard = steady()
-
-    def take_pages(self, every: float) -> bool:
-        """Take the students' pages if it is time, all together; returns whether there were any."""
-        time = steady()
-        if not self.pages or time - self._paged < every:
-            return False
-        self._paged = time
-        pages, self.pages = self.pages, {}
-        for seat, page in pages.items():
-            self.tell_seat(seat, {"page": page})
-        return True
-
-    def note_absence(self) -> bool:
-        """Find out who is away; returns whether that has changed."""
-        time = steady()
-        heard = {"": self.heard, **{seat: live.heard for seat, live in self.seats.items()}}
-        away = {
-            seat
-            for seat, last in heard.items()
-            if seat not in self.here and last < time - (SILENT_AWAY if seat in self.silent else AWAY)
-        }
-        changed = away != self.away
-        self.away = frozenset(away)
-        self._seen_by_all += changed
-        return changed
+    # What pages see
 
     def view(self, ticket: Ticket) -> RoomView:
         """What one page may see."""
-        if self.closed or not self.row:
-            return RoomView(self.id, closed=self.closed, problem=self.problem)
-        mine = self.seats.get(ticket.seat)
-        if ticket.seat and (mine is None or mine.row["removed"]):
-            return RoomView(self.id, closed=REMOVED)
-        present = [live.row for live in self.seats.values() if not live.row["removed"]]
-        seats: tuple[SeatView, ...] = ()
-        if not ticket.seat:
-            present.sort(key=lambda row: (row["joined"], row["id"]))
-            seats = tuple(self._seat(row) for row in present)
-        row, state = self.row, self.state
-        task = state.get("task")
-        return RoomView(
-            id=self.id,
-            code=row["code"],
-            title=row["title"],
-            created=row["created"],
-            ends=row["ends"],
-            page=row["page"],
-            follow=bool(state.get("follow")),
-            frozen=bool(state.get("frozen")),
-            task=None if task is None else Task(task["exercise"], task["at"], task.get("own", "")),
-            shown=self._shown(),
-            poll=self._poll(present, None if mine is None else mine.row),
-            course=state.get("course") or "",
-            course_at=float(state.get("course_at") or 0.0),
-            own={} if ticket.seat else {key: tuple(texts) for key, texts in (state.get("own") or {}).items()},
-            teacher_away="" in self.away,
-            students=len(present),
-            seat=None if mine is None else self._seat(mine.row),
-            seats=seats,
-            problem=self.problem,
-        )
+        with self.lock:
+            if self.closed or not self.row:
+                return RoomView(self.id, closed=self.closed, problem=self.problem)
+            mine = self.seats.get(ticket.seat)
+            if ticket.seat and (mine is None or not _there(mine)):
+                return RoomView(self.id, closed=REMOVED)
+            present = self.present
+            seats = () if ticket.seat else tuple(self._seat(row) for row in present)
+            row, state = self.row, self.row["state"]
+            task = state.get("task")
+            return RoomView(
+                id=self.id,
+                code=row["code"],
+                title=row["title"],
+                created=row["created"],
+                ends=row["ends"],
+                page=row["page"],
+                follow=self.following,
+                frozen=bool(state.get("frozen")),
+                task=None if task is None else Task(task["exercise"], task["at"], task.get("own", "")),
+                shown=self._shown(),
+                poll=self._poll(present, mine),
+                course=state.get("course") or "",
+                course_at=float(state.get("course_at") or 0.0),
+                own={} if ticket.seat else {key: tuple(texts) for key, texts in (state.get("own") or {}).items()},
+                teacher_away="" in self.away,
+                students=len(present),
+                seat=None if mine is None else self._seat(mine),
+                seats=seats,
+                problem=self.problem,
+            )
 
     def _seat(self, row: Mapping[str, Any]) -> SeatView:
         names = ("id", "alias", "hand", "task", "gone", "driven", "work", "page")
-        seen = row["beat"] > 0 or row["id"] in self.here
-        return SeatView(**{name: row[name] for name in names}, away=row["id"] in self.away, seen=seen)
+        return SeatView(**{name: row[name] for name in names}, away=row["id"] in self.away, seen=row["beat"] > 0)
+
+    def _is_shown(self, seat: str) -> bool:
+        """Whether the teacher shows the arm of this seat to all."""
+        shown = self.row.get("state", {}).get("shown")
+        return shown is not None and shown["seat"] == seat
 
     def _shown(self) -> Shown | None:
-        shown = self.state.get("shown")
-        seat = None if shown is None else self.seats.get(shown["seat"])
-        if shown is None or seat is None or seat.row["removed"]:
+        shown = self.row["state"].get("shown")
+        row = None if shown is None else self.seats.get(shown["seat"])
+        if shown is None or row is None or not _there(row):
             return None
-        return Shown(shown["seat"], seat.row["alias"] if shown["named"] else "", seat.row["page"])
+        return Shown(shown["seat"], row["alias"] if shown["named"] else "", row["page"])
 
     def _poll(self, present: list[dict[str, Any]], mine: Mapping[str, Any] | None) -> Poll | None:
-        poll = self.state.get("poll")
+        poll = self.row["state"].get("poll")
         if poll is None:
             return None
         choices = tuple(poll["choices"])
@@ -244,6 +312,21 @@ class LiveRoom:
         return Poll(poll["id"], poll["question"], choices, poll["open"], tuple(votes), chosen)
 
 
-def _changed(before: Mapping[str, Any], after: Mapping[str, Any]) -> set[str]:
-    """The columns that pages show and that are not as they were."""
-    return {name for name, value in after.items() if name not in _UNSEEN and before.get(name) != value}
+def _there(row: Mapping[str, Any]) -> bool:
+    """Whether a seat is there: not removed by the teacher."""
+    return not row["removed"]
+
+
+def with_own(kept: Mapping[str, list[str]], own: Mapping[str, str]) -> dict[str, list[str]]:
+    """The texts of exercises that only the teacher has: results name them after another one was sent.
+
+    Of each there is a list of its different texts, the newest at the end. Where older ones were left out, it
+    begins with an empty text. If there are too many, those that were sent longest ago are forgotten.
+    """
+    found = dict(kept)
+    for key, text in own.items():
+        texts = [*(one for one in found.pop(key, []) if one != text), text]
+        found[key] = texts if len(texts) <= MOST_VERSIONS else ["", *texts[1 - MOST_VERSIONS :]]
+    while len(found) > len(own) and sum(len(one) for texts in found.values() for one in texts) > MOST_OWN:
+        del found[next(iter(found))]
+    return found

@@ -1,18 +1,30 @@
-"""Opening, joining and ending rooms. Each operation is one transaction."""
+"""Opening, joining and ending rooms, and what may not be lost of them: each is one transaction.
+
+A room lives in one process: the one with its pages has it in memory (:class:`app.classroom.live.LiveRoom`). Each
+change is stored first, and then taken over into memory. It counts the version of the room in the database, so one
+that another program has changed, such as a command, is noticed within the transaction, and read anew before it is
+changed. The first change of a room without pages reads it in the same way.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import secrets
 import unicodedata
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
+from typing import Any
 
 from sqlalchemy import Connection, Text, cast, delete, func, insert, select, update
 
 from app.classroom import erasure, marks
 from app.classroom.clock import now
-from app.classroom.database import PATIENCE, Database
-from app.classroom.tables import TOKEN_BYTES, Attempt, LtiSeat, Room, Seat
+from app.classroom.database import PATIENCE, WAIT, Database
+from app.classroom.live import LiveRoom
+from app.classroom.store import read, store_reports
+from app.classroom.tables import TOKEN_BYTES, LtiSeat, Room, Seat
+from app.classroom.tables import Attempt as Stored
 from app.classroom.tokens import Tokens, new_code, read_code
 from app.classroom.views import (
     DELETED,
@@ -27,7 +39,7 @@ from app.classroom.views import (
     UnknownRoomError,
     in_one_line,
 )
-from app.classroom.work import ANSWER_SHOWN
+from app.classroom.work import ANSWER_SHOWN, NOTHING, SHOWN_ANSWER, Attempt, Work
 from app.shared.clients import share_of
 
 LONGEST_ALIAS, LONGEST_TITLE = 32, 80  # characters
@@ -36,7 +48,19 @@ MAX_SEATS = 200
 MAX_ATTEMPTS, MAX_STORED = 2000, 1_000_000  # of one seat: answers, and characters of them
 UNSEEN = 60.0  # seconds after which a seat whose page has never come may be given to somebody else
 LONGEST_ANSWER = 20_000  # characters, as JSON
+GONE = "The room has ended, or the teacher has removed you. The answer is not stored."
 _TRIES = 20  # of random codes
+_BLANK: dict[str, Any] = {
+    "alias": "",
+    "hand": 0.0,
+    "task": "",
+    "tries": 0,
+    "voted": "",
+    "vote": 0,
+    "page": "",
+    "gone": False,
+    "driven": "",
+}
 
 
 @dataclass(frozen=True)
@@ -80,18 +104,64 @@ class Swept:
         return " ".join(filter(None, (said, f"{answered}: answers are stored." if answered else "")))
 
 
+class Change:
+    """A transaction that changes a room: the database has it at once, the memory when it is stored."""
+
+    def __init__(self, connection: Connection, live: LiveRoom, version: int) -> None:
+        self.connection, self.live, self.version = connection, live, version
+        self.taken: dict[str, dict[str, Any]] = {}  # columns, by seat
+
+    def add(self, seat: str, **columns: Any) -> None:
+        """Add a seat."""
+        row = {**_BLANK, "id": seat, "joined": now(), "beat": 0, "removed": False, **columns}
+        self.connection.execute(insert(Seat).values(**row, room_id=self.live.id))
+        self.taken[seat] = {**row, "work": {}}
+
+    def set(self, seats: Iterable[str], **columns: Any) -> None:
+        """Set columns of seats."""
+        self.connection.execute(update(Seat).where(Seat.id.in_(seats)).values(**columns))
+        self.taken |= {seat: dict(columns) for seat in seats}
+
+    def rename(self, seat: str, alias: str) -> None:
+        """Give a seat another alias; the one before is erased."""
+        self.set([seat], alias=alias)
+        erasure.note(self.connection)
+
+    def remove(self, seats: list[str]) -> None:
+        """Erase seats: alias, page and attempts, and whom a learning platform has them for."""
+        if not seats:
+            return
+        self.set(seats, **_BLANK, removed=True)
+        self.connection.execute(delete(Stored).where(Stored.seat_id.in_(seats)))
+        self.connection.execute(delete(LtiSeat).where(LtiSeat.seat_id.in_(seats)))
+        for seat in seats:
+            self.taken[seat]["work"] = {}
+        erasure.note(self.connection)
+
+
 class Rooms:
     """All rooms of a database.
 
     Args:
         most: how many rooms there may be at a time.
         share: of these, for one client.
+        lives: the rooms in memory, by id.
+        attempted: called with the seat of each attempt that was stored.
     """
 
-    def __init__(self, database: Database, most: int = 100, share: float = 1.0) -> None:
+    def __init__(
+        self,
+        database: Database,
+        most: int,
+        share: float,
+        lives: Mapping[str, LiveRoom],
+        attempted: Callable[[str], None],
+    ) -> None:
         self._database = database
         self._most = most
         self._most_of_one = share_of(most, share)
+        self._lives = lives
+        self._attempted = attempted
         self._tokens: Tokens | None = None
 
     @property
@@ -100,6 +170,46 @@ class Rooms:
         if self._tokens is None:
             self._tokens = Tokens(self._database.key())
         return self._tokens
+
+    @contextlib.contextmanager
+    def changing(self, room: str, durable: bool = True, wait: float | None = None) -> Iterator[Change]:
+        """Change a room; raises `UnknownRoomError` if it has ended, and `ClassroomUnavailable`."""
+        kept = self._lives.get(room)
+        live = kept or LiveRoom(room)
+        with live.turn(WAIT if wait is None else wait):
+            with self._database.write(durable, wait) as connection:
+                going_on = update(Room).where(Room.id == room, Room.ends > now())
+                version = connection.scalar(going_on.values(version=Room.version + 1).returning(Room.version))
+                if version is None:
+                    raise UnknownRoomError(NO_ROOM, "code")
+                if version != live.version + 1:
+                    row, seats = read(connection, room, work=kept is not None)
+                    live.load({**row, "version": version - 1}, seats)  # the rest is not stored yet
+                change = Change(connection, live, version)
+                yield change
+            live.take(version, change.taken)
+        live.notify()
+
+    def store(self, live: LiveRoom) -> None:
+        """Store what the pages of a room have reported; raises as `changing`, and loses nothing then."""
+        taken: dict[str, set[str]] = {}
+        try:
+            with self.changing(live.id, durable=False) as change:
+                taken, columns, rows = live.reports()
+                store_reports(change.connection, live.id, columns, rows)
+        except BaseException:
+            live.put_back(taken)
+            raise
+
+    def look(self, live: LiveRoom) -> None:
+        """Read a room if another program has changed it; raises as `changing`."""
+        with live.turn(WAIT), self._database.read() as connection:
+            version = connection.scalar(select(Room.version).where(Room.id == live.id, Room.ends > now()))
+            if version is None:
+                raise UnknownRoomError(NO_ROOM, "code")
+            if version != live.version:
+                live.load(*read(connection, live.id))
+        live.notify()
 
     def open(self, title: str, life: float, client: str = "") -> OpenRoom:
         """Open a room that is erased after `life` seconds; raises `RefusedError`.
@@ -129,20 +239,8 @@ class Rooms:
                 )
             code = _unused_code(connection)
             marks.keep(connection, anew=count == 0)
-            connection.execute(
-                insert(Room).values(
-                    id=room,
-                    code=code,
-                    title=title,
-                    created=begin,
-                    ends=begin + life,
-                    version=1,
-                    state={},
-                    page="",
-                    beat=0,
-                    opener=opener,
-                )
-            )
+            row = {"id": room, "code": code, "title": title, "created": begin, "ends": begin + life}
+            connection.execute(insert(Room).values(**row, opener=opener))
         return OpenRoom(room, code, title, begin, begin + life, tokens.sign(Ticket(room)))
 
     def join(self, code: str, alias: str, known: Ticket | None = None) -> Ticket:
@@ -154,46 +252,26 @@ class Rooms:
             UnknownRoomError: no room has this code.
             RefusedError: the alias is invalid, or the room is full.
         """
-        code = read_code(code)
-        with self._database.write(wait=PATIENCE) as connection:
-            query = select(Room.id).where(Room.code == code, Room.ends > now())
-            room = connection.scalar(query.with_for_update())
-            if room is None:
-                raise UnknownRoomError(NO_ROOM, "code")
-            alias = clean_name(alias, LONGEST_ALIAS, "alias")
-            version = next_version(connection, room)
-            mine = known.seat if known is not None and known.room == room else ""
-            alias = _free_alias(connection, room, alias, mine)
-            if known is not None and known.room == room and known.seat:
-                same = update(Seat).where(Seat.id == known.seat, Seat.room_id == room, Seat.removed.is_(False))
-                if connection.execute(same.values(alias=alias, version=version)).rowcount:
-                    erasure.note(connection)  # of the alias before
-                    return known
-            taken = select(func.count()).where(Seat.room_id == room, Seat.removed.is_(False))
-            full = (connection.scalar(taken) or 0) >= MAX_SEATS
-            if full and not _remove_unseen(connection, room, version):
-                raise RefusedError(f"This room is full ({MAX_SEATS} of {MAX_SEATS} students).", "code")
+        with self._database.read() as connection:
+            query = select(Room.id).where(Room.code == read_code(code), Room.ends > now())
+            room = connection.scalar(query)
+        if room is None:
+            raise UnknownRoomError(NO_ROOM, "code")
+        alias = clean_name(alias, LONGEST_ALIAS, "alias")
+        mine = known.seat if known is not None and known.room == room else ""
+        with self.changing(room, wait=PATIENCE) as change:
+            seats = change.live.present
+            alias = _free_alias(seats, alias, mine)
+            if known is not None and mine in {seat["id"] for seat in seats}:
+                change.rename(mine, alias)
+                return known
+            if len(seats) >= MAX_SEATS:
+                unseen = _unseen(seats)
+                if not unseen:
+                    raise RefusedError(f"This room is full ({MAX_SEATS} of {MAX_SEATS} students).", "code")
+                change.remove(unseen)
             ticket = Ticket(room, secrets.token_hex(TOKEN_BYTES))
-            connection.execute(
-                insert(Seat).values(
-                    id=ticket.seat,
-                    room_id=room,
-                    alias=alias,
-                    joined=now(),
-                    hand=0.0,
-                    task="",
-                    tries=0,
-                    solved=False,
-                    voted="",
-                    vote=0,
-                    page="",
-                    beat=0,
-                    version=version,
-                    removed=False,
-                    gone=False,
-                    driven="",
-                )
-            )
+            change.add(ticket.seat, alias=alias)
         return ticket
 
     def find(self, ticket: Ticket) -> OpenRoom | None:
@@ -206,17 +284,9 @@ class Rooms:
             aliases = {seat.id: seat.alias for seat in connection.execute(seats)}
         if ticket.seat and ticket.seat not in aliases:
             return None
-        token = self.tokens.sign(Ticket(room.id))
-        return OpenRoom(
-            room.id,
-            room.code,
-            room.title,
-            room.created,
-            room.ends,
-            "" if ticket.seat else token,
-            len(aliases),
-            aliases.get(ticket.seat, ""),
-        )
+        token = "" if ticket.seat else self.tokens.sign(ticket)
+        shown = room.id, room.code, room.title, room.created, room.ends, token
+        return OpenRoom(*shown, len(aliases), aliases.get(ticket.seat, ""))
 
     def is_open(self, ticket: Ticket) -> bool:
         """Whether the room of a ticket goes on, and its seat was not removed."""
@@ -243,7 +313,17 @@ class Rooms:
                 erasure.note(connection)
         if ended:
             self.erase()
+        if (live := self._lives.get(room)) is not None:
+            self.close(live)
         return ended
+
+    def close(self, live: LiveRoom) -> None:
+        """Say to the pages of a room that has ended what is true of it."""
+        try:
+            words = self.said_of_ended()
+        except ClassroomUnavailable:
+            words = ERASING
+        live.close(words)
 
     def erase(self) -> bool:
         """Erase what was deleted, if the database lets us; returns whether there is nothing left to be tried."""
@@ -261,37 +341,32 @@ class Rooms:
 
     def remove_seat(self, room: str, seat: str) -> None:
         """Erase a seat: its alias, page and attempts, and whom a learning platform has it for."""
-        with self._database.write() as connection:
-            version = next_version(connection, room)
-            mine = Seat.id == seat, Seat.room_id == room
-            if connection.execute(update(Seat).where(*mine).values(**_ERASED, version=version)).rowcount:
-                connection.execute(delete(Attempt).where(Attempt.seat_id == seat, Attempt.room_id == room))
-                connection.execute(delete(LtiSeat).where(LtiSeat.seat_id == seat))
-                erasure.note(connection)
+        with self.changing(room) as change:
+            change.remove([one["id"] for one in change.live.present if one["id"] == seat])
         self.erase()
 
     def remove_unseen(self, room: str) -> Swept:
         """Remove who has joined a while ago and whose page has never come; returns how many, and who stays."""
-        left = select(Seat.alias, Seat.tries).where(Seat.room_id == room, Seat.removed.is_(False), Seat.beat == 0)
-        with self._database.write() as connection:
-            removed = _remove_unseen(connection, room, next_version(connection, room))
-            stay = connection.execute(left.order_by(Seat.joined)).all()
+        with self.changing(room) as change:
+            seats = change.live.present
+            unseen = _unseen(seats)
+            change.remove(unseen)
+            stay = [seat for seat in seats if not seat["beat"] and seat["id"] not in unseen]
         self.erase()
         return Swept(
-            removed,
-            new=tuple(seat.alias for seat in stay if not seat.tries),
-            answered=tuple(seat.alias for seat in stay if seat.tries),
+            len(unseen),
+            new=tuple(seat["alias"] for seat in stay if not seat["tries"]),
+            answered=tuple(seat["alias"] for seat in stay if seat["tries"]),
         )
 
     def rename_seat(self, room: str, seat: str, alias: str) -> str:
         """Give a seat another alias; returns it, numbered if another student has it. Raises `RefusedError`."""
         alias = clean_name(alias, LONGEST_ALIAS, "alias")
-        with self._database.write() as connection:
-            version = next_version(connection, room)
-            alias = _free_alias(connection, room, alias, seat)
-            one = update(Seat).where(Seat.id == seat, Seat.room_id == room, Seat.removed.is_(False))
-            connection.execute(one.values(alias=alias, version=version))
-            erasure.note(connection)
+        with self.changing(room) as change:
+            seats = change.live.present
+            alias = _free_alias(seats, alias, seat)
+            if seat in {one["id"] for one in seats}:
+                change.rename(seat, alias)
         self.erase()
         return alias
 
@@ -299,34 +374,25 @@ class Rooms:
         """Store an attempt; the same attempt again is stored once. Raises `RefusedError` if the seat is gone."""
         if not 0.0 <= attempt.score <= 1.0:
             raise ValueError(f"score is {attempt.score}; it must be from 0 to 1")
-        if len(json.dumps(attempt.answer)) > LONGEST_ANSWER:
+        text = json.dumps(attempt.answer)
+        if len(text) > LONGEST_ANSWER:
             raise RefusedError(f"The answer is longer than {LONGEST_ANSWER} characters. It is not stored.")
-        with self._database.write() as connection:
-            version = next_version(connection, ticket.room)
-            mine = (Seat.id == ticket.seat, Seat.room_id == ticket.room, Seat.removed.is_(False))
-            seat = connection.execute(select(Seat.id).where(*mine)).one_or_none()
-            if version is None or seat is None:
-                raise RefusedError("The room has ended, or the teacher has removed you. The answer is not stored.")
-            stored = connection.execute(
-                select(Attempt.at, Attempt.seat_id).where(Attempt.id == attempt.id)
-            ).one_or_none()
-            if stored is not None:
-                if stored.seat_id != ticket.seat:
-                    raise RefusedError("This attempt belongs to another student.")
-                return Confirmed(attempt.id, stored.at)
-            size = func.coalesce(func.sum(func.length(cast(Attempt.answer, Text))), 0)
-            mine_all = select(func.count(), size).where(Attempt.seat_id == ticket.seat)
-            made, stored_size = connection.execute(mine_all).one()
-            if made >= MAX_ATTEMPTS:
-                raise RefusedError(f"You have made {MAX_ATTEMPTS} attempts in this room; no more are stored.")
-            if stored_size >= MAX_STORED:
-                raise RefusedError(f"Your answers in this room have {MAX_STORED} characters; no more are stored.")
-            if not attempt.gave_up and _was_shown(connection, ticket.seat, attempt):
-                raise RefusedError("You have seen the answer to this task. Answers to other numbers count.")
-            at = now()
-            values = {field.name: getattr(attempt, field.name) for field in fields(attempt)}
-            connection.execute(insert(Attempt).values(room_id=ticket.room, seat_id=ticket.seat, at=at, **values))
-            connection.execute(update(Seat).where(*mine).values(tries=made + 1, version=version))
+        try:
+            with self.changing(ticket.room) as change:
+                seat = next((one for one in change.live.present if one["id"] == ticket.seat), None)
+                if seat is None:
+                    raise RefusedError(GONE)
+                at = _stored_at(change.connection, ticket, attempt)
+                if at is None:
+                    at = now()
+                    values = {field.name: getattr(attempt, field.name) for field in fields(attempt)}
+                    row = {**values, "room_id": ticket.room, "seat_id": ticket.seat, "at": at}
+                    change.connection.execute(insert(Stored).values(**row))
+                    change.set([ticket.seat], tries=seat["tries"] + 1)
+                    change.taken[ticket.seat]["work"] = _with_attempt(seat["work"], attempt, text, at)
+        except UnknownRoomError:
+            raise RefusedError(GONE) from None
+        self._attempted(ticket.seat)
         return Confirmed(attempt.id, at)
 
     def sweep(self) -> int:
@@ -343,36 +409,6 @@ class Rooms:
         return ended
 
 
-_ERASED: dict[str, object] = {
-    "removed": True,
-    "alias": "",
-    "page": "",
-    "hand": 0.0,
-    "task": "",
-    "tries": 0,
-    "voted": "",
-    "vote": 0,
-    "gone": False,
-    "driven": "",
-}
-
-
-def _remove_unseen(connection: Connection, room: str, version: int | None) -> int:
-    """As `Rooms.remove_unseen`, in a writing transaction."""
-    answered = select(Attempt.seat_id).where(Attempt.room_id == room)
-    unseen = update(Seat).where(
-        Seat.room_id == room,
-        Seat.removed.is_(False),
-        Seat.beat == 0,
-        Seat.joined < now() - UNSEEN,
-        Seat.id.not_in(answered),
-    )
-    count = connection.execute(unseen.values(**_ERASED, version=version)).rowcount
-    if count:
-        erasure.note(connection)
-    return count
-
-
 def clean_name(text: str, longest: int, field: str) -> str:
     """An alias or a title in one line, without control characters; raises `RefusedError`."""
     kept = in_one_line(text)
@@ -385,10 +421,15 @@ def clean_name(text: str, longest: int, field: str) -> str:
     return kept
 
 
-def _free_alias(connection: Connection, room: str, alias: str, seat: str) -> str:
+def _unseen(seats: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Seats whose page has never come, and that are old enough to be given to somebody else."""
+    old = now() - UNSEEN
+    return [one["id"] for one in seats if not one["beat"] and not one["tries"] and one["joined"] < old]
+
+
+def _free_alias(seats: Iterable[Mapping[str, Any]], alias: str, seat: str) -> str:
     """An alias that no other student of a room has, in capitals or not: ``Bob 2`` where there is a Bob."""
-    others = select(Seat.alias).where(Seat.room_id == room, Seat.id != seat, Seat.removed.is_(False))
-    taken = {_folded(other) for other in connection.scalars(others)}
+    taken = {_folded(one["alias"]) for one in seats if one["id"] != seat}
     found, number = alias, 1
     while _folded(found) in taken:
         number += 1
@@ -401,19 +442,31 @@ def _folded(alias: str) -> str:
     return unicodedata.normalize("NFKC", alias).casefold()
 
 
-def next_version(connection: Connection, room: str) -> int | None:
-    """Count a change of a room, in a writing transaction; None if it has ended.
+def _stored_at(connection: Connection, ticket: Ticket, attempt: NewAttempt) -> float | None:
+    """When an attempt was stored; None: it was not, and may be. Raises `RefusedError`."""
+    stored = connection.execute(select(Stored.at, Stored.seat_id).where(Stored.id == attempt.id)).one_or_none()
+    if stored is not None:
+        if stored.seat_id != ticket.seat:
+            raise RefusedError("This attempt belongs to another student.")
+        return float(stored.at)
+    size = func.coalesce(func.sum(func.length(cast(Stored.answer, Text))), 0)
+    made, characters = connection.execute(select(func.count(), size).where(Stored.seat_id == ticket.seat)).one()
+    if made >= MAX_ATTEMPTS:
+        raise RefusedError(f"You have made {MAX_ATTEMPTS} attempts in this room; no more are stored.")
+    if characters >= MAX_STORED:
+        raise RefusedError(f"Your answers in this room have {MAX_STORED} characters; no more are stored.")
+    same = (Stored.seat_id == ticket.seat, Stored.exercise == attempt.exercise, Stored.seed == attempt.seed)
+    shown = select(Stored.id).where(*same, Stored.verdict == ANSWER_SHOWN).limit(1)
+    if not attempt.gave_up and connection.scalar(shown) is not None:
+        raise RefusedError("You have seen the answer to this task. Answers to other numbers count.")
+    return None
 
-    The room's row stays locked until the transaction ends, so versions are stored in their order.
-    """
-    query = update(Room).where(Room.id == room).values(version=Room.version + 1).returning(Room.version)
-    return connection.scalar(query)
 
-
-def _was_shown(connection: Connection, seat: str, attempt: NewAttempt) -> bool:
-    """Whether the seat has seen the answer to these numbers, on whichever of its pages."""
-    same = (Attempt.seat_id == seat, Attempt.exercise == attempt.exercise, Attempt.seed == attempt.seed)
-    return connection.scalar(select(Attempt.id).where(*same, Attempt.verdict == ANSWER_SHOWN).limit(1)) is not None
+def _with_attempt(done: Mapping[str, Work], new: NewAttempt, answer: str, at: float) -> dict[str, Work]:
+    """The work of a seat, by exercise, with one more attempt."""
+    shown = answer[:SHOWN_ANSWER]
+    one = Attempt("", "", new.exercise, new.seed, shown, new.verdict, new.score, new.started, at)
+    return {**done, new.exercise: done.get(new.exercise, NOTHING).plus(one)}
 
 
 def _unused_code(connection: Connection) -> str:

@@ -10,6 +10,7 @@ from enum import Enum
 
 from app.classroom.work import ANSWER_SHOWN, Work
 
+BUSY = "The classroom's database has too much to do at present. Try again in a moment."
 NO_ROOM = "No room has this code. Ask your teacher; rooms end after a while."
 # What can be said of a room that has ended.
 ERASED = "The room has ended. Everything in it was erased."

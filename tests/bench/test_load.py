@@ -9,7 +9,6 @@ from multiprocessing.connection import Connection
 
 import pytest
 from load import attackers, attacks, cloud, drag, lesson, play, rest, siege, soak, storm
-from load.lesson import databases
 from load.raw import Socket
 from load.service import Usage
 from load.visitor import STEP, SWING, Visitor
@@ -127,13 +126,6 @@ def test_students_who_come_together_all_get_a_seat_and_a_page(served):
     row = asyncio.run(lesson.join(*served, 4, 0.5))
     assert (row["lost"], row["why"]) == (0, "")
     assert 0 < row["seat p95 ms"] < row["arm p95 ms"] <= 1e3 * row["all pages s"]
-
-
-def test_pages_of_rooms_are_timed_from_process_to_process():
-    (row,) = databases.compare(None, 0.5)
-    assert (row["database"], row["sent"]) == ("SQLite", 10)
-    assert 0 < row["seen"] <= 10
-    assert 0 < row["p50 ms"] <= row["p95 ms"]
 
 
 def test_every_point_arrives_by_every_way(service):

@@ -17,15 +17,13 @@ import pytest
 from fastapi.testclient import TestClient
 from live_server import wait_for
 from postgres_server import running
-from sqlalchemy import insert, select
+from sqlalchemy import insert, select, update
 from stored_bytes import stored_bytes
 from test_hub import nothing, until
 
 from app.classroom import COOKIE, Hub, NewAttempt, erasure
 from app.classroom.hub import DATABASE_FILE
-from app.classroom.live import Pending
-from app.classroom.tables import LtiSeat, Setting
-from app.classroom.ticks import store
+from app.classroom.tables import LtiSeat, Seat, Setting
 from app.classroom.views import DELETED, ERASED, ERASING
 from app.service.main import create_app
 from app.service.web.rooms import sweeping
@@ -179,7 +177,7 @@ def test_a_long_lesson_leaves_nothing(hub, tmp_path) -> None:
             case _:
                 with hub.database.write(durable=False) as connection:
                     page = text * chance.randrange(1, 900)
-                    store(connection, room.id, Pending(seats={seat.seat: {"page": page}}), set())
+                    connection.execute(update(Seat).where(Seat.id == seat.seat).values(page=page))
     assert len(left(tmp_path, *texts)) > 100
     hub.rooms.end(room.id)
     assert hub.rooms.said_of_ended() == ERASED

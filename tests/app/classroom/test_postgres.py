@@ -9,11 +9,11 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from postgres_server import Postgres, running
-from sqlalchemy import select
+from sqlalchemy import create_engine, select
 from test_hub import attempt, nothing, until
 
 from app.classroom import ClassroomUnavailable, Hub, Ticket
-from app.classroom.tables import Attempt, Base
+from app.classroom.tables import Attempt, Base, Room
 
 
 @pytest.fixture(scope="module")
@@ -39,30 +39,55 @@ def hubs(database, tmp_path):
 
 
 @pytest.mark.full
-def test_a_class_on_two_machines(hubs):
+def test_a_class_goes_on_at_another_machine(hubs):
+    """As when the proxy sends its pages to another container."""
     here, there = hubs
     room = here.rooms.open("Kinematics", 3600)
-    teacher = here.attend(there.ticket(room.token), nothing)
-    seat = there.rooms.join(room.code, "Ada")
-    student = there.attend(seat, nothing)
-    teacher.set_follow(True)
-    teacher.tell_page("live")
-    teacher.open_poll("Elbow?", ["up", "down"])
-    until(lambda: student.room.page == "live" and student.room.poll)
-    student.vote(1)
-    student.tell_page("mine")
-    confirmed = student.submit(attempt())
-    until(lambda: teacher.room.poll.votes == (0, 1) and teacher.room.seats)
-    until(lambda: teacher.room.seats[0].page == "mine" and teacher.room.seats[0].work)
-    assert there.rooms.find(seat).students == 1
+    pages = [here.attend(each, nothing) for each in (Ticket(room.id), here.rooms.join(room.code, "Ada"))]
+    pages[0].set_follow(True)
+    pages[0].tell_page("live")
+    pages[0].open_poll("Elbow?", ["up", "down"])
+    pages[1].vote(1)
+    pages[1].tell_page("mine")
+    confirmed = pages[1].submit(attempt())
+    until(lambda: pages[0].room.seats[0].page == "mine" and not here._lives[room.id].unsaved)
+    teacher, student = (there.attend(page.ticket, nothing) for page in pages)
+    assert teacher.room == pages[0].room
+    assert student.room.page == "live"
+    for page in pages:
+        page.leave()
+    student.raise_hand(True)
+    assert teacher.room.seats[0].hand > 0
     with here.database.read() as connection:
         assert connection.scalars(select(Attempt.id)).all() == [confirmed.id]
     teacher.end_room()
-    until(lambda: student.room.closed)
+    assert student.room.closed
     with here.database.read() as connection:
         for table in Base.metadata.sorted_tables:
             rows = connection.execute(select(table)).all()
             assert table.name == "setting" or rows == [], table.name
+
+
+@pytest.mark.full
+def test_a_row_that_another_program_keeps_locked_holds_up_its_room_alone(hubs, monkeypatch):
+    monkeypatch.setattr("app.classroom.database.WAIT", 0.3)
+    hub, _ = hubs
+    held, free = (hub.attend(Ticket(hub.rooms.open(title, 3600).id), nothing) for title in ("Held", "Free"))
+
+    def frozen(page):
+        with hub.database.read() as connection:
+            return connection.scalar(select(Room.state).where(Room.id == page.ticket.room)).get("frozen")
+
+    engine = create_engine(hub.database._url)
+    with engine.begin() as other:
+        other.execute(select(Room.id).where(Room.id == held.ticket.room).with_for_update())
+        held.set_frozen(True)
+        until(lambda: held.room.problem)
+        free.set_frozen(True)
+        until(lambda: frozen(free))
+        assert not free.room.problem
+    engine.dispose()
+    until(lambda: frozen(held) and not held.room.problem)
 
 
 @pytest.mark.full
@@ -96,10 +121,10 @@ def test_machines_that_start_at_the_same_time_migrate_once(database, tmp_path):
 
 
 def test_a_server_that_dies_and_comes_back(hubs, server):
-    here, there = hubs
-    room = here.rooms.open("Kinematics", 3600)
-    teacher = here.attend(here.ticket(room.token), nothing)
-    student = there.attend(there.rooms.join(room.code, "Ada"), nothing)
+    hub, _ = hubs
+    room = hub.rooms.open("Kinematics", 3600)
+    teacher = hub.attend(hub.ticket(room.token), nothing)
+    student = hub.attend(hub.rooms.join(room.code, "Ada"), nothing)
     first = student.submit(attempt())
     server.stop()
     try:
@@ -112,5 +137,5 @@ def test_a_server_that_dies_and_comes_back(hubs, server):
         server.start()
     until(lambda: student.room.frozen and not student.room.problem)
     second = student.submit(attempt())
-    with here.database.read() as connection:
+    with hub.database.read() as connection:
         assert set(connection.scalars(select(Attempt.id))) == {first.id, second.id}

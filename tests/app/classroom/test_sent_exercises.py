@@ -18,7 +18,7 @@ from sqlalchemy import select, update
 from app.classroom import COOKIE, Hub, NewAttempt, Ticket, tables
 from app.classroom.attendance import Attendance
 from app.classroom.courses import Course, Courses, Item, Seal, SentExercises, to_data, to_toml
-from app.classroom.live import MOST_OWN, MOST_VERSIONS, LiveRoom
+from app.classroom.live import MOST_OWN, MOST_VERSIONS, with_own
 from app.classroom.lti.contents import contents_of
 from app.classroom.results.keys import result_key
 from app.cli.parser import main
@@ -177,25 +177,23 @@ def test_an_exercise_whose_arm_is_gone_keeps_its_title() -> None:
 
 
 def test_what_a_room_keeps_of_them_is_bounded() -> None:
-    live = LiveRoom("room")
+    kept: dict[str, list[str]] = {}
     for i in range(MOST_VERSIONS + 1):
-        live.tell_own({"my-own": own(f"Version {i}")})
-    versions = live.state["own"]["my-own"]
+        kept = with_own(kept, {"my-own": own(f"Version {i}")})
+    versions = kept["my-own"]
     assert len(versions) == MOST_VERSIONS
     assert versions[0] == ""
     assert versions[-1] == own(f"Version {MOST_VERSIONS}")
-    sent = SentExercises(Exercises(), live.state["own"], get_robot)
+    sent = SentExercises(Exercises(), kept, get_robot)
     assert sent.title("my-own") == f"Version {MOST_VERSIONS}"
     assert sent.said("my-own", 7, "2") == "2", "one version is forgotten"
-    live.tell_own({"my-own": own(f"Version {MOST_VERSIONS}")})
-    assert live.state["own"]["my-own"] == versions, "the same text again is no other version"
+    again = with_own(kept, {"my-own": own(f"Version {MOST_VERSIONS}")})
+    assert again["my-own"] == versions, "the same text again is no other version"
     for i in range(30):
-        live.tell_own({f"own-{i}": own() + "#" * 3000})
-    kept = live.state["own"]
+        kept = with_own(kept, {f"own-{i}": own() + "#" * 3000})
     assert sum(len(one) for texts in kept.values() for one in texts) <= MOST_OWN
     assert "my-own" not in kept
     assert list(kept)[-1] == "own-29"
-    assert live.pending.state["own"] == kept
 
 
 def test_a_course_of_a_learning_platform_brings_them(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ MODES = {
     "drag": "until the picture answers a drag, for 1, 10, 30 and 100 visitors",
     "live": "until the picture shows what a program sends, in turn with drags: 1, 10, 30 and 100 visitors",
     "play": "pictures of 1, 10 and 30 visitors who play a program, beside as many who drag",
-    "lesson": "a teacher whom 30 students follow, a wall of their arms, 60 who join, databases of rooms",
+    "lesson": "a teacher whom 30 students follow, a wall of their arms, 60 who join",
     "storm": "200 visitors at once",
     "cloud": "points a second: kernel and its steps, generator, REST, viewer",
     "soak": "visitors who come, drag, draw and go, over and over",

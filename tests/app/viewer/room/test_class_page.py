@@ -134,7 +134,7 @@ def test_a_page_leaves_its_room_once(room: Class, monkeypatch: pytest.MonkeyPatc
     left: list[str] = []
     pages: list[ClassroomPage] = []
     ending = threading.Event()
-    leave, end = room.hub.leave, ClassroomPage.end
+    leave, end = Attendance.leave, ClassroomPage.end
 
     def note(page: Attendance) -> None:
         left.append(page.ticket.seat)
@@ -146,7 +146,7 @@ def test_a_page_leaves_its_room_once(room: Class, monkeypatch: pytest.MonkeyPatc
         ending.set()
 
     student, ticket = room.join("Ann")
-    monkeypatch.setattr(room.hub, "leave", note)
+    monkeypatch.setattr(Attendance, "leave", note)
     monkeypatch.setattr(ClassroomPage, "end", keep)
     student.close()
     assert ending.wait(10.0)

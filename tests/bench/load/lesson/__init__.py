@@ -1,4 +1,4 @@
-"""A class: until the students' pictures show a teacher's drag, a wall of their arms, joining, and databases."""
+"""A class: until the students' pictures show a teacher's drag, a wall of their arms, and joining."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from postgres_server import running as running_postgres
 from app.classroom import COOKIE, Hub
 from load import latencies, percentile, table
 from load.drag import HZ
-from load.lesson import databases
 from load.lesson.joining import join
 from load.play import JOINT, MESSAGES
 from load.service import Service, serve
@@ -154,10 +153,7 @@ def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str,
     with served(workers) as running:
         found["join"] = asyncio.run(join(*running, 2 * count, JOINING))
         print(table(f"lesson: students join within {JOINING:g} s", [found["join"]]))
-    with running_postgres() as server:
-        found["databases"] = databases.compare(server, seconds)
-        print(table(f"lesson: a page sent {HZ:g} times a second, from process to process", found["databases"]))
-        with served(workers, server.create()) as running:
-            found["follow, PostgreSQL"] = asyncio.run(follow(*running, count, seconds))
-            print(table(f"{drags}, PostgreSQL", [found["follow, PostgreSQL"]]))
+    with running_postgres() as server, served(workers, server.create()) as running:
+        found["follow, PostgreSQL"] = asyncio.run(follow(*running, count, seconds))
+        print(table(f"{drags}, PostgreSQL", [found["follow, PostgreSQL"]]))
     return found
