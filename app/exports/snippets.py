@@ -147,6 +147,8 @@ def robotics_toolbox(moment: Moment) -> str:
     """
     robot = moment.robot
     first, last = robot.joint_rows[0], robot.joint_rows[-1]
+    if robot.coupled:
+        return f"# {_comment(robot.name)} has rows that follow joints, which DHRobot cannot express.\n"
     if last - first + 1 != robot.n:
         return f"# {_comment(robot.name)} has a fixed row between two joints, which DHRobot cannot express.\n"
     suffix = "MDH" if robot.convention == "modified" else "DH"
@@ -176,8 +178,10 @@ print(robot.ikine_LM(target, q0=q))  # numerical, the whole pose, one solution
 
 
 def matlab(moment: Moment) -> str:
-    """MATLAB, with the Robotics System Toolbox."""
+    """MATLAB, with the Robotics System Toolbox. For an arm with rows that follow joints a comment says why not."""
     robot = moment.robot
+    if robot.coupled:
+        return f"% {_comment(robot.name)} has rows that follow joints, which rigidBodyTree cannot express.\n"
     kind = "mdh" if robot.convention == "modified" else "dh"
     lines = [f"% {_comment(robot.name)}", "robot = rigidBodyTree('DataFormat', 'row');"]
     parent = "base"

@@ -21,8 +21,8 @@
     return found;
   }
 
-  function motion(joint, value) {
-    if (!joint.turns) return [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, value, 0, 0, 0, 1];
+  function motion(link, value) {
+    if (!link.turns) return [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, value, 0, 0, 0, 1];
     const [c, s] = [Math.cos(value), Math.sin(value)];
     return [c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
   }
@@ -30,7 +30,7 @@
   // Poses of all links, the base first, in the base frame.
   function linkPoses(q, arm = robot) {
     const poses = [UNIT];
-    arm.joints.forEach((joint, i) => poses.push(product(product(poses[i], joint.axis), motion(joint, q[i]))));
+    arm.links.forEach((link, i) => poses.push(product(product(poses[i], link.axis), motion(link, link.ratio * q[link.joint]))));
     return poses;
   }
 
@@ -126,7 +126,7 @@
       this.controls.addEventListener("change", () => this.draw());
       this.waiting = false;
       this.light();
-      this.links = robot.joints.map(() => new THREE.Group());
+      this.links = robot.links.map(() => new THREE.Group());
       this.links.unshift(new THREE.Group());
       this.scene.add(...this.links);
       for (const part of data.parts) {
@@ -354,7 +354,7 @@
     cells.forEach((line, k) => {
       const row = robot.rows[k];
       ["theta", "d", "a", "alpha"].forEach((name, j) => {
-        const value = row[name] + (row.moves === name ? state.q[row.joint] : 0);
+        const value = row[name] + (row.moves === name ? row.ratio * state.q[row.joint] : 0);
         line[j].textContent = written(value, name === "theta" || name === "alpha");
       });
     });

@@ -79,6 +79,15 @@ _ROW: dict[str, Any] = {
         "d": _quantity(_LENGTH, "Translation along z, 0 by default."),
         "a": _quantity(_LENGTH, "Translation along x, 0 by default."),
         "alpha": _quantity(_ANGLE, "Rotation about x, 0 by default."),
+        "follows": {
+            **_TEXT,
+            "description": "Name of the row whose joint moves this one: a parallelogram or a belt, say. Without it "
+            "the row is a joint itself.",
+        },
+        "ratio": {
+            "description": "By how many times that joint's value it moves, rad (m) for each; 1 by default.",
+            "anyOf": [_number(["m"]), {"type": "string", "maxLength": 80, "examples": ["-1/2"]}],
+        },
         "limits": {
             "description": "[lower, upper]; by default ±180° or 0 to 1 m. `none`: an unlimited revolute joint.",
             "anyOf": [_items(_ANY, 2), {"const": "none"}],

@@ -166,7 +166,7 @@ def _frames(sheet: Sheet) -> list[Array]:
 def _path(sheet: Sheet) -> Path:
     """Per row: the points where it starts, turns the corner and ends ``(3, 3)``, and its d and a (m)."""
     robot, frames = sheet.robot, _frames(sheet)
-    values = dict(zip(robot.joint_rows, sheet.q.tolist(), strict=True))
+    values = sheet.values_of_rows
     out: Path = []
     for i, row in enumerate(robot.rows):
         before, after = frames[i], frames[i + 1]

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from app.exports.snippets import row_transform
-from kin import Robot, fk
+from kin import Joint, Robot, fk
 from kin.transforms import Array
 from kin.units import Units, fixed
 
@@ -124,13 +124,13 @@ class Sheet:
                 units.of(k in (0, 3)).number(value) for k, value in enumerate((row.theta, row.d, row.a, row.alpha))
             ]
             moved, limits = None, "–"
-            if row.kind != "fixed":
-                joint += 1
+            if row.moves:
+                joint += row.driven
                 moved = 0 if row.kind == "revolute" else 1
                 offset = row.theta if moved == 0 else row.d
                 unit = units.of(moved == 0)
                 sign, size = ("−" if offset < 0.0 else "+"), unit.number(abs(offset))
-                variable = _variable(row.kind, joint)
+                variable = self._variable_of(row) if row.follows else _variable(row.kind, joint)
                 numbers[moved] = f"{variable} {sign} {size}" if offset else variable
                 if row.limits is not None:
                     limits = " … ".join(unit.number(limit) for limit in row.limits)
@@ -138,10 +138,22 @@ class Sheet:
             out.append(Row(number, row.name, cells, limits, moved))
         return out
 
+    def _variable_of(self, row: Joint) -> str:
+        """The variable of a row that follows a joint: −θ₂, 0.5 θ₂."""
+        names = [joint.name for joint in self.robot.joints]
+        index = names.index(row.follows)
+        leader = _variable(self.robot.joints[index].kind, index)
+        return {1.0: leader, -1.0: f"−{leader}"}.get(row.ratio, f"{fixed(row.ratio, 4)} {leader}")
+
+    @cached_property
+    def values_of_rows(self) -> dict[int, float]:
+        """The value of each moving row, by its index."""
+        return dict(zip(self.robot.moving_rows, self.robot.expand(self.q).tolist(), strict=True))
+
     @cached_property
     def matrices(self) -> list[Array]:
         """A of every row ``(4, 4)``, metres."""
-        values = dict(zip(self.robot.joint_rows, self.q.tolist(), strict=True))
+        values = self.values_of_rows
         return [
             row_transform(row, values.get(i, 0.0), self.robot.convention) for i, row in enumerate(self.robot.rows)
         ]

@@ -33,7 +33,7 @@ def csv_text(sheet: Sheet) -> str:
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(heads)
-    values = dict(zip(sheet.robot.joint_rows, sheet.q.tolist(), strict=True))
+    values = sheet.values_of_rows
     for i, (row, A) in enumerate(zip(sheet.robot.rows, sheet.matrices, strict=True)):
         unit = sheet.units.of(row.kind != "prismatic").scale
         limits = ("", "") if row.limits is None else tuple(limit * unit for limit in row.limits)

@@ -112,7 +112,7 @@ def capsules_for(before: Robot, robot: Robot) -> Robot:
     move = robot.T_world_base @ inverse(before.T_world_base)
     found = []
     for each in before.capsules:
-        row = robot.joint_rows[each.link - 1] if each.link else -1
+        row = robot.moving_rows[each.link - 1] if each.link else -1
         there = old[each.row] if each.row >= 0 else before.T_world_base
         T = inverse(new[row] if each.link else robot.T_world_base) @ move @ there
         if np.abs(T - np.eye(4)).max() < 1e-12:
@@ -127,7 +127,9 @@ def capsules_for(before: Robot, robot: Robot) -> Robot:
 
 def _shifts(before: Robot, robot: Robot) -> list[Array] | None:
     """What leads from each link's frame of one table to that of the other; None if it is another arm."""
-    if [joint.kind for joint in before.joints] != [joint.kind for joint in robot.joints]:
+    if [joint.kind for joint in before.free.joints] != [joint.kind for joint in robot.free.joints]:
+        return None
+    if not np.array_equal(before.expansion, robot.expansion):
         return None
     zeros = np.zeros((1, robot.n))
     move = robot.T_world_base @ inverse(before.T_world_base)

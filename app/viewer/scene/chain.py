@@ -1,4 +1,4 @@
-"""A robot's DH rows regrouped for the scene: one node per moving joint, each the parent of the next.
+"""A robot's DH rows regrouped for the scene: one node per moving row, each the parent of the next.
 
 With nodes nested like the arm itself, moving a revolute joint means assigning one quaternion, in either
 convention:
@@ -8,6 +8,8 @@ convention:
 M(q) turns about z (or slides along z); the constants G_k collect everything between two motions. In a standard
 row the motion comes first, ``M · Rz(θ) Tz(d) Tx(a) Rx(α)``; in a modified one it stands in the middle,
 ``Rx(α) Tx(a) · M · Rz(θ) Tz(d)``. Rz and Tz about the same axis commute, so M may be pulled to the front of both.
+
+The q of this formula are the values of all moving rows (`Robot.expand`): of the joints, and of what follows them.
 """
 
 from __future__ import annotations
@@ -25,17 +27,19 @@ from kin.transforms import Array, wxyz_from_rotation
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A rigid piece: what moves with one joint, up to the next one.
+    """A rigid piece: what moves with one row, up to the next one.
 
     Attributes:
-        index: index of the moving joint that carries it, −1 for the base.
-        joint: that joint's row, None for the base.
+        index: index of the moving row that carries it, −1 for the base.
+        leader: index of the joint whose value moves it: its own, or the one that it follows; −1 for the base.
+        joint: that moving row, None for the base.
         T_parent_axis: G_k ``(4, 4)``; z is the joint's axis, in coordinates of the previous link.
         path: centre line ``(k, 3)`` from the axis to the next joint (or the tool), in the link's coordinates.
         frames: (row number, T_link_frame) of each DH row's frame that moves with this link.
     """
 
     index: int
+    leader: int
     joint: Joint | None
     T_parent_axis: Array
     path: Array
@@ -66,13 +70,15 @@ class Chain:
 def chain(robot: Robot) -> Chain:
     """The robot's rows regrouped into links."""
     links: list[Link] = []
+    leaders = [-1, *robot.expansion.astype(bool).argmax(axis=1).tolist()]
     joint: Joint | None = None
     start, T = np.eye(4), robot.T_world_base.copy()
     path: list[Array] = [T[:3, 3].copy()]
     frames: list[tuple[int, Array]] = []
 
     def close() -> None:
-        links.append(Link(len(links) - 1, joint, start, np.array(path), tuple(frames)))
+        number = len(links)
+        links.append(Link(number - 1, leaders[number], joint, start, np.array(path), tuple(frames)))
 
     for number, row in enumerate(robot.rows):
         for step in _steps(row, robot.convention == "modified"):
@@ -93,9 +99,9 @@ def chain(robot: Robot) -> Chain:
 
 
 def link_poses(robot: Robot, q: Array) -> Array:
-    """Poses ``(k, n + 1, 4, 4)`` of all links, base first, for configurations ``(k, n)``."""
-    links = chain(robot).links
-    found = np.empty((len(q), robot.n + 1, 4, 4))
+    """Poses ``(k, m + 1, 4, 4)`` of all links, base first, for configurations ``(k, n)``."""
+    links, q = chain(robot).links, robot.expand(q)
+    found = np.empty((len(q), len(links), 4, 4))
     T = np.broadcast_to(np.eye(4), (len(q), 4, 4))
     found[:, 0] = T
     for i, link in enumerate(links[1:]):

@@ -34,7 +34,7 @@ class Contact:
     """The deepest place where a drawn part is inside an obstacle.
 
     Attributes:
-        link: index of the joint that moves the part; the number of joints for the gripper.
+        link: index of the row that moves the part, among those that move; their number for the gripper.
         point: centre of the sphere that is inside ``(3,)``, m.
     """
 
@@ -44,7 +44,7 @@ class Contact:
 
     def text(self, robot: Robot) -> str:
         """The contact as a sentence."""
-        part = "The gripper" if self.link == robot.n else f"Link {self.link + 1}"
+        part = "The gripper" if self.link == len(robot.moving_rows) else f"Link {self.link + 1}"
         return f"{part} passes through the {self.obstacle}."
 
 
@@ -170,7 +170,7 @@ def _spheres(
                 add(link, *_core(part), link.index)
     if moving:
         centres, radius = _core(hand)
-        add(moving[-1], centres @ tool[:3, :3].T + tool[:3, 3], radius, robot.n)
+        add(moving[-1], centres @ tool[:3, :3].T + tool[:3, 3], radius, len(robot.moving_rows))
     return np.array(rows, int), np.vstack(points), np.array(radii), np.array(links, int)
 
 

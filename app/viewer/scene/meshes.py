@@ -65,7 +65,7 @@ def body(robot: Robot) -> Body:
     size = _thickness(robot, links)
     grip = _grip_length(links, size, robot)
     tip = _tip(links, size)
-    radii = tuple(size * _taper(link.index, robot.n, tip) for link in links.links)
+    radii = tuple(size * _taper(link.index, len(links.links) - 1, tip) for link in links.links)
     parts = []
     crowd = 0
     for link in links.links:
@@ -120,7 +120,7 @@ def _link_parts(link: Link, r: float, crowd: int, grip: float, links: Chain) -> 
     parts = [Part("link", tube(path, r), LINK_COLOR)] if len(path) > 1 else []
     if link.joint is None:
         return tuple(parts)
-    color = joint_color(link.index)
+    color = joint_color(link.leader)
     if link.joint.kind == "prismatic":
         return (*parts, *_slide(link, r, color, grip))
     along = _leaves_along(link)

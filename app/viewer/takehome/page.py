@@ -160,16 +160,16 @@ def arm_data(robot: Robot) -> dict[str, Any]:
     found = chain(robot)
     return {
         "joints": [
-            _joint(i, joint, link, home)
-            for i, (joint, link, home) in enumerate(zip(robot.joints, found.links[1:], robot.home, strict=True))
+            _joint(i, joint, home) for i, (joint, home) in enumerate(zip(robot.joints, robot.home, strict=True))
         ],
+        "links": [_link(link) for link in found.links[1:]],
         "tool": found.T_last_tool.ravel().tolist(),
         "rows": _rows(robot),
         "convention": f"{robot.convention.capitalize()} convention. {HIGHLIGHTED}",
     }
 
 
-def _joint(index: int, joint: Joint, link: Link, home: float) -> dict[str, Any]:
+def _joint(index: int, joint: Joint, home: float) -> dict[str, Any]:
     """A joint; the slider of one without limits reaches half a turn to either side, as in the viewer."""
     lower, upper = joint.limits or (-math.pi, math.pi)
     return {
@@ -179,18 +179,28 @@ def _joint(index: int, joint: Joint, link: Link, home: float) -> dict[str, Any]:
         "upper": upper,
         "home": home,
         "color": joint_color(index),
+    }
+
+
+def _link(link: Link) -> dict[str, Any]:
+    """What moves a link: a joint, so many times as far."""
+    assert link.joint is not None
+    return {
+        "turns": link.joint.kind == "revolute",
+        "joint": link.leader,
+        "ratio": link.joint.ratio,
         "axis": link.T_parent_axis.ravel().tolist(),
     }
 
 
 def _rows(robot: Robot) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
-    joint = 0
+    links = iter(chain(robot).links[1:])
     for row in robot.rows:
         moves = {"revolute": "theta", "prismatic": "d"}.get(row.kind)
         numbers = {"theta": row.theta, "d": row.d, "a": row.a, "alpha": row.alpha}
-        rows.append({"name": row.name, "moves": moves, "joint": joint if moves else None, **numbers})
-        joint += moves is not None
+        joint = next(links).leader if moves else None
+        rows.append({"name": row.name, "moves": moves, "joint": joint, "ratio": row.ratio, **numbers})
     return rows
 
 

@@ -77,7 +77,7 @@ class ArmScene:
         self._axes: list[viser.MeshHandle] = []
         self._body_axes: list[viser.MeshHandle] = []  # through the drawn body; made when they are first shown
         self._through = False
-        self._shown = [math.nan] * robot.n
+        self._shown = [math.nan] * len(robot.moving_rows)
         self._top: list[viser.SceneNodeHandle] = []
         self.floor = Floor(scene, root, self.body, robot.T_world_base[:3, 3], dark)
         self._top += [*self.floor.nodes, add_lamp(scene, f"{root}-lamp", self.body)]
@@ -109,7 +109,7 @@ class ArmScene:
 
     def show(self, q: Array) -> None:
         """Pose every joint node for a configuration ``(n,)``; unchanged joints cost nothing."""
-        shown = self._shown
+        shown, q = self._shown, self.robot.expand(q)
         for i, (link, node, value) in enumerate(
             zip(self.body.chain.links[1:], self._joints, q.tolist(), strict=True)
         ):
@@ -295,7 +295,8 @@ class ArmScene:
         self._frames = ArmFrames(self._scene, self._root, self.robot, self.body, 0.5 * GIZMO * self.body.radius)
         self._frames.add(self._root, -1, self.robot.T_world_base)
         name = self._root
-        for link, parts, q in zip(self.body.chain.links, self.body.parts, (0.0, *self.robot.home), strict=True):
+        home = (0.0, *self.robot.expand(self.robot.q_home).tolist())
+        for link, parts, q in zip(self.body.chain.links, self.body.parts, home, strict=True):
             parent = name
             if link.joint is not None:
                 name = f"{parent}/{link.index + 1}"

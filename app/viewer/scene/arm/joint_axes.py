@@ -21,8 +21,9 @@ BEHIND, AHEAD = 1.5, 2.4  # how far a rod stands out, in thicknesses of the arm
 
 
 def axes(robot: Robot, made: Body, drawn: Drawing) -> tuple[Part, ...]:
-    """One rod about z for each joint, in the frame of its link; its arrow shows the positive turn."""
+    """One rod about z for each moving row, in the frame of its link; its arrow shows the positive turn."""
     links, parts, r = made.chain.links, [], made.size
+    home = robot.expand(robot.q_home)
     for k, link in enumerate(links[1:], 1):
         heights = [
             *_heights(drawn.parts[k - 1], inverse(link.T_parent_axis)),
@@ -30,11 +31,11 @@ def axes(robot: Robot, made: Body, drawn: Drawing) -> tuple[Part, ...]:
         ]
         low, high = min(heights, default=0.0), max(heights, default=0.0)
         if k + 1 < len(links):
-            after = links[k + 1].pose(float(robot.q_home[k]))
+            after = links[k + 1].pose(float(home[k]))
             beyond = _heights(drawn.parts[k + 1], pose_from_position_wxyz(*after))
             near = [height for height in beyond if low - NEAR * r < height < high + NEAR * r]
             low, high = min([low, *near]), max([high, *near])
-        parts.append(Part("joint-axis", rod(r, low - BEHIND * r, high + AHEAD * r), joint_color(k - 1)))
+        parts.append(Part("joint-axis", rod(r, low - BEHIND * r, high + AHEAD * r), joint_color(link.leader)))
     return tuple(parts)
 
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from app.viewer.scene.bodies.parts import Color, Part, joint_color
-from app.viewer.scene.chain import link_poses
+from app.viewer.scene.chain import chain, link_poses
 from app.viewer.scene.shapes import DIRECTIONS, Solid, loft, merged, outline, placed, spaced
 from kin import Robot, builtin_robots
 from kin.axes import inverse
@@ -71,7 +71,7 @@ def _drawn(robot: Robot, data: dict[str, Any]) -> Drawing:
     parts, covers = [], []
     for link, T_base_link in enumerate(poses):
         T = inverse(T_base_link)
-        colors[OF_JOINT] = joint_color(link - 1)
+        colors[OF_JOINT] = joint_color(chain(robot).links[link].leader)
         parts.append(
             tuple(Part(f"body-{c}", placed(merged(group), T), colors[c]) for c, group in solids[link].items())
         )
