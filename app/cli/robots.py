@@ -9,6 +9,7 @@ from argparse import Namespace
 from dataclasses import replace
 
 import numpy as np
+from msgspec import UNSET
 
 from app.cli.files import write_file
 from app.cli.terminal import (
@@ -72,7 +73,8 @@ def _dh_table(answer: RobotAnswer, units: Notation) -> str:
             units.length(row.a),
             units.angle(row.alpha),
         ]
-        rows.append([row.name, row.kind, *cells, " … ".join(units.joint(index, x) for x in bounds or ())])
+        kind = row.kind if row.follows is UNSET else f"{row.kind}, {row.ratio:g} × {row.follows}"
+        rows.append([row.name, kind, *cells, " … ".join(units.joint(index, x) for x in bounds or ())])
     length = units.of_length
     head = ["row", "kind", "theta", f"d {length}", f"a {length}", "alpha", "limits"]
     return f"DH table, {answer.convention} convention\n\n" + table(head, rows)

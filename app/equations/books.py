@@ -34,7 +34,7 @@ class DerivationError(RuntimeError):
     """A derived closed form disagrees with forward kinematics."""
 
 
-class TooManyRowsError(DerivationError):
+class NotDerivedError(DerivationError):
     """The arm has more rows than equations are derived for."""
 
 
@@ -216,11 +216,13 @@ def book_later(robot: Robot, limited: bool = False) -> Subscription[Book]:
         limited: raise `TooManyPendingError` instead of queueing behind too many derivations.
 
     Raises:
-        TooManyRowsError: at once.
+        NotDerivedError: at once, for an arm with too many rows, or with rows that follow joints.
     """
+    if robot.coupled:
+        raise NotDerivedError("equations are derived for arms in which every moving row is a joint")
     rows = len(robot.rows)
     if rows > MOST_ROWS:
-        raise TooManyRowsError(f"equations are derived for at most {MOST_ROWS} rows, this arm has {rows}")
+        raise NotDerivedError(f"equations are derived for at most {MOST_ROWS} rows, this arm has {rows}")
     return _BOOKS.subscribe(robot, lambda computation: _make(robot, computation), MAX_PENDING if limited else None)
 
 

@@ -13,6 +13,7 @@ are left to numeric descents.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
@@ -32,6 +33,7 @@ from kin.solvers.singular import Singularity, by_jacobian, those_within
 from kin.transforms import Array
 
 Flags = NDArray[np.bool_]
+_THETA = re.compile(r"θ(\d)")
 _MOST = 8  # axes of a free arm: no closed form has more
 _APART = 0.05  # rad or m by which a row may miss the value that the joints give it: a target may be rounded
 _SINGULAR = 1e-7  # of the largest singular value
@@ -107,7 +109,9 @@ class Coupled(ClosedForm):
         )
         self.name, self.title, self.lengths = form.name, form.title, form.lengths
         self.reason = f"{form.reason}; {robot.n} joints move these {free.n} axes, which decides what is kept"
-        self.branches, self.meanings, self.named = form.branches, form.meanings, form.named
+        self.branches, self.named = form.branches, form.named
+        # Of the free arm: an angle that the joints together turn.
+        self.meanings = tuple((name, _THETA.sub(r"the angle at axis \1", text)) for name, text in form.meanings)
         self.off = form.off
         self.kernels = kernels_by_solving(self, form.kernels)
 

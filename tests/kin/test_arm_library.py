@@ -30,7 +30,7 @@ ROBOTS = kin.builtin_robots()
 LIBRARY = {name: robot for name, robot in ROBOTS.items() if name not in kin.classic_robots()}
 FAMILIES = {
     "ur3 ur10 ur3e ur5e ur10e ur16e ur20 z1": "parallel6",
-    "so100 so101 vx300 wx250": "parallel5",
+    "so100 so101 vx300 wx250 palletiser": "parallel5",
     "kr6 tx2-60 lrmate200id gp8 vx300s wx250s jaco2s": "wrist6",
     "crx10ia gofa jaco2 xarm6 cylindrical": "general6",
     "fr3 xarm7": "offset7",
@@ -152,7 +152,7 @@ def test_a_file_states_where_its_numbers_are_from(robot):
     assert "payload" not in data or "payload" in data["source"]
     assert "mass" not in data or "mass" in data["source"]
     for row in data["rows"]:
-        assert row.get("kind") == "fixed" or "limits" in row, row["name"]
+        assert row.get("kind") == "fixed" or "follows" in row or "limits" in row, row["name"]
     assert kin.parse_robot(kin.robot_to_toml(robot)) == robot
 
 
@@ -191,9 +191,15 @@ FORMULAS = {
         0.4 * math.sin(q[1]) + 0.3 * math.sin(q[1] + q[2]),
         q[0],
     ),
-    # The hand of the last two reaches 120 and 150 mm past the wrist's point.
+    # The hand of these two reaches 120 and 150 mm past the wrist's point.
     "cylindrical": lambda q: (-q[2] * math.sin(q[0]), q[2] * math.cos(q[0]), 0.3 + q[1]),
     "gantry": lambda q: (-q[2], q[1], q[0]),
+    # The upper arm is counted from the vertical, the forearm from the horizontal; the hand stays level.
+    "palletiser": lambda q: (
+        math.cos(q[0]) * (0.4 + 0.9 * math.sin(q[1]) + math.cos(q[2])),
+        math.sin(q[0]) * (0.4 + 0.9 * math.sin(q[1]) + math.cos(q[2])),
+        0.8 + 0.9 * math.cos(q[1]) - math.sin(q[2]),
+    ),
 }
 
 
@@ -201,7 +207,7 @@ def test_the_arms_of_textbooks_are_where_their_coordinates_say():
     assert {name for name, robot in LIBRARY.items() if not robot.maker} == set(FORMULAS)
     for name, formula in FORMULAS.items():
         robot = LIBRARY[name]
-        hand = {"cylindrical": 0.12, "gantry": 0.15}.get(name, 0.0)
+        hand = {"cylindrical": 0.12, "gantry": 0.15, "palletiser": 0.25}.get(name, 0.0)
         for q in anywhere(robot, 20):
             T = kin.fk(robot, q)
             assert T[:3, 3] - hand * T[:3, 2] == pytest.approx(np.array(formula(q)), abs=1e-12)

@@ -81,12 +81,11 @@ _ROW: dict[str, Any] = {
         "alpha": _quantity(_ANGLE, "Rotation about x, 0 by default."),
         "follows": {
             **_TEXT,
-            "description": "Name of the row whose joint moves this one: a parallelogram or a belt, say. Without it "
-            "the row is a joint itself.",
+            "description": "Name of the row whose joint moves this one; without it the row is a joint itself.",
         },
         "ratio": {
             "description": "By how many times that joint's value it moves, rad (m) for each; 1 by default.",
-            "anyOf": [_number(["m"]), {"type": "string", "maxLength": 80, "examples": ["-1/2"]}],
+            "anyOf": [_number(["m"]), {"type": "string", "maxLength": 80}],
         },
         "limits": {
             "description": "[lower, upper]; by default ±180° or 0 to 1 m. `none`: an unlimited revolute joint.",

@@ -20,7 +20,7 @@ from app.viewer.panel import Post, assign, listen
 from app.viewer.review.feature import Reviewing
 from app.viewer.views.templates import render
 from app.viewer.worksheet.feature import Worksheets
-from kin import InputError
+from kin import InputError, Robot
 
 NONE = "None"
 MORE: tuple[type[Feature], ...] = (Practising, CourseFeature, Author)  # Reviewing has a row of its own
@@ -96,7 +96,11 @@ class LessonChoice:
     def _show(self, chosen: type[Feature] | None, steps: dict[str, object] | None) -> None:
         """Build what was chosen, in the container that is open; None: the overview."""
         activity, always = self._stage.activity, (self.exercises, self.courses, self.author, self.reviewing)
-        if chosen is None:
+        if chosen is not None and issubclass(chosen, Lesson) and chosen.by_rows and self._stage.now.robot.coupled:
+            assign(self._choice, NONE)
+            self._overview = self._gui.add_html(_not_for(chosen, self._stage.now.robot))
+            chosen = None
+        elif chosen is None:
             self._overview = self._gui.add_html(_overview())
         elif issubclass(chosen, Lesson):
             self._box = self._gui.add_folder(None)
@@ -187,6 +191,11 @@ def after(lesson: type[Lesson]) -> str:
 def lesson_with_key(key: str | None) -> type[Lesson] | None:
     """The lesson with this key; None if there is none."""
     return next((lesson for lesson in LESSONS if lesson.key == key), None)
+
+
+def _not_for(lesson: type[Lesson], robot: Robot) -> str:
+    """Why a lesson is not shown for an arm, above all lessons."""
+    return render("panel/not_for", title=lesson.title, robot=robot.name) + _overview()
 
 
 def _overview() -> str:

@@ -39,6 +39,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
     """The walk through the table of the selected robot, or a table that the student makes."""
 
     key = "dh"
+    by_rows = True
     title = "DH table step by step"
     computes = False
     about = "How four motions per row lead from the base to the tool, one after another."

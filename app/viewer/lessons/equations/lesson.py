@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.equations import Book, DerivationError, TooManyRowsError, book_later
+from app.equations import Book, DerivationError, NotDerivedError, book_later
 from app.exports.worksheet import Formula, Left
 from app.shared.computations import Subscription
 from app.viewer.declared.feature import DeclaredFeature
@@ -166,7 +166,7 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
         self._derive_at = None
         try:
             self._derivation = derivation = book_later(self.stage.now.robot)
-        except TooManyRowsError as error:
+        except NotDerivedError as error:
             self._words = f"No equations for so many rows: {error}."
             return
         if derivation.finished:

@@ -21,9 +21,12 @@ class Lesson(Feature, ABC):
     Attributes:
         computes: whether it solves the pose, or has a scene of its own. Links do not open it for visitors who may
             only look.
+        by_rows: whether it takes each moving row of the table for a joint, so that it is not for arms with rows
+            that follow joints.
     """
 
     computes: ClassVar[bool] = True
+    by_rows: ClassVar[bool] = False
 
     @staticmethod
     def left(robot: Robot) -> Left:

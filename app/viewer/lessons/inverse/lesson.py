@@ -47,6 +47,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
     """See the module."""
 
     key = "inverse"
+    by_rows = True
     title = "Inverse kinematics step by step"
     about = "From a target to the joint angles by hand, and where each solution comes from."
     outline = staticmethod(outline)

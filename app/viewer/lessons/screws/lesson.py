@@ -28,6 +28,7 @@ class ScrewsLesson(DeclaredFeature[ScrewsSettings, ScrewsFacts], Lesson):
     """See the module."""
 
     key = "screws"
+    by_rows = True
     title = "Screws"
     about = "Each joint axis as six numbers, and the pose of the tool as a product of exponentials."
     outline = staticmethod(outline)

@@ -155,13 +155,18 @@ def changed_rows(robot: Robot, own: OwnArm | None, change: Callable[[list[Fields
     data, start = fields_of(robot, own)
     homes = _homes(data)
     change(data["rows"])
-    data["home"] = {"q": [homes.get(id(row)) for row in data["rows"] if row.get("kind") != "fixed"]}
+    data["home"] = {"q": [homes.get(id(row)) for row in data["rows"] if _is_joint(row)]}
     return built(data, start, robot)
+
+
+def _is_joint(row: Fields) -> bool:
+    """Whether a row moves by itself."""
+    return row.get("kind") != "fixed" and "follows" not in row
 
 
 def _homes(data: Fields) -> dict[int, object]:
     """The home values of the joints, by the identity of their rows."""
-    joints = [row for row in data["rows"] if row.get("kind") != "fixed"]
+    joints = [row for row in data["rows"] if _is_joint(row)]
     return {id(row): value for row, value in zip(joints, data["home"]["q"], strict=True)}
 
 
@@ -209,12 +214,18 @@ def _type_row(data: Fields, robot: Robot, index: int, column: str, text: str, un
         for motor in data.get("motors", []):
             if motor.get("joint") == joint.name:
                 motor["joint"] = text
+        for each in data["rows"]:
+            if each.get("follows") == joint.name:
+                each["follows"] = text
     elif column == "kind":
         homes = _homes(data) | {id(row): None}
         row["kind"] = text
         for key in ("limits", *PEAK_FIELDS):
             row.pop(key, None)
-        data["home"] = {"q": [homes[id(each)] for each in data["rows"] if each.get("kind") != "fixed"]}
+        if text == "fixed":
+            row.pop("follows", None)
+            row.pop("ratio", None)
+        data["home"] = {"q": [homes.get(id(each)) for each in data["rows"] if _is_joint(each)]}
     elif column in ("low", "high"):
         if joint.kind == "fixed":
             raise ReadError("a fixed row has no limits")
@@ -234,8 +245,10 @@ def _type_motion(data: Fields, robot: Robot, index: int, column: str, text: str,
     row, turning = robot.rows[index], robot.rows[index].kind == "revolute"
     if row.kind == "fixed":
         raise ReadError("a fixed row does not move")
+    if row.follows and column == "home":
+        raise ReadError(f"this row follows {row.follows}")
     if column == "home":
-        joint = sum(each.get("kind") != "fixed" for each in data["rows"][:index])
+        joint = sum(_is_joint(each) for each in data["rows"][:index])
         unit, low, high = units.of(turning), float(robot.lower[joint]), float(robot.upper[joint])
         if not low <= read_cell(text, unit) <= high:
             raise ReadError(f"“{cut(text)}” is outside the limits: {unit.text(low)} to {unit.text(high)}")

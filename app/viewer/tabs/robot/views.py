@@ -97,7 +97,7 @@ def table(robot: Robot, units: Units, revision: int, written: int, texts: Texts)
 def motion(robot: Robot, units: Units, texts: Texts) -> str:
     """Fields for the home configuration and for the limits of motion; those that are assumed are empty."""
     limits, rows = kin.motion_limits(robot), []
-    moving = [(index, row) for index, row in enumerate(robot.rows) if row.kind != "fixed"]
+    moving = [(index, row) for index, row in enumerate(robot.rows) if row.driven]
     for joint, (index, row) in enumerate(moving):
         angle, cells = row.kind == "revolute", []
         for column in MOTION:
@@ -130,7 +130,8 @@ def _cell(index: int, row: Joint, column: str, units: Units, texts: Texts) -> di
         return {**cell, "value": row.name}
     if column in ("low", "high"):
         if row.limits is None:
-            return {**cell, "none": row.kind == "fixed", "hint": "none"}
+            ratio = f"{general(row.ratio)} × {row.follows}" if column == "low" else ""
+            return {**cell, "none": row.kind == "fixed", "hint": ratio if row.follows else "none"}
         limit, angle = row.limits[column == "high"], row.kind == "revolute"
         return {**cell, "value": _text((index, column), limit, units, angle, texts)}
     variable = column == {"revolute": "theta", "prismatic": "d"}.get(row.kind)

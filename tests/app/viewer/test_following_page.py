@@ -1,0 +1,75 @@
+"""An arm with rows that follow joints in the page: its sliders, its drawing, the lessons that are not for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from fake_browser import FakeBrowser
+from live_server import serve_viewer
+
+import kin
+from app.shared.clouds import Clouds
+from app.shared.settings import Settings
+from app.shared.store import Store
+from app.viewer.scene.chain import chain, link_poses
+from app.viewer.server import ViewerServer
+from app.viewer.tabs.robot.edits import EditError, changed_rows, typed
+from kin.units import Units
+
+pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
+ROBOT = kin.get_robot("palletiser")
+
+
+@pytest.fixture(scope="module")
+def tab() -> Iterator[FakeBrowser]:
+    with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port, FakeBrowser(port) as opened:
+        opened.choose(ROBOT.name)
+        yield opened
+
+
+def test_links_are_drawn_where_the_rows_are() -> None:
+    q = ROBOT.random_q(np.random.default_rng(1), 5)
+    links = chain(ROBOT)
+    assert [link.leader for link in links.links] == [-1, 0, 1, 1, 2, 2, 3]
+    tools = link_poses(ROBOT, q)[:, -1] @ links.T_last_tool
+    assert tools == pytest.approx(kin.fk(ROBOT, q), abs=1e-14)
+
+
+def test_there_is_a_slider_for_each_joint_and_what_follows_moves_with_it(tab: FakeBrowser) -> None:
+    assert tab.sliders[-4:] == ["1 turn", "2 upper arm", "3 forearm", "4 hand turn"]
+    tab.set("3 forearm", 55.0)
+    tab.settle()
+    q = ROBOT.q_home.copy()
+    q[2] = np.radians(55.0)
+    assert tab.tool_pose() == pytest.approx(kin.fk(ROBOT, q), abs=1e-6)
+
+
+def test_a_lesson_about_rows_says_that_it_is_not_for_this_arm(tab: FakeBrowser) -> None:
+    tab.set("Lesson", "DH table step by step")
+    tab.wait(lambda: "has rows that follow joints: choose another arm" in tab.html)
+    assert tab.value("Lesson") == "None"
+    tab.set("Lesson", "Velocity")
+    tab.wait(lambda: 'data-step="1"' in tab.html)
+    tab.set("Lesson", "None")
+    tab.settle()
+
+
+def test_the_table_says_what_follows(tab: FakeBrowser) -> None:
+    assert "-1 × forearm" in tab.html.replace("\u2212", "-")
+
+
+def test_a_renamed_joint_keeps_its_followers_and_a_fixed_row_follows_nothing() -> None:
+    renamed = typed(ROBOT, None, {(3, "name"): "jib"}, Units()).robot
+    assert [row.follows for row in renamed.rows if row.follows] == ["upper arm", "jib"]
+    assert renamed.home == ROBOT.home
+    held = typed(ROBOT, None, {(4, "kind"): "fixed"}, Units()).robot
+    assert [row.follows for row in held.rows if row.follows] == ["upper arm"]
+    assert held.home == ROBOT.home
+    with pytest.raises(EditError, match="follows forearm"):
+        typed(ROBOT, None, {(4, "home"): "1"}, Units())
+    with pytest.raises(EditError, match="moves by itself"):
+        changed_rows(ROBOT, None, lambda rows: rows.pop(3))
+    own = changed_rows(ROBOT, None, lambda rows: rows.insert(0, {"name": "rail", "kind": "prismatic"})).robot
+    assert own.home[1:] == ROBOT.home
