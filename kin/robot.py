@@ -163,7 +163,8 @@ class Robot:
         units: the length unit of the robot file ("mm", "cm" or "m"), used when the table is displayed.
         maker: who builds or built the arm, "" if it is nobody's product.
         payload, mass: what it may carry and what it weighs (kg), None where they are not known.
-        capsules: the bodies of the links as its file states them, none where they are not known.
+        capsules: the bodies of the links as its file states them, none where they are not known; those
+            of a URDF are fitted when something asks for them.
         capsules_source: where they are from.
         mounting: what the arm is mounted on, None if that is not stated. How it is turned, `base` states.
         floor: height (m) of the floor in the world frame, None if it is not stated.
@@ -189,7 +190,7 @@ class Robot:
     mass: float | None = None
     base: Matrix = IDENTITY
     tool: Matrix = IDENTITY
-    capsules: tuple[Capsule, ...] = ()
+    capsules: Sequence[Capsule] = ()
     capsules_source: str = ""
     mounting: Mounting | None = None
     floor: float | None = None

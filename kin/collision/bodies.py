@@ -141,7 +141,7 @@ def _with_tool(robot: Robot) -> tuple[Capsule, ...]:
     tool, last = robot.T_last_tool[:3, 3], len(robot.rows) - 1
     own = [each for each in robot.capsules if each.row == last]
     if any(_distance(each, tool) <= 0.0 for each in own) or float(np.linalg.norm(tool)) <= SHORTEST:
-        return robot.capsules
+        return tuple(robot.capsules)
     radius = min([radius_of(tubes(robot)), *(each.radius for each in own)])
     x, y, z = tool.tolist()
     return (*robot.capsules, Capsule(len(robot.moving_rows), last, ORIGIN, (x, y, z), radius, True))

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kin.fitting.capsule import COARSE, Segment, extremes, quick, smallest
+from kin.fitting.capsule import COARSE, Segment, extremes, quick, rounded, smallest
 from kin.transforms import Array
 
 MOST = 5  # capsules of a body
@@ -57,6 +57,13 @@ def capsules_around(triangles: Array, balls: Array | None = None, most: int = MO
     groups = _groups(halved, most)
     # A plane chosen by some of the elements may have none of them on one side.
     return [smallest(halved[group].reshape(-1, 4)) for group in groups if group.any()]
+
+
+def capsule_around(triangles: Array, balls: Array) -> Segment:
+    """One capsule that holds all of a body, found quickly and not the smallest; arguments as `capsules_around`."""
+    points = _elements(triangles, balls).reshape(-1, 4)
+    size = float(np.ptp(points[:, :3], axis=0).max()) + float(points[:, 3].max())
+    return rounded(points, quick(extremes(points, COARSE))[1], size)
 
 
 def _elements(triangles: Array, balls: Array) -> Array:

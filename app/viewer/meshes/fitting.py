@@ -56,8 +56,8 @@ def fit_all(bodies: Sequence[Body], reach: float, surfaces_of: Callable[[str], S
         for name, numbers, pose in body.pieces:
             T = np.vstack([np.array(pose).reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
             pieces.append(Piece(SHAPES[name](*numbers), T))
-        capsules, missing = fitted(pieces, body.most, reach, triangles_of)
-        found.append(Fit([[*each.start, *each.end, each.radius] for each in capsules], missing))
+        fit = fitted(pieces, body.most, reach, triangles_of)
+        found.append(Fit([[*each.start, *each.end, each.radius] for each in fit.capsules], fit.missing))
     return found
 
 

@@ -21,9 +21,10 @@ from kin.files.read import MAX_CAPSULES
 from kin.files.urdf.poses import poses_of
 from kin.files.urdf.tree import UrdfElement, UrdfJoint, UrdfTree
 from kin.files.urdf.visuals import Box, Cylinder, MeshFile, Shape, Sphere, shape_of
-from kin.fitting import MOST, Segment, capsules_around, radius_of, tubes
+from kin.fitting import MOST, Segment, capsule_around, capsules_around, radius_of, tubes
 from kin.fitting import bodies as solids
 from kin.fk import link_frames
+from kin.later import Later
 from kin.robot import Capsule, Robot
 from kin.transforms import Array
 
@@ -71,38 +72,51 @@ class LinkPieces:
 
 
 class Fitted(NamedTuple):
-    """The capsules of one URDF link, and what of its bodies is missing."""
+    """The capsules of one URDF link, and what of its bodies is missing.
+
+    Attributes:
+        capsules: fitted already, or when something asks for them.
+        missing: a sentence each.
+        rough: one capsule for each body, which is quickly found and larger; none where `capsules` are known.
+    """
 
     capsules: Sequence[Segment]
     missing: Sequence[str]
+    rough: Sequence[Segment] = ()
 
 
 Fit = Callable[[Sequence[LinkPieces], float], Sequence[Fitted]]
 
 
-class UrdfBody(NamedTuple):
+@dataclass(frozen=True)
+class UrdfBody:
     """What stands for a link of the arm in collisions.
 
     Attributes:
         link: 0 for the base, k for the link that joint k moves.
         names: the URDF links whose collision bodies it has.
-        capsules: how many stand for what the file states.
         missing: what could not be used of it, and why.
         assumed: whether a tube is assumed, because something is missing or nothing is stated.
+        fitted: the capsules of each of these links that has some.
     """
 
     link: int
     names: tuple[str, ...]
-    capsules: int
     missing: tuple[str, ...]
     assumed: bool
+    fitted: tuple[Sequence[Segment], ...] = ()
+
+    @property
+    def capsules(self) -> int:
+        """How many stand for what the file states."""
+        return sum(map(len, self.fitted))
 
 
 def collisions_of(robot: Robot, tree: UrdfTree, chain: tuple[UrdfJoint, ...]) -> list[LinkPieces]:
     """The collision bodies of all URDF links that belong to an arm, in the order of the file."""
     carriers, poses = poses_of(tree, chain)
     frames = link_frames(robot, np.zeros(robot.n))
-    rows = [inverse(robot.T_world_base), *(inverse(frames[row]) for row in robot.moving_rows)]
+    rows = [inverse(robot.T_world_base), *(inverse(frames[row]) for row in robot.joint_rows)]
     found, count = [], 0
     for element in tree.root.findall("link"):
         name = element.get("name", "").strip()
@@ -154,13 +168,13 @@ def most_of(links: int) -> int:
 
 
 def fitted(pieces: Sequence[Piece], most: int, reach: float, triangles_of: Triangles) -> Fitted:
-    """Capsules around the bodies of one URDF link.
+    """Capsules around the bodies of one URDF link, which are fitted when something asks for them.
 
     Args:
         most: into how many capsules it may be cut.
         reach: of the arm, in metres: what is far beyond is left out.
     """
-    triangles, balls, missing = [], [], []
+    triangles, balls, missing, rough = [], [], [], []
     for shape, pose in pieces:
         flat, round_ = np.empty((0, 3, 3)), np.empty((0, 2, 4))
         match shape:
@@ -186,11 +200,14 @@ def fitted(pieces: Sequence[Piece], most: int, reach: float, triangles_of: Trian
                 f"{name}: it is {extent:.3g} m large, more than {FARTHEST:g} times the reach of the arm"
             )
             continue
-        triangles.append(flat)
-        balls.append(round_)
+        if len(flat) or len(round_):
+            triangles.append(flat)
+            balls.append(round_)
+            rough.append(capsule_around(flat, round_))
     if not triangles:
         return Fitted((), missing)
-    return Fitted(capsules_around(np.concatenate(triangles), np.concatenate(balls), most), missing)
+    flat, round_ = np.concatenate(triangles), np.concatenate(balls)
+    return Fitted(Later(lambda: capsules_around(flat, round_, most)), missing, rough)
 
 
 def without_meshes(links: Sequence[LinkPieces], reach: float) -> list[Fitted]:
@@ -209,41 +226,64 @@ def with_bodies(
 
     A tube is added where something is missing; without any capsule of the file all bodies are left to be assumed.
     """
-    rows = (-1, *robot.moving_rows)
-    found: list[Capsule] = []
+    pieces = tubes(robot)
     bodies = []
+    for k in range(len(robot.moving_rows) + 1):
+        own = [(link, fit) for link, fit in zip(links, fits, strict=True) if link.link == k]
+        stated = tuple(fit.capsules for _, fit in own if fit.capsules)
+        missing = tuple(f"{link.name}: {words}" for link, fit in own for words in (*link.wrong, *fit.missing))
+        assumed = any(each.link == k for each in pieces) and (bool(missing) or not stated)
+        bodies.append(UrdfBody(k, tuple(link.name for link, _ in own), missing, assumed, stated))
+    if not any(body.fitted for body in bodies):
+        return robot, tuple(bodies)
+    # Only where the most that there can be is too many have they to be fitted at once, and counted.
+    assumed_of = {body.link for body in bodies if body.assumed}
+    most = len(links) * most_of(len(links)) + sum(each.link in assumed_of for each in pieces)
+    if most > MAX_CAPSULES:
+        count = len(_capsules(robot, bodies))
+        if count > MAX_CAPSULES:
+            words = f"{count} capsules would be needed, and a robot has at most {MAX_CAPSULES}"
+            return robot, tuple(UrdfBody(k, (), (words,), True) for k in range(1, len(robot.moving_rows) + 1))
+    source = said(bodies)[:MAX_SOURCE]
+    capsules = Later(lambda: _capsules(robot, bodies))
+    return replace(robot, capsules=capsules, capsules_source=source[0].upper() + source[1:]), tuple(bodies)
+
+
+def _capsules(robot: Robot, bodies: Sequence[UrdfBody]) -> list[Capsule]:
+    """Those that stand for the bodies of an arm, base first: of the file, then the tubes that are assumed."""
+    found: list[Capsule] = []
     pieces = tubes(robot)
     radius = radius_of(pieces)
-    for k, row in enumerate(rows):
-        own = [(link, fit) for link, fit in zip(links, fits, strict=True) if link.link == k]
-        stated = [Capsule(k, row, *each) for _, fit in own for each in fit.capsules]
-        missing = [f"{link.name}: {words}" for link, fit in own for words in (*link.wrong, *fit.missing)]
-        along = [Capsule(*each, radius, True) for each in pieces if each.link == k]
-        assumed = bool(along) and (bool(missing) or not stated)
-        found += stated + (along if assumed else [])
-        bodies.append(UrdfBody(k, tuple(link.name for link, _ in own), len(stated), tuple(missing), assumed))
-    known = any(not each.assumed for each in found)
-    if len(found) > MAX_CAPSULES:
-        words = f"{len(found)} capsules would be needed, and a robot has at most {MAX_CAPSULES}"
-        return robot, tuple(UrdfBody(k, (), 0, (words,), True) for k in range(1, len(rows)))
-    if not known:
-        return robot, tuple(bodies)
-    source = said(bodies)[:MAX_SOURCE]
-    return replace(robot, capsules=tuple(found), capsules_source=source[0].upper() + source[1:]), tuple(bodies)
+    for body, row in zip(bodies, (-1, *robot.moving_rows), strict=True):
+        found += [Capsule(body.link, row, *each) for capsules in body.fitted for each in capsules]
+        if body.assumed:
+            found += [Capsule(*each, radius, True) for each in pieces if each.link == body.link]
+    return found
 
 
-def with_free_home(robot: Robot) -> Robot:
-    """The robot with the best home configuration in which no stated bodies touch; its own if there is none."""
-    if not robot.capsules or not touches_beside_home(robot, robot.q_home[None])[0]:
+def with_free_home(robot: Robot, bodies: Sequence[UrdfBody], fits: Sequence[Fitted]) -> Robot:
+    """The robot with the best home configuration in which no stated bodies touch; its own if there is none.
+
+    Bodies whose capsules are not fitted yet are judged by rough ones, so that nothing has to be fitted.
+    """
+    if not robot.capsules:
+        return robot
+    rough = {id(fit.capsules): fit.rough for fit in fits if fit.rough}
+    quick = [
+        replace(body, fitted=tuple(rough.get(id(capsules), capsules) for capsules in body.fitted))
+        for body in bodies
+    ]
+    judged = replace(robot, capsules=tuple(_capsules(robot, quick)))
+    if not touches_beside_home(judged, robot.q_home[None])[0]:
         return robot
     q = homes(robot)
-    free = np.flatnonzero(~touches_beside_home(robot, q))
+    free = np.flatnonzero(~touches_beside_home(judged, q))
     return replace(robot, home=tuple(q[free[0]].tolist())) if len(free) else robot
 
 
 def said(bodies: Sequence[UrdfBody]) -> str:
     """Which bodies are from the file and which are assumed: the rest of a sentence that begins "Collisions: "."""
-    if not any(body.capsules for body in bodies):
+    if not any(body.fitted for body in bodies):
         why = next((words for body in bodies for words in body.missing), "the URDF states no collision bodies")
         return f"all bodies are assumed to be tubes along the lengths of the table ({why})."
     text = "capsules around the collision bodies of the URDF"
@@ -257,7 +297,7 @@ def said(bodies: Sequence[UrdfBody]) -> str:
 
 def _doubt(body: UrdfBody) -> str:
     link = f"link {body.link}" if body.link else "the base"
-    what = "an assumed tube" if body.assumed else "a part without a body" if body.capsules else "no body"
-    if body.assumed and body.capsules:
+    what = "an assumed tube" if body.assumed else "a part without a body" if body.fitted else "no body"
+    if body.assumed and body.fitted:
         what = "an assumed tube besides them"
     return f"{link} has {what} ({'; '.join(body.missing[:2]) or 'the file states no body'})"

@@ -150,8 +150,9 @@ def read_urdf(
     chain = tree.chain(base, tip)
     robot, report = _import(tree, chain)
     links = collisions_of(robot, tree, chain)
-    robot, bodies = with_bodies(robot, links, (fit or without_meshes)(links, robot.reach))
-    return UrdfRobot(with_free_home(robot), replace(report, bodies=bodies))
+    fits = (fit or without_meshes)(links, robot.reach)
+    robot, bodies = with_bodies(robot, links, fits)
+    return UrdfRobot(with_free_home(robot, bodies, fits), replace(report, bodies=bodies))
 
 
 def urdf_tips(source: Path | str, file: str = "") -> tuple[Tip, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,11 @@ import pytest
 
 import kin
 from kin.collision.bodies import bodies_of
+from kin.files.urdf import collisions
 from kin.files.urdf.collisions import MAX_BODIES, fitted
 from kin.files.urdf.visuals import MeshFile
+from kin.fitting import bodies as solids
+from kin.fitting import capsule_around, capsules_around
 from tests.described import ARMS, imported, triangles
 from tests.kin.fitting.test_fitting import outside
 
@@ -192,3 +196,34 @@ def test_the_home_of_an_import_is_free_of_contacts():
     assert robot.home != free.home
     assert kin.clearance(robot, robot.q_home) > 0.0
     assert kin.clearance(robot, free.q_home) < 0.0
+
+
+def test_capsules_are_fitted_when_something_asks_for_them(monkeypatch):
+    """Reading, FK and IK need none of them; the home is chosen by rough ones, which hold the bodies too."""
+    asked = []
+    fit = collisions.capsules_around
+    monkeypatch.setattr(collisions, "capsules_around", lambda *args: asked.append(1) or fit(*args))
+    robot, report = read()
+    T = kin.fk(robot, robot.q_home)
+    assert kin.solve_ik(robot, T, task="position").status == "solved"
+    assert robot.with_tool(np.eye(4)).capsules
+    assert "for every link" in report.about_bodies
+    assert kin.load_urdf(LINKS.format(upper=BOX, fore=BOX), tip="hand") is not robot
+    assert asked == []
+    assert [body.capsules > 0 for body in report.bodies] == [True, True, True]
+    assert len(asked) == 4, "each URDF link with bodies once"
+    assert len(robot.capsules) == sum(body.capsules for body in report.bodies)
+    assert pickle.loads(pickle.dumps(robot)).capsules == robot.capsules
+    assert len(asked) == 4
+
+
+def test_a_rough_capsule_holds_its_body():
+    for flat, round_ in (
+        (solids.box(0.5, 0.06, 0.02), np.empty((0, 2, 4))),
+        (solids.cylinder(0.1, 0.2), np.empty((0, 2, 4))),
+        (np.empty((0, 3, 3)), solids.balls(0.05, 0.3)),
+    ):
+        rough = capsule_around(flat, round_)
+        inside = np.concatenate([flat.reshape(-1, 3), round_[..., :3].reshape(-1, 3)])
+        assert outside(inside, [rough]).max() <= (0.0 if len(flat) else -0.049)
+        assert rough.volume < 2.5 * sum(each.volume for each in capsules_around(flat, round_, 1))
