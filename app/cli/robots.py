@@ -139,6 +139,15 @@ def _poses(robot: Robot, poses: Array, rad: bool) -> list[str]:
     return [shown, "", f"In each pose: --read and what the motors {motors} read, in this order."]
 
 
+def _tolerance(found: Comparison, units: Units) -> str:
+    """What the option says of arms that are different without it, or with a smaller one."""
+    allowed = messages.allowing(found, units)
+    if allowed is None:
+        return "--tolerance LENGTH ANGLE takes arms for one whose poses differ by no more; these differ by more."
+    length, angle = allowed
+    return f"{messages.nearly(found, units)} --tolerance {length} {angle} takes them for one arm."
+
+
 def _comparison(found: Comparison, a: Robot, b: Robot, units: Units) -> list[str]:
     lines = [messages.verdict(found, a, b, units)]
     if found.is_same and found.mapping is not None and found.verdict != "identical":
@@ -156,4 +165,6 @@ def _comparison(found: Comparison, a: Robot, b: Robot, units: Units) -> list[str
     elif found.verdict == "different":
         tried = "no pair of mistakes explains" if found.complete else "no pair that was tried in time explains"
         lines += ["", f"No single mistake and {tried} the difference."]
+    if not found.is_same:
+        lines += ["", _tolerance(found, units)]
     return [line for k, line in enumerate(lines) if line or (k + 1 < len(lines) and lines[k + 1])]

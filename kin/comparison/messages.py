@@ -40,6 +40,36 @@ def _within(found: Comparison, units: Units) -> str:
     )
 
 
+def allowing(found: Comparison, units: Units = DEFAULT_UNITS) -> tuple[str, str] | None:
+    """The tolerance that would take different arms for one, rounded up: a length and an angle, without their units.
+
+    None where the arms are the same, or differ by more than rounded numbers can.
+    """
+    if found.is_same or found.position is None or found.rotation is None:
+        return None
+    length, angle = (
+        _rounded_up(value, unit)
+        for value, unit in ((found.position, units.lengths), (found.rotation, units.angles))
+    )
+    return length, angle
+
+
+def nearly(found: Comparison, units: Units = DEFAULT_UNITS) -> str:
+    """Within what different arms are the same, in a sentence; "" where there is no `allowing` tolerance."""
+    allowed = allowing(found, units)
+    if allowed is None:
+        return ""
+    length, angle = allowed
+    return f"They are the same within {length}{units.lengths.suffix} and {angle}{units.angles.suffix}."
+
+
+def _rounded_up(value: float, unit: Unit) -> str:
+    """A value as a number with the decimals of a tenth of a degree or of a millimetre, not less than it is."""
+    decimals = unit.decimals(1)
+    steps = max(math.ceil(value * unit.scale * 10.0**decimals), 1)
+    return f"{steps / 10.0**decimals:.{decimals}f}"
+
+
 def mapping(found: Comparison, a: Robot, units: Units = DEFAULT_UNITS) -> list[str]:
     """What separates two descriptions of one arm: joints that count otherwise, base, tool."""
     if found.mapping is None:

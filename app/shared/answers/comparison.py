@@ -121,7 +121,7 @@ def comparison_answer(found: Comparison, a: Robot, b: Robot) -> ComparisonAnswer
     """The comparison of arm b with the reference a."""
     return ComparisonAnswer.of(
         found,
-        text=messages.verdict(found, a, b),
+        text=" ".join(filter(None, (messages.verdict(found, a, b), messages.nearly(found)))),
         differences=[
             DifferenceAnswer.of(each, text=messages.difference(each, a, b)) for each in found.differences
         ],

@@ -52,6 +52,24 @@ def test_a_tolerance_is_in_the_units_of_the_command(tmp_path, capsys):
     assert main([*words, "--tolerance", "3mm", "0.3deg", "--rad"]) == 0
 
 
+def test_every_refusal_names_the_tolerance_that_would_do(tmp_path, capsys):
+    """A right angle typed as 1.571: with the words of the answer, the arms are one."""
+    arm = kin.get_robot("ur5")
+    kin.save_robot(replace(arm, rows=(replace(arm.rows[0], alpha=1.571), *arm.rows[1:])), tmp_path / "mine.toml")
+    words = ["compare", "ur5", str(tmp_path / "mine.toml")]
+    for units in ([], ["--rad"]):
+        assert main([*words, *units]) == 1
+        (line,) = [line for line in capsys.readouterr().out.splitlines() if "--tolerance" in line]
+        assert line.startswith("They are the same within 0.2" if not units else "They are the same within 0.0002 m")
+        length, angle = line.partition("--tolerance ")[2].split()[:2]
+        assert main([*words, *units, "--tolerance", length, angle]) == 0
+        capsys.readouterr()
+    assert main([*words, "--json"]) == 1
+    assert "They are the same within 0.2 mm and 0.1°." in json.loads(capsys.readouterr().out)["text"]
+    assert main(["compare", "ur5", "ur10"]) == 1
+    assert "--tolerance LENGTH ANGLE takes arms for one whose poses differ by no more" in capsys.readouterr().out
+
+
 def test_an_unknown_arm_is_invalid_input(capsys):
     assert main(["compare", "ur5", "ur55"]) == 2
     assert "expected one of" in capsys.readouterr().err

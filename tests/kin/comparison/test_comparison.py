@@ -372,3 +372,26 @@ def test_numbers_that_differ_are_written_differently():
     assert (
         said == "the axes of joints 2 and 3 are at a distance of 425.00 mm in the book and 424.96 mm in the table"
     )
+
+
+@pytest.mark.parametrize("digits", [3, 4])
+def test_right_angles_with_few_digits_are_the_same_within_what_is_said(digits: int):
+    """The tolerance in the sentence is rounded up, so it is enough."""
+    a = kin.get_robot("ur5")
+    one = replace(a, rows=(replace(a.rows[0], alpha=round(a.rows[0].alpha, digits)), *a.rows[1:]))
+    every = replace(a, rows=tuple(replace(row, alpha=round(row.alpha, digits)) for row in a.rows))
+    for b in (one, every):
+        found = kin.compare(a, b, explain=False)
+        assert found.verdict == "different"
+        for units in (Units(), Units(degrees=False, length="m")):
+            length, angle = messages.allowing(found, units) or ("", "")
+            assert f"They are the same within {length}" in messages.nearly(found, units)
+            allowed = float(length) / units.lengths.scale, float(angle) / units.angles.scale
+            assert kin.compare(a, b, tolerance=allowed, explain=False).verdict == "close"
+
+
+def test_arms_that_differ_by_more_than_roundings_are_the_same_within_nothing():
+    a = kin.get_robot("ur5")
+    b = replace(a, rows=(a.rows[0], replace(a.rows[1], a=-0.5), *a.rows[2:]))
+    for other in (b, kin.get_robot("panda"), a):
+        assert messages.nearly(kin.compare(a, other, explain=False)) == ""

@@ -57,6 +57,7 @@ def answer(
         colour=_COLOURS[found.verdict],
         symbol=_SYMBOLS[found.verdict],
         words=messages.verdict(found, a, shown, units, _NAMES),
+        nearly=messages.nearly(found, units),
         within=_proof(found.position, found.rotation, units) if found.is_same else "",
         differences=[messages.difference(each, a, shown, units, _NAMES) for each in listed],
         more=max(0, len(found.differences) - 1 - MOST_DIFFERENCES),
