@@ -49,6 +49,7 @@ from app.service.web.failures import Failures
 from app.service.web.hosts import LOCAL_NAMES, Hosts
 from app.service.web.lti import PlatformsRefused, check_platforms, lti_routes
 from app.service.web.observe import Observe, write_to_stderr
+from app.service.web.origins import Preflights
 from app.service.web.pages import page_routes
 from app.service.web.prefix import PathPrefix, clean_prefix
 from app.service.web.rooms import room_routes, sweeping
@@ -200,6 +201,7 @@ def _add_middleware(app: FastAPI, settings: Settings, guests: Guests) -> None:
             allow_headers=["*"],
             expose_headers=["*"],
         )
+    app.add_middleware(Preflights, allowed=settings.cors_origins)
     app.add_middleware(Failures)
     app.add_middleware(Hosts, allowed=settings.allowed_hosts, proxies=bool(settings.trusted_proxies))
     app.add_middleware(SecurityHeaders, ancestors=settings.frame_ancestors)

@@ -40,6 +40,7 @@ KINDS = {
     "not-allowed": "This is not allowed here",
     "not-running": "Nothing is under way",
     "wrong-host": "The request is for another host",
+    "other-origin": "Pages of this origin may not read answers",
     "busy": "The service is busy",
     "preparing": "What the request needs is being prepared",
     "too-slow": "The computation takes too long",

@@ -105,7 +105,9 @@ class Settings(BaseSettings):
         allow_inf_nan=False,
         description="Maximum rate of requests per second of one client; 0: no limit.",
     )
-    cors_origins: Names = Field((), description="Origins whose pages may read REST answers.")
+    cors_origins: Names = Field(
+        (), description="Origins whose pages may read REST answers, by `fetch`; others are refused by name."
+    )
     workers: int = Field(
         1,
         ge=1,

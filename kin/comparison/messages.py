@@ -41,7 +41,7 @@ def _within(found: Comparison, units: Units) -> str:
 
 
 def allowing(found: Comparison, units: Units = DEFAULT_UNITS) -> tuple[str, str] | None:
-    """The tolerance that would take different arms for one, rounded up: a length and an angle, without their units.
+    """The tolerance that would take different arms for one, rounded up: a length and an angle, without units.
 
     None where the arms are the same, or differ by more than rounded numbers can.
     """

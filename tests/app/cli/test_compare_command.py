@@ -57,10 +57,10 @@ def test_every_refusal_names_the_tolerance_that_would_do(tmp_path, capsys):
     arm = kin.get_robot("ur5")
     kin.save_robot(replace(arm, rows=(replace(arm.rows[0], alpha=1.571), *arm.rows[1:])), tmp_path / "mine.toml")
     words = ["compare", "ur5", str(tmp_path / "mine.toml")]
-    for units in ([], ["--rad"]):
+    for units, within in (([], "0.2 mm"), (["--rad"], "0.0002 m")):
         assert main([*words, *units]) == 1
         (line,) = [line for line in capsys.readouterr().out.splitlines() if "--tolerance" in line]
-        assert line.startswith("They are the same within 0.2" if not units else "They are the same within 0.0002 m")
+        assert line.startswith(f"They are the same within {within}")
         length, angle = line.partition("--tolerance ")[2].split()[:2]
         assert main([*words, *units, "--tolerance", length, angle]) == 0
         capsys.readouterr()

@@ -486,8 +486,26 @@ def test_other_origins_read_answers_only_if_configured():
         FK, headers={"origin": "https://evil.example", "access-control-request-method": "POST"}
     )
     assert "access-control-allow-origin" not in refused.headers
+    assert refused.status_code == 403
     answer = client.post(FK, json=Q, headers=asking | HEADER)
     assert answer.headers["access-control-allow-origin"] == "https://school.example"
+
+
+@pytest.mark.parametrize("allowed", [(), ("https://school.example",)])
+def test_a_page_of_another_origin_is_told_which_setting_would_let_it_in(allowed):
+    client = client_with(cors_origins=allowed, token=TOKEN)
+    asking = {"origin": "https://other.example", "access-control-request-method": "POST"}
+    refused = client.options(FK, headers=asking)
+    assert refused.status_code == 403
+    assert refused.headers["content-type"] == "application/problem+json"
+    assert "https://other.example may not read" in refused.json()["detail"]
+    assert "KINBOARD_CORS_ORIGINS" in refused.json()["hint"]
+    assert "access-control-allow-origin" not in refused.headers
+    long = client.options(FK, headers=asking | {"origin": "https://" + 3000 * "x"})
+    assert len(long.content) < 1000
+    # What is no preflight is answered as before.
+    assert client.options(FK, headers={"origin": "https://other.example"} | HEADER).status_code == 405
+    assert client_with(cors_origins=("*",)).options(FK, headers=asking).status_code == 200
 
 
 def test_a_short_token_is_refused_at_start():
