@@ -33,7 +33,8 @@ RULES: dict[str, set[str]] = {
     "kin/comparison": {"numpy", "kin.comparison", "kin.dh", *MODEL},
     "kin/differential": {"numpy", "kin.axes", "kin.differential", "kin.fk", "kin.robot", "kin.transforms"},
     "kin/files": {
-        *("numpy", "kin.collision", "kin.dh", "kin.files", "kin.fitting", "kin.frames", "kin.typed", *MODEL),
+        *("numpy", "kin.collision", "kin.dh", "kin.files", "kin.fitting", "kin.frames", "kin.later", "kin.typed"),
+        *MODEL,
     },
     "kin/fitting": {"numpy", "kin.fitting", "kin.robot", "kin.transforms"},
     "kin/readings": {"numpy", "kin.collision", "kin.readings", *MODEL},

@@ -492,7 +492,7 @@ def test_other_origins_read_answers_only_if_configured():
 
 
 @pytest.mark.parametrize("allowed", [(), ("https://school.example",)])
-def test_a_page_of_another_origin_is_told_which_setting_would_let_it_in(allowed):
+def test_a_page_of_another_origin_gets_the_name_of_the_setting_that_would_let_it_in(allowed):
     client = client_with(cors_origins=allowed, token=TOKEN)
     asking = {"origin": "https://other.example", "access-control-request-method": "POST"}
     refused = client.options(FK, headers=asking)
