@@ -22,6 +22,7 @@ from kin.collision import (
     obstacle_from_dict,
 )
 from kin.comparison import Comparison, compare
+from kin.coupling import Shown
 from kin.dh import Screws, convert_dh, exp_screw, robot_from_screws, screws
 from kin.differential.task import Task
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
@@ -86,6 +87,7 @@ from kin.poses import (
 from kin.readings import (
     MotorFinding,
     MotorMatch,
+    from_pendant,
     match_motors,
     motor_poses,
     motors_from_lerobot,
@@ -94,6 +96,7 @@ from kin.readings import (
     readings_from_q,
     readings_from_ticks,
     ticks_from_readings,
+    to_pendant,
 )
 from kin.robot import Joint, Robot
 from kin.singularity import Singularity, singularities
@@ -160,6 +163,7 @@ __all__ = [
     "Section",
     "SectionArc",
     "SegmentTimes",
+    "Shown",
     "Singularity",
     "Spline",
     "Status",
@@ -188,6 +192,7 @@ __all__ = [
     "fk",
     "fk_positions",
     "frame_pose",
+    "from_pendant",
     "get_robot",
     "ik_branches",
     "jacobian",
@@ -235,6 +240,7 @@ __all__ = [
     "solve_ik_many",
     "solve_path",
     "ticks_from_readings",
+    "to_pendant",
     "urdf_tips",
     "warm_up",
     "workspace_configurations",

@@ -9,7 +9,7 @@ are in use, and the same table read in both orders gives two *different* arms:
   turns about z of frame i.
 
 A revolute joint adds its value to θ, a prismatic one to d; a ``fixed`` row is constant (a tool, an adapter). A row
-may *follow* a joint instead of being one: it adds so many times that joint's value (:mod:`kin.following`).
+may *follow* a joint instead of being one: it adds so many times that joint's value (:mod:`kin.coupling`).
 ``T_world_tool = base · A_1 … A_m · tool``. Lengths are metres and angles radians.
 """
 
@@ -25,110 +25,34 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kin.checks import finite_number, one_of
+from kin.coupling import (
+    PendantMap,
+    Shown,
+    check_followers,
+    checked_pendant,
+    expansion,
+    joints_of,
+    map_of,
+    stroke_of,
+)
 from kin.errors import InputError
-from kin.following import check_followers, effective, expansion
+from kin.joint import DEFAULT_LIMITS as DEFAULT_LIMITS
+from kin.joint import FOLLOWS
+from kin.joint import KIND_CODES as KIND_CODES
+from kin.joint import PEAK_FIELDS as PEAK_FIELDS
+from kin.joint import Joint as Joint
+from kin.joint import Kind as Kind
 from kin.motor import Motor, checked_motors
 from kin.transforms import Array, as_transform, finite_array
 
 Convention = Literal["standard", "modified"]
-Kind = Literal["revolute", "prismatic", "fixed"]
 Mounting = Literal["pedestal", "floor", "table", "wall", "ceiling"]
 CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
 MOUNTINGS: tuple[Mounting, ...] = get_args(Mounting)
 LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-KIND_CODES: dict[Kind, float] = {"fixed": 0.0, "revolute": 1.0, "prismatic": 2.0}
-FOLLOWS = 2.0  # added to the code of a row that follows a joint
-# Fields of a joint that hold the largest value of a quantity.
-PEAK_FIELDS = ("velocity", "acceleration", "jerk", "effort")
-# Where none are stated: one turn about zero, or one metre of stroke.
-DEFAULT_LIMITS: dict[str, tuple[float, float] | None] = {
-    "fixed": None,
-    "revolute": (-math.pi, math.pi),
-    "prismatic": (0.0, 1.0),
-}
-
 Matrix = tuple[tuple[float, ...], ...]
 _ROUNDING = 1e-14  # a rotation further from orthonormal than this is made orthonormal
 IDENTITY: Matrix = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))
-
-
-@dataclass(frozen=True, slots=True)
-class Joint:
-    """One DH row.
-
-    Attributes:
-        limits: (lower, upper) in radians or metres; None for a fixed row or an unlimited joint.
-        velocity, acceleration, jerk: largest values (rad or m, per second, s² and s³), None if they are not known.
-        effort: largest torque or force (N·m or N), None if it is not known.
-        follows: name of the row whose joint moves this one; "" for a joint, which moves by itself.
-        ratio: by how many times that joint's value it moves (rad or m for each rad or m).
-
-    Raises:
-        InputError: a kind that does not exist, a number that is not finite, limits that are not lower and upper, a
-            fixed row that follows, or a ratio of a row that follows none.
-    """
-
-    name: str
-    theta: float = 0.0
-    d: float = 0.0
-    a: float = 0.0
-    alpha: float = 0.0
-    kind: Kind = "revolute"
-    limits: tuple[float, float] | None = None
-    velocity: float | None = None
-    effort: float | None = None
-    acceleration: float | None = None
-    jerk: float | None = None
-    follows: str = ""
-    ratio: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Check the row; numbers of any type become floats."""
-        if not isinstance(self.kind, str) or self.kind not in KIND_CODES:
-            raise InputError(f"kind of {self.name}", self.kind, one_of(*KIND_CODES))
-        for key in ("theta", "d", "a", "alpha"):
-            object.__setattr__(self, key, finite_number(f"{key} of {self.name}", getattr(self, key)))
-        for key in PEAK_FIELDS:
-            if (value := getattr(self, key)) is not None:
-                where = f"{key} of {self.name}"
-                if self.kind == "fixed" or not (limit := finite_number(where, value)) > 0.0:
-                    raise InputError(where, value, "a positive number, or None for a fixed row")
-                object.__setattr__(self, key, limit)
-        self._check_following()
-        if self.limits is None:
-            return
-        where = f"limits of {self.name}"
-        if self.kind == "fixed":
-            raise InputError(where, self.limits, "None, because the row is fixed")
-        try:
-            lower, upper = self.limits
-        except (TypeError, ValueError):
-            raise InputError(where, self.limits, "two numbers (lower, upper)") from None
-        lower, upper = finite_number(where, lower), finite_number(where, upper)
-        if lower > upper:
-            raise InputError(where, self.limits, "the lower limit first")
-        object.__setattr__(self, "limits", (lower, upper))
-
-    def _check_following(self) -> None:
-        if not isinstance(self.follows, str) or (self.follows and self.kind == "fixed"):
-            expected = "the name of a row" if self.kind != "fixed" else "none, because the row is fixed"
-            raise InputError(f"follows of {self.name}", self.follows, expected)
-        where = f"ratio of {self.name}"
-        ratio = finite_number(where, self.ratio)
-        if ratio == 0.0 or (ratio != 1.0 and not self.follows):
-            expected = "a number that is not 0" if self.follows else "1, because the row follows no joint"
-            raise InputError(where, self.ratio, expected)
-        object.__setattr__(self, "ratio", ratio)
-
-    @property
-    def moves(self) -> bool:
-        """Whether it is not fixed."""
-        return self.kind != "fixed"
-
-    @property
-    def driven(self) -> bool:
-        """Whether it is a joint: it moves, and by itself."""
-        return self.kind != "fixed" and not self.follows
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,11 +94,13 @@ class Robot:
         floor: height (m) of the floor in the world frame, None if it is not stated.
         motors: what the motors of the joints read, none if that is not stated. One whose joint is no moving row
             moves nothing: an arm that is made from another may keep its motors.
+        pendant: what a pendant shows of joints otherwise than their values, see `kin.to_pendant`. An entry that
+            names no joint counts for nothing, for the same reason.
 
     Raises:
         InputError: an unknown convention, unit or mounting, no moving joint, a row that follows what is no joint
             or leaves it no value, a home of another length, a floor that is no finite number, a base or tool that
-            is no rigid transform, or motors of one id.
+            is no rigid transform, motors of one id, or a pendant that does not tell the joint values.
     """
 
     id: str
@@ -195,6 +121,7 @@ class Robot:
     mounting: Mounting | None = None
     floor: float | None = None
     motors: tuple[Motor, ...] = ()
+    pendant: tuple[Shown, ...] = ()
 
     def __repr__(self) -> str:
         """Id, name and joints in one line; `kin.robot_to_toml` writes out the table."""
@@ -229,6 +156,9 @@ class Robot:
         if self.floor is not None:
             object.__setattr__(self, "floor", finite_number("floor", self.floor))
         object.__setattr__(self, "motors", checked_motors(self.motors))
+        object.__setattr__(self, "pendant", checked_pendant(self.pendant))
+        if self.pendant:
+            _ = self.pendant_map
         for key in ("base", "tool"):
             T = getattr(self, key)
             if T is not IDENTITY:
@@ -408,6 +338,11 @@ class Robot:
 
         Returns:
             ``(..., m)``: those of the joints, and of the rows that follow them, in the order of the rows.
+
+        Examples:
+            >>> import kin
+            >>> kin.get_robot("palletiser").expand([0.0, 0.1, 0.3, 0.5]) + 0.0
+            array([ 0. ,  0.1, -0.1,  0.3, -0.3,  0.5])
         """
         return q if not self.coupled else np.asarray(q) @ self.expansion.T
 
@@ -415,6 +350,11 @@ class Robot:
     def leads(self) -> NDArray[np.bool_]:
         """Whether rows follow each joint ``(n,)``."""
         return _flags(any(row.follows == joint.name for row in self.rows) for joint in self.joints)
+
+    @cached_property
+    def pendant_map(self) -> PendantMap | None:
+        """What a pendant shows of the joints; None if it shows their values."""
+        return map_of(self.joints, self.pendant) if self.pendant else None
 
     @property
     def turns_as_one(self) -> bool:
@@ -485,17 +425,9 @@ class Robot:
         for row in self.rows:
             stroke = 0.0
             if row.kind == "prismatic":
-                stroke = self.stroke(row)
+                stroke = stroke_of(row, self.joints)
             total += math.hypot(row.a, abs(row.d) + stroke)
         return total
-
-    def stroke(self, row: Joint) -> float:
-        """How far a slide, one of the rows, goes from zero at most (m); infinite without limits."""
-        own = max(map(abs, row.limits)) if row.limits else math.inf
-        if not row.follows:
-            return own
-        leader = next(joint for joint in self.joints if joint.name == row.follows)
-        return min(own, abs(row.ratio) * max(map(abs, leader.limits))) if leader.limits else own
 
     def check_q(self, q: ArrayLike, field: str = "q") -> Array:
         """Joint values as an array.
@@ -575,16 +507,6 @@ class Robot:
         lower = np.where(np.isfinite(self.lower), self.lower, -math.pi)
         upper = np.where(np.isfinite(self.upper), self.upper, math.pi)
         return rng.uniform(lower, upper, (*shape, self.n))
-
-
-def joints_of(rows: Sequence[Joint]) -> tuple[Joint, ...]:
-    """The rows that move by themselves, with the limits that they and what follows them keep."""
-    followed = {row.follows for row in rows}
-    return tuple(
-        effective(row, [each for each in rows if each.follows == row.name]) if row.name in followed else row
-        for row in rows
-        if row.driven
-    )
 
 
 def _row(index: int, row: Joint | Mapping[str, Any] | Sequence[float]) -> Joint:

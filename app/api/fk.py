@@ -15,8 +15,10 @@ from app.api.body import versioned
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
+    Pendant,
     example,
     is_warm,
+    joint_values,
     settings_of,
 )
 from app.api.work import Deadline, compute_slots, computed
@@ -58,6 +60,7 @@ class FkRequest(WorkpiecesBody):
         description="Joint values from base to tool, in radians (metres for sliding joints): "
         "one configuration of n numbers, or a list of configurations."
     )
+    pendant: Pendant = False
     frames: bool = Field(
         False,
         strict=True,
@@ -97,6 +100,7 @@ async def forward_kinematics(request: Request, robot: Robot, body: FkRequest) ->
     limits are answered too, with `in_limits` false.
     """
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
+    q = joint_values(robot, q, body.pendant)
     axes = body.axes(robot)
     batch = Batch("q", len(q), single, POSE + FRAME * len(robot.rows) * body.frames, "frames false")
     answer = partial(_answers, robot, q, (body.frames, body.frame, axes), batch)

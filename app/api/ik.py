@@ -23,14 +23,16 @@ from app.api.problems import invalid
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
+    Pendant,
     example,
+    joint_values,
     reply,
     settings_of,
     store_of,
 )
 from app.api.work import Deadline, compute_slots, computed, computed_here
 from app.shared.answers.answer import Answer
-from app.shared.answers.ik import Brief, IkAnswer, WholeAnswers, ik_answer, ik_renewed
+from app.shared.answers.ik import Brief, IkAnswer, WholeAnswers, add_pendant, ik_answer, ik_renewed
 from app.shared.metrics import SOLVE_SECONDS
 from app.shared.problems import FieldError
 from app.shared.settings import Settings
@@ -105,6 +107,7 @@ class IkRequest(OptionsBody):
         "by the distance to it. One for all targets, or a list with one per target. "
         "By default the home configuration.",
     )
+    pendant: Pendant = False
 
 
 class IkAnswers(Answer):
@@ -131,7 +134,7 @@ async def inverse_kinematics(request: Request, robot: Robot, body: IkRequest, fi
     gets `{"results": [...]}` in the same order. Each solution's errors are measured by forward kinematics.
     """
     names, settings = names_of(fields), settings_of(request)
-    if not isinstance(body.target, list):
+    if not isinstance(body.target, list) and not body.pendant:
         answered = await _alone(request, robot, body, body.target, names)
         if answered is not None:
             return answered
@@ -191,7 +194,8 @@ def _solve(
     count = len(body.target) if isinstance(body.target, list) else 1
     schemas.check_batch("target", count, settings)
     seeds = _seeds(robot, body, count, settings)
-    together = body.poses_of_all(body.target) if isinstance(body.target, list) else None
+    several = body.target if isinstance(body.target, list) and not body.pendant else None
+    together = None if several is None else body.poses_of_all(several)
     if together is not None:
         return _solve_together(robot, body, names, together, seeds, deadline)
     targets, single = body.resolve_all(robot, body.target, settings, seeds)
@@ -201,6 +205,8 @@ def _solve(
     def answer(goal: Goal, seed: Array | None) -> IkAnswer | dict[str, Any]:
         deadline.check()
         whole = _whole(robot, goal.task, solve(robot, goal.T, options[goal.task], seed, goal.rounding))
+        if body.pendant:
+            add_pendant(robot, whole)
         return brief(whole, names) if names else whole
 
     def answers(some: slice) -> list[IkAnswer | dict[str, Any]]:
@@ -269,6 +275,7 @@ def _seeds(robot: Robot, body: IkRequest, count: int, settings: Settings) -> lis
     if body.q_seed is None:
         return [None] * count
     seeds, single = schemas.as_configurations(robot, body.q_seed, settings, "q_seed")
+    seeds = joint_values(robot, seeds, body.pendant)
     if single:
         return [seeds[0]] * count
     if len(seeds) != count:

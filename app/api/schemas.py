@@ -16,7 +16,7 @@ from app.shared.problems import FieldError, Problem, show
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.shared.threads.turns import offer
-from kin import InputError, Robot
+from kin import InputError, Robot, from_pendant
 from kin.transforms import Array
 
 LARGEST = 1e6
@@ -152,6 +152,21 @@ def check_batch(field: str, count: int, settings: Settings, most: int | None = N
         detail = f"{field} holds {count} items; one request may hold {most}."
         hint = "Split the list into several requests."
         raise ProblemError(413, "batch-too-large", detail, hint, [error])
+
+
+Pendant = Annotated[
+    bool,
+    Field(
+        strict=True,
+        description="Whether joint values are those that the arm's pendant shows, as its file states them under "
+        "`pendant`: FANUC's J3, for example, counts from the horizontal.",
+    ),
+]
+
+
+def joint_values(robot: Robot, values: Array, pendant: bool) -> Array:
+    """Joint values ``(k, n)`` from what was sent."""
+    return from_pendant(robot, values) if pendant else values
 
 
 def as_configurations(

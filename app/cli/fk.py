@@ -20,9 +20,10 @@ from app.cli.terminal import (
     units_of,
 )
 from app.shared.answers.fk import fk_answers
-from kin import InputError, Robot, fk
+from kin import InputError, Robot, fk, to_pendant
 from kin.axes import inverse
 from kin.frames import TOOL, WORLD
+from kin.readings.pendant import shown_limits
 from kin.transforms import Array, wxyz_from_rotation
 
 
@@ -39,16 +40,18 @@ def run(arguments: Namespace) -> int:
             raise InputError(f"--{option}", getattr(arguments, option), "--configurations FILE as well")
     if not arguments.q:
         raise InputError("q", "nothing", f"{robot.n} joint values, or --configurations FILE")
-    q = configuration(robot, arguments.q, "q", units_of(arguments))
+    q = configuration(robot, arguments.q, "q", units_of(arguments), arguments.pendant)
     answer = fk_answers(robot, q[None], arguments.frames, arguments.frame, T)[0]
     if arguments.json:
         return print_json(answer)
     units = Notation(robot, arguments.rad)
+    values = to_pendant(robot, q) if arguments.pendant else q
+    limits = shown_limits(robot) if arguments.pendant else [joint.limits for joint in robot.joints]
     rows = [
         [
             joint.name,
-            units.joint(i, q[i]),
-            " … ".join(units.joint(i, limit) for limit in joint.limits or ()),
+            units.joint(i, values[i]),
+            " … ".join(units.joint(i, limit) for limit in limits[i] or ()),
             "" if robot.lower[i] <= q[i] <= robot.upper[i] else "outside limits",
         ]
         for i, joint in enumerate(robot.joints)
@@ -70,6 +73,8 @@ def _run_many(robot: Robot, arguments: Namespace, T_world_frame: Array | None) -
     """Write the poses for the rows of a file, or of standard input."""
     if arguments.q:
         raise InputError("q", arguments.q, "no joint values besides --configurations")
+    if arguments.pendant:
+        raise InputError("--pendant", "with --configurations", "joint values as arguments, or kin.from_pendant")
     output = arguments.output or "-"
     with opened_source(arguments.configurations, "--configurations") as source:
         form = form_of(output, arguments.format, source.form)

@@ -25,7 +25,7 @@ from app.cli.terminal import (
     table,
     units_of,
 )
-from app.shared.answers.ik import Blocked, IkAnswer, Solution, ik_answer
+from app.shared.answers.ik import Blocked, IkAnswer, Solution, add_pendant, ik_answer
 from app.shared.options import Option, declared
 from kin import IKOptions, InputError, Robot, Task
 from kin.frames import TOOL
@@ -49,13 +49,19 @@ def run(arguments: Namespace) -> int:
     if arguments.approach is not None:
         T[:3, :3] = frame_from_approach(_vector(arguments.approach, PLAIN, "--approach"))
     task = _task(arguments)
-    q_seed = None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", units)
+    q_seed = (
+        None
+        if arguments.seed is None
+        else configuration(robot, arguments.seed, "--seed", units, arguments.pendant)
+    )
     if arguments.frame == TOOL and q_seed is None:
         raise InputError("--frame", TOOL, "--seed as well, which says where the tool is")
     T = frame_of(robot, arguments, q_seed) @ T
     options = _options(robot, arguments, units, task, shown=None if arguments.json else 1)
     result = solve(robot, T, options, q_seed)
     answer = ik_answer(result)
+    if arguments.pendant:
+        add_pendant(robot, answer)
     if arguments.json:
         print_json(answer)
     else:
@@ -72,7 +78,13 @@ def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
         raise InputError("--targets", arguments.targets, "no --wxyz or --approach: the file has the orientations")
     if arguments.frame == TOOL:
         raise InputError("--frame", TOOL, "a frame that does not move, together with --targets")
-    q_seed = None if arguments.seed is None else configuration(robot, arguments.seed, "--seed", units)
+    if arguments.pendant:
+        raise InputError("--pendant", "with --targets", "one target, or kin.to_pendant")
+    q_seed = (
+        None
+        if arguments.seed is None
+        else configuration(robot, arguments.seed, "--seed", units, arguments.pendant)
+    )
     if _is_piped(arguments):
         if arguments.dask is not None:
             raise InputError("--dask", arguments.dask, "--targets and --output as .npy, .csv or .parquet files")
@@ -164,17 +176,18 @@ def _print(answer: IkAnswer, units: Notation) -> None:
 
 def _solutions(units: Notation, listed: list[tuple[str, Solution]]) -> str:
     """The table of solutions."""
-    count = len(listed[0][1].q)
+    values = [each.pendant or each.q for _, each in listed]
+    count = len(values[0])
     head = ["", *(f"q{i + 1}" for i in range(count)), "point error", "rotation error", "posture"]
     rows = [
         [
             name,
-            *(units.joint(i, value) for i, value in enumerate(solution.q)),
+            *(units.joint(i, value) for i, value in enumerate(shown)),
             f"{units.length(solution.position_error)} {units.of_length}",
             units.angle(solution.rotation_error),
             solution.branch + ("" if solution.in_limits else " (outside limits)"),
         ]
-        for name, solution in listed
+        for (name, solution), shown in zip(listed, values, strict=True)
     ]
     return table(head, rows)
 

@@ -9,7 +9,6 @@ from argparse import Namespace
 from dataclasses import replace
 
 import numpy as np
-from msgspec import UNSET
 
 from app.cli.files import write_file
 from app.cli.terminal import (
@@ -73,7 +72,7 @@ def _dh_table(answer: RobotAnswer, units: Notation) -> str:
             units.length(row.a),
             units.angle(row.alpha),
         ]
-        kind = row.kind if row.follows is UNSET else f"{row.kind}, {row.ratio:g} × {row.follows}"
+        kind = row.kind if not row.follows else f"{row.kind}, {row.ratio:g} × {row.follows}"
         rows.append([row.name, kind, *cells, " … ".join(units.joint(index, x) for x in bounds or ())])
     length = units.of_length
     head = ["row", "kind", "theta", f"d {length}", f"a {length}", "alpha", "limits"]

@@ -23,6 +23,7 @@ from kin import (
     Obstacle,
     Robot,
     frame_pose,
+    from_pendant,
     load_robot,
     load_urdf,
     pose_from_xyz_rpy,
@@ -115,8 +116,11 @@ def quantity(text: str, unit: Unit, field: str) -> float:
         raise KinematicsError(f"{field}: {error.reason}{hint}") from None
 
 
-def configuration(robot: Robot, texts: list[str], field: str, units: Units) -> Array:
-    """Joint values as ``(n,)`` in radians (metres); raises `KinematicsError` unless there are n of them."""
+def configuration(robot: Robot, texts: list[str], field: str, units: Units, pendant: bool = False) -> Array:
+    """Joint values as ``(n,)`` in radians (metres); raises `KinematicsError` unless there are n of them.
+
+    `pendant`: they are typed as the arm's pendant shows them.
+    """
     if len(texts) != robot.n:
         joints = ", ".join(joint.name for joint in robot.joints)
         raise InputError(field, f"{len(texts)} values", f"{robot.n}, one for each of: {joints}")
@@ -125,7 +129,8 @@ def configuration(robot: Robot, texts: list[str], field: str, units: Units) -> A
         (text, units.of(turns), f"{field}[{i}]")
         for i, (text, turns) in enumerate(zip(texts, turning, strict=True))
     ]
-    return robot.check_q(np.array([quantity(*each) for each in named]), field)
+    values = robot.check_q(np.array([quantity(*each) for each in named]), field)
+    return from_pendant(robot, values) if pendant else values
 
 
 def obstacles_of(arguments: Namespace) -> tuple[Obstacle, ...]:

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from kin.coupling import Shown, check_followers, joints_of, map_of
 from kin.errors import InputError, KinematicsError, RobotFileError, shorten
 from kin.files.home import default_home
 from kin.files.numbers import LARGEST, NUMBER, scaled
-from kin.following import check_followers
 from kin.frames import matrix_of
 from kin.motor import MOTOR_UNITS, Motor, checked_motors, fit_joints
 from kin.parsing import Limits, TextError, read_toml
@@ -31,7 +31,6 @@ from kin.robot import (
     Joint,
     Matrix,
     Robot,
-    joints_of,
 )
 from kin.transforms import as_transform
 from kin.typed import ReadError, cut, read, valid
@@ -44,13 +43,13 @@ LIMITS = Limits(1_000_000, 20_000, 16)  # of a robot file
 MAX_REACH = 1e5  # metres; targets may have coordinates up to 1e6 m
 _TOP = {
     *("id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"),
-    *("capsules", "capsules_source", "maker", "payload", "mass", "mounting", "floor", "motors"),
+    *("capsules", "capsules_source", "maker", "payload", "mass", "mounting", "floor", "motors", "pendant"),
 }
 _CAPSULE = {"row", "start", "end", "radius", "assumed"}
 _MOTOR = {
     *("joint", "id", "name", "sign", "offset", "unit", "ticks", "lead", "range", "drive_mode", "homing_offset"),
 }
-_ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", "follows", "ratio", *PEAK_FIELDS}
+_ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", "follows", "ratio", "sign", *PEAK_FIELDS}
 _QUANTITY = re.compile(rf"\s*({NUMBER})\s*(rad|deg|°|m|cm|mm)(/s[23²³]?)?\s*")
 PER = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
 _POWERS = str.maketrans("²³", "23")
@@ -246,6 +245,7 @@ class Reader:
             mounting=self.choice(data, "mounting", MOUNTINGS) if "mounting" in data else None,  # type: ignore[arg-type]
             floor=self.length_of("floor", data["floor"]) if "floor" in data else None,
             motors=self.motors(data, joints),
+            pendant=self.pendant(data, joints),
         )
         if robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3])) > MAX_REACH:
             raise self.refuse(
@@ -269,7 +269,7 @@ class Reader:
             raise self.refuse(f"rows[{index}]", data, "a table with theta, d, a, alpha")
         self.only_known_fields(where, data, _ROW)
         kind = self.choice(data, "kind", tuple(KIND_CODES), where, default="revolute")
-        for key in ("limits", "follows", *PEAK_FIELDS):
+        for key in ("limits", "follows", "sign", *PEAK_FIELDS):
             if kind == "fixed" and key in data:
                 raise self.refuse(where + key, data[key], f"no {key}, because the row is fixed")
         slides = kind == "prismatic"
@@ -292,17 +292,65 @@ class Reader:
         )
 
     def ratio(self, data: dict[str, Any], follows: str, where: str) -> float:
-        """By how many times the value of its joint a row moves: a number, or a text such as ``"-1/2"``."""
+        """By how many times the value of its joint a row moves."""
         given = data.get("ratio", 1)
         if "ratio" in data and not follows:
             raise self.refuse(where + "ratio", given, "no ratio, because the row follows no joint")
+        if (found := self.plain(where + "ratio", given)) == 0.0:
+            raise self.refuse(where + "ratio", given, "a number that is not 0")
+        return found
+
+    def plain(self, field: str, given: object) -> float:
+        """A number without a unit, or a text such as ``"-1/2"``."""
         try:
             value = read(given, PLAIN) if isinstance(given, str) and len(given) <= _LONGEST else given
         except ReadError as error:
-            raise self.refuse(where + "ratio", given, f"a number that is not 0 ({error.reason})") from None
-        if (found := self.number(where + "ratio", value)) == 0.0:
-            raise self.refuse(where + "ratio", given, "a number that is not 0")
-        return found
+            raise self.refuse(field, given, f"a number ({error.reason})") from None
+        return self.number(field, value)
+
+    def pendant(self, data: dict[str, Any], joints: Sequence[Joint]) -> tuple[Shown, ...]:
+        """What a pendant shows of joints: the table `pendant`, and the signs of rows."""
+        table = (
+            self.table(data, "pendant", "a table of parts for each joint that it names")
+            if "pendant" in data
+            else {}
+        )
+        slides = {joint.name: joint.kind == "prismatic" for joint in joints}
+        found = []
+        for i, row in enumerate(data["rows"]):
+            if "sign" not in row:
+                continue
+            where, name = f"rows[{i}].sign", row.get("name", f"joint {i + 1}")
+            if row["sign"] not in (1, -1) or isinstance(row["sign"], bool):
+                raise self.refuse(where, row["sign"], "1, or -1 for a joint that a pendant counts backwards")
+            if name not in slides or name in table:
+                expected = (
+                    "a joint, which moves by itself" if name not in slides else f"no sign, or no pendant.{name}"
+                )
+                raise self.refuse(where, row["sign"], expected)
+            if row["sign"] == -1:
+                found.append(Shown(name, ((name, -1.0),)))
+        for name, parts in table.items():
+            where = f"pendant.{name if len(name) <= 80 else shorten(name)}"
+            if name not in slides:
+                raise self.refuse(where, parts, "one of the joints " + ", ".join(slides))
+            if not isinstance(parts, dict):
+                raise self.refuse(where, parts, "a table of joints and how many times each counts, and offset")
+            self.only_known_fields(
+                where + ".", parts, {*slides, "offset"} if "offset" not in slides else set(slides)
+            )
+            read_offset = self.length_of if slides[name] else self.angle_of
+            offset = read_offset(where + ".offset", parts.get("offset", 0)) if "offset" not in slides else 0.0
+            counted = [each for each in parts if each in slides]
+            found.append(
+                Shown(name, tuple((each, self.plain(f"{where}.{each}", parts[each])) for each in counted), offset)
+            )
+        try:
+            map_of(joints, found)
+        except InputError as error:
+            name = error.field.removeprefix("pendant of ")
+            raise self.refuse(f"pendant.{name}", table.get(name), error.expected) from None
+        return tuple(found)
 
     def limits(self, pair: object, where: str, slides: bool) -> tuple[float, float] | None:
         where += "limits"

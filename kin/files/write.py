@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
 
+from kin.coupling import Shown
 from kin.errors import InputError
 from kin.files.numbers import scaled
 from kin.files.read import ANGLES, PER, UNLIMITED, Reader
@@ -27,6 +29,7 @@ from kin.units import Length
 
 Angle = Literal["deg", "rad"]
 Value = int | float | str
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _DIGITS = (12, 15, 16, 17)  # tried in this order
 
 
@@ -149,6 +152,8 @@ class _Writer:
         data["rows"] = [self.row(row) for row in robot.rows]
         pairs = zip(robot.joints, robot.home, strict=True)
         data["home"] = {"q": [self.value(value, joint.kind == "prismatic") for joint, value in pairs]}
+        if shown := [each for each in robot.pendant if self.is_known(robot, each)]:
+            data["pendant"] = {each.joint: self.shown(robot, each) for each in shown}
         if robot.motors:
             data["motors"] = [self.motor(each) for each in robot.motors]
         if robot.capsules:
@@ -156,6 +161,17 @@ class _Writer:
                 data["capsules_source"] = robot.capsules_source
             data["capsules"] = [self.capsule(robot, each) for each in robot.capsules]
         return data
+
+    @staticmethod
+    def is_known(robot: Robot, shown: Shown) -> bool:
+        """Whether all that an entry of the pendant names are joints."""
+        return {shown.joint, *(name for name, _ in shown.parts)} <= {joint.name for joint in robot.joints}
+
+    def shown(self, robot: Robot, shown: Shown) -> dict[str, Any]:
+        """What a pendant shows of a joint."""
+        slides = next(joint.kind == "prismatic" for joint in robot.joints if joint.name == shown.joint)
+        parts: dict[str, Any] = {name: _plain(share) for name, share in shown.parts}
+        return parts | {"offset": self.value(shown.offset, slides)} if shown.offset else parts
 
     def capsule(self, robot: Robot, capsule: Capsule) -> dict[str, Any]:
         """The row is left out for what stands still, the end of a ball, too."""
@@ -250,6 +266,11 @@ def _plain(value: float) -> int | float:
     return int(value) if value == int(value) and abs(value) < 1e6 else value
 
 
+def _key(name: str) -> str:
+    """A key of a TOML table, in quotes where it needs them."""
+    return name if _BARE.fullmatch(name) else str(_toml(name))
+
+
 def _toml(value: Any) -> str:
     """A number, text, list or flat table as TOML."""
     if isinstance(value, bool):
@@ -259,5 +280,5 @@ def _toml(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(map(_toml, value)) + "]"
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key(key)} = {_toml(item)}" for key, item in value.items()) + " }"
     return repr(value)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kin.coupling import stroke_of
 from kin.robot import Joint, Robot, exact_cos_sin
 
 SHARE, THINNEST, STOUTEST = 0.032, 0.014, 0.3  # radius, relative to all lengths, and at most to the shortest one
@@ -63,5 +64,5 @@ def tubes(robot: Robot) -> list[Tube]:
 
 def _rod(robot: Robot, row: Joint) -> float:
     """Length of what slides: as far as it is drawn out at most."""
-    stroke = robot.stroke(row) if row.kind == "prismatic" else 0.0
+    stroke = stroke_of(row, robot.joints) if row.kind == "prismatic" else 0.0
     return stroke if math.isfinite(stroke) else 0.0

@@ -12,11 +12,13 @@ from kin.readings.findings import MotorFinding, MotorMatch
 from kin.readings.joints import q_from_readings, readings_from_q, readings_from_ticks, ticks_from_readings
 from kin.readings.lerobot import motors_from_lerobot, motors_to_lerobot
 from kin.readings.match import match_motors
+from kin.readings.pendant import from_pendant, to_pendant
 from kin.readings.poses import motor_poses
 
 __all__ = [
     "MotorFinding",
     "MotorMatch",
+    "from_pendant",
     "match_motors",
     "motor_poses",
     "motors_from_lerobot",
@@ -25,4 +27,5 @@ __all__ = [
     "readings_from_q",
     "readings_from_ticks",
     "ticks_from_readings",
+    "to_pendant",
 ]

@@ -205,7 +205,7 @@ def test_a_robot_file_states_what_follows_and_is_written_again(tmp_path):
         ('follows = "upper arm"', 'follows = "level"', "rows[2].follows", "moves by itself"),
         ('follows = "upper arm"\nratio = -1', "ratio = -1", "rows[2].ratio", "follows no joint"),
         ("ratio = -1", "ratio = 0", "rows[2].ratio", "not 0"),
-        ("ratio = -1", 'ratio = "1/"', "rows[2].ratio", "not 0"),
+        ("ratio = -1", 'ratio = "1/"', "rows[2].ratio", "not a number"),
         ("ratio = -1", "ratio = -1\nlimits = [100, 110]", "rows[2].limits", "leave upper arm a value"),
         ("ratio = -1", 'ratio = -1\nkind = "fixed"', "rows[2].follows", "fixed"),
     ],

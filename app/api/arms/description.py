@@ -87,6 +87,7 @@ _ROW: dict[str, Any] = {
             "description": "By how many times that joint's value it moves, rad (m) for each; 1 by default.",
             "anyOf": [_number(["m"]), {"type": "string", "maxLength": 80}],
         },
+        "sign": {"enum": [1, -1], "description": "-1: a pendant counts this joint backwards. 1 by default."},
         "limits": {
             "description": "[lower, upper]; by default ±180° or 0 to 1 m. `none`: an unlimited revolute joint.",
             "anyOf": [_items(_ANY, 2), {"const": "none"}],
@@ -217,6 +218,12 @@ _SCHEMA: dict[str, Any] = {
         },
         "floor": _quantity(_LENGTH, "Height of the floor in the world frame, in the length unit, for drawings."),
         "motors": MOTORS,
+        "pendant": {
+            "type": "object",
+            "maxProperties": MAX_ROWS,
+            "additionalProperties": {"type": "object", "maxProperties": MAX_ROWS + 1},
+            "description": "By joint, what its pendant shows: how many times joints count, and `offset`.",
+        },
         "base": {**_TRANSFORM, "description": "Constant transform before the first row."},
         "tool": {**_TRANSFORM, "description": "Constant transform after the last row."},
     },

@@ -73,6 +73,7 @@ def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "forward kinematics: tool pose for joint values",
         parents.robots,
         parents.output,
+        parents.pendant,
         parents.frames,
     )
     q = parser.add_argument("q", nargs="+", metavar="Q", help=f"joint values, {UNITS_NOTE}")
@@ -102,6 +103,7 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "inverse kinematics: joint values for a tool pose",
         parents.robots,
         parents.output,
+        parents.pendant,
         parents.joints,
         parents.frames,
         usage="kinboard ik ROBOT (--position X Y Z [--wxyz W X Y Z | --approach X Y Z] | --targets FILE "

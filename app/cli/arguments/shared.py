@@ -15,6 +15,7 @@ class Parents:
         robots: ``--robots``, the folder of further robot files.
         output: ``--json`` and the units.
         joints: ``--lock`` and ``--limit``.
+        pendant: ``--pendant``.
         mounts: ``--base`` and ``--tool``.
         frames: these and ``--workpiece``.
     """
@@ -39,6 +40,12 @@ class Parents:
         )
         self.joints = argparse.ArgumentParser(add_help=False)
         add_options(self.joints, ["limits", "locked", "wider_limits"])
+        self.pendant = argparse.ArgumentParser(add_help=False)
+        self.pendant.add_argument(
+            "--pendant",
+            action="store_true",
+            help="read and print joint values as the arm's pendant shows them (pendant in its file)",
+        )
         self.mounts = argparse.ArgumentParser(add_help=False)
         for flag, about in (
             (

@@ -11,7 +11,7 @@ from msgspec import UNSET, UnsetType
 
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.details import IkDetails, RedundancyAnswer, SingularityAnswer, Violation
-from kin import IKResult, PathResult, Status
+from kin import IKResult, PathResult, Robot, Status, to_pendant
 from kin.ik.details import Solved
 from kin.ik.messages import explain
 from kin.ik.results import Cause
@@ -46,6 +46,8 @@ class Solution(Answer):
     compromise: str | None
     """null for an exact answer; "roll" if the rotation about the approach axis was given up; "rotation" if only
     the point is kept and the whole rotation error is as small as it gets; "closest" for the nearest there is."""
+    pendant: list[float] | UnsetType = UNSET
+    """With `pendant` in the request: these joint values as the arm's pendant shows them."""
 
 
 class Blocked(Answer):
@@ -119,6 +121,13 @@ class IkAnswer(Answer):
     """The singularities that the first solution (or `closest`) is at."""
     tolerances: Tolerances | UnsetType = UNSET
     """The errors that count as none, if they are not 1e-9."""
+
+
+def add_pendant(robot: Robot, answer: IkAnswer) -> None:
+    """Give each solution of an answer its values on the pendant."""
+    for each in (*answer.solutions, answer.closest, answer.nearest_orientation):
+        if each is not None:
+            each.pendant = to_pendant(robot, each.q).tolist()
 
 
 def ik_answer(result: IKResult) -> IkAnswer:

@@ -72,7 +72,16 @@ def robot_to_mjcf(robot: Robot | str) -> str:
         f"    <body name={quoted(base)}>",
         *_geoms(robot, bodies, 0, robot.T_world_base, "      "),
     ]
-    frames = _frames(robot)
+    lines += _nested(robot, bodies, moving, names)
+    lines += ["  </worldbody>", *_contacts(bodies, links, robot.floor is not None)]
+    lines += [*_equalities(robot, moving, names), "  <keyframe>"]
+    lines.append(f'    <key name="home" qpos="{_numbers(robot.expand(robot.q_home))}"/>')
+    return "\n".join([*lines, "  </keyframe>", "</mujoco>", ""])
+
+
+def _nested(robot: Robot, bodies: Bodies, moving: Sequence[Joint], names: Sequence[str]) -> list[str]:
+    """The bodies that move, each in the one before, and the tool in the last; with the ends of all bodies."""
+    frames, lines = _frames(robot), []
     before = np.eye(4)
     for k, (joint, name) in enumerate(zip(moving, names, strict=True), 1):
         indent = "    " + "  " * k
@@ -88,10 +97,7 @@ def robot_to_mjcf(robot: Robot | str) -> str:
     indent = "    " + "  " * (len(moving) + 1)
     lines.append(f'{indent}<site name="tool"{_placed(inverse(before) @ tool)}/>')
     lines += ["    " + "  " * k + "</body>" for k in range(len(moving), -1, -1)]
-    lines += ["  </worldbody>", *_contacts(bodies, links, robot.floor is not None)]
-    lines += [*_equalities(robot, moving, names), "  <keyframe>"]
-    lines.append(f'    <key name="home" qpos="{_numbers(robot.expand(robot.q_home))}"/>')
-    return "\n".join([*lines, "  </keyframe>", "</mujoco>", ""])
+    return lines
 
 
 def _frames(robot: Robot) -> list[Array]:

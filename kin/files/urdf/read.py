@@ -18,6 +18,7 @@ import numpy as np
 
 from kin.axes import frame_of, inverse, perpendicular_to
 from kin.checks import one_of
+from kin.coupling import joints_of
 from kin.dh import SAMPLES, table_of_chain
 from kin.errors import InputError, RobotFileError
 from kin.files.home import default_home
@@ -39,7 +40,7 @@ from kin.files.urdf.following import Followers, followers_of, left_of
 from kin.files.urdf.poses import motion_of
 from kin.files.urdf.tree import FREE, UNLIMITED, Tip, UrdfJoint, UrdfTree, read_tree
 from kin.fk import fk
-from kin.robot import DEFAULT_LIMITS, MOUNTINGS, Joint, Mounting, Robot, joints_of
+from kin.robot import DEFAULT_LIMITS, MOUNTINGS, Joint, Mounting, Robot
 from kin.transforms import Array
 
 _UPRIGHT = 0.7  # of the height of a vertical axis of unit length

@@ -1,0 +1,74 @@
+"""Joint values as the pendant of an arm shows them, and back; what it shows is stated in :mod:`kin.coupling`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from kin.named import robot_of
+from kin.robot import Robot
+from kin.transforms import Array
+
+
+def to_pendant(robot: Robot | str, q: ArrayLike) -> Array:
+    """Joint values as the pendant of an arm shows them.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        q: ``(..., n)`` joint values, radians (metres).
+
+    Returns:
+        ``(..., n)`` what is shown, radians (metres); q itself for an arm whose file states nothing of it.
+
+    Raises:
+        InputError: q has another number of joints, or values that are not finite.
+
+    Examples:
+        >>> import kin, numpy as np
+        >>> shown = kin.to_pendant("lrmate200id", np.radians([0, 30, 50, 0, -90, 0]))
+        >>> np.degrees(shown).round(6) + 0.0  # FANUC counts J3 from the horizontal
+        array([  0.,  30.,  20.,   0., -90.,   0.])
+    """
+    robot = robot_of(robot)
+    q = robot.check_q(q)
+    found = robot.pendant_map
+    return q if found is None else q @ found.B.T + found.c
+
+
+def from_pendant(robot: Robot | str, shown: ArrayLike) -> Array:
+    """Joint values from what the pendant of an arm shows: the opposite of `to_pendant`.
+
+    Args:
+        robot: the arm, or the id of a built-in one.
+        shown: ``(..., n)`` values on the pendant, radians (metres).
+
+    Returns:
+        ``(..., n)`` joint values, radians (metres).
+
+    Raises:
+        InputError: another number of joints, or values that are not finite.
+
+    Examples:
+        >>> import kin, numpy as np
+        >>> q = kin.from_pendant("lrmate200id", np.radians([0, 30, 20, 0, -90, 0]))
+        >>> np.degrees(q).round(6) + 0.0
+        array([  0.,  30.,  50.,   0., -90.,   0.])
+    """
+    robot = robot_of(robot)
+    values = robot.check_q(shown, "shown")
+    found = robot.pendant_map
+    return values if found is None else (values - found.c) @ found.back.T
+
+
+def shown_limits(robot: Robot) -> list[tuple[float, float] | None]:
+    """The limits of each joint as its pendant shows them; None without any, or where other joints move them."""
+    found: list[tuple[float, float] | None] = []
+    for i, joint in enumerate(robot.joints):
+        own = robot.pendant_map
+        if joint.limits is None or own is None:
+            found.append(joint.limits)
+            continue
+        others = np.delete(own.B[i], i).any()
+        low, high = sorted(own.B[i, i] * limit + own.c[i] for limit in joint.limits)
+        found.append(None if others else (float(low), float(high)))
+    return found
