@@ -29,7 +29,10 @@ SMALLEST, LARGEST = 1e-3, 1000.0  # m: reach of an arm that can be shown
 LONGEST = 10_000  # characters of the compact form; a link holds 12 000 in all
 OF_MAKER = ("maker", "payload", "mass")  # fields that an own arm has not: nobody has built or weighed it
 _KINDS = {"revolute": "", "prismatic": "p", "fixed": "f"}
-_ROW = ("theta", "d", "a", "alpha", "limits", "kind", "name", "velocity", "effort", "acceleration", "jerk")
+_ROW = (
+    *("theta", "d", "a", "alpha", "limits", "kind", "name", "velocity", "effort", "acceleration", "jerk"),
+    *("follows", "ratio"),  # the joint by the index of its row
+)
 _MOTOR = ("id", "sign", "offset", "unit", "name", "ticks", "lead", "range", "drive_mode", "homing_offset")
 _TOP = {
     "n": "name",
@@ -74,7 +77,10 @@ def own_arm(data: Mapping[str, Any], start: str = "") -> OwnArm:
         fields["capsules_source"] = clean(fields["capsules_source"], CAPSULES_SOURCE)
     rows = data.get("rows")
     if isinstance(rows, Sequence) and not isinstance(rows, str):
-        fields["rows"] = _named(rows)
+        named = _named(rows)
+        fields["rows"] = [_of_row(each, "follows", rows, named) for each in named]
+        if isinstance(pendant := data.get("pendant"), Mapping):
+            fields["pendant"] = _of_rows(pendant, rows, named)
         if isinstance(capsules := data.get("capsules"), Sequence):
             fields["capsules"] = [_of_row(each, "row", rows, fields["rows"]) for each in capsules]
         if isinstance(motors := data.get("motors"), Sequence) and not isinstance(motors, str):
@@ -135,6 +141,20 @@ def _of_row(part: Any, key: str, before: Sequence[Any], rows: Sequence[Any]) -> 
     return {**part, key: rows[row].get("name") if isinstance(rows[row], Mapping) else row}
 
 
+def _of_rows(pendant: Mapping[Any, Any], before: Sequence[Any], rows: Sequence[Any]) -> dict[Any, Any]:
+    """What a pendant shows, with the names that its rows have now."""
+
+    def named(name: Any) -> Any:
+        return _of_row({"row": name}, "row", before, rows)["row"]
+
+    return {
+        named(joint): {named(name) if name != "offset" else name: value for name, value in parts.items()}
+        if isinstance(parts, Mapping)
+        else parts
+        for joint, parts in pendant.items()
+    }
+
+
 def _unused(name: str, taken: Set[Any]) -> str:
     """The name, with a number if it is taken."""
     endings = ("", *(f"_{k}" for k in range(2, MAX_ROWS + 2)))
@@ -187,6 +207,8 @@ def unpack(value: object) -> OwnArm:
         data["capsules_source"] = value.get("ks", "")
     if (motors := value.get("o")) is not None:
         data["motors"] = [_motor(i, each) for i, each in enumerate(motors)] if isinstance(motors, list) else motors
+    if (pendant := value.get("p")) is not None:
+        data["pendant"] = dict(map(_shown, pendant)) if isinstance(pendant, list) else pendant
     start = value.get("from", "")
     return own_arm(data, start if isinstance(start, str) else "")
 
@@ -210,6 +232,13 @@ def _capsule(index: int, given: object) -> dict[str, Any]:
     return found if row == -1 else {**found, "row": row}
 
 
+def _shown(given: object) -> tuple[int, dict[Any, Any]]:
+    if not isinstance(given, list) or len(given) % 2 or not all(isinstance(row, int) for row in given[::2]):
+        raise InputError("pendant", given, "a list of row, offset, and then rows with how many times each counts")
+    parts: dict[Any, Any] = {"offset": given[1], **dict(zip(given[2::2], given[3::2], strict=True))}
+    return given[0], parts
+
+
 def _motor(index: int, given: object) -> dict[str, Any]:
     if not isinstance(given, list) or not 1 <= len(given) <= len(_MOTOR) + 1:
         raise InputError(f"motors[{index}]", given, "a list of joint, " + ", ".join(_MOTOR))
@@ -228,7 +257,8 @@ def _text(robot: Robot) -> str:
         del packed["c"]
     if data["units"]["length"] != "mm":
         packed["u"] = data["units"]["length"]
-    packed["r"] = [_packed_row(row) for row in data["rows"]]
+    places = {row.name: i for i, row in enumerate(robot.rows)}
+    packed["r"] = [_packed_row(row, places) for row in data["rows"]]
     packed["h"] = data["home"]["q"]
     if robot.capsules:
         stated = zip(robot.capsules, data["capsules"], strict=True)
@@ -238,18 +268,27 @@ def _text(robot: Robot) -> str:
         ]
         packed["ks"] = robot.capsules_source
     if robot.motors:
-        names = [row.name for row in robot.rows]
         packed["o"] = [
-            _without_end([names.index(item["joint"]) if "joint" in item else -1, *map(item.get, _MOTOR)])
+            _without_end([places[item["joint"]] if "joint" in item else -1, *map(item.get, _MOTOR)])
             for item in data["motors"]
+        ]
+    if "pendant" in data:
+        packed["p"] = [
+            [
+                places[joint],
+                parts.pop("offset", 0),
+                *(x for name, share in parts.items() for x in (places[name], share)),
+            ]
+            for joint, parts in data["pendant"].items()
         ]
     return json.dumps(packed, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
-def _packed_row(row: Mapping[str, Any]) -> list[Any]:
+def _packed_row(row: Mapping[str, Any], places: Mapping[str, int]) -> list[Any]:
     """The items of a row, without trailing ones that are missing."""
     items = [row.get(name, 0) for name in _ROW[:4]]
-    items += [row.get("limits"), _KINDS[row.get("kind", "revolute")], row["name"], *map(row.get, _ROW[7:])]
+    items += [row.get("limits"), _KINDS[row.get("kind", "revolute")], row["name"], *map(row.get, _ROW[7:11])]
+    items += [places[row["follows"]], row["ratio"]] if "follows" in row else []
     return _without_end(items)
 
 

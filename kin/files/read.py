@@ -309,48 +309,49 @@ class Reader:
         return self.number(field, value)
 
     def pendant(self, data: dict[str, Any], joints: Sequence[Joint]) -> tuple[Shown, ...]:
-        """What a pendant shows of joints: the table `pendant`, and the signs of rows."""
-        table = (
-            self.table(data, "pendant", "a table of parts for each joint that it names")
-            if "pendant" in data
-            else {}
-        )
+        """What a pendant shows of joints: the signs of rows, and the table `pendant`."""
+        table: dict[Any, Any] = {}
+        if "pendant" in data:
+            table = self.table(data, "pendant", "a table for each joint that it names")
         slides = {joint.name: joint.kind == "prismatic" for joint in joints}
         found = []
         for i, row in enumerate(data["rows"]):
-            if "sign" not in row:
-                continue
-            where, name = f"rows[{i}].sign", row.get("name", f"joint {i + 1}")
-            if row["sign"] not in (1, -1) or isinstance(row["sign"], bool):
-                raise self.refuse(where, row["sign"], "1, or -1 for a joint that a pendant counts backwards")
-            if name not in slides or name in table:
-                expected = (
-                    "a joint, which moves by itself" if name not in slides else f"no sign, or no pendant.{name}"
-                )
-                raise self.refuse(where, row["sign"], expected)
-            if row["sign"] == -1:
-                found.append(Shown(name, ((name, -1.0),)))
-        for name, parts in table.items():
-            where = f"pendant.{name if len(name) <= 80 else shorten(name)}"
-            if name not in slides:
-                raise self.refuse(where, parts, "one of the joints " + ", ".join(slides))
-            if not isinstance(parts, dict):
-                raise self.refuse(where, parts, "a table of joints and how many times each counts, and offset")
-            self.only_known_fields(
-                where + ".", parts, {*slides, "offset"} if "offset" not in slides else set(slides)
-            )
-            read_offset = self.length_of if slides[name] else self.angle_of
-            offset = read_offset(where + ".offset", parts.get("offset", 0)) if "offset" not in slides else 0.0
-            counted = [each for each in parts if each in slides]
-            found.append(
-                Shown(name, tuple((each, self.plain(f"{where}.{each}", parts[each])) for each in counted), offset)
-            )
+            if "sign" in row and (shown := self.sign(i, row, slides, table)) is not None:
+                found.append(shown)
+        found += [self.shown(name, parts, slides) for name, parts in table.items()]
         try:
             map_of(joints, found)
         except InputError as error:
             name = error.field.removeprefix("pendant of ")
             raise self.refuse(f"pendant.{name}", table.get(name), error.expected) from None
         return tuple(found)
+
+    def sign(
+        self, index: int, row: dict[str, Any], slides: dict[str, bool], table: dict[Any, Any]
+    ) -> Shown | None:
+        """What the sign of a row says a pendant shows of it; None if it counts as the table does."""
+        field, sign, name = f"rows[{index}].sign", row["sign"], row.get("name", f"joint {index + 1}")
+        if isinstance(sign, bool) or sign not in (1, -1):
+            raise self.refuse(field, sign, "1, or -1 for a joint that a pendant counts backwards")
+        if name not in slides:
+            raise self.refuse(field, sign, "no sign, because the row follows a joint")
+        if name in table:
+            raise self.refuse(field, sign, f"no sign, because pendant.{name} says what is shown")
+        return Shown(name, ((name, -1.0),)) if sign == -1 else None
+
+    def shown(self, name: object, parts: object, slides: dict[str, bool]) -> Shown:
+        """What a pendant shows of a joint."""
+        if not isinstance(name, str) or name not in slides:
+            shown = name if isinstance(name, str) and name.isprintable() and len(name) <= 80 else shorten(name)
+            raise self.refuse(f"pendant.{shown}", parts, "one of the joints " + ", ".join(slides))
+        where = f"pendant.{name}"
+        if not isinstance(parts, dict):
+            raise self.refuse(where, parts, "a table of joints and how many times each counts, and offset")
+        self.only_known_fields(where + ".", parts, {*slides, "offset"})
+        read_offset = self.length_of if slides[name] else self.angle_of
+        offset = read_offset(where + ".offset", parts.get("offset", 0))
+        counted = [(key, self.plain(f"{where}.{key}", share)) for key, share in parts.items() if key != "offset"]
+        return Shown(name, tuple(counted), offset)
 
     def limits(self, pair: object, where: str, slides: bool) -> tuple[float, float] | None:
         where += "limits"

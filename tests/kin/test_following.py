@@ -363,3 +363,18 @@ def test_what_has_no_meaning_for_rows_that_follow_is_refused():
         kin.compare(robot, robot.free)
     assert kin.screws(robot.free).S.shape == (6, 7)
     assert kin.compare(robot, kin.convert_dh(robot, "modified")).verdict == "identical"
+
+
+def test_bodies_of_a_follower_are_where_its_offset_puts_them():
+    text = urdf_of(
+        'j1|revolute|<limit lower="-1" upper="1"/>',
+        'j2|revolute|<mimic joint="j1" multiplier="-1" offset="0.7"/>',
+    ).replace('<link name="l3"/>', "")
+    ball = '<link name="l2"><collision><origin xyz="0.1 0 0"/>'
+    ball += '<geometry><sphere radius="0.05"/></geometry></collision>'
+    robot = kin.load_urdf(text.replace('<link name="l2"/>', ball + "</link>"))
+    (capsule,) = [each for each in robot.capsules if not each.assumed]
+    end = kin.link_frames(robot, [0.3])[capsule.row] @ [*capsule.start, 1.0]
+    tool = kin.fk(robot, [0.3]) @ [0.1, 0.0, 0.0, 1.0]
+    assert end == pytest.approx(tool, abs=1e-6)
+    assert capsule.link == 2

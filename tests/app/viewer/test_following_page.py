@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 
 import numpy as np
@@ -13,6 +14,7 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
+from app.viewer.own_arm import own_arm, pack, unpack
 from app.viewer.scene.chain import chain, link_poses
 from app.viewer.server import ViewerServer
 from app.viewer.tabs.robot.edits import EditError, changed_rows, typed
@@ -73,3 +75,22 @@ def test_a_renamed_joint_keeps_its_followers_and_a_fixed_row_follows_nothing() -
         changed_rows(ROBOT, None, lambda rows: rows.pop(3))
     own = changed_rows(ROBOT, None, lambda rows: rows.insert(0, {"name": "rail", "kind": "prismatic"})).robot
     assert own.home[1:] == ROBOT.home
+
+
+def test_a_link_carries_what_follows_and_the_pendant() -> None:
+    data = kin.robot_to_dict(ROBOT) | {"pendant": {"forearm": {"forearm": -1, "upper arm": 1, "offset": 5}}}
+    own = own_arm(data)
+    back = unpack(json.loads(json.dumps(pack(own))))
+    assert back == own
+    assert [(row.follows, row.ratio) for row in back.robot.rows] == [(r.follows, r.ratio) for r in ROBOT.rows]
+    assert kin.to_pendant(back.robot, ROBOT.q_home) == pytest.approx(
+        kin.to_pendant(kin.robot_from_dict(data), ROBOT.q_home), abs=1e-15
+    )
+    data["rows"][3]["name"] = "fore\u200barm"  # which cannot be shown as it is
+    data["rows"][4]["follows"] = "fore\u200barm"
+    data["pendant"] = {"fore\u200barm": {"fore\u200barm": -1}}
+    renamed = own_arm(data).robot
+    assert (renamed.rows[4].follows, renamed.pendant[0].joint) == ("forearm", "forearm")
+    for wrong in ("p", [1], [[1]], [[0, 0, "x", 1]], [[0, 0, 99, 1]], [[99, 0, 0, 1]]):
+        with pytest.raises(kin.KinematicsError, match="pendant"):
+            unpack({**pack(own), "p": wrong})

@@ -76,7 +76,7 @@ def test_fanucs_j3_counts_from_the_horizontal(name):
     [
         ("sign = -1", "sign = 2", "rows[0].sign", "1, or -1"),
         ("sign = -1", "sign = true", "rows[0].sign", "1, or -1"),
-        ('name = "elbow"', 'name = "elbow"\nsign = -1', "rows[1].sign", "no pendant.elbow"),
+        ('name = "elbow"', 'name = "elbow"\nsign = -1', "rows[1].sign", "because pendant.elbow says"),
         ("elbow = { shoulder", "albow = { shoulder", "pendant.albow", "shoulder, elbow, lift"),
         ("{ shoulder = 1", "{ neck = 1", "pendant.elbow.neck", "only the fields"),
         ("{ shoulder = 1", '{ shoulder = "one"', "pendant.elbow.shoulder", "a number"),
