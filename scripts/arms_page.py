@@ -28,8 +28,8 @@ This page is written by `scripts/arms_page.py`.
 """
 LEAD = {
     "Classics": "The arms of textbooks and lessons.",
-    "Library": "By maker; textbook layouts come last. Joint values are those of the maker's own description. A maker's arm ends in its "
-    "flange, or between its fingers where that is said first; there z points out "
+    "Library": "By maker; textbook layouts come last. Joint values are those of the maker's own description. "
+    "A maker's arm ends in its flange, or between its fingers where that is said first; there z points out "
     "([picture](background/conventions.md#transforms)).",
 }
 

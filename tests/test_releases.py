@@ -29,11 +29,7 @@ DATA = ROOT / "tests" / "data" / "releases"
 RELEASES = sorted(path.name for path in DATA.iterdir())
 ROBOTS = sorted(path.relative_to(DATA).as_posix() for path in DATA.glob("*/robots/*.toml"))
 # Built-in arms that did not end in their maker's flange, or whose z axis did not point out: where the tool is now,
-<<<<<<< HEAD
-# in the frame that the releases before had as xyz (m) and rpy (rad).
-=======
 # as xyz (m) and rpy (rad) in the frame of the tool in that release.
->>>>>>> 8914bd87 (Capsules around the bodies of a URDF are fitted when something asks for them)
 HALF = np.pi / 2
 ENDS: dict[str, dict[str, tuple[list[float], list[float]]]] = {
     "1.0.0": {

@@ -1,10 +1,11 @@
 """Motions that begin while the arm moves.
 
-A *ramp* takes a joint from a speed and an acceleration to another speed, without acceleration, as fast as the limits
-of acceleration and jerk allow: the acceleration rises to a peak, stays, and falls (Biagiotti and Melchiorri,
-Trajectory Planning for Automatic Machines and Robots, 2008, section 3.4). From the motion at the start to rest at the
-end, a joint has two ramps with a time of steady speed between them. That speed is the only unknown: the fastest one
-that covers the distance, or for joints that have to wait for the slowest one, the one that takes as long.
+A *ramp* takes a joint from a speed and an acceleration to another speed, without acceleration, as fast as the
+limits of acceleration and jerk allow: the acceleration rises to a peak, stays, and falls (Biagiotti and
+Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, section 3.4). From the motion at the
+start to rest at the end, a joint has two ramps with a time of steady speed between them. That speed is the only
+unknown: the fastest one that covers the distance, or for joints that have to wait for the slowest one, the one
+that takes as long.
 """
 
 from __future__ import annotations

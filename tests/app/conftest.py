@@ -6,8 +6,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 import kin
-from app.service.main import create_app
 from app.service.compute.pool import Pool
+from app.service.main import create_app
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store

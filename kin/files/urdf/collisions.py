@@ -116,7 +116,7 @@ def collisions_of(robot: Robot, tree: UrdfTree, chain: tuple[UrdfJoint, ...]) ->
     """The collision bodies of all URDF links that belong to an arm, in the order of the file."""
     carriers, poses = poses_of(tree, chain)
     frames = link_frames(robot, np.zeros(robot.n))
-    rows = [inverse(robot.T_world_base), *(inverse(frames[row]) for row in robot.joint_rows)]
+    rows = [inverse(robot.T_world_base), *(inverse(frames[row]) for row in robot.moving_rows)]
     found, count = [], 0
     for element in tree.root.findall("link"):
         name = element.get("name", "").strip()

@@ -15,7 +15,7 @@ from bare_page import nodes_of
 import kin
 from app.shared.settings import static_folder
 from app.shared.store import Store
-from app.viewer.panel import joints, readout, rotations, status
+from app.viewer.panel import joints, readout, status
 from app.viewer.scene import camera
 from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.bodies.drawing import drawing
@@ -23,6 +23,7 @@ from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.scene.chain import chain, link_poses
 from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import box, tube
+from kin.poses import rotations
 from kin.transforms import pose_from_position_wxyz
 from kin.units import DEFAULT_UNITS, Units
 
