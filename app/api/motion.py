@@ -34,6 +34,7 @@ router = versioned("motion")
 MOST_RATE = 1000.0  # samples per second
 MOST_SAMPLES = 1_000_000
 NUMBER = 21  # bytes of a number in JSON, about
+_OWN_FIELDS = ("program", "q_start", "qd_start", "qdd_start")  # all others are of the program
 
 EXAMPLES = {
     "ptp": example(
@@ -70,6 +71,16 @@ class MotionRequest(AvoidingBody, WorkpiecesBody):
     q_start: Configuration | None = Field(
         None,
         description="Where the arm is, in radians (metres for sliding joints); by default the home configuration.",
+    )
+    qd_start: Configuration | None = Field(
+        None,
+        description="How fast the joints move at the start, in radians (metres for sliding joints) per second; at "
+        "rest by default. A PTP without a blend goes on from this motion; before any other segment the arm "
+        "brakes, and the segment begins where it then stands. `refusal` has the cause `stop` where a joint cannot "
+        "stop before its limit.",
+    )
+    qdd_start: Configuration | None = Field(
+        None, description="The accelerations of the joints at the start, per s²; none by default."
     )
     rate: float = Field(
         100.0, ge=0.1, le=MOST_RATE, strict=True, allow_inf_nan=False, description="Samples per second."
@@ -133,9 +144,14 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
     segments = body.program.get("segments")
     if isinstance(segments, list):
         schemas.check_batch("program.segments", len(segments), settings, settings.max_path)
-    q_start = None
-    if body.q_start is not None:
-        q_start = schemas.as_configurations(robot, body.q_start, settings, "q_start")[0][0]
+    q_start, qd_start, qdd_start = (
+        None if given is None else schemas.as_configurations(robot, given, settings, field)[0][0]
+        for field, given in (
+            ("q_start", body.q_start),
+            ("qd_start", body.qd_start),
+            ("qdd_start", body.qdd_start),
+        )
+    )
     try:
         frames = {name: body.constant_frames[f"workpieces.{name}"][0] for name in body.workpieces}
         program = program_from_dict(body.program, robot, frames)
@@ -143,11 +159,15 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
             robot,
             program,
             q_start,
+            qd_start=qd_start,
+            qdd_start=qdd_start,
             stop=deadline.check,
             **body.keywords,
         )
     except InputError as error:
-        prefix = "" if error.field.partition("[")[0] in ("program", "q_start") else "program."
+        prefix = (
+            "" if error.field.partition("[")[0] in ("program", "q_start", "qd_start", "qdd_start") else "program."
+        )
         raise invalid(from_input_error(error, prefix)) from None
     if found.driven is not None:
         _check_length(found.driven, body.rate)

@@ -84,11 +84,19 @@ import numpy as np
 
 {robot_code(motion.robot)}
 program = {program}
-motion = kin.plan_motion(robot, program, q_start={json.dumps(motion.q_start.tolist())})
+motion = kin.plan_motion(robot, program, {_start(motion)})
 print(motion.reason)
 sample = motion.sample(np.arange(0.0, motion.duration, {1.0 / rate:.9g}))
 print(sample.q.shape, sample.tool_speed.max())
 """.encode()
+
+
+def _start(motion: Motion) -> str:
+    """Where the motion begins, and how the joints move there, as keywords."""
+    start = {"q_start": motion.q_start}
+    if motion.start is not None:
+        start |= {"qd_start": motion.start.qd, "qdd_start": motion.start.qdd}
+    return ", ".join(f"{key}={json.dumps(values.tolist())}" for key, values in start.items())
 
 
 def _urscript(motion: Motion, rate: float) -> Generator[bytes]:

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from kin.collision import Obstacle
@@ -32,9 +33,12 @@ from kin.motion.planning.plan import task_of
 from kin.motion.planning.starts import segment_poses, start_as_recorded
 from kin.motion.program import Circ, Dwell, JointTarget, Lin, Move, PoseTarget, Program, Ptp, Segment, Spline
 from kin.motion.reading import parse_program, program_from_dict, program_to_dict
-from kin.motion.results import Motion, MotionSample, Peak, Refusal, SegmentTimes
+from kin.motion.results import InMotion, Motion, MotionSample, Peak, Refusal, SegmentTimes
 from kin.named import robot_of
 from kin.robot import Robot
+from kin.transforms import finite_array
+
+_ROUNDING = 1e-9  # part of a speed
 
 __all__ = [
     "Arrival",
@@ -68,6 +72,8 @@ def plan_motion(
     program: Program | Mapping[str, Any] | Sequence[Move | Dwell],
     q_start: ArrayLike | None = None,
     *,
+    qd_start: ArrayLike | None = None,
+    qdd_start: ArrayLike | None = None,
     limits: MotionLimits | None = None,
     options: IKOptions | None = None,
     avoid_self_collision: bool = False,
@@ -80,6 +86,9 @@ def plan_motion(
         robot: the arm, or the id of a built-in one.
         program: a `Program`, its segments, or plain data as in `program_from_dict`.
         q_start: ``(n,)`` where the arm is, radians (metres); the home pose by default.
+        qd_start, qdd_start: ``(n,)`` how the joints move at the start, radians (metres) per second and per s²,
+            within their limits; at rest by default. A PTP without a blend goes on from this motion; before any
+            other segment the arm brakes, and the segment begins where it then stands.
         limits: other limits than those of `motion_limits`, in radians (metres) and seconds.
         options: the next two as one value. All others have to be the default: the program states the task, and
             its start the posture.
@@ -88,10 +97,12 @@ def plan_motion(
         stop: called now and then; cancels the computation by raising.
 
     Returns:
-        The motion to sample, or the refusal with its place and joint.
+        The motion to sample, or the refusal with its place and joint; its cause is ``"stop"`` where a joint that
+        moves at the start cannot stop before its limit.
 
     Raises:
-        InputError: a malformed program or start. A program that cannot be driven is not an error.
+        InputError: a malformed program or start, or one that moves faster than the limits allow. A program that
+            cannot be driven is not an error.
 
     Examples:
         >>> import kin
@@ -114,9 +125,41 @@ def plan_motion(
         limits = motion_limits(robot)
     elif not isinstance(limits, MotionLimits) or len(limits.velocity) != robot.n:
         raise InputError("limits", limits, f"MotionLimits of {robot.n} joints")
+    start = _in_motion(robot, limits, qd_start, qdd_start)
     wanted = IKOptions.of(options, avoid_self_collision=avoid_self_collision, obstacles=obstacles)
     wanted.check_only("avoid_self_collision", "obstacles")
-    found = planned(robot, program, limits, q.copy(), stop)
+    found = planned(robot, program, limits, q.copy(), start, stop)
     if wanted.avoids:
         return checked(found, surroundings(robot, wanted.obstacles, wanted.avoid_self_collision), stop)
     return found
+
+
+def _in_motion(
+    robot: Robot, limits: MotionLimits, qd_start: ArrayLike | None, qdd_start: ArrayLike | None
+) -> InMotion | None:
+    """How the arm moves at the start, checked against the limits of its joints; None at rest."""
+    found = []
+    for field, given, most, per in (
+        ("qd_start", qd_start, limits.velocity, "s"),
+        ("qdd_start", qdd_start, limits.acceleration, "s²"),
+    ):
+        values = np.zeros(robot.n) if given is None else finite_array(field, given, (robot.n,)).copy()
+        if values.ndim != 1:
+            raise InputError(field, f"shape {values.shape}", f"{robot.n} numbers, one for each joint")
+        for i in np.flatnonzero(np.abs(values) > most).tolist():
+            raise InputError(f"{field}[{i}]", float(values[i]), _at_most(robot, i, float(most[i]), per))
+        found.append(values)
+    qd, qdd = found
+    # What the acceleration at the start adds to the speed until it is gone.
+    later = np.abs(qd + 0.5 * qdd * np.abs(qdd) / limits.jerk)
+    for i in np.flatnonzero(later > limits.velocity * (1.0 + _ROUNDING)).tolist():
+        least = float(limits.velocity[i] - np.sign(qdd[i]) * qd[i])
+        most = (2.0 * float(limits.jerk[i]) * max(least, 0.0)) ** 0.5
+        why = ", or the joint would become faster than it may before the acceleration is gone"
+        raise InputError(f"qdd_start[{i}]", float(qdd[i]), _at_most(robot, i, most, "s²") + why)
+    return InMotion(qd, qdd) if qd.any() or qdd.any() else None
+
+
+def _at_most(robot: Robot, index: int, most: float, per: str) -> str:
+    joint = robot.joints[index]
+    return f"at most {most:.6g} {'rad' if robot.revolute[index] else 'm'}/{per} either way, as {joint.name} may"

@@ -15,7 +15,9 @@ from kin.motion.arrivals import Arrival
 from kin.path.details import JointMove
 from kin.solvers.singular import Singularity
 
-Cause = Literal["start", "target", "unreachable", "limits", "singularity", "branch", "circle", "task", "collision"]
+Cause = Literal[
+    "start", "target", "unreachable", "limits", "singularity", "branch", "circle", "task", "collision", "stop"
+]
 HelpCode = Literal["ptp", "posture", "via", "start", "closer", "task"]
 
 
@@ -23,6 +25,20 @@ class StartOutside(NamedTuple):
     """Cause ``start``: the arm is outside its limits before it moves."""
 
     violations: tuple[LimitViolation, ...]
+
+
+class CannotStop(NamedTuple):
+    """Cause ``stop``: the arm moves at the start, and a joint cannot stop before its limit.
+
+    Attributes:
+        violation: which joint and limit, and the value that it would need, braking as fast as it may.
+        time: seconds from the start until it reaches the limit.
+        speed: of the joint at the start.
+    """
+
+    violation: LimitViolation
+    time: float
+    speed: float
 
 
 class TargetOutside(NamedTuple):
@@ -108,6 +124,7 @@ class Collides(NamedTuple):
 
 RefusalDetails = (
     StartOutside
+    | CannotStop
     | TargetOutside
     | NotReached
     | LimitMet
@@ -179,6 +196,12 @@ class Slowed(NamedTuple):
     singularity: Singularity | None
 
 
+class Braked(NamedTuple):
+    """The arm moves at the start, and brakes for so many seconds; the first segment begins after that."""
+
+    seconds: float
+
+
 class JerkCost(NamedTuple):
     """What the limits of jerk cost on a path: its seconds with them and without."""
 
@@ -214,4 +237,4 @@ class ArrivesOtherwise(NamedTuple):
         return cls(segment, arrival.posture, arrival.recorded_posture, move)
 
 
-Note = ArrivesOtherwise | BlendShortened | BlendLeftOut | Slowed | JerkCost
+Note = ArrivesOtherwise | BlendShortened | BlendLeftOut | Slowed | JerkCost | Braked

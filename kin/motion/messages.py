@@ -12,7 +12,9 @@ from kin.motion.details import (
     ArrivesOtherwise,
     BlendLeftOut,
     BlendShortened,
+    Braked,
     BranchNeeded,
+    CannotStop,
     Collides,
     Help,
     JerkCost,
@@ -67,6 +69,14 @@ def _why(details: RefusalDetails, units: Units) -> str:
     match details:
         case StartOutside(violations):
             return f"the arm starts outside its limits: {listed([need(each, units) for each in violations])}"
+        case CannotStop(violation, time, speed):
+            who, kind = joint(violation.joint, violation.name), violation.kind
+            fast = units.of(kind == "revolute").per_second().value(abs(speed))
+            return (
+                f"{who} cannot stop in time: it moves at {fast}, reaches its limit of "
+                f"{joint_value(kind, violation.limit, units)} after {time:.3f} s and would need "
+                f"{joint_value(kind, violation.value, units)}"
+            )
         case TargetOutside(violations):
             return f"the target is outside the limits: {listed([need(each, units) for each in violations])}"
         case NotReached(facts, cause, task, singularities):
@@ -127,6 +137,8 @@ def note(fact: Note, units: Units) -> str:
                 f"Segment {segment + 1} slows down to {100.0 * ratio:.2g} % of its usual speed at "
                 f"{100.0 * fraction:.0f} % of the way{near}: {joint(index, name)} is at its limit of {quantity}."
             )
+        case Braked(seconds):
+            return f"The arm moves at the start: it brakes for {seconds:.3f} s before the first segment."
         case JerkCost(first, last, duration, without):
             which = f"segment {first + 1}" if first == last else f"segments {first + 1} to {last + 1}"
             share = 100.0 * (duration / without - 1.0)

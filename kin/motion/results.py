@@ -18,7 +18,7 @@ from kin.errors import InputError
 from kin.fk import fk, jacobian
 from kin.motion import messages, tables
 from kin.motion.arrivals import Arrival
-from kin.motion.details import Cause, Help, Note, RefusalDetails
+from kin.motion.details import Braked, Cause, Help, Note, RefusalDetails
 from kin.motion.limits import MotionLimits
 from kin.motion.pieces import Piece
 from kin.motion.program import Dwell, Kind, Program
@@ -155,6 +155,14 @@ class MotionSample:
         return np.asarray(np.linalg.norm(self.twist[..., 3:], axis=-1))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class InMotion:
+    """How the joints move at the start: `qd` and `qdd` ``(n,)``, radians (metres) per second and per s²."""
+
+    qd: Array
+    qdd: Array
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion:
     """The answer to a program: a motion, or why there is none.
@@ -168,6 +176,7 @@ class Motion:
             where it cannot go on. None if that is nothing, or nothing was refused.
         notes: what is worth knowing, see :mod:`kin.motion.details`.
         pieces: the joints as functions of time, one after the other.
+        start: how the joints move at the start; None at rest.
     """
 
     robot: Robot
@@ -179,6 +188,7 @@ class Motion:
     notes: tuple[Note, ...] = ()
     pieces: tuple[Piece, ...] = field(default=())
     part: Motion | None = None
+    start: InMotion | None = None
 
     def __repr__(self) -> str:
         """The sentence about it."""
@@ -250,7 +260,13 @@ class Motion:
         if index > len(done):
             return None
         arrivals = [each.arrival for each in done[:index] if each.arrival is not None]
-        return arrivals[-1].q if arrivals else self.q_start
+        if arrivals:
+            return arrivals[-1].q
+        driven = self.driven
+        braked = driven is not None and any(isinstance(note, Braked) for note in driven.notes)
+        if driven is None or not braked:
+            return self.q_start
+        return np.asarray(driven.pieces[0].at(np.array([driven.pieces[0].duration]))[0, 0])
 
     def derivatives(self, t: ArrayLike) -> Array:
         """Joint values and their first three derivatives, without the poses that `sample` computes.

@@ -18,6 +18,7 @@ from kin.motion.details import (
     ArrivesOtherwise,
     BlendLeftOut,
     BlendShortened,
+    Braked,
     Cause,
     HelpCode,
     JerkCost,
@@ -30,13 +31,14 @@ from kin.motion.results import Quantity
 from kin.transforms import wxyz_from_rotation
 from kin.units import DEFAULT_UNITS
 
-NoteCode = Literal["arrives otherwise", "blend shortened", "blend left out", "slowed", "jerk cost"]
+NoteCode = Literal["arrives otherwise", "blend shortened", "blend left out", "slowed", "jerk cost", "braked"]
 _NOTES: dict[type[Note], NoteCode] = {
     ArrivesOtherwise: "arrives otherwise",
     BlendShortened: "blend shortened",
     BlendLeftOut: "blend left out",
     Slowed: "slowed",
     JerkCost: "jerk cost",
+    Braked: "braked",
 }
 
 
@@ -116,7 +118,7 @@ class RefusalDetailsAnswer(Answer):
     singularities: list[SingularityAnswer] | UnsetType = UNSET
     """Cause "unreachable": the singularities that the closest configuration is at."""
     violation: Violation | UnsetType = UNSET
-    """Cause "limits": the joint that would pass its limit."""
+    """Causes "limits" and "stop": the joint that would pass its limit."""
     singularity: SingularityAnswer | UnsetType | None = UNSET
     """Cause "singularity": which one; null if no condition is known."""
     move: JointMoveAnswer | UnsetType | None = UNSET
@@ -132,7 +134,9 @@ class RefusalDetailsAnswer(Answer):
     rotation: float | UnsetType = UNSET
     """Cause "task": by how much the orientations on the path are missed."""
     time: float | UnsetType = UNSET
-    """Cause "collision": seconds from the start to the first contact."""
+    """Cause "collision": seconds from the start to the first contact. Cause "stop": to the joint's limit."""
+    speed: float | UnsetType = UNSET
+    """Cause "stop": how fast the joint moves at the start."""
     contact: ContactAnswer | UnsetType = UNSET
     """Cause "collision": what touches."""
 

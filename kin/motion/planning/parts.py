@@ -16,9 +16,10 @@ from kin.fk import fk
 from kin.motion.geometry.curves import poses
 from kin.motion.paths import NO_LENGTH, curve_of
 from kin.motion.planning.plan import Plan, RefusedError
+from kin.motion.planning.setting_off import set_off
 from kin.motion.planning.zones import drive_fastest
 from kin.motion.program import Circ, Dwell, Lin, PoseTarget, Program, Segment
-from kin.motion.results import Motion, Refusal
+from kin.motion.results import InMotion, Motion, Refusal
 from kin.transforms import Array
 
 _SHORTER = (0.98, 0.9)  # of the way to the place: how much of it is driven, at first and where that fails
@@ -26,21 +27,23 @@ _SHORTER = (0.98, 0.9)  # of the way to the place: how much of it is driven, at 
 
 def driven(plan: Plan, index: int) -> None:
     """Add the segments of the program from this one on to the plan; raises `RefusedError`."""
+    if plan.start is not None:
+        index = set_off(plan)
     while index < len(plan.program.segments):
         plan.stop()
         index = drive_fastest(plan, index)
 
 
-def part_before(plan: Plan, q_start: Array, refusal: Refusal) -> Motion | None:
+def part_before(plan: Plan, q_start: Array, refusal: Refusal, start: InMotion | None = None) -> Motion | None:
     """The motion up to a refusal that has ended the planning; None if that is nothing.
 
-    `plan` holds what was planned before it, and `q_start` ``(n,)`` is where it began.
+    `plan` holds what was planned before it, `q_start` ``(n,)`` is where it began, and `start` how it moved there.
     """
     whole, count = plan.program, refusal.segment
     try:
         _drive_first(plan, whole, count)
     except RefusedError:  # without the blend into the refused segment another one is refused
-        return _motion(plan, whole, q_start)
+        return _motion(plan, whole, q_start, start)
     segment = whole.segments[count]
     for share in _SHORTER if isinstance(segment, Lin | Circ) and refusal.fraction else ():
         assert isinstance(segment, Lin | Circ)
@@ -53,16 +56,16 @@ def part_before(plan: Plan, q_start: Array, refusal: Refusal) -> Motion | None:
         with suppress(RefusedError):
             drive_fastest(trial, count)
             plan.take(trial)
-            return _motion(plan, trial.program, q_start)
-    return _motion(plan, whole, q_start)
+            return _motion(plan, trial.program, q_start, start)
+    return _motion(plan, whole, q_start, start)
 
 
 def part_of(motion: Motion, count: int, stop: Callable[[], None]) -> Motion | None:
     """The motion of the first segments of a planned one, with a stop at their end; None if there are none."""
-    plan = Plan(motion.robot, motion.program, motion.limits, motion.q_start.copy(), stop)
+    plan = Plan(motion.robot, motion.program, motion.limits, motion.q_start.copy(), stop, start=motion.start)
     with suppress(RefusedError):
         _drive_first(plan, motion.program, count)
-    return _motion(plan, motion.program, motion.q_start)
+    return _motion(plan, motion.program, motion.q_start, motion.start)
 
 
 def ended(program: Program, count: int) -> tuple[Segment, ...]:
@@ -81,12 +84,12 @@ def _drive_first(plan: Plan, whole: Program, count: int) -> None:
         driven(plan, len(plan.segments))
 
 
-def _motion(plan: Plan, whole: Program, q_start: Array) -> Motion | None:
+def _motion(plan: Plan, whole: Program, q_start: Array, start: InMotion | None) -> Motion | None:
     """What is planned, as the motion of the program's beginning."""
     if not plan.segments:
         return None
     plan.program = replace(whole, segments=ended(whole, len(plan.segments)))
-    return plan.motion(q_start)
+    return plan.motion(q_start, start)
 
 
 def _beginning(plan: Plan, segment: Lin | Circ, fraction: float) -> Lin | Circ | None:

@@ -11,7 +11,7 @@ from kin.motion.details import ArrivesOtherwise, Cause, Help, Note, RefusalDetai
 from kin.motion.limits import MotionLimits
 from kin.motion.pieces import Piece
 from kin.motion.program import Move, Program, kind_of
-from kin.motion.results import Motion, Refusal, SegmentTimes
+from kin.motion.results import InMotion, Motion, Refusal, SegmentTimes
 from kin.motion.tasks import most_kept
 from kin.robot import Robot
 from kin.solvers.contract import APPROACH, POSE, POSITION
@@ -40,6 +40,7 @@ class Plan:
     Attributes:
         robot, program, limits, stop: what is asked for.
         q: where the arm is ``(n,)``.
+        start: how it moves at the start, until that is planned; None if it is at rest.
         stops: the segments at whose ends the arm stops although a blend is set.
         pieces, segments, notes: what is planned.
         time: when it ends.
@@ -55,6 +56,7 @@ class Plan:
     q: Array
     stop: Callable[[], None]
     stops: frozenset[int] = frozenset()
+    start: InMotion | None = None
     pieces: list[Piece] = field(default_factory=list)
     segments: list[SegmentTimes] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
@@ -99,10 +101,10 @@ class Plan:
             self.pieces.append(piece)
             self.time += piece.duration
 
-    def motion(self, q_start: Array) -> Motion:
-        """What is planned, as a motion that began at a configuration ``(n,)``."""
+    def motion(self, q_start: Array, start: InMotion | None = None) -> Motion:
+        """What is planned, as a motion that began at a configuration ``(n,)``, and how the arm moved there."""
         parts = tuple(self.segments), tuple(self.notes), tuple(self.pieces)
-        return Motion(self.robot, self.program, self.limits, q_start, None, *parts)
+        return Motion(self.robot, self.program, self.limits, q_start, None, *parts, start=start)
 
     def move(self, index: int) -> Move:
         """A segment that is not a pause."""

@@ -85,7 +85,7 @@ def _joint_run(plan: Plan, first: int) -> Run | None:
         points = segment.points if isinstance(segment, Spline) else (segment.target,)
         rows = [q]
         for point in points:
-            rows.append(_configuration(plan, index, point, rows[-1]))
+            rows.append(configuration_of(plan, index, point, rows[-1]))
         curve = JointCurve.through(np.array(rows))
         if curves:
             radius = joint_radius(robot, plan.move(index - 1).blend, curves[-1], curve)
@@ -227,7 +227,7 @@ def _refused_at(
     return plan.refused(layout.owners[0][0] + k, cause, details, helps, (fraction, distance))
 
 
-def _configuration(plan: Plan, index: int, target: Target, q: Array) -> Array:
+def configuration_of(plan: Plan, index: int, target: Target, q: Array) -> Array:
     """Where a PTP ends ``(n,)``; `q`: where it begins."""
     robot = plan.robot
     if isinstance(target, JointTarget):

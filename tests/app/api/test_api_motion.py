@@ -358,3 +358,25 @@ def test_poses_in_the_frame_of_a_workpiece_are_those_of_the_world(client):
     assert refused["errors"] == [
         {"field": "program.segments[0].frame", "value": "'tool'", "expected": "one of world, table, base"}
     ]
+
+
+def test_a_motion_starts_while_the_arm_moves_or_says_which_joint_cannot_stop(client):
+    body = {"program": {"segments": [{"kind": "ptp", "q": [3.5, -1.5, 1.5, -1.2, -1.2, 0.3]}]}, "rate": 50}
+    start = {"qd_start": [0.6, 0, 0, 0, 0, -0.3], "qdd_start": [0, 0, 0, 0, 0, 1.0]}
+    answer = client.post("/api/v1/robots/ur5/motion", json=body | start).json()
+    assert answer["planned"]
+    assert answer["samples"]["qd"][0] == pytest.approx(start["qd_start"])
+    assert answer["samples"]["qdd"][0] == pytest.approx(start["qdd_start"])
+    code = client.post("/api/v1/robots/ur5/motion", json=body | start | {"format": "python"}).text
+    assert f"qd_start={start['qd_start']}".replace(" 0,", " 0.0,") in code
+    near = [float(UR5.upper[0]) - 0.01, *UR5.home[1:]]
+    moving = {"q_start": near, "qd_start": [3.0, 0, 0, 0, 0, 0]}
+    refused = client.post("/api/v1/robots/ur5/motion", json=body | moving).json()["refusal"]
+    assert refused["cause"] == "stop"
+    assert refused["details"]["violation"]["joint"] == 0
+    assert refused["details"]["speed"] == 3.0
+    assert 0.0 < refused["details"]["time"] < 0.01
+    for field, given in (("qd_start", [9, 0, 0, 0, 0, 0]), ("qdd_start", [0, 0]), ("qd_start", "fast")):
+        problem = client.post("/api/v1/robots/ur5/motion", json=body | {field: given})
+        assert problem.status_code == 422
+        assert problem.json()["errors"][0]["field"].startswith(field)
