@@ -81,7 +81,7 @@ BESIDE = """
     ("old", "new", "placed"),
     [
         ("", "", True),
-        ('lower="0" upper="0"', 'lower="2" upper="1"', True),
+        ('lower="0" upper="0"', 'lower="2" upper="wide"', True),
         ('lower="0" upper="0"', 'lower="wide" upper="nan"', True),
         ('xyz="0 0.1 0"', 'xyz="0 0.1"', False),
         ('type="prismatic"', 'type="magnetic"', True),
@@ -127,10 +127,8 @@ def test_base_and_tip_may_be_any_links_of_the_chain(tmp_path):
         ('xyz="0 0 0.2"', 'xyz="0 0.2"', "joint shoulder: origin xyz", "three numbers"),
         ('rpy="0.1 0.2 0.3"', 'rpy="0.1 x 0.3"', "joint slide: origin rpy[1]", "finite"),
         ('xyz="0 0 -2"', 'xyz="0 0 0"', "joint shoulder: axis xyz", "not zero"),
-        ('lower="-1" upper="2"', 'lower="2" upper="-1"', "joint shoulder: limit", "lower below upper"),
         ('velocity="3"', 'velocity="nan"', "joint shoulder: limit velocity", "0 stands for unknown"),
         ('velocity="3"', 'velocity="3" jerk="fast"', "joint shoulder: limit jerk", "0 stands for unknown"),
-        ('lower="-1" upper="2"', 'lower="1" upper="1"', "joint shoulder: limit", "lower below upper"),
         ('xyz="0 0 0.2"', 'xyz="0 0 0.2" quat_xyzw="0 0 1"', "joint shoulder: origin quat_xyzw", "four numbers"),
         ('xyz="0 0 0.2"', 'xyz="0 0 0.2" quat_xyzw="0 0 0 0"', "joint shoulder: origin quat_xyzw", "no direction"),
         ('xyz="0 0 0.2"', 'xyz="0 0 0.2" quat_xyzw="0 0 0.24 0"', "joint shoulder: origin quat_xyzw", "length 1"),
@@ -479,6 +477,32 @@ def test_names_are_written_once(names, written):
     text = kin.robot_to_urdf(Robot.from_dh([Joint(name, a=0.1, limits=(-1, 1)) for name in names]))
     _, report = kin.read_urdf(text)
     assert [*report.joints, *report.merged] == written
+
+
+def test_exchanged_limits_are_put_in_order_and_the_report_says_so():
+    robot, report = kin.read_urdf(GOOD.replace('lower="-1" upper="2"', 'lower="2" upper="-1"'), tip="tcp")
+    assert robot.joints[0].limits == (-1.0, 2.0)
+    assert [note for note in report.notes if "shoulder" in note] == [
+        "Joint shoulder has a lower limit above the upper one: they are read as -1 to 2 rad."
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "at", "note"),
+    [
+        ('lower="-1" upper="2"', 'lower="0.7" upper="0.7"', 0, "Joint shoulder has no other value than"),
+        ('lower="0" upper="0.4"', 'lower="0.3" upper="0.3"', 1, "its limits, 0.3 m: it is read as fixed there."),
+    ],
+)
+def test_a_joint_with_one_value_only_is_fixed_there(old, new, at, note):
+    whole = kin.load_urdf(GOOD, tip="tcp")
+    held, report = kin.read_urdf(GOOD.replace(old, new), tip="tcp")
+    assert held.n == 2
+    assert note in " ".join(report.notes)
+    assert report.difference < EXACT
+    value = 0.7 if at == 0 else 0.3
+    for q in held.random_q(np.random.default_rng(1), 5):
+        assert kin.fk(held, q) == pytest.approx(kin.fk(whole, np.insert(q, at, value)), abs=1e-12)
 
 
 def test_a_slide_without_limits_is_not_written():

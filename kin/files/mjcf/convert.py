@@ -19,7 +19,7 @@ from kin.axes import frame_of, inverse
 from kin.errors import RobotFileError
 from kin.files.mjcf.fields import ignored_of
 from kin.files.names import unused
-from kin.files.numbers import number_of
+from kin.files.numbers import LARGEST, number_of
 from kin.files.write import rpy_of
 from kin.frames import pose_from_xyz_rpy
 from kin.transforms import Array, pose_from_position_wxyz
@@ -27,6 +27,7 @@ from kin.transforms import Array, pose_from_position_wxyz
 MOUNTING, FLOOR = "kinboard_mounting", "kinboard_floor"  # names of custom data: text, and metres
 POLYNOMIAL = "polycoef"  # attribute of `<mimic>` that keeps a relation of two joints which is not linear
 MOST_SHAPES = 240  # shapes that are drawn
+WRITTEN = "mjcf-type"  # attribute of a converted joint: its type in the MJCF file
 _KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "floating", "free": "floating"}
 _SHAPES = ("sphere", "capsule", "box", "cylinder")
 _X, _Y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
@@ -244,6 +245,7 @@ class _Converter:
         link = self._link(child)
         self._note(link, f"Joint {name}", element)
         joint = self._add_joint(name, urdf, parent, link, T @ at)
+        joint.set(WRITTEN, kind)
         SubElement(joint, "axis", xyz=_spelled(axis))
         force = [number_of(part) for part in values.get("actuatorfrcrange", "").split()]
         limited = values.get("actuatorfrclimited", "auto") != "false" and len(force) == 2
@@ -264,10 +266,22 @@ class _Converter:
         limited = values.get("limited", "auto")
         if limited == "false":
             return None
-        low, high = self._numbers(values, "range", where, 2, "0 0")
-        if limited == "auto" and not (self._auto and "range" in values and low != high):
+        low, high = (number_of(part) for part in self._pair(values, where))
+        if limited == "auto" and not (self._auto and "range" in values and low < high):
             return None  # MuJoCo's "0 0" resets the range of a class
-        return low * unit, high * unit
+        if not low < high:
+            raise self._refuse(f"{where}: range", values.get("range", "none"), "two numbers, range[0] < range[1]")
+        low, high = low * unit, high * unit
+        if not (max(abs(low), abs(high)) < LARGEST or (low <= -LARGEST and high >= LARGEST)):
+            raise self._refuse(f"{where}: range", values["range"], "numbers smaller than a million rad or m")
+        return low, high
+
+    def _pair(self, values: dict[str, str], where: str) -> list[str]:
+        """The texts of a range, which may be infinite."""
+        parts = values.get("range", "0 0").split()
+        if len(parts) != 2 or any(math.isnan(number_of(part)) for part in parts):
+            raise self._refuse(f"{where}: range", values.get("range", ""), "2 numbers with blanks between")
+        return parts
 
     # Shapes and followers
 

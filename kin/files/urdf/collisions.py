@@ -19,7 +19,7 @@ from kin.errors import RobotFileError
 from kin.files.home import homes
 from kin.files.read import MAX_CAPSULES
 from kin.files.urdf.poses import poses_of
-from kin.files.urdf.tree import UrdfElement, UrdfJoint, UrdfTree
+from kin.files.urdf.tree import TERMS, Format, UrdfElement, UrdfJoint, UrdfTree
 from kin.files.urdf.visuals import Box, Cylinder, MeshFile, Shape, Sphere, shape_of
 from kin.fitting import MOST, Segment, capsule_around, capsules_around, radius_of, tubes
 from kin.fitting import bodies as solids
@@ -220,7 +220,7 @@ def without_meshes(links: Sequence[LinkPieces], reach: float) -> list[Fitted]:
 
 
 def with_bodies(
-    robot: Robot, links: Sequence[LinkPieces], fits: Sequence[Fitted]
+    robot: Robot, links: Sequence[LinkPieces], fits: Sequence[Fitted], file_format: Format = "URDF"
 ) -> tuple[Robot, tuple[UrdfBody, ...]]:
     """The robot with these capsules, and what stands for each of its links.
 
@@ -244,7 +244,7 @@ def with_bodies(
         if count > MAX_CAPSULES:
             words = f"{count} capsules would be needed, and a robot has at most {MAX_CAPSULES}"
             return robot, tuple(UrdfBody(k, (), (words,), True) for k in range(1, len(robot.moving_rows) + 1))
-    source = said(bodies)[:MAX_SOURCE]
+    source = said(bodies, file_format)[:MAX_SOURCE]
     capsules = Later(lambda: _capsules(robot, bodies))
     return replace(robot, capsules=capsules, capsules_source=source[0].upper() + source[1:]), tuple(bodies)
 
@@ -281,12 +281,13 @@ def with_free_home(robot: Robot, bodies: Sequence[UrdfBody], fits: Sequence[Fitt
     return replace(robot, home=tuple(q[free[0]].tolist())) if len(free) else robot
 
 
-def said(bodies: Sequence[UrdfBody]) -> str:
+def said(bodies: Sequence[UrdfBody], file_format: Format = "URDF") -> str:
     """Which bodies are from the file and which are assumed: the rest of a sentence that begins "Collisions: "."""
     if not any(body.fitted for body in bodies):
-        why = next((words for body in bodies for words in body.missing), "the URDF states no collision bodies")
+        none = f"the {file_format} states no {TERMS[file_format].bodies}"
+        why = next((words for body in bodies for words in body.missing), none)
         return f"all bodies are assumed to be tubes along the lengths of the table ({why})."
-    text = "capsules around the collision bodies of the URDF"
+    text = f"capsules around the {TERMS[file_format].bodies} of the {file_format}"
     doubtful = [body for body in bodies if body.missing or body.assumed]
     if not doubtful:
         return f"{text}, for every link."

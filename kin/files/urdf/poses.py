@@ -1,4 +1,4 @@
-"""Where the links of a URDF are, and what its joints do."""
+"""Where the links of a URDF are."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from kin.errors import RobotFileError
 from kin.files.urdf.following import followers_of
-from kin.files.urdf.tree import MOVING, UrdfJoint, UrdfTree
+from kin.files.urdf.tree import MOVING, UrdfJoint, UrdfTree, motion_of
 from kin.transforms import Array
 
 
@@ -35,16 +35,3 @@ def poses_of(tree: UrdfTree, chain: tuple[UrdfJoint, ...]) -> tuple[dict[str, in
             poses[joint.child] = T
             links.append(joint.child)
     return carriers, poses
-
-
-def motion_of(joint: UrdfJoint, values: Array) -> Array:
-    """The motion of a joint ``(k, 4, 4)``, by Rodrigues' formula or along its axis."""
-    x, y, z = axis = np.array(joint.axis())
-    T = np.tile(np.eye(4), (len(values), 1, 1))
-    if joint.kind == "prismatic":
-        T[:, :3, 3] = values[:, None] * axis
-        return T
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    s, c = np.sin(values)[:, None, None], 2.0 * np.sin(0.5 * values)[:, None, None] ** 2
-    T[:, :3, :3] += s * K + c * (K @ K)
-    return T

@@ -37,8 +37,7 @@ from kin.files.urdf.collisions import (
 )
 from kin.files.urdf.fields import ignored_of
 from kin.files.urdf.following import Followers, followers_of, left_of
-from kin.files.urdf.poses import motion_of
-from kin.files.urdf.tree import FREE, UNLIMITED, Tip, UrdfJoint, UrdfTree, read_tree
+from kin.files.urdf.tree import FREE, UNLIMITED, Format, Terms, Tip, UrdfJoint, UrdfTree, motion_of, read_tree
 from kin.fk import fk
 from kin.robot import DEFAULT_LIMITS, MOUNTINGS, Joint, Mounting, Robot
 from kin.transforms import Array
@@ -64,6 +63,7 @@ class UrdfReport:
         difference: largest difference of any entry of the tool pose from the product of the URDF's transforms.
         samples: the number of random configurations at which it was measured.
         bodies: what stands for each link in collisions, base first.
+        format: of the file.
     """
 
     base: str
@@ -78,11 +78,12 @@ class UrdfReport:
     samples: int
     bodies: tuple[UrdfBody, ...] = ()
     following: tuple[str, ...] = ()
+    format: Format = "URDF"
 
     @property
     def about_bodies(self) -> str:
         """Which bodies are from the file and which are assumed: the rest of a sentence "Collisions: …"."""
-        return said(self.bodies)
+        return said(self.bodies, self.format)
 
 
 class UrdfRobot(NamedTuple):
@@ -152,7 +153,7 @@ def read_urdf(
     robot, report = _import(tree, chain)
     links = collisions_of(robot, tree, chain)
     fits = (fit or without_meshes)(links, robot.reach)
-    robot, bodies = with_bodies(robot, links, fits)
+    robot, bodies = with_bodies(robot, links, fits, tree.format)
     return UrdfRobot(with_free_home(robot, bodies, fits), replace(report, bodies=bodies))
 
 
@@ -185,7 +186,7 @@ def _tree(source: Path | str, file: str) -> UrdfTree:
         if "<" not in source and not source.startswith(LFS):
             wanted = "the text of a URDF, or the Path of a file: pathlib.Path(…)"
             raise RobotFileError(file or "URDF", "file", source, wanted)
-        return read_tree(source, file or "URDF")
+        return read_tree(source, file or ("MJCF" if "<mujoco" in source else "URDF"))
     try:
         content = source.read_bytes()
     except (OSError, ValueError) as error:
@@ -199,7 +200,7 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
         raise RobotFileError(tree.file, "joint", f"{len(moving)} moving joints", f"at most {MAX_ROWS}")
     notes = [*tree.notes, *_above(tree, chain), *(joint.note for joint in chain if joint.note)]
     followers = followers_of(tree, chain)
-    joints = [_joint(joint, notes, followers) for joint in moving]
+    joints = [_joint(joint, notes, followers, tree.terms) for joint in moving]
     joints = [_in_place(joint, tree, followers, notes) for joint in joints]
     notes += _ignored(tree, chain)
     table = table_of_chain(joints, _transforms(chain, followers))
@@ -212,7 +213,7 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
     robot = Robot(
         id=re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:40].strip("-") or "robot",
         name=name[:200].strip(),
-        source=f"{_source(tree)}, from link {chain[0].parent} to link {chain[-1].child}",
+        source=f"{_source(tree)}, from {tree.terms.link} {chain[0].parent} to {tree.terms.link} {chain[-1].child}",
         convention="standard",
         rows=rows,
         home=tuple(0.5 * sum(joint.limits or (0.0,)) for joint in leaders),
@@ -243,6 +244,7 @@ def _import(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> UrdfRobot:
         notes=tuple(notes),
         difference=difference,
         samples=SAMPLES,
+        format=tree.format,
     )
     return UrdfRobot(robot, report)
 
@@ -265,7 +267,8 @@ def _above(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> list[str]:
     joint = tree.parents.get(chain[0].parent)
     if joint is None or joint.type not in FREE:
         return []
-    return [f"Joint {joint.name} is {joint.type}: the arm begins behind it, at link {joint.child}."]
+    kind = f"a {joint.said} joint" if tree.format == "MJCF" else joint.type
+    return [f"Joint {joint.name} is {kind}: the arm begins behind it, at {tree.terms.link} {joint.child}."]
 
 
 def _ignored(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> list[str]:
@@ -311,7 +314,7 @@ def _mounting(first: UrdfJoint) -> Mounting:
 def _source(tree: UrdfTree) -> str:
     """The format and the name of the file, if it has one."""
     name = _file_name(tree.file)
-    return tree.format if name == "URDF" and tree.format != "URDF" else f"{tree.format} {name}"
+    return tree.format if name in ("URDF", "MJCF") and tree.format != "URDF" else f"{tree.format} {name}"
 
 
 def _file_name(file: str) -> str:
@@ -319,14 +322,16 @@ def _file_name(file: str) -> str:
     return Path(file).name.encode("utf-8", "replace").decode()
 
 
-def _joint(joint: UrdfJoint, notes: list[str], followers: Followers) -> Joint:
+def _joint(joint: UrdfJoint, notes: list[str], followers: Followers, terms: Terms) -> Joint:
     relation = followers.relations.get(joint.name)
     return Joint(
         joint.name,
         kind=joint.kind,
         follows="" if relation is None else relation.leader,
         ratio=1.0 if relation is None else relation.multiplier,
-        limits=_limits(joint, notes) if relation is None else _limits_of_follower(joint, relation.offset),
+        limits=_limits(joint, notes, terms)
+        if relation is None
+        else _limits_of_follower(joint, relation.offset, notes),
         velocity=_peak(joint, "velocity", notes),
         effort=_peak(joint, "effort", notes),
         acceleration=_acceleration(joint, notes),
@@ -334,11 +339,11 @@ def _joint(joint: UrdfJoint, notes: list[str], followers: Followers) -> Joint:
     )
 
 
-def _limits(joint: UrdfJoint, notes: list[str]) -> tuple[float, float] | None:
-    limits, unit = joint.limits(), "m" if joint.kind == "prismatic" else "rad"
+def _limits(joint: UrdfJoint, notes: list[str], terms: Terms) -> tuple[float, float] | None:
+    limits, unit = _in_order(joint, notes), "m" if joint.kind == "prismatic" else "rad"
     if joint.type == "continuous" or (limits is not None and -math.inf < limits[0] < limits[1]):
         return limits
-    why = "states no limits"
+    why = f"states no {terms.limits}"
     if limits == (0.0, 0.0):
         why = "has limits that are both zero, which stand for none"
     elif limits is not None:
@@ -352,9 +357,20 @@ def _limits(joint: UrdfJoint, notes: list[str]) -> tuple[float, float] | None:
     return assumed
 
 
-def _limits_of_follower(joint: UrdfJoint, offset: float) -> tuple[float, float] | None:
-    """The limits of a follower, counted from its offset; without any, its leader decides."""
+def _in_order(joint: UrdfJoint, notes: list[str]) -> tuple[float, float] | None:
+    """The limits of a joint as they stand, but the smaller one first."""
     limits = joint.limits()
+    if limits is None or limits[0] <= limits[1]:
+        return limits
+    high, low = limits
+    words = f"they are read as {low:g} to {high:g} {'m' if joint.kind == 'prismatic' else 'rad'}"
+    notes.append(f"Joint {joint.name} has a lower limit above the upper one: {words}.")
+    return low, high
+
+
+def _limits_of_follower(joint: UrdfJoint, offset: float, notes: list[str]) -> tuple[float, float] | None:
+    """The limits of a follower, counted from its offset; without any, its leader decides."""
+    limits = _in_order(joint, notes)
     if limits is None or not -math.inf < limits[0] < limits[1]:
         return None
     return limits[0] - offset, limits[1] - offset

@@ -9,13 +9,15 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
 from kin.errors import RobotFileError
-from kin.files.mjcf.convert import as_urdf
+from kin.files.mjcf.convert import WRITTEN, as_urdf
 from kin.files.numbers import LARGEST, number_of
 from kin.files.urdf.causes import parse_mended
 from kin.frames import matrix_of
 from kin.robot import Kind, Matrix
-from kin.transforms import pose_from_position_wxyz
+from kin.transforms import Array, pose_from_position_wxyz
 
 MOVING = ("revolute", "continuous", "prismatic")
 FREE = ("floating", "planar")  # not of a serial arm, which may stand on a link that floats
@@ -27,6 +29,31 @@ UNLIMITED = {"revolute": 9e5, "prismatic": 1e4}  # rad and m: limits beyond it b
 UNIT = 0.01  # by how much the length of a quaternion may differ from 1: it is written with few digits
 _COUNTS = {3: "three", 4: "four"}
 _ONCE = "a name that no other {} has"
+
+
+Format = Literal["URDF", "MJCF"]
+
+
+class Terms(NamedTuple):
+    """What a format calls its parts, in messages.
+
+    Attributes:
+        link: what joints connect.
+        moving: the joints of an arm.
+        bodies: what becomes capsules.
+        limits: what a joint without limits lacks.
+    """
+
+    link: str
+    moving: str
+    bodies: str
+    limits: str
+
+
+TERMS: dict[Format, Terms] = {
+    "URDF": Terms("link", "revolute or prismatic joints", "collision bodies", "limits"),
+    "MJCF": Terms("body", "hinge or slide joints", "colliding geoms", "range"),
+}
 
 
 class Tip(NamedTuple):
@@ -94,6 +121,19 @@ class UrdfJoint(UrdfElement):
     parent: str
     child: str
     note: str = ""  # what had to be understood
+    held: tuple[str, float] | None = None  # the type and the only value of a joint that is read as fixed
+
+    def pose(self) -> Matrix:
+        """As of any element; of a joint that is held, with its value."""
+        if self.held is None:
+            return super().pose()
+        T = np.array(super().pose()) @ motion_of(self, np.array([self.held[1]]))[0]
+        return tuple(map(tuple, T.tolist()))
+
+    @property
+    def said(self) -> str:
+        """Its type, as its file says it."""
+        return self.element.get(WRITTEN, self.type)
 
     @property
     def moves(self) -> bool:
@@ -103,7 +143,7 @@ class UrdfJoint(UrdfElement):
     @property
     def kind(self) -> Kind:
         """The kind of the row."""
-        return "prismatic" if self.type == "prismatic" else "revolute"
+        return "prismatic" if (self.held or (self.type,))[0] == "prismatic" else "revolute"
 
     def axis(self) -> list[float]:
         """The joint axis, a unit vector in the joint's frame."""
@@ -114,7 +154,7 @@ class UrdfJoint(UrdfElement):
         return [v / length for v in given]
 
     def limits(self) -> tuple[float, float] | None:
-        """Lower and upper limit; None if it states none, as a continuous joint does.
+        """Lower and upper limit as they stand; None if it states none, as a continuous joint does.
 
         Limits that stand for none are infinite: some files write huge ones, or infinity.
         """
@@ -126,8 +166,6 @@ class UrdfJoint(UrdfElement):
         if lower <= -UNLIMITED[self.kind] and upper >= UNLIMITED[self.kind]:
             return -math.inf, math.inf
         lower, upper = (self.number("limit", key, text) for key, text in texts.items())
-        if lower > upper or lower == upper != 0.0:
-            raise self.refuse("limit", [lower, upper], "lower below upper; a joint that does not move is fixed")
         return lower, upper
 
     def resting(self) -> float:
@@ -194,9 +232,14 @@ class UrdfTree:
     joints: tuple[UrdfJoint, ...]
     root: Element
     unread: tuple[Unread, ...] = ()
-    format: Literal["URDF", "MJCF"] = "URDF"
+    format: Format = "URDF"
     notes: tuple[str, ...] = ()
     ignored: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def terms(self) -> Terms:
+        """What its format calls things."""
+        return TERMS[self.format]
 
     @cached_property
     def parents(self) -> dict[str, UrdfJoint]:
@@ -260,7 +303,7 @@ class UrdfTree:
             self._check_all()
             if len(self.tips) != 1:
                 given = "no tip, and several are possible" if self.tips else "no moving joints"
-                expected = f"one of {self.choices()}" if self.tips else "a chain with revolute or prismatic joints"
+                expected = f"one of {self.choices()}" if self.tips else f"a chain with {self.terms.moving}"
                 raise RobotFileError(self.file, "tip", given, expected)
             tip = self.tips[0].link
         found = self.to_root(tip)
@@ -326,7 +369,8 @@ class UrdfTree:
         for joint in chain:
             if joint.moves and joint.type not in MOVING:
                 behind = f", or an arm behind it: base {joint.child}" if joint.type in FREE else ""
-                raise joint.refuse("type", joint.type, "one of " + ", ".join((*MOVING, "fixed")) + behind)
+                valid = "one of " + ", ".join((*MOVING, "fixed")) if self.format == "URDF" else "hinge or slide"
+                raise joint.refuse("type", joint.said, valid + behind)
 
     def choices(self) -> str:
         """The tips, for a message."""
@@ -419,11 +463,37 @@ def _joint(element: Element, file: str, links: Collection[str]) -> UrdfJoint:
     meant = given.strip().lower()
     kind = meant if meant in TYPES else given
     note = f"Joint {name} has the type {given}: it is read as {kind}." if kind != given else ""
-    joint = UrdfJoint(file, element, name, kind, ends[0], ends[1], note)
+    joint = _held(UrdfJoint(file, element, name, kind, ends[0], ends[1], note))
     for field, link in (("parent", joint.parent), ("child", joint.child)):
         if link not in links:
             raise joint.refuse(field, link, "the name of a link of this file")
     return joint
+
+
+def _held(joint: UrdfJoint) -> UrdfJoint:
+    """The joint, or if both of its limits are one value other than zero, a fixed one at this value."""
+    limit = joint.element.find("limit")
+    if joint.type not in ("revolute", "prismatic") or limit is None or joint.element.find("mimic") is not None:
+        return joint
+    lower, upper = (number_of(limit.get(key, "nan")) for key in ("lower", "upper"))
+    if not (lower == upper != 0.0 and abs(lower) < LARGEST):
+        return joint
+    unit = "m" if joint.type == "prismatic" else "rad"
+    note = f"Joint {joint.name} has no other value than its limits, {lower:g} {unit}: it is read as fixed there."
+    return replace(joint, type="fixed", note=f"{joint.note} {note}".strip(), held=(joint.type, lower))
+
+
+def motion_of(joint: UrdfJoint, values: Array) -> Array:
+    """The motion of a joint ``(k, 4, 4)``, by Rodrigues' formula or along its axis."""
+    x, y, z = axis = np.array(joint.axis())
+    T = np.tile(np.eye(4), (len(values), 1, 1))
+    if joint.kind == "prismatic":
+        T[:, :3, 3] = values[:, None] * axis
+        return T
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    s, c = np.sin(values)[:, None, None], 2.0 * np.sin(0.5 * values)[:, None, None] ** 2
+    T[:, :3, :3] += s * K + c * (K @ K)
+    return T
 
 
 def _end(joint: Element, tag: str) -> str:

@@ -396,7 +396,7 @@ def test_export(client):
     response = client.get("/api/v1/robots/panda/export?format=mjcf")
     assert response.headers["content-disposition"] == 'attachment; filename="panda.xml"'
     again = post(client, "robots/import", {"urdf": response.text})
-    assert again["robot"]["source"].startswith("MJCF, from link world")
+    assert again["robot"]["source"].startswith("MJCF, from body world")
     assert kin.fk(kin.parse_robot(again["toml"]), panda.home) == pytest.approx(
         kin.fk(panda, panda.home), abs=1e-12
     )

@@ -296,7 +296,7 @@ def test_capsules_of_mjcf_are_those_of_the_arm():
         ('quat="1 0.2 0.3 0"', 'quat="0 0 0 0"', "body boom: quat"),
         ('name="roll" range="-3 3"', 'name="roll" type="ball"', "joint roll: type"),
         ('name="roll" range="-3 3"', 'name="roll" type="screw"', "joint roll: type"),
-        ('range="0 0.3"', 'range="0.3 0"', "joint boom: limit"),
+        ('range="0 0.3"', 'range="0.3 0" limited="true"', "joint boom: range"),
         ('<compiler angle="degree"/>', '<compiler eulerseq="abc"/>', "compiler eulerseq"),
         ('<compiler angle="degree"/>', '<compiler coordinate="global"/>', "compiler coordinate"),
         (
@@ -327,7 +327,7 @@ def test_a_cup_on_the_table_is_no_end_of_the_arm_but_a_camera_on_a_pole_is():
 def test_a_slide_may_be_unlimited():
     text = RICH.format(compiler='angle="degree"').replace('range="0 0.3"', 'range="0 0.3" limited="false"')
     robot, report = kin.read_urdf(text)
-    assert "Joint boom states no limits: it gets 0 to 1 m." in report.notes
+    assert "Joint boom states no range: it gets 0 to 1 m." in report.notes
     assert (0.0, 1.0) in [joint.limits for joint in robot.joints]
 
 
@@ -376,3 +376,64 @@ def test_a_site_from_a_point_to_another_is_where_mujoco_has_it():
     T = kin.fk(kin.load_urdf(text, tip="s"), [0.0])
     assert np.allclose(T[:3, 3], data.site_xpos[0], atol=1e-12)
     assert np.allclose(T[:3, :3], data.site_xmat[0].reshape(3, 3), atol=1e-12)
+
+
+BALL = "joint j: type", "hinge or slide"
+ONE = """<mujoco model="one"><compiler angle="radian"/><worldbody><body name="base">{joint}
+<body name="arm" pos="0 0 0.3"><joint name="bend" axis="0 1 0" range="-1 1"/><geom size="0.02" mass="1"/></body>
+</body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("joint", "words"),
+    [
+        ('<joint name="j" type="slide"/>', "Joint j states no range: it gets 0 to 1 m."),
+        ('<joint name="j" type="ball"/>', "Joint j is a ball joint: the arm begins behind it, at body j of base."),
+        ('<freejoint name="j"/>', "Joint j is a free joint: the arm begins behind it, at body j of base."),
+    ],
+)
+def test_notes_are_in_the_words_of_mujoco(joint, words):
+    robot, report = kin.read_urdf(ONE.format(joint=joint))
+    assert words in report.notes
+    assert robot.source.startswith("MJCF, from body ")
+    assert robot.source.endswith(" to body arm")
+    assert "URDF" not in f"{robot.source}{report.about_bodies}{report.notes}"
+
+
+@pytest.mark.parametrize(
+    ("joint", "keywords", "field", "valid"),
+    [
+        ('<joint name="j" limited="true" range="1 -1"/>', {}, "joint j: range", "range[0] < range[1]"),
+        ('<joint name="j" limited="true" range="1 1"/>', {}, "joint j: range", "range[0] < range[1]"),
+        ('<joint name="j" range="0 2e6"/>', {}, "joint j: range", "smaller than a million"),
+        ('<joint name="j" range="0"/>', {}, "joint j: range", "2 numbers"),
+        ('<joint name="j" type="turn"/>', {}, "joint j: type", "hinge, slide, ball, free"),
+        ('<body name="m"><joint name="j" type="ball"/></body>', {"base": "base", "tip": "m"}, *BALL),
+    ],
+)
+def test_refusals_are_in_the_words_of_mujoco(joint, keywords, field, valid):
+    with pytest.raises(kin.RobotFileError) as refused:
+        kin.read_urdf(ONE.format(joint=joint), **keywords)
+    assert refused.value.field == field
+    assert valid in refused.value.expected
+    assert "URDF" not in str(refused.value)
+
+
+def test_a_file_without_joints_of_an_arm_says_which_it_lacks():
+    with pytest.raises(kin.RobotFileError, match="a chain with hinge or slide joints"):
+        kin.read_urdf('<mujoco><worldbody><body name="a"><geom size="1"/></body></worldbody></mujoco>')
+
+
+@pytest.mark.parametrize("limited", ["auto", "true", "false"])
+@pytest.mark.parametrize("values", ["-1 1", "1 -1", "1 1", "0 0"])
+def test_which_ranges_count_and_which_are_refused_is_mujocos_choice(limited, values):
+    text = ONE.format(joint=f'<joint name="j" limited="{limited}" range="{values}"/><geom size="0.1" mass="1"/>')
+    if limited == "true" and values != "-1 1":
+        with pytest.raises(ValueError, match=r"range\[0\] should be smaller than range\[1\]"):
+            mujoco.MjModel.from_xml_string(text)
+        with pytest.raises(kin.RobotFileError, match="range"):
+            kin.load_urdf(text)
+        return
+    model = mujoco.MjModel.from_xml_string(text)
+    limits = tuple(model.jnt_range[0].tolist()) if model.jnt_limited[0] else None
+    assert kin.load_urdf(text).joints[0].limits == limits
