@@ -112,12 +112,7 @@ def plan_motion(
         (True, (6,))
     """
     robot = robot_of(robot)
-    if isinstance(program, Mapping):
-        program = program_from_dict(program, robot)
-    elif not isinstance(program, Program):
-        if not isinstance(program, Sequence) or isinstance(program, str | bytes):
-            raise InputError("program", program, "a Program, its segments, or a dict")
-        program = Program(cast(tuple[Segment, ...], tuple(program)))  # checked there
+    program = _program_of(program, robot)
     q = robot.q_home if q_start is None else robot.check_q(q_start, "q_start")
     if q.ndim != 1:
         raise InputError("q_start", f"shape {q.shape}", f"one configuration of {robot.n} values")
@@ -132,6 +127,16 @@ def plan_motion(
     if wanted.avoids:
         return checked(found, surroundings(robot, wanted.obstacles, wanted.avoid_self_collision), stop)
     return found
+
+
+def _program_of(program: Program | Mapping[str, Any] | Sequence[Move | Dwell], robot: Robot) -> Program:
+    if isinstance(program, Program):
+        return program
+    if isinstance(program, Mapping):
+        return program_from_dict(program, robot)
+    if not isinstance(program, Sequence) or isinstance(program, str | bytes):
+        raise InputError("program", program, "a Program, its segments, or a dict")
+    return Program(cast(tuple[Segment, ...], tuple(program)))  # checked there
 
 
 def _in_motion(

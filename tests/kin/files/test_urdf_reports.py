@@ -12,8 +12,10 @@ import pytest
 
 import kin
 from kin import RobotFileError
+from kin.files.mjcf.fields import BESIDE as BESIDE_MJCF
+from kin.files.mjcf.fields import READ as READ_MJCF
 from kin.files.urdf.causes import cause_of
-from kin.files.urdf.fields import ATTRIBUTES
+from kin.files.urdf.fields import ATTRIBUTES, ELEMENTS
 
 FILES = Path(__file__).parents[2] / "data" / "urdf" / "reports"
 OK = (FILES / "ok.urdf").read_text(encoding="utf-8")
@@ -230,3 +232,24 @@ def test_a_cause_is_found_in_linear_time(part):
     start = time.process_time()
     cause_of(part * (900_000 // len(part)))
     assert time.process_time() - start < 3.0
+
+
+def documented(title: str) -> dict[str, tuple[set[str], set[str]]]:
+    """The first table below a title of the page *Formats*: of each element what is read, and what is not."""
+    page = (Path(__file__).parents[3] / "docs" / "formats.md").read_text(encoding="utf-8")
+    table = page.partition(f"## {title}\n")[2].partition("\n|---|---|---|\n")[2].partition("\n\n")[0]
+    cells = [[set(re.findall("`([^`]+)`", cell)) for cell in row.split("|")[1:4]] for row in table.splitlines()]
+    return {tag.pop().strip("<>"): (read, beside) for tag, read, beside in cells}
+
+
+def test_the_page_formats_lists_what_is_read_of_a_urdf():
+    expected = {}
+    for tag, attributes in ATTRIBUTES.items():
+        uses = {**attributes, **{f"<{key}>": use for key, use in ELEMENTS.get(tag, {}).items()}}
+        expected[tag] = tuple({key for key, each in uses.items() if each == use} for use in ("read", "beside"))
+    assert documented("What is read of a URDF") == expected
+
+
+def test_the_page_formats_lists_what_is_read_of_an_mjcf_file():
+    expected = {tag: (set(READ_MJCF[tag]), set(BESIDE_MJCF[tag])) for tag in READ_MJCF}
+    assert documented("What is read of an MJCF file") == expected
