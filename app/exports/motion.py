@@ -104,6 +104,8 @@ def _urscript(motion: Motion, rate: float) -> Generator[bytes]:
     robot = motion.robot
     if robot.n != 6 or not robot.revolute.all():
         raise InputError("format", "urscript", "an arm with six revolute joints")
+    if motion.start is not None:
+        raise InputError("format", "urscript", "a motion that starts at rest, as those of URScript do")
     name = "".join(c if c.isascii() and c.isalnum() else "_" for c in motion.program.name or "program")[:60]
     lines = [f"def {name if name[0].isalpha() else f'p_{name}'}():"]
     lines += [f"  # {robot.id}: {motion.duration:.3f} s as planned; the controller plans speeds and blends anew."]

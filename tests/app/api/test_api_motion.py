@@ -368,6 +368,9 @@ def test_a_motion_starts_while_the_arm_moves_or_says_which_joint_cannot_stop(cli
     assert answer["samples"]["qd"][0] == pytest.approx(start["qd_start"])
     assert answer["samples"]["qdd"][0] == pytest.approx(start["qdd_start"])
     code = client.post("/api/v1/robots/ur5/motion", json=body | start | {"format": "python"}).text
+    script = client.post("/api/v1/robots/ur5/motion", json=body | start | {"format": "urscript"})
+    assert script.status_code == 422
+    assert "starts at rest" in script.json()["errors"][0]["expected"]
     assert f"qd_start={start['qd_start']}".replace(" 0,", " 0.0,") in code
     near = [float(UR5.upper[0]) - 0.01, *UR5.home[1:]]
     moving = {"q_start": near, "qd_start": [3.0, 0, 0, 0, 0, 0]}
