@@ -210,7 +210,7 @@ class _Pages:
             return refused("The teacher has removed you from this room, or it has ended.", 403)
         ticket, room = entered
         answer = RedirectResponse("../viewer/", 303, headers={"cache-control": "no-store"})
-        token = self._hub.rooms.tokens.sign(ticket)
+        token = self._hub.rooms.tokens.cookie(ticket, room.code)
         set_cookie(answer, COOKIE, token, int(room.ends - room.created), request.scope, framed=True)
         pass_guest(request, answer, (ticket.room, ticket.seat), room.ends - now(), framed=True)
         set_cookie(answer, STATE_COOKIE, "", 0, request.scope, framed=True)

@@ -8,9 +8,10 @@ import shutil
 import socket
 import ssl
 import subprocess
+import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import httpx2
@@ -24,18 +25,21 @@ from websockets.sync.client import connect
 from websockets.sync.server import serve as serve_websocket
 
 import kin
+from app.classroom import COOKIE
+from app.classroom.hub import LOOK
 from app.service.main import create_app
 from app.shared.settings import Settings
 
 pytestmark = pytest.mark.full
 
-DEPLOY = Path(__file__).parents[3] / "deploy"
+ROOT = Path(__file__).parents[3]
+DEPLOY = ROOT / "deploy"
 PIONEER = kin.get_robot("pioneer5")
 LARGE = 12 * 1024 * 1024
 TOKEN = "a token for proxies"
 BEARER = {"Authorization": f"Bearer {TOKEN}"}
 
-Start = Callable[[Path, int, int], list[str | Path]]
+Start = Callable[[Path, int, Sequence[int]], list[str | Path]]
 
 
 def program(name: str) -> str:
@@ -53,12 +57,12 @@ def replaced(text: str, changes: dict[str, str]) -> str:
     return text
 
 
-def nginx(folder: Path, port: int, upstream: int) -> list[str | Path]:
+def nginx(folder: Path, port: int, upstreams: Sequence[int]) -> list[str | Path]:
     changes = {
         "listen 443 ssl": f"listen 127.0.0.1:{port} ssl",
         "/etc/ssl/certs/robots.example.pem": str(folder / "certificate.pem"),
         "/etc/ssl/private/robots.example.key": str(folder / "key.pem"),
-        "http://127.0.0.1:8000": f"http://127.0.0.1:{upstream}",
+        "server 127.0.0.1:8000;": " ".join(f"server 127.0.0.1:{upstream};" for upstream in upstreams),
     }
     (folder / "kinboard.conf").write_text(replaced((DEPLOY / "nginx.conf").read_text(), changes))
     user = "user root;" if os.geteuid() == 0 else ""  # or its workers could not enter pytest's folder
@@ -72,19 +76,21 @@ def nginx(folder: Path, port: int, upstream: int) -> list[str | Path]:
     return [program("nginx"), "-e", "stderr", "-p", folder, "-c", folder / "nginx.conf"]
 
 
-def caddy(folder: Path, port: int, upstream: int) -> list[str | Path]:
-    return caddy_with("Caddyfile", "robots.example", "127.0.0.1:8000", folder, port, upstream)
+def caddy(folder: Path, port: int, upstreams: Sequence[int]) -> list[str | Path]:
+    return caddy_with("Caddyfile", "robots.example", "127.0.0.1:8000", folder, port, upstreams)
 
 
-def of_compose(folder: Path, port: int, upstream: int) -> list[str | Path]:
-    return caddy_with("compose.Caddyfile", "{$KINBOARD_DOMAIN}", "kinboard:8000", folder, port, upstream)
+def of_compose(folder: Path, port: int, upstreams: Sequence[int]) -> list[str | Path]:
+    return caddy_with("compose.Caddyfile", "{$KINBOARD_DOMAIN}", "kinboard:8000", folder, port, upstreams)
 
 
-def caddy_with(name: str, site: str, behind: str, folder: Path, port: int, upstream: int) -> list[str | Path]:
+def caddy_with(
+    name: str, site: str, behind: str, folder: Path, port: int, upstreams: Sequence[int]
+) -> list[str | Path]:
     """Caddy with a file of deploy/, which names a site and the service behind it."""
     changes = {
         f"{site} {{": f"localhost:{port} {{\n    tls {folder}/certificate.pem {folder}/key.pem",
-        behind: f"127.0.0.1:{upstream}",
+        behind: " ".join(f"127.0.0.1:{upstream}" for upstream in upstreams),
     }
     snippet = replaced((DEPLOY / name).read_text(), changes)
     options = (
@@ -101,8 +107,8 @@ PROXIES = {"nginx": nginx, "caddy": caddy}
 
 
 @contextmanager
-def running(start: Start, folder: Path, certificate: Path, upstream: int) -> Iterator[str]:
-    """The address of a proxy in front of a port of this machine."""
+def running(start: Start, folder: Path, certificate: Path, *upstreams: int) -> Iterator[str]:
+    """The address of a proxy in front of ports of this machine."""
     folder.mkdir()
     for file in certificate.iterdir():
         shutil.copy(file, folder)
@@ -112,7 +118,7 @@ def running(start: Start, folder: Path, certificate: Path, upstream: int) -> Ite
     environment = {**os.environ, "XDG_DATA_HOME": str(folder), "XDG_CONFIG_HOME": str(folder)}
     with (
         messages.open("wb") as output,
-        subprocess.Popen(start(folder, port, upstream), env=environment, stdout=output, stderr=output) as process,
+        subprocess.Popen(start(folder, port, upstreams), env=environment, stdout=output, stderr=output) as process,
     ):
 
         def listens() -> bool:
@@ -291,3 +297,81 @@ def test_compose_puts_https_in_front(certificate: Path, tmp_path: Path) -> None:
             assert np.allclose(answer.json()["pose"]["matrix"], kin.fk(PIONEER, [0.0] * 5))
             login = visitor.post("/login", data={"token": TOKEN})
             assert "Secure" in login.headers["set-cookie"]
+
+
+@contextmanager
+def process(data: Path) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A service of its own process, as in a container, and its port."""
+    names = {"KINBOARD_ROOT_PATH": "/kinboard", "KINBOARD_TRUSTED_PROXIES": '["127.0.0.1"]'}
+    env = {**os.environ, **names, "KINBOARD_DATA": str(data), "KINBOARD_REST_WORKERS": "0"}
+    command = [sys.executable, "-m", "app.cli", "serve", "--port", "0"]
+    with subprocess.Popen(command, cwd=ROOT, env=env, stdout=subprocess.PIPE, text=True) as started:
+        try:
+            assert started.stdout is not None
+            found = re.search(r"http://[^/]+:(\d+)/", started.stdout.readline())
+            assert found
+            port = int(found[1])
+            with httpx2.Client(trust_env=False, base_url=f"http://127.0.0.1:{port}/kinboard", timeout=20.0) as ask:
+                wait_for(lambda: ask.get("/readyz").status_code == 200, seconds=600)
+            yield started, port
+        finally:
+            started.kill()
+
+
+@pytest.mark.parametrize("name", PROXIES)
+def test_all_pages_of_a_room_reach_the_same_of_two_processes(
+    name: str, certificate: Path, tls: ssl.SSLContext, tmp_path: Path
+) -> None:
+    """They see each other at once, in memory; if the process is killed, the room goes on in the other one."""
+    with (
+        process(tmp_path / "data") as one,
+        process(tmp_path / "data") as two,
+        running(PROXIES[name], tmp_path / name, certificate, one[1], two[1]) as address,
+        ExitStack() as stack,
+    ):
+
+        def browser() -> httpx2.Client:
+            made = httpx2.Client(base_url=f"https://{address}/kinboard", verify=tls, trust_env=False, timeout=20.0)
+            return stack.enter_context(made)
+
+        def home(client: httpx2.Client, query: str = "") -> int:
+            """Which process answers."""
+            return int(client.get(f"/livez{query}").json()["pid"])
+
+        def opened() -> tuple[httpx2.Client, str]:
+            teacher = browser()
+            assert teacher.post("/room", data={"hours": "2"}).status_code == 303
+            return teacher, re.sub(r"\W", "", teacher.get("/room").text.split('class="code">')[1][:9])
+
+        rooms = [opened()]
+        while len({home(teacher) for teacher, _ in rooms}) < 2:
+            assert len(rooms) < 40, "all rooms are in one process"
+            rooms.append(opened())
+        for teacher, code in rooms[-2:]:
+            student = browser()
+            assert f"room/join?code={code}" in student.get(f"/room?code={code}").text
+            assert student.post(f"/room/join?code={code}", data={"code": code, "alias": "Ada"}).status_code == 303
+            assert home(student) == home(browser(), f"?code={code}") == home(teacher)
+        tabs = [stack.enter_context(tab(address, tls, client)) for client in (student, teacher)]
+        for each in tabs:
+            each.wait(lambda each=each: "data-class-bar" in each.html)
+        tabs[1].say("feature", ["class", ["freeze", 1], None])  # as the button does
+        tabs[0].wait(lambda: "data-class-frozen" in tabs[0].html, timeout=LOOK - 0.5)
+        first, other = (one, two) if home(student) == one[0].pid else (two, one)
+        first[0].kill()
+        wait_for(lambda: student.get("/room").status_code == 200 and home(student) == other[0].pid)
+        assert "You are in this room as a student" in student.get("/room").text
+        with tab(address, tls, student) as again:
+            again.wait(lambda: "data-class-bar" in again.html)
+
+
+def tab(address: str, tls: ssl.SSLContext, client: httpx2.Client) -> FakeBrowser:
+    """The page of a browser in a room."""
+    cookie = f"{COOKIE}={client.cookies[COOKIE]}"
+    return FakeBrowser(
+        f"wss://{address}/kinboard/viewer",
+        ssl=tls,
+        origin=f"https://{address}",
+        additional_headers={"Cookie": cookie},
+        proxy=None,
+    )

@@ -117,7 +117,7 @@ class _Pages:
         except ClassroomUnavailable as error:
             return again(503, message=str(error))
         answer = RedirectResponse("room", 303)
-        await self._remember(request, answer, Ticket(room.id), room.ends)
+        await self._remember(request, answer, Ticket(room.id), room)
         return answer
 
     async def join(self, request: Request) -> Response:
@@ -147,10 +147,12 @@ class _Pages:
         except ClassroomUnavailable as error:
             return again(503, message=str(error))
         answer: Response = RedirectResponse("../viewer/", 303)
-        if room is not None and room.alias != in_one_line(alias):
+        if room is None:  # ended meanwhile, or the seat was removed: the viewer is that of nobody
+            return answer
+        if room.alias != in_one_line(alias):
             words = f"Another student has this alias: you are “{room.alias}” here."
             answer = self._room_of(request, room, words)
-        await self._remember(request, answer, ticket, now() if room is None else room.ends)
+        await self._remember(request, answer, ticket, room)
         return answer
 
     async def teach(self, request: Request) -> Response:
@@ -165,7 +167,7 @@ class _Pages:
             words = "This link for a teacher is not valid: its room has ended, or the link is not complete."
             return room_page(request, 404, message=words, may_open=may_open(request.scope))
         answer = RedirectResponse("../../viewer/", 303)
-        await self._remember(request, answer, ticket, room.ends)
+        await self._remember(request, answer, ticket, room)
         return answer
 
     async def qr(self, request: Request) -> Response:
@@ -235,11 +237,11 @@ class _Pages:
         except ClassroomUnavailable as error:
             return None, str(error)
 
-    async def _remember(self, request: Request, answer: Response, ticket: Ticket, ends: float) -> None:
-        token = await run_in_threadpool(self._hub.rooms.tokens.sign, ticket)
-        set_cookie(answer, COOKIE, token, max(1, int(ends - now())), request.scope, self._framed)
+    async def _remember(self, request: Request, answer: Response, ticket: Ticket, room: OpenRoom) -> None:
+        token, left = await run_in_threadpool(self._hub.rooms.tokens.cookie, ticket, room.code), room.ends - now()
+        set_cookie(answer, COOKIE, token, max(1, int(left)), request.scope, self._framed)
         answer.headers["cache-control"] = "no-store"
-        pass_guest(request, answer, (ticket.room, ticket.seat), ends - now(), self._framed)
+        pass_guest(request, answer, (ticket.room, ticket.seat), left, self._framed)
 
     def _forget(self, request: Request, answer: Response) -> None:
         set_cookie(answer, COOKIE, "", 0, request.scope, self._framed)
