@@ -26,6 +26,7 @@ const channel = (() => {
   const watchers = new Map(); // key → what to call with its value
   const doers = new Map(); // name of a notice → what to call with its value
   const lineWatchers = [];
+  let greeting = () => null; // what a new session is sent first
   const tellLine = (what) => { for (const act of lineWatchers) act(what); };
 
   const bytes = (text) => new TextEncoder().encode(text).length;
@@ -123,6 +124,7 @@ const channel = (() => {
     waiting.clear();
     values.clear();
     viserPage.emptyField();
+    send("hello", greeting());
     open();
   });
 
@@ -132,6 +134,8 @@ const channel = (() => {
     isOpen,
     /** The name of the present session's channel, "" before the first one. */
     name: () => name,
+    /** Have a new session be sent what `greet` returns before anything else. */
+    greet: (greet) => { greeting = greet; },
     /** Ask the service for a sign of life. */
     ask: () => { if (isOpen()) socket.send('["ask"]'); },
     /** Call `act` with the value of a key, now if there is one and whenever it changes. */

@@ -102,9 +102,9 @@
   // comes from the service shows that it is there. It is asked for only while that is in doubt: after something was sent
   // and nothing has come, after the connection has ended, and after a long silence.
 
-  const EVERY = 800; // ms between two looks at the connection, and two questions while it is in doubt
+  const EVERY = 700; // ms between two looks at the connection, and two questions while it is in doubt
   const SILENCE = 5000; // ms; the service gives a sign every two seconds
-  const PATIENCE = 1500; // ms for an answer of the service
+  const PATIENCE = 1400; // ms for an answer of the service
   const WAITING = 2500; // ms after which it is said that an answer waits
   let online = true;
   let sure = 0; // until when (ms) the connection is not in doubt
@@ -135,8 +135,8 @@
   function doubt() { sure = 0; }
   function look() {
     if (member() && !document.hidden && Date.now() >= sure) {
-      if (!asked) channel.ask();
-      else if (Date.now() - asked >= PATIENCE) become(false);
+      channel.ask();
+      if (asked && Date.now() - asked >= PATIENCE) become(false);
       asked ||= Date.now();
     }
     tell(); // the page may have come into a room, or left it

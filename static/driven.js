@@ -1,6 +1,6 @@
 "use strict";
 // Runs in viser's page: the frame around it while a connected program drives something with it. The frame is beside viser's
-// page, so that it stays when the panel, which brings its words, is folded away.
+// page, so that it stays when the panel is folded away.
 (() => {
   const frame = document.createElement("div");
   frame.id = "kb-driven";
@@ -8,10 +8,17 @@
   frame.hidden = true;
   addEventListener("DOMContentLoaded", () => document.body.append(frame));
 
-  viserPage.watchHtml("<div hidden data-driven", (html) => {
-    const words = new DOMParser().parseFromString(html, "text/html").body.firstElementChild;
-    frame.hidden = !words.childElementCount;
+  function element(kind, text) {
+    const made = document.createElement(kind);
+    made.textContent = text;
+    return made;
+  }
+  channel.watch("driven", (name) => {
+    frame.hidden = !name;
     document.documentElement.toggleAttribute("data-kb-driven", !frame.hidden);
-    frame.replaceChildren(...words.children);
+    const [line, words] = [element("p", ""), element("b", "Drives: ")];
+    words.append(element("bdi", name));
+    line.append(words, " ", element("i", "·"), " ", element("span", "nothing here is a safety function"));
+    frame.replaceChildren(...(name ? [line] : []));
   });
 })();

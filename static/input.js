@@ -9,24 +9,20 @@
   const { type, thumbOf: thumb } = viserPage;
   const { send } = channel;
 
-  // Answers
+  // What can be undone
 
-  let answered = "";
-  function readAnswers() {
-    const text = document.querySelector("[data-answers]")?.dataset.answers ?? "";
-    const buttons = ["undo", "redo"].map((name) => document.querySelector(`[data-send="${name}"]`));
-    // The panel, and its buttons, are built anew where a phone is turned.
-    if (!text || (text === answered && buttons.every((button) => !button || button.shows === text))) return;
-    answered = text;
-    const { undo, redo } = JSON.parse(text);
-    for (const [name, label] of [["undo", undo], ["redo", redo]]) {
-      const button = buttons[name === "undo" ? 0 : 1];
-      if (!button) { answered = ""; continue; }
-      button.shows = text;
+  function showHistory() {
+    const labels = channel.value("history");
+    for (const [k, name] of ["undo", "redo"].entries()) {
+      const button = document.querySelector(`[data-send="${name}"]`);
+      if (!labels || !button || button.shows === labels) continue; // the panel is built anew where a phone is turned
+      button.shows = labels;
+      const label = labels[k];
       button.ariaDisabled = String(!label);
       button.title = label ? `${name[0].toUpperCase() + name.slice(1)}: ${label} (${button.dataset.keys})` : `Nothing to ${name}`;
     }
   }
+  channel.watch("history", showHistory);
 
   // Number fields beside sliders
 
@@ -369,7 +365,7 @@
   }
 
   function follow() {
-    readAnswers();
+    showHistory();
     readFields();
     keepJog();
     pressLocks();

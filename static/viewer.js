@@ -1,13 +1,9 @@
 "use strict";
 // Runs in viser's page, before viser's own script. It stores the page's state per tab: the state that the server sends
-// is kept in the URL and in sessionStorage, and returned to the server after a reload or a lost connection. The server
-// uses viser's access to localStorage for this. All tabs of a browser share localStorage, so our items are redirected.
-// Each state has an entry in the browser's history: Back returns to the one before.
+// is kept in the URL and in sessionStorage, and returned to the server after a reload or a lost connection, as the first
+// message of the page's channel. Each state has an entry in the browser's history: Back returns to the one before.
 (() => {
-  const ITEM = "viser-user:kinboard";
-  const REPLACE = `${ITEM}-replace`; // the same state from another viewpoint
-  const RETURN = `${ITEM}-return`; // a state that has an entry
-  const LAST = `${ITEM}-last`; // the same state, for the next page of this browser
+  const LONGEST_STATE = 16000; // characters
   const LEFT_OFF = "kinboard-left-off";
   const STATE = "kinboard-state";
   const TAB = "kinboard-tab";
@@ -43,8 +39,9 @@
   const loaded = at;
   const trail = []; // the state of each entry, as far as known
   trail[at] = state;
-  // viser derives the websocket's address from the page's, where a fragment is an error: `show` restores it.
-  viserPage.replaceState({ kinboard: at }, "", page);
+  // viser derives the websocket's address from the page's, where a fragment is an error, and writes it into the page's:
+  // `show` restores that.
+  history.replaceState({ kinboard: at }, "", page);
 
   function address() {
     const parts = [];
@@ -52,7 +49,7 @@
     if (tab) parts.push(`tab=${encodeURIComponent(tab)}`);
     return parts.length ? `${page}#${parts.join("&")}` : page;
   }
-  const show = () => { trail[at] = state; viserPage.replaceState({ kinboard: at }, "", address()); aim(); };
+  const show = () => { trail[at] = state; history.replaceState({ kinboard: at }, "", address()); aim(); };
   function aim() {
     const whole = document.getElementById("kb-open");
     if (whole) whole.href = location.pathname + (state ? `#s=${state}` : "");
@@ -66,8 +63,7 @@
   }
 
   // The server may write the state with which this page was loaded in other words.
-  const answers = () => JSON.parse(document.querySelector("[data-answers]")?.dataset.answers ?? "{}");
-  const start = () => answers().start ?? "";
+  const start = () => channel.value("start")?.[0] ?? "";
   let expected = false; // whether the next move in the history is our own
   function goBack() {
     const near = [...trail.keys()].filter((i) => trail[i] === state || (i === loaded && state === start()));
@@ -87,23 +83,28 @@
     expected = false;
   });
 
-  viserPage.keepAddress(show);
+  viserPage.watch(() => { if (location.search.includes("websocket=")) show(); });
   addEventListener("hashchange", () => { if (history.state?.kinboard === undefined) location.reload(); });
 
-  function read() {
+  channel.greet(() => {
     openTab(performance.now() + 30000);
-    return JSON.stringify({
+    show();
+    return {
+      // A longer state cannot be one, and the service says so.
       address: location.origin + location.pathname.replace(/viewer\/?$/, ""),
-      state,
+      state: state.slice(0, LONGEST_STATE + 1),
       text: document.documentElement.dataset.kbText,
       embedded: mode,
       shown: query.get("shown") ?? "",
       zone: -new Date().getTimezoneOffset(),
       dark: matchMedia("(prefers-color-scheme: dark)").matches,
-    });
+    };
+  });
+  // A state of the page: a new one, the same from another viewpoint, or one that has an entry.
+  for (const [kind, then] of [["state", add], ["state-replace", show], ["state-return", goBack]]) {
+    channel.on(kind, (value) => { state = value; keep(STATE, state); then(); });
   }
-  const write = (then) => (value) => { state = value; keep(STATE, state); then(); };
-  viserPage.serveItems({ [ITEM]: read }, { [ITEM]: write(add), [REPLACE]: write(show), [RETURN]: write(goBack), [LAST]: leave });
+  channel.on("state-last", leave); // the same state, for the next page of this browser
 
   // The controls appear some time after the state was requested, with the first tab open.
   function openTab(until) {
@@ -111,7 +112,8 @@
     const ready = document.querySelector("[data-status]") !== null;
     if (!tab && ready && start()) { // then the one of what it shows
       silent = false;
-      if (answers().tab) dispatchEvent(new CustomEvent("kinboard-tab", { detail: answers().tab }));
+      const [, opened] = channel.value("start");
+      if (opened) dispatchEvent(new CustomEvent("kinboard-tab", { detail: opened }));
     }
     if (!ready || (tab ? !viserPage.openTab(tab) : silent)) setTimeout(openTab, 100, until);
   }

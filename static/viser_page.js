@@ -28,11 +28,11 @@ const viserPage = (() => {
     menu: "input.mantine-Select-input", // whose options are searched by typing
     settings: "button .tabler-icon-adjustments", // viser's own settings
     icon: "svg.tabler-icon, svg[data-combobox-chevron]",
-    messages: "div:has(> [data-answers]) + div input", // the hidden field behind our hidden HTML
+    messages: "div:has(> [data-messages]) + div input", // the hidden field behind our hidden HTML
   };
   // What viser calls, and how often it has since this page was loaded.
   const HOOKS = {
-    readItem: 0, writeItem: 0, replaceAddress: 0, change: 0, reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0,
+    change: 0, reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0,
     findParent: 0,
   };
 
@@ -81,40 +81,6 @@ const viserPage = (() => {
     const what = { subtree: true, childList: true, characterData: true, attributeFilter: ATTRIBUTES };
     new MutationObserver(dispatch).observe(document.documentElement, what);
   });
-
-  // Storage: viser's calls that read and write a browser's localStorage also reach the items of `serveItems`.
-
-  const { getItem, setItem } = Storage.prototype;
-  let readable = {}; // name of an item → function that returns its text
-  let writable = {}; // name of an item → function that gets its text
-
-  // A browser may forbid storage, most often to a page in a frame of another site: then items live as long as the page.
-  for (const name of ["localStorage", "sessionStorage"]) {
-    try { void window[name]; } catch {
-      const items = new Map();
-      const memory = Object.create(Storage.prototype, {
-        kept: { value: { getItem: (key) => items.get(key) ?? null, setItem: (key, value) => { items.set(key, String(value)); } } },
-        removeItem: { value: (key) => { items.delete(key); } },
-      });
-      Object.defineProperty(window, name, { value: memory });
-    }
-  }
-  Storage.prototype.getItem = function (name) {
-    if (!Object.hasOwn(readable, name)) return this.kept ? this.kept.getItem(name) : getItem.call(this, name);
-    HOOKS.readItem++;
-    return readable[name]();
-  };
-  Storage.prototype.setItem = function (name, value) {
-    if (!Object.hasOwn(writable, name)) return this.kept ? this.kept.setItem(name, value) : setItem.call(this, name, value);
-    HOOKS.writeItem++;
-    return writable[name](value);
-  };
-
-  // The address: viser would write that of its websocket into it, and a shared link would contain it.
-
-  const replaceState = history.replaceState.bind(history);
-  let restoreAddress = () => {};
-  history.replaceState = () => { HOOKS.replaceAddress++; restoreAddress(); };
 
   // Changes of controls. After one that is sent, viser keeps the next for 50 ms, and longer in a busy page: the newest of a
   // whole tab. So of three controls pressed at once the second was lost, though the page showed its new value, and what
@@ -516,13 +482,6 @@ const viserPage = (() => {
     watchValue: (thumb, act) => { valueWatchers.set(thumb, act); },
 
     pass, // for viser's own script
-
-    /** Serve items of the storage: name → () => text, and name → (text) => …, for viser's calls alone. */
-    serveItems: (reading, writing) => { readable = reading; writable = writing; },
-    /** Call `restore` where viser would change the address. */
-    keepAddress: (restore) => { restoreAddress = restore; },
-    /** What `history.replaceState` does, which viser's calls no longer do. */
-    replaceState,
 
     writeField,
     /** Forget what the field had: a new session must not act on it. */

@@ -192,7 +192,7 @@ def imported_paths(source: str, sources: Sources) -> Iterator[str]:
 # What viser's page consists of, and the browser's functions that are replaced in it.
 VISER = re.compile(
     r"\bmantine-|\btabler-|\bdata-dock|\bdata-engine|role=\\?[\"'](?:tab|slider|progressbar|option)|\bGuiUpdate"
-    r"|\bMutationObserver\b|\.prototype\b|\bhistory\.replaceState\b"
+    r"|\bMutationObserver\b|\.prototype\b"
 )
 
 
@@ -302,7 +302,7 @@ def test_every_rule_is_shown_to_have_teeth():
         (cut_sentences, {"app/new.py": "def f(text):\n    return text.partition('=')[0]"}),
         (own_numbers, {"app/viewer/new.py": "f'{general(x, 3)} {y:.3f} {code:.9g}'", "kin/new.py": "f'{x:.3g}'"}),
         (viser_elsewhere, {"static/viser_page.js": "new MutationObserver(f); find('.mantine-Slider-root')"}),
-        (viser_elsewhere, {"static/new.js": "viserPage.watch(f); viserPage.replaceState(state)"}),
+        (viser_elsewhere, {"static/new.js": "viserPage.watch(f); history.replaceState(state)"}),
         (banned_words, {"app/new.py": "text = 'as I told you'; retold = calmness = 1"}),
         (
             import_circles,

@@ -32,6 +32,7 @@ SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 # What a camera reports, and what the page remembers, when viser asks for it: a link says what to look at.
 CAMERA = "ViewerCameraMessage"
 MEMORY = "LocalStorageGetItemResponseMessage"
+HELLO = "hello"  # in the page's channel: what it remembers
 
 # Of a page's channel, with the number of the process that has the page: below the prefix of the service.
 _CHANNEL = re.compile(r"/viewer/channel/(\d{1,3})")
@@ -61,7 +62,7 @@ class Rights(Enum):
         Args:
             kind: its kind in viser's protocol, or its name in the page's channel.
         """
-        return self.compute or kind in (CAMERA, MEMORY)
+        return self.compute or kind in (CAMERA, MEMORY, HELLO)
 
     @property
     def compute(self) -> bool:

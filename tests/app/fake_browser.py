@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import html
 import json
-import threading
 import time
 import weakref
 from collections.abc import Callable, Hashable
 from pathlib import Path
-from queue import Empty, Queue
 from typing import Any
 
 import msgspec
@@ -31,6 +28,7 @@ from kin.transforms import pose_from_position_wxyz, wxyz_from_rotation
 
 ANSWER = 1.5  # s until a message is answered on a busy machine, by a service in another process
 PATIENCE = 30.0  # s until something that must happen has happened, on a machine that does much else
+LOOK = 0.005  # s between two looks at the channel
 WORK = 10.0  # s for which `settle` waits for a worker that has something to do
 
 # Of services in this process: workers that something was posted to, those that act, and how many messages of each
@@ -118,10 +116,10 @@ _BESIDE = _SCRIPT.split("BESIDE_CONTROLS = new Set(", 1)[1].split(")", 1)[0]
 BESIDE_CONTROLS = frozenset(json.loads(_BESIDE))
 
 
-class _Wire:
-    """A websocket whose messages, and its end, go into a queue as ``(wire, data)``."""
+class Wire:
+    """A websocket."""
 
-    def __init__(self, url: str, protocols: list[str], queue: Queue[tuple[_Wire, Any]], options: Any) -> None:
+    def __init__(self, url: str, protocols: list[str], options: Any) -> None:
         self._socket = connect(
             url,
             subprotocols=protocols,  # type: ignore[arg-type]
@@ -130,23 +128,30 @@ class _Wire:
             compression=None,
             **options,
         )
-        self.port: int = self._socket.local_address[1]
+        self.port = 0
+        with contextlib.suppress(OSError):  # the service has ended it already
+            self.port = self._socket.local_address[1]
         self.sent = 0  # messages
         self.ended = False
-        self._queue = queue
-        threading.Thread(target=self._read, daemon=True).start()
 
-    def _read(self) -> None:
+    def receive(self, timeout: float) -> bytes | str | None:
+        """The next message; None: there is none within this time. Raises `ConnectionClosed`."""
         try:
-            while True:
-                self._queue.put((self, self._socket.recv()))
-        except ConnectionClosed as end:
+            return self._socket.recv(timeout=timeout)
+        except TimeoutError:
+            return None
+        except ConnectionClosed:
             self.ended = True
-            self._queue.put((self, end))
+            raise
 
     def send(self, data: bytes | str) -> None:
         self._socket.send(data)
         self.sent += 1
+
+    def ping(self) -> None:
+        """Wait until what the service has sent so far has arrived."""
+        with contextlib.suppress(ConnectionClosed):
+            self._socket.ping().wait(1.0)
 
     def close(self) -> None:
         self._socket.close()
@@ -166,10 +171,11 @@ class _Wire:
 class FakeBrowser:
     """One visitor of a local port or of any URL, which may need more `options` to connect.
 
-    `read` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`. `memory` is the content
-    of the page's storage, `kept` what the service has stored there, and `left_off` what it has stored for the next
-    page of the browser. `said` has the last messages in the hidden field. `camera` is where the service has
-    moved it; unlike a real page, this one reports it only with `look`. It opens the page's channel when it comes.
+    `read` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`, and `shown` by the
+    channel, which it opens when it can. `memory` is the content of the page's storage, which it sends first,
+    `kept` what the service has stored there, and `left_off` what it has stored for the next page of the browser.
+    `said` has the last messages in the hidden field. `camera` is where the service has moved it; unlike a real
+    page, this one reports it only with `look`.
     """
 
     def __init__(
@@ -184,12 +190,12 @@ class FakeBrowser:
         self.memory = memory
         self.said: list[list[Any]] = []
         self.kept: list[str] = []
+        self.kept_as: list[str] = []  # the names of the notices
         self.left_off: list[str] = []
         self._url = where if isinstance(where, str) else f"ws://127.0.0.1:{where}{path}"
         self._options = options
-        self._queue: Queue[tuple[_Wire, Any]] = Queue()
-        self._wire = _Wire(self._url, [f"viser-v{viser.__version__}"], self._queue, options)
-        self.channel: _Wire | None = None
+        self._wire = Wire(self._url, [f"viser-v{viser.__version__}"], options)
+        self.channel: Wire | None = None
         self._place = self._name = ""  # of the channel
         self._number = self._noted = 0  # of the last message and the last notice
         self.shown: dict[str, Any] = {}  # by the channel
@@ -201,7 +207,7 @@ class FakeBrowser:
         self.nodes: dict[str, dict[str, Any]] = {}
         self.log: list[dict[str, Any]] = []
         self._owed = False  # whether one was sent that may still be answered
-        self.answers = True  # whether the page reports its storage, as a page in the foreground does
+        self.answers = True  # whether the page answers by itself, as a page in the foreground does
         self.camera: dict[str, Any] = {"position": (3, 3, 3), "look_at": (0, 0, 0), "up_direction": (0, 0, 1)}
         self._size = {"image_width": width, "image_height": height}
         self.look()
@@ -298,41 +304,68 @@ class FakeBrowser:
 
     @property
     def script(self) -> dict[str, Any]:
-        """What the page's own scripts know: next steps of the history, the last reply."""
-        shown = next(
-            m["props"]["content"] for m in self.gui.values() if "data-answers" in m["props"].get("content", "")
-        )
-        answers: dict[str, Any] = json.loads(html.unescape(shown.split('data-answers="', 1)[1].split('"', 1)[0]))
-        return {**answers, "reply": self.replied}
+        """What the page's own scripts know: next steps of the history, what it started with, the last reply."""
+        (undo, redo), (start, tab) = self.shown.get("history", ["", ""]), self.shown.get("start", ["", ""])
+        return {"undo": undo, "redo": redo, "start": start, "tab": tab, "reply": self.replied}
 
     def open_channel(self) -> None:
         """Open the channel of the present session, or open it anew."""
         before, protocols = self.channel, [CHANNEL_PROTOCOL, self._name]
-        self.channel = _Wire(
-            f"{self._url.rstrip('/')}/channel/{self._place}", protocols, self._queue, self._options
-        )
+        self.channel = Wire(f"{self._url.rstrip('/')}/channel/{self._place}", protocols, self._options)
         if before is not None:
             before.close()
+            before.ended = True
 
     def _note_channel(self, content: str) -> None:
         place, name = content.split('data-channel="', 1)[1].split('"', 1)[0].split("/")
         if name != self._name:
             self._place, self._name, self.said = place, name, []
             self._number, self._noted, self.replied = 0, 0, [0, "", []]
+            self.shown = {}
             self.open_channel()
+            if self.answers:
+                self.say("hello", _value(self.memory))
 
-    def _hear(self, wire: _Wire, text: str) -> bool:
-        """Take what came by the channel; returns whether it was more than a beat."""
+    def _read_channel(self) -> bool:
+        """Take what has come by the channel; returns whether it was more than a beat."""
+        wire = self.channel
+        try:
+            text = None if wire is None else wire.receive(0.0)
+        except ConnectionClosed:
+            self.channel = None
+            return False
+        if wire is None or text is None:
+            return False
         heard = json.loads(text)
         self.shown |= heard.get("set", {})
+        if "notices" in heard:
+            self._catch_up()
         for number, name, value in heard.get("notices", []):
             if number > self._noted:
                 self._noted = number
-                if name == "reply":
-                    self.replied = value
+                self._take(name, value)
         with contextlib.suppress(ConnectionClosed):  # the service has ended it since
             wire.send(json.dumps(["heard", self._noted]))
         return "set" in heard or "notices" in heard
+
+    def _catch_up(self) -> None:
+        """Show what belongs to the step that a notice comes from, as a person sees both at once."""
+        if self._wire.port in _handled:
+            end = time.monotonic() + ANSWER
+            while working() and time.monotonic() < end:
+                time.sleep(0.0005)
+        self._wire.ping()
+        while not self._wire.ended and (data := self._wire.receive(0.0)) is not None:
+            self._apply_frame(data)
+
+    def _take(self, name: str, value: Any) -> None:
+        if name == "reply":
+            self.replied = value
+        elif name == KEY_LAST:
+            self.left_off.append(value)
+        else:
+            self.kept.append(value)
+            self.kept_as.append(name)
 
     def updates_without_component(self) -> list[dict[str, Any]]:
         """Updates of the panel that came before their component, or after its removal."""
@@ -452,22 +485,22 @@ class FakeBrowser:
         return self.kept[-1]
 
     def read(self, timeout: float) -> bool:
-        """Read one frame of messages; returns whether one came in time."""
+        """Read what comes next by either connection; returns whether something came in time."""
         end = time.monotonic() + timeout
         while True:
-            try:
-                wire, data = self._queue.get(timeout=max(0.0, end - time.monotonic()))
-            except Empty:
-                return False
-            if wire is self._wire and isinstance(data, ConnectionClosed):
-                self._queue.put((wire, data))  # for the next time
-                raise data
-            if wire is self._wire:
-                break
-            if wire is self.channel and isinstance(data, ConnectionClosed):
-                self.channel = None
-            elif wire is self.channel and self._hear(wire, data):
+            if self._read_channel():
                 return True
+            left = max(0.0, end - time.monotonic())
+            data = self._wire.receive(left if self.channel is None else min(left, LOOK))
+            if data is not None:
+                self._apply_frame(data)
+                return True
+            if left == 0.0:
+                return False
+
+    def _apply_frame(self, data: bytes | str) -> None:
+        """Show a frame of viser's messages."""
+        assert isinstance(data, bytes)
         size, packed = (int.from_bytes(data[i : i + 8], "little") for i in (0, 8))
         inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
         decoded = msgspec.msgpack.decode(inner)
@@ -478,7 +511,6 @@ class FakeBrowser:
                     if isinstance(value, dict) and "__binary_index" in value:
                         values[key] = np.frombuffer(arrays[value["__binary_index"]], value["dtype"])
             self._apply(message)
-        return True
 
     def _apply(self, m: dict[str, Any]) -> None:
         self.log.append(m)
@@ -486,11 +518,7 @@ class FakeBrowser:
             case "LocalStorageGetItemRequestMessage":
                 if self.answers:
                     uuid = m["request_uuid"]
-                    self.send(
-                        "LocalStorageGetItemResponseMessage", request_uuid=uuid, value=self.memory, error=None
-                    )
-            case "LocalStorageSetItemMessage":
-                (self.left_off if m["key"].endswith(KEY_LAST) else self.kept).append(m["value"])
+                    self.send("LocalStorageGetItemResponseMessage", request_uuid=uuid, value=None, error=None)
             case "SetCameraPositionMessage":
                 self.camera["position"] = m["position"]
             case "SetCameraLookAtMessage":
@@ -530,6 +558,14 @@ class FakeBrowser:
                 self.values[m["uuid"]] = m.get("value")
             case _ if "props" in m and "name" in m:
                 self.nodes[m["name"]] = m
+
+
+def _value(text: str | None) -> Any:
+    """The value of a text of JSON; of another text, the text."""
+    try:
+        return json.loads(text or "null")
+    except ValueError:
+        return text
 
 
 def _arrays(data: bytes, start: int, lengths: list[int]) -> list[memoryview]:

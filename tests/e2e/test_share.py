@@ -160,9 +160,7 @@ def test_a_link_to_a_lesson_opens_it(browser: Browser, address: str, said: str, 
     page = browser.new_page(viewport={"width": 1280, "height": 720})
     page.goto(f"{address}viewer/#s={encode(PageState(PIONEER.id, lesson='dh'))}{said}")
     expect(page.locator("[data-status]").first).to_be_attached(timeout=4 * WAIT)
-    page.wait_for_function(
-        "JSON.parse(document.querySelector('[data-answers]').dataset.answers).start", timeout=WAIT
-    )
+    page.wait_for_function("channel.value('start')?.[0]", timeout=WAIT)
     expect(page.get_by_role("tab", name=opened, exact=True)).to_have_attribute("aria-selected", "true")
     wait_for_url(page, "tab")
     assert parse_qs(urlsplit(page.url).fragment)["tab"] == [opened]

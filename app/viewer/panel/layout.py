@@ -12,7 +12,7 @@ from app.viewer.panel.jog import JogPad
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.robots import RobotMenu
-from app.viewer.panel.script import Messages, PageScript
+from app.viewer.panel.script import Messages, listen_for_messages
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.theme import SYSTEM_IS_DARK
@@ -35,7 +35,6 @@ class Panel:
         messages: takes what comes in the hidden field.
 
     Attributes:
-        script: the hidden field, and what the page's own scripts are shown.
         jog: buttons that move the arm in steps.
         joints, posture: folders that are filled for each robot.
         obstacles: the folder of the obstacles. Like that of `jog` it is closed at first, so that the rest fits a
@@ -45,7 +44,6 @@ class Panel:
         learn: the tab for lessons.
         tabs: the features' tabs.
         legend: what a lesson draws in the scene; below the tabs, so that it stays when another tab is opened.
-        driven: what a program drives with the page, for ``static/driven.js``.
         hints: where the hints of the first minute are shown in the scene.
         sheet: the page to print of a worksheet, hidden.
     """
@@ -65,7 +63,7 @@ class Panel:
     ) -> None:
         self.status = StatusLine(gui, welcome)
         listen(gui.add_checkbox(SYSTEM_IS_DARK, system_dark), post, "system-dark")
-        self.script = PageScript(gui, messages)
+        listen_for_messages(gui, messages)
         gui.add_html(render("panel/head"))
         self.robots = RobotMenu(gui, robots, own, robot, post)
         self.readout = PoseReadout(gui, fk(robot, robot.q_home), units)
@@ -78,7 +76,6 @@ class Panel:
             self.jog = JogPad(gui, robot)
             self.obstacles = gui.add_folder("Obstacles", expand_by_default=False)
         self.legend = gui.add_html("")
-        self.driven = gui.add_html(render("live/driven", name=""))
         self.hints = gui.add_html("")
         self.sheet = gui.add_html("")
         self.learn = group.add_tab(LEARN)

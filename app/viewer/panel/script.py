@@ -1,4 +1,4 @@
-"""Messages of the page's own scripts that come in viser's connection, and what these scripts are shown.
+"""Messages of the page's own scripts that come in viser's connection.
 
 The page's scripts send by their channel (:mod:`app.viewer.session.channel`). A message whose order with changes of
 viser's controls matters, such as *Undo* after a slider was moved, has to come behind these:
@@ -13,7 +13,6 @@ from typing import Any, NamedTuple, Protocol
 
 import viser
 
-from app.viewer.panel import update_html
 from app.viewer.views.templates import render
 from kin.parsing import Limits, read_json
 
@@ -54,45 +53,32 @@ class Messages(Protocol):
         """Take a message. False: too many before it are missing."""
 
 
-class PageScript:
-    """Passes on the messages in the hidden field, and shows what the page starts with and what can be undone."""
+def listen_for_messages(gui: viser.GuiApi, messages: Messages) -> None:
+    """Add the hidden field, and pass on the messages in it."""
+    gui.add_html(render("panel/messages"))
+    field = gui.add_text(LABEL, "")
+    last = 0
 
-    def __init__(self, gui: viser.GuiApi, messages: Messages) -> None:
-        self._last = 0
-        self._answers: dict[str, object] = {"undo": "", "redo": "", "start": "", "tab": ""}
-        self._shown = gui.add_html(self._html())
-        field = gui.add_text(LABEL, "")
+    @field.on_update
+    async def _(event: Any) -> None:
+        nonlocal last
+        if event.client is None:
+            return
+        for number, name, argument in read_messages(event.target.value, last):
+            last = number
+            messages.take(number, name, argument)
 
-        @field.on_update
-        async def _(event: Any) -> None:
-            if event.client is None:
-                return
-            for number, name, argument in self.read(event.target.value):
-                messages.take(number, name, argument)
 
-    def read(self, text: str) -> list[tuple[int, str, object]]:
-        """The messages in `text` that have not been read yet, as number, name and argument, in order."""
-        try:
-            items = read_page_json(text, finite=True)
-        except ValueError:
-            return []
-        found = []
-        for item in items[-AT_ONCE:] if isinstance(items, list) else []:
-            match item:
-                case [int(number), str(name), argument] if self._last < number < MAX_NUMBER:
-                    self._last = number
-                    found.append((number, name, argument))
-        return found
-
-    def show_history(self, undo: str, redo: str) -> None:
-        """Show what would be undone and redone next; empty: nothing."""
-        self._answers |= {"undo": undo, "redo": redo}
-        update_html(self._shown, self._html())
-
-    def show_start(self, state: str, tab: str) -> None:
-        """Tell the page the state with which it starts, and the tab where a link to it opens; empty: the first."""
-        self._answers |= {"start": state, "tab": tab}
-        update_html(self._shown, self._html())
-
-    def _html(self) -> str:
-        return render("panel/answers", answers=json.dumps(self._answers))
+def read_messages(text: str, last: int) -> list[tuple[int, str, object]]:
+    """The messages in `text` beyond number `last`, as number, name and argument, in order."""
+    try:
+        items = read_page_json(text, finite=True)
+    except ValueError:
+        return []
+    found = []
+    for item in items[-AT_ONCE:] if isinstance(items, list) else []:
+        match item:
+            case [int(number), str(name), argument] if last < number < MAX_NUMBER:
+                last = number
+                found.append((number, name, argument))
+    return found

@@ -5,11 +5,12 @@ channel, as texts of JSON (``static/channel.js``). The page opens it when it has
 name cannot be guessed, so it proves which session a connection belongs to; it stands in no address, because
 proxies log these.
 
-The page sends ``[number, name, argument]``, or ``["heard", k]`` for the notices that have arrived, up to the k-th,
-or ``["ask"]`` for a sign of life. The session sends ``{"heard": n, "set": {key: value}, "notices": [[k, name,
-value]]}``: the number of the last message that has come; the newest value of each key, which may skip older ones;
-notices, each once and in order. What was lost with a connection is sent again over the next one, and counts once.
-At least every `BEAT` seconds there is a text, which the page answers: so each side notices a line that is dead.
+The page sends ``[number, name, argument]``, first of all ``hello`` with what it remembers, or ``["heard", k]`` for
+the notices that have arrived, up to the k-th, or ``["ask"]`` for a sign of life. The session sends ``{"heard": n,
+"set": {key: value}, "notices": [[k, name, value]]}``: the number of the last message that has come; the newest
+value of each key, which may skip older ones; notices, each once and in order. What was lost with a connection is
+sent again over the next one, and counts once. At least every `BEAT` seconds there is a text, which the page
+answers: so each side notices a line that is dead.
 
 A message counts up from the one before, on whatever way it comes: those whose order with viser's controls matters
 come beside these, in viser's connection (:mod:`app.viewer.panel.script`). `Sequence` puts both in order again.
@@ -25,11 +26,12 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Hashable
+from concurrent.futures import Future
 from typing import Final
 
 from app.shared.connection import ConnectionEnded, PageConnection
 from app.shared.metrics import DROPPED
-from app.shared.security import Rights
+from app.shared.security import HELLO, Rights
 from app.viewer.panel import Post
 from app.viewer.panel.script import MAX_NUMBER, Reply, read_page_json
 from app.viewer.session.events import MESSAGES
@@ -70,6 +72,11 @@ class Channel:
         self._count = 0  # of notices
         self._line: _Line | None = None
         self._closed = False
+        self._hello: Future[object] = Future()
+
+    def hello(self, timeout: float) -> object:
+        """What the page remembers, a value of JSON; waits. Raises `TimeoutError`, `CancelledError` if it ends."""
+        return self._hello.result(timeout)
 
     def show(self, key: str, value: object) -> None:
         """The value of a key from now on; raises `ValueError` for one that JSON cannot hold, such as NaN."""
@@ -97,6 +104,7 @@ class Channel:
     def close(self) -> None:
         """The session has ended."""
         self._closed = True
+        self._hello.cancel()
         self._wake()
 
     def silence(self) -> float:
@@ -184,7 +192,7 @@ class Channel:
     def _take(self, number: int, name: str, argument: object, rights: Rights) -> None:
         if number <= self._received:
             return  # it has come over an earlier connection
-        if name not in MESSAGES:
+        if name not in (HELLO, *MESSAGES):
             raise ConnectionEnded(1008, "the page has no message of this name")
         if not (rights.allow_message(name) and self._rights.allow_message(name)):
             DROPPED.labels("refused").inc()
@@ -196,6 +204,10 @@ class Channel:
         self._received = number
 
     def _deliver(self, number: int, name: str, argument: object) -> None:
+        if name == HELLO:
+            if not self._hello.done():
+                self._hello.set_result(argument)
+            return
         key: Hashable = ("message", name, number)
         self._post(key, argument)
 

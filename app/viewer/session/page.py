@@ -202,7 +202,7 @@ class VisitorPage(ShownArm, Worker):
 
     def show_driven(self, name: str) -> None:
         self.driven = name
-        update_html(self.panel.driven, render("live/driven", name=name))
+        self.channel.show("driven", name)
 
     def show_joints(self, folder: viser.GuiFolderHandle | None) -> None:
         self._more_joints = folder
@@ -474,7 +474,9 @@ class VisitorPage(ShownArm, Worker):
                 self._preparing.hold_state(stored, robot_of(self, stored.robot), self.offered)
             self._show_hints()
             learns = self._persistence.stored.lesson is not None
-            self.panel.script.show_start(self._persistence.begin(self.panel.share), LEARN if learns else "")
+            self.channel.show("start", [self._persistence.begin(self.panel.share), LEARN if learns else ""])
+            self.channel.show("history", ["", ""])
+            self.channel.show("driven", self.driven)
         self.client.flush()
 
     def _use_robot(self, robot: Robot, q: Array | None = None, glide: bool = False) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Hashable, Mapping, Sequence
+from concurrent.futures import CancelledError
 from dataclasses import replace
 
 from app.exports.snippets import LOCAL, Moment, Service
@@ -21,7 +22,6 @@ from app.viewer.session.history import same
 from app.viewer.session.lessons import lesson_with_key
 from app.viewer.session.parts import Page
 from app.viewer.session.state import (
-    KEY,
     KEY_LAST,
     KEY_REPLACE,
     KEY_RETURN,
@@ -85,11 +85,10 @@ class Persistence:
 
     def load(self) -> None:
         """Read the stored state from the browser, and wait for it. A page that does not answer starts fresh."""
-        client = self._page.client
         try:
-            stored = read_stored_page(client.local_storage.get_item(KEY, timeout=ANSWER_WITHIN))
-        except (RuntimeError, TimeoutError) as error:  # storage forbidden, page gone, no answer
-            log.debug("visitor %s has no stored state: %s", client.client_id, error)
+            stored = read_stored_page(self._page.channel.hello(ANSWER_WITHIN))
+        except (CancelledError, TimeoutError):  # page gone, no answer
+            log.debug("visitor %s has no stored state", self._page.client.client_id)
             stored = StoredPage()
         self._address = stored.address or LOCAL
         self.system_dark, self.text_size, self.embedded = stored.dark, stored.text_size, stored.embedded
@@ -172,9 +171,9 @@ class Persistence:
         if text != self._saved:
             replaces = self.led or (key != KEY_RETURN and same(state, self._state))
             self._saved, self._state = text, state
-            self._page.client.local_storage.set_item(KEY_REPLACE if replaces else key, text)
+            self._page.channel.notify(KEY_REPLACE if replaces else key, text)
             if state.lesson is not None and not self._page.activity.practice.seated:
-                self._page.client.local_storage.set_item(KEY_LAST, text)
+                self._page.channel.notify(KEY_LAST, text)
             self._update_share()
             self._page.client.flush()
 

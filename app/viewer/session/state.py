@@ -5,8 +5,7 @@ differs from a fresh page; everything else takes the defaults of the page that o
 old version of this program, truncated by a mail client, or from somebody with bad intentions. So `decode` never
 raises; it ignores what it cannot use.
 
-``static/viewer.js`` stores the text for its own tab: viser's calls that read and write a browser's `localStorage`
-are redirected there.
+``static/viewer.js`` stores the text for its own tab, and sends it as the first message of the page's channel.
 """
 
 from __future__ import annotations
@@ -38,11 +37,11 @@ from kin.transforms import Array, pose_from_position_wxyz, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS, LENGTHS, Units
 
 VERSION = 1
-# Of the item in the page's storage. For a state under `KEY`, the page adds an entry to the browser's history;
+# Names of the notices that have a state. For one under `KEY`, the page adds an entry to the browser's history;
 # under the next two, it replaces the present entry (another viewpoint) or returns to the entry with this state.
-KEY, KEY_REPLACE, KEY_RETURN = "kinboard", "kinboard-replace", "kinboard-return"
-KEY_LAST = "kinboard-last"  # the browser's next page offers it
-MAX_TEXT = 16_000  # characters; the bridge refuses messages of 64 KiB
+KEY, KEY_REPLACE, KEY_RETURN = "state", "state-replace", "state-return"
+KEY_LAST = "state-last"  # the browser's next page offers it
+MAX_TEXT = 16_000  # characters; a message of a page has at most 64 KiB
 LONG = 2000  # characters; longer texts are compressed
 COMPRESSED = "z"  # begins a compressed text; base64 of JSON never begins with it
 MOST_BYTES = 64_000  # of JSON that is unpacked from a text
@@ -101,7 +100,7 @@ class PageState:
 
 @dataclass(frozen=True)
 class StoredPage:
-    """The contents of a page's storage.
+    """What a page remembers when it connects.
 
     Attributes:
         address: the service's address as the visitor sees it.
@@ -262,9 +261,9 @@ def decode(text: str, robots: Sequence[Robot]) -> PageState:
     return PageState(robot=robot.id, locks=locks, ignored=ignored, **entries, **common)
 
 
-def read_stored_page(text: str | None) -> StoredPage:
-    """Parse the contents of a page's storage; invalid parts are left empty."""
-    data = _parse(text or "")
+def read_stored_page(remembered: object) -> StoredPage:
+    """What a page remembers, from a value of JSON; invalid parts are left empty."""
+    data: dict[str, Any] = remembered if isinstance(remembered, dict) else {}
     address, state = data.get("address"), data.get("state")
     usable = isinstance(address, str) and len(address) < 500 and _ADDRESS.fullmatch(address)
     state = state if isinstance(state, str) else ""

@@ -71,18 +71,18 @@ def test_a_target_is_answered_when_it_has_been_assigned(page, arm):
 def test_what_is_driven_is_shown_as_long_as_the_program_is_there(viewer, page, code):
     address = f"http://127.0.0.1:{viewer}"
     with kin.connect(address, code, drives="SO-101 at /dev/ttyACM0") as arm:
-        page.wait(lambda: 'data-driven="SO-101 at /dev/ttyACM0"' in page.html)
+        page.wait(lambda: page.shown.get("driven") == "SO-101 at /dev/ttyACM0")
         assert arm.drives == "SO-101 at /dev/ttyACM0"
         arm.drives = None
-        page.wait(lambda: 'data-driven=""' in page.html)
+        page.wait(lambda: page.shown.get("driven") == "")
         arm.drives = "SO-101"
         arm._connection._socket.socket.shutdown(2)  # the network fails
-        page.wait(lambda: 'data-driven=""' in page.html)
-        page.wait(lambda: 'data-driven="SO-101"' in page.html)
+        page.wait(lambda: page.shown.get("driven") == "")
+        page.wait(lambda: page.shown.get("driven") == "SO-101")
         with pytest.raises(RefusedError, match="drives"):
             arm.drives = "x" * 61
         assert arm.drives == "SO-101"
-    page.wait(lambda: 'data-driven=""' in page.html)
+    page.wait(lambda: page.shown.get("driven") == "")
     with pytest.raises(RefusedError, match="drives"):
         kin.connect(address, code, drives="")
     with kin.connect(address, code):
@@ -323,18 +323,18 @@ def test_a_notebook_says_what_it_drives(viewer, monkeypatch):
     arm = notebook.show("ur5", Q, None, 4.0, True, 400, 300, None, "SO-101 at /dev/ttyACM0")
     with frame(arm, viewer) as page:
         page.wait(lambda: "data-live-code" in page.html)
-        assert 'data-driven=""' in page.html, "the notebook has not moved it yet"
+        assert page.shown.get("driven") == "", "the notebook has not moved it yet"
         arm.q = Q + 0.1
         page.wait(lambda: "Drives: <bdi>SO-101 at /dev/ttyACM0</bdi>" in page.html)
         with pytest.raises(kin.InputError, match="drives"):
             arm.drives = "\n"
         assert arm.drives == "SO-101 at /dev/ttyACM0"
         arm.drives = None
-        page.wait(lambda: 'data-driven=""' in page.html)
+        page.wait(lambda: page.shown.get("driven") == "")
         arm.drives = "Panda"
         page.wait(lambda: "Drives: <bdi>Panda</bdi>" in page.html)
         arm.page.close()
-        page.wait(lambda: 'data-driven=""' in page.html)
+        page.wait(lambda: page.shown.get("driven") == "")
 
 
 def test_a_notebook_reads_what_is_dragged_in_its_frame(viewer, monkeypatch):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import sys
 import time
 from typing import Any
@@ -14,7 +13,6 @@ from load.drag import measure as measure_drag
 from load.service import Service, serve
 from load.visitor import Visitor
 
-MESSAGES = "Messages of the page"  # label of the hidden field of the page's script
 JOINT = "1 rotating base"
 POSES = (20.0, 160.0)  # degrees of the joint at the two waypoints
 _PAUSE = 0.3  # s between what is pressed
@@ -23,7 +21,7 @@ _UP = 2.0  # s until the program is played
 
 async def press(visitor: Visitor, number: int, name: str, value: object = None) -> None:
     """Press a button of the tab Program, and give it a moment."""
-    visitor.set(MESSAGES, json.dumps([[number, "feature", ["program", [name, number], value]]]))
+    visitor.say("feature", ["program", [name, number], value])
     await asyncio.sleep(_PAUSE)
 
 

@@ -119,12 +119,12 @@ def _bearer(token: str) -> str:
 
 
 class Socket(asyncio.Protocol):
-    """A websocket; `heard` is called with each binary message, texts are passed over.
+    """A websocket; `heard` is called with each message, as bytes.
 
     Frames are masked with zeros, which costs nothing and is as good as any mask where nobody stands between.
     """
 
-    def __init__(self, hello: bytes, heard: Callable[[bytes], None]) -> None:
+    def __init__(self, hello: bytes, heard: Callable[[bytes], object]) -> None:
         self._hello = hello
         self._heard = heard
         self._buffer = bytearray()
@@ -139,7 +139,7 @@ class Socket(asyncio.Protocol):
         port: int,
         path: str,
         subprotocol: str,
-        heard: Callable[[bytes], None],
+        heard: Callable[[bytes], object],
         token: str = "",
         source: str = "127.0.0.1",
         cookie: str = "",
@@ -161,6 +161,10 @@ class Socket(asyncio.Protocol):
     def send(self, data: bytes) -> None:
         """A binary message."""
         self._transport.write(frame(2, data))
+
+    def send_text(self, text: str) -> None:
+        """A text message."""
+        self._transport.write(frame(1, text.encode()))
 
     def stop_reading(self) -> None:
         """Read nothing more of what the service sends."""
@@ -217,7 +221,7 @@ class Socket(asyncio.Protocol):
             at = begin + length
             if not whole or opcode == 0:
                 raise RuntimeError("a message in several frames: this client does not put them together")
-            if opcode == 2:
+            if opcode in (1, 2):
                 self._heard(data)
             elif opcode == 9:
                 self._transport.write(frame(10, data))

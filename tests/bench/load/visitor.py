@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import math
 import re
 import time
@@ -17,6 +18,7 @@ import zstandard
 from load.raw import Socket
 
 SUBPROTOCOL = f"viser-v{viser.__version__}"
+_CHANNEL = re.compile(r'data-channel="(\d+)/([\w-]+)"')
 _BASE_JOINT = re.compile(r"/arm-\d+/\d+")
 _unpack = zstandard.ZstdDecompressor().decompress
 _decode = msgspec.msgpack.Decoder().decode
@@ -40,6 +42,8 @@ class Visitor:
         self._token, self._cookie = token, cookie
         self._source = source
         self._socket: Socket
+        self._channel: Socket | None = None
+        self._opening: set[asyncio.Task[None]] = set()
         self.began = time.perf_counter()
         self.complete = self.last = math.nan  # when the gizmo was there, and the last message
         self.gizmo: dict[str, Any] = {}
@@ -60,6 +64,7 @@ class Visitor:
     async def connect(self, port: int, timeout: float = 60.0) -> None:
         """Connect and wait until the arm is there. Who gives up hangs up, and leaves no page to the next round."""
         self.began = time.perf_counter()
+        self._port = port
         async with asyncio.timeout(timeout):
             self._socket = await Socket.open(
                 port, "/viewer", SUBPROTOCOL, self._heard, self._token, self._source, self._cookie
@@ -101,6 +106,8 @@ class Visitor:
     def close(self) -> None:
         """Close the tab."""
         self._socket.close()
+        if self._channel is not None:
+            self._channel.close()
 
     def send(self, kind: str, **fields: Any) -> None:
         """A message of viser's protocol."""
@@ -199,6 +206,8 @@ class Visitor:
                 points = message["props"]["points"]
                 width = 3 * np.dtype(points["dtype"]).itemsize
                 self.points += said["binaryBufferLengths"][points["__binary_index"]] // width
+            elif kind == "GuiHtmlMessage" and (found := _CHANNEL.search(message["props"]["content"])):
+                self._opening.add(asyncio.get_running_loop().create_task(self._open_channel(*found.groups())))
             elif kind == "LocalStorageGetItemRequestMessage":
                 self.send(
                     "LocalStorageGetItemResponseMessage",
@@ -214,6 +223,31 @@ class Visitor:
                 self._joint = message["name"]
             elif "uuid" in message and "props" in message:
                 self.elements[message["props"].get("label", "")] = message["uuid"]
+
+    async def _open_channel(self, place: str, name: str) -> None:
+        """Open the page's channel, which remembers nothing."""
+        channel = await Socket.open(
+            self._port,
+            f"/viewer/channel/{place}",
+            f"kinboard-1, {name}",
+            self._give_sign,
+            self._token,
+            self._source,
+            self._cookie,
+        )
+        self._channel, self._said = channel, 0
+        self.say("hello", None)
+
+    def _give_sign(self, _: bytes) -> None:
+        """Answer a text of the channel, as the service expects every two seconds."""
+        if self._channel is not None:
+            self._channel.send_text('["heard", 0]')
+
+    def say(self, name: str, argument: object) -> None:
+        """Send a message of the page's scripts."""
+        assert self._channel is not None
+        self._said += 1
+        self._channel.send_text(json.dumps([self._said, name, argument]))
 
     def _pose(self, name: str) -> dict[str, Any]:
         return self._poses.setdefault(name, {"position": (0.0, 0.0, 0.0), "wxyz": (1.0, 0.0, 0.0, 0.0)})

@@ -188,7 +188,7 @@ class Actions:
         page.for_features(lambda feature: feature.on_request())
 
     def _show_history(self) -> None:
-        self._page.panel.script.show_history(*self.history.labels)
+        self._page.channel.show("history", self.history.labels)
 
     def _on_release(self, _: object) -> None:
         """The visitor has released a control: what follows is another step."""

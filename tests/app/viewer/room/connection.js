@@ -1,8 +1,9 @@
 "use strict";
-// Runs static/viser_page.js and static/class_tab.js as the page of a student does, with a clock of its own, and prints
+// Runs static/viser_page.js, channel.js and class_tab.js as the page of a student does, with a clock of its own, and prints
 // what they ask the service and when they say "No connection". Usage: node connection.js FOLDER_OF_SCRIPTS < steps.json
 //
-// A step is ["wait", ms], ["sent"], ["heard"], ["closed"], ["cut"], ["mend"] or ["event", name].
+// A step is ["wait", ms], ["sent"], ["heard"], ["closed"], ["cut"], ["mend"] or ["event", name]: of viser's connection
+// something is sent, of the channel something is heard, or it is closed.
 const fs = require("node:fs");
 const path = require("node:path");
 const vm = require("node:vm");
@@ -18,6 +19,8 @@ const setTimeout = (act, delay = 0, ...rest) => {
   timers.push(timer);
   return timer;
 };
+const clearTimeout = (timer) => { timers = timers.filter((each) => each !== timer); };
+const setInterval = (act, ms) => { setTimeout(() => { act(); setInterval(act, ms); }, ms); };
 /** Let all that waits for promises run. */
 const settle = () => new Promise((done) => setImmediate(done));
 async function wait(ms) {
@@ -41,6 +44,28 @@ const standIn = (name, ...properties) => {
 };
 class Worker extends EventTarget { postMessage() {} }
 class WebGL2RenderingContext { shaderSource() {} attachShader() {} linkProgram() {} }
+let channelSocket = null;
+class WebSocket extends EventTarget {
+  constructor() {
+    super();
+    channelSocket = this;
+    this.readyState = 0;
+    if (!cut) setTimeout(() => { this.readyState = WebSocket.OPEN; this.dispatchEvent(new Event("open")); }, 1);
+  }
+
+  send(text) {
+    if (text !== '["ask"]') return;
+    log.push([now - 1e6, text]);
+    if (!cut) setTimeout(hear, 5);
+  }
+
+  close() { this.readyState = 3; }
+}
+WebSocket.OPEN = 1;
+const hear = () => channelSocket.dispatchEvent(Object.assign(new Event("message"), { data: '{"heard": 1}' }));
+class DOMParser {
+  parseFromString() { return { body: { firstElementChild: { dataset: { channel: "0/name" } } } }; }
+}
 class Storage { getItem() { return null; } setItem() {} }
 
 const page = new EventTarget();
@@ -55,32 +80,28 @@ const document = Object.assign(new EventTarget(), {
   querySelectorAll: () => [],
 });
 const world = vm.createContext({
-  document, setTimeout, Date: FakeDate, Worker, WebGL2RenderingContext, Storage, Event, CustomEvent, URL, TextEncoder,
+  document, setTimeout, clearTimeout, setInterval, WebSocket, DOMParser, performance: { now: () => now }, Date: FakeDate, Worker, WebGL2RenderingContext, Storage, Event, CustomEvent, URL, TextEncoder,
   Intl, navigator: { language: "en", languages: ["en"] }, history: { replaceState() {} }, location: new URL("http://127.0.0.1/viewer/"),
   addEventListener: page.addEventListener.bind(page), dispatchEvent: page.dispatchEvent.bind(page),
   localStorage: new Storage(), sessionStorage: new Storage(), ResizeObserver: class { observe() {} disconnect() {} },
   Node: standIn("Node", "textContent"), Element: standIn("Element", "innerHTML"), HTMLScriptElement: standIn("HTMLScriptElement"),
   HTMLInputElement: standIn("HTMLInputElement", "value"), Navigator: standIn("Navigator"), MutationObserver: class { observe() {} },
-  AbortSignal: { timeout: (ms) => ms },
-  fetch: (url, { signal: patience }) => {
-    log.push([now - 1e6, url]);
-    return cut ? new Promise((_, refuse) => setTimeout(() => refuse(new Error("timeout")), patience)) : Promise.resolve({});
-  },
 });
 world.window = world;
-for (const name of ["viser_page.js", "class_tab.js"]) {
+for (const name of ["viser_page.js", "channel.js", "class_tab.js"]) {
   vm.runInContext(fs.readFileSync(path.join(process.argv[2], name), "utf8"), world, { filename: name });
 }
 Object.defineProperty(note, "textContent", { set(text) { this.text = text; log.push([now - 1e6, text]); }, get() { return this.text ?? ""; } });
 
 const line = new Worker();
 line.postMessage({ type: "set_server" });
-const tell = (data) => line.dispatchEvent(Object.assign(new Event("message"), { data }));
+const html = { type: "GuiHtmlMessage", props: { content: '<div hidden data-channel="0/name"></div>' } };
+line.dispatchEvent(Object.assign(new Event("message"), { data: { type: "message_batch", messages: [html] } }));
 const steps = {
   wait,
   sent: () => line.postMessage({ type: "send", message: { type: "GuiUpdateMessage", uuid: "a", updates: { value: 1 } } }),
-  heard: () => tell({ type: "message_batch", messages: [] }),
-  closed: () => tell({ type: "closed" }),
+  heard: hear,
+  closed: () => channelSocket.dispatchEvent(Object.assign(new Event("close"), { code: 1006 })),
   cut: () => { cut = true; },
   mend: () => { cut = false; },
   event: (name) => page.dispatchEvent(new Event(name)),

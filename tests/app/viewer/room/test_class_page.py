@@ -379,8 +379,9 @@ def test_what_is_opened_is_stored_in_the_same_step(room: Class) -> None:
     student.say("feature", ["course", ["pick", 1], 0])
     student.wait(lambda: 'data-course="follow"' in student.html)
     student.log.clear()
+    stored = len(student.kept)
     student.say("feature", ["course", ["next", 1], None])
-    student.wait(lambda: any(m["type"] == "LocalStorageSetItemMessage" for m in student.log))
+    student.wait(lambda: len(student.kept) > stored and EXERCISE in student.html)
     shown = next(i for i, m in enumerate(student.log) if f'data-exercise="{EXERCISE}"' in str(m.get("updates")))
     assert not any(m["type"] == "SetOrientationMessage" for m in student.log[shown:]), "in the same step"
     assert opened(student)["exercises"]["at"] == EXERCISE

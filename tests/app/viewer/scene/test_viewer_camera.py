@@ -141,7 +141,7 @@ def test_the_camera_is_stored_when_it_stops_and_restored(port: int) -> None:
         assert np.abs(rest(tab).camera - ASIDE).max() < 1e-9
         seen = {m["type"] for m in tab.log[sent:]}
         of_bar = {"SceneNodeUpdateMessage", "SetPositionMessage"}
-        assert seen == {"LocalStorageSetItemMessage", "GuiUpdateMessage", *of_bar}
+        assert seen == {"GuiUpdateMessage", *of_bar}
         (bar,) = (name for name in tab.nodes if name.endswith("-scale/length"))
         assert {m["name"] for m in tab.log[sent:] if m["type"] == "SetPositionMessage"} == {bar}
         changed = [(m["name"], m["updates"]) for m in tab.log[sent:] if m["type"] == "SceneNodeUpdateMessage"]

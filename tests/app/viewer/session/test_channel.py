@@ -7,6 +7,7 @@ import itertools
 import json
 import math
 from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from typing import Any
 
@@ -211,6 +212,26 @@ def test_who_may_only_look_is_answered_and_changes_nothing(door: str) -> None:
         assert replies == [[number, MAY_LOOK, []] for number in range(1, len(MESSAGES) + 1)]
 
     assert run(play, looking if door == "page" else Rights.FULL).posted == []
+
+
+def test_what_a_page_remembers_comes_first_and_counts_once_whatever_its_rights() -> None:
+    async def play(page: Page) -> None:
+        line = page.connect(Rights.LOOK)
+        line.say(1, "hello", {"state": "abc"})
+        line.say(2, "hello", {"state": "other"})
+        await rest()
+        assert page.channel.hello(0.0) == {"state": "abc"}
+
+    assert run(play, Rights.LOOK).posted == []
+
+
+def test_a_page_that_leaves_or_says_nothing_is_not_awaited_for_ever() -> None:
+    channel = Channel(lambda *_: None)
+    with pytest.raises(TimeoutError):
+        channel.hello(0.0)
+    channel.close()
+    with pytest.raises(CancelledError):
+        channel.hello(5.0)
 
 
 def test_a_value_that_no_page_could_read_is_the_error_of_who_shows_it() -> None:

@@ -294,7 +294,7 @@ def test_a_compressed_state_as_long_as_allowed_is_read():
     ],
 )
 def test_only_an_http_address_is_accepted_as_the_address_of_the_page(address, usable):
-    memory = read_stored_page(json.dumps({"address": address, "state": "abc"}))
+    memory = read_stored_page({"address": address, "state": "abc"})
     assert memory.address == (address if usable else "")
     assert memory.state == "abc"
 
@@ -303,12 +303,12 @@ def test_only_an_http_address_is_accepted_as_the_address_of_the_page(address, us
     ("sent", "used"), [("Large", "Large"), ("Tiny", "Normal"), ([], "Normal"), (None, "Normal")]
 )
 def test_the_page_opens_with_a_known_text_size(sent, used):
-    assert read_stored_page(json.dumps({"text": sent})).text_size == used
+    assert read_stored_page({"text": sent}).text_size == used
 
 
-@pytest.mark.parametrize("text", [None, "", "[]", "{", '{"state": 7}'])
-def test_an_invalid_message_of_the_page_restores_nothing(text):
-    assert read_stored_page(text).state == ""
+@pytest.mark.parametrize("remembered", [None, "", [], 5, {}, {"state": 7}])
+def test_an_invalid_message_of_the_page_restores_nothing(remembered):
+    assert read_stored_page(remembered).state == ""
 
 
 TEXTS = st.text(st.characters(codec=None), max_size=20)  # half letters too
@@ -418,10 +418,10 @@ def remembering(state: str, address: str = "https://arms.example/kin/") -> str:
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.key)
 def test_a_link_opens_for_visitors_who_may_only_look_what_computes_nothing(lesson: type[Lesson]) -> None:
     text = remembering(encode(PageState("pioneer5", lesson=lesson.key)))
-    client = SimpleNamespace(local_storage=SimpleNamespace(get_item=lambda key, timeout: text))
+    channel = SimpleNamespace(hello=lambda timeout: json.loads(text))
     for rights, shown in ((Rights.FULL, True), (Rights.LOOK, not lesson.computes)):
         activity = SimpleNamespace(review=SimpleNamespace(zone=""))
-        page_ = SimpleNamespace(client=client, store=STORE, activity=activity)
+        page_ = SimpleNamespace(channel=channel, store=STORE, activity=activity)
         persistence = Persistence(page_, False, lambda action: action(), rights)  # type: ignore[arg-type]
         persistence.load()
         assert persistence.stored.lesson == (lesson.key if shown else None)

@@ -277,8 +277,7 @@ def test_a_return_and_a_viewpoint_are_stored_as_what_they_are(port: int) -> None
         tab.wait(lambda: len(tab.kept) == 2)
         tab.say("undo")
         tab.wait(lambda: len(tab.kept) == 3)
-        keys = [m["key"] for m in tab.log if m["type"] == "LocalStorageSetItemMessage"]
-        assert keys == [KEY, KEY_REPLACE, KEY_RETURN]
+        assert tab.kept_as == [KEY, KEY_REPLACE, KEY_RETURN]
         assert math.isclose(tab.value(BASE), 90)
 
 
@@ -291,8 +290,7 @@ def test_a_step_that_goes_on_after_a_rest_replaces_its_entry(port: int) -> None:
             tab.wait(lambda count=count: len(tab.kept) == count)
         tab.set(ELBOW, 20)
         tab.wait(lambda: len(tab.kept) == 4)
-        keys = [m["key"] for m in tab.log if m["type"] == "LocalStorageSetItemMessage"]
-        assert keys == [KEY, KEY_REPLACE, KEY_REPLACE, KEY]
+        assert tab.kept_as == [KEY, KEY_REPLACE, KEY_REPLACE, KEY]
         tab.say("undo")
         tab.say("undo")
         tab.wait(lambda: tab.value(BASE) == 90)

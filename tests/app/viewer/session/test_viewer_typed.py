@@ -47,7 +47,7 @@ def test_a_typed_joint_value_keeps_its_digits(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
         elbow = label(PIONEER, 1)
-        tab.say("field", [tab.element(elbow), "45.678"])
+        number = tab.say("field", [tab.element(elbow), "45.678"])
         q = PIONEER.q_home.copy()
         q[1] = math.radians(45.678)
         arrives(tab, kin.fk(PIONEER, q), 1e-12)
@@ -55,7 +55,7 @@ def test_a_typed_joint_value_keeps_its_digits(port: int) -> None:
         tab.set(label(PIONEER, 0), 12)
         tab.settle()
         assert tab.value(elbow) == 45.678, "another joint's motion does not round it"
-        assert tab.script["reply"] == [1, "", []]
+        assert tab.script["reply"] == [number, "", []]
 
 
 def test_a_value_typed_into_a_field_that_was_replaced_counts_for_the_same_joint(port: int) -> None:
