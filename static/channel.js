@@ -1,5 +1,5 @@
 "use strict";
-// The page's own connection to its session (app/viewer/session/channel.py says what both send): messages of our scripts and
+// The page's own connection to its session (app/viewer/session/channel/ says what both send): messages of our scripts and
 // their answers. viser brings its name, in hidden HTML, with each new session. A connection that is lost is opened again, and
 // what was not confirmed is sent again: each message counts once. A new session must not act on messages to the one before.
 const channel = (() => {
@@ -134,6 +134,17 @@ const channel = (() => {
     isOpen,
     /** The name of the present session's channel, "" before the first one. */
     name: () => name,
+    /** Send a file to a feature of the session, which says how far it is.
+     *  Resolves to 200 if it has come or the page says why not, otherwise to the status of the answer, 0 if there was none. */
+    async sendFile(feature, key, fileName, body, signal) {
+      const headers = { "X-Kinboard-Channel": name, "X-Kinboard-File": encodeURIComponent(JSON.stringify([feature, key, fileName])) };
+      try {
+        const answer = await fetch(`upload/${place}`, { method: "POST", headers, body, signal });
+        return answer.ok || answer.headers.has("X-Kinboard-Said") ? 200 : answer.status;
+      } catch {
+        return 0;
+      }
+    },
     /** Have a new session be sent what `greet` returns before anything else. */
     greet: (greet) => { greeting = greet; },
     /** Ask the service for a sign of life. */

@@ -1,7 +1,6 @@
 "use strict";
 // Runs in viser's page: files that are opened or dropped, on whatever tab. `kindOf` says which file goes where. Several
-// files, or a folder, become a zip here. Texts are sent as they are, other files in base64; both in parts, because a
-// message has a limit.
+// files, or a folder, become a zip here. Small texts go as messages, other files by a request of their own.
 (() => {
   // Where files go: feature, tab, and the most bytes of one. The service refuses larger ones itself.
   const KINDS = {
@@ -11,14 +10,11 @@
     program: { feature: "program", tab: "Program", most: 30_000 },
     recording: { feature: "connect", tab: "Program", most: 16_777_216 },
   };
-  const PART = 16000; // bytes of a text in one message
-  const PART_OF_BYTES = 32000; // bytes of another file in one message, which base64 makes a third longer
-  const AT_ONCE = 6; // parts on their way
   const MOST_FILES = 500;
   const WANTED = /\.(urdf|xacro|xml|toml|stl|obj|mtl|dae|glb)$/i; // what is worth sending of a folder
   const HIDDEN = /(^|\/)(\.|__MACOSX)/;
 
-  const send = (kind, value, done, key = "upload") => channel.send("feature", [kind.feature, [key], value], done);
+  const send = (kind, value, key = "upload") => channel.send("feature", [kind.feature, [key], value]);
 
   /** Which kind of file this is, as it begins, and what its name says where that tells nothing. */
   async function kindOf(name, file, usual) {
@@ -36,7 +32,7 @@
     const button = event.target.closest?.("[data-arm-upload]");
     if (button) document.querySelector(button.dataset.armUpload === "folder" ? "[data-arm-folder]" : "[data-arm-file]").click();
     if (event.target.closest?.("[data-program-upload]")) document.querySelector("[data-program-file]").click();
-    if (event.target.closest?.('[data-arm-do="cancel"]')) uploading++;
+    if (event.target.closest?.('[data-arm-do="cancel"]')) end();
   });
   addEventListener("change", (event) => {
     const input = event.target.closest?.("[data-arm-file], [data-arm-folder], [data-program-file]");
@@ -81,14 +77,13 @@
 
   /** Send files to where they belong, and open that tab: it says how far they are, and asks where it must. */
   async function open(files, usual) {
-    const mine = ++uploading;
+    const signal = begin();
     if (files.length > 1) {
       viserPage.openTab(KINDS.zip.tab);
       const wanted = files.filter(([path]) => WANTED.test(path) && !HIDDEN.test(path));
       const roots = new Set(files.map(([path]) => path.split("/")[0]));
       const name = roots.size === 1 ? [...roots][0] : (wanted.find(([path]) => /\.urdf$/i.test(path)) ?? files[0])[0].split("/").pop();
-      const bytes = await zip(wanted);
-      if (mine === uploading) sendBytes(KINDS.zip, name.slice(0, 100), bytes, mine);
+      sendFile(KINDS.zip, name.slice(0, 100), await zip(wanted), signal);
       return;
     }
     const [[path, file]] = files;
@@ -96,12 +91,8 @@
     const kind = await kindOf(name, file, usual);
     const { tab, most } = KINDS[kind];
     viserPage.openTab(tab);
-    if (kind === "zip" || kind === "recording") {
-      const bytes = new Uint8Array(await file.slice(0, most + 1).arrayBuffer());
-      if (mine !== uploading) return;
-      shown = kind === "recording" ? null : shown;
-      sendBytes(KINDS[kind], name, bytes, mine);
-    } else if (kind === "arm") sendText(name, await file.slice(0, most + 1).text(), 0, mine);
+    if (kind === "recording") shown = null;
+    if (["zip", "recording", "arm"].includes(kind)) sendFile(KINDS[kind], name, file, signal);
     else send(KINDS[kind], [name, file.size > most ? null : await file.text()]);
   }
 
@@ -119,7 +110,7 @@
   addEventListener("click", (event) => {
     const button = event.target.closest?.("[data-compare-do]");
     if (button?.dataset.compareDo === "open") document.querySelector("[data-compare-file]").click();
-    if (button?.dataset.compareDo === "send") sendText("your text", document.querySelector("[data-compare-text]").value, 0, ++uploading, "other-text");
+    if (button?.dataset.compareDo === "send") sendFile(KINDS.arm, "your text", new Blob([document.querySelector("[data-compare-text]").value]), begin(), "other-text");
   });
   addEventListener("change", async (event) => {
     const input = event.target.closest?.("[data-compare-file]");
@@ -128,7 +119,7 @@
     input.value = "";
     const text = await file.slice(0, KINDS.arm.most + 1).text();
     document.querySelector("[data-compare-text]").value = text;
-    sendText(file.name.slice(0, 100), text, 0, ++uploading, "other-text");
+    sendFile(KINDS.arm, file.name.slice(0, 100), file, begin(), "other-text");
   });
 
   // Zipping
@@ -165,40 +156,28 @@
       if (at > KINDS.zip.most) break;
     }
     const length = list.reduce((sum, one) => sum + one.length, 0);
-    const end = record([0x06054b50], 0, 0, list.length / 2, list.length / 2, [length], [at], 0);
-    return new Uint8Array(await new Blob([...parts, ...list, end]).arrayBuffer());
+    const tail = record([0x06054b50], 0, 0, list.length / 2, list.length / 2, [length], [at], 0);
+    return new Blob([...parts, ...list, tail]);
   }
 
   // Sending
 
-  let uploading = 0; // the upload that goes on: a newer one ends it
-  addEventListener("kinboard-connect", () => { uploading++; });
-  function sendBytes(kind, name, bytes, mine) {
-    let from = 0;
-    let begun = false;
-    const next = () => {
-      if (mine !== uploading || (begun && from >= bytes.length)) return;
-      begun = true;
-      const start = from;
-      const to = from = Math.min(start + PART_OF_BYTES, bytes.length);
-      const part = btoa(String.fromCharCode(...bytes.subarray(start, to)));
-      const first = start === 0;
-      send(kind, [name, first, to >= bytes.length, part, "base64", start, bytes.length], first ? begin : next);
-    };
-    const begin = () => { for (let k = 0; k < AT_ONCE; k++) next(); };
-    next();
+  let ending = null; // ends the file that is on its way
+  /** End the file that is on its way; the service drops what it has of it. */
+  function end() {
+    ending?.abort();
+    ending = null;
   }
-  /** The end of the part that begins at `from`: a short enough message, and no character is cut in two. */
-  function endOfPart(text, from) {
-    let length = PART;
-    while (new TextEncoder().encode(JSON.stringify(text.slice(from, from + length))).length > PART + 2) length >>= 1;
-    const inside = text.codePointAt(from + length - 1) > 0xffff; // the second half of that character comes next
-    return from + length - inside;
+  /** Begin another one in its place; returns what tells whether it has been ended. */
+  function begin() {
+    end();
+    ending = new AbortController();
+    return ending.signal;
   }
-  function sendText(name, text, from, mine, key) {
-    if (mine !== uploading) return;
-    const to = endOfPart(text, from);
-    const next = () => { if (to < text.length) sendText(name, text, to, mine, key); };
-    send(KINDS.arm, [name, from === 0, to >= text.length, text.slice(from, to)], next, key);
+  addEventListener("kinboard-connect", end); // a new session knows nothing of it
+  async function sendFile(kind, name, body, signal, key = "upload") {
+    if (signal.aborted) return;
+    const status = await channel.sendFile(kind.feature, key, name, body, signal);
+    if (!signal.aborted && status !== 200) send(kind, [name, status], key); // the page says so
   }
 })();

@@ -11,7 +11,7 @@ whose partner is away does everything itself, as far as it can: the viewer's pro
 REST accepts connections, and tells visitors that the viewer is warming up.
 
 A program that is to be connected to a page may reach any process of any worker. The code in its address says which
-one has the page (:mod:`app.live.codes`), and the address of a page's channel says it too: the processes with
+one has the page (:mod:`app.live.codes`), and so do the addresses of a page's channel and files: the processes with
 viewers are linked for these connections alone.
 """
 
@@ -31,7 +31,7 @@ from typing import Final
 
 from app.live import code_in, home_of
 from app.shared import metrics
-from app.shared.security import place_of_channel
+from app.shared.security import place_of_page
 from kin.warmup.preparation import SIZE
 
 logger = logging.getLogger("kinboard.connections")
@@ -197,7 +197,7 @@ class Handover:
             path = path.removeprefix(self._prefix)
         if (code := code_in(path)) is not None:
             return self._towards(self._member.home(code))
-        if (place := place_of_channel(path)) is not None:
+        if (place := place_of_page(path)) is not None:
             return self._towards(place * len(self._member.group))
         if adopted or self._member.role.serves(path):
             return None

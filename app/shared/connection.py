@@ -5,7 +5,8 @@ Messages pass between both by function calls in one event loop; there is no seco
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 from app.shared.security import Rights
@@ -79,6 +80,36 @@ class PageConnection(Protocol):
         """Send a text; returns when the connection takes the next one. Raises `ConnectionEnded`."""
 
 
+@dataclass(frozen=True)
+class SentFile:
+    """What the request says of a file that a page sends.
+
+    Attributes:
+        feature, key: what it is for.
+        name: of the file.
+        size: its bytes.
+    """
+
+    feature: str
+    key: str
+    name: str
+    size: int
+
+
+class FileRefused(Exception):  # noqa: N818 - an answer
+    """A file is not taken.
+
+    Attributes:
+        status: of the answer.
+        why: in words.
+        said: whether the page says so already.
+    """
+
+    def __init__(self, status: int, why: str, said: bool = False) -> None:
+        super().__init__(status, why)
+        self.status, self.why, self.said = status, why, said
+
+
 class Viewer(Protocol):
     """Serves the connections of all visitors, in the event loop that it was started with."""
 
@@ -90,3 +121,6 @@ class Viewer(Protocol):
 
     async def serve_channel(self, connection: PageConnection, name: str) -> ConnectionEnded:
         """Serve the channel of this name until the connection ends; returns why. Another name: code 1008."""
+
+    async def receive_file(self, name: str, sent: SentFile, parts: AsyncIterator[bytes]) -> None:
+        """Receive a file for the page whose channel has this name; raises `FileRefused`."""

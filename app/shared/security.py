@@ -34,8 +34,8 @@ CAMERA = "ViewerCameraMessage"
 MEMORY = "LocalStorageGetItemResponseMessage"
 HELLO = "hello"  # in the page's channel: what it remembers
 
-# Of a page's channel, with the number of the process that has the page: below the prefix of the service.
-_CHANNEL = re.compile(r"/viewer/channel/(\d{1,3})")
+# Of a page's channel and files, with the number of the process that has the page; below the prefix of the service.
+_OF_PAGE = re.compile(r"/viewer/(?:channel|upload)/([0-9]{1,3})")
 _COMPUTING = re.compile(r"/(workspace|capability)\b")
 
 
@@ -54,7 +54,7 @@ class Rights(Enum):
 
     def allow_websocket(self, path: str) -> bool:
         """Whether a websocket is accepted: one of a page, or a cloud."""
-        return self.compute or is_page_socket(path)
+        return self.compute or is_of_page(path)
 
     def allow_message(self, kind: object) -> bool:
         """Whether a message of a page, which is known and well-formed, is passed on.
@@ -75,15 +75,15 @@ class Rights(Enum):
         return self is Rights.SAVE
 
 
-def place_of_channel(path: str) -> int | None:
-    """Which of the processes with pages has the page whose channel has this address; None: another address."""
-    found = _CHANNEL.fullmatch(path)
+def place_of_page(path: str) -> int | None:
+    """The number of the process with the page, in the address of its channel or files; None: another address."""
+    found = _OF_PAGE.fullmatch(path)
     return None if found is None else int(found[1])
 
 
-def is_page_socket(path: str) -> bool:
-    """Whether a page opens a websocket there: viser's, or its channel."""
-    return path.rstrip("/") == "/viewer" or place_of_channel(path) is not None
+def is_of_page(path: str) -> bool:
+    """Whether it is the address of a page, of one of its websockets or of its files."""
+    return path.rstrip("/") == "/viewer" or place_of_page(path) is not None
 
 
 # Swagger UI sets inline styles and data: images; scripts come from our own files only.

@@ -8,7 +8,8 @@ needs no locks, and what it sends appears together with the arm's new pose.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import ClassVar, Protocol
 
 import viser
@@ -194,6 +195,7 @@ class Feature:
         kernels: names of the parts of the core (`kin.warmup.parts`) that it needs, beside what moves the robot. On
             a new machine the visitor waits for them. `ALL`: what else arms of the robot's family do.
         messages: the events that the page's own script may send, by the first part of their key.
+        files: those of these events that bring a file, and its most bytes (`app.viewer.session.channel.files`).
         acts: whether they change what the visitor sees of the arm and the lessons, which a class that is led or
             frozen does not leave to its students.
         shared: whether the pages that a class follows show its state, as they do that of the open lesson.
@@ -206,6 +208,7 @@ class Feature:
     about: ClassVar[str] = ""
     kernels: ClassVar[tuple[str, ...]] = ()
     messages: ClassVar[frozenset[str]] = frozenset()
+    files: ClassVar[Mapping[str, int]] = MappingProxyType({})
     acts: ClassVar[bool] = True
     shared: ClassVar[bool] = False
 

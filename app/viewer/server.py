@@ -7,6 +7,7 @@ import hmac
 import logging
 import threading
 import time
+from collections.abc import AsyncIterator
 
 import viser
 
@@ -15,7 +16,14 @@ from app.classroom.courses import Courses
 from app.exercises import Exercises
 from app.live import Lines
 from app.shared.clouds import Clouds
-from app.shared.connection import Connection, ConnectionEnded, PageConnection, never_silent
+from app.shared.connection import (
+    Connection,
+    ConnectionEnded,
+    FileRefused,
+    PageConnection,
+    SentFile,
+    never_silent,
+)
 from app.shared.maps import Maps
 from app.shared.security import Rights
 from app.shared.settings import Settings
@@ -41,6 +49,7 @@ from kin.warmup.preparation import Preparation
 
 log = logging.getLogger(__name__)
 
+GONE = "There is no such page any more. Reload it."
 STOP_TIMEOUT = 2.0  # s for all workers to end
 RESTARTS = 3  # of one visitor's worker; after that, it is assumed to fail again
 RESTARTED = Notice(
@@ -117,10 +126,23 @@ class ViewerServer:
 
     async def serve_channel(self, connection: PageConnection, name: str) -> ConnectionEnded:
         """Serve the channel of this name until the connection ends; returns why."""
-        for page in list(self.pages.values()):
-            if hmac.compare_digest(page.channel.name.encode(), name.encode()):
-                return await page.channel.serve(connection, self._connections.waker.call)
-        return ConnectionEnded(1008, "there is no page of this name any more; reload it")
+        page = self._page_named(name)
+        if page is None:
+            return ConnectionEnded(1008, GONE)
+        return await page.channel.serve(connection, self._connections.waker.call)
+
+    async def receive_file(self, name: str, sent: SentFile, parts: AsyncIterator[bytes]) -> None:
+        """Receive a file for the page whose channel has this name; raises `FileRefused`."""
+        page = self._page_named(name)
+        if page is None:
+            raise FileRefused(404, GONE)
+        await page.files.receive(sent, parts)
+
+    def _page_named(self, name: str) -> VisitorPage | None:
+        """The page whose channel has this name."""
+        given = name.encode()
+        pages = list(self.pages.values())
+        return next((each for each in pages if hmac.compare_digest(each.channel.name.encode(), given)), None)
 
     def stop(self) -> None:
         """End every page and the server; returns when their threads have ended."""

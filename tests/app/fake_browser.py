@@ -7,8 +7,10 @@ import json
 import time
 import weakref
 from collections.abc import Callable, Hashable
+from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote, urlsplit
 
 import msgspec
 import numpy as np
@@ -19,7 +21,13 @@ from starlette.websockets import WebSocket
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from app.service.web.viewer_proxy import CHANNEL_PROTOCOL, ChannelConnection, VisitorConnection, _SocketConnection
+from app.service.web.viewer_proxy import (
+    CHANNEL_NAME,
+    CHANNEL_PROTOCOL,
+    FILE,
+    ChannelConnection,
+    VisitorConnection,
+)
 from app.viewer.panel.script import LABEL
 from app.viewer.session.persistence import SAVE_AFTER
 from app.viewer.session.state import KEY_LAST
@@ -58,7 +66,7 @@ def _watched_channel(self: ChannelConnection, visitor: WebSocket) -> None:
     _count_messages(self, visitor)
 
 
-def _count_messages(self: _SocketConnection, visitor: WebSocket) -> Callable[[], None]:
+def _count_messages(self: ChannelConnection | VisitorConnection, visitor: WebSocket) -> Callable[[], None]:
     """Note how many messages of a connection have been handled; returns what counts one more."""
     receive, received = visitor.receive, 0
     port = visitor.client.port if visitor.client else 0
@@ -194,9 +202,9 @@ class FakeBrowser:
         self.left_off: list[str] = []
         self._url = where if isinstance(where, str) else f"ws://127.0.0.1:{where}{path}"
         self._options = options
-        self._wire = Wire(self._url, [f"viser-v{viser.__version__}"], options)
+        self.viser = Wire(self._url, [f"viser-v{viser.__version__}"], options)
         self.channel: Wire | None = None
-        self._place = self._name = ""  # of the channel
+        self._place = self.name = ""  # of the channel
         self._number = self._noted = 0  # of the last message and the last notice
         self.shown: dict[str, Any] = {}  # by the channel
         self.replied: list[Any] = [0, "", []]
@@ -220,7 +228,7 @@ class FakeBrowser:
         self.close()
 
     def close(self) -> None:
-        self._wire.close()
+        self.viser.close()
         if self.channel is not None:
             self.channel.close()
 
@@ -230,7 +238,7 @@ class FakeBrowser:
     def send_raw(self, data: bytes | str) -> None:
         if self.channel is not None:
             self.channel.wait_until_handled()
-        self._wire.send(data)
+        self.viser.send(data)
         self._owed = True
 
     # What is shown
@@ -297,10 +305,36 @@ class FakeBrowser:
             self.said = [*self.said[-19:], message]
             self.set(LABEL, json.dumps(self.said))
         else:
-            self._wire.wait_until_handled()
+            self.viser.wait_until_handled()
             self.channel.send(json.dumps(message))
             self._owed = True
         return self._number
+
+    def begin_file(self, feature: str, name: str, size: int, key: str = "upload") -> HTTPConnection:
+        """The request that sends a file, up to its head."""
+        self.wait(lambda: self.channel is not None)
+        self.viser.wait_until_handled()
+        place = urlsplit(self._url)
+        assert place.hostname is not None
+        request = HTTPConnection(place.hostname, place.port, timeout=PATIENCE)
+        request.putrequest("POST", f"{place.path.rstrip('/')}/upload/{self._place}")
+        about = {CHANNEL_NAME: self.name, FILE: quote(json.dumps([feature, key, name])), "Content-Length": size}
+        for field, value in (about | self._options.get("additional_headers", {})).items():
+            request.putheader(field, str(value))
+        request.endheaders()
+        return request
+
+    def open_file(self, feature: str, name: str, content: bytes | str, key: str = "upload") -> int:
+        """Send a file as static/upload.js does; returns the status of the answer when the page has taken it."""
+        data = content.encode() if isinstance(content, str) else content
+        request = self.begin_file(feature, name, len(data), key)
+        with contextlib.suppress(BrokenPipeError, ConnectionResetError):  # it may be refused before all has come
+            request.send(data)
+        answer = request.getresponse()
+        answer.read()
+        request.close()
+        self._catch_up()
+        return answer.status
 
     @property
     def script(self) -> dict[str, Any]:
@@ -310,7 +344,7 @@ class FakeBrowser:
 
     def open_channel(self) -> None:
         """Open the channel of the present session, or open it anew."""
-        before, protocols = self.channel, [CHANNEL_PROTOCOL, self._name]
+        before, protocols = self.channel, [CHANNEL_PROTOCOL, self.name]
         self.channel = Wire(f"{self._url.rstrip('/')}/channel/{self._place}", protocols, self._options)
         if before is not None:
             before.close()
@@ -318,8 +352,8 @@ class FakeBrowser:
 
     def _note_channel(self, content: str) -> None:
         place, name = content.split('data-channel="', 1)[1].split('"', 1)[0].split("/")
-        if name != self._name:
-            self._place, self._name, self.said = place, name, []
+        if name != self.name:
+            self._place, self.name, self.said = place, name, []
             self._number, self._noted, self.replied = 0, 0, [0, "", []]
             self.shown = {}
             self.open_channel()
@@ -350,12 +384,12 @@ class FakeBrowser:
 
     def _catch_up(self) -> None:
         """Show what belongs to the step that a notice comes from, as a person sees both at once."""
-        if self._wire.port in _handled:
+        if self.viser.port in _handled:
             end = time.monotonic() + ANSWER
             while working() and time.monotonic() < end:
                 time.sleep(0.0005)
-        self._wire.ping()
-        while not self._wire.ended and (data := self._wire.receive(0.0)) is not None:
+        self.viser.ping()
+        while not self.viser.ended and (data := self.viser.receive(0.0)) is not None:
             self._apply_frame(data)
 
     def _take(self, name: str, value: Any) -> None:
@@ -464,16 +498,16 @@ class FakeBrowser:
         self._owed = False
         while True:
             now = time.monotonic()
-            wires = [self._wire, *([] if self.channel is None else [self.channel])]
+            wires = [self.viser, *([] if self.channel is None else [self.channel])]
             if now > answered:
                 for wire in wires:
                     wire.sent = _handled.get(wire.port, wire.sent)  # some messages are not passed on
-            if self._wire.port in _handled:
+            if self.viser.port in _handled:
                 rests = now > late or (all(wire.is_handled for wire in wires) and not working())
             else:
                 rests = now > answered
             if self.read(quiet if rests else 0.02):
-                answered = answered if self._wire.port in _handled else 0.0
+                answered = answered if self.viser.port in _handled else 0.0
             elif rests:
                 return
             assert time.monotonic() < end, f"the page did not come to rest within {timeout} s"
@@ -491,7 +525,7 @@ class FakeBrowser:
             if self._read_channel():
                 return True
             left = max(0.0, end - time.monotonic())
-            data = self._wire.receive(left if self.channel is None else min(left, LOOK))
+            data = self.viser.receive(left if self.channel is None else min(left, LOOK))
             if data is not None:
                 self._apply_frame(data)
                 return True

@@ -34,7 +34,7 @@ from starlette.websockets import WebSocket
 from app.api.problems import ProblemError, respond
 from app.service.web.rate_limit import TokenBucket
 from app.shared.clients import client_of, is_here
-from app.shared.security import SAFE_METHODS, Rights, is_page_socket, origin_allowed, set_cookie
+from app.shared.security import SAFE_METHODS, Rights, is_of_page, origin_allowed, set_cookie
 
 COOKIE = "kinboard"
 COOKIE_AGE = 30 * 24 * 3600  # seconds until a login ends
@@ -159,7 +159,7 @@ class Access:
         """Whether the client may go there without the token: pages of rooms; with a seat, the viewer."""
         if path.startswith("/room/") or (path == "/room" and scope.get("method") in SAFE_METHODS):
             return True
-        if self._guests is None or not is_page_socket(path):
+        if self._guests is None or not is_of_page(path):
             return False
         try:
             cookies = SimpleCookie(dict(scope["headers"]).get(b"cookie", b"").decode("latin-1"))

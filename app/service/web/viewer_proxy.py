@@ -3,7 +3,7 @@
 The page and the viewer's messages come from :mod:`app.viewer`, which listens on no port: `ViewerBridge` accepts a
 websocket, and the viewer receives and sends through `VisitorConnection`, by function calls in the same event loop.
 viser's page connects to its own address without the trailing slash, so both forms are routes. Our own scripts in
-it have a second websocket, their channel (:mod:`app.viewer.session.channel`).
+it have a second websocket, their channel (:mod:`app.viewer.session.channel.channel`).
 
 Messages of visitors are inspected first (:mod:`app.service.web.inspection`); a visitor who sends invalid ones is
 disconnected without affecting others. A slow visitor must not fill our memory: sending waits until the socket
@@ -21,12 +21,14 @@ import logging
 from collections.abc import Awaitable, Callable, Iterable
 from functools import partial
 from typing import Any
+from urllib.parse import unquote
 
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, HTTPConnection, Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
+from app.api.problems import ProblemError
 from app.classroom import COOKIE as ROOM_COOKIE
 from app.service.web.access import rights_of
 from app.service.web.embedding import discovery
@@ -34,10 +36,20 @@ from app.service.web.inspection import MalformedMessageError, admitted
 from app.service.web.negotiation import accepts_gzip, is_current
 from app.service.web.short_page import short_page
 from app.shared.clients import client_of
-from app.shared.connection import LINE, SILENCE, ConnectionEnded, Line, Viewer, never_silent
+from app.shared.connection import (
+    LINE,
+    SILENCE,
+    ConnectionEnded,
+    FileRefused,
+    Line,
+    SentFile,
+    Viewer,
+    never_silent,
+)
 from app.shared.metrics import DROPPED, STREAMED, VISITORS
 from app.shared.security import VIEWER_POLICY, origin_allowed
 from app.shared.slots import Slot, Slots
+from kin.parsing import Limits, TextError, read_json
 
 logger = logging.getLogger("kinboard.bridge")
 
@@ -50,6 +62,17 @@ _FULL_PAGE = short_page(
     again=10,
 )
 
+FILE, CHANNEL_NAME = "x-kinboard-file", "x-kinboard-channel"  # fields of the head of a request with a file
+SAID = "x-kinboard-said"  # of its answer: the page says why the file is not taken
+_FILE_LIMITS = Limits(4096, 8, 2)
+_FILE_PROBLEMS = {
+    400: "bad-request",
+    403: "read-only",
+    404: "not-found",
+    409: "not-allowed",
+    413: "body-too-large",
+    503: "busy",
+}
 CHANNEL_PROTOCOL = "kinboard-1"  # the first subprotocol of a channel
 ADDRESSES = 8  # of the service, for which a page with an address of its own is kept
 
@@ -103,6 +126,7 @@ class ViewerBridge:
             WebSocketRoute("/viewer", self.websocket),
             WebSocketRoute("/viewer/", self.websocket),
             WebSocketRoute("/viewer/channel/{place:int}", self.channel),
+            Route("/viewer/upload/{place:int}", self.upload, methods=["POST"]),
         ]
 
     async def page(self, request: Request) -> Response:
@@ -153,12 +177,44 @@ class ViewerBridge:
             serve = partial(self.viewer.serve_channel, connection, protocols[1])
             await _serve(visitor, connection, CHANNEL_PROTOCOL, serve)
 
-    def _is_ours(self, visitor: WebSocket) -> bool:
-        """Whether a websocket may be opened by the page that does."""
+    async def upload(self, request: Request) -> Response:
+        """A file for a page, whose channel's name and what it is for are in the head: addresses are logged."""
+        if not self._is_ours(request):
+            raise ProblemError(403, "forbidden", "Pages of other sites may not send files.", "")
+        if self.viewer is None:
+            raise ProblemError(503, "busy", "The viewer is warming up.", "Try again in a moment.")
+        sent = _sent_file(request)
+        try:
+            await self.viewer.receive_file(request.headers.get(CHANNEL_NAME, ""), sent, request.stream())
+        except FileRefused as refused:
+            kind = _FILE_PROBLEMS.get(refused.status, "http-error")
+            headers = {"connection": "close"} | ({SAID: "1"} if refused.said else {})
+            raise ProblemError(refused.status, kind, refused.why, "", headers=headers) from None
+        except ClientDisconnect:
+            pass  # nobody hears the answer
+        return Response(status_code=204)
+
+    def _is_ours(self, visitor: HTTPConnection) -> bool:
+        """Whether a websocket may be opened, or a file sent, by the page that does."""
         if origin_allowed(visitor.headers, self._allowed_origins):
             return True
-        logger.warning("refused a websocket from a page of %.200r", visitor.headers.get("origin"))
+        logger.warning("refused a %s from a page of %.200r", visitor.scope["type"], visitor.headers.get("origin"))
         return False
+
+
+def _sent_file(request: Request) -> SentFile:
+    """What the head of a request says of its file; raises `ProblemError`."""
+    length = request.headers.get("content-length", "")
+    if not (length.isascii() and length.isdecimal() and len(length) < 12):
+        raise ProblemError(411, "bad-request", "A file needs a Content-Length.", "")
+    try:
+        match read_json(unquote(request.headers.get(FILE, "")), _FILE_LIMITS):
+            case [str(feature), str(key), str(name)]:
+                return SentFile(feature, key, name, int(length))
+    except TextError:
+        pass
+    hint = "Send [feature, event, name of the file] as JSON with percent signs."
+    raise ProblemError(400, "bad-request", f"The field {FILE} does not say what the file is for.", hint)
 
 
 async def _serve(

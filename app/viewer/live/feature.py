@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,7 +25,7 @@ from app.viewer.live.drawings import Drawings, merged, nodes
 from app.viewer.live.opening import Opening
 from app.viewer.live.tape import BYTES, LONGEST, OF_ALL, WRITERS, Tape
 from app.viewer.meshes.archive import MeshError
-from app.viewer.meshes.incoming import late
+from app.viewer.meshes.incoming import IncomingFile, not_sent
 from app.viewer.own_arm import own_arm
 from app.viewer.panel.status import Notice
 from app.viewer.skeleton import ghost
@@ -64,6 +65,7 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
     title = "Connected program"
     settings_of, facts_of = TapeSettings, ConnectFacts
     messages = frozenset({"upload"})
+    files = MappingProxyType({"upload": OPENED.size})
     undo: ClassVar[dict[str, str]] = {"on_show_arm": "Another arm"}
 
     def __init__(self, stage: Stage) -> None:
@@ -101,9 +103,16 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
 
     def handle(self, key: Hashable, value: object) -> None:
         match key:
+            case ("arriving", "upload") if isinstance(value, IncomingFile):
+                self.wake()
+                if why := self._opening.expect(value):
+                    self.stage.notify(Notice("error", f"{value.name} did not arrive", why))
             case ("upload",):
                 self.wake()
-                self._try(lambda: self._opening.take(value))
+                if isinstance(value, IncomingFile):
+                    self._opening.take(value)
+                else:
+                    self.stage.notify(Notice("error", *not_sent(value)))
             case ("read", int(number)):
                 self.wake()
                 self._try(lambda: self._use(self._opening.result(number, value)))
@@ -193,10 +202,6 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
             elif line is not None:
                 self.stage.notify(Notice("hand", f"{self._was} has left", "The code still counts."))
             self._was = name
-            self._stale = True
-        timeout = self.stage.meshes.reader.receive_timeout
-        if name := self._opening.stalled(now, timeout):
-            self.stage.notify(Notice("error", f"{name} did not arrive", late(timeout)))
             self._stale = True
         if self._tape.playing:
             self._measured = self._tape.advance(now)

@@ -1,4 +1,4 @@
-"""A recording that the visitor opens: it arrives in parts, and is read behind the page.
+"""A recording that the visitor opens: it is read behind the page.
 
 Recordings come from anybody, and a large one takes seconds to read: one thread of low priority reads one after the
 other, for all pages of the process.
@@ -15,11 +15,10 @@ from app.shared.memory.answers import Reservation
 from app.shared.threads import lower_priority
 from app.shared.threads.executor import DaemonExecutor
 from app.viewer.feature import Stage
-from app.viewer.meshes.incoming import Incoming
+from app.viewer.meshes.incoming import IncomingFile
 from app.viewer.panel import Post
 from kin import Robot
 
-MOST_TEXT: Final = 0  # recordings are sent as bytes, tables too
 _reader: Final = DaemonExecutor(1, "recordings", lower_priority)
 
 
@@ -32,7 +31,7 @@ class Opening:
 
     def __init__(self, stage: Stage, post: Post, bounds: Bounds) -> None:
         self._stage, self._post, self._bounds = stage, post, bounds
-        self._incoming = Incoming(stage.meshes.memory, MOST_TEXT, bounds.size, "a recording")
+        self._incoming: IncomingFile | None = None  # on its way
         self._future: Future[Recording] | None = None
         self._number = 0
         self.name = ""  # of the file that is being read or was read last
@@ -42,28 +41,28 @@ class Opening:
         """What goes on, and how far it is, in per cent; None: nothing."""
         if self._future is not None:
             return f"Reading “{self.name}” …", 100.0
-        if self._incoming.name:
-            total = max(self._incoming.total, 1)
-            return f"Receiving “{self._incoming.name}” …", round(
-                min(100.0 * self._incoming.arrived / total, 100.0)
-            )
+        if (file := self._incoming) is not None and file.busy:
+            return f"Receiving “{file.name}” …", round(100.0 * file.arrived / max(file.total, 1))
         return None
 
-    def take(self, value: object) -> None:
-        """A part of a file.
+    def expect(self, file: IncomingFile) -> str:
+        """A file is on its way, or has failed; returns why it has."""
+        if file.cancelled:
+            return ""
+        if file is not self._incoming:
+            self.stop()
+        self._incoming = None if file.failure else file
+        return file.failure
 
-        Raises:
-            MeshError: it is too large, there is no room for it, or a part of it is missing.
-            kin.InputError: no part of a file.
-        """
-        self._cancel()
-        file = self._incoming.take(value)
-        if file is None:
+    def take(self, file: IncomingFile) -> None:
+        """A file that is whole, unless it was cancelled meanwhile."""
+        if file is not self._incoming:
             return
-        self.name, content, room = file
-        data = content.encode() if isinstance(content, str) else content
+        self._incoming = None
+        self._cancel()
+        self.name = file.name
         self._number += 1
-        self._future = _reader.submit(_read, data, self._stage.now.robot, self._bounds, room)
+        self._future = _reader.submit(_read, file.content(), self._stage.now.robot, self._bounds, file.room)
         self._future.add_done_callback(partial(self._post, ("read", self._number)))
 
     def result(self, number: int, done: object) -> Recording | None:
@@ -74,17 +73,11 @@ class Opening:
         found: Recording = done.result()
         return found
 
-    def stalled(self, now: float, timeout: float) -> str:
-        """End a file whose next part does not come; returns its name, "" if there is none."""
-        left = self._incoming.left(now, timeout)
-        name = self._incoming.name if left is not None and left <= 0.0 else ""
-        if name:
-            self._incoming.forget()
-        return name
-
     def stop(self) -> None:
         """End what goes on."""
-        self._incoming.forget()
+        if self._incoming is not None:
+            self._incoming.cancel()
+            self._incoming = None
         self._cancel()
 
     def _cancel(self) -> None:

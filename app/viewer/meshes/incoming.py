@@ -1,114 +1,116 @@
-"""A file that the page's own script sends in parts, because a message has a limit (static/upload.js)."""
+"""A file that a page sends by an HTTP request of its own, beside its messages (static/upload.js).
+
+The event loop receives it, into room that was reserved from the length that the request announces. The feature
+that it is for learns that it is on its way, how far it is, and that it is there or has failed; it may cancel it.
+"""
 
 from __future__ import annotations
 
-import base64
-import binascii
-import time
+import threading
+from collections.abc import Callable
 
-from app.shared.memory.answers import AnswerMemory, MemoryFullError, Reservation
-from app.viewer.meshes.archive import MB, MeshError
-from app.viewer.meshes.reader import full
+from app.shared.memory.answers import Reservation
+from app.viewer.meshes.archive import MeshError
 from kin import InputError
 from kin.typed import cut
 
+ZIP = b"PK"  # begins a zip
+PROXY = "Something between the browser and the service takes no file of this size."
+CUT_OFF = "The connection ended before all of it had come. Open it again."
 
-class Incoming:
-    """A file that arrives in parts: text, or bytes in base64.
+
+class IncomingFile:
+    """One file. The event loop calls `add`, `finish` and `fail`; who has the whole file calls the rest.
 
     Args:
-        memory: where room for bytes is reserved while they arrive.
-        most_text: characters of a text.
-        most_bytes: of bytes.
-        kind: what bytes are, such as "a zip".
+        name: of the file.
+        total: bytes that are announced.
+        room: where they are counted.
+        changed: called when there is more of it, when it is whole and when it has failed.
 
     Attributes:
-        name: of the file of which more is to come; empty if there is none.
-        last: when the last part came, as `time.perf_counter` tells it.
-        total: bytes of a file of which more is to come, as its sender says.
+        arrived: bytes so far.
+        whole: whether all of it is there.
+        failure: why it will not come, in words; empty: it has not failed.
+        cancelled: whether nobody wants it any more.
     """
 
-    def __init__(self, memory: AnswerMemory, most_text: int, most_bytes: int, kind: str) -> None:
-        self._memory = memory
-        self._most_text, self._most_bytes, self._kind = most_text, most_bytes, kind
+    def __init__(self, name: str, total: int, room: Reservation, changed: Callable[[IncomingFile], None]) -> None:
+        self.name, self.total, self.room = name, total, room
+        self.arrived, self.whole, self.failure, self.cancelled = 0, False, "", False
+        self._changed = changed
+        self._lock = threading.Lock()  # the room must be given back once
+        self._parts: list[bytes] = []
+
+    def add(self, part: bytes) -> None:
+        """Take a part; raises `ValueError` if there is more than was announced."""
+        if self.arrived + len(part) > self.total:
+            raise ValueError(f"more than the {self.total} bytes that were announced")
+        self._parts.append(part)
+        self.arrived += len(part)
+
+    def note(self) -> None:
+        """Report how far it is."""
+        self._changed(self)
+
+    def finish(self) -> None:
+        """All of it has come; raises `ValueError` if there is less than was announced."""
+        if self.arrived != self.total:
+            raise ValueError(f"{self.arrived} of {self.total} bytes")
+        self.whole = True
+
+    def fail(self, why: str) -> None:
+        """Give it up, and its room back."""
+        self.failure = why
+        self.forget()
+        self._changed(self)
+
+    def cancel(self) -> None:
+        """Nobody wants it any more."""
+        self.cancelled = True
         self.forget()
 
     def forget(self) -> None:
-        """Drop what has arrived."""
-        self.name, self.last, self.total = "", 0.0, 0
-        self._parts: list[str | bytes] = []
-        self._length = 0
-        self._room = self._memory.reserve(0)
+        """Drop what has come, and give its room back."""
+        with self._lock:
+            self._parts = []
+            self.room.release()
 
     @property
-    def arrived(self) -> int:
-        """Bytes of a file of which more is to come."""
-        return self._length if self._parts and isinstance(self._parts[0], bytes) else 0
+    def busy(self) -> bool:
+        """Whether more of it is to come."""
+        return not (self.whole or self.failure or self.cancelled)
 
-    def take(self, value: object) -> tuple[str, str | bytes, Reservation] | None:
-        """Add a part; name, content and room of the file if it was the last one.
+    def content(self) -> bytes:
+        """Its bytes, once; the room stays reserved, and belongs to the caller."""
+        parts, self._parts = self._parts, []
+        return b"".join(parts)
 
-        Raises:
-            MeshError: the file is too large; its parts are forgotten.
-            kin.InputError: not a part of a file.
-        """
-        name, first, last, part, from_, total = _part(value)
-        from_ = self._length if from_ is None else from_
-        if first:
-            self.forget()
-            self.name, self.total = name, total
-        elif not self._parts:
-            return None  # the rest of a file that was refused
-        elif not self._follows(name, part, from_):
-            self.forget()
-            raise MeshError(f"{name}: part", "a part that does not follow the one before", "another try")
-        self._parts.append(part)
-        self.last = time.perf_counter()
-        self._length += len(part)
-        most = self._most_text if isinstance(part, str) else self._most_bytes
-        try:
-            self._room.resize(0 if isinstance(part, str) else min(self._length, most))
-        except MemoryFullError:
-            self.forget()
-            raise full() from None
-        if self._length > most:
-            self.forget()
-            limit = f"{most // 1000} kB" if isinstance(part, str) else f"{most // MB} MB for {self._kind}"
-            raise MeshError(f"{name}: size", "it is too large", f"at most {limit}")
-        if not last:
-            return None
-        empty: str | bytes = type(part)()
-        content, room = empty.join(self._parts), self._room  # type: ignore[arg-type]
+    def text(self, most: int) -> str:
+        """It as a text, whose room is given back; raises `MeshError` if it has more than `most` characters."""
+        text = self.content().decode("utf-8", "replace").removeprefix("\ufeff")
         self.forget()
-        return name, content, room
+        if len(text) > most:
+            raise MeshError(f"{self.name}: size", "it is too large", f"at most {most // 1000} kB")
+        return text
 
-    def left(self, now: float, timeout: float) -> float | None:
-        """Seconds until the next part, which may take `timeout`, is late; None: nothing is awaited.
-
-        Args:
-            now: `time.perf_counter`'s.
-        """
-        return self.last + timeout - now if self.name else None
-
-    def _follows(self, name: str, part: str | bytes, before: int) -> bool:
-        """Whether a part continues what has arrived."""
-        same = name == self.name and type(part) is type(self._parts[0])
-        return same and before == self._length
+    def text_or_zip(self, most: int) -> str | bytes:
+        """Its bytes if it is a zip, otherwise as `text`."""
+        begin = self._parts[0] if self._parts else b""
+        return self.content() if begin.startswith(ZIP) else self.text(most)
 
 
-def late(timeout: float) -> str:
-    """What is said about an upload whose next part does not come."""
-    return f"For {timeout:g} s no part of it has come. Open it again."
+def not_sent(value: object) -> tuple[str, str]:
+    """What is said of a file that the page could not send: title and detail.
 
+    Args:
+        value: the name of the file and the status of the answer, 0 if there was none.
 
-def _part(value: object) -> tuple[str, bool, bool, str | bytes, int | None, int]:
-    """Name, whether it is the first and the last part, content; of bytes how many came before, and of how many."""
+    Raises:
+        kin.InputError: it is something else.
+    """
     match value:
-        case [str(name), bool(first), bool(last), str(part)] if part or last:
-            return cut(name), first, last, part, None, 0
-        case [str(name), bool(first), bool(last), str(part), "base64", int(before), int(total)] if part or last:
-            try:
-                return cut(name), first, last, base64.b64decode(part, validate=True), before, total
-            except (binascii.Error, ValueError):
-                pass
-    raise InputError("upload", value, "name, whether it is the first part, the last part, and its text or base64")
+        case [str(name), int(status)]:
+            why = PROXY if status == 413 else f"The answer was {status}." if status else CUT_OFF
+            return f"{cut(name)} did not arrive", why
+    raise InputError("upload", value, "the name of a file, and the status that its request was answered with")

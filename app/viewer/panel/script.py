@@ -1,7 +1,7 @@
 """Messages of the page's own scripts that come in viser's connection.
 
-The page's scripts send by their channel (:mod:`app.viewer.session.channel`). A message whose order with changes of
-viser's controls matters, such as *Undo* after a slider was moved, has to come behind these:
+The page's scripts send by their channel (:mod:`app.viewer.session.channel.channel`). A message whose order with
+changes of viser's controls matters, such as *Undo* after a slider was moved, has to come behind these:
 ``static/viser_page.js`` writes it into a hidden text field of viser's. Each message has a number, and the field
 always holds the last few: viser sends at most one change of a control per 50 ms and drops older ones.
 """

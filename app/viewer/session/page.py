@@ -37,7 +37,8 @@ from app.viewer.scene.camera import Sphere, VisitorCamera
 from app.viewer.scene.chain import center_line
 from app.viewer.session.actions.actions import Actions
 from app.viewer.session.actions.typed import BY_HAND
-from app.viewer.session.channel import Channel
+from app.viewer.session.channel.channel import Channel
+from app.viewer.session.channel.files import Files
 from app.viewer.session.choices import ViewState
 from app.viewer.session.controller import ArmController
 from app.viewer.session.events import LINK
@@ -108,6 +109,7 @@ class VisitorPage(ShownArm, Worker):
         self.channel = Channel(self.post, rights)
         client.gui.add_html(render("panel/channel", place=services.lines.place, name=self.channel.name))
         self._welcome, self._looking, self.may_save = welcome, rights is Rights.LOOK, rights.save
+        self.files = Files(self.post, lambda: self.features, self.meshes.memory, rights)
         self.door = Door(services.lines, self.post, self._looking)
         self._persistence = Persistence(self, token, self._guard, rights)
         self.offered: tuple[type[Feature], ...] = TABS

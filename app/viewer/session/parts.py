@@ -11,7 +11,7 @@ from app.viewer.panel.joints import JointSliders
 from app.viewer.panel.layout import Panel
 from app.viewer.panel.status import StatusLine
 from app.viewer.scene.camera import VisitorCamera
-from app.viewer.session.channel import Channel
+from app.viewer.session.channel.channel import Channel
 from app.viewer.session.choices import ViewState
 from app.viewer.session.controller import ArmController
 from app.viewer.session.forms import Forms

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import gc
 import io
 import json
@@ -29,7 +28,6 @@ from app.live.recording.table import heads
 from app.viewer.live import feature
 
 A, B = Q, Q + 0.2
-PART = 15_000
 
 
 def recording(robot: kin.Robot = ARM, count: int = 20) -> Recording:
@@ -46,15 +44,8 @@ def recording(robot: kin.Robot = ARM, count: int = 20) -> Recording:
     return Recording(robot, "test.py").restored(entries, 2.0)
 
 
-def send(page: FakeBrowser, name: str, data: bytes, end: bool = True) -> None:
-    """As static/upload.js sends it."""
-    for at in range(0, max(len(data), 1), PART):
-        part, last = data[at : at + PART], at + PART >= len(data)
-        value = [name, at == 0, last, base64.b64encode(part).decode(), "base64", at, len(data)]
-        if end or not last:
-            number = page.say("feature", ["connect", ["upload"], value])
-            page.wait(lambda number=number: page.script["reply"][0] >= number)
-            page.said = page.said[-1:]
+def send(page: FakeBrowser, name: str, data: bytes) -> None:
+    page.open_file("connect", name, data)
 
 
 def opened(page: FakeBrowser, name: str, data: bytes) -> None:
@@ -122,12 +113,13 @@ def test_while_something_is_driven_the_arm_stays(page, viewer):
 
 
 def test_what_arrives_can_be_cancelled_and_the_rest_of_it_is_dropped(page):
-    data = bytes(3 * PART)
-    send(page, "slow.mcap", data, end=False)
+    request = page.begin_file("connect", "slow.mcap", 45_000)
+    request.send(bytes(30_000))
     page.wait(lambda: "Receiving “slow.mcap”" in page.html)
     press(page, "Cancel")
     page.wait(lambda: "Receiving" not in page.html)
-    page.say("feature", ["connect", ["upload"], ["slow.mcap", False, True, "", "base64", 2 * PART, 3 * PART]])
+    request.send(bytes(15_000))
+    assert request.getresponse().status == 409
     opened(page, "run.mcap", to_mcap(recording()))
     assert "was not used" not in page.html
 
@@ -311,21 +303,19 @@ def test_records_are_bounded_in_number_and_those_of_others_are_not_read():
         read(with_record(0x90, b"", 2000), ARM, Bounds(size=100_000))
 
 
-@pytest.mark.parametrize(
-    "value", ["x", ["a", True, True], ["a", True, True, "!", "base64", 0, 1], [1, True, True, ""]]
-)
-def test_messages_that_are_no_part_of_a_file_are_refused(page, value):
+@pytest.mark.parametrize("value", ["x", ["a", True, True], [1, 413]])
+def test_messages_that_say_nothing_of_a_file_are_refused(page, value):
     page.say("feature", ["connect", ["upload"], value])
-    page.wait(lambda: "The file was not used" in page.html)
+    page.wait(lambda: "Invalid input" in page.html)
 
 
 def test_more_bytes_than_a_recording_may_have_are_refused_before_all_have_come(viewer, monkeypatch):
-    monkeypatch.setattr(feature, "OPENED", Bounds(3600.0, 1_000_000))
+    monkeypatch.setattr(feature.Connect, "files", {"upload": 1_000_000})
     with FakeBrowser(viewer) as page:
         page.settle()
-        send(page, "big.mcap", bytes(1_030_000), end=False)
-        words = "big.mcap: size: got it is too large, expected at most 1 MB for a recording"
-        page.wait(lambda: words in page.html)
+        request = page.begin_file("connect", "big.mcap", 1_030_000)
+        assert request.getresponse().status == 413
+        page.wait(lambda: "big.mcap: size: it is too large, expected at most 1 MB." in page.html)
 
 
 def test_many_small_messages_take_no_more_memory_than_large_ones():

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from functools import partial
+from urllib.parse import quote
 
 import httpx2
 import msgspec
@@ -23,7 +25,8 @@ from websockets.sync.client import connect
 from app.service.web.inspection import BURST, RATE, MessageLimit
 from app.service.web.negotiation import accepts_gzip, is_current
 from app.service.web.viewer_proxy import CHANNEL_PROTOCOL, ViewerBridge, VisitorConnection, _serve
-from app.shared.connection import Connection, ConnectionEnded, PageConnection
+from app.shared.connection import Connection, ConnectionEnded, FileRefused, PageConnection, SentFile
+from app.shared.security import place_of_page
 from app.shared.settings import Settings
 from app.shared.slots import Slots
 
@@ -46,6 +49,7 @@ class StandIn:
         self.endings: list[int] = []
         self.subprotocols: list[str | None] = []
         self.sent = 0
+        self.files: list[tuple[str, SentFile, bytes]] = []
 
     def page(self) -> bytes:
         return b"<html><title>Viser</title>page</html>"
@@ -72,6 +76,12 @@ class StandIn:
         except ConnectionEnded as end:
             self.endings.append(end.code)
             return end
+
+    async def receive_file(self, name: str, sent: SentFile, parts: AsyncIterator[bytes]) -> None:
+        """Keeps what it gets; refuses files for nobody."""
+        if sent.feature == "nobody":
+            raise FileRefused(413, "it is too large", said=True)
+        self.files.append((name, sent, b"".join([part async for part in parts])))
 
     async def serve_channel(self, connection: PageConnection, name: str) -> ConnectionEnded:
         """Says the name, and echoes every text."""
@@ -555,3 +565,55 @@ def test_a_channel_waits_for_the_viewer_and_takes_no_place(viser):
         with visit(port), visit_channel(port) as page:
             assert page.recv(timeout=10) == "name-1_x"
             assert bridge.slots.taken == 1
+
+
+# Files
+
+
+def post_file(port: int, about: object = ("robot", "upload", "a é.zip"), **headers: str) -> httpx2.Response:
+    given = {"x-kinboard-channel": "name", "x-kinboard-file": quote(json.dumps(about))} | headers
+    address = f"http://127.0.0.1:{port}/viewer/upload/0"
+    return httpx2.post(address, content=b"PK" + bytes(100_000), headers=given, trust_env=False)
+
+
+def test_a_file_reaches_the_page_with_its_name_and_length(port, viser):
+    assert post_file(port).status_code == 204
+    ((name, sent, data),) = viser.files
+    assert (name, sent, len(data)) == ("name", SentFile("robot", "upload", "a é.zip", 100_002), 100_002)
+
+
+@pytest.mark.parametrize(
+    ("about", "headers", "status"),
+    [
+        (["robot", "upload"], {}, 400),
+        ([1, 2, 3], {}, 400),
+        ("x", {}, 400),
+        (["x" * 5000, "upload", "a"], {}, 400),
+        (["robot", "upload", "a"], {"x-kinboard-file": "%ff[["}, 400),
+        (["robot", "upload", "a"], {"origin": "https://evil.example"}, 403),
+        (["nobody", "upload", "a"], {}, 413),
+    ],
+)
+def test_a_file_whose_head_is_not_ours_is_refused(port, viser, about, headers, status):
+    answer = post_file(port, about, **headers)
+    assert answer.status_code == status
+    assert ("x-kinboard-said" in answer.headers) == (status == 413)
+    assert viser.files == []
+
+
+def test_a_file_needs_its_length(port, viser):
+    address = f"http://127.0.0.1:{port}/viewer/upload/0"
+    assert httpx2.post(address, content=iter([b"PK"]), trust_env=False).status_code == 411
+    assert viser.files == []
+
+
+def test_the_address_of_a_page_s_channel_and_files_says_where_it_is():
+    assert [place_of_page(f"/viewer/{what}/12") for what in ("channel", "upload", "other")] == [12, 12, None]
+    for path in (
+        "/viewer/channel",
+        "/viewer/channel/",
+        "/viewer/channel/1234",
+        "/viewer/channel/-1",
+        "/viewer/upload/١",
+    ):
+        assert place_of_page(path) is None

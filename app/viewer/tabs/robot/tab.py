@@ -8,13 +8,15 @@ not sent again; the rest is.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
+from types import MappingProxyType
 
 import kin
 from app.exports.snippets import named
 from app.shared.answers.inspection import inspect
 from app.viewer.feature import Feature, Stage
 from app.viewer.frames import Frames
-from app.viewer.meshes.archive import MeshError
+from app.viewer.meshes.archive import MOST_BYTES, MeshError
+from app.viewer.meshes.incoming import IncomingFile, not_sent
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
@@ -22,7 +24,7 @@ from app.viewer.tabs.robot import edits, views, workpieces
 from app.viewer.tabs.robot.beginnings import Beginnings
 from app.viewer.tabs.robot.compare.comparing import Comparing
 from app.viewer.tabs.robot.edits import Cell, EditError
-from app.viewer.tabs.robot.files import text_of
+from app.viewer.tabs.robot.files import MOST, text_of
 from app.viewer.tabs.robot.texts import Texts
 from app.viewer.tabs.robot.uploads import Uploads
 from kin import InputError, KinematicsError, RobotFileError
@@ -50,6 +52,7 @@ class RobotTab(Feature):
             *("other", "agree", "other-text", "apply", "compare-stop"),
         }
     )
+    files = MappingProxyType({"upload": MOST_BYTES, "other-text": 4 * MOST})
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
@@ -60,11 +63,10 @@ class RobotTab(Feature):
         self._editing = ""  # the part of the tab in which the visitor types; "kind": rows and units stay
         self._uploads = Uploads(stage, self.post, lambda own, words: self._beginnings.begin(own, words))
         self._beginnings = Beginnings(stage, lambda: self._uploads.last)
-        self._stalled: float | None = None  # seconds until the next part of a file should have come
         self._converting = False
         gui = stage.client.gui
         self._html = {name: gui.add_html("") for name in PARTS}
-        self._comparing = Comparing(stage, stage.meshes.memory, self.post)
+        self._comparing = Comparing(stage, self.post)
         self._html |= {name: gui.add_html("") for name in ("files", "doctor")}
         self._handlers: dict[str, Callable[[object], None]] = {
             "start": self._beginnings.start,
@@ -106,6 +108,12 @@ class RobotTab(Feature):
             case ("reading", int(number)):
                 self._uploads.note_progress(number, value)
                 self._show_files()
+            case ("arriving", "upload") if isinstance(value, IncomingFile):
+                self._uploads.expect(value)
+                self._show_files()
+            case ("arriving", "other-text") if isinstance(value, IncomingFile):
+                if value.failure:
+                    self._refuse(f"{value.name} did not arrive", value.failure)
             case (str(name),) if name in self._handlers:
                 self._handlers[name](value)
                 self._plan()
@@ -113,15 +121,12 @@ class RobotTab(Feature):
                 raise InputError("robot", key, "the key of a field or a button")
 
     def tick(self, now: float) -> None:
-        before, self._stalled = self._stalled, self._uploads.end_stalled(now)
-        if before is not None and self._stalled is None:
-            self._show_files()
         self._comparing.tick()
         self._plan()
 
     def _plan(self) -> None:
         """When to look at what is under way."""
-        self.due = min((due for due in (self._stalled, self._comparing.due) if due is not None), default=None)
+        self.due = self._comparing.due
 
     def step_name(self, key: Hashable) -> str:
         match key:
@@ -393,8 +398,10 @@ class RobotTab(Feature):
         self.stage.notify(Notice("hand", f"{name} is saved", SAVED))
 
     def _upload(self, value: object) -> None:
-        self._stalled = 0.0  # `tick` says when to look whether the next part has come
-        self._open(lambda: self._uploads.take(value))
+        if isinstance(value, IncomingFile):
+            self._open(lambda: self._uploads.take(value))
+        else:
+            self.stage.notify(Notice("error", *not_sent(value)))
 
     def _open(self, act: Callable[[], None]) -> None:
         """Take a file, or a choice about it, a step further."""
@@ -421,7 +428,10 @@ class RobotTab(Feature):
             self._show_files()
 
     def _take_other(self, value: object) -> None:
-        """A part of a text with the arm to compare with."""
+        """A text with the arm to compare with."""
+        if not isinstance(value, IncomingFile):
+            self.stage.notify(Notice("error", *not_sent(value)))
+            return
         try:
             self._comparing.take(value)
         except (KinematicsError, MeshError) as error:

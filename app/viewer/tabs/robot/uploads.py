@@ -9,8 +9,8 @@ from functools import partial
 
 from app.shared.memory.answers import MemoryFullError, Reservation
 from app.viewer.feature import Stage
-from app.viewer.meshes.archive import MOST_BYTES, MeshError, TooLargeError
-from app.viewer.meshes.incoming import Incoming, late
+from app.viewer.meshes.archive import MeshError, TooLargeError
+from app.viewer.meshes.incoming import IncomingFile
 from app.viewer.meshes.links import drawing_of, drawing_without_meshes, shapes_of, size_of
 from app.viewer.meshes.placing import Shapes
 from app.viewer.meshes.reader import MOST_TRIANGLES, Meshes, full
@@ -80,7 +80,7 @@ class Uploads:
         self._stage = stage
         self._post = post
         self._begin = begin
-        self._incoming = Incoming(stage.meshes.memory, MOST, MOST_BYTES, "a zip")
+        self._incoming: IncomingFile | None = None  # on its way
         self._number = 0
         self._tip: str | None = None  # of the URDF that was opened last
         self._reading: _Reading | None = None
@@ -92,8 +92,8 @@ class Uploads:
     @property
     def busy(self) -> Busy | None:
         """What goes on."""
-        if self._incoming.arrived:
-            return Busy("Receiving the zip", self._incoming.arrived, self._incoming.total, "MB")
+        if (file := self._incoming) is not None and file.busy:
+            return Busy(f"Receiving “{file.name}”", file.arrived, file.total, "MB")
         if self._reading is not None:
             name = self._reading.source.name
             return Busy(f"Reading the meshes of “{name}”", self._reading.done, self._reading.count)
@@ -101,8 +101,8 @@ class Uploads:
 
     def stop(self) -> str:
         """End what goes on; returns what is to be said about it."""
-        receiving, reading = bool(self._incoming.arrived), self._reading
-        self._incoming.forget()
+        receiving, reading = self._incoming is not None, self._reading
+        self._drop_incoming()
         self._reading = None
         self._cancel()
         if receiving:
@@ -111,10 +111,16 @@ class Uploads:
 
     def forget(self) -> None:
         """The visitor has left."""
-        self._incoming.forget()
+        self._drop_incoming()
         self.waiting = self._reading = None
         self.doctor.close()
         self._cancel()
+
+    def _drop_incoming(self) -> None:
+        """A file that is on its way is not wanted any more."""
+        if self._incoming is not None:
+            self._incoming.cancel()
+            self._incoming = None
 
     def _cancel(self) -> None:
         """Meshes that wait or are being read are not wanted any more."""
@@ -122,42 +128,36 @@ class Uploads:
             self._stage.meshes.reader.cancel(self._future)
             self._future = None
 
-    def take(self, value: object) -> None:
-        """A part of a file; raises `kin.KinematicsError`."""
+    def expect(self, file: IncomingFile) -> None:
+        """A file is on its way, or has failed, which is said."""
+        if file.cancelled:
+            return
+        if file is not self._incoming:
+            self._drop_incoming()
+        self._incoming = None if file.failure else file
+        if file.failure:
+            self._stage.notify(Notice("error", f"{file.name} did not arrive", file.failure))
+
+    def take(self, file: IncomingFile) -> None:
+        """A file that is whole, unless it was cancelled meanwhile; raises `kin.KinematicsError`."""
+        if file is not self._incoming:
+            return
+        self._incoming = None
         try:
-            file = self._incoming.take(value)
+            content = file.text_or_zip(MOST)
         except MeshError as error:
             raise file_error("upload", error) from None
-        if file is not None:
-            self.waiting = None
-            name, content, room = file
-            self.doctor.close()
-            if isinstance(content, str):
-                self.doctor.look(Source(name, content))
-            self._open(opened(name, content, room))
+        self.waiting = None
+        self.doctor.close()
+        if isinstance(content, str):
+            self.doctor.look(Source(file.name, content))
+        self._open(opened(file.name, content, file.room))
 
     def open_mended(self) -> None:
         """Open the URDF of the report once more, mended; raises `kin.KinematicsError`."""
         source = self.doctor.mended
         self.waiting = None
         self._open(replace(source, tips=tips_of(source.name, source.text)), self._tip)
-
-    def end_stalled(self, now: float) -> float | None:
-        """End an upload whose next part does not come.
-
-        Args:
-            now: `time.perf_counter`'s.
-
-        Returns:
-            The seconds after which to call this again; None: nothing is on its way.
-        """
-        name, timeout = self._incoming.name, self._stage.meshes.reader.receive_timeout
-        left = self._incoming.left(now, timeout)
-        if left is None or left > 0.0:
-            return left
-        self._incoming.forget()
-        self._stage.notify(Notice("error", f"{name} did not arrive", late(timeout)))
-        return None
 
     def choose(self, what: str, value: object) -> None:
         """The URDF or the tip that was chosen; raises `kin.KinematicsError`."""

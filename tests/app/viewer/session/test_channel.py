@@ -16,8 +16,10 @@ import pytest
 from app.shared.connection import ConnectionEnded
 from app.shared.security import Rights
 from app.viewer.panel.script import Reply
-from app.viewer.session import channel as module
-from app.viewer.session.channel import EARLY, MAY_LOOK, REPLACED, Channel, Sequence
+from app.viewer.session.channel import channel as module
+from app.viewer.session.channel import sequence as order
+from app.viewer.session.channel.channel import MAY_LOOK, REPLACED, Channel
+from app.viewer.session.channel.sequence import EARLY, Sequence
 from app.viewer.session.events import MESSAGES
 
 
@@ -243,10 +245,14 @@ def test_a_value_that_no_page_could_read_is_the_error_of_who_shows_it() -> None:
 
 
 def test_a_page_that_confirms_nothing_fills_no_memory() -> None:
-    channel = Channel(lambda *_: None)
-    for k in range(2 * module.KEPT):
-        channel.reply(Reply(k, ""))
-    assert len(channel._notices) == module.KEPT
+    async def play(page: Page) -> None:
+        for k in range(2 * module.KEPT):
+            page.channel.reply(Reply(k, ""))
+        line = page.connect()
+        await rest()
+        assert [number for number, *_ in line.notices] == list(range(module.KEPT + 1, 2 * module.KEPT + 1))
+
+    run(play)
 
 
 def test_a_beat_comes_by_itself_and_when_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -302,7 +308,7 @@ def test_messages_of_both_ways_are_in_the_order_in_which_they_were_sent(order: t
 def test_what_is_missing_is_waited_for_a_while_and_passed_on_when_it_comes_late(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "PATIENCE", 0.0)
+    monkeypatch.setattr(order, "PATIENCE", 0.0)
 
     async def play() -> None:
         with sequence(asyncio.get_running_loop()) as (put, found):

@@ -404,13 +404,13 @@ def test_a_page_goes_on_over_another_connection_of_its_channel(port: int) -> Non
 def test_only_the_name_of_a_page_opens_its_channel(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
-        name = tab._name
+        name = tab.name
         for wrong in (name[:-1], name + "A", name.swapcase()):
-            tab._name = wrong
+            tab.name = wrong
             tab.open_channel()
             opened = tab.channel
             tab.wait(lambda opened=opened: opened.ended)  # type: ignore[misc]
-        tab._name = name
+        tab.name = name
         tab.open_channel()
         tab.say("axes")
         tab.settle()
@@ -427,7 +427,7 @@ def test_the_channel_of_a_page_ends_with_it(port: int) -> None:
     tab.wait(lambda: tab.channel is not None)
     channel = tab.channel
     assert channel is not None
-    tab._wire.close()
+    tab.viser.close()
     with pytest.raises(ConnectionClosed):
         read_to_end(channel)
     tab.close()

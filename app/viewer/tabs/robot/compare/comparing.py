@@ -10,11 +10,9 @@ from collections.abc import Mapping
 from typing import cast, get_args
 
 from app.shared.computations import Subscription
-from app.shared.memory.answers import AnswerMemory
 from app.viewer.declared.scene import SceneView
 from app.viewer.feature import Stage
-from app.viewer.meshes.archive import MOST_BYTES
-from app.viewer.meshes.incoming import Incoming
+from app.viewer.meshes.incoming import IncomingFile
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post, assign, listen, update_html
 from app.viewer.panel.status import Notice
@@ -40,9 +38,8 @@ class Comparing:
         post: posts ``("walk",)``, the joint that is marked.
     """
 
-    def __init__(self, stage: Stage, memory: AnswerMemory, post: Post) -> None:
+    def __init__(self, stage: Stage, post: Post) -> None:
         self._stage = stage
-        self._incoming = Incoming(memory, MOST, MOST_BYTES, "a zip")
         self._other: Reference | None = None
         self._frames: Frames = "fixed"
         self._typing = False  # whether the field for a text is open
@@ -92,15 +89,13 @@ class Comparing:
         self._frames = cast(Frames, value)
         self.start()
 
-    def take(self, value: object) -> None:
-        """A part of a text; raises `kin.KinematicsError`."""
-        arrived = self._incoming.take(value)
-        if arrived is None:
-            return
-        name, text, _ = arrived
+    def take(self, file: IncomingFile) -> None:
+        """A text; raises `kin.KinematicsError`, or `MeshError` if it is too large."""
+        text = file.text_or_zip(MOST)
         if not isinstance(text, str):
-            raise InputError("text", name, "a robot file (TOML), a URDF or a table; no zip")
-        self._use(reference.of_text(name, text, self._stage.units, self._stage.now.robot.n))
+            file.forget()
+            raise InputError("text", file.name, "a robot file (TOML), a URDF or a table; no zip")
+        self._use(reference.of_text(file.name, text, self._stage.units, self._stage.now.robot.n))
 
     def _use(self, other: Reference | None) -> None:
         self._other = other
@@ -161,7 +156,6 @@ class Comparing:
     def forget(self) -> None:
         """The visitor has left."""
         self.leave()
-        self._incoming.forget()
 
     def proposed(self, index: object, own: OwnArm | None) -> OwnArm:
         """The arm on show with the changes of an explanation; raises `EditError`."""

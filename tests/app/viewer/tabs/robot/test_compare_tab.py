@@ -48,8 +48,7 @@ def say(tab: FakeBrowser, *key: object, value: object = None) -> None:
 
 
 def send(tab: FakeBrowser, text: str) -> None:
-    for k in range(0, max(1, len(text)), 5000):
-        say(tab, "other-text", value=["their text", k == 0, k + 5000 >= len(text), text[k : k + 5000]])
+    tab.open_file("robot", "their text", text, "other-text")
 
 
 def compared(tab: FakeBrowser) -> str:

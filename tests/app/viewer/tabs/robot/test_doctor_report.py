@@ -30,7 +30,7 @@ def report(tab: FakeBrowser) -> str:
 
 
 def upload(tab: FakeBrowser, text: str, name: str = "two.urdf") -> None:
-    say(tab, "upload", value=[name, True, True, text])
+    tab.open_file("robot", name, text)
 
 
 @pytest.mark.full

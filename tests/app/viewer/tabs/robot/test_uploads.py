@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import base64
 import html
-import re
 import threading
 import time
-from pathlib import Path
 
 import pytest
 from fake_browser import FakeBrowser
@@ -16,12 +13,11 @@ from test_robot_tab import STORE, UR5, cell, part, say, shows, type_in
 from zips import MESH_AND_BOX, TWO_JOINTS, announced, packed, robot_files
 
 import kin
-from app.service.web.inspection import MAX_MESSAGE
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.meshes import reader as readers
-from app.viewer.meshes.archive import MeshError, TooLargeError
+from app.viewer.meshes.archive import MOST_BYTES, MeshError, TooLargeError
 from app.viewer.meshes.loading import PARSED
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import decode
@@ -29,15 +25,10 @@ from app.viewer.session.state import decode
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
 TWO = kin.load_urdf(TWO_JOINTS)
-PART = 32_000
-STATIC = Path(__file__).parents[5] / "static"
 
 
 def send(tab: FakeBrowser, name: str, data: bytes) -> None:
-    for at in range(0, len(data), PART):
-        tab.said = tab.said[-1:]  # as the page's script does: a message to the service has a limit
-        piece = base64.b64encode(data[at : at + PART]).decode()
-        say(tab, "upload", value=[name, at == 0, at + PART >= len(data), piece, "base64", at, len(data)])
+    tab.open_file("robot", name, data)
 
 
 def meshes(tab: FakeBrowser) -> set[str]:
@@ -121,7 +112,7 @@ def test_a_zip_gives_the_arm_the_capsules_of_its_collision_bodies(port: int) -> 
 def test_a_urdf_alone_says_which_bodies_are_assumed(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
-        say(tab, "upload", value=["two.urdf", True, True, MESH_AND_BOX])
+        tab.open_file("robot", "two.urdf", MESH_AND_BOX)
         assert "link 1 has an assumed tube (upper: upper.stl: its mesh was not sent along)" in html.unescape(
             tab.html
         )
@@ -150,16 +141,6 @@ def test_what_is_wanted_of_a_zip_is_asked(port: int) -> None:
         say(tab, "tip", value="fore")
         shows(tab, TWO, TWO.q_home)
         tab.wait(lambda: meshes(tab) == ALL)
-
-
-def test_parts_of_a_zip_fit_the_field_beside_other_messages_and_the_field_fits_a_message() -> None:
-    constants = {
-        name: int(value)
-        for file in ("robot", "upload", "input", "viser_page")
-        for name, value in re.findall(r"const (\w+) = (\d+);", (STATIC / f"{file}.js").read_text(encoding="utf-8"))
-    }
-    assert 4 / 3 * constants["PART_OF_BYTES"] + 12_000 < constants["LONGEST"] < MAX_MESSAGE - 8_000
-    assert constants["PAUSE"] < constants["REST"]
 
 
 BAD = {
@@ -191,15 +172,8 @@ def test_a_bad_zip_changes_nothing_and_bad_meshes_leave_a_skeleton(port: int) ->
             assert words in html.unescape(tab.html), name
             assert "The arm is a skeleton" in tab.html
             assert not meshes(tab)
-        for value in (
-            ["x.zip", True, True, "%%%", "base64", 0, 100_000],
-            ["x.zip", True, True, "", "rot13", 0, 1],
-        ):
-            say(tab, "upload", value=value)
-            assert "Invalid input" in tab.html
-        for first, before in ((True, 0), (False, 7)):
-            say(tab, "upload", value=["x.zip", first, False, "UEs=", "base64", before, 9])
-        assert "does not follow the one before" in tab.html
+        say(tab, "upload", value=["x.zip", True, True, "UEs="])
+        assert "Invalid input" in tab.html, "files come by requests"
 
 
 TOO_LARGE = {
@@ -262,35 +236,65 @@ def test_steps_made_while_a_file_is_read_that_is_refused_are_taken_back_with_it(
         assert tab.value("Robot") == before
 
 
-@pytest.mark.full
-def test_an_upload_that_stalls_ends_and_gives_back_its_room(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_upload_that_ends_early_or_is_cancelled_gives_back_its_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.shared.memory.answers.SMALL", 0)
     viewer = ViewerServer(Store(), Settings(), Clouds())
-    reader = viewer.services.meshes
-    memory = reader.memory
+    memory = viewer.services.meshes.memory
     with serve_viewer(viewer) as port, FakeBrowser(port) as tab:
         tab.settle()
-        piece = base64.b64encode(bytes(15_000)).decode()
-        say(tab, "upload", value=["slow.zip", True, False, piece, "base64", 0, 100_000])
-        assert memory.held == 15_000
-        reader.receive_timeout = 0.2
-        say(tab, "upload", value=["slow.zip", False, False, piece, "base64", 15_000, 100_000])
+        request = tab.begin_file("robot", "slow.zip", 2_000_000)
+        request.send(bytes(15_000))
+        tab.wait(lambda: "Receiving “slow.zip”: 0.0 of 2.0 MB" in part(tab, "files"))
+        assert memory.held == 2_000_000, "room for all of it, before it has come"
+        request.close()
         tab.wait(lambda: "slow.zip did not arrive" in tab.html)
-        assert "For 0.2 s no part of it has come" in tab.html
-        assert "Receiving the zip" not in part(tab, "files")
+        assert "Receiving" not in part(tab, "files")
         assert memory.held == 0
-        tab.said, reader.receive_timeout = tab.said[-1:], 30.0
-        say(tab, "upload", value=["slow.zip", True, False, piece, "base64", 0, 2_000_000])
-        assert "Receiving the zip: 0.0 of 2.0 MB" in part(tab, "files")
+
+        request = tab.begin_file("robot", "slow.zip", 2_000_000)
+        request.send(bytes(15_000))
+        tab.wait(lambda: "Receiving" in part(tab, "files"))
         say(tab, "cancel")
         assert "The file was not used; the arm stays as it is" in tab.html
+        assert "Receiving" not in part(tab, "files")
         assert memory.held == 0
-        say(tab, "upload", value=["slow.zip", False, False, piece, "base64", 15_000, 2_000_000])
-        assert "Receiving" not in part(tab, "files"), "what is still on its way is dropped"
+        request.send(bytes(1_985_000))
+        assert request.getresponse().status == 409, "what is still on its way is dropped"
+        assert memory.held == 0
+
+        first = tab.begin_file("robot", "first.zip", 2_000_000)
+        first.send(bytes(15_000))
+        tab.wait(lambda: "Receiving “first.zip”" in part(tab, "files"))
         send(tab, "two.zip", packed(robot_files()))
         tab.wait(lambda: meshes(tab) == ALL)
+        first.send(bytes(1_985_000))
+        assert first.getresponse().status == 409, "a newer file has taken its place"
         tab.settle(0.5)
         assert "did not arrive" not in tab.html
+        assert meshes(tab) == ALL
+
+
+def test_files_are_refused_in_words_by_the_answer_and_in_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    viewer = ViewerServer(Store(), Settings(mesh_memory=MOST_BYTES), Clouds())
+    with serve_viewer(viewer) as port, FakeBrowser(port) as tab:
+        tab.settle()
+        before = tab.value("Robot")
+        request = tab.begin_file("robot", "big.zip", MOST_BYTES + 1)
+        assert request.getresponse().status == 413, "before any of it has come"
+        tab.wait(lambda: "big.zip: size: it is too large, expected at most 20 MB." in html.unescape(tab.html))
+        held = viewer.services.meshes.of("127.0.0.1").memory.reserve(1_000_000)
+        request = tab.begin_file("robot", "full.zip", MOST_BYTES)
+        assert request.getresponse().status == 503
+        tab.wait(lambda: "full.zip: the service holds as many files as it may" in html.unescape(tab.html))
+        held.release()
+        for feature, key in (("robot", "cell"), ("nobody", "upload"), ("program", "upload")):
+            assert tab.open_file(feature, "a.zip", b"PK", key) == 404
+        say(tab, "upload", value=["far.zip", 413])
+        assert "Something between the browser and the service takes no file of this size" in tab.html
+        name, tab.name = tab.name, "x" * 22
+        assert tab.open_file("robot", "a.zip", b"PK") == 404, "of a page that is not there"
+        tab.name = name
+        assert tab.value("Robot") == before
 
 
 def test_the_next_zip_and_leaving_end_what_is_being_read(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -345,12 +349,12 @@ def test_a_real_shape_that_cannot_be_read_is_said_in_the_page() -> None:
 def test_the_shapes_of_a_urdf_need_no_zip(port: int) -> None:
     with FakeBrowser(port) as tab:
         tab.settle()
-        say(tab, "upload", value=["two.urdf", True, True, TWO_JOINTS])
+        tab.open_file("robot", "two.urdf", TWO_JOINTS)
         assert "Open it together with its meshes" in tab.html
         assert not meshes(tab)
         plain = TWO_JOINTS.replace('<mesh filename="../meshes/fore.obj"/>', '<sphere radius="0.05"/>')
         mesh = '<mesh filename="package://two_description/meshes/upper.stl" scale="0.001 0.001 0.001"/>'
-        say(tab, "upload", value=["plain.urdf", True, True, plain.replace(mesh, '<box size="0.1 0.1 0.4"/>')])
+        tab.open_file("robot", "plain.urdf", plain.replace(mesh, '<box size="0.1 0.1 0.4"/>'))
         tab.wait(lambda: meshes(tab) == ALL - {"mesh-2-2"})
 
 
