@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.viewer.panel import Post, assign, listen, listen_click
+from app.viewer.panel import Post, assign, listen, listen_click, update_html
 from app.viewer.panel.crossing import Crossings
 from app.viewer.panel.entry import read_value
 from app.viewer.panel.fields import field, fields_html, limit_marks, shown
 from app.viewer.panel.status import Notice
+from app.viewer.views.templates import render
 from app.viewer.viser_patches import show_value
-from kin import InputError, Robot
+from kin import InputError, Robot, to_pendant
 from kin.files.numbers import index_of
 from kin.transforms import Array
 from kin.typed import EntryError
@@ -60,6 +61,16 @@ def lock_notice(locked: Sequence[bool]) -> Notice:
     return Notice("hand", f"{joints} locked", detail)
 
 
+def pendant_html(robot: Robot, q: Array, units: Units) -> str:
+    """What the pendant of an arm shows at a configuration ``(n,)``."""
+    turning = robot.revolute.tolist()
+    values = [
+        (joint.name, units.of(turns).text(value))
+        for joint, turns, value in zip(robot.joints, turning, to_pendant(robot, q).tolist(), strict=True)
+    ]
+    return render("panel/pendant", values=values)
+
+
 class JointSliders:
     """The sliders of one robot in the visitor's units; rebuilt when either changes, or the folders.
 
@@ -93,6 +104,7 @@ class JointSliders:
         self._fields: dict[object, tuple[int, str, Unit]] = {} if before is None else before._fields
         self._sliders: list[list[viser.GuiSliderHandle[float]]] = []
         self._others: list[Any] = []  # controls besides sliders
+        self._pendants: list[viser.GuiHtmlHandle] = []
         self._locks: list[viser.GuiButtonGroupHandle] = []
         for place, folder in enumerate(folders):
             with folder:
@@ -100,6 +112,8 @@ class JointSliders:
                 locks = gui.add_button_group("Locked", lock_buttons(locked), hint=LOCK_HINT)
                 fields = dict(field(slider, self._unit(i)) for i, slider in enumerate(self._sliders[-1]))
                 self._others.append(gui.add_html(fields_html(fields)))
+                if robot.pendant_map is not None:
+                    self._pendants.append(gui.add_html(pendant_html(robot, q, units)))
             joints = [(i, joint.kind, self._unit(i)) for i, joint in enumerate(robot.joints)]
             self._fields |= zip(fields, joints, strict=True)
             self._locks.append(locks)
@@ -166,6 +180,8 @@ class JointSliders:
                 if not held and value != slider.value:
                     assign(slider, value)
                     self._crossings.sent([(place, i)])
+        for html in self._pendants:
+            update_html(html, pendant_html(self.robot, q, self._units))
 
     def show_again(self, q: Array) -> None:
         """Show what has crossed a visitor's change of the same slider, now that the visitor rests."""
@@ -202,7 +218,12 @@ class JointSliders:
 
     def remove(self) -> None:
         """Remove the sliders from the panel."""
-        for control in (*self._locks, *self._others, *(s for sliders in self._sliders for s in sliders)):
+        for control in (
+            *self._locks,
+            *self._others,
+            *self._pendants,
+            *(s for sliders in self._sliders for s in sliders),
+        ):
             control.remove()
 
 

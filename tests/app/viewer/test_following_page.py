@@ -94,3 +94,13 @@ def test_a_link_carries_what_follows_and_the_pendant() -> None:
     for wrong in ("p", [1], [[1]], [[0, 0, "x", 1]], [[0, 0, 99, 1]], [[99, 0, 0, 1]]):
         with pytest.raises(kin.KinematicsError, match="pendant"):
             unpack({**pack(own), "p": wrong})
+
+
+def test_the_page_shows_what_the_pendant_shows(tab: FakeBrowser) -> None:
+    fanuc = kin.get_robot("lrmate200id")
+    tab.choose(fanuc.name)
+    assert "Pendant: J1 0.0°, J2 0.0°, J3 0.0°" in tab.html
+    tab.set("2 J2" if "2 J2" in tab.sliders else tab.sliders[-5], 30.0)
+    tab.wait(lambda: "J2 30.0°, J3 -30.0°" in tab.html.replace("\u2212", "-"))
+    tab.choose(ROBOT.name)
+    assert "Pendant:" not in tab.html
