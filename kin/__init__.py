@@ -22,7 +22,6 @@ from kin.collision import (
     obstacle_from_dict,
 )
 from kin.comparison import Comparison, compare
-from kin.coupling import Shown
 from kin.dh import Screws, convert_dh, exp_screw, robot_from_screws, screws
 from kin.differential.task import Task
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
@@ -54,6 +53,7 @@ from kin.ik import IKOptions, JointConstraints, branch_meanings, branch_names, b
 from kin.ik.batch import IKResults, ik_branches, solve_ik_many
 from kin.ik.details import LimitViolation, Redundancy
 from kin.ik.results import BlockedBranch, IKResult, IKSolution, Status
+from kin.joint import Shown
 from kin.motion import (
     Circ,
     Dwell,

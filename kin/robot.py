@@ -9,7 +9,7 @@ are in use, and the same table read in both orders gives two *different* arms:
   turns about z of frame i.
 
 A revolute joint adds its value to θ, a prismatic one to d; a ``fixed`` row is constant (a tool, an adapter). A row
-may *follow* a joint instead of being one: it adds so many times that joint's value (:mod:`kin.coupling`).
+may *follow* a joint instead of being one: it adds so many times that joint's value (:mod:`kin.joint`).
 ``T_world_tool = base · A_1 … A_m · tool``. Lengths are metres and angles radians.
 """
 
@@ -25,7 +25,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kin.checks import finite_number, one_of
-from kin.coupling import (
+from kin.errors import InputError
+from kin.joint import DEFAULT_LIMITS as DEFAULT_LIMITS
+from kin.joint import (
+    FOLLOWS,
     PendantMap,
     Shown,
     check_followers,
@@ -35,9 +38,6 @@ from kin.coupling import (
     map_of,
     stroke_of,
 )
-from kin.errors import InputError
-from kin.joint import DEFAULT_LIMITS as DEFAULT_LIMITS
-from kin.joint import FOLLOWS
 from kin.joint import KIND_CODES as KIND_CODES
 from kin.joint import PEAK_FIELDS as PEAK_FIELDS
 from kin.joint import Joint as Joint

@@ -15,7 +15,6 @@ ROOT = Path(__file__).parents[1]
 MODEL = {
     "kin.axes",
     "kin.checks",
-    "kin.coupling",
     "kin.differential",
     "kin.errors",
     "kin.fk",
@@ -38,7 +37,7 @@ RULES: dict[str, set[str]] = {
         *("numpy", "kin.collision", "kin.dh", "kin.files", "kin.fitting", "kin.frames", "kin.later", "kin.typed"),
         *MODEL,
     },
-    "kin/fitting": {"numpy", "kin.coupling", "kin.fitting", "kin.robot", "kin.transforms"},
+    "kin/fitting": {"numpy", "kin.fitting", "kin.joint", "kin.robot", "kin.transforms"},
     "kin/readings": {"numpy", "kin.collision", "kin.readings", *MODEL},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
     "kin/ik": {"numpy", "kin.collision", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from kin.coupling import Shown, check_followers, joints_of, map_of
 from kin.errors import InputError, KinematicsError, RobotFileError, shorten
 from kin.files.home import default_home
 from kin.files.numbers import LARGEST, NUMBER, scaled
 from kin.frames import matrix_of
+from kin.joint import Shown, check_followers, joints_of, map_of
 from kin.motor import MOTOR_UNITS, Motor, checked_motors, fit_joints
 from kin.parsing import Limits, TextError, read_toml
 from kin.robot import (

@@ -16,11 +16,11 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from kin.coupling import Shown
 from kin.errors import InputError
 from kin.files.numbers import scaled
 from kin.files.read import ANGLES, PER, UNLIMITED, Reader
 from kin.frames import matrix_of
+from kin.joint import Shown
 from kin.motor import STS3215, Motor
 from kin.named import robot_of
 from kin.robot import IDENTITY, LENGTHS, Capsule, Joint, Matrix, Robot, exact_cos_sin

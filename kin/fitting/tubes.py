@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.coupling import stroke_of
+from kin.joint import stroke_of
 from kin.robot import Joint, Robot, exact_cos_sin
 
 SHARE, THINNEST, STOUTEST = 0.032, 0.014, 0.3  # radius, relative to all lengths, and at most to the shortest one

@@ -1,4 +1,4 @@
-"""Joint values as the pendant of an arm shows them, and back; what it shows is stated in :mod:`kin.coupling`."""
+"""Joint values as the pendant of an arm shows them, and back; what it shows is stated in :mod:`kin.joint`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Closed forms of arms with rows that follow joints, made of those of their free arms.
 
 In the *free arm* every row moves by itself, and neighbouring rows about one line count as one. With t its values
-and q those of the joints, ``t = A q`` (:mod:`kin.coupling`), so the configurations of the arm at a pose are
+and q those of the joints, ``t = A q`` (:mod:`kin.joint`), so the configurations of the arm at a pose are
 those of the free arm that are of this form. A palletiser has four joints and a free arm with five axes, three of
 them parallel. Whole turns need care: t is known but for them, so an n × n part of A is inverted whose inverse
 has whole numbers too. The rows of A that are left tell which configurations the joints can make.

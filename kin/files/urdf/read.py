@@ -18,7 +18,6 @@ import numpy as np
 
 from kin.axes import frame_of, inverse, perpendicular_to
 from kin.checks import one_of
-from kin.coupling import joints_of
 from kin.dh import SAMPLES, table_of_chain
 from kin.errors import InputError, RobotFileError
 from kin.files.home import default_home
@@ -39,6 +38,7 @@ from kin.files.urdf.fields import ignored_of
 from kin.files.urdf.following import Followers, followers_of, left_of
 from kin.files.urdf.tree import FREE, UNLIMITED, Format, Terms, Tip, UrdfJoint, UrdfTree, motion_of, read_tree
 from kin.fk import fk
+from kin.joint import joints_of
 from kin.robot import DEFAULT_LIMITS, MOUNTINGS, Joint, Mounting, Robot
 from kin.transforms import Array
 
