@@ -251,15 +251,15 @@ class PendantMap(NamedTuple):
 
 def checked_pendant(pendant: Iterable[Shown]) -> tuple[Shown, ...]:
     """What is shown for joints, each joint once."""
-    found = tuple(pendant) if isinstance(pendant, Iterable) else (None,)
-    names = []
-    for i, each in enumerate(found):
+    given: tuple[object, ...] = tuple(pendant) if isinstance(pendant, Iterable) else (None,)
+    found: dict[str, Shown] = {}
+    for i, each in enumerate(given):
         if not isinstance(each, Shown):
             raise InputError(f"pendant[{i}]", each, "a Shown")
-        if each.joint in names:
+        if each.joint in found:
             raise InputError(f"pendant of {each.joint}", "twice", "each joint once")
-        names.append(each.joint)
-    return found  # type: ignore[return-value]  # each of them is a Shown
+        found[each.joint] = each
+    return tuple(found.values())
 
 
 def map_of(joints: Sequence[Joint], pendant: Sequence[Shown]) -> PendantMap | None:
@@ -290,7 +290,7 @@ def map_of(joints: Sequence[Joint], pendant: Sequence[Shown]) -> PendantMap | No
         stated = [each.joint for each in pendant if each.joint in index]
         one = next(name for name in stated if np.linalg.matrix_rank(np.delete(B, index[name], axis=0)) == rank)
         raise InputError(f"pendant of {one}", B.tolist(), "a map from which all joint values follow")
-    back = np.linalg.inv(B)
+    back = np.asarray(np.linalg.inv(B), dtype=np.float64)
     if np.array_equal(np.round(back) @ B, np.eye(len(joints))):
         back = np.round(back)  # whole numbers, without rounding errors
     return PendantMap(B, c, back + 0.0)

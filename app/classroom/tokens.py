@@ -2,8 +2,8 @@
 
 A token is the id of a room, and of a seat if it is a student's, signed with a key that the database keeps: every
 process of every machine can check it. The teacher's link holds a token; a browser keeps one in the cookie
-`COOKIE`, after the room's code and a dot. By the code, a proxy sends all pages of a room to one of several containers;
-it is not signed, and means nothing to us.
+`COOKIE`, after the room's code and a dot. By the code, a proxy sends all pages of a room to one of several
+containers; it is not signed, and means nothing to us.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ from kin import InputError, Obstacle, Robot
 from kin.collision.contacts import surroundings
 from kin.motion import Circ, Dwell, JointTarget, Lin, Motion, PoseTarget, Program, Ptp, Spline, start_as_recorded
 from kin.motion.arrivals import Arrival
-from kin.motion.details import ArrivesOtherwise, Collides, JerkCost, Note
+from kin.motion.details import ArrivesOtherwise, Braked, Collides, JerkCost, Note
 from kin.motion.messages import note
 from kin.motion.planning.collisions import checked
 from kin.motion.program import Segment, Target, kind_of
@@ -173,6 +173,8 @@ class Plan:
         return " ".join(said)
 
     def _numbered(self, note: Note) -> Note:
+        if isinstance(note, Braked):
+            return note
         if isinstance(note, JerkCost):
             return note._replace(first=self.item_of(note.first), last=self.item_of(note.last))
         return note._replace(segment=self.item_of(note.segment))
