@@ -10,6 +10,8 @@ import pytest
 
 import kin
 from kin import InputError, Joint, Robot
+from kin.collision.contacts import surroundings
+from kin.collision.sweep import levers
 
 
 def arm(convention: str = "standard") -> Robot:
@@ -378,3 +380,52 @@ def test_bodies_of_a_follower_are_where_its_offset_puts_them():
     tool = kin.fk(robot, [0.3]) @ [0.1, 0.0, 0.0, 1.0]
     assert end == pytest.approx(tool, abs=1e-6)
     assert capsule.link == 2
+
+
+@pytest.mark.parametrize("robot", [*ARMS, kin.parse_robot(PALLETISER)], ids=["standard", "modified", "palletiser"])
+def test_levers_bound_how_far_bodies_move_with_what_follows(robot):
+    """The proof that a motion touches nothing rests on these bounds."""
+    near = surroundings(robot, ())
+    body, rng = near.bodies, np.random.default_rng(8)
+    for q in robot.random_q(rng, 30):
+        step = rng.uniform(-0.05, 0.05, robot.n)
+        bound = levers(near, np.maximum(np.abs(q), np.abs(q + step))) @ np.abs(step)
+        ends = []
+        for at in (q, q + step):
+            frames = np.concatenate([robot.T_world_base[None], kin.link_frames(robot, at)])[body.rows + 1]
+            points = np.concatenate([body.shape[:, k : k + 3] for k in (0, 3)])
+            both = np.concatenate([frames, frames])
+            ends.append((both[:, :3, :3] @ points[:, :, None])[..., 0] + both[:, :3, 3])
+        moved = np.linalg.norm(ends[1] - ends[0], axis=1)
+        assert (moved <= np.concatenate([bound, bound]) + 1e-12).all()
+
+
+def test_motions_keep_the_speeds_of_what_follows():
+    rows = list(kin.parse_robot(PALLETISER).rows)
+    rows[4] = replace(rows[4], velocity=0.2)
+    robot = replace(kin.parse_robot(PALLETISER), rows=tuple(rows))
+    target = robot.q_home + np.array([0.5, 0.4, 0.6, 1.0])
+    T = kin.fk(robot, robot.q_home)
+    T[:3, 3] += [0.1, 0.3, -0.1]
+    motion = kin.plan_motion(robot, [kin.Ptp(kin.JointTarget(tuple(target))), kin.Lin(kin.PoseTarget.of(T))])
+    times = np.linspace(0.0, motion.duration, 200)
+    sample = motion.sample(times)
+    assert np.abs(sample.qd[:, 2]).max() == pytest.approx(0.2, rel=0.05)
+    assert np.abs(sample.qd[:, 2]).max() <= 0.2 + 1e-9
+    assert kin.fk(robot, sample.q)[:, :3, 2] == pytest.approx(np.tile([0.0, 0.0, -1.0], (200, 1)), abs=1e-12)
+
+
+def test_where_joint_1_is_followed_the_workspace_is_no_body_of_revolution():
+    turn = (-math.pi, math.pi)
+    rows = [
+        Joint("a", a=0.3, alpha=1.0, limits=turn),
+        Joint("b", a=0.2, follows="a", ratio=0.5),
+        Joint("c", a=0.2, limits=turn),
+    ]
+    robot = Robot.from_dh(rows)
+    with pytest.raises(InputError, match="does not turn the whole arm"):
+        kin.workspace_section(robot, resolution=8)
+    x = [end.value for end in kin.workspace_facts(robot, effort=2, volume=False).x]
+    sampled = kin.fk_positions(robot, robot.random_q(np.random.default_rng(9), 20_000))[:, 0]
+    assert (x[0] <= sampled.min(), sampled.max() <= x[1]) == (True, True)
+    assert x == pytest.approx((sampled.min(), sampled.max()), abs=0.02)
