@@ -248,6 +248,14 @@ class PendantMap(NamedTuple):
     c: Array
     back: Array
 
+    def shown(self, q: Array) -> Array:
+        """What is shown of joint values ``(..., n)``."""
+        return np.asarray(q @ self.B.T + self.c)
+
+    def joint_values(self, shown: Array) -> Array:
+        """The joint values ``(..., n)`` of which this is shown."""
+        return np.asarray((shown - self.c) @ self.back.T)
+
 
 def checked_pendant(pendant: Iterable[Shown]) -> tuple[Shown, ...]:
     """What is shown for joints, each joint once."""

@@ -128,6 +128,7 @@ class ProgramBody(_Described):
     units: ProgramUnits = Field(
         default_factory=lambda: ProgramUnits(length="m", angle="rad"), description="By default metres and radians."
     )
+    pendant: bool = Field(False, description="Whether joint values are those that the arm's pendant shows.")
     name: Name = Field("", description="For people.")
     task: Literal["pose", "approach", "position"] | None = Field(
         None, description="What the tool keeps of poses; by default as much as the joints of the arm can keep."

@@ -15,8 +15,8 @@ blend = 20
 ```
 
 A target is `q`, or `position` with or without `wxyz`, or `pose`, a 4×4 matrix. Poses and via points are in the
-world frame, or in the one that `frame` names: ``"base"``, or a workpiece. Every error names the field, as in
-``segments[1].blend``.
+world frame, or in the one that `frame` names: ``"base"``, or a workpiece. With ``pendant = true`` at the top,
+joint values are those that the arm's pendant shows. Every error names the field, as in ``segments[1].blend``.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ from kin.transforms import Array, as_transform
 
 _TARGET = ("q", "position", "wxyz", "pose", "frame")
 LIMITS = Limits(16_000_000, 4_000_000, 16)  # of a program; a page takes shorter ones
-_TOP = (*field_names(Program), "units")
+_TOP = (*field_names(Program), "units", "pendant")
 _LENGTHS, _ANGLES = ("tool_speed", "blend"), ("tool_turn",)
 
 
@@ -118,7 +118,11 @@ def program_from_dict(
     if not isinstance(data, Mapping):
         raise InputError("program", data, "a table with the fields " + ", ".join(_TOP))
     _only(data, _TOP, "")
-    reader = _Reader(data.get("units", {}), None if robot is None else robot_of(robot), workpieces or {})
+    pendant = data.get("pendant", False)
+    if not isinstance(pendant, bool) or (pendant and robot is None):
+        expected = "true or false" if not isinstance(pendant, bool) else "a robot as well, whose pendant is meant"
+        raise InputError("pendant", pendant, expected)
+    reader = _Reader(data.get("units", {}), None if robot is None else robot_of(robot), workpieces or {}, pendant)
     segments = data.get("segments")
     if not isinstance(segments, list | tuple) or not 1 <= len(segments) <= MOST_SEGMENTS:
         raise InputError("segments", _counted(segments, "segments"), f"1 to {MOST_SEGMENTS} segments")
@@ -192,13 +196,15 @@ _PLAIN = Move()
 class _Reader:
     """Reads numbers in the units of the file."""
 
-    def __init__(self, units: object, robot: Robot | None, workpieces: Mapping[str, ArrayLike]) -> None:
+    def __init__(
+        self, units: object, robot: Robot | None, workpieces: Mapping[str, ArrayLike], pendant: bool
+    ) -> None:
         if not isinstance(units, Mapping):
             raise InputError("units", units, 'a table such as { length = "mm", angle = "deg" }')
         _only(units, ("length", "angle"), "units.")
         self.length = _unit(units, "length", LENGTHS, "m")
         self.angle = _unit(units, "angle", ANGLES, "rad")
-        self.robot, self.workpieces = robot, workpieces
+        self.robot, self.workpieces, self.pendant = robot, workpieces, pendant
 
     def segment(self, data: object, where: str) -> Segment:
         if not isinstance(data, Mapping):
@@ -282,7 +288,9 @@ class _Reader:
         if len(target.q) != self.robot.n:
             raise InputError("q", list(target.q), f"{self.robot.n} joint values")
         scale = np.where(self.robot.revolute, self.angle, self.length).tolist()
-        return JointTarget(tuple(scaled(value, each) for value, each in zip(target.q, scale, strict=True)))
+        q = tuple(scaled(value, each) for value, each in zip(target.q, scale, strict=True))
+        found = self.robot.pendant_map if self.pendant else None
+        return JointTarget(q if found is None else tuple(found.joint_values(np.array(q)).tolist()))
 
     def via(self, data: object, where: str, frame: Array | None) -> tuple[float, float, float]:
         if isinstance(data, Mapping):

@@ -32,7 +32,7 @@ def to_pendant(robot: Robot | str, q: ArrayLike) -> Array:
     robot = robot_of(robot)
     q = robot.check_q(q)
     found = robot.pendant_map
-    return q if found is None else q @ found.B.T + found.c
+    return q if found is None else found.shown(q)
 
 
 def from_pendant(robot: Robot | str, shown: ArrayLike) -> Array:
@@ -57,7 +57,7 @@ def from_pendant(robot: Robot | str, shown: ArrayLike) -> Array:
     robot = robot_of(robot)
     values = robot.check_q(shown, "shown")
     found = robot.pendant_map
-    return values if found is None else (values - found.c) @ found.back.T
+    return values if found is None else found.joint_values(values)
 
 
 def shown_limits(robot: Robot) -> list[tuple[float, float] | None]:

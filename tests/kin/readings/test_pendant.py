@@ -106,3 +106,22 @@ def test_in_python_it_is_checked_too_and_an_arm_made_of_another_may_keep_it():
     rest = fixed(robot, {1: 0.3})
     assert kin.to_pendant(rest, [0.2, 0.03]) == pytest.approx([-0.2, 0.07])
     assert "elbow" not in kin.robot_to_dict(rest)["pendant"]
+
+
+def test_a_program_may_have_joint_values_as_on_the_pendant():
+    robot = kin.parse_robot(FLIP)
+    text = """
+units = { length = "mm", angle = "deg" }
+pendant = true
+[[segments]]
+kind = "ptp"
+q = [20, 100, 70]
+"""
+    (segment,) = kin.parse_program(text, robot).segments
+    assert segment.target.q == pytest.approx(kin.from_pendant(robot, [*np.radians([20, 100]), 0.07]), abs=1e-15)
+    (plain,) = kin.parse_program(text.replace("true", "false"), robot).segments
+    assert plain.target.q == pytest.approx([*np.radians([20, 100]), 0.07])
+    for given, arm, valid in (("true", None, "a robot as well"), ('"yes"', robot, "true or false")):
+        with pytest.raises(InputError, match=valid) as caught:
+            kin.parse_program(text.replace("true", given), arm)
+        assert caught.value.field == "pendant"
