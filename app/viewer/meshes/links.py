@@ -65,7 +65,8 @@ def drawing_of(links: Sequence[LinkBody]) -> Drawing:
 
 def size_of(body: Drawing) -> int:
     """The bytes of a drawn body."""
-    meshes = [part.mesh for link in body.parts for part in link]
+    links = (*body.parts, *(finger.parts for finger in body.fingers))
+    meshes = [part.mesh for link in links for part in link]
     return sum(mesh.vertices.nbytes + mesh.faces.nbytes for mesh in meshes)
 
 
@@ -99,7 +100,11 @@ def carried_over(drawing: Drawing, before: Robot, robot: Robot) -> Drawing | Non
         np.column_stack([cover[:, :3] @ shift[:3, :3].T + shift[:3, 3], cover[:, 3]])
         for cover, shift in zip(drawing.spheres, shifts, strict=True)
     )
-    return Drawing(parts, spheres)
+    fingers = tuple(
+        each.moved(tuple(_moved(part, shifts[each.link]) for part in each.parts), shifts[each.link])
+        for each in drawing.fingers
+    )
+    return Drawing(parts, spheres, fingers)
 
 
 def capsules_for(before: Robot, robot: Robot) -> Robot:

@@ -8,6 +8,7 @@ import viser
 
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post, listen
+from app.viewer.panel.gripper import GripperSlider
 from app.viewer.panel.jog import JogPad
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.readout import PoseReadout
@@ -37,6 +38,7 @@ class Panel:
     Attributes:
         jog: buttons that move the arm in steps.
         joints, posture: folders that are filled for each robot.
+        gripper: its slider, below those of the joints.
         obstacles: the folder of the obstacles. Like that of `jog` it is closed at first, so that the rest fits a
         small window.
         view, target, avoid: where the choices for the whole page are: in the tab *View*, between the joints and
@@ -70,6 +72,7 @@ class Panel:
         group = gui.add_tab_group()
         with group.add_tab("Move"):
             self.joints = gui.add_folder("Joints")
+            self.gripper = GripperSlider(gui, self.joints, post)
             go_to_buttons(gui, post)
             self.target = gui.add_folder(None)
             self.posture = gui.add_folder("Posture and redundancy")

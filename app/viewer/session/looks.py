@@ -115,6 +115,7 @@ class Looks:
         page, scene = self._page, self._page.arm.scene
         page.arm.avoid_collisions(page.view.avoid)
         scene.show_as(page.view.look)
+        page.panel.gripper.offer(scene.opened)
         scene.show_frames(page.view.frames)
         scene.show_labels(page.view.labels)
         scene.show_axes(page.view.axes)

@@ -208,7 +208,8 @@ def _parts(made: Body, drawn: Drawing | None) -> list[tuple[Part, int, Array | N
     """Each mesh, the link that carries it (0: the base), and its pose there; None: as the link's."""
     found: list[tuple[Part, int, Array | None]] = [(made.mount.part, 0, None)]
     if drawn is not None:
-        return [*found, *((part, k, None) for k, parts in enumerate(drawn.parts) for part in parts)]
+        found += [(part, k, None) for k, parts in enumerate(drawn.parts) for part in parts]
+        return [*found, *((part, each.link, None) for each in drawn.fingers for part in each.parts)]
     for link, parts in zip(made.chain.links, made.parts, strict=True):
         for part in parts:
             if part.name not in _HIDDEN:

@@ -121,6 +121,16 @@ class ArmScene:
             else:
                 assign(node, wxyz=turn(link.wxyz, value))
 
+    @property
+    def opened(self) -> float | None:
+        """How far the gripper is open, from 0 to 1; None without fingers."""
+        drawn = self._drawn.drawing
+        return self._drawn.opened if drawn is not None and drawn.fingers else None
+
+    def open_gripper(self, share: float) -> None:
+        """Open the gripper to a share, from 0 (closed) to 1."""
+        self._drawn.open(share)
+
     def place_gizmo(self, T_base_tool: Array, again: bool = False) -> None:
         """Move the gizmo. Never call this while the visitor holds it. `again`: send its pose, changed or not."""
         wxyz = wxyz_from_rotation(T_base_tool[:3, :3])

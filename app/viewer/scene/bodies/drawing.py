@@ -6,6 +6,8 @@ Each of its ``parts`` names the joint that carries it (0: none, the part stands 
 ``[u, v, radius]``: one disc gives a cylinder, two a rounded bar, four a box with rounded edges. ``end`` is the
 section at the far end, if it differs, and ``bevel`` the size of the bevel at both rims.
 
+Parts with ``opens = [x, y, z]`` are fingers: they are drawn closed, and move by this when the gripper opens.
+
 The directions u and v are y and z across an axis along x, z and x along y, x and y along z. Across any other
 axis u is horizontal. Lengths are in millimetres, angles in degrees.
 """
@@ -20,11 +22,12 @@ from typing import Any
 
 import numpy as np
 
+from app.viewer.scene.bodies.fingers import Finger
 from app.viewer.scene.bodies.parts import Color, Part, joint_color
 from app.viewer.scene.chain import chain, link_poses
 from app.viewer.scene.shapes import DIRECTIONS, Solid, loft, merged, outline, placed, spaced
 from kin import Robot, builtin_robots
-from kin.axes import inverse
+from kin.axes import inverse, perpendicular_to
 from kin.transforms import Array
 
 FOLDER = Path(__file__).parent
@@ -42,10 +45,12 @@ class Drawing:
     Attributes:
         parts: one mesh for each colour.
         spheres: ``(k, 4)`` of x, y, z and radius that cover the link, some of radius 0 on its edges.
+        fingers: parts that a gripper moves, which are not among the others.
     """
 
     parts: tuple[tuple[Part, ...], ...]
     spheres: tuple[Array, ...]
+    fingers: tuple[Finger, ...] = ()
 
 
 @lru_cache(maxsize=32)
@@ -63,8 +68,12 @@ def _drawn(robot: Robot, data: dict[str, Any]) -> Drawing:
     poses = link_poses(robot, (np.array(data["pose"], dtype=float) * scale)[None])[0]
     solids: list[dict[str, list[Solid]]] = [{} for _ in poses]
     spheres: list[list[Array]] = [[np.empty((0, 4))] for _ in poses]
+    fingers = []
     for part in data["parts"]:
         solid = _loft(part)
+        if "opens" in part:
+            fingers.append(_finger(part, solid.mesh, poses[part["joint"]], _rgb(data["colors"][part["color"]])))
+            continue
         solids[part["joint"]].setdefault(part["color"], []).append(solid.mesh)
         spheres[part["joint"]].append(solid.spheres)
     colors = {name: _rgb(text) for name, text in data["colors"].items()}
@@ -78,7 +87,19 @@ def _drawn(robot: Robot, data: dict[str, Any]) -> Drawing:
         cover = _outermost(np.vstack(spheres[link]))
         cover[:, :3] = cover[:, :3] @ T[:3, :3].T + T[:3, 3]
         covers.append(cover)
-    return Drawing(tuple(parts), tuple(covers))
+    return Drawing(tuple(parts), tuple(covers), tuple(fingers))
+
+
+def _finger(part: dict[str, Any], mesh: Solid, T_base_link: Array, color: Color) -> Finger:
+    """A part that is drawn closed and slides along `opens`."""
+    T = inverse(T_base_link)
+    way = T[:3, :3] @ (MM * np.array(part["opens"], dtype=float))
+    length = float(np.linalg.norm(way))
+    axis = np.eye(4)
+    axis[:3, 2] = way / length
+    axis[:3, 0] = perpendicular_to(axis[:3, 2])
+    axis[:3, 1] = np.cross(axis[:3, 2], axis[:3, 0])
+    return Finger(part["joint"], (Part("finger", placed(mesh, T), color),), axis, True, 0.0, length)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,10 @@ from collections.abc import Callable, Sequence
 import viser
 
 from app.viewer.scene.bodies.drawing import Drawing
+from app.viewer.scene.bodies.fingers import Finger
 from app.viewer.scene.bodies.parts import Color, Part
 from app.viewer.scene.shapes import merged, placed
+from app.viewer.viser_patches import assign
 from kin import Contact
 from kin.axes import inverse
 from kin.transforms import Array
@@ -62,6 +64,7 @@ class DrawnBody:
         nodes: the meshes of the body; empty if there is none.
         hand: the meshes of the ghost.
         count: of bodies so far: browsers keep the poses of removed nodes, so names are used once.
+        opened: how far the gripper is open, from 0 to 1.
     """
 
     def __init__(
@@ -81,6 +84,8 @@ class DrawnBody:
         self.drawing: Drawing | None = None
         self.nodes: list[viser.MeshHandle] = []
         self.hand: list[viser.MeshHandle] = []
+        self.opened = 0.5
+        self._fingers: list[tuple[viser.MeshHandle, Finger]] = []
 
     def use(self, drawing: Drawing | None, colors: LinkColors) -> None:
         """Replace the body; the new one is visible, its ghost is not."""
@@ -88,14 +93,27 @@ class DrawnBody:
         for node in (*self.nodes, *self.hand):
             node.remove()
         self.count += 1
-        self.drawing, self.nodes, self.hand = drawing, [], []
+        self.drawing, self.nodes, self.hand, self._fingers = drawing, [], [], []
         if drawing is None:
             return
         for k, (parent, parts) in enumerate(zip(self._links, drawing.parts, strict=True)):
             for part in parts:
                 self.nodes.append(self._add(parent, part, name=f"{part.name}-{k}-{self.count}"))
                 colors.add(k, self.nodes[-1], part.color)
+        for k, finger in enumerate(drawing.fingers):
+            for part in finger.parts:
+                name = f"{part.name}-finger-{k}-{self.count}"
+                self.nodes.append(self._add(self._links[finger.link], part, name=name))
+                colors.add(finger.link, self.nodes[-1], part.color)
+                self._fingers.append((self.nodes[-1], finger))
+        self.open(self.opened)
         if drawing.parts[-1]:
             hand = merged([placed(part.mesh, self._T_tool_last) for part in drawing.parts[-1]])
             ghost = Part(f"hand-{self.count}", hand, self._color)
             self.hand = [self._add(self._target, ghost, opacity=GHOST, visible=False)]
+
+    def open(self, share: float) -> None:
+        """Open the gripper to a share, from 0 (closed) to 1."""
+        self.opened = share
+        for node, finger in self._fingers:
+            assign(node, *finger.place(share))

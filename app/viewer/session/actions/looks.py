@@ -7,6 +7,7 @@ from typing import Any
 
 import kin
 from app.viewer.labels import size_labels, text_factor
+from app.viewer.panel.gripper import share_of
 from app.viewer.scene.camera import Sphere
 from app.viewer.scene.viewpoints import SIDES
 from app.viewer.session.parts import Page
@@ -34,6 +35,7 @@ class LookControls:
             "resized": self._on_resize,
             "looked": self._on_look,  # the viewpoint is read when the camera rests
             "frame": lambda name: page.use_frames(page.frames.choose(name)),
+            "gripper": lambda value: arm.scene.open_gripper(share_of(value)),
             "text-size": lambda name: size_labels(page.client.scene, text_factor(name)),
         }
 

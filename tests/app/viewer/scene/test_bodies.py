@@ -21,7 +21,8 @@ from app.viewer.scene.meshes import body
 from app.viewer.session.choices import LOOKS
 from kin.transforms import rotation_vector
 
-FILES = sorted(path.stem for path in FOLDER.glob("*.toml"))
+LIBRARY = {"palletiser"}  # tested in test_gripper.py
+FILES = sorted({path.stem for path in FOLDER.glob("*.toml")} - LIBRARY)
 Array = np.ndarray
 
 
