@@ -11,12 +11,14 @@ from app.viewer.meshes.fitting import bodies_of
 from app.viewer.meshes.placing import PLAIN, Piece, Shapes, placed
 from app.viewer.meshes.surface import LinkBody, Surface
 from app.viewer.scene.bodies.drawing import Drawing
+from app.viewer.scene.bodies.fingers import Finger
 from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.shapes import Solid, ball, box, cylinder
 from kin import Capsule, Robot, link_frames
 from kin.axes import inverse
 from kin.files.urdf.collisions import LinkPieces
+from kin.files.urdf.fingers import FingerMotion
 from kin.files.urdf.visuals import Box, Cylinder, MeshFile, Sphere, Visual
 from kin.transforms import Array
 
@@ -31,36 +33,57 @@ def shapes_of(robot: Robot, visuals: Sequence[Visual], links: Sequence[LinkPiece
         links: its collision bodies.
     """
     poses = [inverse(T) for T in link_poses(robot, np.zeros((1, robot.n)))[0]]
+    motions = _motions(visuals)
     pieces: list[Piece] = []
     solids: list[Surface] = []
     for visual in visuals:
         pose = (poses[visual.carrier] @ visual.T_root_visual)[:3].ravel().tolist()
         color = None if visual.color is None else [round(255 * value) for value in visual.color]
+        # Fingers come behind the links of the arm, as `drawing_of` takes them apart.
+        carrier = visual.carrier if visual.finger is None else len(poses) + motions.index(visual.finger)
         if isinstance(visual.shape, MeshFile):
             path, scale = visual.shape
-            pieces.append(Piece(path, visual.carrier, pose, scale, color, visual.link))
+            pieces.append(Piece(path, carrier, pose, scale, color, visual.link))
         else:
-            pieces.append(Piece(len(solids), visual.carrier, pose, color=color, link=visual.link))
+            pieces.append(Piece(len(solids), carrier, pose, color=color, link=visual.link))
             solids.append(_solid(visual.shape))
-    return Shapes(pieces, solids, len(poses), robot.reach, bodies_of(links))
+    return Shapes(pieces, solids, len(poses) + len(motions), robot.reach, bodies_of(links))
 
 
-def drawing_without_meshes(shapes: Shapes) -> Drawing:
+def _motions(visuals: Sequence[Visual]) -> list[FingerMotion]:
+    """The motions of fingers, each once."""
+    return list(dict.fromkeys(visual.finger for visual in visuals if visual.finger is not None))
+
+
+def fingers_of(robot: Robot, visuals: Sequence[Visual]) -> tuple[Finger, ...]:
+    """The fingers of a robot from a URDF, without parts, in the order in which `shapes_of` has them."""
+    poses = [inverse(T) for T in link_poses(robot, np.zeros((1, robot.n)))[0]]
+    return tuple(
+        Finger(each.carrier, (), poses[each.carrier] @ each.T_root_axis, each.slides, each.closed, each.open)
+        for each in _motions(visuals)
+    )
+
+
+def drawing_without_meshes(shapes: Shapes, fingers: Sequence[Finger] = ()) -> Drawing:
     """The drawn body of a robot whose URDF has boxes, cylinders and spheres only; raises `MeshError`."""
-    return drawing_of(placed(shapes, {}))
+    return drawing_of(placed(shapes, {}), fingers)
 
 
-def drawing_of(links: Sequence[LinkBody]) -> Drawing:
-    """The drawn body of finished links."""
-    parts = tuple(
+def drawing_of(links: Sequence[LinkBody], fingers: Sequence[Finger] = ()) -> Drawing:
+    """The drawn body of finished links; the last ones are the bodies of the fingers, which have no parts yet."""
+    every = tuple(
         tuple(
             Part(f"mesh-{k}", Solid(surface.points, surface.faces), surface.color or PLAIN, double_sided=True)
             for k, surface in enumerate(link.surfaces)
         )
         for link in links
     )
-    spheres = tuple(np.column_stack([link.cover.astype(float), np.zeros(len(link.cover))]) for link in links)
-    return Drawing(parts, spheres)
+    spheres = [np.column_stack([link.cover.astype(float), np.zeros(len(link.cover))]) for link in links]
+    count = len(links) - len(fingers)
+    for finger, cover in zip(fingers, spheres[count:], strict=True):  # as it is drawn
+        spheres[finger.link] = np.concatenate([spheres[finger.link], cover])
+    moving = tuple(replace(finger, parts=parts) for finger, parts in zip(fingers, every[count:], strict=True))
+    return Drawing(every[:count], tuple(spheres[:count]), moving)
 
 
 def size_of(body: Drawing) -> int:

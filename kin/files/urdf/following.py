@@ -63,6 +63,15 @@ def followers_of(tree: UrdfTree, chain: Sequence[UrdfJoint]) -> Followers:
     return Followers(relations, replaced)
 
 
+def relation_of(tree: UrdfTree, joint: UrdfJoint) -> Relation:
+    """How any joint follows the one at the end of its leaders; itself if it follows none.
+
+    Raises:
+        RobotFileError: as `followers_of`.
+    """
+    return _relation(joint, {each.name: each for each in reversed(tree.joints)})
+
+
 def _relation(joint: UrdfJoint, known: dict[str, UrdfJoint]) -> Relation:
     """How a joint follows the one at the end of its leaders, which moves by itself."""
     multiplier, offset = 1.0, 0.0

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from kin.errors import RobotFileError
+from kin.files.urdf.fingers import FingerMotion, fingers_of
 from kin.files.urdf.poses import poses_of
 from kin.files.urdf.tree import UrdfElement, UrdfTree, read_tree
 from kin.transforms import Array
@@ -57,6 +58,7 @@ class Visual:
         carrier: how many joints of the chain move it: 0, and it stands still.
         T_root_visual: its pose ``(4, 4)`` in the root link with all joints of the chain at zero.
         color: red, green and blue from 0 to 1; None if the URDF names none.
+        finger: the joint beside the chain that moves it, None if none does.
     """
 
     link: str
@@ -64,13 +66,14 @@ class Visual:
     T_root_visual: Array
     shape: Shape
     color: Rgb | None
+    finger: FingerMotion | None = None
 
 
 def read_visuals(text: str, tip: str | None = None, file: str = "URDF") -> tuple[Visual, ...]:
     """The visible bodies of all links that belong to the arm up to the link `tip`, in the order of the file.
 
-    Links beside the chain, such as fingers, move with the link that carries them; their own joints stay at zero,
-    or at the limit closest to it.
+    Links beside the chain, such as fingers, move with the link that carries them; their own joints are at zero,
+    or at the limit closest to it. Where one joint moves such a link, it is told how.
 
     Raises:
         RobotFileError: the file is invalid; the message names the link.
@@ -78,6 +81,7 @@ def read_visuals(text: str, tip: str | None = None, file: str = "URDF") -> tuple
     tree = read_tree(text, file)
     chain = tree.chain(None, tip)
     carriers, poses = poses_of(tree, chain)
+    fingers = fingers_of(tree, chain, carriers, poses)
     colors = _colors(tree)
     found: list[Visual] = []
     for element in tree.root.findall("link"):
@@ -85,9 +89,8 @@ def read_visuals(text: str, tip: str | None = None, file: str = "URDF") -> tuple
         if link not in poses:
             continue
         for visual in element.findall("visual"):
-            found += _visual(
-                UrdfElement(file, visual, f"of link {link}"), link, carriers[link], poses[link], colors
-            )
+            seen = _visual(UrdfElement(file, visual, f"of link {link}"), link, carriers[link], poses[link], colors)
+            found += [replace(each, finger=fingers.get(link)) for each in seen]
             if len(found) > MAX_VISUALS:
                 raise RobotFileError(
                     file, "visual", f"more than {MAX_VISUALS}", f"at most {MAX_VISUALS} in all links"

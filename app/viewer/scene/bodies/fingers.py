@@ -1,8 +1,8 @@
 """Fingers of a gripper: parts beside the way to the tool, which one slider opens and closes.
 
 No row of the table moves them, and no pose depends on them. They are drawn as the file has them, in the
-coordinates of the link that carries them. How far the gripper is open is one share for all of them, from 0 (closed)
-to 1 (open), as fingers that follow one motor are.
+coordinates of the link that carries them. How far the gripper is open is one share for all of them, from 0
+(closed) to 1 (open), as fingers that follow one motor are.
 """
 
 from __future__ import annotations

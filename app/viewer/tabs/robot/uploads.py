@@ -11,13 +11,14 @@ from app.shared.memory.answers import MemoryFullError, Reservation
 from app.viewer.feature import Stage
 from app.viewer.meshes.archive import MeshError, TooLargeError
 from app.viewer.meshes.incoming import IncomingFile
-from app.viewer.meshes.links import drawing_of, drawing_without_meshes, shapes_of, size_of
+from app.viewer.meshes.links import drawing_of, drawing_without_meshes, fingers_of, shapes_of, size_of
 from app.viewer.meshes.placing import Shapes
 from app.viewer.meshes.reader import MOST_TRIANGLES, Meshes, full
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post
 from app.viewer.panel.status import Notice
 from app.viewer.scene.bodies.drawing import Drawing
+from app.viewer.scene.bodies.fingers import Finger
 from app.viewer.tabs.robot.doctor import Doctor
 from app.viewer.tabs.robot.files import (
     MOST,
@@ -46,6 +47,7 @@ class _Reading:
     Attributes:
         replaced: the id of the robot that was on show before.
         links: its collision bodies.
+        fingers: beside it, whose parts are among what is read.
     """
 
     own: OwnArm
@@ -53,6 +55,7 @@ class _Reading:
     source: Source
     count: int
     links: Sequence[LinkPieces]
+    fingers: Sequence[Finger] = ()
     done: int = 0
 
     @property
@@ -202,14 +205,14 @@ class Uploads:
         if source.archive is None:
             plain = [visual for visual in visuals if not isinstance(visual.shape, MeshFile)]
             if plain == list(visuals):
-                self._draw_plain(robot, source, shapes_of(robot, plain))
+                self._draw_plain(robot, source, shapes_of(robot, plain), fingers_of(robot, plain))
                 return ""
             return "Open it together with its meshes, and they are shown."
         links = bodies_in(source.name, source.text, tip, robot)
         shapes = shapes_of(robot, visuals, links if any(link.meshes for link in links) else ())
         count = len(shapes.files)
         if not count and not shapes.bodies:
-            self._draw_plain(robot, source, shapes)
+            self._draw_plain(robot, source, shapes, fingers_of(robot, visuals))
             _, words = with_capsules(own, links, without_meshes(links, robot.reach))
             return words
         self._number += 1
@@ -220,7 +223,8 @@ class Uploads:
             )
         except MeshError as error:
             raise file_error(source.name, error) from None
-        self._reading = _Reading(own, self._stage.now.robot.id, source, count, links if shapes.bodies else ())
+        fingers, kept = fingers_of(robot, visuals), links if shapes.bodies else ()
+        self._reading = _Reading(own, self._stage.now.robot.id, source, count, kept, fingers)
         future.add_done_callback(partial(self._post, done))
         self._future = future
         return f"Its {count} meshes are being read." if count else "Its collision meshes are being read."
@@ -239,7 +243,7 @@ class Uploads:
         source = reading.source
         try:
             meshes: Meshes = done.result()
-            self._draw(reading.robot, source, drawing_of(meshes.links), meshes.room)
+            self._draw(reading.robot, source, drawing_of(meshes.links, reading.fingers), meshes.room)
         except TooLargeError as error:
             self._post(("refused",), (reading, str(file_error(source.name, error)), MOST_BACK))
             return
@@ -284,12 +288,14 @@ class Uploads:
         self._post(("refused",), (reading, words, left - 1))
         return ""
 
-    def _draw_plain(self, robot: Robot, source: Source, shapes: Shapes) -> None:
+    def _draw_plain(self, robot: Robot, source: Source, shapes: Shapes, fingers: Sequence[Finger]) -> None:
         """Draw boxes, cylinders and spheres."""
         if not shapes.pieces:
             return
         try:
-            self._draw(robot, source, drawing_without_meshes(shapes), self._stage.meshes.memory.reserve(0))
+            self._draw(
+                robot, source, drawing_without_meshes(shapes, fingers), self._stage.meshes.memory.reserve(0)
+            )
         except MeshError as error:
             raise file_error(source.name, error) from None
 

@@ -18,13 +18,14 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.meshes.links import carried_over
+from app.viewer.meshes.links import carried_over, drawing_without_meshes, fingers_of, shapes_of
 from app.viewer.panel.gripper import share_of
 from app.viewer.scene.arm.arm_scene import ArmScene
 from app.viewer.scene.bodies.drawing import drawing
 from app.viewer.scene.bodies.fingers import Finger
 from app.viewer.scene.chain import link_poses
 from app.viewer.server import ViewerServer
+from kin.files.urdf.visuals import read_visuals
 from kin.transforms import pose_from_position_wxyz
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -103,6 +104,69 @@ def test_a_scene_moves_the_fingers_and_keeps_how_far_they_are_open() -> None:
         assert ArmScene(server.scene, kin.get_robot("ur5"), root="/without").opened is None
     finally:
         server.stop()
+
+
+HAND = """<robot name="picker">
+<link name="base"><visual><geometry><box size="0.2 0.2 0.2"/></geometry></visual></link>
+<link name="arm"><visual><origin xyz="0 0 0.2"/><geometry><box size="0.05 0.05 0.4"/></geometry></visual></link>
+<link name="palm"/>
+<link name="left"><visual><origin xyz="0 0 0.05"/><geometry><box size="0.02 0.01 0.1"/></geometry></visual></link>
+<link name="right"><visual><origin xyz="0 0 0.05"/><geometry><box size="0.02 0.01 0.1"/></geometry></visual></link>
+<link name="nail"><visual><geometry><sphere radius="0.01"/></geometry></visual></link>
+<link name="tool"/>
+<joint name="j1" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0 0 0.1"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>
+<joint name="wrist" type="fixed"><parent link="arm"/><child link="palm"/><origin xyz="0 0 0.4"/></joint>
+<joint name="flange" type="fixed"><parent link="palm"/><child link="tool"/><origin xyz="0 0 0.1"/></joint>
+<joint name="finger" type="prismatic"><parent link="palm"/><child link="left"/><origin xyz="0 0.01 0"/>
+<axis xyz="0 1 0"/><limit lower="0" upper="0.04" velocity="1" effort="1"/></joint>
+<joint name="other" type="revolute"><parent link="palm"/><child link="right"/><origin xyz="0 -0.01 0"/>
+<axis xyz="1 0 0"/><limit lower="-1" upper="1" velocity="1" effort="1"/>
+<mimic joint="finger" multiplier="10" offset="0.1"/></joint>
+<joint name="tip" type="fixed"><parent link="left"/><child link="nail"/><origin xyz="0 0 0.1"/></joint>
+</robot>"""
+
+
+def test_fingers_of_a_urdf_are_beside_the_arm_and_have_the_range_of_the_one_that_leads() -> None:
+    robot, visuals = kin.load_urdf(HAND, tip="tool"), read_visuals(HAND, "tool")
+    assert robot.n == 1
+    drawn = drawing_without_meshes(shapes_of(robot, visuals), fingers_of(robot, visuals))
+    assert [len(parts) for parts in drawn.parts] == [1, 1]
+    left, right = drawn.fingers
+    assert (left.link, left.slides, left.closed, left.open) == (1, True, 0.0, 0.04)
+    assert (right.slides, right.closed, right.open) == (False, 0.1, pytest.approx(0.5))
+    # The arm bent by 90°: what points up at zero points along x, 0.1 m up.
+    T = link_poses(robot, np.array([[math.pi / 2]]))[0][1]
+
+    def middle(finger: Finger, share: float) -> np.ndarray:
+        vertices = np.vstack([part.mesh.vertices for part in finger.parts])
+        points = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+        return T @ pose_from_position_wxyz(*finger.place(share)) @ [*points, 1.0]
+
+    assert middle(left, 0.0)[:3] == pytest.approx([0.455, 0.01, 0.1], abs=1e-6), "with the nail on it"
+    assert middle(left, 1.0)[:3] == pytest.approx([0.455, 0.05, 0.1], abs=1e-6)
+    angle = 10.0 * 0.5 * 0.04 + 0.1
+    place = [0.4 + 0.05 * math.cos(angle), -0.01 - 0.05 * math.sin(angle), 0.1]
+    assert middle(right, 0.5)[:3] == pytest.approx(place, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "moving"),
+    [
+        ('mimic joint="finger"', 'mimic joint="j1"', 1),
+        ('mimic joint="finger"', 'mimic joint="nobody"', 1),
+        ('lower="0" upper="0.04"', 'lower="0" upper="0"', 0),
+        ('name="tip" type="fixed"', 'name="tip" type="continuous"', 2),
+    ],
+)
+def test_fingers_without_a_range_of_their_own_stay_as_they_are_drawn(old: str, new: str, moving: int) -> None:
+    text = HAND.replace(old, new)
+    robot, visuals = kin.load_urdf(text, tip="tool"), read_visuals(text, "tool")
+    drawn = drawing_without_meshes(shapes_of(robot, visuals), fingers_of(robot, visuals))
+    assert len(drawn.fingers) == moving
+    bodies = [part for parts in (*drawn.parts, *(each.parts for each in drawn.fingers)) for part in parts]
+    assert len(visuals) == 5
+    assert bodies
 
 
 @pytest.fixture
