@@ -37,14 +37,15 @@ def data_of(page: str) -> dict:
 def fk_of(robot: dict, q: np.ndarray) -> np.ndarray:
     """Forward kinematics from the constants in the file."""
     T = np.eye(4)
-    for joint, value in zip(robot["joints"], q, strict=True):
+    for link in robot["links"]:
+        value = link["ratio"] * q[link["joint"]]
         c, s = np.cos(value), np.sin(value)
         motion = np.eye(4)
-        if joint["turns"]:
+        if link["turns"]:
             motion[:2, :2] = [[c, -s], [s, c]]
         else:
             motion[2, 3] = value
-        T = T @ np.reshape(joint["axis"], (4, 4)) @ motion
+        T = T @ np.reshape(link["axis"], (4, 4)) @ motion
     return T @ np.reshape(robot["tool"], (4, 4))
 
 
@@ -58,8 +59,9 @@ def test_the_file_has_the_arm(robot):
     assert [joint["name"] for joint in data["robot"]["joints"]] == [joint.name for joint in robot.joints]
     assert all(each["lower"] <= each["home"] <= each["upper"] for each in data["robot"]["joints"])
     assert [each["home"] for each in data["robot"]["joints"]] == list(robot.home)
-    moved = [row["joint"] for row in data["robot"]["rows"] if row["moves"]]
-    assert moved == list(range(robot.n))
+    moved = [(row["joint"], row["ratio"]) for row in data["robot"]["rows"] if row["moves"]]
+    names = [joint.name for joint in robot.joints]
+    assert moved == [(names.index(row.follows or row.name), row.ratio) for row in robot.rows if row.moves]
 
 
 def test_nothing_is_loaded_from_elsewhere():
