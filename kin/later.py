@@ -7,33 +7,35 @@ it behaves as the tuple that it becomes.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
 from typing import Any, TypeVar, overload
 
 T = TypeVar("T")
 
 
 class Later(Sequence[T]):
-    """A tuple with at least one element, computed once, at the first use of its elements or its length.
+    """A tuple with at least one element, computed at the first use of its elements or its length.
 
     Args:
-        compute: gives the elements; it is called at most once and then forgotten.
+        compute: gives the elements, and is then forgotten. Threads that ask at the same time each call it, so it
+            has to give the same ones.
     """
 
     def __init__(self, compute: Callable[[], Iterable[T]]) -> None:
         self._compute: Callable[[], Iterable[T]] | None = compute
+        self._found: tuple[T, ...] = ()
 
-    @cached_property
+    @property
     def _elements(self) -> tuple[T, ...]:
-        assert self._compute is not None
-        found = tuple(self._compute())
-        self._compute = None
-        return found
+        compute = self._compute
+        if compute is not None:
+            self._found = tuple(compute())
+            self._compute = None  # after the elements are there for other threads
+        return self._found
 
     @property
     def is_computed(self) -> bool:
         """Whether the elements are known."""
-        return "_elements" in self.__dict__
+        return self._compute is None
 
     def __bool__(self) -> bool:
         """True, without computing anything: there is at least one element."""

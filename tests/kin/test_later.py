@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import threading
 
 import pytest
 
@@ -63,3 +64,19 @@ def test_what_fails_is_asked_for_again(asked):
     with pytest.raises(MemoryError):
         len(found)
     assert found == ("a", "b")
+
+
+def test_threads_that_ask_at_the_same_time_all_get_the_elements():
+    inside = threading.Barrier(4)
+
+    def compute():
+        inside.wait(10.0)  # all four are computing
+        return "ab"
+
+    later, found = Later(compute), []
+    threads = [threading.Thread(target=lambda: found.append(later[:])) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(10.0)
+    assert found == 4 * [("a", "b")]

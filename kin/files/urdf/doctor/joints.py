@@ -97,9 +97,9 @@ def _check_limits(notes: FindingLog, joint: Element, place: str, kind: str) -> b
         notes.add(limit, place, "limit", "suspicious", words, mend)
         return False
     if lower == upper:
-        words = f"Both limits are {general(lower)}: it cannot move."
+        words = f"Both limits are {general(lower)}: it cannot move, and is read as fixed there."
         mend = "State its limits, or make it fixed, and its value a part of the origin."
-        notes.add(limit, place, "limit", "wrong", words, mend)
+        notes.add(limit, place, "limit", "suspicious", words, mend)
         return False
     if lower > upper:
         low = source.with_attribute(limit, "lower", spelled(upper))
