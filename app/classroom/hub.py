@@ -196,7 +196,9 @@ class Hub:
         """Store what is pending, and stop; returns soon even if the database does not answer."""
         self._stopping.set()
         end = steady() + STOPPING
-        for thread in [*self._threads.values()]:
+        with self._lock:
+            threads = list(self._threads.values())
+        for thread in threads:
             thread.join(max(0.0, end - steady()))
         if self._database is not None:
             self._database.close()

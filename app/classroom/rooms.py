@@ -290,14 +290,7 @@ class Rooms:
 
     def is_open(self, ticket: Ticket) -> bool:
         """Whether the room of a ticket goes on, and its seat was not removed."""
-        query = select(Room.id).where(Room.id == ticket.room)
-        if ticket.seat:
-            query = query.join(Seat, Seat.room_id == Room.id).where(
-                Seat.id == ticket.seat, Seat.removed.is_(False)
-            )
-        with self._database.read() as connection:
-            query = query.where(Room.ends > now())  # not earlier: the first transaction may change how it counts
-            return connection.scalar(query) is not None
+        return self.find(ticket) is not None
 
     def all(self) -> list[OpenRoom]:
         """All rooms, the newest first."""

@@ -38,7 +38,7 @@ class Room(Base):
         version: grows by one with each change of this row or of a seat.
         state: what the teacher has set: follow, frozen, task, shown, poll, course, course_at, own.
         page: the packed state of the teacher's page.
-        beat: grows every few seconds while a page of the teacher is connected.
+        beat: of earlier versions; not read any more.
         opener: a number from 1 to 1000 that the address which opened the room shares with many others; 0: none.
     """
 
@@ -62,13 +62,12 @@ class Seat(Base):
     Attributes:
         hand: when it was raised; 0: it is down.
         task: the exercise that the page shows, or empty.
-        tries: how many attempts are stored; pages read the attempts again when it has changed.
-        solved: of earlier versions; not read any more.
+        tries: how many attempts are stored.
+        solved, version: of earlier versions; not read any more.
         gone: whether the student has stopped following.
         driven: what a program drives with the arm of the page, or empty.
         voted: id of the poll that `vote` belongs to.
-        beat: grows every few seconds while a page of this seat is connected.
-        version: that of the room when the seat last changed.
+        beat: 0 until a page of this seat has come.
         removed: by the teacher; alias, page and attempts are then erased.
     """
 

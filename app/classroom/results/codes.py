@@ -10,12 +10,12 @@ from __future__ import annotations
 import hashlib
 import hmac
 import struct
-import unicodedata
 from binascii import crc_hqx
 from dataclasses import dataclass
 from datetime import date, timedelta
 from typing import Literal
 
+from app.classroom.views import in_one_line
 from kin import InputError
 
 LETTERS = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
@@ -71,10 +71,7 @@ class Outcome:
 
 def clean_alias(text: str) -> str:
     """An alias in one line without control characters; raises `InputError`."""
-    kept = "".join(
-        x if unicodedata.category(x)[0] not in "CZ" else " " for x in unicodedata.normalize("NFC", text)
-    )
-    kept = " ".join(kept.split())
+    kept = in_one_line(text)
     if not 1 <= len(kept) <= LONGEST_ALIAS:
         raise InputError("alias", text, f"1 to {LONGEST_ALIAS} characters")
     return kept
