@@ -19,11 +19,11 @@ pytestmark = pytest.mark.browser
 
 TYPE_SLOWLY = """texts => new Promise(done => {
     const sent = [], cell = document.querySelector('[data-arm] input[data-cell="tool z"]');
-    const { send } = viserPage;
-    viserPage.send = (...message) => {
+    const { send } = channel;
+    channel.send = (...message) => {
         if (message[1]?.[1]?.[0] === "cell") {
             sent.push(message[1][2][1]);
-            setTimeout(() => { viserPage.send = send; done(sent); }, 500);
+            setTimeout(() => { channel.send = send; done(sent); }, 500);
         }
         return send(...message);
     };

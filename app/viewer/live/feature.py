@@ -105,8 +105,7 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
         match key:
             case ("arriving", "upload") if isinstance(value, IncomingFile):
                 self.wake()
-                if why := self._opening.expect(value):
-                    self.stage.notify(Notice("error", f"{value.name} did not arrive", why))
+                self._opening.expect(value)
             case ("upload",):
                 self.wake()
                 if isinstance(value, IncomingFile):

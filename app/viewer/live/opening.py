@@ -17,6 +17,7 @@ from app.shared.threads.executor import DaemonExecutor
 from app.viewer.feature import Stage
 from app.viewer.meshes.incoming import IncomingFile
 from app.viewer.panel import Post
+from app.viewer.panel.status import Notice
 from kin import Robot
 
 _reader: Final = DaemonExecutor(1, "recordings", lower_priority)
@@ -45,14 +46,15 @@ class Opening:
             return f"Receiving “{file.name}” …", round(100.0 * file.arrived / max(file.total, 1))
         return None
 
-    def expect(self, file: IncomingFile) -> str:
-        """A file is on its way, or has failed; returns why it has."""
+    def expect(self, file: IncomingFile) -> None:
+        """A file is on its way, or has failed, which is said."""
         if file.cancelled:
-            return ""
+            return
         if file is not self._incoming:
             self.stop()
         self._incoming = None if file.failure else file
-        return file.failure
+        if file.failure:
+            self._stage.notify(Notice("error", *file.notice))
 
     def take(self, file: IncomingFile) -> None:
         """A file that is whole, unless it was cancelled meanwhile."""

@@ -77,6 +77,12 @@ class IncomingFile:
             self.room.release()
 
     @property
+    def notice(self) -> tuple[str, str]:
+        """What is said when it has failed: title and detail."""
+        title = f"{self.name} did not arrive" if self.failure == CUT_OFF else "The file was not used"
+        return title, self.failure
+
+    @property
     def busy(self) -> bool:
         """Whether more of it is to come."""
         return not (self.whole or self.failure or self.cancelled)

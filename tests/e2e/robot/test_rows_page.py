@@ -10,12 +10,12 @@ pytestmark = pytest.mark.browser
 
 # How often the page says that a field was left, within seconds in which it was left once for a button.
 LEFT = """() => new Promise((done) => {
-  const { send } = viserPage;
+  const { send } = channel;
   let left = 0;
-  viserPage.send = (...message) => { left += message[1]?.[1]?.[0] === "left"; return send(...message); };
+  channel.send = (...message) => { left += message[1]?.[1]?.[0] === "left"; return send(...message); };
   document.querySelector('[data-cell="0 name"]').focus();
   document.querySelector('[data-arm-do="add"]').focus();
-  setTimeout(() => { viserPage.send = send; done(left); }, 2500);
+  setTimeout(() => { channel.send = send; done(left); }, 2500);
 })"""
 # Something else of the page changes before the service has answered.
 ADD = """() => {

@@ -113,7 +113,7 @@ class RobotTab(Feature):
                 self._show_files()
             case ("arriving", "other-text") if isinstance(value, IncomingFile):
                 if value.failure:
-                    self._refuse(f"{value.name} did not arrive", value.failure)
+                    self._refuse(*value.notice)
             case (str(name),) if name in self._handlers:
                 self._handlers[name](value)
                 self._plan()

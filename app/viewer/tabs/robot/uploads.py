@@ -139,7 +139,7 @@ class Uploads:
             self._drop_incoming()
         self._incoming = None if file.failure else file
         if file.failure:
-            self._stage.notify(Notice("error", f"{file.name} did not arrive", file.failure))
+            self._stage.notify(Notice("error", *file.notice))
 
     def take(self, file: IncomingFile) -> None:
         """A file that is whole, unless it was cancelled meanwhile; raises `kin.KinematicsError`."""
