@@ -5,6 +5,7 @@
 const channel = (() => {
   const PROTOCOL = "kinboard-1";
   const REPLACED = 4000; // code of a connection that a newer one of this page replaces
+  const UNREADABLE = [1007, 1008]; // of one that a message has ended
   const LONGEST = 56000; // bytes of a message; the service closes a connection that sends more than 64 KiB at once
   const MOST = 200; // messages that wait for the connection; later ones are refused
   const AGAIN = 500, SELDOM = 4000; // ms until another try to connect
@@ -20,6 +21,8 @@ const channel = (() => {
   let heardAt = 0; // ms
   let number = 0; // of the last message
   let unconfirmed = []; // [number, text]
+  let again = false; // whether they wait to be sent over a new connection
+  let refused = false; // whether the first of them has ended a connection
   let noted = 0; // the last notice
   const waiting = new Map(); // number of a message → what to do with its reply
   const values = new Map(); // by key
@@ -38,18 +41,20 @@ const channel = (() => {
   /** Send a message to the session. done(error, readings) gets its answer. Returns whether there is a session. */
   function send(message, argument = null, done = null) {
     if (!name) return false;
-    const text = JSON.stringify([number + 1, message, argument]);
-    const refused = bytes(text) > LONGEST ? "This text is too long." : unconfirmed.length >= MOST ? "There is no connection." : "";
-    if (refused) { done?.(refused, []); return true; }
+    const text = JSON.stringify([number + 1, message, argument], wellFormed);
+    const why = bytes(text) > LONGEST ? "This text is too long." : unconfirmed.length >= MOST ? "There is no connection." : "";
+    if (why) { done?.(why, []); return true; }
     number++;
     if (done) waiting.set(number, done);
-    if (BESIDE_CONTROLS.has(message) && viserPage.writeField([number, message, argument])) return true;
+    if (BESIDE_CONTROLS.has(message) && viserPage.writeField(JSON.parse(text))) return true;
     unconfirmed.push([number, text]);
     sendText(text);
     return true;
   }
+  /** Half letters, which no message can have, become marks. */
+  const wellFormed = (_, value) => (typeof value === "string" ? value.replace(/\p{Surrogate}/gu, "\ufffd") : value);
   function sendText(text) {
-    if (!isOpen()) return;
+    if (!isOpen() || again) return;
     socket.send(text);
     tellLine("sent");
   }
@@ -68,6 +73,7 @@ const channel = (() => {
     const { set = {}, notices = [], heard } = JSON.parse(data);
     heardAt = performance.now();
     unconfirmed = unconfirmed.filter(([sent]) => sent > heard);
+    if (again) sendAgain();
     for (const [key, value] of Object.entries(set)) {
       values.set(key, value);
       for (const act of watchers.get(key) ?? []) attempt(act, value);
@@ -82,6 +88,19 @@ const channel = (() => {
     tellLine("heard");
   }
 
+  /** Send what the service has not heard, but for a message for which it has ended the connection before. */
+  function sendAgain() {
+    again = false;
+    if (refused && unconfirmed.length) {
+      const [[sent]] = unconfirmed.splice(0, 1);
+      const done = waiting.get(sent);
+      waiting.delete(sent);
+      if (done) attempt(done, "The service cannot read this.", []);
+    }
+    refused = false;
+    for (const [, text] of unconfirmed) socket.send(text);
+  }
+
   function open() {
     clearTimeout(timer);
     const address = new URL(`channel/${place}`, location.href);
@@ -93,13 +112,17 @@ const channel = (() => {
       if (socket !== made) return;
       tries = 0;
       heardAt = performance.now();
-      if (!opened) { opened = true; dispatchEvent(new Event("kinboard-connect")); }
+      again = opened; // once the service has said what it has heard
+      if (again) return;
+      opened = true;
+      dispatchEvent(new Event("kinboard-connect"));
       for (const [, text] of unconfirmed) made.send(text);
     });
     made.addEventListener("message", (event) => { if (socket === made) hear(event); });
     made.addEventListener("close", ({ code }) => {
       if (socket !== made) return;
       socket = null;
+      refused ||= UNREADABLE.includes(code);
       tellLine("closed");
       if (code !== REPLACED) timer = setTimeout(open, Math.min(AGAIN * 2 ** tries++, SELDOM));
     });
@@ -120,7 +143,7 @@ const channel = (() => {
     if (found[1] === name) return;
     leave();
     [place, name] = found;
-    [opened, tries, number, noted, unconfirmed] = [false, 0, 0, 0, []];
+    [opened, tries, number, noted, unconfirmed, again, refused] = [false, 0, 0, 0, [], false, false];
     waiting.clear();
     values.clear();
     viserPage.emptyField();

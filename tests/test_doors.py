@@ -45,7 +45,6 @@ GUARDED = {
     "app/service/web/lti.py": "bytes",
     "app/viewer/meshes/archive.py": "bytes and files before it is unpacked",
     "app/viewer/meshes/child.py": "a process of its own",
-    "app/viewer/meshes/incoming.py": "bytes of a message",
     "app/viewer/meshes/loading.py": "a process of its own",
     "app/viewer/session/state.py": "characters, and bytes while it is unpacked",
     "app/viewer/viser_patches.py": "bytes",

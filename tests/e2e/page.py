@@ -76,6 +76,20 @@ localStorage.setItem("kinboard-hints", "drag joint learn");
 localStorage.setItem("kinboard-software", "closed");
 """
 
+# Keeps the websockets of the page's own scripts: viser's is in a worker.
+KEEP_SOCKETS = """
+{
+  const { WebSocket } = window;
+  window.kbSockets = [];
+  window.WebSocket = class extends WebSocket {
+    constructor(...given) {
+      super(...given);
+      window.kbSockets.push(this);
+    }
+  };
+}
+"""
+
 # What the console of a browser says beside errors of ours.
 EXPECTED = (
     "THREE.Clock: This module has been deprecated",  # viser uses it

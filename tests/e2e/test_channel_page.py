@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from page import Tab
+from page import KEEP_SOCKETS, Tab
 from playwright.sync_api import Browser, ConsoleMessage, expect
 
 import kin
@@ -17,19 +17,6 @@ from tests.app.zips import packed, robot_files
 pytestmark = [pytest.mark.browser, pytest.mark.full]
 
 PIONEER = kin.get_robot("pioneer5")
-# Keeps the websockets of the page's own scripts: viser's is in a worker.
-KEEP_SOCKETS = """
-{
-  const { WebSocket } = window;
-  window.kbSockets = [];
-  window.WebSocket = class extends WebSocket {
-    constructor(...given) {
-      super(...given);
-      window.kbSockets.push(this);
-    }
-  };
-}
-"""
 FORBIDDEN = """
 for (const name of ["localStorage", "sessionStorage"]) {
   Object.defineProperty(window, name, { get: () => { throw new DOMException("forbidden", "SecurityError"); } });
@@ -79,6 +66,18 @@ def test_what_is_done_while_the_channel_is_lost_counts_once(tab: SocketTab) -> N
     again = [now - was for now, was in zip(tab.tool(), before, strict=True)]
     assert any(abs(step) > 0.5 for step in moved), "mm"
     assert moved == pytest.approx(again, abs=0.11)
+
+
+def test_a_message_that_the_service_cannot_read_ends_nothing_else(tab: SocketTab) -> None:
+    page = tab.page
+    page.evaluate("""() => {
+      channel.send("target", ["position", "\\ud800"]);
+      channel.send("nothing", 1, (error) => { window.kbRefused = error; });
+      channel.send("nudge", [2, false, 1, false]);
+    }""")
+    expect(page.locator("[data-send=undo]")).to_have_attribute("title", re.compile("Target moved by keys"))
+    page.wait_for_function("window.kbRefused === 'The service cannot read this.'")
+    assert page.evaluate("kbSockets.length") == 2
 
 
 def test_a_large_file_shows_how_far_it_is_and_cancel_ends_it(tab: SocketTab, tmp_path: Path) -> None:
