@@ -130,7 +130,9 @@ const channel = (() => {
   function leave() {
     const left = socket;
     socket = null;
-    left?.close();
+    // A browser complains of one that is closed before it is open.
+    if (left?.readyState === WebSocket.CONNECTING) left.addEventListener("open", () => left.close());
+    else left?.close();
   }
   setInterval(() => {
     if (!socket || performance.now() - heardAt < DEAD) return;

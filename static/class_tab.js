@@ -59,7 +59,7 @@
   }
   function deliver() {
     for (const one of answers) {
-      if (sent.has(one.id) || one.place !== place() || !student() || !channel.isOpen()) continue;
+      if (sent.has(one.id) || one.place !== place() || !student() || !channel.name()) continue;
       sent.add(one.id);
       channel.send("feature", ["exercises", [one.kind, one.id, Date.now()], one.value], () => {
         answers = answers.filter((each) => each !== one);
