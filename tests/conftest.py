@@ -36,7 +36,6 @@ LONG = frozenset(
         "app/cli/test_xacro.py",
         "app/service/test_fault_table.py",
         "app/service/test_faults.py",
-        "app/service/test_workers.py",
         "app/viewer/room/test_leaks.py",
         "app/viewer/scene/test_viewer_camera.py",
         "app/viewer/session/test_state.py",

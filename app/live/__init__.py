@@ -1,10 +1,9 @@
 """Programs that are connected to a page: the codes of pages, and the line between a page and its program.
 
-`Lines` are those of one process. A page opens a `Line` and shows its code; :mod:`app.api.live` lets the program
+`Lines` are those of the service. A page opens a `Line` and shows its code; :mod:`app.api.live` lets the program
 with this code talk to the page, and :mod:`app.viewer.live` lets the page answer. Neither knows the other.
 """
 
-from app.live.codes import code_in, home_of
 from app.live.line import EVENTS, RESERVED, VALUES, BusyLineError, Door, Line, Lines, Program, invite, reserved
 
 __all__ = [
@@ -16,8 +15,6 @@ __all__ = [
     "Line",
     "Lines",
     "Program",
-    "code_in",
-    "home_of",
     "invite",
     "reserved",
 ]

@@ -275,15 +275,9 @@ class Line:
 
 
 class Lines:
-    """The lines of one process, by their codes.
+    """The lines of all pages, by their codes."""
 
-    Args:
-        place: of this process among those with pages.
-        places: how many there are.
-    """
-
-    def __init__(self, place: int = 0, places: int = 1) -> None:
-        self.place, self._places = place, places
+    def __init__(self) -> None:
         self._lock = threading.Lock()
         self._lines: dict[str, Line] = {}
 
@@ -291,7 +285,7 @@ class Lines:
         """A new line of a page that shows this robot; with a reserved code, in place of an earlier page."""
         with self._lock:
             if code not in RESERVED:
-                code = unused_code({*self._lines, *RESERVED}, self.place, self._places)
+                code = unused_code({*self._lines, *RESERVED})
             before = self._lines.get(code)
             line = self._lines[code] = Line(code, robot, post)
         if before is not None:

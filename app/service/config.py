@@ -9,15 +9,13 @@ from collections.abc import Callable
 import uvicorn
 
 from app.service.guard import Guard
-from app.service.handover import Handover
 from app.shared.threads.turns import urgent
 
 
 class GuardedConfig(uvicorn.Config):
-    """uvicorn's configuration, the guard of its connections, and other processes to hand them to."""
+    """uvicorn's configuration, and the guard of its connections."""
 
     guard: Guard
-    handover: Handover | None = None
 
     def get_loop_factory(self) -> Callable[[], asyncio.AbstractEventLoop] | None:
         """asyncio's event loop, for which computations wait. Others, as uvloop, do not tell when they sleep."""

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import asyncio
 import socket
-import urllib.parse
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -29,7 +28,6 @@ from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 from app.api.problems import ProblemError
 from app.service.config import GuardedConfig
 from app.service.guard import Outflow
-from app.service.handover import LARGEST
 from app.shared.problems import MEDIA_TYPE
 
 if TYPE_CHECKING:
@@ -40,9 +38,6 @@ MAX_HEAD: Final = 64 * 1024  # bytes
 MAX_HEADERS: Final = 128
 CHUNK_FRAME: Final = 16  # bytes of a chunk besides its data that do not count: its size and two line ends
 MIN_RATE: Final = 1024.0  # bytes per second, on average, at which a body must arrive
-PIECE: Final = (
-    LARGEST - MAX_HEAD
-)  # bytes read at once: with a head that came before, one message to another process
 
 
 class _Flow(FlowControl):
@@ -58,19 +53,12 @@ class _Flow(FlowControl):
 
 
 class HttpProtocol(HttpToolsProtocol):
-    """One HTTP connection.
+    """One HTTP connection."""
 
-    Args:
-        first: bytes that another process has read from it: at least the head of a request that is for this one.
-    """
-
-    def __init__(self, config: GuardedConfig, *args: Any, first: bytes = b"", **kwargs: Any) -> None:
+    def __init__(self, config: GuardedConfig, *args: Any, **kwargs: Any) -> None:
         super().__init__(config, *args, **kwargs)
         self.guard = config.guard
         self.ended = False  # no more requests are read from this connection
-        self._handover = config.handover
-        self._first = first
-        self._raw: bytearray | None = None  # what has arrived of a request, until its head is complete
         self._host: str | None = None  # None: not counted
         self._outflow: Outflow
         self._in_message = False
@@ -109,10 +97,6 @@ class HttpProtocol(HttpToolsProtocol):
         self._outflow = Outflow(transport, self.guard.send_timeout)
         self._since = self._last = self.loop.time()
         self.guard.add(self, host)
-        if self._handover is not None:
-            transport.max_size = PIECE  # type: ignore[attr-defined]
-        if self._first:
-            self.data_received(self._first)
 
     def connection_lost(self, exc: Exception | None) -> None:
         if self._host is not None:
@@ -172,12 +156,10 @@ class HttpProtocol(HttpToolsProtocol):
         self._unset_keepalive_if_required()
         self._received += len(data)
         self._last = self.loop.time()
-        if self._handover is not None:
-            self._keep(data)
         view = memoryview(data)
-        going_on = all(self._parse(view[start : start + MAX_HEAD]) for start in range(0, len(data), MAX_HEAD))
-        if going_on and (not self._in_message or self._head_complete):
-            self._raw = None
+        for start in range(0, len(data), MAX_HEAD):
+            if not self._parse(view[start : start + MAX_HEAD]):
+                return
 
     def _parse(self, piece: memoryview | bytes) -> bool:
         """Parse at most `MAX_HEAD` bytes; returns whether what follows them is for this parser too.
@@ -243,12 +225,8 @@ class HttpProtocol(HttpToolsProtocol):
         self._ignored_upgrade = self.parser.should_upgrade() and not self._should_upgrade()
         if self._ignored_upgrade:
             return
-        if self._handover is not None:
-            path = urllib.parse.unquote((httptools.parse_url(self.url).path or b"").decode("ascii", "replace"))
-            if (elsewhere := self._handover.destination(path, bool(self._first))) is not None:
-                raise _ElsewhereError(elsewhere)
         super().on_headers_complete()
-        self._head_complete, self._first, self._besides = True, b"", 0
+        self._head_complete, self._besides = True, 0
 
     def on_message_complete(self) -> None:
         self._in_message = False
@@ -269,35 +247,11 @@ class HttpProtocol(HttpToolsProtocol):
             self.ended = True
             self.flow.pause_reading()
             self.cycle.keep_alive = False
-        elif isinstance(error, _ElsewhereError):
-            self._hand_over(error.number)
         elif isinstance(error, ProblemError):
             self._refuse(error)
         else:
             self.guard.note("malformed", f"{self._host} sent something that is not HTTP; the connection is closed")
             self._refuse(ProblemError(400, "bad-request", "This is not a valid HTTP request."))
-
-    def _keep(self, data: bytes) -> None:
-        """Keep what arrives of a request until it is known which process it is for."""
-        if not self._in_message:
-            self._raw = bytearray(data)
-        elif self._raw is not None:
-            self._raw += data
-
-    def _hand_over(self, number: int) -> None:
-        """Let another process go on with this connection, if no earlier request is under way.
-
-        Otherwise the earlier ones are answered, then the connection is closed: clients send the rest again.
-        """
-        self.ended = True
-        self.flow.pause_reading()
-        if self.pipeline or (self.cycle is not None and not self.cycle.response_complete):
-            self.cycle.keep_alive = False
-        elif self._handover is None or self._raw is None or self.transport.get_write_buffer_size():
-            self.transport.close()
-        else:
-            self._handover.send(number, self.transport, bytes(self._raw))
-        self._raw = None
 
     def _refuse(self, error: ProblemError) -> None:
         """Answer with a problem document, if no answer to an earlier request is on its way, and close."""
@@ -332,18 +286,6 @@ class HttpProtocol(HttpToolsProtocol):
         super()._start_asgi_task(cycle, cast("ASGI3Application", _while_connected(app, cycle)))
 
 
-class SupervisorLine(HttpProtocol):
-    """The connection on which the supervisor asks whether this process answers: not counted, and never idle."""
-
-    def _accept(self, transport: asyncio.Transport) -> None:
-        self._handover = None
-        HttpToolsProtocol.connection_made(self, transport)
-        self.client = None  # tells the application whose requests these are
-
-    def timeout_keep_alive_handler(self) -> None:
-        """Nothing: a supervisor that was stopped for a while still needs the line."""
-
-
 def raw_answer(error: ProblemError, headers: Iterable[tuple[bytes, bytes]]) -> bytes:
     """The last answer of a connection, as bytes, for requests that do not reach the application."""
     body = to_json(error.problem)
@@ -358,14 +300,6 @@ def raw_answer(error: ProblemError, headers: Iterable[tuple[bytes, bytes]]) -> b
 
 class _PipelineFullError(Exception):
     """A client sends requests faster than they are answered."""
-
-
-class _ElsewhereError(Exception):
-    """A request belongs to the process of this number."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(number)
-        self.number = number
 
 
 def _head_too_large() -> ProblemError:

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import os
-import random
 import signal
 import socket
 import sys
@@ -36,11 +34,11 @@ from app.classroom import Hub, clock
 from app.classroom.courses import Courses
 from app.exercises import ExerciseFileError, Exercises
 from app.live import Lines
-from app.service import status, uvicorn_names
+from app.service import status
 from app.service.compute.pool import Pool
 from app.service.gauges import update_gauges
-from app.service.handover import SUPPORTED, Member, Phase, Role, members
 from app.service.log import guard_log
+from app.service.restarts import can_restart, restarted
 from app.service.server import STOP_TIMEOUT, Greeting, Server, is_loopback, listen, url_of
 from app.service.startup import Startup
 from app.service.web.access import Access
@@ -58,13 +56,10 @@ from app.service.web.rooms.limits import Limits
 from app.service.web.rooms.network import url_for_others
 from app.service.web.scoreboard import Scoreboard
 from app.service.web.viewer_proxy import ViewerBridge
-from app.service.workers import supervise
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.memory.answers import AnswerMemory
 from app.shared.memory.process import MemoryKeeper
-from app.shared.memory.shared import shared_bytes
-from app.shared.metrics import count_together, forget_process
 from app.shared.security import SecurityHeaders
 from app.shared.settings import Settings, static_folder
 from app.shared.slots import Slots
@@ -79,9 +74,6 @@ SWITCH_INTERVAL = 5e-4
 # Full collections are rare, besides those when the process is idle or has grown (`app.shared.memory.process`): one
 # among requests with many thousand targets stops all visitors for 80 ms, one of young objects for a millisecond.
 COLLECTIONS = (700, 10, 100)
-
-# Of a process for REST, so that visitors go first where both want the same processor.
-NICENESS = 5
 
 DESCRIPTION = (
     "Metres and radians everywhere; quaternions are `wxyz`. "
@@ -103,7 +95,6 @@ OPEN_TO_ALL = """\
 def create_app(
     settings: Settings,
     store: Store | None = None,
-    member: Member | None = None,
     on_ready: Callable[[], None] | None = None,
     bench: Path | None = None,
     courses: Courses | None = None,
@@ -112,9 +103,8 @@ def create_app(
     """The whole service as one ASGI application; `on_ready` is called when it has warmed up.
 
     Args:
-        member: what its process is among those of the service.
-        bench: folder that these share for runs of the benchmark; None: one of its own.
-        courses: those of the operator, and exercises, which all processes share; None: they are read when needed.
+        bench: folder for runs of the benchmark; None: one of its own.
+        courses: those of the operator, and exercises; None: they are read when needed.
         pool: processes that compute, with these settings and this store; None: threads do.
 
     Raises:
@@ -128,9 +118,9 @@ def create_app(
     work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share, memory, pool)
     scoreboard, classroom = Scoreboard(settings, bench), Hub.of(settings)
     known = cache(lambda: courses or _courses(settings, store))
-    lines = Lines(*((0, 1) if member is None else member.place))
+    lines = Lines()
     begin = settings, store, clouds, maps, summaries, classroom
-    startup = Startup(*begin, known, bridge, lines, pool, member, on_ready)
+    startup = Startup(*begin, known, bridge, lines, pool, on_ready)
 
     def idle() -> bool:
         return not (bridge.slots.taken or work.used or state.streams.open or summaries.pending or maps.pending)
@@ -216,55 +206,46 @@ def run(settings: Settings, open_browser: bool = False, page: str = "", words: s
         open_browser, page, words: as for `Greeting`.
     """
     try:
-        listeners = listen(settings)
+        listener = listen(settings)
     except OSError as error:
         reason = error.strerror or str(error)
         print(NO_PORT.format(settings.host, settings.port, reason), file=sys.stderr)
         return 1
     with contextlib.ExitStack() as stack:
-        for listener in listeners:
-            stack.enter_context(listener)
+        stack.enter_context(listener)
         try:
             store = Store(settings.robots)
             courses = _courses(settings, store)
-            _ = courses.all  # now: processes that start later must not depend on the files
+            _ = courses.all  # now: a service that is started again must not depend on the files
             check_platforms(settings)
         except (InputError, RobotFileError, ExerciseFileError, PlatformsRefused) as error:
             print(f"kinboard: {error}", file=sys.stderr)
             return 1
         if settings.token is None and not settings.read_only:
-            if not is_loopback(listeners[0]):
+            if not is_loopback(listener):
                 print(OPEN_TO_ALL, file=sys.stderr, flush=True)
             elif not settings.allowed_hosts:
                 settings = settings.model_copy(update={"allowed_hosts": (*LOCAL_NAMES, settings.host)})
         if Hub.of(settings).state == "newer-database":
             print(NEWER_DATABASE.format(settings.data_folder), file=sys.stderr, flush=True)
-        clock.now()  # processes that start later, after the clock was set, count from here too
-        port = listeners[0].getsockname()[1]
+        clock.now()  # a service that is started again, after the clock was set, counts from here too
+        port = listener.getsockname()[1]
         others = url_for_others(settings.host, port, clean_prefix(settings.root_path))
         greeting = Greeting(url_of(settings, port), open_browser, others, page, words)
-        partners = settings.rest_workers if SUPPORTED and uvicorn_names.HTTP.is_there else 0
-        try:
-            parts = members(listeners, partners, shared_bytes)
-        except OSError as error:
-            print(f"kinboard: there is no memory for the processes to share: {error}", file=sys.stderr)
-            return 1
-        for part in parts:
-            for link in part.links.values():
-                stack.enter_context(link)
         settings, bench = _with_bench_folder(settings, stack)
-        if len(parts) == 1:
-            return _serve(settings, parts[0], store=store, courses=courses, greeting=greeting, bench=bench)
-        processor = random.randrange(1024)
-        return supervise(
-            # One reading of the operator's files for all processes, also for those that start later.
-            partial(_serve, settings, store=store, courses=courses, bench=bench, processor=processor),
-            parts,
-            grace=settings.drain + STOP_TIMEOUT + 1.0,
-            silence=settings.worker_timeout,
-            on_start=greeting.show,
-            on_end=_forget,
-        )
+        serve = partial(_serve, settings, listener, store, courses, bench)
+        if not can_restart():
+            return serve(greeting.show)
+
+        def served(first: bool, say: Callable[[], None]) -> int:
+            def begin() -> None:
+                say()
+                if first:
+                    greeting.show()
+
+            return serve(begin, alone=False)
+
+        return restarted(served, grace=settings.drain + STOP_TIMEOUT + 1.0)
 
 
 def _with_bench_folder(settings: Settings, stack: contextlib.ExitStack) -> tuple[Settings, Path | None]:
@@ -278,51 +259,38 @@ def _with_bench_folder(settings: Settings, stack: contextlib.ExitStack) -> tuple
         return settings.model_copy(update={"bench": False}), None
 
 
-def _forget(member: Member, pid: int) -> None:
-    """Drop what a process that has ended reported."""
-    member.report(Phase.AWAY)
-    forget_process(member.counts, member.number)
-
-
 def _serve(
     settings: Settings,
-    member: Member,
-    line: socket.socket | None = None,
-    store: Store | None = None,
-    courses: Courses | None = None,
-    greeting: Greeting | None = None,
-    processor: int = 0,
-    bench: Path | None = None,
+    listener: socket.socket,
+    store: Store,
+    courses: Courses,
+    bench: Path | None,
+    on_start: Callable[[], None],
+    alone: bool = True,
 ) -> int:
     """Serve until a signal ends this process; returns 1 if it could not start.
 
     Args:
-        line: connection to the supervisor, if there are several processes.
-        store, courses: read by the supervisor; None: they are read here.
+        store, courses: of the operator.
         bench: folder for runs of the benchmark, if there are any.
-        processor: on which the first of several processes is kept, and the others on those that follow.
+        on_start: called once it accepts connections.
+        alone: whether no other process would start it again.
     """
     guard_log()
     if settings.pin:
-        pin(None if line is None else processor + member.number)
-    if line is not None:
-        count_together(member.counts, member.number, len(member.phases))
-    if member.role is Role.REST:
-        os.nice(NICENESS)
+        pin()
     if settings.access_log:
         write_to_stderr()
     sys.setswitchinterval(SWITCH_INTERVAL)
     gc.set_threshold(*COLLECTIONS)
+    pool = Pool(settings.processes, settings, store) if settings.processes else None
     # Kernels and routes live as long as the process: one collection among them would stop all visitors for 50 ms.
-    store = store or Store(settings.robots)
-    computes = settings.compute if member.role is not Role.VIEWER else 0
-    pool = Pool(settings.compute, settings, store) if computes else None
-    app = create_app(settings, store, member, gc.freeze, bench, courses, pool)
-    server = Server(app, settings, member, greeting, line)
+    app = create_app(settings, store, gc.freeze, bench, courses, pool)
+    server = Server(app, settings, on_start, alone)
     # uvicorn shuts down in order and then raises the signal again, which is the expected end here.
     before = signal.signal(signal.SIGTERM, server.handle_exit)
     try:
-        server.run(sockets=[member.listener] if member.accepts else [])
+        server.run(sockets=[listener])
     except KeyboardInterrupt:
         pass
     finally:

@@ -15,7 +15,7 @@ import threading
 import webbrowser
 from collections.abc import Callable
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -23,16 +23,12 @@ from fastapi import FastAPI
 from app.service import uvicorn_names
 from app.service.config import GuardedConfig
 from app.service.guard import Guard
-from app.service.handover import AT_ONCE, Handover, Member, Phase
+from app.service.restarts import Watchdog, is_orphan
 from app.service.web.inspection import MAX_MESSAGE
 from app.service.web.prefix import clean_prefix
-from app.service.workers import is_orphan
 from app.shared.settings import Settings
 from app.shared.threads import end_process
 from kin import __version__
-
-if TYPE_CHECKING:
-    from app.service.http_protocol import HttpProtocol
 
 if sys.platform != "win32":
     import resource
@@ -42,7 +38,7 @@ logger = logging.getLogger("kinboard.server")
 QUEUE = 2048  # connections that may wait to be accepted
 # Connections accepted in one round of the event loop (asyncio takes uvicorn's backlog for it). Each holds a file
 # for two more rounds, even if it is refused, so this must be a quarter of `guard.SPARE_FILES`.
-ACCEPTED = AT_ONCE
+ACCEPTED = 4
 STOP_TIMEOUT = 3.0  # s for the end of the service itself, after requests have ended
 PING_INTERVAL = 20.0  # seconds between two pings of a websocket
 
@@ -93,34 +89,23 @@ def protocols() -> tuple[Any, Any]:
 
 
 class Server(uvicorn.Server):
-    """Prints the greeting once it accepts connections; on shutdown ends requests that would be cut off.
+    """Says when it accepts connections, and that its loop turns; on shutdown ends requests that would be cut off.
 
     Args:
-        member: what this process is among those of the service.
-        line: connection to the supervisor, which asks on it whether this process is well.
+        on_start: called once it accepts connections.
+        alone: whether no other process would start it again.
     """
 
     def __init__(
-        self,
-        app: FastAPI,
-        settings: Settings,
-        member: Member,
-        greeting: Greeting | None = None,
-        line: socket.socket | None = None,
+        self, app: FastAPI, settings: Settings, on_start: Callable[[], None] = lambda: None, alone: bool = True
     ) -> None:
         config = server_config(app, settings, open_files())
         super().__init__(config)
-        self._config = config
-        self._member = member
-        self._handover = Handover(member, clean_prefix(settings.root_path))
-        if member.links:
-            config.handover = self._handover
-        self._adopting: set[asyncio.Task[object]] = set()
         self._note = config.guard.note
         self._end_work = app.state.compute.close
         self._drain = settings.drain
-        self._greeting = greeting
-        self._line = line
+        self._on_start = on_start
+        self._watchdog = None if alone else Watchdog(settings.worker_timeout)
         self._deadline: threading.Timer | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -128,13 +113,8 @@ class Server(uvicorn.Server):
         await super().startup(sockets=sockets)
         for listener in sockets or ():
             listener.listen(QUEUE)  # asyncio has just made the queue as short as `ACCEPTED`
-        self._handover.start(self._adopt)
-        if self._line is not None:
-            self._take(self._line, lambda: self._protocol(supervised=True))
-        if self._member.away(self._member.number):
-            self._member.report(Phase.SERVING)
-        if self._greeting is not None:
-            self._greeting.show()
+        if self.started:
+            self._on_start()
 
     def _on_loop_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         """One line instead of a traceback where the loop accepts more connections at once than there are files."""
@@ -145,47 +125,12 @@ class Server(uvicorn.Server):
             loop.default_exception_handler(context)
 
     async def on_tick(self, counter: int) -> bool:
-        if counter % 10 == 0 and is_orphan():  # called ten times a second
-            os.kill(os.getpid(), signal.SIGTERM)
-        if not self._member.accepts:
-            await self._stand_in()
+        """Called ten times a second."""
+        if self._watchdog is not None and counter % 10 == 0:
+            self._watchdog.look()
+            if is_orphan():
+                os.kill(os.getpid(), signal.SIGTERM)
         return await super().on_tick(counter)
-
-    async def _stand_in(self) -> None:
-        """Accept connections while the process that should do so is away."""
-        away = self._member.away(self._member.group[0])
-        if away and not self.servers:
-            listener = self._member.listener.dup()
-            self.servers = [
-                await asyncio.get_running_loop().create_server(self._protocol, sock=listener, backlog=ACCEPTED)
-            ]
-            listener.listen(QUEUE)
-        elif not away and self.servers:
-            self.servers.pop().close()
-
-    def _protocol(self, supervised: bool = False, first: bytes = b"") -> HttpProtocol:
-        from app.service.http_protocol import HttpProtocol, SupervisorLine
-
-        kind = SupervisorLine if supervised else HttpProtocol
-        return kind(self._config, server_state=self.server_state, app_state=self.lifespan.state, first=first)
-
-    def _adopt(self, connection: socket.socket, data: bytes) -> None:
-        """Go on with a connection that another process has accepted."""
-        self._take(connection, lambda: self._protocol(first=data))
-
-    def _take(self, connection: socket.socket, protocol: Callable[[], HttpProtocol]) -> None:
-        loop = asyncio.get_running_loop()
-
-        async def take() -> None:
-            try:
-                await loop.connect_accepted_socket(protocol, connection)
-            except Exception as error:  # noqa: BLE001 - the client would wait for an answer
-                self._note("failed", "a connection could not be accepted and is closed", error)
-                connection.close()
-
-        task = loop.create_task(take())
-        self._adopting.add(task)
-        task.add_done_callback(self._adopting.discard)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Stop, at most `STOP_TIMEOUT` after running requests have had their time."""
@@ -201,9 +146,8 @@ class Server(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         asyncio.get_running_loop().call_later(self._drain - min(1.0, 0.5 * self._drain), self._end_work)
-        self._member.report(Phase.AWAY)
-        self._handover.stop()
-        await asyncio.gather(*self._adopting, return_exceptions=True)
+        if self._watchdog is not None:
+            self._watchdog.stop()
         await super().shutdown(sockets=sockets)
 
 
@@ -239,29 +183,13 @@ class Greeting:
             print(f"No browser could be opened; open {self._page} yourself.", file=self._out, flush=True)
 
 
-def listen(settings: Settings) -> list[socket.socket]:
-    """One socket per worker, all on one address; raises `OSError` if the address is in use.
-
-    With uvicorn's own HTTP there is one: only our protocol answers the supervisor and hands connections over.
-    """
+def listen(settings: Settings) -> socket.socket:
+    """The listening socket; raises `OSError` if the address is in use."""
     family, *_, address = socket.getaddrinfo(
         settings.host or None, settings.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
     )[0]
     dual = family == socket.AF_INET6 and address[0] == "::" and socket.has_dualstack_ipv6()
-
-    def bind(port: object, shared: bool) -> socket.socket:
-        return socket.create_server(
-            (address[0], port), family=family, backlog=QUEUE, dualstack_ipv6=dual, reuse_port=shared
-        )
-
-    alone = bind(address[1], False)
-    if settings.workers == 1 or not uvicorn_names.HTTP.is_there:
-        return [alone]
-    # Sockets with SO_REUSEPORT would share the port with any other service of this user. Binding without it first
-    # has shown that the port is free.
-    port = alone.getsockname()[1]
-    alone.close()
-    return [bind(port, True) for _ in range(settings.workers)]
+    return socket.create_server(address[:2], family=family, backlog=QUEUE, dualstack_ipv6=dual)
 
 
 def open_files() -> int | None:

@@ -3,9 +3,9 @@
 The landing page is served at once and shows "warming up" until ``/readyz`` reports ready. Kernels are loaded from
 numba's cache in milliseconds, or are compiled, which takes seconds. The service is ready when those of the first
 arm are; all others are compiled after that, part by part (:mod:`kin.warmup.preparation`), by another process
-(:mod:`app.service.compiler`). Of several processes of a service the first one has the kernels compiled, and
-the others wait and load them. Those of the first arm are compiled by two such processes at once. A request that
-needs a kernel before its turn has it compiled at once, by a process of its own.
+(:mod:`app.service.compiler`). Those of the first arm are compiled by two such processes at once. A request that
+needs a kernel before its turn has it compiled at once, by a process of its own. The processes that compute for
+REST load what is compiled.
 """
 
 from __future__ import annotations
@@ -20,10 +20,9 @@ from typing import TYPE_CHECKING, Literal
 from app.classroom import Hub
 from app.classroom.courses import Courses
 from app.live import Lines
-from app.service.compiler import STEP, Compilers, CompilerStoppedError, ahead, compile_first
+from app.service.compiler import Compilers, CompilerStoppedError, ahead, compile_first
 from app.service.compute.child import load_first, load_rest
 from app.service.compute.pool import Pool
-from app.service.handover import Member, Phase, Role
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
@@ -50,11 +49,11 @@ class Startup:
         courses: those that pages offer, and their exercises.
         lines: of the pages, to the programs that are connected to them.
         pool: processes that compute, if there are any.
-        member: what this process is among those of the service.
         on_ready: called by that thread when everything is ready, just before `status` says so.
 
     Attributes:
-        preparation: which kernels are compiled, for all processes of the service.
+        complete: whether all kernels are compiled.
+        preparation: which kernels are compiled.
         named: whether this process knows the parts of the preparation, for which it looks at all families of arms.
     """
 
@@ -70,12 +69,10 @@ class Startup:
         bridge: ViewerBridge,
         lines: Lines,
         pool: Pool | None = None,
-        member: Member | None = None,
         on_ready: Callable[[], None] | None = None,
     ) -> None:
         self.status: Status = "warming"
-        self._complete = False
-        self._member = member
+        self.complete = False
         self._settings = settings
         self._store = store
         self._clouds = clouds
@@ -89,7 +86,7 @@ class Startup:
         self._on_ready = on_ready
         self._viewer: ViewerServer | None = None
         self._loop: asyncio.AbstractEventLoop
-        self.preparation = Preparation(None if member is None else member.kernels)
+        self.preparation = Preparation()
         self.named = False
         self.compilers = Compilers()
         self._stopping = threading.Event()
@@ -97,23 +94,6 @@ class Startup:
         # A daemon, so that Ctrl-C need not wait for the end of a compilation.
         self._thread = threading.Thread(target=self._run, name="kinboard-startup", daemon=True)
         self._rest = threading.Thread(target=self._warm_up_rest, name="kinboard-warm-up", daemon=True)
-
-    @property
-    def readiness(self) -> Status:
-        """The status of this process and its partners together."""
-        if self._member is None:
-            return self.status
-        phases = [self._member.phases[number] for number in self._member.group]
-        if Phase.FAILED in phases:
-            return "failed"
-        return self.status if min(phases) >= Phase.READY else "warming"
-
-    @property
-    def complete(self) -> bool:
-        """Whether all kernels are compiled, for this process and its partners."""
-        if self._member is None:
-            return self._complete
-        return all(self._member.phases[number] == Phase.COMPLETE for number in self._member.group)
 
     def start(self) -> None:
         """Start; returns at once. The viewer serves its visitors in the running event loop."""
@@ -138,7 +118,6 @@ class Startup:
     def _run(self) -> None:
         try:
             self._start_viewer()
-            self._wait_for_first(Phase.READY)
             if not compiled():
                 unpin()  # also what this thread starts
                 second = ["warm_up_first(backwards=True)"] if processors() > 1 else []
@@ -150,7 +129,6 @@ class Startup:
                 if self._on_ready is not None:
                     self._on_ready()
                 self.status = "ready"
-                self._report(Phase.READY)
                 self._rest.start()
         except CompilerStoppedError:  # by `stop`
             return
@@ -158,46 +136,20 @@ class Startup:
             # REST goes on working; /readyz reports the failure.
             logger.exception("the viewer could not be started, or a kernel could not be compiled")
             self.status = "failed"
-            self._report(Phase.FAILED)
-
-    def _report(self, phase: Phase) -> None:
-        if self._member is not None and not self._stopping.is_set():
-            self._member.report(phase)
-
-    @property
-    def _compiles(self) -> bool:
-        """Whether this process has the kernels compiled."""
-        return self._member is None or self._member.number == 0
-
-    def _wait_for_first(self, phase: Phase, or_begun: bool = False) -> None:
-        """Wait until the first process of the service, which has the kernels compiled, is so far.
-
-        Args:
-            or_begun: do not wait any longer once it compiles the parts.
-        """
-        member = self._member
-        while member is not None and not self._compiles and member.phases[0] < phase:
-            if (or_begun and not self.preparation.complete) or self._stopping.wait(STEP):
-                return
 
     def _warm_up_rest(self) -> None:
         lower_priority()
         ahead.set(True)
         try:
-            # Those of the first process, which names the parts before it begins with them, are loaded here.
-            self._wait_for_first(Phase.COMPLETE, or_begun=True)
             parts()  # here and not where they are first asked for
             self.named = True
-            self._wait_for_first(Phase.COMPLETE)
-            if self._compiles:
-                self._prepare_parts()
+            self._prepare_parts()
             warm_up_rest(self._stopping.is_set)
             if self._viewer is not None and not self._stopping.is_set():
                 importlib.import_module("trimesh.creation")  # before a visitor opens a lesson that draws a sphere
-            if self._pool is not None and self._compiles and not self._stopping.is_set():
+            if self._pool is not None and not self._stopping.is_set():
                 self._pool.prepare(load_rest)
-            self._complete = not self._stopping.is_set()
-            self._report(Phase.COMPLETE)
+            self.complete = not self._stopping.is_set()
         except CompilerStoppedError:  # by `stop`
             return
         except Exception:
@@ -219,9 +171,6 @@ class Startup:
             self.preparation.finish()
 
     def _start_viewer(self) -> None:
-        if self._member is not None and self._member.role is Role.REST:
-            self._viewer_settled.set()
-            return
         try:
             # Importing viser takes half a second, for which the landing page and REST need not wait.
             from app.viewer.server import ViewerServer

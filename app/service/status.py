@@ -22,7 +22,7 @@ class Alive(BaseModel):
     """The process answers."""
 
     status: Literal["alive"] = "alive"
-    pid: int = Field(description="Process id; with several workers each answers for itself.")
+    pid: int = Field(description="Process id.")
 
 
 class Kernels(BaseModel):
@@ -70,7 +70,7 @@ async def livez() -> Alive:
 )
 async def readyz(request: Request, response: Response) -> Readiness:
     startup = request.app.state.startup
-    status: Status = startup.readiness
+    status: Status = startup.status
     response.headers["cache-control"] = "no-store"
     response.status_code = 200 if status == "ready" else 503
     return Readiness(

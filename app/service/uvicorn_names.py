@@ -14,8 +14,8 @@ _SOCKET = "uvicorn.protocols.websockets.websockets_sansio_impl:WebSocketsSansIOP
 
 HTTP = PrivateUse(
     "uvicorn",
-    "Bounds on heads, pipelines and waiting clients; refusals as problem documents; several processes.",
-    "uvicorn's own HTTP serves, in one process and without bounds on slow clients: put a proxy in front.",
+    "Bounds on heads, pipelines and waiting clients; refusals as problem documents.",
+    "uvicorn's own HTTP serves, without bounds on slow clients: put a proxy in front.",
     (
         f"{_PROTOCOL}.connection_made(self, transport)",
         f"{_PROTOCOL}.connection_lost(self, exc)",
@@ -27,12 +27,10 @@ HTTP = PrivateUse(
         f"{_PROTOCOL}.on_body(self, body)",
         f"{_PROTOCOL}.on_message_complete(self)",
         f"{_PROTOCOL}.on_response_complete(self)",
-        f"{_PROTOCOL}.timeout_keep_alive_handler(self)",
         f"{_PROTOCOL}.handle_websocket_upgrade(self)",
         f"{_PROTOCOL}._start_asgi_task(self, cycle, app)",
         f"{_PROTOCOL}._should_upgrade(self)",
         f"{_PROTOCOL}._unset_keepalive_if_required(self)",
-        f"{_PROTOCOL}.client",
         f"{_PROTOCOL}.cycle",
         f"{_PROTOCOL}.flow",
         f"{_PROTOCOL}.headers",

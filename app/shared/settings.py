@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from types import MappingProxyType
+from typing import Annotated, Final
 
 import platformdirs
 from pydantic import BeforeValidator, Field, SecretStr, field_validator
@@ -12,6 +14,7 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from app.shared.clients import Proxies
 from app.shared.security import frame_ancestor
+from app.shared.threads import every_processor
 
 
 def _listed(value: object) -> object:
@@ -25,6 +28,14 @@ def _listed(value: object) -> object:
     except json.JSONDecodeError as error:
         raise ValueError(f"not a list in JSON ({error.msg}); write values with commas between them") from None
 
+
+# Settings of earlier versions that do nothing any more, by their variables, and why.
+OBSOLETE: Final[Mapping[str, str]] = MappingProxyType(
+    dict.fromkeys(
+        ("KINBOARD_WORKERS", "KINBOARD_REST_WORKERS"),
+        "the service is one process, and KINBOARD_COMPUTE says how many compute for it",
+    )
+)
 
 Names = Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)]
 
@@ -58,14 +69,16 @@ class Settings(BaseSettings):
     max_path: int = Field(1000, ge=1, description="Maximum number of waypoints in a path.")
     max_points: int = Field(100_000_000, ge=1, description="Maximum number of points in a workspace cloud.")
     max_streams: int = Field(
-        8, ge=1, description="Maximum number of clouds and capability maps that a process sends at a time."
+        8, ge=1, description="Maximum number of clouds and capability maps that are sent at a time."
     )
     max_voxels: int = Field(
         40, ge=1, le=256, description="Maximum number of voxels along one side of a capability map."
     )
     max_body: int = Field(8 * 1024 * 1024, ge=1024, description="Maximum size of a request body in bytes.")
     upload_memory: int = Field(
-        64 * 1024 * 1024, ge=1024, description="Maximum size in bytes of all request bodies that a process holds."
+        64 * 1024 * 1024,
+        ge=1024,
+        description="Maximum size in bytes of all request bodies held at a time.",
     )
     max_answer: int = Field(
         128 * 1024 * 1024, ge=1 << 16, description="Maximum size of the answer to one request in bytes."
@@ -73,10 +86,13 @@ class Settings(BaseSettings):
     answer_memory: int = Field(
         256 * 1024 * 1024,
         ge=1 << 16,
-        description="Maximum size in bytes of all answers that a process holds until they are read.",
+        description="Maximum size in bytes of all answers that the service holds until they are read.",
     )
     max_requests: int = Field(
-        16, ge=1, le=32, description="Maximum number of requests that a process computes at a time; others wait."
+        16,
+        ge=1,
+        le=32,
+        description="Maximum number of requests that threads of the service compute at a time; others wait.",
     )
     time_budget: float = Field(
         30.0,
@@ -90,7 +106,7 @@ class Settings(BaseSettings):
     mesh_memory: int = Field(
         128 * 1024 * 1024,
         ge=0,
-        description="Maximum size in bytes of the meshes of visitors' own arms that a process holds.",
+        description="Maximum size in bytes of the meshes of visitors' own arms that the service holds.",
     )
     map_time: float = Field(
         600.0, ge=1, le=86400, description="Seconds that one capability map of the viewer may be computed."
@@ -108,39 +124,24 @@ class Settings(BaseSettings):
     cors_origins: Names = Field(
         (), description="Origins whose pages may read REST answers, by `fetch`; others are refused by name."
     )
-    workers: int = Field(
-        1,
-        ge=1,
-        le=64,
-        description="Number of server processes; each has its visitors, and serves REST and the viewer.",
-    )
-    rest_workers: int = Field(
-        1,
-        ge=0,
-        le=16,
-        description="Number of further processes beside each of these, which answer REST instead of it, so that "
-        "visitors do not wait for programs; on Linux. 0: none.",
-    )
-    compute: int = Field(
-        0,
+    compute: int | None = Field(
+        None,
         ge=0,
         le=64,
         description="Number of processes that compute for REST, so that visitors do not wait for programs. "
-        "0: threads of the service compute.",
+        "0: threads of the service compute. Unset: one fewer than there are processors, at least 1.",
     )
     worker_timeout: float = Field(
         30.0,
         ge=2,
         le=3600,
-        description="Seconds without a sign of life after which one of several server processes is replaced.",
+        description="Seconds without a step of the event loop after which the service ends and is started again.",
     )
-    pin: bool = Field(
-        False, description="Keep the interpreter of each process on one processor, for faster drags."
-    )
+    pin: bool = Field(False, description="Keep the interpreter of the service on one processor, for faster drags.")
     drain: float = Field(
         5.0, ge=1, le=300, description="Seconds that running requests may take after the service is asked to stop."
     )
-    max_connections: int = Field(1000, ge=1, description="Maximum number of open connections, for each worker.")
+    max_connections: int = Field(1000, ge=1, description="Maximum number of open connections.")
     client_share: float = Field(
         0.75,
         gt=0,
@@ -156,7 +157,7 @@ class Settings(BaseSettings):
     send_timeout: float = Field(
         60.0, ge=0.1, le=3600, description="Seconds after which a client that reads nothing is disconnected."
     )
-    max_visitors: int = Field(200, ge=1, description="Maximum number of open viewer tabs, for each worker.")
+    max_visitors: int = Field(200, ge=1, description="Maximum number of open viewer tabs.")
     bench: bool = Field(
         False,
         description="Visitors may start the benchmark from the scoreboard, one run at a time with low priority; "
@@ -207,13 +208,17 @@ class Settings(BaseSettings):
             update={
                 "host": "127.0.0.1",
                 "port": 0,
-                "workers": 1,
-                "rest_workers": 0,
+                "compute": 0,
                 "token": None,
                 "read_only": False,
                 "root_path": "",
             }
         )
+
+    @property
+    def processes(self) -> int:
+        """How many processes compute for REST."""
+        return max(1, len(every_processor()) - 1) if self.compute is None else self.compute
 
     @property
     def data_folder(self) -> Path:

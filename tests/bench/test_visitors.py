@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.bench, pytest.mark.full]
 def test_bodies_of_too_many_values_hardly_delay_drags(monkeypatch):
     monkeypatch.setattr(siege, "VISITORS", 3)
     ratios = []
-    with serve(token=siege.TOKEN, rest_workers="0") as service:
+    with serve(token=siege.TOKEN, compute="0") as service:
         while len(ratios) < ATTEMPTS and min(ratios, default=RATIO) >= RATIO:
             (row,) = asyncio.run(attacks.measure(siege.Siege(service), [["bodies of too many values"]], 6.0, 4.0))
             ratios.append(row["p95 ms"] / row["quiet p95 ms"])

@@ -42,9 +42,11 @@ def add_serve(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     parser.add_argument(
         "--port", type=whole_number, help="port to listen on (default 8000; 0 takes any free port)"
     )
-    parser.add_argument("--workers", type=whole_number, metavar="N", help="number of server processes (default 1)")
     parser.add_argument(
-        "--pin", action="store_true", default=None, help="keep the interpreter of each process on one processor"
+        "--workers", type=whole_number, metavar="N", help="does nothing any more: see KINBOARD_COMPUTE"
+    )
+    parser.add_argument(
+        "--pin", action="store_true", default=None, help="keep the interpreter of the service on one processor"
     )
     parser.add_argument("--root-path", metavar="PREFIX", help="path prefix that a reverse proxy adds")
     parser.add_argument(

@@ -47,7 +47,7 @@ class Begin:
     """The first message to a process.
 
     Attributes:
-        processors: on which it may run, whatever the service is pinned to; empty: it is not pinned.
+        processors: on which it may run, whatever the service is pinned to.
     """
 
     settings: Settings
@@ -153,7 +153,7 @@ def main() -> None:
     guard_log()
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, signal.SIG_IGN)  # sent to the whole service: this process ends with it
-    if begin.processors:
+    if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, begin.processors)
     if hasattr(os, "nice"):
         os.nice(NICENESS)

@@ -27,7 +27,7 @@ from starlette.concurrency import run_in_threadpool
 
 from app.api.work import Deadline, busy
 from app.service.compute.child import Begin, robot_called, settings_given
-from app.service.compute.process import Job, LostError, Process
+from app.service.compute.process import ComputeProcess, Job, LostError
 from app.shared.memory.process import resident_bytes
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -52,25 +52,26 @@ class Pool:
 
     Attributes:
         count: how many there are.
+        processes: all of them.
     """
 
     def __init__(self, count: int, settings: Settings, store: Store) -> None:
         self.count = count
         self._settings, self._store = settings, store
         begin = pickle.dumps(Begin(settings, store.robots, every_processor()))
-        self._processes = [Process(begin) for _ in range(count)]
-        self._free = deque(self._processes)
+        self.processes = [ComputeProcess(begin) for _ in range(count)]
+        self._free = deque(self.processes)
 
     def start(self) -> None:
         """Start the processes; returns at once. Any thread may call."""
-        self._each("start", Process.start)
+        self._each("start", ComputeProcess.start)
 
     def prepare(self, load: Callable[[Deadline], None]) -> None:
         """Have each process load something, and wait for that. Any thread may call; raises what `load` raises."""
-        job = self._message(load, 3600.0)
+        job = self.message(load, 3600.0)
         failures: list[BaseException] = []
 
-        def ask(process: Process) -> None:
+        def ask(process: ComputeProcess) -> None:
             for left in reversed(range(TRIES)):
                 try:
                     process.ask(Job(job))
@@ -86,10 +87,10 @@ class Pool:
         if failures:
             raise failures[0]
 
-    def _each(self, name: str, act: Callable[[Process], None]) -> list[threading.Thread]:
+    def _each(self, name: str, act: Callable[[ComputeProcess], None]) -> list[threading.Thread]:
         threads = [
             threading.Thread(target=act, args=(process,), name=f"kinboard-pool-{name}", daemon=True)
-            for process in self._processes
+            for process in self.processes
         ]
         for thread in threads:
             thread.start()
@@ -113,7 +114,7 @@ class Pool:
             timers.append(loop.call_later(GRACE, process.kill, job))
 
         def ask() -> Any:
-            job.message = self._message(answer, deadline.left)
+            job.message = self.message(answer, deadline.left)
             return process.ask(job, deadline.memory)
 
         deadline.on_left = left
@@ -137,21 +138,21 @@ class Pool:
 
     def cancel(self) -> None:
         """End what is being computed."""
-        for process in self._processes:
+        for process in self.processes:
             process.cancel(process.job)
             asyncio.get_running_loop().call_later(GRACE, process.kill, process.job)
 
     def stop(self) -> None:
         """End all processes. Any thread may call."""
-        for process in self._processes:
+        for process in self.processes:
             process.stop()
 
     @property
     def resident(self) -> int:
         """Bytes of memory that the processes take. Any thread may ask."""
-        return sum(resident_bytes(pid) for process in self._processes if (pid := process.pid) is not None)
+        return sum(resident_bytes(pid) for process in self.processes if (pid := process.pid) is not None)
 
-    def _message(self, answer: Answer[object], seconds: float) -> bytes:
+    def message(self, answer: Answer[object], seconds: float) -> bytes:
         """What the process reads. Robots and settings that it has are named, not sent."""
         buffer = io.BytesIO()
         pickler = pickle.Pickler(buffer, pickle.HIGHEST_PROTOCOL)

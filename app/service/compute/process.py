@@ -38,7 +38,7 @@ class Job:
     seconds: float = 0.0  # that the process took
 
 
-class Process:
+class ComputeProcess:
     """One process and those that replace it.
 
     Args:
@@ -46,6 +46,7 @@ class Process:
 
     Attributes:
         job: what it computes; None: nothing.
+        child: the present process; None: there is none.
     """
 
     def __init__(self, begin: bytes) -> None:
@@ -53,15 +54,15 @@ class Process:
         self._asking = threading.Lock()  # held while something is asked
         self._lock = threading.Lock()  # protects what follows
         self.job: Job | None = None
-        self._child: subprocess.Popen[bytes] | None = None
+        self.child: subprocess.Popen[bytes] | None = None
         self._started = -APART
         self._stopped = False
 
     @property
     def pid(self) -> int | None:
         """Of the present process."""
-        child = self._child
-        return None if child is None else child.pid
+        running = self.child
+        return None if running is None else running.pid
 
     def start(self) -> None:
         """Start a process if there is none."""
@@ -96,25 +97,25 @@ class Process:
         with self._lock, contextlib.suppress(OSError):  # it has ended: the thread that asks sees that too
             if job is not None and not job.cancelled:
                 job.cancelled = True
-                if job.sent and job is self.job and self._child is not None:
-                    write(self._child.stdin, CANCEL)
+                if job.sent and job is self.job and self.child is not None:
+                    write(self.child.stdin, CANCEL)
 
     def kill(self, job: Job | None) -> None:
         """Kill the process if it is still at this job."""
         with self._lock:
-            if job is not None and job is self.job and self._child is not None:
+            if job is not None and job is self.job and self.child is not None:
                 job.cancelled = True
-                self._child.kill()
+                self.child.kill()
 
     def stop(self) -> None:
         """End the process, and start no other one."""
         with self._lock:
             self._stopped = True
-            running = self._child
+            running = self.child
             if running is not None:
                 running.kill()
         if running is not None and self._asking.acquire(timeout=1.0):  # else the thread that asks buries it
-            if self._child is running:
+            if self.child is running:
                 self._bury(running, expected=True)
             self._asking.release()
 
@@ -139,7 +140,7 @@ class Process:
 
     def _running(self) -> subprocess.Popen[bytes]:
         """The process, started if there is none; raises `LostError` if it ends at once or may not start."""
-        running = self._child
+        running = self.child
         if running is not None and running.poll() is None:
             return running
         if running is not None:
@@ -149,7 +150,7 @@ class Process:
         with self._lock:
             if self._stopped:
                 raise LostError
-            started = self._child = _start()
+            started = self.child = _start()
         try:
             write(started.stdin, self._begin)
         except OSError:
@@ -159,7 +160,7 @@ class Process:
 
     def _bury(self, ended: subprocess.Popen[bytes], expected: bool) -> None:
         with self._lock:
-            self._child = None
+            self.child = None
             silent = expected or self._stopped
         ended.kill()
         code = ended.wait()

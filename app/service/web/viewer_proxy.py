@@ -162,8 +162,7 @@ class ViewerBridge:
     async def channel(self, visitor: WebSocket) -> None:
         """The channel of a page, whose name is the second of the subprotocols: addresses are logged, it is not.
 
-        Its address says which process has the page (`app.service.handover`). It takes no place of a visitor: the
-        page has one, and its channel one connection at a time.
+        It takes no place of a visitor: the page has one, and its channel one connection at a time.
         """
         protocols = list(visitor.scope["subprotocols"])
         if not self._is_ours(visitor):

@@ -2,9 +2,8 @@
 
 Of a process's threads only one at a time runs Python. A gizmo drag passes through five of them in turn; if each
 wakes up on another processor, a drag among many visitors takes two to ten times as long as on a single one. So
-`pin` keeps a process on one processor (each of several worker processes on another). Threads that compute outside
-the interpreter for long, such as those of clouds and maps, call `lower_priority` first: it unpins them and lets
-visitors go first.
+`pin` keeps a process on one processor. Threads that compute outside the interpreter for long, such as those of
+clouds and maps, call `lower_priority` first: it unpins them and lets visitors go first.
 """
 
 from __future__ import annotations
@@ -24,18 +23,13 @@ NICENESS = 10  # of threads that compute in the background
 _processors: set[int] = set()  # those available before this process was pinned
 
 
-def pin(number: int | None = None) -> None:
-    """Keep this thread and those it starts on one processor. Does nothing where the system has no such call.
-
-    Args:
-        number: index of the processor among those available, taken modulo their number; None: a random one.
-    """
+def pin() -> None:
+    """Keep this thread and those it starts on one processor. Does nothing where the system has no such call."""
     if not hasattr(os, "sched_setaffinity"):  # Linux only
         return
     available = sorted(os.sched_getaffinity(0))
     _processors.update(available)
-    chosen = random.randrange(len(available)) if number is None else number % len(available)
-    os.sched_setaffinity(0, {available[chosen]})
+    os.sched_setaffinity(0, {random.choice(available)})
 
 
 def unpin() -> None:
@@ -45,8 +39,11 @@ def unpin() -> None:
 
 
 def every_processor() -> frozenset[int]:
-    """The processors that were available before this process was pinned; empty: it is not pinned."""
-    return frozenset(_processors)
+    """Numbers of the processors that were available before this process was pinned."""
+    try:
+        return frozenset(_processors or os.sched_getaffinity(0))
+    except AttributeError:  # not on Linux
+        return frozenset(range(os.cpu_count() or 1))
 
 
 def lower_priority(niceness: int = NICENESS) -> None:

@@ -317,7 +317,7 @@ def test_few_poses_run_on_the_event_loop_and_more_in_a_thread(app, client, monke
         return fk_answers(*arguments)
 
     monkeypatch.setattr("app.api.fk.fk_answers", watched)
-    monkeypatch.setattr(app.state.startup, "_complete", complete)
+    monkeypatch.setattr(app.state.startup, "complete", complete)
     answer = client.post("/api/v1/robots/pioneer5/fk", json={"q": [[0.0] * 5] * count})
     assert len(answer.json()["results"]) == count
     assert set(on_the_loop) == {inline}

@@ -20,7 +20,7 @@ import kin
 from app.api import ComputeSlots, api_routes
 from app.classroom.tokens import show_code
 from app.live import VALUES, Door, Line, Lines
-from app.live.codes import code_in, home_of, unused_code
+from app.live.codes import unused_code
 from app.live.recording import Recording
 from app.service.web.rooms.limits import Limits
 from app.shared.problems import problem
@@ -479,16 +479,12 @@ def test_pages_of_other_sites_are_rejected(page, port):
         heard(program, "welcome")
 
 
-def test_codes_tell_the_process_that_has_the_page():
-    lines = [Lines(place, 5) for place in range(5)]
-    codes = {place: [lines[place].open(ARM, lambda *_: None).code for _ in range(20)] for place in range(5)}
-    for place, found in codes.items():
-        assert {home_of(show_code(code).lower(), 5) for code in found} == {place}
-    assert len({code for found in codes.values() for code in found}) == 100
-    assert code_in("/api/v1/live/k7qf-2m4a") == "K7QF2M4A"
-    assert code_in("/api/v1/live/") is None
-    assert code_in("/api/v1/live/a/b") is None
-    assert unused_code((), 3, 4) not in codes[3]
+def test_each_page_has_a_code_of_its_own(monkeypatch):
+    lines = Lines()
+    assert len({lines.open(ARM, lambda *_: None).code for _ in range(100)}) == 100
+    drawn = iter(("AAAAAAAA", "BBBBBBBB"))
+    monkeypatch.setattr("app.live.codes.new_code", lambda: next(drawn))
+    assert unused_code({"AAAAAAAA"}) == "BBBBBBBB"
 
 
 @pytest.mark.full

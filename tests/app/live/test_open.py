@@ -109,14 +109,14 @@ def test_an_arm_of_a_file_and_no_arm(opened, viewer, tmp_path):
 
 
 def test_it_is_a_service_for_this_machine_alone(opened, monkeypatch, tmp_path):
-    for name, value in {"HOST": "0.0.0.0", "WORKERS": "2", "TOKEN": "t" * 20, "ROOT_PATH": "/arms"}.items():
+    for name, value in {"HOST": "0.0.0.0", "COMPUTE": "2", "TOKEN": "t" * 20, "ROOT_PATH": "/arms"}.items():
         monkeypatch.setenv(f"KINBOARD_{name}", value)
     kin.save_robot(
         kin.robot_from_dict({**kin.robot_to_dict(kin.get_robot("scara")), "id": "mine"}), tmp_path / "mine.toml"
     )
     url, _, settings = opened("mine", "--robots", str(tmp_path))
     assert url.endswith(f"#s={encode(PageState(robot='mine'))}")
-    assert (settings.host, settings.port, settings.workers, settings.token) == ("127.0.0.1", 0, 1, None)
+    assert (settings.host, settings.port, settings.compute, settings.token) == ("127.0.0.1", 0, 0, None)
     assert (settings.root_path, settings.robots) == ("", tmp_path)
 
 

@@ -16,6 +16,7 @@ import mmap
 import os
 import re
 import shutil
+import signal
 import socketserver
 import sqlite3
 import subprocess
@@ -48,17 +49,20 @@ from kin import get_robot
 from kin.kernels.cache import KernelCache, kernel_folder
 
 MOST = 8 << 20  # bytes of each folder, besides compiled kernels
-SILENCE = 10.0  # s: KINBOARD_WORKER_TIMEOUT
+SILENCE = 10.0  # s: KINBOARD_WORKER_TIMEOUT and KINBOARD_TIME_BUDGET
+HANG = signal.SIGUSR1  # lets the event loop of the service hang
 PATIENCE = 120.0  # s for what is not measured
 EXERCISE = "which-joint-goes-down"
 ASKED = (
     ("POST", "/api/v1/robots/pioneer5/ik", {"target": {"position": [0.045, 0.191, -0.211]}}),
+    ("POST", "/api/v1/robots/pioneer5/ik", {"target": [{"position": [0.045, 0.191, -0.211]}] * 2}),
     *(("GET", path, None) for path in ("/livez", "/readyz", "/room")),
 )
 # Of every Python of the machine. The end of a terminal ends the service, also where these tests run without one.
 STARTUP = """
 import os, signal, time
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
+signal.signal(signal.SIGUSR1, lambda *_: time.sleep(600))
 _true = time.time
 
 def _time():
@@ -109,19 +113,19 @@ class Machine:
     # Processes
 
     def processes(self) -> dict[str, psutil.Process]:
-        """The processes of a worker, which are there, by their roles."""
+        """The process of the service and the one that computes for it, by their roles."""
         found: list[psutil.Process] = []
 
         def all_there() -> bool:
             with contextlib.suppress(psutil.NoSuchProcess):  # it has ended meanwhile
-                found[:] = sorted(
-                    psutil.Process(self.service.process.pid).children(), key=lambda each: each.nice()
-                )
+                found[:] = psutil.Process(self.service.process.pid).children()
+                for service in found[:1]:
+                    found[1:] = [each for each in service.children() if "compute" in " ".join(each.cmdline())]
                 return len(found) == 2
             return False
 
-        wait_for(all_there, 30)
-        return dict(zip(("viewer", "rest"), found, strict=True))
+        wait_for(all_there, 60)
+        return dict(zip(("service", "compute"), found, strict=True))
 
     # Folders
 
@@ -346,6 +350,8 @@ def running_machine(base: Path, kernels: bool = False) -> Iterator[Machine]:
         "TMPDIR": str(folders / "temp" / "in"),
         "KINBOARD_DATA": str(folders / "data" / "in"),
         "KINBOARD_BENCH": "1",
+        "KINBOARD_COMPUTE": "1",
+        "KINBOARD_TIME_BUDGET": str(SILENCE),
         "KINBOARD_WORKER_TIMEOUT": str(SILENCE),
     } | {f"KINBOARD_{name.upper()}": str(folders / name / "in") for name in SEEDS}
     if kernels:

@@ -21,15 +21,11 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import Close
 from websockets.sync.client import ClientConnection, connect
 
-from app.api import ComputeSlots
 from app.api.body import UploadMemory
 from app.api.problems import ProblemError
 from app.service.guard import Guard
-from app.service.handover import members
 from app.service.http_protocol import MAX_HEAD, MAX_PIPELINE, HttpProtocol
-from app.service.server import Server
 from app.service.websocket_protocol import MAX_FRAGMENTS
-from app.shared.memory.answers import AnswerMemory
 from app.shared.settings import Settings
 
 
@@ -111,27 +107,6 @@ def test_a_connection_that_cannot_be_accepted_is_closed(monkeypatch, caplog):
     (record,) = [each for each in caplog.records if "could not be accepted" in each.message]
     assert "an error of our own" in caplog.text
     assert record.exc_info
-
-
-def test_a_connection_of_another_process_that_cannot_be_taken_is_closed(monkeypatch, caplog):
-    app = FastAPI()
-    app.state.compute = ComputeSlots(1, 1.0, 1.0, AnswerMemory(1 << 20, 1 << 20))
-
-    def fails(*_: object, **__: object) -> None:
-        raise RuntimeError("an error of our own")
-
-    async def run() -> bool:
-        with socket.create_server(("127.0.0.1", 0)) as listener:
-            server = Server(app, Settings(), members([listener], 0, bytearray)[0])
-            monkeypatch.setattr(server, "_protocol", fails)
-            ours, theirs = socket.socketpair()
-            theirs.setblocking(False)
-            server._adopt(theirs, GET)
-            with ours:
-                return await asyncio.to_thread(closed, ours, 5)
-
-    assert asyncio.run(run())
-    assert "could not be accepted" in caplog.text
 
 
 # -- requests --------------------------------------------------------------------------------------------------

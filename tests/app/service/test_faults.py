@@ -160,7 +160,7 @@ def test_a_service_that_cannot_stop_ends_all_the_same():
     code = (
         "import sys, time, concurrent.futures as f; from app.service.main import run; "
         "from app.shared.settings import Settings; "
-        "pool = f.ThreadPoolExecutor(1); pool.submit(time.sleep, 300); run(Settings(port=0, rest_workers=0))"
+        "pool = f.ThreadPoolExecutor(1); pool.submit(time.sleep, 300); run(Settings(port=0, compute=0))"
     )
     assert started_and_stopped(code) == ""
 

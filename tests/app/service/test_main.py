@@ -24,14 +24,11 @@ from websockets.sync.client import ClientConnection, connect
 
 import app.service.compiler
 import app.service.startup
-from app.service.compiler import STEP
-from app.service.handover import Member, Phase, Role
 from app.service.main import create_app, run
 from app.shared.settings import Settings, static_folder
 from app.viewer.server import ViewerServer
 from kin import builtin_robots
 from kin.warmup import first_family, parts
-from kin.warmup.preparation import SIZE, Preparation
 
 ROOT = Path(__file__).parents[3]
 PROTOCOL = f"viser-v{viser.__version__}"
@@ -111,26 +108,6 @@ def test_missing_kernels_are_compiled_by_other_processes_which_a_stop_ends(monke
     first = ["warm_up_first()", "warm_up_first(backwards=True)"][:processors]
     assert steps[:-1] == [f"from kin import warmup; warmup.{call}" for call in first]
     wait_for(lambda: started[-1].poll() is not None)
-
-
-@pytest.mark.parametrize("begun", [True, False], ids=["it compiles the parts", "all are compiled"])
-def test_other_processes_look_at_families_of_arms_after_the_first_which_has_compiled_what_that_needs(
-    monkeypatch, begun
-):
-    named = threading.Event()
-    monkeypatch.setattr(app.service.startup, "parts", named.set)
-    monkeypatch.setattr(app.service.startup, "warm_up_rest", lambda stop: None)
-    phases, memory = bytearray([Phase.READY, Phase.SERVING]), bytearray(SIZE)
-    listener = socket.socket()
-    member = Member(Role.REST, 1, listener, phases, memory, bytearray(), (0, 1), {})
-    with listener, TestClient(create_app(Settings(), member=member)):
-        wait_for(lambda: phases[1] == Phase.READY, 120)
-        assert not named.wait(5 * STEP)
-        if begun:
-            Preparation(memory).begin()
-        else:
-            phases[0] = Phase.COMPLETE
-        assert named.wait(30)
 
 
 def test_rest_is_served_when_the_viewer_fails(monkeypatch, caplog):
@@ -398,7 +375,8 @@ def test_the_process_starts_and_a_signal_stops_it_without_errors(ready, stop):
 )
 def test_a_public_service_without_a_token_logs_a_warning(capfd, monkeypatch, settings, warned):
     monkeypatch.setattr("app.service.main._serve", lambda *_, **__: 0)
-    assert run(Settings(port=0, rest_workers=0, **settings)) == 0
+    monkeypatch.setattr("app.service.main.can_restart", lambda: False)
+    assert run(Settings(port=0, compute=0, **settings)) == 0
     assert ("open to everybody" in capfd.readouterr().err) is warned
 
 

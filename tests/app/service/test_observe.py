@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -128,54 +125,6 @@ def test_without_the_setting_nothing_is_logged(caplog, client):
     caplog.set_level(logging.INFO, "kinboard.access")
     client.get("/livez")
     assert not [record for record in caplog.records if record.name == "kinboard.access"]
-
-
-COUNTING = """
-import os
-from app.shared.memory.shared import shared_bytes
-from app.shared.metrics import (
-    REQUEST_SECONDS, REQUESTS, SIZE, VISITORS, count_together, exposition, forget_process
-)
-
-memory = shared_bytes(2 * SIZE)
-
-def count(process, code):
-    if os.fork() == 0:
-        count_together(memory, process, 2)
-        exec(code)
-        os._exit(0)
-    os.wait()
-
-count(0, "REQUESTS.labels('GET', '/x', 200).inc(2); VISITORS.set(7); REQUEST_SECONDS.labels('/x').observe(0.03)")
-forget_process(memory, 0)
-count(0, "REQUESTS.labels('GET', '/x', 200).inc(); VISITORS.inc()")
-count(1, "VISITORS.set(3); REQUEST_SECONDS.labels('/x').observe(0.3)")
-count(1, "VISITORS.set(2)")
-count(1, "print(exposition().decode())")
-count(0, "print(exposition().decode())")
-count(1, "[REQUESTS.labels('', k, 0).inc() for k in range(20_000)]; print('more', len(exposition()) > 1e6)")
-"""
-
-
-@pytest.mark.full
-def test_several_processes_count_as_one_and_a_process_goes_on_where_its_predecessor_ended():
-    out = subprocess.run(
-        [sys.executable, "-c", COUNTING],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout
-    for line in (
-        'kinboard_requests_total{method="GET",route="/x",status="200"} 3.0',
-        'kinboard_request_seconds_count{route="/x"} 2.0',
-        'kinboard_request_seconds_bucket{le="0.05",route="/x"} 1.0',
-        'kinboard_request_seconds_bucket{le="0.5",route="/x"} 2.0',
-    ):
-        assert out.count(f"\n{line}\n") == 2, out
-    # 1 of process 0 and none of process 1, which has not set it since it was replaced, and the other way round.
-    assert re.findall(r"^kinboard_visitors (.*)", out, re.MULTILINE) == ["1.0", "0.0"]
-    assert "more True" in out
 
 
 @pytest.mark.parametrize("path", ["/livez", FK])

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import logging
-import socket
-from collections.abc import Callable
 from typing import Any
 
 import httpx2
@@ -14,12 +12,10 @@ from live_server import serve
 from private_names import asked_again, leave_out, take_away
 from websockets.sync.client import connect
 
-from app.service import main, uvicorn_names
-from app.service.handover import Member
+from app.service import uvicorn_names
 from app.service.http_protocol import HttpProtocol
 from app.service.server import protocols
 from app.service.websocket_protocol import WebSocketProtocol
-from app.shared.settings import Settings
 
 
 def test_the_installed_version_has_all_names() -> None:
@@ -70,19 +66,3 @@ def test_requests_and_websockets_are_served_all_the_same(
         with connect(f"ws://127.0.0.1:{port}/echo") as websocket:
             websocket.send(b"a message")
             assert websocket.recv() == b"a message"
-
-
-@pytest.mark.parametrize("lacking", [False, True])
-def test_without_our_protocol_there_is_one_process(monkeypatch: pytest.MonkeyPatch, lacking: bool) -> None:
-    if lacking:
-        leave_out(monkeypatch, uvicorn_names.HTTP)
-    seen: list[tuple[int, int]] = []
-
-    def members(listeners: list[socket.socket], partners: int, _: Callable[[int], object]) -> list[Member]:
-        seen.append((len(listeners), partners))
-        raise OSError("not in this test")
-
-    monkeypatch.setattr(main, "SUPPORTED", True)
-    monkeypatch.setattr(main, "members", members)
-    assert main.run(Settings(port=0, workers=3, rest_workers=2)) == 1
-    assert seen == [(1, 0) if lacking else (3, 2)]

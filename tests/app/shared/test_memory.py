@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import errno
-import multiprocessing
-import operator
-import os
 import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from live_server import wait_for
 
-from app.service.main import run
 from app.shared.memory import process as memory
 from app.shared.memory.process import BUSY_GROWTH, IDLE_GROWTH, MemoryKeeper, release_free_memory, resident_bytes
-from app.shared.memory.shared import shared_bytes
-from app.shared.settings import Settings
 
 ROOT = Path(__file__).parents[3]
 
@@ -108,33 +100,3 @@ def test_without_glibc_nothing_happens(monkeypatch):
     memory._malloc_trim.cache_clear()
     monkeypatch.setattr(memory, "_PROCESSES", Path("/nowhere"))
     assert resident_bytes() == 0
-
-
-@pytest.mark.parametrize("anonymous", [True, False])
-@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
-def test_processes_share_memory_however_they_were_started(method, anonymous, monkeypatch):
-    if not anonymous:
-        monkeypatch.delattr(os, "memfd_create", raising=False)
-    memory = shared_bytes(3)
-    process = multiprocessing.get_context(method).Process(target=operator.setitem, args=(memory, 1, 7))
-    process.start()
-    process.join()
-    assert list(memory) == [0, 7, 0]
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="Linux only")
-def test_without_anonymous_memory_the_space_of_a_file_is_reserved_before_it_is_used(monkeypatch, capfd):
-    """Otherwise a folder that fills up later would end the processes, by SIGBUS."""
-    monkeypatch.delattr(os, "memfd_create", raising=False)
-    found = os.fstat(shared_bytes(1 << 20).file)  # type: ignore[attr-defined]
-    assert found.st_blocks * 512 >= 1 << 20
-    assert found.st_nlink == 0
-
-    def refuse(*_: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(os, "posix_fallocate", refuse)
-    assert run(Settings(port=0)) == 1
-    said = capfd.readouterr().err
-    assert "no memory for the processes to share: [Errno 28] No space left on device" in said
-    assert "Traceback" not in said

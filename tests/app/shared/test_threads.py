@@ -40,16 +40,6 @@ def test_a_pinned_process_stays_pinned_and_background_threads_use_every_processo
     assert os.sched_getaffinity(0) == {chosen}, "others stay where they are"
 
 
-def test_workers_are_pinned_in_turn(as_before):
-    chosen = []
-    for number in range(len(as_before) + 1):
-        os.sched_setaffinity(0, as_before)
-        threads.pin(number)
-        chosen += os.sched_getaffinity(0)
-    assert set(chosen) == as_before
-    assert chosen[0] == chosen[-1]
-
-
 def test_without_it_nothing_changes(as_before):
     threads.unpin()
     assert os.sched_getaffinity(0) == as_before

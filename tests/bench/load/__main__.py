@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import os
 import sys
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from app.bench.run import machine  # noqa: E402
 MODES = {
     "rest": "requests a second beside an empty endpoint",
     "drag": "until the picture answers a drag, for 1, 10, 30 and 100 visitors",
+    "beside": "the same for 10 and 30 visitors beside programs that have batches and equations computed",
     "live": "until the picture shows what a program sends, in turn with drags: 1, 10, 30 and 100 visitors",
     "play": "pictures of 1, 10 and 30 visitors who play a program, beside as many who drag",
     "lesson": "a teacher whom 30 students follow, a wall of their arms, 60 who join",
@@ -32,7 +34,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python tests/bench/load", description=__doc__)
     parser.add_argument("mode", choices=(*MODES, "all"), help="; ".join(f"{k}: {v}" for k, v in MODES.items()))
     parser.add_argument("--quick", action="store_true", help="seconds instead of minutes, to try it")
-    parser.add_argument("--workers", type=int, default=1, help="processes of the service")
+    parser.add_argument("--compute", metavar="N", help="processes of the service that compute for REST")
     parser.add_argument(
         "--only",
         nargs="+",
@@ -45,7 +47,9 @@ def main() -> int:
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write everything measured to this file")
     arguments = parser.parse_args()
-    found = {"machine": machine(), "workers": arguments.workers}
+    if arguments.compute is not None:
+        os.environ["KINBOARD_COMPUTE"] = arguments.compute  # see `load.service.serve`
+    found = {"machine": machine(), "compute": arguments.compute}
     failed = False
     if arguments.only and arguments.mode == "all":
         parser.error("--only goes with one mode")
@@ -57,7 +61,7 @@ def main() -> int:
             long = {"minutes": arguments.minutes}
         if only and mode not in ("rest", "attacks"):
             only = [int(value) for value in only]
-        found[mode] = importlib.import_module(f"load.{mode}").run(arguments.quick, arguments.workers, only, **long)
+        found[mode] = importlib.import_module(f"load.{mode}").run(arguments.quick, only, **long)
         failed |= bool(found[mode].get("left behind"))
         print(flush=True)
     if arguments.json is not None:

@@ -65,14 +65,14 @@ async def measure(siege: Siege, groups: list[list[str]], attacked: float, quiet:
     return rows
 
 
-def run(quick: bool, workers: int, only: list[str] | None = None) -> dict[str, Any]:
+def run(quick: bool, only: list[str] | None = None) -> dict[str, Any]:
     """The table on stdout, and what is in it; `only`: names of attacks, or parts of them."""
     names = [attack.name for attack in ATTACKS]
     chosen = [name for name in names if only is None or any(part in name for part in only)]
     if not chosen:
         raise SystemExit(f"no attack is called {only}; there are: {', '.join(names)}")
     seconds = ATTACKED / 3 if quick else ATTACKED
-    with serve(workers, token=TOKEN, read_only="1") as service:
+    with serve(token=TOKEN, read_only="1") as service:
         rows = asyncio.run(measure(Siege(service), [[name] for name in chosen], seconds, QUIET))
-    print("\n" + table(f"attacks: {seconds:g} s each, {workers} worker(s)", rows))
+    print("\n" + table(f"attacks: {seconds:g} s each", rows))
     return {"rows": rows, "seconds": seconds}

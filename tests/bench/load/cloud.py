@@ -110,15 +110,15 @@ def alone(quick: bool) -> list[dict[str, Any]]:
     ]
 
 
-def run(quick: bool, workers: int, sizes: list[int] | None = None) -> dict[str, Any]:
+def run(quick: bool, sizes: list[int] | None = None) -> dict[str, Any]:
     """The tables on stdout, and what is in them."""
     steps = alone(quick)
     print(table(f"cloud: {ROBOT}, a thread of this process", steps) + "\n", flush=True)
     rows: list[dict[str, Any]] = []
-    with serve(workers) as service:
+    with serve() as service:
         for n in sizes or ([100_000] if quick else [1_000_000, 10_000_000]):
             rows += asyncio.run(_of_size(service, n, 2 if quick else 5))
-    print(table(f"cloud: {ROBOT}, {workers} worker(s), the fastest run of each", rows))
+    print(table(f"cloud: {ROBOT}, the fastest run of each", rows))
     return {"alone": steps, "rows": rows, "robot": ROBOT}
 
 

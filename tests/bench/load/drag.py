@@ -72,15 +72,15 @@ async def measure(
     }
 
 
-def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str, Any]:
+def run(quick: bool, counts: list[int] | None = None) -> dict[str, Any]:
     """The table on stdout, and what is in it."""
     counts = counts or ([1, 10] if quick else [1, 10, 30, 100])
     seconds = 3.0 if quick else 15.0
     rows = []
     for count in counts:
         # A service for each, so that memory begins where it began for the others.
-        with serve(workers) as service:
+        with serve() as service:
             asyncio.run(measure(service, 1, 1.0))  # nobody's first drag
             rows.append(asyncio.run(measure(service, count, seconds)))
-    print(table(f"drag: {HZ:g} events/s each for {seconds:g} s, {workers} worker(s)", rows))
+    print(table(f"drag: {HZ:g} events/s each for {seconds:g} s", rows))
     return {"rows": rows, "seconds": seconds, "hz": HZ}

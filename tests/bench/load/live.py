@@ -87,7 +87,7 @@ class Programmed(Visitor):
             self._code = found[1]
 
 
-def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str, Any]:
+def run(quick: bool, counts: list[int] | None = None) -> dict[str, Any]:
     """The tables on stdout, and what is in them."""
     counts = counts or ([1, 10] if quick else [1, 10, 30, 100])
     seconds = 3.0 if quick else 15.0
@@ -95,8 +95,8 @@ def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str,
     for name, kind in (("drag", Visitor), ("program", Programmed)):
         found[name] = []
         for count in counts:
-            with serve(workers) as service:
+            with serve() as service:
                 asyncio.run(measure(service, 1, 1.0, HZ, kind))
                 found[name].append(asyncio.run(measure(service, count, seconds, HZ, kind)))
-        print(table(f"{name}: {HZ:g} a second each for {seconds:g} s, {workers} worker(s)", found[name]))
+        print(table(f"{name}: {HZ:g} a second each for {seconds:g} s", found[name]))
     return found

@@ -70,7 +70,7 @@ def _say(text: str) -> None:
     print(time.strftime("%H:%M:%S"), text, file=sys.stderr, flush=True)
 
 
-def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str, Any]:
+def run(quick: bool, counts: list[int] | None = None) -> dict[str, Any]:
     """The table on stdout with that of as many dragging visitors, and what is in them."""
     counts = counts or ([1, 10] if quick else [1, 10, 30])
     seconds = 3.0 if quick else 15.0
@@ -78,13 +78,13 @@ def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str,
     for count in counts:
         for rows, drags in ((played, False), (dragged, True)):
             _say(f"{count} visitors who {'drag' if drags else 'play'}: the service starts")
-            with serve(workers) as service:
+            with serve() as service:
                 _say("measuring")
                 asyncio.run(measure_drag(service, 1, 1.0))  # nobody's first drag
                 if drags:
                     rows.append(asyncio.run(measure_drag(service, count, seconds)))
                 else:
                     rows.append(asyncio.run(measure(service, count, seconds)))
-    print(table(f"play: programs in a loop for {seconds:g} s, {workers} worker(s)", played))
+    print(table(f"play: programs in a loop for {seconds:g} s", played))
     print(table(f"drag: as many visitors for {seconds:g} s", dragged))
     return {"rows": played, "drag": dragged, "seconds": seconds}

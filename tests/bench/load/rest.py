@@ -98,10 +98,10 @@ async def measure(
     ]
 
 
-def run(quick: bool, workers: int, names: list[str] | None = None) -> dict[str, Any]:
+def run(quick: bool, names: list[str] | None = None) -> dict[str, Any]:
     """The table on stdout, and what is in it."""
     rounds, seconds, connections = (3, 0.4, 4) if quick else (15, 1.0, 4)
-    with serve(workers) as service:
+    with serve() as service:
         rows = asyncio.run(measure(service, rounds, seconds, connections, names))
-    print(table(f"rest: {connections} connections, {rounds} rounds of {seconds:g} s, {workers} worker(s)", rows))
+    print(table(f"rest: {connections} connections, {rounds} rounds of {seconds:g} s", rows))
     return {"rows": rows, "rounds": rounds, "seconds": seconds, "connections": connections}

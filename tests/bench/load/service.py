@@ -60,10 +60,9 @@ class Service:
         return sum(process.memory_info().rss for process in family(self.pid))
 
     def loop_seconds(self) -> float:
-        """Processor time that the event loop has spent that serves visitors; of one worker."""
-        service = psutil.Process(self.pid)
-        children = [child for child in service.children() if child.nice() == service.nice()]
-        process = children[0] if children else service
+        """Processor time that the event loop has spent."""
+        process = psutil.Process(self.pid)
+        process = next(iter(process.children()), process)  # the service has been started by another process
         return sum(each.user_time + each.system_time for each in process.threads() if each.id == process.pid)
 
     def seconds(self) -> float:
@@ -72,10 +71,11 @@ class Service:
 
 
 @contextmanager
-def serve(workers: int = 1, **settings: str) -> Iterator[Service]:
-    """A service that is ready, on a port of its own, with no other settings than these."""
-    command = [sys.executable, "-m", "app.cli", "serve", "--port", "0", "--workers", str(workers)]
-    env = {name: value for name, value in os.environ.items() if not name.startswith("KINBOARD_")}
+def serve(**settings: str) -> Iterator[Service]:
+    """A service that is ready, on a port of its own, with no other settings than these and KINBOARD_COMPUTE."""
+    command = [sys.executable, "-m", "app.cli", "serve", "--port", "0"]
+    kept = ("KINBOARD_COMPUTE", "KINBOARD_CACHE")
+    env = {name: value for name, value in os.environ.items() if name in kept or not name.startswith("KINBOARD_")}
     env |= {f"KINBOARD_{name.upper()}": value for name, value in settings.items()}
     with subprocess.Popen(
         command, cwd=ROOT, env=env | {"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, text=True
@@ -86,7 +86,7 @@ def serve(workers: int = 1, **settings: str) -> Iterator[Service]:
             if found is None:
                 raise RuntimeError("the service did not start")
             service = Service(process.pid, int(found[1]))
-            _wait_until_ready(service.port, workers)
+            _wait_until_ready(service.port)
             _wait_until_idle(service)
             yield service
         finally:
@@ -97,19 +97,15 @@ def serve(workers: int = 1, **settings: str) -> Iterator[Service]:
                 process.kill()
 
 
-def _wait_until_ready(port: int, workers: int) -> None:
-    """Each connection may meet another worker: so many times ready in a row that none can have been missed."""
+def _wait_until_ready(port: int) -> None:
     end = time.monotonic() + _WARM_UP
-    in_a_row = 0
-    while in_a_row < (1 if workers == 1 else 12 * workers):
-        if time.monotonic() > end:
-            raise RuntimeError(f"the service was not ready within {_WARM_UP:g} s")
+    while time.monotonic() < end:
         try:
             with _direct.open(f"http://127.0.0.1:{port}/readyz", timeout=20):
-                in_a_row += 1
+                return
         except OSError:  # refused, or 503
-            in_a_row = 0
             time.sleep(0.05)
+    raise RuntimeError(f"the service was not ready within {_WARM_UP:g} s")
 
 
 def _wait_until_idle(service: Service) -> None:

@@ -76,12 +76,10 @@ class Phase:
 
 
 def limit(settings: Settings) -> float:
-    """Bytes that a worker may hold, besides visitors and computations: the sum in docs/limits.md."""
-    partners = settings.rest_workers
-    viewer = PROGRAM + settings.cloud_memory + settings.map_memory + settings.mesh_memory + BODIES
-    programs = max(1, partners) * (settings.answer_memory + settings.upload_memory)
-    rest = partners * (PROGRAM + settings.map_memory)
-    return viewer + programs + rest + (STARTER if partners else 0.0)
+    """Bytes that the service may hold, besides visitors and computations: the sum in docs/limits.md."""
+    caches = settings.cloud_memory + settings.map_memory + settings.mesh_memory + BODIES
+    requests = settings.answer_memory + settings.upload_memory
+    return (1 + settings.processes) * PROGRAM + caches + requests + STARTER
 
 
 class Siege:
@@ -219,21 +217,21 @@ async def answers(service: Service) -> dict[str, int]:
     return dict(sorted(found.items()))
 
 
-def run(quick: bool, workers: int, only: list[int] | None = None) -> dict[str, Any]:
+def run(quick: bool, only: list[int] | None = None) -> dict[str, Any]:
     """The tables on stdout, and what is in them; `only`: how many minutes."""
     minutes = only[0] if only else 3 if quick else 30
     length = ATTACKED + SETTLING + QUIET
     rounds = max(1, round((60.0 * minutes - QUIET) / length))
-    with serve(workers, token=TOKEN, read_only="1") as service:
+    with serve(token=TOKEN, read_only="1") as service:
         siege = Siege(service)
         before = service.resident()
         asyncio.run(siege.run(rounds, ATTACKED, SETTLING, QUIET))
         statuses = asyncio.run(answers(service))
         time.sleep(20.0)  # memory is given back when the service is idle
-        return report(siege, statuses, before, service.resident(), workers)
+        return report(siege, statuses, before, service.resident())
 
 
-def report(siege: Siege, statuses: dict[str, int], before: int, after: int, workers: int) -> dict[str, Any]:
+def report(siege: Siege, statuses: dict[str, int], before: int, after: int) -> dict[str, Any]:
     """The tables on stdout, and what is in them.
 
     Args:
@@ -254,10 +252,10 @@ def report(siege: Siege, statuses: dict[str, int], before: int, after: int, work
         whole.refused += phase.refused
         whole.late, whole.peak = max(whole.late, phase.late), max(whole.peak, phase.peak)
     rows = [phase.row("all") for phase in sums.values()]
-    print("\n" + table(f"siege: {VISITORS} visitors, {workers} worker(s)", rows))
+    print("\n" + table(f"siege: {VISITORS} visitors", rows))
     ratio = rows[1]["p95 ms"] / rows[0]["p95 ms"]
     most = max(whole.peak for whole in sums.values())
-    bound = workers * limit(Settings())
+    bound = limit(Settings())
     failures = sum(count for status, count in statuses.items() if status.startswith("5") and status != "503")
     print(f"p95 attacked / quiet {ratio:.2f}; answers: {', '.join(f'{n} × {s}' for s, n in statuses.items())}")
     sizes = [f"{size / 1e6:.0f} MB" for size in (before, most, after, bound)]

@@ -186,12 +186,12 @@ def left_behind(before: Usage, after: Usage, visits: int) -> list[str]:
     return found
 
 
-def run(quick: bool, workers: int, only: list[int] | None = None, minutes: int | None = None) -> dict[str, Any]:
+def run(quick: bool, only: list[int] | None = None, minutes: int | None = None) -> dict[str, Any]:
     """The table on stdout, and what is in it; `only`: how many rounds; `minutes`: of a steady load instead."""
     if minutes is not None:
-        return _run_steady(workers, minutes)
+        return _run_steady(minutes)
     rounds, visitors, seconds = (only[0] if only else 4 if quick else 60), 4, 1.0
-    with serve(workers) as service:
+    with serve() as service:
         before, after = asyncio.run(soak(service, rounds, visitors, seconds))
     visits = rounds * visitors
     rows = [
@@ -199,21 +199,21 @@ def run(quick: bool, workers: int, only: list[int] | None = None, minutes: int |
         for name, u in (("before", before), ("after", after))
     ]
     left = left_behind(before, after, visits)
-    print(table(f"soak: {visits} visits, {workers} worker(s)", rows))
+    print(table(f"soak: {visits} visits", rows))
     kilobytes = (after.memory - before.memory) / visits / 1e3
     print(f"{kilobytes:.1f} kB a visit; left behind: {', '.join(left) or 'nothing'}")
     return {"rows": rows, "visits": visits, "left behind": left}
 
 
-def _run_steady(workers: int, minutes: int) -> dict[str, Any]:
-    with serve(workers) as service:
+def _run_steady(minutes: int) -> dict[str, Any]:
+    with serve() as service:
         rows, before, after = asyncio.run(steady(service, minutes))
     left = left_behind(before, after, 0)
     left += [f"{row['lost']} visitors lost in minute {row['minute']}" for row in rows if row["lost"]]
     left += [
         f"{row['unanswered']} drags unanswered in minute {row['minute']}" for row in rows if row["unanswered"] > HZ
     ]
-    print("\n" + table(f"soak: {minutes} minutes of steady load, {workers} worker(s)", rows))
+    print("\n" + table(f"soak: {minutes} minutes of steady load", rows))
     for name, usage in (("early", before), ("end", after)):
         print(f"{name}: {usage.memory / 1e6:.0f} MB, {usage.files} files, {usage.threads} threads")
     print(f"left behind: {', '.join(left) or 'nothing'}")

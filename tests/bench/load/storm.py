@@ -59,11 +59,11 @@ async def _probe(port: int) -> list[float]:
         connection.close()
 
 
-def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str, Any]:
+def run(quick: bool, counts: list[int] | None = None) -> dict[str, Any]:
     """The table on stdout, and what is in it."""
     rows = []
     for count in counts or ([20] if quick else [50, 200]):
-        with serve(workers, client_share="1") as service:  # all come from one address
+        with serve(client_share="1") as service:  # all come from one address
             rows.append(asyncio.run(measure(service, count)))
-    print(table(f"storm: everybody at once, {workers} worker(s)", rows))
+    print(table("storm: everybody at once", rows))
     return {"rows": rows}

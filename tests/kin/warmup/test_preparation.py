@@ -1,4 +1,4 @@
-"""Which kernels are compiled: the order, what is wanted first, and what several processes see."""
+"""Which kernels are compiled: the order and what is wanted first."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 
 from kin import classic_robots
 from kin.solvers import NUMERIC, family_of
-from kin.warmup import MADE_UP, MOTIONS, all_of, first_family, made_up_arms, parts
-from kin.warmup.preparation import ROOM, SIZE, Preparation
+from kin.warmup import MADE_UP, all_of, first_family, made_up_arms, parts
+from kin.warmup.preparation import Preparation
 
 
 def begun() -> Preparation:
@@ -24,11 +24,10 @@ def finish_part(preparation: Preparation, name: str) -> None:
         preparation.done(name)
 
 
-def test_every_family_has_its_parts_and_all_fit_into_the_memory():
+def test_every_family_has_its_parts():
     for robot in classic_robots().values():
         assert (family_of(robot) in parts()) == (family_of(robot) != first_family())
         assert all_of(family_of(robot)) in parts()
-    assert len(parts()) <= ROOM
     assert all(steps for steps in parts().values())
 
 
@@ -81,21 +80,6 @@ def test_other_names_are_never_waited_for():
     assert preparation.ready((first_family(), NUMERIC, "no part"))
     assert preparation.ready(())
     assert preparation.steps(("no part",)) == (0, 0)
-
-
-def test_processes_with_the_same_memory_see_the_same():
-    memory = bytearray(SIZE)
-    compiling, viewer = Preparation(memory), Preparation(memory)
-    assert viewer.complete
-    compiling.begin()
-    assert not viewer.complete
-    viewer.want((MOTIONS,))
-    assert compiling.next() == (MOTIONS, 0)
-    finish_part(compiling, MOTIONS)
-    assert viewer.ready((MOTIONS,))
-    compiling.finish()
-    assert viewer.complete
-    assert viewer.steps((MOTIONS,)) == (len(parts()[MOTIONS]),) * 2
 
 
 def test_nothing_is_waited_for_before_the_begin_and_after_the_end():

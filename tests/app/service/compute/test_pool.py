@@ -91,7 +91,7 @@ def test_robots_and_settings_are_named_and_others_are_sent(pool):
     other = robot.with_base(kin.pose_from_xyz_rpy([0.1, 0.0, 0.0]))
     assert ask(pool, partial(pool_jobs.shared, (other, Settings()))) == [False, False]
     assert ask(pool, partial(pool_jobs.given, (other,))) == (other,)
-    assert len(pool._message(partial(pool_jobs.given, (STORE.get("ur5"), SETTINGS)), 1.0)) < 300
+    assert len(pool.message(partial(pool_jobs.given, (STORE.get("ur5"), SETTINGS)), 1.0)) < 300
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_a_process_that_was_killed_while_idle_costs_nothing(stand_ins):
     pool = stand_ins()
     before = ask(pool, pool_jobs.pid)
     os.kill(before, signal.SIGKILL)
-    running = pool._processes[0]._child
+    running = pool.processes[0].child
     assert running is not None
     running.wait()
     assert ask(pool, pool_jobs.pid) != before
@@ -202,7 +202,7 @@ def test_a_stop_of_the_service_ends_what_is_computed(pool):
 def test_each_process_is_prepared_and_a_failure_is_raised(stand_ins):
     pool = stand_ins(2)
     pool.prepare(pool_jobs.pid)
-    assert all(each.pid for each in pool._processes)
+    assert all(each.pid for each in pool.processes)
     with pytest.raises(module.LostError):
         pool.prepare(pool_jobs.ends)
 
@@ -221,7 +221,7 @@ def test_the_process_ends_with_the_service_and_not_by_a_signal_to_all(pool):
     os.kill(number, signal.SIGTERM)
     os.kill(number, signal.SIGINT)
     assert ask(pool, pool_jobs.pid) == number
-    running = pool._processes[0]._child
+    running = pool.processes[0].child
     assert running is not None
     assert running.stdin is not None
     running.stdin.close()  # as the system does when the service is killed

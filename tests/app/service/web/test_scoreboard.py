@@ -12,7 +12,6 @@ from starlette.applications import Starlette
 
 from app.bench.board.page import recorded
 from app.bench.board.runs import Runs, write_json
-from app.service.handover import Role
 from app.service.main import create_app
 from app.service.web.scoreboard import Scoreboard
 from app.shared.settings import Settings
@@ -105,7 +104,7 @@ def test_with_a_token_nobody_starts_a_run_without_it(tmp_path):
     assert client.get("/scoreboard/run", headers={"Authorization": "Bearer open sesame"}).status_code == 200
 
 
-def test_processes_of_a_service_share_what_they_know_of_a_run(tmp_path):
+def test_a_service_that_is_started_again_knows_of_a_run(tmp_path):
     settings = Settings(bench=True)
     first, second = (TestClient(create_app(settings, bench=tmp_path)) for _ in range(2))
     runs = Runs(tmp_path, [sys.executable, "-c", SLEEP])
@@ -117,11 +116,6 @@ def test_processes_of_a_service_share_what_they_know_of_a_run(tmp_path):
         runs.close()
     assert first.get("/scoreboard/run").json()["state"] == "failed"
     assert tmp_path.is_dir()
-
-
-def test_the_process_for_rest_serves_the_scoreboard():
-    assert Role.REST.serves("/scoreboard")
-    assert not Role.VIEWER.serves("/scoreboard/run")
 
 
 def test_a_folder_that_was_cleaned_away_is_made_again(board, tmp_path):

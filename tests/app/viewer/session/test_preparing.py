@@ -15,10 +15,10 @@ from live_server import serve_viewer
 
 import kin
 from app.api import ComputeSlots, api_routes
+from app.classroom.tokens import read_code
 from app.live import Lines
 from app.live import line as live_line
 from app.live.client import page as client_page
-from app.live.codes import read_code
 from app.live.line import Letter, Line, Program
 from app.service.web.rooms.limits import Limits
 from app.shared.clouds import Clouds

@@ -29,11 +29,11 @@ PATIENCE = 3.0  # s for the last pictures
 
 
 @contextmanager
-def served(workers: int, url: str | None = None) -> Iterator[tuple[Service, Hub]]:
+def served(url: str | None = None) -> Iterator[tuple[Service, Hub]]:
     """A service with an empty database of rooms, SQLite or the one of this URL, and our own door to it."""
     with tempfile.TemporaryDirectory(prefix="kinboard-lesson-") as data:
         settings = {"data": data} if url is None else {"data": data, "database_url": url}
-        with serve(workers, **settings) as service:
+        with serve(**settings) as service:
             hub = Hub(Path(data), url)
             try:
                 yield service, hub
@@ -139,21 +139,21 @@ async def wall(service: Service, hub: Hub, count: int, seconds: float) -> list[d
     return rows
 
 
-def run(quick: bool, workers: int, counts: list[int] | None = None) -> dict[str, Any]:
+def run(quick: bool, counts: list[int] | None = None) -> dict[str, Any]:
     """The tables on stdout, and what is in them."""
     count, seconds = (counts or [5 if quick else 30])[0], 3.0 if quick else 15.0
     found: dict[str, Any] = {}
-    drags = f"lesson: a teacher drags at {HZ:g} events/s for {seconds:g} s, {workers} worker(s)"
-    with served(workers) as running:
+    drags = f"lesson: a teacher drags at {HZ:g} events/s for {seconds:g} s"
+    with served() as running:
         found["follow"] = asyncio.run(follow(*running, count, seconds))
         print(table(drags, [found["follow"]]))
-    with served(workers) as running:
+    with served() as running:
         found["wall"] = asyncio.run(wall(*running, count, seconds))
         print(table(f"lesson: {count} students move at {WALL_HZ:g} Hz for {seconds:g} s", found["wall"]))
-    with served(workers) as running:
+    with served() as running:
         found["join"] = asyncio.run(join(*running, 2 * count, JOINING))
         print(table(f"lesson: students join within {JOINING:g} s", [found["join"]]))
-    with running_postgres() as server, served(workers, server.create()) as running:
+    with running_postgres() as server, served(server.create()) as running:
         found["follow, PostgreSQL"] = asyncio.run(follow(*running, count, seconds))
         print(table(f"{drags}, PostgreSQL", [found["follow, PostgreSQL"]]))
     return found

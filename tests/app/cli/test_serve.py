@@ -1,0 +1,42 @@
+"""`kinboard serve`: settings that do nothing any more, and how many processes compute."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from app.cli import serve
+from app.cli.parser import main
+from app.shared.settings import Settings
+
+
+def test_settings_and_options_that_do_nothing_any_more_are_accepted_and_say_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given: list[Settings] = []
+
+    def run(settings: Settings, open_browser: bool) -> int:
+        given.append(settings)
+        return 0
+
+    monkeypatch.setattr(serve, "import_service", lambda: run)
+    for name in ("KINBOARD_WORKERS", "KINBOARD_REST_WORKERS"):
+        monkeypatch.setenv(name, "2")
+    assert main(["serve", "--workers", "3", "--port", "0"]) == 0
+    said = capsys.readouterr().err.splitlines()
+    names = ("KINBOARD_REST_WORKERS", "KINBOARD_WORKERS", "--workers")
+    assert [line.partition(" does nothing")[0] for line in said] == [f"kinboard: {name}" for name in names]
+    assert all("KINBOARD_COMPUTE" in line for line in said)
+    assert given[0].port == 0
+
+
+@pytest.mark.parametrize(("given", "processes"), [({}, 3), ({"compute": 0}, 0), ({"compute": 5}, 5)])
+def test_one_fewer_compute_than_there_are_processors(
+    monkeypatch: pytest.MonkeyPatch, given: dict[str, Any], processes: int
+) -> None:
+    monkeypatch.setattr("app.shared.settings.every_processor", lambda: frozenset(range(4)))
+    assert Settings(**given).processes == processes
+    assert Settings(**given).on_this_machine().processes == 0
+    monkeypatch.setattr("app.shared.settings.every_processor", lambda: frozenset([7]))
+    assert Settings().processes == 1, "at least one"
