@@ -161,3 +161,13 @@ def test_singularities_are_those_of_the_joints():
     straight = np.array([0.0, 0.5, 0.5 + DOWN, 0.0])  # the forearm along the upper arm
     assert kin.singularities(robot, straight)[0].distance < 1e-9
     assert kin.singularities(robot, robot.q_home)[0].distance > 0.1
+
+
+def test_what_only_the_free_arm_reaches_is_no_branch():
+    """Batch kernels verify nothing: a hand that is pitched is a posture of the five axes, not of the four joints."""
+    robot = palletiser()
+    T = kin.fk(robot, robot.q_home)
+    pitched = T @ kin.pose_from_xyz_rpy([0.0, 0.0, 0.0], [0.0, 0.3, 0.0])
+    assert np.isnan(kin.ik_branches(robot, pitched)).all()
+    assert not np.isnan(kin.ik_branches(robot, T)).all()
+    assert kin.solve_ik(robot.free, pitched).status.value == "solved"
