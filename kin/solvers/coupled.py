@@ -108,7 +108,7 @@ class Coupled(ClosedForm):
             self._back[np.ix_(robot.revolute, free.revolute[chosen])]
         )
         self.name, self.title, self.lengths = form.name, form.title, form.lengths
-        self.reason = f"{form.reason}; {robot.n} joints move these {free.n} axes, which decides what is kept"
+        self.reason = f"{form.reason}; {robot.n} joints move these {free.n} axes"
         self.branches, self.named = form.branches, form.named
         # Of the free arm: an angle that the joints together turn.
         self.meanings = tuple((name, _THETA.sub(r"the angle at axis \1", text)) for name, text in form.meanings)

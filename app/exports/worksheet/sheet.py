@@ -12,7 +12,7 @@ import numpy as np
 from app.exports.snippets import row_transform
 from kin import Joint, Robot, fk
 from kin.transforms import Array
-from kin.units import Units, fixed
+from kin.units import Units, fixed, general
 
 # The table and the matrices are filled in, or their product alone; or the pose is given, and the configuration is
 # to be found.
@@ -143,7 +143,7 @@ class Sheet:
         names = [joint.name for joint in self.robot.joints]
         index = names.index(row.follows)
         leader = _variable(self.robot.joints[index].kind, index)
-        return {1.0: leader, -1.0: f"−{leader}"}.get(row.ratio, f"{fixed(row.ratio, 4)} {leader}")
+        return {1.0: leader, -1.0: f"−{leader}"}.get(row.ratio, f"{general(row.ratio)} {leader}")
 
     @cached_property
     def values_of_rows(self) -> dict[int, float]:

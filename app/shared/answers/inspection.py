@@ -111,12 +111,14 @@ class InspectionAnswer(Answer):
 def inspect(robot: Robot, taken: bool = False) -> InspectionAnswer:
     """Describe an arm; `taken`: a built-in robot has the same id."""
     match = closed_form_of(robot)
-    between, count, margin = pairs(robot), motions(robot), home_margin(robot)
+    # Between two joints of an arm with rows that follow there is no rigid link, and so no lasting relation.
+    rigid = not robot.coupled
+    between, count, margin = pairs(robot) if rigid else (), motions(robot), home_margin(robot)
     return InspectionAnswer(
         robot=robot_answer(robot),
         axes=[PairAnswer.of(pair) for pair in between],
-        parallel=[list(range(first, last + 1)) for first, last in parallel_groups(robot)],
-        spherical=[list(range(i, i + 3)) for i in spherical_groups(robot)],
+        parallel=[list(range(first, last + 1)) for first, last in parallel_groups(robot)] if rigid else [],
+        spherical=[list(range(i, i + 3)) for i in spherical_groups(robot)] if rigid else [],
         motions=count,
         redundancy=robot.n - count,
         home_margin=margin,

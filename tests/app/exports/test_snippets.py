@@ -304,3 +304,11 @@ def test_without_obstacles_the_code_does_not_speak_of_them():
     for code in (curl(here), python_requests(here), python_kin(here)):
         assert "obstacles" not in code
         assert "avoid" not in code
+
+
+@pytest.mark.parametrize("write", [robotics_toolbox, matlab])
+def test_toolboxes_without_rows_that_follow_say_so(write):
+    robot = kin.get_robot("palletiser")
+    code = write(Moment(robot, robot.q_home, kin.fk(robot, robot.q_home)))
+    assert "has rows that follow joints, which" in code
+    assert code.count("\n") == 1

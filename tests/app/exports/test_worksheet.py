@@ -24,7 +24,9 @@ PIONEER = kin.get_robot("pioneer5")
 SLANTED = replace(
     PIONEER, base=((0.8, 0.0, 0.6, 0.2), (0.0, 1.0, 0.0, 0.3), (-0.6, 0.0, 0.8, 0.9), (0, 0, 0, 1.0))
 )
-each_robot = pytest.mark.parametrize("robot", [*ROBOTS, SLANTED], ids=lambda robot: robot.name)
+each_robot = pytest.mark.parametrize(
+    "robot", [*ROBOTS, SLANTED, kin.get_robot("palletiser")], ids=lambda robot: robot.name
+)
 PARTS = (
     Part(
         "1. First", "A text with θ₁ − 90° & 5 %.", (Question("How far is it?", "12.0 mm. √(x² + y²).", (), "mm"),)
@@ -66,7 +68,7 @@ def test_csv_is_read_back(robot, units):
         assert np.allclose(read, (row.theta, row.d, row.a, row.alpha), atol=1e-13)
         if line["value"]:
             values.append(float(line["value"]) * (angle if row.kind == "revolute" else length))
-    assert np.allclose(values, made.q, atol=1e-13)
+    assert np.allclose(values, robot.expand(made.q), atol=1e-13)
     T = np.array(
         [float(rows[-1][f"m{r}{c}"]) * (length if c == 4 else 1) for r in (1, 2, 3) for c in (1, 2, 3, 4)]
     )
@@ -152,3 +154,11 @@ def test_text_becomes_latex():
     assert to_latex("10⁻¹⁶") == "10$^{-16}$"
     assert to_latex("xₖ") == "x$_{k}$"
     assert to_latex("“R” = RᵀR ≤ λ") == r"``R'' = R$^{T}$R $\le$ $\lambda$"
+
+
+def test_rows_that_follow_have_the_variable_of_their_joint():
+    robot = kin.get_robot("palletiser")
+    rows = sheet(robot).rows
+    assert [row.cells[0] for row in rows] == ["θ₁", "θ₂ − 90.0", "−θ₂ + 90.0", "θ₃", "−θ₃", "θ₄"]
+    half = replace(robot, rows=(*robot.rows[:4], replace(robot.rows[4], ratio=0.5), robot.rows[5]))
+    assert sheet(half).rows[4].cells[0] == "0.5 θ₃"
