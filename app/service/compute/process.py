@@ -73,6 +73,8 @@ class ComputeProcess:
         """Wait for the answer to a job; raises what the process raises, `LostError`, or 503 if memory is full."""
         with self._asking:
             running = self._running()
+            if job.cancelled:  # while the process was started
+                raise LostError
             began = time.perf_counter()
             with self._lock:
                 self.job = job

@@ -159,6 +159,15 @@ def test_one_whose_time_is_over_is_killed(stand_ins, monkeypatch):
     assert ask(pool, pool_jobs.pid)
 
 
+def test_a_client_that_leaves_while_its_process_is_started_is_forgotten(stand_ins, monkeypatch):
+    start = process._start
+    monkeypatch.setattr(process, "_start", lambda: time.sleep(0.1) or start())
+    pool = stand_ins()
+    with pytest.raises(ClientLeftError):
+        ask(pool, pool_jobs.hangs, leave=0.01)
+    assert ask(pool, pool_jobs.pid) == pool.processes[0].pid, "the process was not killed"
+
+
 def test_a_process_that_ends_loses_one_request(stand_ins, caplog):
     pool = stand_ins(2)
 
