@@ -303,7 +303,7 @@ def test_compose_puts_https_in_front(certificate: Path, tmp_path: Path) -> None:
 def process(data: Path) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """A service of its own process, as in a container, and its port."""
     names = {"KINBOARD_ROOT_PATH": "/kinboard", "KINBOARD_TRUSTED_PROXIES": '["127.0.0.1"]'}
-    env = {**os.environ, **names, "KINBOARD_DATA": str(data), "KINBOARD_REST_WORKERS": "0"}
+    env = {**os.environ, **names, "KINBOARD_DATA": str(data), "KINBOARD_COMPUTE": "0"}
     command = [sys.executable, "-m", "app.cli", "serve", "--port", "0"]
     with subprocess.Popen(command, cwd=ROOT, env=env, stdout=subprocess.PIPE, text=True) as started:
         try:
