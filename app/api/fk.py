@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Annotated
 
 from fastapi import Request, Response
 from pydantic import Field
@@ -15,6 +16,7 @@ from app.api.body import versioned
 from app.api.schemas import (
     POST_REFUSALS,
     Configurations,
+    OneOf,
     Pendant,
     example,
     is_warm,
@@ -26,9 +28,10 @@ from app.shared.answers.answer import Answer
 from app.shared.answers.fk import FkAnswer, fk_answers
 from kin import Robot
 from kin.frames import WORLD
+from kin.poses import FORMS as POSES
 from kin.transforms import Array
 
-POSE, FRAME = 570, 520  # bytes of a pose and of a frame, about
+POSE, FRAME, TEXT = 570, 520, 120  # bytes of a pose, of a frame and of a text, about
 FEW = 16  # configurations that are answered sooner than a thread could be asked to
 
 router = versioned("kinematics")
@@ -46,6 +49,7 @@ EXAMPLES = {
             "frame": "table",
         },
     ),
+    "form": example("As it stands on a pendant", {"q": [1.5708, 0.5236, 1.0472, 0.5236, 0.5236], "form": "fanuc"}),
     "many": example(
         "Several configurations",
         {"q": [[0.0, 0.0, 0.0, 0.0, 0.5], [1.2, 0.4, 0.9, 0.3, 0.6], [3.0, 1, 1, 1, 0.3]]},
@@ -70,6 +74,12 @@ class FkRequest(WorkpiecesBody):
         WORLD,
         description="The frame in which poses are answered: world, base (that of the first DH row), or the name "
         "of one of `workpieces`.",
+    )
+
+    form: Annotated[str, OneOf(POSES)] | None = Field(
+        None,
+        description="The form in which the tool's pose is answered as `text` as well: a notation in metres and "
+        "radians, or a maker's in the units of its pendants.",
     )
 
     def axes(self, robot: Robot) -> Array | None:
@@ -102,14 +112,15 @@ async def forward_kinematics(request: Request, robot: Robot, body: FkRequest) ->
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
     q = joint_values(robot, q, body.pendant)
     axes = body.axes(robot)
-    batch = Batch("q", len(q), single, POSE + FRAME * len(robot.rows) * body.frames, "frames false")
-    answer = partial(_answers, robot, q, (body.frames, body.frame, axes), batch)
+    size = POSE + FRAME * len(robot.rows) * body.frames + TEXT * (body.form is not None)
+    batch = Batch("q", len(q), single, size, "frames false")
+    answer = partial(_answers, robot, q, (body.frames, body.frame, axes, body.form), batch)
     if is_warm(request) and len(q) <= FEW:
         return answer(Deadline(compute_slots(request)))
     return await computed(request, answer)
 
 
 def _answers(
-    robot: Robot, q: Array, options: tuple[bool, str, Array | None], batch: Batch, deadline: Deadline
+    robot: Robot, q: Array, options: tuple[bool, str, Array | None, str | None], batch: Batch, deadline: Deadline
 ) -> Response:
     return one_or_all(lambda some: fk_answers(robot, q[some], *options), batch, deadline)

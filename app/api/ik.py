@@ -80,6 +80,9 @@ EXAMPLES = {
             "workpieces": {"table": {"xyz": [0.1, 0.2, -0.3], "rpy": [0.0, 0.0, 1.5708]}},
         },
     ),
+    "text": example(
+        "As it stands on a pendant", {"target": {"text": "X 45 Y 191 Z -211 W 180 P 0 R 0"}, "task": "position"}
+    ),
     "unreachable": example("Out of reach: still an answer", {"target": {"position": [2.0, 0.0, 0.0]}}),
     "many": example(
         "Several targets",

@@ -20,10 +20,11 @@ from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model
 from app.api import schemas
 from app.api.arms.frames import FrameName, FramesBody, WorkpiecesBody
 from app.api.problems import invalid
-from app.api.schemas import Number, Vector3, Vector4, integral, numbers
+from app.api.schemas import Number, OneOf, Vector3, Vector4, integral, numbers
 from app.shared.options import declared
 from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
+from app.shared.targets import ORIENTATIONS, orientation, text_target, whole_matrix
 from app.shared.threads.turns import offer
 from kin import IKOptions, InputError, JointConstraints, Robot, Task, solve_path
 from kin.collision.obstacles import LONGEST_NAME, MOST_OBSTACLES, checked_obstacles
@@ -31,27 +32,26 @@ from kin.frames import WORLD
 from kin.ik.options import DEFAULTS
 from kin.ik.problem import FAR, read_pose
 from kin.kernels.checks import straighten_many
+from kin.poses import FORMS as POSES
+from kin.poses import far_from_unit
 from kin.solvers.contract import POSE
-from kin.transforms import (
-    Array,
-    frame_from_approach,
-    frames_from_approaches,
-    pose_from_position_wxyz,
-    rotations_from_wxyz,
-)
+from kin.transforms import Array, frame_from_approach, frames_from_approaches, rotations_from_wxyz
+from kin.typed import LONGEST_LIST
 
 AGREEMENT = 1e-6  # metres, and matrix entries
 _IDENTITY = np.eye(4)
 _AT_ONCE = 512  # targets that are read between two offers to other threads
+# A task, and what a text gives that is too little for it.
+_TOO_LITTLE = {("pose", "position"), ("pose", "approach"), ("approach", "position")}
 FORMS = {
-    "pose": "`position` and `wxyz`, or `matrix`",
-    "approach": "`position` and `approach`, or `position` and `wxyz`, or `matrix`",
-    "position": "`position`, or `matrix`",
+    "pose": "`position` and `wxyz` (or `xyzw`, `rpy`, `rotvec`), or `matrix`, or `text`",
+    "approach": "`position` and `approach`, or `position` and `wxyz`, or `matrix`, or `text`",
+    "position": "`position`, or `matrix`, or `text`",
 }
 
 
 class Target(schemas.Body):
-    """A target: `matrix`, or `position` with `wxyz` or `approach`, or `position` alone."""
+    """A target: `position` with one orientation, `approach` or nothing; or `matrix`; or `text`."""
 
     frame: FrameName | None = Field(
         None,
@@ -66,73 +66,140 @@ class Target(schemas.Body):
     )
     wxyz: Vector4 | None = Field(
         None,
-        description="Orientation of the tool as a quaternion w, x, y, z (scalar first), of any length.",
+        description="Orientation of the tool as a quaternion w, x, y, z (scalar first), of length 1; it is "
+        "normalised where its length differs by 0.1 at most.",
         examples=[[1.0, 0.0, 0.0, 0.0]],
+    )
+    xyzw: Vector4 | None = Field(
+        None,
+        description="The same with the scalar last, in the place of `wxyz`.",
+        examples=[[0.0, 0.0, 0.0, 1.0]],
+    )
+    rpy: Vector3 | None = Field(
+        None,
+        description="Roll, pitch, yaw in radians in the place of `wxyz`: Rz(yaw) Ry(pitch) Rx(roll).",
+        examples=[[0.0, 1.5708, 0.0]],
+    )
+    rotvec: Vector3 | None = Field(
+        None,
+        description="A rotation vector in the place of `wxyz`: the axis times the angle in radians.",
+        examples=[[0.0, 3.1416, 0.0]],
     )
     approach: Vector3 | None = Field(
         None,
         description="Direction the tool's z axis should have; its length does not matter.",
         examples=[[0.0, 0.0, -1.0]],
     )
-    matrix: Annotated[list[Vector4], numbers(4)] | None = Field(
-        None, description="4×4 homogeneous transform, row by row; positions in metres, last row 0, 0, 0, 1."
+    matrix: Annotated[list[Vector4], Field(min_length=3, max_length=4, fail_fast=True)] | None = Field(
+        None,
+        description="4×4 homogeneous transform, row by row; positions in metres. The last row, 0, 0, 0, 1, may be "
+        "left out.",
+    )
+    text: Annotated[str, Field(max_length=LONGEST_LIST)] | None = Field(
+        None,
+        description="The target as it is typed, or as it stands on a maker's pendant or in its programs; besides "
+        "it only `form` and `frame` may be given.",
+        examples=["X 600 Y 100 Z 300 A 0 B 90 C 0"],
+    )
+    form: Annotated[str, OneOf(POSES)] | None = Field(
+        None,
+        description="How the numbers of `text` are meant: a notation in metres and radians, or a maker's in the "
+        "units of its pendants. By default what the text shows.",
     )
 
-    def resolve(self, task: Task | None, field: str) -> tuple[Task, Array]:
+    def resolve(self, task: Task | None, field: str, maker: str = "") -> tuple[Task, Array]:
         """The task it asks for, if none is given the one its form implies, and T_frame_tool ``(4, 4)``.
+
+        `maker`: of the arm, which decides what an ambiguous `text` means.
 
         Raises:
             ProblemError: 422 naming `field` and what is missing, contradicts, or is no rotation.
         """
         offer()
-        if task is None:
-            task = "approach" if self.approach is not None else "position" if self._is_point() else "pose"
-        usable = self.matrix is not None or (
-            self.position is not None
-            and (task == "position" or self.wxyz is not None or (task == "approach" and self.approach is not None))
-        )
-        if not usable:
-            fields = type(self).model_fields
-            given = [name for name in fields if name != "frame" and getattr(self, name) is not None]
-            raise _wrong(
-                field, f"only {', '.join(given)}" if given else "nothing", f"{FORMS[task]} for task {task}"
-            )
-        if self.approach is not None and (self.wxyz is not None or self.matrix is not None):
-            raise _wrong(f"{field}.approach", "an approach besides an orientation", "one of the two")
         try:
-            return task, self._transform(field)
+            if self.text is not None:
+                return self._typed(task, field, maker)
+            return self._task(task, field), self._transform(field)
         except InputError as error:
             prefix = "" if error.field.startswith(field) else f"{field}."
             raise invalid(from_input_error(error, prefix)) from None
 
-    @property
-    def form(self) -> tuple[bool, bool, bool, bool]:
-        """Which of position, wxyz, approach and matrix are given."""
-        return self.position is not None, self.wxyz is not None, self.approach is not None, self.matrix is not None
+    def _given(self) -> list[str]:
+        """The fields that say where the tool should be."""
+        return [name for name in type(self).model_fields if name != "frame" and getattr(self, name) is not None]
 
-    def _is_point(self) -> bool:
-        return self.position is not None and self.wxyz is None and self.matrix is None
+    def _typed(self, task: Task | None, field: str, maker: str) -> tuple[Task, Array]:
+        """The task and the pose of a text."""
+        others = [name for name in self._given() if name not in ("text", "form")]
+        if others:
+            raise InputError(f"{field}.{others[0]}", getattr(self, others[0]), "nothing besides `text` and `form`")
+        implied, T = text_target(self.text, self.form, field, maker)
+        if task is not None and (task, implied) in _TOO_LITTLE:
+            raise InputError(f"{field}.text", self.text, f"a whole pose for task {task}")
+        return task or implied, T
+
+    def _task(self, task: Task | None, field: str) -> Task:
+        """The task, by default the one that the fields imply; raises `InputError` for fields that do not fit."""
+        turned = [name for name in ORIENTATIONS if getattr(self, name) is not None]
+        if task is None:
+            is_point = self.position is not None and not turned and self.matrix is None
+            task = "approach" if self.approach is not None else "position" if is_point else "pose"
+        usable = self.matrix is not None or (
+            self.position is not None
+            and (task == "position" or bool(turned) or (task == "approach" and self.approach is not None))
+        )
+        if not usable:
+            given = self._given()
+            raise _wrong(
+                field, f"only {', '.join(given)}" if given else "nothing", f"{FORMS[task]} for task {task}"
+            )
+        if self.form is not None:
+            raise _wrong(f"{field}.form", self.form, "`text` as well, whose numbers it explains")
+        if len(turned) > 1:
+            raise _wrong(f"{field}.{turned[1]}", f"{turned[1]} besides {turned[0]}", "one of the two")
+        if self.approach is not None and (turned or self.matrix is not None):
+            raise _wrong(f"{field}.approach", "an approach besides an orientation", "one of the two")
+        return task
+
+    @property
+    def kind(self) -> tuple[bool, bool, bool, bool, bool]:
+        """Whether position, wxyz, approach, matrix, and one of the other fields are given."""
+        others = (self.xyzw, self.rpy, self.rotvec, self.text, self.form)
+        other = any(value is not None for value in others)
+        position, wxyz = self.position is not None, self.wxyz is not None
+        return position, wxyz, self.approach is not None, self.matrix is not None, other
+
+    def _rotation(self) -> tuple[str, Array] | None:
+        """The name of the orientation that is given, and its rotation ``(3, 3)``."""
+        for name in ORIENTATIONS:
+            if (values := getattr(self, name)) is not None:
+                return name, orientation(name, values)
+        return None
 
     def _transform(self, field: str) -> Array:
+        turned = self._rotation()
         if self.matrix is None:
             assert self.position is not None
             # These numbers have been checked: nothing is left to do for a point.
-            T = _IDENTITY.copy() if self.wxyz is None else pose_from_position_wxyz(self.position, self.wxyz)
+            T = _IDENTITY.copy()
             T[:3, 3] = self.position
-            if self.approach is not None:
+            if turned is not None:
+                T[:3, :3] = turned[1]
+            elif self.approach is not None:
                 T[:3, :3] = frame_from_approach(self.approach)
             return T
         # As it was sent, so that its digits tell how closely it can be met.
-        T = np.array(self.matrix)
-        error = read_pose(T, POSE, f"{field}.matrix", always=self.wxyz is not None)[1]
+        T = whole_matrix(self.matrix)
+        error = read_pose(T, POSE, f"{field}.matrix", always=turned is not None)[1]
         if self.position is not None and np.abs(T[:3, 3] - self.position).max() > AGREEMENT:
             raise _wrong(
                 f"{field}.position", str(self.position), "the position the matrix has, or only one of them"
             )
-        if self.wxyz is not None:
-            R = pose_from_position_wxyz([0.0, 0.0, 0.0], self.wxyz)[:3, :3]
+        if turned is not None:
+            name, R = turned
             if np.abs(T[:3, :3] - R).max() > max(AGREEMENT, 2.0 * error):
-                raise _wrong(f"{field}.wxyz", str(self.wxyz), "the rotation the matrix has, or only one of them")
+                given = str(getattr(self, name))
+                raise _wrong(f"{field}.{name}", given, "the rotation the matrix has, or only one of them")
         return T
 
 
@@ -146,10 +213,15 @@ def _placed(targets: list[Target], rotations: Array | None) -> Array | None:
     return T
 
 
+def _rotations(wxyz: Array) -> Array | None:
+    """The rotations of quaternions ``(k, 4)``; None if the length of one is far from 1."""
+    return None if far_from_unit(wxyz).any() else rotations_from_wxyz(wxyz)
+
+
 def _with_matrices(targets: list[Target]) -> Array | None:
     """The matrices of targets ``(k, 4, 4)`` as they were sent; None if one of them is not exactly a pose."""
     offer()
-    T = np.array([each.matrix for each in targets])
+    T = np.stack([whole_matrix(each.matrix or ()) for each in targets])
     errors = np.empty(len(T))
     straighten_many(T, FAR, np.empty_like(T), errors)
     return T if (errors >= 0.0).all() else None
@@ -157,22 +229,22 @@ def _with_matrices(targets: list[Target]) -> Array | None:
 
 # By the form of a target: the task it implies, the tasks it can have, and the poses of several.
 _TOGETHER: dict[tuple[bool, ...], tuple[Task, tuple[Task, ...], Callable[[list[Target]], Array | None]]] = {
-    (True, False, False, False): (
+    (True, False, False, False, False): (
         "position",
         ("position",),
         lambda targets: _placed(targets, np.broadcast_to(np.eye(3), (len(targets), 3, 3))),
     ),
-    (True, True, False, False): (
+    (True, True, False, False, False): (
         "pose",
         ("pose", "approach", "position"),
-        lambda targets: _placed(targets, rotations_from_wxyz(np.array([each.wxyz for each in targets]))),
+        lambda targets: _placed(targets, _rotations(np.array([each.wxyz for each in targets]))),
     ),
-    (True, False, True, False): (
+    (True, False, True, False, False): (
         "approach",
         ("approach", "position"),
         lambda targets: _placed(targets, frames_from_approaches(np.array([each.approach for each in targets]))),
     ),
-    (False, False, False, True): ("pose", ("pose", "approach", "position"), _with_matrices),
+    (False, False, False, True, False): ("pose", ("pose", "approach", "position"), _with_matrices),
 }
 
 
@@ -335,12 +407,12 @@ class OptionsBody(AvoidingBody, WorkpiecesBody):
 
         They are those of `resolve_all`. None for others, and if one of them is invalid.
         """
-        form = targets[0].form
-        if form not in _TOGETHER or self.constant_frames or self.keywords["mask"] is not None:
+        kind = targets[0].kind
+        if kind not in _TOGETHER or self.constant_frames or self.keywords["mask"] is not None:
             return None
-        implied, fits, poses = _TOGETHER[form]
+        implied, fits, poses = _TOGETHER[kind]
         task: Task = self.task or implied
-        if task not in fits or any(each.form != form or each.frame not in (None, WORLD) for each in targets):
+        if task not in fits or any(each.kind != kind or each.frame not in (None, WORLD) for each in targets):
             return None
         pieces = [poses(targets[k : k + _AT_ONCE]) for k in range(0, len(targets), _AT_ONCE)]
         found = [piece for piece in pieces if piece is not None]
@@ -348,7 +420,7 @@ class OptionsBody(AvoidingBody, WorkpiecesBody):
 
     def resolve(self, robot: Robot, target: Target, field: str, q: Array | None = None) -> Goal:
         """The target in the world frame; raises `ProblemError` naming `field`."""
-        task, T = self._in_its_frame(target, field)
+        task, T = self._in_its_frame(target, field, robot.maker)
         frame = target.frame or WORLD
         if frame == WORLD:
             return Goal(task, T, self.rounding(robot, frame, T) if self.constant_frames else 0.0)
@@ -357,13 +429,13 @@ class OptionsBody(AvoidingBody, WorkpiecesBody):
             T, own = read_pose(T, POSE, f"{field}.matrix", always=robot.n < 6)
         return Goal(task, T_world_frame @ T, own + self.rounding(robot, frame, T))
 
-    def _in_its_frame(self, target: Target, field: str) -> tuple[Task, Array]:
+    def _in_its_frame(self, target: Target, field: str, maker: str) -> tuple[Task, Array]:
         """The task, and the target's pose in its own frame.
 
         With a mask without rotations, a target may be a point alone.
         """
         mask = self.keywords["mask"]
         if mask is None:
-            return target.resolve(self.task, field)
-        _, T = target.resolve("pose" if any(mask[3:]) else "position", field)
+            return target.resolve(self.task, field, maker)
+        _, T = target.resolve("pose" if any(mask[3:]) else "position", field, maker)
         return self.task or "pose", T

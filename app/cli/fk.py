@@ -23,6 +23,7 @@ from app.shared.answers.fk import fk_answers
 from kin import InputError, Robot, fk, to_pendant
 from kin.axes import inverse
 from kin.frames import TOOL, WORLD
+from kin.poses import form_named
 from kin.readings.pendant import shown_limits
 from kin.transforms import Array, wxyz_from_rotation
 
@@ -41,7 +42,7 @@ def run(arguments: Namespace) -> int:
     if not arguments.q:
         raise InputError("q", "nothing", f"{robot.n} joint values, or --configurations FILE")
     q = configuration(robot, arguments.q, "q", units_of(arguments), arguments.pendant)
-    answer = fk_answers(robot, q[None], arguments.frames, arguments.frame, T)[0]
+    answer = fk_answers(robot, q[None], arguments.frames, arguments.frame, T, arguments.form)[0]
     if arguments.json:
         return print_json(answer)
     units = Notation(robot, arguments.rad)
@@ -59,12 +60,19 @@ def run(arguments: Namespace) -> int:
     print(f"{robot.name} ({robot.id})\n")
     print(table(["joint", "value", "limits", ""], rows))
     frames = [("tool", answer.pose)] + [(frame.name, frame.pose) for frame in answer.frames or ()]
+    if arguments.frame != WORLD:
+        print(f"\nin the frame {arguments.frame}:", end="")
+    if arguments.form is not None:
+        form = form_named(arguments.form, "--form")
+        texts = [(name, form.text(np.array(pose.matrix), units_of(arguments))) for name, pose in frames]
+        print()
+        for name, text in texts:
+            print(name, text, sep="\n" if "\n" in text else "  ")
+        return 0
     rows = [
         [name, *(units.length(x) for x in pose.position), *(f"{clean(w, 5)}" for w in pose.wxyz)]
         for name, pose in frames
     ]
-    if arguments.frame != WORLD:
-        print(f"\nin the frame {arguments.frame}:", end="")
     print("\n" + table(["frame", *(f"{axis} {units.of_length}" for axis in "xyz"), *"wxyz"], rows))
     return 0
 

@@ -23,15 +23,17 @@ from app.cli.terminal import (
     print_json,
     quantity,
     table,
+    typed_target,
     units_of,
 )
 from app.shared.answers.ik import Blocked, IkAnswer, Solution, add_pendant, ik_answer
 from app.shared.options import Option, declared
+from app.shared.targets import ORIENTATIONS, orientation
 from kin import IKOptions, InputError, Robot, Task
 from kin.frames import TOOL
 from kin.ik import solve
 from kin.ik.options import MASK_NAMES
-from kin.transforms import Array, frame_from_approach, pose_from_position_wxyz
+from kin.transforms import Array, frame_from_approach
 from kin.units import PLAIN, Unit, Units
 
 
@@ -44,11 +46,8 @@ def run(arguments: Namespace) -> int:
     for option in ("output", "format", "dask"):
         if getattr(arguments, option) is not None:
             raise InputError(f"--{option}", getattr(arguments, option), "--targets FILE as well")
-    wxyz = None if arguments.wxyz is None else _vector(arguments.wxyz, PLAIN, "--wxyz")
-    T = pose_from_position_wxyz(_vector(arguments.position, units.lengths, "--position"), wxyz)
-    if arguments.approach is not None:
-        T[:3, :3] = frame_from_approach(_vector(arguments.approach, PLAIN, "--approach"))
-    task = _task(arguments)
+    T, implied = _target(robot, arguments, units)
+    task = _task(arguments, implied)
     q_seed = (
         None
         if arguments.seed is None
@@ -67,15 +66,46 @@ def run(arguments: Namespace) -> int:
     else:
         print(result.explain(units).text + "\n")
         _print(answer, Notation(robot, arguments.rad))
-        if not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
+        if arguments.position and not arguments.rad and np.abs(T[:3, 3]).max() < 5e-3:
             print("note: --position is in millimetres; --rad makes it metres", file=sys.stderr)
     return 0 if answer.status == "solved" else 1
 
 
+def _turned(arguments: Namespace) -> str | None:
+    """The name of the orientation that was typed beside the position."""
+    return next((name for name in ORIENTATIONS if getattr(arguments, name) is not None), None)
+
+
+def _target(robot: Robot, arguments: Namespace, units: Units) -> tuple[Array, Task]:
+    """The typed target ``(4, 4)`` in its frame, and the task that it implies."""
+    turned = _turned(arguments)
+    if arguments.pose is not None:
+        if turned or arguments.approach is not None:
+            raise InputError("--pose", " ".join(arguments.pose), "no other orientation besides it")
+        return typed_target(arguments.pose, arguments.form, units, robot.maker, "--pose")
+    if arguments.form is not None:
+        raise InputError("--form", arguments.form, "--pose or --targets as well")
+    T = np.eye(4)
+    T[:3, 3] = _vector(arguments.position, units.lengths, "--position")
+    if arguments.approach is not None:
+        T[:3, :3] = frame_from_approach(_vector(arguments.approach, PLAIN, "--approach"))
+        return T, "approach"
+    if turned is None:
+        return T, "position"
+    unit = units.angles if turned in ("rpy", "rotvec") else PLAIN
+    values = _vector(getattr(arguments, turned), unit, f"--{turned}")
+    try:
+        T[:3, :3] = orientation(turned, values)
+    except InputError as error:
+        raise error.renamed(f"--{turned}") from None
+    return T, "pose"
+
+
 def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
     """Solve a file of targets, and say how many have an exact solution; 1 if one has none."""
-    if arguments.wxyz is not None or arguments.approach is not None:
-        raise InputError("--targets", arguments.targets, "no --wxyz or --approach: the file has the orientations")
+    turned = "approach" if arguments.approach is not None else _turned(arguments)
+    if turned is not None:
+        raise InputError("--targets", arguments.targets, f"no --{turned}: the file has the orientations")
     if arguments.frame == TOOL:
         raise InputError("--frame", TOOL, "a frame that does not move, together with --targets")
     if arguments.pendant:
@@ -192,19 +222,19 @@ def _solutions(units: Notation, listed: list[tuple[str, Solution]]) -> str:
     return table(head, rows)
 
 
-def _task(arguments: Namespace) -> Task:
-    """The task named by ``--task``, or implied by the target; "pose" with a mask."""
+def _task(arguments: Namespace, implied: Task) -> Task:
+    """The task named by ``--task``, or `implied` by the target; "pose" with a mask."""
     if arguments.mask:
         if arguments.task:
             raise InputError("--task", arguments.task, "no --task together with --mask")
-        if not arguments.wxyz and any(name.startswith("r") for name in arguments.mask):
-            raise InputError("--mask", " ".join(arguments.mask), "--wxyz as well as --position for rx, ry or rz")
+        if implied != "pose" and any(name.startswith("r") for name in arguments.mask):
+            expected = "an orientation such as --wxyz as well as --position for rx, ry or rz"
+            raise InputError("--mask", " ".join(arguments.mask), expected)
         return "pose"
-    implied: Task = "pose" if arguments.wxyz else "approach" if arguments.approach else "position"
     task: Task = arguments.task or implied
-    if task == "pose" and not arguments.wxyz:
-        raise InputError("--task", task, "--wxyz as well as --position for a pose")
-    if task == "approach" and not (arguments.approach or arguments.wxyz):
+    if task == "pose" and implied != "pose":
+        raise InputError("--task", task, "an orientation such as --wxyz as well as --position for a pose")
+    if task == "approach" and implied == "position":
         raise InputError("--task", task, "--approach or --wxyz as well as --position for an approach")
     return task
 

@@ -22,6 +22,7 @@ from kin import (
     KinematicsError,
     Obstacle,
     Robot,
+    Task,
     frame_pose,
     from_pendant,
     load_robot,
@@ -31,6 +32,7 @@ from kin import (
 from kin.collision.obstacles import checked_obstacles
 from kin.files.numbers import index_of
 from kin.frames import FRAMES
+from kin.poses import read_target
 from kin.transforms import Array
 from kin.typed import ReadError, read, valid
 from kin.units import Unit, Units
@@ -72,6 +74,14 @@ def pose_of(texts: list[str], field: str, units: Units) -> Array:
     """X, Y, Z, ROLL, PITCH, YAW as a transform ``(4, 4)``."""
     values = [quantity(text, units.of(k >= 3), field) for k, text in enumerate(texts)]
     return pose_from_xyz_rpy(values[:3], values[3:])
+
+
+def typed_target(texts: list[str], form: str | None, units: Units, maker: str, field: str) -> tuple[Array, Task]:
+    """A typed target ``(4, 4)`` and the task that it implies; raises `KinematicsError` with the field."""
+    try:
+        return read_target(" ".join(texts), form, units, maker)
+    except ReadError as error:
+        raise KinematicsError(f"{field}: {error.reason}") from None
 
 
 def joint_constraints(robot: Robot, arguments: Namespace) -> JointConstraints:

@@ -12,7 +12,7 @@ from kin.poses.quaternions import (
     rotation_from_wxyz,
 )
 from kin.poses.reading import FARTHEST, PoseKind, pose_from_text, read_pose, read_target, turned_to
-from kin.poses.rotations import ANGLES, DEFAULT, QUATERNIONS, RPY, Notation, Rotations, roll_pitch_yaw
+from kin.poses.rotations import ANGLES, DEFAULT, QUATERNIONS, RPY, VECTOR, Notation, Rotations, roll_pitch_yaw
 
 __all__ = [
     "ANGLES",
@@ -21,6 +21,7 @@ __all__ = [
     "FORMS",
     "QUATERNIONS",
     "RPY",
+    "VECTOR",
     "Notation",
     "PoseForm",
     "PoseKind",

@@ -129,7 +129,7 @@ _ROWS = (
     _plain("rotvec", "rotation vector", "rvx rvy rvz", rotations.VECTOR),
     _plain("zyz", "Euler Z-Y-Z", "alpha beta gamma", rotations.ZYZ),
     _plain("axis", "axis and angle", "kx ky kz theta", rotations.AXIS),
-    _Matrix("matrix", "matrix", (), rotations.WXYZ, None, "{} {} {} {}\n{} {} {} {}\n{} {} {} {}"),
+    _Matrix("matrix", "matrix", (), rotations.RPY, None, "{} {} {} {}\n{} {} {} {}\n{} {} {} {}"),
     PoseForm(
         "kuka",
         "KUKA",
@@ -156,7 +156,7 @@ _ROWS = (
         "abb",
         "ABB",
         ("q1", "q2", "q3", "q4"),
-        rotations.WXYZ,
+        rotations.ABB,
         PENDANT,
         "[[{}, {}, {}], [{}, {}, {}, {}]]",
         pattern=_ROBTARGET,

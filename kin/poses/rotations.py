@@ -187,6 +187,7 @@ ANGLES: Final = {
     "kawasaki": KAWASAKI,
 }
 WXYZ, XYZW = _quaternion("w x y z"), _quaternion("x y z w")
+ABB: Final = replace(WXYZ, names="q1 q2 q3 q4")
 QUATERNIONS: Final = {"wxyz": WXYZ, "xyzw": XYZW}
 
 

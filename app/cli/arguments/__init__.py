@@ -12,6 +12,10 @@ from app.shared.options import declared
 
 ROBOT_HELP = "id of the robot (`kinboard robots` lists them), or a robot file (*.toml, *.urdf)"
 XYZ = ("X", "Y", "Z")
+POSE_FORMS = (
+    *("wxyz", "xyzw", "rpy", "rotvec", "zyz", "axis", "matrix", "kuka", "fanuc", "abb", "ur", "polyscope"),
+    *("staubli", "yaskawa", "doosan", "kawasaki", "denso", "mitsubishi"),
+)
 
 
 def _command(
@@ -80,6 +84,7 @@ def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     )
     q = parser.add_argument("q", nargs="+", metavar="Q", help=f"joint values, {UNITS_NOTE}")
     q.required = False  # with nargs="*", argparse would take no values where options stand before them
+    _add_form(parser, "print poses in this form; with --configurations, the columns of a table")
     _add_rows(
         parser,
         "--configurations",
@@ -108,8 +113,8 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         parents.pendant,
         parents.joints,
         parents.frames,
-        usage="kinboard ik ROBOT (--position X Y Z [--wxyz W X Y Z | --approach X Y Z] | --targets FILE "
-        "[-o FILE]) [options]",
+        usage="kinboard ik ROBOT (--position X Y Z [--wxyz W X Y Z | --rpy ROLL PITCH YAW | --approach X Y Z] | "
+        "--pose TEXT [--form FORM] | --targets FILE [-o FILE]) [options]",
     )
     _add_target(parser)
     parser.add_argument(
@@ -133,6 +138,11 @@ def add_ik(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     return parser
 
 
+def _add_form(parser: argparse.ArgumentParser, about: str) -> None:
+    """The argument that names the form of poses."""
+    parser.add_argument("--form", choices=POSE_FORMS, help=f"{about}: a notation, or a maker's in its own units")
+
+
 def _add_dask(parser: argparse.ArgumentParser) -> None:
     """The argument of the commands whose work a cluster can do."""
     parser.add_argument(
@@ -147,6 +157,14 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
     """The arguments of ``ik`` that say what the tool has to match."""
     place = parser.add_mutually_exclusive_group(required=True)
     place.add_argument("--position", nargs=3, metavar=XYZ, help="millimetres (--rad: metres)")
+    place.add_argument(
+        "--pose",
+        nargs="+",
+        metavar="TEXT",
+        help="the target as it is typed in the page, or as it stands on a maker's pendant or in its programs: "
+        "x y z roll pitch yaw, p[x, y, z, rx, ry, rz], kuka X 600 Y 100 Z 300 A 0 B 90 C 0",
+    )
+    _add_form(parser, "how the numbers of --pose, or the columns of the table of --targets, are meant")
     _add_rows(
         parser,
         "--targets",
@@ -157,9 +175,18 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
         "continued by the same command",
         place,
     )
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="with --targets: end at the first row that is no target. By default it is answered with the status "
+        "invalid and the reason, as all others are answered",
+    )
     _add_dask(parser)
     turn = parser.add_mutually_exclusive_group()
     turn.add_argument("--wxyz", nargs=4, metavar=("W", *XYZ), help="orientation as a quaternion")
+    turn.add_argument("--xyzw", nargs=4, metavar=(*XYZ, "W"), help="the same, scalar last")
+    turn.add_argument("--rpy", nargs=3, metavar=("ROLL", "PITCH", "YAW"), help="Rz(yaw) Ry(pitch) Rx(roll)")
+    turn.add_argument("--rotvec", nargs=3, metavar=("RX", "RY", "RZ"), help="rotation vector: axis times angle")
     turn.add_argument("--approach", nargs=3, metavar=XYZ, help="direction of the tool's z axis")
     parser.add_argument(
         "--frame",

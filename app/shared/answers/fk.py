@@ -6,6 +6,7 @@ from app.shared.answers.answer import Answer
 from kin import Robot, fk, link_frames
 from kin.axes import inverse
 from kin.frames import WORLD
+from kin.poses import form_named
 from kin.transforms import Array, wxyz_from_rotation
 
 Matrix = list[list[float]]
@@ -41,6 +42,8 @@ class FkAnswer(Answer):
     """Pose of the tool."""
     in_limits: bool
     """Whether every joint is inside its limits. The pose is computed in either case."""
+    text: str | None
+    """The pose as a text in the requested `form`; null unless one was requested."""
     frames: list[Frame] | None
     """Frame after every DH row, base to tool, fixed rows included; null unless requested with `frames`."""
 
@@ -52,7 +55,12 @@ def poses(T: Array, frame: str) -> list[Pose]:
 
 
 def fk_answers(
-    robot: Robot, q: Array, frames: bool = False, frame: str = WORLD, T_world_frame: Array | None = None
+    robot: Robot,
+    q: Array,
+    frames: bool = False,
+    frame: str = WORLD,
+    T_world_frame: Array | None = None,
+    form: str | None = None,
 ) -> list[FkAnswer]:
     """Forward kinematics of configurations ``(k, n)`` in radians (metres).
 
@@ -60,18 +68,20 @@ def fk_answers(
         frames: whether to include the frame of each row.
         frame: name of the frame in which poses are answered.
         T_world_frame: its pose ``(4, 4)``; None: the world frame.
+        form: of `kin.pose_to_text`, in which tool poses are written as well; None: they are not.
     """
 
-    def framed(T: Array) -> list[Pose]:
-        return poses(T if T_world_frame is None else inverse(T_world_frame) @ T, frame)
+    def framed(T: Array) -> Array:
+        return T if T_world_frame is None else inverse(T_world_frame) @ T
 
-    tools = framed(fk(robot, q))
-    inside: list[bool] = robot.in_limits(q).tolist()
+    T = framed(fk(robot, q))
+    tools, inside = poses(T, frame), robot.in_limits(q).tolist()
+    texts = [None if form is None else form_named(form).text(each) for each in T]
     if not frames:
-        return [FkAnswer(pose, ok, None) for pose, ok in zip(tools, inside, strict=True)]
+        return [FkAnswer(*each, None) for each in zip(tools, inside, texts, strict=True)]
     names = [row.name for row in robot.rows]
-    flat = iter(framed(link_frames(robot, q).reshape(-1, 4, 4)))
+    flat = iter(poses(framed(link_frames(robot, q).reshape(-1, 4, 4)), frame))
     return [
-        FkAnswer(pose, ok, [Frame(name, next(flat)) for name in names])
-        for pose, ok in zip(tools, inside, strict=True)
+        FkAnswer(*each, [Frame(name, next(flat)) for name in names])
+        for each in zip(tools, inside, texts, strict=True)
     ]

@@ -307,7 +307,7 @@ def test_robots_lists_all_and_describes_one(capsys, client):
         (("fk", "pioneer5"), "5 joint values, or --configurations FILE"),
         (("ik", "pioneer5"), "--position"),
         (("ik", "pioneer5", "--position", 1, 2), "expected 3 arguments"),
-        (("ik", "pioneer5", "--position", 1, 2, 3, "--wxyz", 0, 0, 0, 0), "not zero"),
+        (("ik", "pioneer5", "--position", 1, 2, 3, "--wxyz", 0, 0, 0, 0), "this one is zero"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--approach", 0, 0, 0), "not zero"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--task", "pose"), "--wxyz"),
         (("ik", "pioneer5", "--position", 1, 2, 3, "--task", "approach"), "--approach"),

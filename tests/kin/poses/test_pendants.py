@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -103,6 +105,20 @@ def test_every_form_says_where_it_is_defined(key: str) -> None:
     form = FORMS[key]
     assert bool(form.maker) == bool(form.source)
     assert form.written.replace("{{", "").count("{}") == len(form.units_of(Units()))
+
+
+def test_the_documents_list_every_form() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "poses.md").read_text()
+    rows = re.findall(r"^\| `(\w+)` \| ([^|]*) \| ([^|]*) \| ([^|]*) \| ([^|]*) \|", page, re.MULTILINE)
+    assert [key for key, *_ in rows] == list(FORMS)
+    for key, title, names, definition, units in rows:
+        form = FORMS[key]
+        assert title == form.title
+        assert key == "matrix" or names == f"x y z and {form.rotation.names}"
+        assert key == "matrix" or definition.strip("`") in form.rotation.definition
+        assert bool(units) == (form.units is not None)
+        assert not units or units.split(", ")[0] == form.units_of(Units())[0].name
+        assert form.source in page
 
 
 def test_labels_of_several_makers_are_those_of_the_maker_or_asked_for() -> None:
