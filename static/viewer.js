@@ -96,6 +96,7 @@
       text: document.documentElement.dataset.kbText,
       embedded: mode,
       shown: query.get("shown") ?? "",
+      robot: query.get("robot") ?? "",
       zone: -new Date().getTimezoneOffset(),
       dark: matchMedia("(prefers-color-scheme: dark)").matches,
     };

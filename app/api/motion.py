@@ -22,6 +22,7 @@ from app.api.schemas import POST_REFUSALS, Configuration, example, settings_of
 from app.api.work import Deadline, computed
 from app.api.workspace.streaming import ComputedResponse
 from app.exports.motion import FORMATS
+from app.exports.motion_samples import with_joint_names
 from app.shared.answers.motion import MotionAnswer, motion_answer
 from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
@@ -61,6 +62,10 @@ EXAMPLES = {
 }
 
 
+JointName = Annotated[str, Field(min_length=1, max_length=100)]
+MOST_NAMES = 64
+
+
 class MotionRequest(AvoidingBody, WorkpiecesBody):
     """What the arm should do, and how the motion is answered."""
 
@@ -84,6 +89,12 @@ class MotionRequest(AvoidingBody, WorkpiecesBody):
     )
     rate: float = Field(
         100.0, ge=0.1, le=MOST_RATE, strict=True, allow_inf_nan=False, description="Samples per second."
+    )
+    joint_names: Annotated[list[JointName], Field(min_length=1, max_length=MOST_NAMES)] | None = Field(
+        None,
+        description="What a file calls the joints, from base to tool, such as the names of a ROS driver; by "
+        "default those of the arm.",
+        examples=[["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint"]],
     )
     samples: bool = Field(True, strict=True, description="json: whether to include samples of the motion.")
     format: Annotated[str, schemas.OneOf(FORMATS)] = Field(
@@ -173,6 +184,11 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
         _check_length(found.driven, body.rate)
     if body.format == "json" or not found.planned:
         return _whole(found, body, deadline)
+    if body.joint_names is not None:
+        try:
+            found = with_joint_names(found, body.joint_names, "joint_names")
+        except InputError as error:
+            raise invalid(from_input_error(error)) from None
     if body.format not in ("urscript", "python"):
         _check_format(body.format)
         return found

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from itertools import chain
 
 import numpy as np
 
-from app.cli.pipes.columns import POSE
+from app.cli.pipes.poses import PoseTable
 from app.cli.pipes.sink import Sink, form_of, opened_sink
 from app.cli.pipes.source import opened_source
 from app.cli.terminal import (
@@ -25,7 +26,7 @@ from kin.axes import inverse
 from kin.frames import TOOL, WORLD
 from kin.poses import form_named
 from kin.readings.pendant import shown_limits
-from kin.transforms import Array, wxyz_from_rotation
+from kin.transforms import Array
 
 
 def run(arguments: Namespace) -> int:
@@ -83,32 +84,34 @@ def _run_many(robot: Robot, arguments: Namespace, T_world_frame: Array | None) -
         raise InputError("q", arguments.q, "no joint values besides --configurations")
     if arguments.pendant:
         raise InputError("--pendant", "with --configurations", "joint values as arguments, or kin.from_pendant")
-    output = arguments.output or "-"
+    output, table = arguments.output or "-", PoseTable.named(arguments.form)
     with opened_source(arguments.configurations, "--configurations") as source:
         form = form_of(output, arguments.format, source.form)
         pieces = source.configurations(robot)
         first = next(pieces)  # what is wrong at once leaves no file
-        with opened_sink(output, form, [*POSE, "in_limits"]) as sink:
-            _put(sink, robot, first, arguments, T_world_frame)
-            for q in pieces:
-                _put(sink, robot, q, arguments, T_world_frame)
+        with opened_sink(output, form, [*table.names, "in_limits"]) as sink:
+            for q in chain([first], pieces):
+                _put(sink, robot, q, arguments, T_world_frame, table)
     return 0
 
 
-def _put(sink: Sink, robot: Robot, q: Array, arguments: Namespace, T_world_frame: Array | None) -> None:
+def _put(
+    sink: Sink, robot: Robot, q: Array, arguments: Namespace, T_world_frame: Array | None, table: PoseTable
+) -> None:
     """Write the poses for configurations ``(m, n)``; rows of NaN get none."""
     present = [not any(row) for row in np.isnan(q).tolist()]
     if sink.form == "ndjson":
-        found = iter(fk_answers(robot, q[present], arguments.frames, arguments.frame, T_world_frame))
-        sink.answers(next(found) if there else None for there in present)
+        found = fk_answers(robot, q[present], arguments.frames, arguments.frame, T_world_frame, arguments.form)
+        answers = iter(found)
+        sink.answers(next(answers) if there else None for there in present)
         return
     T = np.full((len(q), 4, 4), np.nan)
     T[present] = fk(robot, q[present]) if T_world_frame is None else inverse(T_world_frame) @ fk(robot, q[present])
     if sink.form == "npy":
         sink.array(T)
         return
-    numbers = np.full((len(q), 7), np.nan)
-    numbers[present, :3], numbers[present, 3:] = T[present, :3, 3], wxyz_from_rotation(T[present, :3, :3])
+    numbers = np.full((len(q), len(table.names)), np.nan)
+    numbers[present] = np.array(table.rows(T[present])).reshape(-1, len(table.names))
     inside = robot.in_limits(q)
     within = [bool(inside[i]) if there else "" for i, there in enumerate(present)]
     sink.rows([*row, each] for row, each in zip(numbers.tolist(), within, strict=True))

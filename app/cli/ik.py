@@ -12,6 +12,7 @@ import numpy as np
 
 from app.cli.arguments.options import flag_of
 from app.cli.pipes.ik import RowsQuestion, solve_rows
+from app.cli.pipes.poses import PoseTable
 from app.cli.targets import Question, solve_file
 from app.cli.terminal import (
     Notation,
@@ -35,6 +36,8 @@ from kin.ik import solve
 from kin.ik.options import MASK_NAMES
 from kin.transforms import Array, frame_from_approach
 from kin.units import PLAIN, Unit, Units
+
+_NUMBERED = "solution "  # begins the name of a posture that has only a number
 
 
 def run(arguments: Namespace) -> int:
@@ -120,17 +123,25 @@ def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
             raise InputError("--dask", arguments.dask, "--targets and --output as .npy, .csv or .parquet files")
         return _run_rows(robot, arguments, units, q_seed)
     options = _options(robot, arguments, units, "pose" if arguments.mask else arguments.task or "pose")
-    question = Question(robot, options, frame_of(robot, arguments, q_seed), q_seed)
+    table = PoseTable.named(arguments.form)
+    question = Question(robot, options, frame_of(robot, arguments, q_seed), q_seed, table, arguments.strict)
     try:
-        count, solved = solve_file(question, Path(arguments.targets), Path(arguments.output), arguments.dask)
+        count, solved, invalid = solve_file(
+            question, Path(arguments.targets), Path(arguments.output), arguments.dask
+        )
     except KeyboardInterrupt:
         print("kinboard: interrupted; the same command goes on from here", file=sys.stderr)
         return 130
     if arguments.json:
-        print_json({"targets": count, "solved": solved})
+        print_json({"targets": count, "solved": solved, "invalid": invalid})
     else:
-        print(f"{arguments.output}: {solved} of {count} targets have an exact solution")
+        print(f"{arguments.output}: {solved} of {count} targets have an exact solution{_invalid(invalid)}")
     return 0 if solved == count else 1
+
+
+def _invalid(count: int) -> str:
+    """How many rows are no targets, if there are any."""
+    return f"; {count} {'row is' if count == 1 else 'rows are'} no target (column reason)" if count else ""
 
 
 def _is_piped(arguments: Namespace) -> bool:
@@ -151,10 +162,13 @@ def _run_rows(robot: Robot, arguments: Namespace, units: Units, q_seed: Array | 
             raise InputError("--targets", TOOL, "frames that do not move")
         return frame_of(robot, arguments, q_seed, name)
 
-    question = RowsQuestion(robot, q_seed, cache(options), cache(frame))
-    count, solved = solve_rows(question, arguments.targets, arguments.output or "-", arguments.format)
+    table = PoseTable.named(arguments.form)
+    question = RowsQuestion(robot, q_seed, cache(options), cache(frame), table, arguments.strict)
+    count, solved, invalid = solve_rows(question, arguments.targets, arguments.output or "-", arguments.format)
     if arguments.output not in (None, "-"):
-        print(f"{arguments.output}: {solved} of {count} targets have an exact solution")
+        print(f"{arguments.output}: {solved} of {count} targets have an exact solution{_invalid(invalid)}")
+    elif invalid:
+        print(f"kinboard: of {count} targets{_invalid(invalid).removeprefix(';')}", file=sys.stderr)
     return 0 if solved == count else 1
 
 
@@ -197,6 +211,9 @@ def _print(answer: IkAnswer, units: Notation) -> None:
         listed.append(("nearest orientation", answer.nearest_orientation))
     if listed:
         print(_solutions(units, listed))
+    numbers = {solution.branch.removeprefix(_NUMBERED) for solution in answer.solutions}
+    if any(number.isdecimal() and int(number) > len(numbers) for number in numbers):
+        print("\nPostures have no names here: they are numbered among all of them, with those outside the limits.")
     for parameter in answer.redundancy:
         ranges = ", ".join(" … ".join(units.angle(x) for x in interval) for interval in parameter.intervals)
         print(f"\n{parameter.label} = {units.angle(parameter.value)}, possible: {ranges or 'nothing'}")

@@ -23,6 +23,7 @@ from app.cli.terminal import (
 )
 from app.exports.motion import FORMATS, MotionFormat
 from app.exports.motion_plot import motion_plot
+from app.exports.motion_samples import with_joint_names
 from app.exports.save import opened
 from app.shared.answers.motion import motion_answer
 from kin import InputError, Motion, Program, Robot, plan_motion, program_from_dict
@@ -66,6 +67,8 @@ def run(arguments: Namespace) -> int:
     elif not motion.planned:
         print(motion.reason, file=sys.stderr)
     driven = motion.driven if motion.planned or arguments.partial else None
+    if driven is not None and arguments.joint_names is not None:
+        driven = with_joint_names(driven, arguments.joint_names, "--joint-names")
     if driven is not None:
         _write_files(arguments, driven, kind, rate)
     return 0 if motion.planned else 1
@@ -96,11 +99,11 @@ def _run_many(robot: Robot, arguments: Namespace, rate: float | None) -> int:
         opened_source(arguments.programs, "--programs") as source,
         opened_sink(arguments.output or "-", "ndjson", ()) as sink,
     ):
-        for place, data in enumerate(source.objects()):
+        for place, data in source.objects():
             try:
                 motion = _planned(robot, program_from_dict(data, robot, workpieces), q_start, arguments)
             except InputError as error:
-                raise error.within(f"--programs[{place}]") from None
+                raise error.within(place) from None
             sink.answers([motion_answer(motion, rate)])
             refused = refused or not motion.planned
     return 1 if refused else 0

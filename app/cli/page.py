@@ -5,11 +5,11 @@ from __future__ import annotations
 from argparse import Namespace
 from pathlib import Path
 
-from app.cli.terminal import configuration, mounted_robot_of, pose_of, print_json, units_of
+from app.cli.terminal import configuration, mounted_robot_of, obstacles_of, pose_of, print_json, units_of
 from app.exports.save import opened
 from app.viewer.scene.bodies.drawing import drawing
 from app.viewer.takehome.page import SavedArm, web_page
-from kin import InputError, Robot, plan_motion
+from kin import IKOptions, InputError, Obstacle, Robot, plan_motion
 from kin.motion import Motion, parse_program
 from kin.transforms import Array
 
@@ -19,8 +19,11 @@ def run(arguments: Namespace) -> int:
     robot, units = mounted_robot_of(arguments), units_of(arguments)
     q = robot.q_home if arguments.q is None else configuration(robot, arguments.q, "--q", units)
     target = None if arguments.target is None else pose_of(arguments.target, "--target", units)
-    motion = None if arguments.program is None else _motion(robot, arguments.program, q)
-    page = web_page(SavedArm(robot, q, drawing(robot), target, motion=motion, units=units, link=arguments.link))
+    obstacles = obstacles_of(arguments)
+    motion = None if arguments.program is None else _motion(robot, arguments.program, q, obstacles)
+    options = IKOptions(obstacles=obstacles)
+    saved = SavedArm(robot, q, drawing(robot), target, options, motion, units, arguments.link, obstacles)
+    page = web_page(saved)
     file = arguments.output or f"{robot.id}.html"
     data = page.encode()
     try:
@@ -36,9 +39,9 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def _motion(robot: Robot, path: str, q_start: Array) -> Motion:
+def _motion(robot: Robot, path: str, q_start: Array, obstacles: tuple[Obstacle, ...]) -> Motion:
     try:
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError("--program", path, f"a program that can be read ({error})") from None
-    return plan_motion(robot, parse_program(text, robot), q_start)
+    return plan_motion(robot, parse_program(text, robot), q_start, obstacles=obstacles)

@@ -3,7 +3,7 @@
 Targets are read, solved and written in pieces, so memory does not grow with their number. ``FILE.part`` is written
 until all is done. A run that was interrupted leaves it there, with ``FILE.state`` beside it: how many targets are
 done, and of which question. The same command goes on from there; any other question begins anew. A Parquet file
-cannot be continued: its rows stand in ``FILE.part`` as plain records, and become a Parquet file in the end.
+cannot be continued: its rows stand in ``FILE.part`` as CSV, and become a Parquet file in the end.
 """
 
 from __future__ import annotations
@@ -20,33 +20,24 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.cli.pipes.columns import Columns
 from app.cli.pipes.parquet import arrow_with_parquet, opened_columns, rows_of
+from app.cli.pipes.poses import INVALID, Answers, Counted, PoseTable, Target, answered, target_of
 from app.exports.progress import progress_bar
 from app.shared.mapreduce import dask_client
 from app.shared.threads import processors
-from kin import IKOptions, InputError, Robot, Status, solve_ik_many
-from kin.transforms import pose_from_position_wxyz, rotations_from_wxyz
+from kin import IKOptions, InputError, Robot, Status
 
 Array = NDArray[np.float64]
 AT_ONCE = 4096  # targets of one piece
-COLUMNS = ["x", "y", "z", "qw", "qx", "qy", "qz"]
 _FIELD = "--targets"
-_FILES = "a .npy file of poses (k, 4, 4), or a .csv or .parquet file with the columns " + ", ".join(COLUMNS)
 _ENDINGS = (".npy", ".csv", ".parquet")
-_STATUSES = list(Status)
 _RETRIES = 3  # of a piece that failed on a worker of a cluster
-
-
-class Found(NamedTuple):
-    """The answers to some targets: ``(m, n)`` joint values, NaN where there is no exact solution, and statuses."""
-
-    q: Array
-    status: tuple[Status, ...]
 
 
 @dataclass(frozen=True)
@@ -56,23 +47,21 @@ class Question:
     Attributes:
         frame: the frame of the targets ``(4, 4)``, in that of the robot.
         q_seed: ``(n,)``, None for the home configuration.
+        table: the columns of targets in tables.
+        strict: whether the first row that is no target ends the run.
     """
 
     robot: Robot
     options: IKOptions
     frame: Array
     q_seed: Array | None
+    table: PoseTable
+    strict: bool
 
-    def answers(self, T: Array, first: int) -> Found:
-        """The answers to targets ``(m, 4, 4)``; an error names the target by its place in the file."""
-        try:
-            found = solve_ik_many(self.robot, self.frame @ T, options=self.options, q_seed=self.q_seed)
-            return Found(found.q, found.status)
-        except InputError as error:
-            place, _, rest = error.field.removeprefix("targets[").partition("]")
-            if not place.isdigit():
-                raise
-            raise error.renamed(f"{_FIELD}[{first + int(place)}]{rest}") from None
+    def answers(self, targets: list[Target]) -> Answers:
+        """The answers to some targets."""
+        placed = [each._replace(T=self.frame @ each.T) for each in targets]
+        return answered(self.robot, placed, self.options, self.q_seed, self.strict)
 
     def key(self, source: Path, output: Path) -> str:
         """A digest of the question, the file of targets and the kind of output."""
@@ -80,14 +69,15 @@ class Question:
         seed = None if self.q_seed is None else self.q_seed.tolist()
         asked = (robot.convention, robot.rows, robot.base, robot.tool, robot.home, self.options, seed)
         where = (self.frame.tolist(), str(source.resolve()), stat.st_size, stat.st_mtime_ns, output.suffix.lower())
-        return hashlib.sha256(repr((*asked, *where)).encode()).hexdigest()
+        read = (self.table.form.key, self.strict)
+        return hashlib.sha256(repr((*asked, *where, *read)).encode()).hexdigest()
 
 
-def solve_file(question: Question, source: Path, output: Path, dask: str | None = None) -> tuple[int, int]:
-    """Write the best solution of each target of `source` to `output`: (targets, how many are solved).
+def solve_file(question: Question, source: Path, output: Path, dask: str | None = None) -> Counted:
+    """Write the best solution of each target of `source` to `output`.
 
     A .npy file gets ``(k, n)`` joint values, NaN where there is no exact solution; a .csv or .parquet file a row
-    ``status, q1, …`` for each target. Radians and metres.
+    ``status, q1, …, reason`` for each target. Radians and metres.
 
     Args:
         dask: address of a Dask scheduler whose workers solve them; by default threads of this process do.
@@ -102,7 +92,7 @@ def solve_file(question: Question, source: Path, output: Path, dask: str | None 
     if output.suffix.lower() == ".parquet":
         arrow_with_parquet("--output", str(output))
     try:
-        total = _count(source)
+        total = _count(source, question.table)
         with _solvers(dask) as (pool, most):
             return _resumed(question, source, output, total, pool, most)
     except OSError as error:
@@ -121,13 +111,11 @@ def _solvers(dask: str | None) -> Iterator[tuple[Executor, int]]:
         yield client.get_executor(pure=False, retries=_RETRIES), sum(client.nthreads().values())
 
 
-def _resumed(
-    question: Question, source: Path, output: Path, total: int, pool: Executor, most: int
-) -> tuple[int, int]:
+def _resumed(question: Question, source: Path, output: Path, total: int, pool: Executor, most: int) -> Counted:
     """`solve_file` of this many targets, from where an earlier run has ended."""
     part, state = (output.with_name(output.name + end) for end in (".part", ".state"))
     key = question.key(source, output)
-    done, solved, size = _state(state, part, key)
+    (done, solved, invalid), size = _state(state, part, key)
     with (
         part.open("r+b" if done else "wb") as file,
         progress_bar(total, "targets", sys.stderr.isatty()) as advance,
@@ -140,8 +128,10 @@ def _resumed(
         for found in _answered(question, source, done, pool, most):
             file.write(_written(output, found))
             file.flush()
-            done, solved = done + len(found.q), solved + found.status.count(Status.SOLVED)
-            state.write_text(json.dumps({"key": key, "done": done, "solved": solved, "size": file.tell()}))
+            done += len(found.q)
+            solved, invalid = solved + found.status.count(Status.SOLVED), invalid + found.status.count(INVALID)
+            counts = {"done": done, "solved": solved, "invalid": invalid, "size": file.tell()}
+            state.write_text(json.dumps({"key": key, **counts}))
             advance(len(found.q))
     if output.suffix.lower() == ".parquet":
         _write_parquet(part, output, question.robot.n)
@@ -149,16 +139,15 @@ def _resumed(
     else:
         part.replace(output)
     state.unlink(missing_ok=True)
-    return done, solved
+    return Counted(done, solved, invalid)
 
 
-def _answered(question: Question, source: Path, first: int, pool: Executor, most: int) -> Iterator[Found]:
+def _answered(question: Question, source: Path, first: int, pool: Executor, most: int) -> Iterator[Answers]:
     """The answers to the targets from the first one on, piece by piece in order; `most` pieces at a time."""
-    waiting: deque[Future[Found]] = deque()
+    waiting: deque[Future[Answers]] = deque()
     try:
-        for T in _pieces(source, first):
-            waiting.append(pool.submit(question.answers, T, first))
-            first += len(T)
+        for targets in _pieces(source, first, question.table):
+            waiting.append(pool.submit(question.answers, targets))
             if len(waiting) > most:
                 yield waiting.popleft().result()
         while waiting:
@@ -168,55 +157,50 @@ def _answered(question: Question, source: Path, first: int, pool: Executor, most
             each.cancel()
 
 
-def _state(state: Path, part: Path, key: str) -> tuple[int, int, int]:
-    """What an earlier run of the same question left: (targets done, how many are solved, bytes), or zeros."""
+def _state(state: Path, part: Path, key: str) -> tuple[Counted, int]:
+    """What an earlier run of the same question left: how much is done, and bytes; zeros if there is nothing."""
     try:
         found = json.loads(state.read_text())
-        done, solved, size = int(found["done"]), int(found["solved"]), int(found["size"])
+        counted = Counted(int(found["done"]), int(found["solved"]), int(found["invalid"]))
+        size = int(found["size"])
     except (FileNotFoundError, ValueError, KeyError, TypeError):
-        return 0, 0, 0
+        return Counted(0, 0, 0), 0
     same = found["key"] == key and part.is_file() and part.stat().st_size >= size
-    return (done, solved, size) if same else (0, 0, 0)
+    return (counted, size) if same else (Counted(0, 0, 0), 0)
+
+
+def _columns(n: int) -> list[str]:
+    """The columns of the answers for an arm of n joints."""
+    return ["status", *(f"q{i + 1}" for i in range(n)), "reason"]
 
 
 def _heading(output: Path, total: int, n: int) -> bytes:
     """What stands before the rows of a file."""
-    if output.suffix.lower() == ".parquet":
-        return b""
-    if output.suffix.lower() == ".csv":
-        return ",".join(["status", *(f"q{i + 1}" for i in range(n))]).encode() + b"\n"
+    if output.suffix.lower() != ".npy":
+        return ",".join(_columns(n)).encode() + b"\n"
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (total, n)})
     return header.getvalue()
 
 
-def _written(output: Path, found: Found) -> bytes:
-    """The rows of some answers."""
+def _written(output: Path, found: Answers) -> bytes:
+    """The rows of some answers; those of a Parquet file are kept as CSV until all are there."""
     if output.suffix.lower() == ".npy":
         return found.q.astype("<f8").tobytes()
-    if output.suffix.lower() == ".parquet":
-        records = np.empty(len(found.q), _record(found.q.shape[1]))
-        records["status"], records["q"] = [_STATUSES.index(status) for status in found.status], found.q
-        return records.tobytes()
-    rows = [
-        ",".join([status.value, *("" if x != x else repr(x) for x in q)])
-        for status, q in zip(found.status, found.q.tolist(), strict=True)
-    ]
-    return ("\n".join(rows) + "\n").encode()
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    for status, q, reason in zip(found.status, found.q.tolist(), found.reason, strict=True):
+        rows.writerow([status, *("" if x != x else repr(x) for x in q), reason])
+    return text.getvalue().encode()
 
 
-def _count(source: Path) -> int:
+def _count(source: Path, table: PoseTable) -> int:
     """How many targets a file has."""
     if source.suffix.lower() == ".csv":
-        with source.open(newline="") as file:
-            lines = csv.reader(file)
-            head = next(lines, [])
-            if [name.strip() for name in head] != COLUMNS:
-                raise InputError(_FIELD, head, _FILES)
-            count = sum(1 for _ in lines)
+        count = sum(1 for _ in _lines(source, table))
     elif source.suffix.lower() == ".parquet":
-        with _opened(source) as table:
-            count = table.metadata.num_rows
+        with _opened(source, table) as opened:
+            count = opened.metadata.num_rows
     else:
         count = len(_poses(source))
     if not count:
@@ -224,86 +208,89 @@ def _count(source: Path) -> int:
     return count
 
 
+def _expected(table: PoseTable) -> str:
+    """What a file of targets may be."""
+    return "a .npy file of poses (k, 4, 4), or a .csv or .parquet file with the columns " + ", ".join(table.names)
+
+
 def _poses(source: Path) -> NDArray[Any]:
     """The poses ``(k, 4, 4)`` of a .npy file, read when they are used."""
     try:
         found: NDArray[Any] = np.load(source, mmap_mode="r", allow_pickle=False)
     except (ValueError, EOFError):
-        raise InputError(_FIELD, str(source), _FILES) from None
+        raise InputError(_FIELD, str(source), _expected(PoseTable())) from None
     if (
         not isinstance(found, np.ndarray)
         or found.ndim != 3
         or found.shape[1:] != (4, 4)
         or found.dtype.kind != "f"
     ):
-        raise InputError(_FIELD, str(source), _FILES)
+        raise InputError(_FIELD, str(source), _expected(PoseTable()))
     return found
 
 
-def _pieces(source: Path, first: int) -> Iterator[Array]:
-    """The targets ``(m, 4, 4)`` from the first one on, some at a time."""
+def _pieces(source: Path, first: int, table: PoseTable) -> Iterator[list[Target]]:
+    """The targets from the first one on, some at a time."""
     if source.suffix.lower() == ".parquet":
-        yield from _parquet_pieces(source, first)
+        yield from _parquet_pieces(source, first, table)
         return
     if source.suffix.lower() != ".csv":
         poses = _poses(source)
         for start in range(first, len(poses), AT_ONCE):
-            yield np.ascontiguousarray(poses[start : start + AT_ONCE], dtype=np.float64)
+            some = np.ascontiguousarray(poses[start : start + AT_ONCE], dtype=np.float64)
+            yield [Target(f"{_FIELD}[{start + i}]", T) for i, T in enumerate(some)]
         return
-    with source.open(newline="") as file:
-        rows = enumerate(itertools.islice(csv.reader(file), first + 1, None), first)
-        while some := list(itertools.islice(rows, AT_ONCE)):
-            yield np.stack([_pose(place, row) for place, row in some])
+    rows = itertools.islice(_lines(source, table), first, None)
+    while piece := list(itertools.islice(rows, AT_ONCE)):
+        yield [target_of(row, columns, table, place) for place, row, columns in piece]
 
 
-def _pose(place: int, row: list[str]) -> Array:
-    """One row of a .csv file as a pose ``(4, 4)``."""
-    try:
-        x, y, z, *wxyz = map(float, row)
-        return pose_from_position_wxyz([x, y, z], wxyz)
-    except (ValueError, InputError):
-        raise InputError(f"{_FIELD}[{place}]", ",".join(row), "seven numbers: " + ", ".join(COLUMNS)) from None
+def _lines(source: Path, table: PoseTable) -> Iterator[tuple[str, list[str], Columns]]:
+    """The rows of a .csv file with the place of each, without the heading and empty lines."""
+    with source.open(newline="", encoding="utf-8-sig", errors="replace") as file:
+        separator = Columns.separator(file.readline())
+        file.seek(0)
+        rows, columns = csv.reader(file, delimiter=separator), None
+        try:
+            for row in rows:
+                if columns is None:
+                    decimal = "." if separator == "," else ","
+                    columns = Columns.of(row, table.names, _FIELD, decimal)
+                    if columns.has_heading:
+                        continue
+                if row:
+                    yield f"{_FIELD} line {rows.line_num}", row, columns
+        except csv.Error as error:
+            raise InputError(f"{_FIELD} line {rows.line_num}", str(error), "a row of a CSV file") from None
 
 
 # -- Parquet ---------------------------------------------------------------------------------------------------
 
 
-def _opened(source: Path) -> AbstractContextManager[Any]:
+def _opened(source: Path, table: PoseTable) -> AbstractContextManager[Any]:
     """A Parquet file of targets, open."""
-    return opened_columns(source, COLUMNS, _FIELD, _FILES)
+    return opened_columns(source, table.names, _FIELD, _expected(table))
 
 
-def _parquet_pieces(source: Path, first: int) -> Iterator[Array]:
-    """The targets ``(m, 4, 4)`` of a Parquet file from the first one on."""
-    with _opened(source) as table:
-        for place, rows in rows_of(table, COLUMNS, AT_ONCE, _FIELD, _FILES, first):
-            yield _poses_of(rows, place)
-
-
-def _poses_of(rows: Array, place: int) -> Array:
-    """Rows ``(m, 7)`` as poses ``(m, 4, 4)``; `place` is that of the first in its file."""
-    rotations = rotations_from_wxyz(rows[:, 3:]) if np.isfinite(rows).all() else None
-    if rotations is None:
-        return np.stack([_pose(place + i, list(map(str, row))) for i, row in enumerate(rows.tolist())])
-    T = np.zeros((len(rows), 4, 4))
-    T[:, :3, :3], T[:, :3, 3], T[:, 3, 3] = rotations, rows[:, :3], 1.0
-    return T
-
-
-def _record(n: int) -> np.dtype[Any]:
-    """A row of ``FILE.part``: the place of its status among all, and joint values."""
-    return np.dtype([("status", "u1"), ("q", "<f8", (n,))])
+def _parquet_pieces(source: Path, first: int, table: PoseTable) -> Iterator[list[Target]]:
+    """The targets of a Parquet file from the first one on."""
+    with _opened(source, table) as opened:
+        for place, rows in rows_of(opened, table.names, AT_ONCE, _FIELD, _expected(table), first):
+            yield [table.target(row, f"{_FIELD}[{place + i}]") for i, row in enumerate(rows.tolist())]
 
 
 def _write_parquet(part: Path, output: Path, n: int) -> None:
     """The rows of ``FILE.part`` as a Parquet file; joint values are null where there is no exact solution."""
     arrow = arrow_with_parquet("--output", str(output))
-    names = ["status", *(f"q{i + 1}" for i in range(n))]
-    schema = arrow.schema([(name, arrow.float64() if name != "status" else arrow.string()) for name in names])
+    names = _columns(n)
+    kinds = [arrow.string(), *[arrow.float64()] * n, arrow.string()]
+    schema = arrow.schema(list(zip(names, kinds, strict=True)))
     new = output.with_name(output.name + ".new")
-    words = np.array([status.value for status in _STATUSES])
-    with part.open("rb") as file, arrow.parquet.ParquetWriter(new, schema) as writer:
-        while len(some := np.fromfile(file, _record(n), 16 * AT_ONCE)):
-            joints = [arrow.array(some["q"][:, i], from_pandas=True) for i in range(n)]
-            writer.write_table(arrow.table([arrow.array(words[some["status"]]), *joints], schema=schema))
+    with part.open(newline="", encoding="utf-8") as file, arrow.parquet.ParquetWriter(new, schema) as writer:
+        rows = itertools.islice(csv.reader(file), 1, None)
+        while some := list(itertools.islice(rows, 16 * AT_ONCE)):
+            status, *joints, reason = zip(*some, strict=True)
+            values = [arrow.array([float(x) if x else None for x in joint], arrow.float64()) for joint in joints]
+            columns = [arrow.array(status), *values, arrow.array(reason)]
+            writer.write_table(arrow.table(columns, schema=schema))
     new.replace(output)

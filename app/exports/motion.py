@@ -21,6 +21,8 @@ from kin.motion.details import BlendLeftOut, BlendShortened
 from kin.motion.program import Move, Segment
 from kin.transforms import Array, wxyz_from_rotation
 
+_UR = "Universal Robots"
+
 
 @dataclass(frozen=True)
 class MotionFormat:
@@ -106,9 +108,15 @@ def _urscript(motion: Motion, rate: float) -> Generator[bytes]:
         raise InputError("format", "urscript", "an arm with six revolute joints")
     if motion.start is not None:
         raise InputError("format", "urscript", "a motion that starts at rest, as those of URScript do")
+    if robot.maker and _UR not in robot.maker:
+        raise InputError("format", "urscript", f"an arm of {_UR}; the maker of {robot.name} is {robot.maker}")
     name = "".join(c if c.isascii() and c.isalnum() else "_" for c in motion.program.name or "program")[:60]
     lines = [f"def {name if name[0].isalpha() else f'p_{name}'}():"]
     lines += [f"  # {robot.id}: {motion.duration:.3f} s as planned; the controller plans speeds and blends anew."]
+    if not robot.maker:
+        lines += [
+            "  # No maker is stated: zeros and directions may not be those of a controller of Universal Robots."
+        ]
     lines += [f"  movej({_list(motion.q_start)})  # the start"]
     for times, segment in zip(motion.segments, motion.program.segments, strict=True):
         q, T = _target(motion, segment, times.end)

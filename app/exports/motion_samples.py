@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
+from dataclasses import replace
 
-from kin import Motion
+from kin import InputError, Motion
 from kin.robot import Joint
 from kin.transforms import Array
+
+
+def with_joint_names(motion: Motion, names: Sequence[str], field: str) -> Motion:
+    """The same motion with other names of its joints, such as those of a ROS driver; raises `InputError`."""
+    robot = motion.robot
+    if len(names) != robot.n or len({*names}) != robot.n or not all(map(str.strip, names)):
+        joints = ", ".join(joint.name for joint in robot.joints)
+        raise InputError(field, list(names), f"{robot.n} different names, one for each of: {joints}")
+    left = iter(names)
+    rows = tuple(replace(row, name=next(left)) if row.kind != "fixed" else row for row in robot.rows)
+    return replace(motion, robot=replace(robot, rows=rows, motors=()))
 
 
 def about(motion: Motion) -> list[tuple[str, str]]:

@@ -3,7 +3,7 @@
 One reader serves Python, REST, the command line and the page.
 """
 
-from kin.poses.forms import FORMS, PoseForm, form_named, pose_to_text
+from kin.poses.forms import FORMS, SI, PoseForm, form_named, pose_to_text
 from kin.poses.quaternions import (
     check_length,
     checked_wxyz,
@@ -21,6 +21,7 @@ __all__ = [
     "FORMS",
     "QUATERNIONS",
     "RPY",
+    "SI",
     "VECTOR",
     "Notation",
     "PoseForm",

@@ -6,6 +6,7 @@ where the range of each motor begins and ends in ticks, and nothing about the ze
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from collections.abc import Mapping
@@ -21,6 +22,7 @@ from kin.robot import Robot
 _FIELDS = ("id", "drive_mode", "homing_offset", "range_min", "range_max")
 _OLDER = {"motor_names", "calib_mode", "start_pos", "end_pos"}
 _MOST = 64  # motors
+_GRIPPER = "gripper"
 _LIMITS = Limits(100_000, 2000, 4)  # of a file
 
 
@@ -31,7 +33,8 @@ def motors_from_lerobot(
 
     A motor belongs to the joint of its name; capitals, spaces and ``_`` do not count. Otherwise it belongs to the
     joint named like its id. One without a joint, such as that of a gripper, moves nothing. If the arm already has
-    a motor of that name, it keeps its joint, sign, zero and unit.
+    a motor of that name, it keeps its joint, sign, zero and unit. The reading of a gripper is from 0 to 100 in any
+    case: LeRobot normalises it so whatever the unit of the others.
 
     Args:
         robot: the arm, or the id of a built-in one.
@@ -42,7 +45,8 @@ def motors_from_lerobot(
         The motors, in the order of the file.
 
     Raises:
-        InputError: no calibration of LeRobot's, or none of its motors is named like a joint.
+        InputError: no calibration of LeRobot's, none of its motors is named like a joint, or one that is named
+            like none while a joint has no motor.
 
     Examples:
         >>> import kin
@@ -61,17 +65,27 @@ def motors_from_lerobot(
         low, high = given.pop("range_min"), given.pop("range_max")
         given["range"] = (low, high)
         try:
-            if (motor := known.get(_plain(name))) is not None:
-                motors.append(replace(motor, name=name, **given))
-                continue
-            joint = joints.get(_plain(name)) or joints.get(str(given["id"]))
-            motors.append(Motor(joint.name if joint else "", name=name, unit=unit, **given))
+            motor = known.get(_plain(name))
+            if motor is None:
+                joint = joints.get(_plain(name)) or joints.get(str(given["id"]))
+                motor = Motor(joint.name if joint else "", given["id"], name, unit=unit, range=given["range"])
+            if not motor.joint and _plain(name) == _GRIPPER:
+                given["unit"] = "range_0_100"
+            motors.append(replace(motor, name=name, **given))
         except InputError as error:
             raise error.within(f"calibration.{name}") from None
     if not any(motor.joint for motor in motors):
         names = "one motor at least that is named like a joint: " + ", ".join(joint.name for joint in robot.joints)
         raise InputError("calibration", list(table), names)
     found = checked_motors(motors)
+    moved = {motor.joint for motor in motors}
+    missing = [joint.name for joint in robot.joints if joint.name not in moved]
+    for motor in motors:
+        if missing and not motor.joint and _plain(motor.name) != _GRIPPER:
+            near = difflib.get_close_matches(motor.name, missing, 1)
+            expected = f"the name of a joint that has no motor: {', '.join(missing)}"
+            meant = f"; perhaps {near[0]}" if near else ""
+            raise InputError(f"calibration.{motor.name}", motor.name, expected + meant)
     fit_joints(found, {joint.name: joint.kind == "prismatic" for joint in robot.joints})
     return found
 

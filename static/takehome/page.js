@@ -64,14 +64,79 @@
     return `${written(value, turns)}${unit === "°" ? "" : " "}${unit}`;
   }
 
-  // A typed number in the unit on screen, or null. Both minus signs, a comma for the point, and the unit itself are read.
+  // A typed number in radians or metres, or null: an expression such as pi/4, 2*45 or 90deg in the unit on screen, as
+  // in the full page. Both minus signs and a comma for the point are read; pi is in radians whatever the unit.
+  const PER = { "°": 180 / Math.PI, deg: 180 / Math.PI, rad: 1, mm: 1e3, cm: 1e2, m: 1, in: 1 / 0.0254 };
+  const TOKEN = /\s*(?:(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+(?:e[+-]?\d+)?)|(°|deg|rad|mm|cm|in|m|pi|π)|([-+*/^()]))/iy;
+
+  function tokensOf(text) {
+    const found = [];
+    TOKEN.lastIndex = 0;
+    while (TOKEN.lastIndex < text.length) {
+      const part = TOKEN.exec(text);
+      if (!part) return null;
+      found.push(part[1] ? Number(part[1]) : (part[2] ?? part[3]).toLowerCase());
+    }
+    return found;
+  }
+
+  // A value is [number, whether it has a unit]; what has none is in the unit on screen, once it meets one that has.
   function read(text, turns) {
-    const unit = unitOf(turns);
-    const bare = text.trim().replace(/^[\u2212\u2013]/, "-").replace(",", ".");
-    const number = (bare.endsWith(unit) ? bare.slice(0, -unit.length) : bare).trim();
-    if (!/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(number)) return null;
-    const value = Number(number) / scaleOf(turns);
-    return Number.isFinite(value) ? value : null;
+    const tokens = tokensOf(text.trim().slice(0, 100).replace(/[\u2212\u2013]/g, "-").replace(",", "."));
+    const units = turns ? ["°", "deg", "rad"] : ["mm", "cm", "m", "in"];
+    const measured = ([value, unit]) => (unit ? value : value / scaleOf(turns));
+    const next = (...wanted) => (wanted.includes(tokens[0]) ? tokens.shift() : null);
+    const fail = () => { throw new SyntaxError("no number"); };
+
+    function atom() {
+      const token = tokens.shift();
+      if (token === "(") { const value = sum(); return next(")") ? value : fail(); }
+      if (token === "pi" || token === "π") return [Math.PI, turns];
+      if (typeof token !== "number") return fail();
+      return next("pi", "π") ? [token * Math.PI, turns] : [token, false];
+    }
+    function power() {
+      const [value, unit] = atom();
+      if (!next("^")) return [value, unit];
+      const sign = next("-") ? -1 : 1;
+      const exponent = tokens.shift();
+      return unit || typeof exponent !== "number" ? fail() : [value ** (sign * exponent), false];
+    }
+    function signed() {
+      let sign = 1;
+      for (let mark = next("+", "-"); mark; mark = next("+", "-")) if (mark === "-") sign = -sign;
+      const [value, unit] = power();
+      const name = next(...units);
+      if (!name) return [sign * value, unit];
+      return unit && name !== "rad" ? fail() : [(sign * value) / PER[name], true];
+    }
+    function term() {
+      let [value, unit] = signed();
+      for (let mark = next("*", "/"); mark; mark = next("*", "/")) {
+        const [other, has] = signed();
+        if (has && (unit || mark === "/")) fail();
+        value = mark === "*" ? value * other : value / other;
+        unit ||= has;
+      }
+      return [value, unit];
+    }
+    function sum() {
+      let value = term();
+      for (let mark = next("+", "-"); mark; mark = next("+", "-")) {
+        let other = term();
+        if (value[1] || other[1]) { value = [measured(value), true]; other = [measured(other), true]; }
+        value = [value[0] + (mark === "+" ? other[0] : -other[0]), value[1]];
+      }
+      return value;
+    }
+    try {
+      if (!tokens?.length) return null;
+      const value = measured(sum());
+      return tokens.length || !Number.isFinite(value) ? null : value;
+    } catch (error) {
+      if (error instanceof SyntaxError) return null;
+      throw error;
+    }
   }
 
   // ---- The scene ----
@@ -270,6 +335,11 @@
     return made;
   }
 
+  // Sign of a key's step of one degree or millimetre, and how many.
+  const STEPS = {
+    ArrowLeft: [-1, 1], ArrowDown: [-1, 1], ArrowRight: [1, 1], ArrowUp: [1, 1], PageDown: [-1, 10], PageUp: [1, 10],
+  };
+
   const rows = robot.joints.map((joint, i) => {
     const slider = node("input", { type: "range", step: "any", min: joint.lower, max: joint.upper, "aria-label": joint.name });
     const field = node("input", { type: "text", inputmode: "decimal", autocomplete: "off", "aria-label": `${joint.name}, exact value` });
@@ -280,6 +350,15 @@
     row.style.setProperty("--of", `rgb(${joint.color})`);
     find("#joints").append(row);
     slider.addEventListener("input", () => { pause(); move(i, clamp(Number(slider.value), joint.lower, joint.upper)); });
+    // Without this the keys of a slider move it by a hundredth of its range.
+    slider.addEventListener("keydown", (event) => {
+      const [sign, far] = STEPS[event.key] ?? [0, 1];
+      if (!sign || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      const step = (joint.turns ? Math.PI / 180 : 0.001) * far * (event.shiftKey ? 0.1 : 1);
+      pause();
+      move(i, clamp(state.q[i] + sign * step, joint.lower, joint.upper));
+    });
     const typed = () => {
       const value = read(field.value, joint.turns);
       const [low, high] = [joint.lower, joint.upper].map((limit) => withUnit(limit, joint.turns));

@@ -20,6 +20,14 @@ pytestmark = pytest.mark.browser
 SCHOOL, STRANGER = "school.localhost", "stranger.localhost"  # browsers take both for this machine
 
 
+# The texts of marks of one slider that lie on each other.
+OVERLAPPING = """[...document.querySelectorAll(".mantine-Slider-root")].flatMap((slider) => {
+  const marks = [...slider.querySelectorAll(".mantine-Slider-markLabel")].filter((mark) => mark.offsetParent);
+  const [a, b] = [marks[0], marks.at(-1)].map((mark) => mark?.getBoundingClientRect());
+  return marks.length > 1 && a.right > b.left ? [marks.map((mark) => mark.textContent).join(" ")] : [];
+})"""
+
+
 @pytest.fixture(scope="module")
 def outer(address: str) -> Iterator[int]:
     """The port of a site whose pages have a frame: ``/?embed=panel`` shows the viewer in that mode."""
@@ -67,6 +75,15 @@ def test_a_listed_site_embeds_the_viewer(page: Page, outer: int) -> None:
     entry.last.press("Enter")
     expect(frame.locator("[data-status]")).to_contain_text("Joints moved by hand")
     expect(whole).to_have_attribute("href", re.compile(r"/viewer/#s=[\w-]+$"))  # once the arm rests
+
+
+def test_a_small_frame_opens_with_the_arm_of_its_address_and_no_marks_overlap(page: Page, address: str) -> None:
+    page.set_viewport_size({"width": 900, "height": 480})
+    page.goto(f"{address}viewer/?embed=panel&robot=ur5")
+    expect(page.get_by_text("2 shoulder", exact=True)).to_be_visible()
+    expect(page.locator("[data-status]")).to_be_visible()
+    overlapping = page.evaluate(OVERLAPPING)
+    assert overlapping == []
 
 
 @pytest.mark.full

@@ -248,6 +248,13 @@ def add_move(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         help="format of the file (default: by the ending of its name)",
     )
     parser.add_argument(
+        "--joint-names",
+        nargs="+",
+        metavar="NAME",
+        help="with -o: what the file calls the joints, such as the names of a ROS driver (default: those of "
+        "the arm)",
+    )
+    parser.add_argument(
         "--partial",
         action="store_true",
         help="if the program cannot be driven, write its beginning that can; the exit code stays 1",
@@ -307,6 +314,7 @@ def add_page(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     )
     parser.add_argument("--program", metavar="FILE", help="program to play (TOML), with its own units")
     parser.add_argument("--link", metavar="URL", default="", help="address of the full page, which the file names")
+    add_options(parser, ["obstacles"])
     return parser
 
 

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 from kin import InputError
 
-POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
-
 
 @dataclass(frozen=True)
 class Columns:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.cli.pipes.poses import INVALID, NOTHING, Counted, PoseTable, Target, Wrong, answered
 from app.cli.pipes.sink import Sink, form_of, opened_sink
 from app.cli.pipes.source import Goal, opened_source
 from app.shared.answers.ik import IkAnswer, ik_answer
-from kin import IKOptions, InputError, Robot, Status, Task, solve_ik_many
+from kin import IKOptions, InputError, Robot, Status, Task
 from kin.ik import solve
 from kin.ik.problem import read_pose
 from kin.solvers.contract import POSE
@@ -31,83 +33,80 @@ class RowsQuestion:
         q_seed: ``(n,)``, None for the home configuration.
         options: of a task that targets imply, with so many solutions where nothing else was typed; None for all.
         frame: T_world_frame ``(4, 4)`` of a name; None for that of ``--frame``.
+        table: the columns of targets in tables.
+        strict: whether the first row that is no target ends the run.
     """
 
     robot: Robot
     q_seed: Array | None
     options: Callable[[Task, int | None], IKOptions]
     frame: Callable[[str | None], Array]
+    table: PoseTable
+    strict: bool
 
-    def best(self, goals: list[Goal], first: int) -> Iterator[Row]:
-        """Status and best solution of each target; the first one has this place among all."""
+    def best(self, goals: list[Goal]) -> Iterator[tuple[str, Array, str]]:
+        """Status, best solution ``(n,)`` and reason of each target."""
         for task, group in groupby(goals, lambda goal: goal.task):
-            some = list(group)
-            T = np.stack([self._placed(goal, first + i)[0] for i, goal in enumerate(some)])
-            try:
-                found = solve_ik_many(self.robot, T, options=self.options(task, 1), q_seed=self.q_seed)
-            except InputError as error:
-                place, _, rest = error.field.removeprefix("targets[").partition("]")
-                if not place.isdigit():
-                    raise
-                raise error.renamed(f"{_FIELD}[{first + int(place)}]{rest}") from None
-            yield from map(Row, found.status, found.q)
-            first += len(some)
+            targets = [Target(goal.place, *self._placed(goal)[::2]) for goal in group]
+            found = answered(self.robot, targets, self.options(task, 1), self.q_seed, self.strict)
+            yield from zip(found.status, found.q, found.reason, strict=True)
 
-    def answers(self, goals: list[Goal], first: int) -> Iterator[IkAnswer]:
-        """The answers that REST gives to the targets."""
-        for place, goal in enumerate(goals, first):
-            T, rounding = self._placed(goal, place)
-            try:
-                yield ik_answer(solve(self.robot, T, self.options(goal.task, None), self.q_seed, rounding))
-            except InputError as error:
-                if not error.field.startswith("target"):
-                    raise
-                raise error.renamed(f"{_FIELD}[{place}]") from None
+    def answers(self, goals: list[Goal]) -> Iterator[IkAnswer | dict[str, Any]]:
+        """The answers that REST gives to the targets; of a row that is none, status and reason."""
+        for goal in goals:
+            T, rounding, wrong = self._placed(goal)
+            if wrong is None:
+                try:
+                    yield ik_answer(solve(self.robot, T, self.options(goal.task, None), self.q_seed, rounding))
+                    continue
+                except InputError as error:
+                    if not error.field.startswith("target"):
+                        raise
+                    wrong = Wrong.of(error.renamed(f"{goal.place}{error.field.removeprefix('target')}"))
+            if self.strict:
+                raise wrong.error()
+            yield {"status": INVALID, "reason": str(wrong.error()), "solutions": []}
 
-    def _placed(self, goal: Goal, place: int) -> tuple[Array, float]:
-        """The target in the world frame, and how rounded it is besides the entries that it has there."""
-        frame = self.frame(goal.frame)
-        if np.array_equal(frame, _WORLD):
-            return goal.T, 0.0
-        T, rounding = read_pose(goal.T, POSE, f"{_FIELD}[{place}]", always=self.robot.n < 6)
-        return frame @ T, rounding
-
-
-class Row(NamedTuple):
-    """The best solution ``(n,)`` of a target, NaN where there is none."""
-
-    status: Status
-    q: Array
+    def _placed(self, goal: Goal) -> tuple[Array, float, Wrong | None]:
+        """The target in the world frame, how rounded it is besides its entries there, and what is wrong."""
+        try:
+            frame = self.frame(goal.frame)
+            if goal.wrong is not None or np.array_equal(frame, _WORLD):
+                return goal.T, 0.0, goal.wrong
+            T, rounding = read_pose(goal.T, POSE, goal.place, always=self.robot.n < 6)
+        except InputError as error:
+            return NOTHING, 0.0, Wrong.of(error)
+        return frame @ T, rounding, None
 
 
-def solve_rows(question: RowsQuestion, source: str, output: str, form: str | None) -> tuple[int, int]:
-    """Write the answer to each target of a file or of standard input: (targets, how many are solved).
+def solve_rows(question: RowsQuestion, source: str, output: str, form: str | None) -> Counted:
+    """Write the answer to each target of a file or of standard input.
 
     Raises:
-        InputError: a row that is no target, or a file that cannot be read or written.
+        InputError: a file that cannot be read or written; with `strict`, a row that is no target.
     """
-    done = solved = 0
-    heading = ["status", *(f"q{i + 1}" for i in range(question.robot.n))]
+    counts = Counter[str]()
+    question.frame(None)  # an unknown --frame is wrong for all
+    heading = ["status", *(f"q{i + 1}" for i in range(question.robot.n)), "reason"]
     with opened_source(source, _FIELD) as opened:
-        pieces = opened.goals()
+        pieces = opened.goals(question.table, question.robot.maker)
         some = next(pieces)  # what is wrong at once leaves no file
         with opened_sink(output, form_of(output, form, opened.form), heading) as sink:
             while some:
-                solved += _put(sink, question, some, done)
-                done += len(some)
+                counts += Counter(_put(sink, question, some))
                 some = next(pieces, [])
-    return done, solved
+    return Counted(counts.total(), counts[Status.SOLVED], counts[INVALID])
 
 
-def _put(sink: Sink, question: RowsQuestion, goals: list[Goal], first: int) -> int:
-    """Write the answers to some targets; returns how many are solved."""
+def _put(sink: Sink, question: RowsQuestion, goals: list[Goal]) -> list[str]:
+    """Write the answers to some targets; returns their statuses."""
     if sink.form == "ndjson":
-        answers = list(question.answers(goals, first))
+        answers = list(question.answers(goals))
         sink.answers(answers)
-        return sum(answer.status == "solved" for answer in answers)
-    rows = list(question.best(goals, first))
+        return [each["status"] if isinstance(each, dict) else each.status for each in answers]
+    rows = list(question.best(goals))
     if sink.form == "npy":
-        sink.array(np.stack([row.q for row in rows]))
+        sink.array(np.stack([q for _, q, _ in rows]))
     else:
-        sink.rows([row.status.value, *row.q.tolist()] for row in rows)
-    return sum(row.status is Status.SOLVED for row in rows)
+        sink.rows([status, *q.tolist(), reason] for status, q, reason in rows)
+    return [status for status, _, _ in rows]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -34,8 +36,9 @@ class Sink:
 
     def rows(self, rows: Iterable[Iterable[object]]) -> None:
         """Write cells; not-a-number is an empty one."""
-        lines = (",".join(map(_cell, row)) for row in rows)
-        self._write("".join(f"{line}\n" for line in lines).encode())
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows(map(_cell, row) for row in rows)
+        self._write(text.getvalue().encode())
 
     def array(self, part: NDArray[np.float64]) -> None:
         """Keep a part of the array, whose first axis counts the rows."""

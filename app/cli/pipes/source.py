@@ -9,18 +9,20 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.cli.pipes.columns import POSE, Columns
+from app.cli.pipes.columns import Columns
 from app.cli.pipes.parquet import MAGIC, opened_columns, rows_of
+from app.cli.pipes.poses import NOTHING, PoseTable, Wrong
+from app.shared.targets import FIELDS, ORIENTATIONS, orientation, text_target, whole_matrix
 from kin import InputError, Robot, Task
 from kin.ik.problem import read_pose
 from kin.solvers import contract
@@ -31,24 +33,26 @@ Form = Literal["csv", "npy", "ndjson"]
 AT_ONCE = 4096  # rows of one piece
 LONGEST_LINE = 1 << 20
 _CHUNK = 1 << 16
-_UNIT = 0.1  # by how much a quaternion's length may differ from 1: further away, one of its numbers is wrong
 _NUMPY = b"\x93NUMPY"
 _EXAMPLE = '{"position": [0.4, 0.1, 0.3], "wxyz": [0, 1, 0, 0]}'
-_GIVEN = ("position", "wxyz", "approach", "matrix", "frame")
 
 
 class Goal(NamedTuple):
     """One target.
 
     Attributes:
+        place: of the row, for a message: ``--targets line 3``.
         task: what its form implies, "pose" for tables and arrays.
         T: in its frame ``(4, 4)``, as it was sent: its digits tell how closely it can be met.
         frame: name of its frame; None: that of ``--frame``.
+        wrong: what is wrong with the row, None for a target.
     """
 
+    place: str
     task: Task
     T: Array
     frame: str | None = None
+    wrong: Wrong | None = None
 
 
 class Source:
@@ -84,48 +88,47 @@ class Source:
             for q in self._arrays((robot.n,), f"an array of configurations (k, {robot.n})"):
                 wrong = ~np.isfinite(q).all(axis=1) & ~np.isnan(q).all(axis=1)
                 for i in np.flatnonzero(wrong).tolist():
-                    self._q(robot, q[i].tolist(), done + i)
+                    self._q(robot, q[i].tolist(), f"{self.field}[{done + i}]")
                 done += len(q)
                 yield q
         elif self.form == "csv":
-            for first, rows in self._table(names):
-                yield np.array([self._q(robot, row, first + i) for i, row in enumerate(rows)])
+            for rows in self._table(names):
+                yield np.array([self._q(robot, numbers(), place) for place, numbers in rows])
         else:
-            for first, lines in self._lines():
-                yield np.array(
-                    [self._q(robot, self._json(each, first + i), first + i) for i, each in enumerate(lines)]
-                )
+            for lines in self._lines():
+                yield np.array([self._q(robot, self._json(line, place), place) for place, line in lines])
 
-    def goals(self) -> Iterator[list[Goal]]:
-        """Targets, piece by piece.
+    def goals(self, table: PoseTable, maker: str = "") -> Iterator[list[Goal]]:
+        """Targets, piece by piece; a row that is none says what is wrong with it.
 
-        A table has the columns `POSE` among others, or nothing but these numbers in each row. A JSON line is a
+        A table has the columns of `table` among others, or nothing but these numbers in each row. A JSON line is a
         target of REST, or an answer with a `pose`.
+
+        Args:
+            maker: of the arm, which decides what a `text` with letters of several makers means.
         """
         if self.form == "npy":
-            for T in self._arrays((4, 4), "an array of poses (k, 4, 4)"):
-                yield [Goal("pose", each) for each in T]
+            done = 0
+            for poses in self._arrays((4, 4), "an array of poses (k, 4, 4)"):
+                yield [Goal(f"{self.field}[{done + i}]", "pose", T) for i, T in enumerate(poses)]
+                done += len(poses)
         elif self.form == "csv":
-            for first, rows in self._table(POSE):
-                yield [Goal("pose", pose_of(row, f"{self.field}[{first + i}]")) for i, row in enumerate(rows)]
+            for rows in self._table(table.names):
+                yield [_goal(place, partial(_row, table, place, numbers)) for place, numbers in rows]
         else:
-            for first, lines in self._lines():
-                yield [
-                    self._goal(self._json(each, first + i), f"{self.field}[{first + i}]")
-                    for i, each in enumerate(lines)
-                ]
+            for lines in self._lines():
+                yield [_goal(place, partial(self._line, place, line, maker)) for place, line in lines]
 
-    def objects(self) -> Iterator[dict[str, Any]]:
-        """The objects of JSON lines, one by one."""
-        for first, lines in self._lines():
-            for i, line in enumerate(lines):
-                found = self._json(line, first + i)
+    def objects(self) -> Iterator[tuple[str, dict[str, Any]]]:
+        """The objects of JSON lines, one by one, each with its place."""
+        for lines in self._lines():
+            for place, line in lines:
+                found = self._json(line, place)
                 if not isinstance(found, dict):
-                    raise InputError(f"{self.field}[{first + i}]", found, "an object in braces")
-                yield found
+                    raise InputError(place, found, "an object in braces")
+                yield place, found
 
-    def _q(self, robot: Robot, values: object, place: int) -> Array:
-        field = f"{self.field}[{place}]"
+    def _q(self, robot: Robot, values: object, field: str) -> Array:
         if isinstance(values, dict):
             solutions = values.get("solutions", [values])
             if solutions == []:
@@ -138,60 +141,80 @@ class Source:
             return np.full(robot.n, np.nan)
         return robot.check_q(values, field)
 
-    def _goal(self, data: object, field: str) -> Goal:
+    def _line(self, place: str, line: str, maker: str) -> Goal:
+        return self._goal(self._json(line, place), place, maker)
+
+    def _goal(self, data: object, field: str, maker: str) -> Goal:
         if isinstance(data, dict) and isinstance(data.get("pose"), dict):
             data = data["pose"]
         if not isinstance(data, dict):
             raise InputError(field, data, f"a target such as {_EXAMPLE}")
         given = {name: value for name, value in data.items() if value is not None}
         for name in given:
-            if name not in _GIVEN:
-                raise InputError(f"{field}.{name}", given[name], "only the fields " + ", ".join(_GIVEN))
-        frame = given.get("frame")
+            if name not in FIELDS:
+                raise InputError(f"{field}.{name}", given[name], "only the fields " + ", ".join(FIELDS))
+        frame = given.pop("frame", None)
         if frame is not None and not isinstance(frame, str):
             raise InputError(f"{field}.frame", frame, "the name of a frame")
         if "matrix" in given:
-            read_pose(given["matrix"], contract.POSE, f"{field}.matrix")
-            return Goal("pose", np.array(given["matrix"], dtype=np.float64), frame)
-        if "position" not in given or ("wxyz" in given and "approach" in given):
-            raise InputError(field, sorted(given), "position, with wxyz, approach or neither; or matrix")
+            T = whole_matrix(given["matrix"])
+            read_pose(T, contract.POSE, f"{field}.matrix")
+            return Goal(field, "pose", T, frame)
+        if "text" in given and not set(given) - {"text", "form"}:
+            return Goal(field, *text_target(given["text"], given.get("form"), field, maker), frame)
+        turned = [name for name in (*ORIENTATIONS, "approach") if name in given]
+        if "position" not in given or len(given) > 1 + len(turned) or len(turned) > 1:
+            expected = f"position, with one of {', '.join(ORIENTATIONS)}, approach or none; or matrix; or text"
+            raise InputError(field, sorted(given), expected)
         try:
-            T = pose_from_position_wxyz(given["position"], given.get("wxyz"))
-            if "approach" in given:
-                T[:3, :3] = frame_from_approach(given["approach"])
+            T = pose_from_position_wxyz(given["position"])
+            if turned:
+                name, values = turned[0], given[turned[0]]
+                T[:3, :3] = frame_from_approach(values) if name == "approach" else orientation(name, values)
         except InputError as error:
             raise error.within(field) from None
-        task: Task = "pose" if "wxyz" in given else "approach" if "approach" in given else "position"
-        return Goal(task, T, frame)
+        task: Task = "position" if not turned else "approach" if turned == ["approach"] else "pose"
+        return Goal(field, task, T, frame)
 
-    def _json(self, line: str, place: int) -> object:
+    def _json(self, line: str, field: str) -> object:
         try:
             return json.loads(line)
         except (ValueError, RecursionError) as error:
-            raise InputError(f"{self.field}[{place}]", line, f"a line of JSON ({error})") from None
+            raise InputError(field, line, f"a line of JSON ({error})") from None
 
-    def _table(self, names: tuple[str, ...] | list[str]) -> Iterator[tuple[int, list[list[float]]]]:
-        """The named numbers of each row, and the place of the first row."""
+    def _table(self, names: Sequence[str]) -> Iterator[list[tuple[str, Callable[[], list[float]]]]]:
+        """The place of each row, and what reads its named numbers or raises `InputError`."""
         if self._first.startswith(MAGIC):
-            yield from self._parquet(names)
+            for first, rows in self._parquet(names):
+                yield [(f"{self.field}[{first + i}]", partial(list, row)) for i, row in enumerate(rows)]
             return
         columns: Columns | None = None
         done, separator = 0, ","
-        for _, lines in self._lines():
+        for lines in self._lines():
             if columns is None:
-                separator = Columns.separator(lines[0])
-            rows = list(csv.reader(lines, delimiter=separator))
+                separator = Columns.separator(lines[0][1])
+            cells = list(self._cells(lines, separator))
             if columns is None:
-                columns = Columns.of(rows[0], names, self.field, "." if separator == "," else ",")
-                rows = rows[columns.has_heading :]
-            some = [columns.numbers(row, f"{self.field}[{done + i}]") for i, row in enumerate(rows)]
+                columns = Columns.of(cells[0], names, self.field, "." if separator == "," else ",")
+                lines, cells = lines[columns.has_heading :], cells[columns.has_heading :]
+            some: list[tuple[str, Callable[[], list[float]]]] = [
+                (place, partial(columns.numbers, row, place)) for (place, _), row in zip(lines, cells, strict=True)
+            ]
             if some:
-                yield done, some
+                yield some
             done += len(some)
         if not done:
             raise InputError(self.field, "a heading alone", "at least one row")
 
-    def _parquet(self, names: tuple[str, ...] | list[str]) -> Iterator[tuple[int, list[list[float]]]]:
+    def _cells(self, lines: list[tuple[str, str]], separator: str) -> Iterator[list[str]]:
+        """The cells of each line."""
+        for place, line in lines:
+            try:
+                yield next(csv.reader([line], delimiter=separator))
+            except csv.Error as error:
+                raise InputError(place, str(error), "a row of a table") from None
+
+    def _parquet(self, names: Sequence[str]) -> Iterator[tuple[int, list[list[float]]]]:
         """The named numbers of each row of a Parquet file, and the place of the first row."""
         file = io.BytesIO(self._first + self._file.read())
         expected = "a Parquet file with the columns " + ", ".join(names)
@@ -201,27 +224,29 @@ class Source:
             for first, rows in rows_of(table, names, AT_ONCE, self.field, expected):
                 yield first, rows.tolist()
 
-    def _lines(self) -> Iterator[tuple[int, list[str]]]:
-        """Lines as they arrive, without empty ones, and the place of the first."""
-        rest, done, chunk = b"", 0, self._first.removeprefix(b"\xef\xbb\xbf")
+    def _lines(self) -> Iterator[list[tuple[str, str]]]:
+        """Lines as they arrive, without empty ones, each with its place."""
+        rest, done, number, chunk = b"", 0, 0, self._first.removeprefix(b"\xef\xbb\xbf")
         while chunk or rest:
             *whole, rest = (rest + chunk).split(b"\n") if chunk else [rest, b""]
             if len(rest) > LONGEST_LINE:
                 raise InputError(self.field, f"a line of more than {LONGEST_LINE} bytes", "shorter lines")
-            lines = [self._text(line, done + i) for i, line in enumerate(whole)]
-            lines = [line for line in lines if line.strip()]
+            places = [f"{self.field} line {number + i + 1}" for i in range(len(whole))]
+            number += len(whole)
+            lines = [(place, self._text(line, place)) for place, line in zip(places, whole, strict=True)]
+            lines = [(place, line) for place, line in lines if line.strip()]
             for start in range(0, len(lines), AT_ONCE):
-                yield done, lines[start : start + AT_ONCE]
-                done += len(lines[start : start + AT_ONCE])
+                yield lines[start : start + AT_ONCE]
+            done += len(lines)
             chunk = _read(self._file)  # only now: the sender may wait for the answers to these lines
         if not done:
             raise InputError(self.field, "nothing", "at least one row")
 
-    def _text(self, line: bytes, place: int) -> str:
+    def _text(self, line: bytes, place: str) -> str:
         try:
             return line.decode().removesuffix("\r")
         except UnicodeDecodeError:
-            raise InputError(f"{self.field}[{place}]", line, "text in UTF-8") from None
+            raise InputError(place, line, "text in UTF-8") from None
 
     def _arrays(self, shape: tuple[int, ...], expected: str) -> Iterator[Array]:
         data = self._first + self._file.read()
@@ -251,17 +276,16 @@ def opened_source(path: str, field: str) -> Iterator[Source]:
         yield Source(file, field)
 
 
-def pose_of(numbers: list[float], field: str) -> Array:
-    """Seven numbers of a row as a pose ``(4, 4)``."""
-    length = math.hypot(*numbers[3:])
-    if abs(length - 1.0) > _UNIT:
-        what = "is zero" if length == 0.0 else f"has the length {length:.3g}"
-        expected = f"qw, qx, qy, qz of length 1: this quaternion {what}"
-        raise InputError(field, numbers, expected + ("; 1, 0, 0, 0 is no rotation" if length == 0.0 else ""))
+def _row(table: PoseTable, place: str, numbers: Callable[[], list[float]]) -> Goal:
+    return Goal(place, "pose", table.pose(numbers(), place))
+
+
+def _goal(place: str, read: Callable[[], Goal]) -> Goal:
+    """The target of a row, or what is wrong with it."""
     try:
-        return pose_from_position_wxyz(numbers[:3], numbers[3:])
-    except InputError:
-        raise InputError(field, numbers, "seven numbers: " + ", ".join(POSE)) from None
+        return read()
+    except InputError as error:
+        return Goal(place, "pose", NOTHING, None, Wrong.of(error))
 
 
 def _read(file: BinaryIO) -> bytes:

@@ -27,8 +27,8 @@ from app.viewer.session.state import (
     KEY_RETURN,
     PageState,
     StoredPage,
-    decode,
     encode,
+    opened_with,
     read_stored_page,
     write,
 )
@@ -96,7 +96,7 @@ class Persistence:
         if stored.shown:
             self.shown = stored.shown
             SHOWN.join(stored.shown, self._page.post)
-        saved = decode(stored.state, self._page.store.robots)
+        saved = opened_with(stored, self._page.store.robots)
         if self._rights.compute:
             self.stored = saved
             return

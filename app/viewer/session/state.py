@@ -111,6 +111,7 @@ class StoredPage:
             code that is reserved for the page (`app.live.reserved`).
         zone: minutes by which the visitor's clock is ahead of UTC.
         embedded: how the page is embedded in another: ``"scene"``, ``"panel"`` or not at all.
+        robot: id of an arm in the address, which a page without a state begins with.
     """
 
     address: str = ""
@@ -120,6 +121,16 @@ class StoredPage:
     embedded: str = ""
     shown: str = ""
     zone: int = 0
+    robot: str = ""
+
+
+def opened_with(stored: StoredPage, known: Iterable[Robot]) -> PageState:
+    """The state with which a page opens: its own, or else a fresh one with the arm that its address names."""
+    robots = tuple(known)
+    if stored.state or not stored.robot:
+        return decode(stored.state, robots)
+    found = next((robot.id for robot in robots if robot.id == stored.robot), None)
+    return PageState(missing=stored.robot) if found is None else PageState(robot=found)
 
 
 def with_arm(robot: Robot, q: Array | None, known: Iterable[Robot]) -> PageState:
@@ -274,7 +285,9 @@ def read_stored_page(remembered: object) -> StoredPage:
     shown = shown if isinstance(shown, str) else ""
     zone = data.get("zone")
     zone = zone if type(zone) is int and abs(zone) <= FARTHEST_ZONE else 0
-    return StoredPage(str(address) if usable else "", state, data.get("dark") is True, size, embedded, shown, zone)
+    dark, robot = data.get("dark") is True, data.get("robot")
+    robot = robot[:80] if isinstance(robot, str) else ""
+    return StoredPage(str(address) if usable else "", state, dark, size, embedded, shown, zone, robot)
 
 
 _TASKS: tuple[Task, ...] = get_args(Task)

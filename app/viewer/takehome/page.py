@@ -23,15 +23,18 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import ArrayLike, NDArray
+from trimesh import creation
 
 from app.shared.settings import static_folder
+from app.viewer.obstacles.nodes import COLOR
+from app.viewer.obstacles.placed import pose, sizes
 from app.viewer.panel.posture import short
 from app.viewer.scene.bodies.drawing import Drawing, drawing
 from app.viewer.scene.bodies.parts import Part, joint_color
 from app.viewer.scene.chain import Link, chain
 from app.viewer.scene.meshes import Body, body
 from app.viewer.views.templates import render
-from kin import IKOptions, InputError, Motion, Robot, __version__, solve_ik
+from kin import IKOptions, InputError, Motion, Obstacle, Robot, __version__, pose_from_xyz_rpy, solve_ik
 from kin.named import robot_of
 from kin.robot import Joint
 from kin.transforms import Array
@@ -59,6 +62,7 @@ class SavedArm:
         motion: a program to play; None: none.
         units: of the numbers on the page.
         link: address of the full page with the same arm; "": there is none.
+        obstacles: bodies around the arm, in the frame of the target.
     """
 
     robot: Robot
@@ -69,6 +73,7 @@ class SavedArm:
     motion: Motion | None = None
     units: Units = DEFAULT_UNITS
     link: str = ""
+    obstacles: tuple[Obstacle, ...] = ()
 
 
 def save_page(
@@ -140,7 +145,9 @@ def _data(saved: SavedArm, drawn: Drawing | None) -> dict[str, Any]:
         "units": {"degrees": saved.units.degrees, "length": saved.units.length},
         "robot": arm_data(robot),
         "q": saved.q.tolist(),
-        "parts": [_mesh(part, link, T) for part, link, T in _parts(made, drawn)],
+        "parts": [
+            _mesh(part, link, T) for part, link, T in [*_parts(made, drawn), *map(_obstacle, saved.obstacles)]
+        ],
         "frames": [
             {"link": link.index + 1, "pose": T.ravel().tolist()}
             for link in made.chain.links
@@ -219,6 +226,21 @@ def _parts(made: Body, drawn: Drawing | None) -> list[tuple[Part, int, Array | N
                 )
     last = len(made.chain.links) - 1
     return [*found, (made.gripper[0], last, made.chain.T_last_tool)]
+
+
+def _obstacle(obstacle: Obstacle) -> tuple[Part, int, Array]:
+    """The mesh of an obstacle, beside the base; the place of a table is the middle of its top."""
+    T = pose(obstacle)
+    if obstacle.shape == "sphere":
+        mesh = creation.icosphere(3, sizes(obstacle)[0])
+    elif obstacle.shape == "cylinder":
+        radius, height = sizes(obstacle)
+        mesh = creation.cylinder(radius, height, sections=48)
+    else:
+        mesh = creation.box(sizes(obstacle))
+        if obstacle.shape == "table":
+            T = T @ pose_from_xyz_rpy([0.0, 0.0, -0.5 * sizes(obstacle)[2]])
+    return Part("obstacle", mesh, COLOR), 0, T
 
 
 def _mesh(part: Part, link: int, T: Array | None) -> dict[str, Any]:

@@ -19,7 +19,9 @@ def send_page(stage: Stage, motion: Motion | None = None) -> None:
     arm = stage.now
     robot = named(arm.robot)
     drawn = stage.bodies.of(arm.robot, stage.own)
-    page = web_page(SavedArm(robot, arm.goal, drawn, arm.aim, arm.options, motion, stage.units, stage.link))
+    page = web_page(
+        SavedArm(robot, arm.goal, drawn, arm.aim, arm.options, motion, stage.units, stage.link, arm.obstacles)
+    )
     file = f"{robot.id}.html"
     stage.client.send_file_download(file, page.encode(), save_immediately=True)
     words = "It needs no server: open it from a disk, send it, or put it into a learning platform."

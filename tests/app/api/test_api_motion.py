@@ -160,6 +160,26 @@ def test_code_is_text_and_python_plans_the_same_motion(client, capsys):
     assert problem["errors"][0]["field"] == "format"
 
 
+def test_urscript_is_for_arms_of_universal_robots(client):
+    still = {"format": "urscript", "program": {"segments": [{"kind": "dwell", "seconds": 1}]}}
+    error = post(client, still, 422, "robots/kr6/motion").json()["errors"][0]
+    assert error["expected"] == "an arm of Universal Robots; the maker of KUKA KR 6 R900 sixx is KUKA"
+    assert "No maker is stated" not in post(client, still, path="robots/ur5/motion").text
+    table = {"robot": {**kin.robot_to_dict(kin.get_robot("ur5")), "id": "mine", "maker": ""}, **still}
+    assert "# No maker is stated" in post(client, table, path="motion").text
+
+
+def test_a_file_calls_the_joints_as_a_driver_does(client):
+    names = [f"{name}_joint" for name in ("pan", "lift", "elbow", "wrist_1", "wrist_2", "wrist_3")]
+    still = {"program": {"segments": [{"kind": "dwell", "seconds": 0.1}]}, "joint_names": names}
+    text = post(client, {**still, "format": "trajectory-yaml"}, path="robots/ur5/motion").text
+    assert f"joint_names: {json.dumps(names)}" in text
+    for wrong in (names[:5], [*names[:5], names[0]], [*names[:5], " "]):
+        error = post(client, {**still, "format": "csv", "joint_names": wrong}, 422, "robots/ur5/motion").json()
+        assert error["errors"][0]["field"] == "joint_names"
+        assert "6 different names" in error["errors"][0]["expected"]
+
+
 @pytest.mark.parametrize("form", FORMATS)
 def test_what_cannot_be_driven_is_an_answer_with_a_reason(client, form):
     program = {"segments": [{"kind": "ptp", "q": Q}, {"kind": "ptp", "q": [9.0, *Q[1:]], "name": "far"}]}

@@ -202,3 +202,24 @@ def test_what_an_open_question_asks_for_is_not_saved():
     send_page(stage)
     assert stage.files == []
     assert stage.notices[0].title == "Not now"
+
+
+def test_obstacles_are_drawn_where_they_are() -> None:
+    table = kin.Obstacle("table", [0.5, 0.1, 0.2], [0.0, 0.0, 0.5], size=[0.4, 0.6, 0.3])
+    can = kin.Obstacle("cylinder", [0.3, 0.0, 0.4], [0.3, 0.2, 0.1], radius=0.05, height=0.2)
+    ball = kin.Obstacle("sphere", [0.0, 0.4, 0.5], radius=0.1)
+    plain = data_of(web_page(SavedArm(UR5, Q)))["parts"]
+    parts = data_of(web_page(SavedArm(UR5, Q, obstacles=(table, can, ball))))["parts"][len(plain) :]
+    assert [part["link"] for part in parts] == [0, 0, 0]
+    for part, each, low, high in (
+        (parts[0], table, (-0.2, -0.3, -0.3), (0.2, 0.3, 0.0)),
+        (parts[1], can, (-0.05, -0.05, -0.1), (0.05, 0.05, 0.1)),
+        (parts[2], ball, (-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)),
+    ):
+        steps = np.frombuffer(base64.b64decode(part["vertices"]), "<u2").reshape(-1, 3)
+        T = np.array(part["pose"]).reshape(4, 4)
+        points = (np.array(part["low"]) + steps * part["step"]) @ T[:3, :3].T + T[:3, 3]
+        F = kin.pose_from_xyz_rpy(each.xyz, each.rpy)
+        local = (points - F[:3, 3]) @ F[:3, :3]
+        assert np.allclose(local.min(axis=0), low, atol=2e-3)
+        assert np.allclose(local.max(axis=0), high, atol=2e-3)

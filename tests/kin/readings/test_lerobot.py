@@ -88,6 +88,11 @@ def test_ticks_pass_as_they_are_and_a_motor_without_a_range_is_named():
             convert([Motor("elbow", 3)], [7.0])
 
 
+def renamed(old: str, new: str) -> dict[str, Any]:
+    """The file with another name of a motor."""
+    return {new if name == old else name: each for name, each in FILE.items()}
+
+
 BAD: list[tuple[Any, str]] = [
     ("", "LeRobot's calibration"),
     ("{", "LeRobot's calibration"),
@@ -105,9 +110,26 @@ BAD: list[tuple[Any, str]] = [
     ({"elbow_flex": {"id": 3}}, r"calibration.elbow_flex.drive_mode: got None"),
     ({"elbow_flex": FILE["elbow_flex"], "other": FILE["elbow_flex"]}, "an id that no other motor has"),
     ({"left": {**FILE["elbow_flex"], "id": 40}}, "named like a joint: shoulder pan"),
+    (
+        {"sholder_pan" if name == "shoulder_pan" else name: each for name, each in FILE.items()},
+        "; perhaps shoulder pan",
+    ),
+    ({"wheel" if name == "wrist_roll" else name: each for name, each in FILE.items()}, "no motor: wrist roll$"),
     ({"motor_names": ["a"], "homing_offset": [3], "drive_mode": [0]}, "an older format of LeRobot"),
     ({f"m{i}": FILE["elbow_flex"] for i in range(65)}, "at most 64"),
 ]
+
+
+@pytest.mark.parametrize("unit", ["deg", "range_m100_100", "ticks"])
+def test_a_gripper_reads_from_0_to_100_whatever_the_unit_of_the_others(unit: Any):
+    file = {**FILE, "gripper": {**FILE["gripper"], "range_min": 2000, "range_max": 3500, "drive_mode": 0}}
+    motors = kin.motors_from_lerobot(replace(SO101, motors=()), file, unit)
+    assert [motor.unit for motor in motors] == [unit] * 5 + ["range_0_100"]
+    known = kin.motors_from_lerobot(SO101, file)  # the arm has these motors, with a gripper in degrees
+    assert known[-1].unit == "range_0_100"
+    readings = kin.readings_from_ticks(known, [m.range[0] for m in known[:-1]] + [3500])
+    assert readings[-1] == pytest.approx(100.0)
+    assert kin.ticks_from_readings(known, readings)[-1] == 3500
 
 
 @pytest.mark.parametrize(("given", "words"), BAD, ids=range(len(BAD)))

@@ -45,6 +45,7 @@ from app.viewer.session.state import (
     decode,
     encode,
     equal,
+    opened_with,
     read_stored_page,
     write,
 )
@@ -610,3 +611,13 @@ def test_another_language(port):
         tab.set("Copy as", "COBOL")
         tab.wait(lambda: "Invalid input" in tab.html)
         assert tab.value("Copy as") == "MATLAB"
+
+
+def test_an_arm_in_the_address_is_what_a_page_without_a_state_begins_with() -> None:
+    robots = (kin.get_robot("pioneer5"), kin.get_robot("ur5"))
+    fresh = read_stored_page(json.dumps({"state": "", "robot": "ur5"}))
+    assert opened_with(fresh, robots) == PageState(robot="ur5")
+    assert opened_with(read_stored_page(json.dumps({"robot": "ur55"})), robots).missing == "ur55"
+    kept = read_stored_page(json.dumps({"state": encode(PageState("pioneer5")), "robot": "ur5"}))
+    assert opened_with(kept, robots).robot == "pioneer5", "what the visitor has done since"
+    assert opened_with(read_stored_page(json.dumps({"robot": 5})), robots) == PageState()
