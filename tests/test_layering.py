@@ -45,7 +45,7 @@ RULES: dict[str, set[str]] = {
     "kin/path": {"numpy", "kin.collision", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", *MODEL},
     "kin/motion": {
         *("numpy", "kin.collision", "kin.files", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", "kin.motion"),
-        *("kin.frames", *MODEL),
+        *("kin.frames", "kin.poses", "kin.typed", *MODEL),
     },
     "kin/poses": {"numpy", "kin.frames", "kin.poses", "kin.typed", *MODEL},
     "kin/way": {"numpy", "ompl", "kin.collision", "kin.ik", "kin.motion", "kin.way", *MODEL},

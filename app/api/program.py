@@ -20,6 +20,7 @@ from kin.motion.program import (
     MOST_VALUES,
     Orientation,
 )
+from kin.typed import LONGEST_LIST
 
 Part = Annotated[float, Field(gt=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
@@ -43,8 +44,9 @@ class SegmentTarget(_Described):
     wxyz: Vector4 | None = Field(
         None, description="Orientation at `position`; by default that at the start of the segment."
     )
-    pose: Annotated[list[Row], numbers(4)] | None = Field(
-        None, description="A 4×4 matrix in the place of position and wxyz."
+    pose: Annotated[list[Row], numbers(4)] | Annotated[str, Field(max_length=LONGEST_LIST)] | None = Field(
+        None,
+        description="In the place of position and wxyz: a 4×4 matrix, or a text as on a maker's pendant.",
     )
     frame: str | None = Field(
         None, description="The frame in which poses and via points are: world (by default), base, or a workpiece."

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.options import finite_number, shape_of
+from kin.poses import check_length
 from kin.transforms import Array, as_transform, pose_from_position_wxyz, wxyz_from_rotation
 
 Orientation = Literal["geodesic", "two-axis"]
@@ -45,7 +46,8 @@ class PoseTarget:
 
     Attributes:
         position: the tool point in the world frame, metres.
-        wxyz: unit quaternion of the orientation; None keeps the orientation at the start of the segment.
+        wxyz: quaternion of the orientation, of length 1 to within 0.1, and made 1 here; None keeps the orientation
+            at the start of the segment.
     """
 
     position: tuple[float, float, float]
@@ -57,10 +59,9 @@ class PoseTarget:
             self, "position", _numbers("position", self.position, 3, "three numbers x, y, z in metres")
         )
         if self.wxyz is not None:
-            given = _numbers("wxyz", self.wxyz, 4, "a quaternion (w, x, y, z) that is not zero")
+            given = _numbers("wxyz", self.wxyz, 4, "a quaternion (w, x, y, z) of length 1")
+            check_length(given)
             size = math.hypot(*given)
-            if not size > 1e-12:
-                raise InputError("wxyz", self.wxyz, "a quaternion (w, x, y, z) that is not zero")
             if abs(size - 1.0) > 1e-15:
                 given = tuple(value / size for value in given)
             object.__setattr__(self, "wxyz", given)

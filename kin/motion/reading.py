@@ -14,9 +14,10 @@ wxyz = [0, 1, 0, 0]
 blend = 20
 ```
 
-A target is `q`, or `position` with or without `wxyz`, or `pose`, a 4×4 matrix. Poses and via points are in the
-world frame, or in the one that `frame` names: ``"base"``, or a workpiece. With ``pendant = true`` at the top,
-joint values are those that the arm's pendant shows. Every error names the field, as in ``segments[1].blend``.
+A target is `q`, or `position` with or without `wxyz`, or `pose`: a 4×4 matrix, or a text as `kin.pose_from_text`
+reads it, such as ``"kuka X 400 Y 100 Z 300 A 0 B 180 C 0"``. Poses and via points are in the world frame, or in the
+one that `frame` names: ``"base"``, or a workpiece. With ``pendant = true`` at the top, joint values are those that
+the arm's pendant shows. Every error names the field, as in ``segments[1].blend``.
 """
 
 from __future__ import annotations
@@ -50,8 +51,11 @@ from kin.motion.program import (
 )
 from kin.named import robot_of
 from kin.parsing import Limits, TextError, read_json, read_toml
+from kin.poses import read_target
 from kin.robot import LENGTHS, Robot
 from kin.transforms import Array, as_transform
+from kin.typed import ReadError
+from kin.units import Units
 
 _TARGET = ("q", "position", "wxyz", "pose", "frame")
 LIMITS = Limits(16_000_000, 4_000_000, 16)  # of a program; a page takes shorter ones
@@ -204,6 +208,7 @@ class _Reader:
         _only(units, ("length", "angle"), "units.")
         self.length = _unit(units, "length", LENGTHS, "m")
         self.angle = _unit(units, "angle", ANGLES, "rad")
+        self.units = Units(units.get("angle") == "deg", units.get("length", "m"))
         self.robot, self.workpieces, self.pendant = robot, workpieces, pendant
 
     def segment(self, data: object, where: str) -> Segment:
@@ -257,6 +262,8 @@ class _Reader:
         try:
             if given == ["q"]:
                 return self.joints(JointTarget(data["q"]))
+            if given == ["pose"] and isinstance(data["pose"], str):
+                return self.typed(data["pose"], frame)
             if given == ["pose"]:
                 T = as_transform(data["pose"], "pose")
                 T[:3, 3] = _times(tuple(T[:3, 3].tolist()), self.length)
@@ -269,6 +276,17 @@ class _Reader:
             return read
         placed = frame @ read.pose(np.eye(4))
         return PoseTarget.of(placed) if read.wxyz is not None else PoseTarget(_point(placed))
+
+    def typed(self, text: str, frame: Array | None) -> Target:
+        """The target of a text, whose numbers are in the units of the file unless its form has its own."""
+        try:
+            T, task = read_target(text, None, self.units, "" if self.robot is None else self.robot.maker)
+        except ReadError as error:
+            raise InputError("pose", text, f"a pose that can be read in one way. {error.sentence}") from None
+        if task == "approach":
+            raise InputError("pose", text, "a whole pose, or a point")
+        placed = T if frame is None else frame @ T
+        return PoseTarget.of(placed) if task == "pose" else PoseTarget(_point(placed))
 
     def frame(self, data: Mapping[str, Any], where: str) -> Array | None:
         """T_world_frame ``(4, 4)`` of the frame in which a segment or point has its poses; None for the world."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
 from app.api.arms.description import RobotDescription
 from app.api.body import parsed
@@ -24,6 +24,7 @@ from app.shared.problems import FieldError, from_input_error, show
 from app.shared.store import Store
 from kin import InputError, Robot, UnknownRobotError, program_from_dict, q_from_readings
 from kin.collision.obstacles import MOST_OBSTACLES, checked_obstacles
+from kin.poses import check_length
 from kin.readings.joints import moving_motors, of_moving
 from kin.transforms import Array
 
@@ -59,12 +60,22 @@ class LineDrawing(Body):
     color: _Color = Field("#e8590c", description="As in CSS.")
 
 
+def _unit(wxyz: list[float]) -> list[float]:
+    try:
+        check_length(wxyz)
+    except InputError as error:
+        raise ValueError(error.expected) from None
+    return wxyz
+
+
 class FrameDrawing(Body):
     """The three axes of a frame."""
 
     kind: Literal["frame"] = Field(description="Three axes.")
     position: Vector3 = Field(description="Its origin in metres, in the world frame.")
-    wxyz: Vector4 = Field([1.0, 0.0, 0.0, 0.0], description="Its orientation as a quaternion w, x, y, z.")
+    wxyz: Annotated[Vector4, AfterValidator(_unit)] = Field(
+        [1.0, 0.0, 0.0, 0.0], description="Its orientation as a quaternion w, x, y, z of length 1."
+    )
     length: float = Field(0.1, ge=0.001, le=10.0, strict=True, description="Of an axis, in metres.")
 
 
