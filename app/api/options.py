@@ -189,7 +189,7 @@ class Target(schemas.Body):
                 T[:3, :3] = frame_from_approach(self.approach)
             return T
         # As it was sent, so that its digits tell how closely it can be met.
-        T = whole_matrix(self.matrix)
+        T = np.array(whole_matrix(self.matrix))
         error = read_pose(T, POSE, f"{field}.matrix", always=turned is not None)[1]
         if self.position is not None and np.abs(T[:3, 3] - self.position).max() > AGREEMENT:
             raise _wrong(
@@ -221,7 +221,7 @@ def _rotations(wxyz: Array) -> Array | None:
 def _with_matrices(targets: list[Target]) -> Array | None:
     """The matrices of targets ``(k, 4, 4)`` as they were sent; None if one of them is not exactly a pose."""
     offer()
-    T = np.stack([whole_matrix(each.matrix or ()) for each in targets])
+    T = np.array([whole_matrix(each.matrix) for each in targets])
     errors = np.empty(len(T))
     straighten_many(T, FAR, np.empty_like(T), errors)
     return T if (errors >= 0.0).all() else None

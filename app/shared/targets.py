@@ -5,8 +5,7 @@ A target is a `position` with one orientation or none, a `matrix`, or a `text` a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,9 +34,9 @@ def orientation(name: str, values: ArrayLike) -> Array:
     return pose_from_xyz_rpy(np.zeros(3), given)[:3, :3] if name == "rpy" else VECTOR.matrix(given.tolist())
 
 
-def whole_matrix(matrix: Sequence[Sequence[float]]) -> Array:
-    """A 4×4 matrix of three or four rows of four numbers."""
-    return np.array(matrix if len(matrix) == 4 else [*matrix, _BOTTOM], dtype=np.float64)
+def whole_matrix(matrix: Any) -> Any:
+    """The rows of a 4×4 matrix, of which the last may be left out; anything else as it is."""
+    return [*matrix, _BOTTOM] if isinstance(matrix, list) and len(matrix) == 3 else matrix
 
 
 def text_target(text: object, form: str | None, field: str, maker: str = "") -> tuple[Task, Array]:

@@ -157,9 +157,9 @@ class Source:
         if frame is not None and not isinstance(frame, str):
             raise InputError(f"{field}.frame", frame, "the name of a frame")
         if "matrix" in given:
-            T = whole_matrix(given["matrix"])
-            read_pose(T, contract.POSE, f"{field}.matrix")
-            return Goal(field, "pose", T, frame)
+            rows = whole_matrix(given["matrix"])
+            read_pose(rows, contract.POSE, f"{field}.matrix")
+            return Goal(field, "pose", np.array(rows, dtype=np.float64), frame)
         if "text" in given and not set(given) - {"text", "form"}:
             return Goal(field, *text_target(given["text"], given.get("form"), field, maker), frame)
         turned = [name for name in (*ORIENTATIONS, "approach") if name in given]

@@ -135,7 +135,7 @@ def test_what_is_no_parquet_file_of_targets_is_refused_by_name(tmp_path, capsys)
         (b"no table", "a .npy file of poses"),
         ({"x": [1.0]}, "the columns x, y, z"),
         ({name: ["a"] for name in COLUMNS}, r"--targets\[0\]"),
-        ({name: [1.0, 1.0, None] for name in COLUMNS}, r"--targets\[2\]"),
+        ({name: [0.5, 0.5, None] for name in COLUMNS}, r"--targets\[2\]"),
         ({name: [0.5] * 5 + [0.0] for name in COLUMNS}, r"--targets\[5\]"),
     ]
     for content, message in given:
