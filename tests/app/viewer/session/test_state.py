@@ -615,9 +615,9 @@ def test_another_language(port):
 
 def test_an_arm_in_the_address_is_what_a_page_without_a_state_begins_with() -> None:
     robots = (kin.get_robot("pioneer5"), kin.get_robot("ur5"))
-    fresh = read_stored_page(json.dumps({"state": "", "robot": "ur5"}))
+    fresh = read_stored_page({"state": "", "robot": "ur5"})
     assert (opened_with(fresh, robots).robot, opened_with(fresh, robots).missing) == ("ur5", "")
-    assert opened_with(read_stored_page(json.dumps({"robot": "ur55"})), robots).missing == "ur55"
-    kept = read_stored_page(json.dumps({"state": encode(PageState("pioneer5")), "robot": "ur5"}))
+    assert opened_with(read_stored_page({"robot": "ur55"}), robots).missing == "ur55"
+    kept = read_stored_page({"state": encode(PageState("pioneer5")), "robot": "ur5"})
     assert opened_with(kept, robots).robot == "pioneer5", "what the visitor has done since"
-    assert opened_with(read_stored_page(json.dumps({"robot": 5})), robots).missing == ""
+    assert opened_with(read_stored_page({"robot": 5}), robots).missing == ""
