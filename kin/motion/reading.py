@@ -14,10 +14,11 @@ wxyz = [0, 1, 0, 0]
 blend = 20
 ```
 
-A target is `q`, or `position` with or without `wxyz`, or `pose`: a 4×4 matrix, or a text as `kin.pose_from_text`
-reads it, such as ``"kuka X 400 Y 100 Z 300 A 0 B 180 C 0"``. Poses and via points are in the world frame, or in the
-one that `frame` names: ``"base"``, or a workpiece. With ``pendant = true`` at the top, joint values are those that
-the arm's pendant shows. Every error names the field, as in ``segments[1].blend``.
+A target is `q`, or `position` with or without `wxyz`, or `pose`: a 4×4 matrix, or a text as
+`kin.pose_from_text` reads it, such as ``"kuka X 400 Y 100 Z 300 A 0 B 180 C 0"``. Poses and via points are in
+the world frame, or in the one that `frame` names: ``"base"``, or a workpiece. With ``pendant = true`` at the
+top, joint values are those that the arm's pendant shows. Every error names the field, as in
+``segments[1].blend``.
 """
 
 from __future__ import annotations

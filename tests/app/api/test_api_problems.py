@@ -269,7 +269,12 @@ def test_a_wrong_configuration(client, what, q, field, value, expected):
     ("what", "body", "field", "expected"),
     [
         ("fk", {}, "q", "a value"),
-        ("fk", {"q": Q, "pose": True}, "pose", "only the fields base, tool, workpieces, q, pendant, frames, frame, form"),
+        (
+            "fk",
+            {"q": Q, "pose": True},
+            "pose",
+            "only the fields base, tool, workpieces, q, pendant, frames, frame, form",
+        ),
         ("fk", {"q": Q, "frames": "yes"}, "frames", "a valid boolean"),
         ("jacobian", {"q": Q, "frame": "world"}, "frame", "'base' or 'tool'"),
         ("ik", {}, "target", "a value"),

@@ -164,7 +164,7 @@ def test_singularities_are_those_of_the_joints():
 
 
 def test_what_only_the_free_arm_reaches_is_no_branch():
-    """Batch kernels verify nothing: a hand that is pitched is a posture of the five axes, not of the four joints."""
+    """Batch kernels verify nothing: a pitched hand is a posture of the five axes, not of the four joints."""
     robot = palletiser()
     T = kin.fk(robot, robot.q_home)
     pitched = T @ kin.pose_from_xyz_rpy([0.0, 0.0, 0.0], [0.0, 0.3, 0.0])
