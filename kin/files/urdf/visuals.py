@@ -73,7 +73,7 @@ def read_visuals(text: str, tip: str | None = None, file: str = "URDF") -> tuple
     """The visible bodies of all links that belong to the arm up to the link `tip`, in the order of the file.
 
     Links beside the chain, such as fingers, move with the link that carries them; their own joints are at zero,
-    or at the limit closest to it. Where one joint moves such a link, it is told how.
+    or at the limit closest to it. Where one joint moves such a link, `finger` says how.
 
     Raises:
         RobotFileError: the file is invalid; the message names the link.
