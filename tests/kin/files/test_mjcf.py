@@ -35,9 +35,11 @@ def pose(model, data, q: np.ndarray, site: str = "tool") -> np.ndarray:
 
 def assert_moves_alike(robot: Robot, text: str, site: str = "tool") -> None:
     model, data = loaded(text)
-    assert model.nq == robot.n
+    assert model.nq == len(robot.moving_rows)
     for q in robot.random_q(np.random.default_rng(2), 20):
-        assert np.abs(pose(model, data, q, site) - kin.fk(robot, q)).max() < NEAR * max(1.0, robot.reach)
+        assert np.abs(pose(model, data, robot.expand(q), site) - kin.fk(robot, q)).max() < NEAR * max(
+            1.0, robot.reach
+        )
 
 
 @pytest.mark.full
@@ -47,9 +49,9 @@ def test_a_built_in_arm_is_loaded_by_mujoco_and_read_back(robot):
     assert_moves_alike(robot, text)
     model, _ = loaded(text)
     assert model.jnt_range[model.jnt_limited == 1].tolist() == [
-        list(joint.limits) for joint in robot.joints if joint.limits is not None
+        list(row.limits) for row in robot.rows if row.limits is not None
     ]
-    assert model.key("home").qpos.tolist() == list(robot.home)
+    assert model.key("home").qpos.tolist() == robot.expand(robot.q_home).tolist()
     back, report = kin.read_urdf(text)
     assert report.difference < 1e-12
     assert [joint.limits for joint in back.joints] == [joint.limits for joint in robot.joints]
@@ -99,7 +101,7 @@ def test_capsules_are_where_the_arm_has_them_and_touch_where_it_says(robot):
         distance = float(kin.clearance(robot, q))
         if abs(distance) < 1e-4:
             continue
-        data.qpos[:] = q
+        data.qpos[:] = robot.expand(q)
         mujoco.mj_fwdPosition(model, data)
         among = [solid[contact.geom].all() for contact in data.contact]  # the others are with the floor
         assert any(among) == (distance < 0.0), q
@@ -205,7 +207,7 @@ def test_masses_are_said_to_be_assumed(robot):
     assert (model.body_mass[2:] > 0.0).all(), "MuJoCo refuses a moving body without mass"
     shapes = kin.capsules(robot)
     volume = sum(math.pi * c.radius**2 * (math.dist(c.start, c.end) + 4.0 / 3.0 * c.radius) for c in shapes)
-    balls = robot.n - len({c.link for c in shapes} - {0})  # links without a capsule weigh 0.1 kg
+    balls = len(robot.moving_rows) - len({c.link for c in shapes} - {0})  # links without a capsule weigh 0.1 kg
     assert model.body_mass.sum() == pytest.approx(1000.0 * volume + 0.1 * balls)
     mujoco.mj_step(model, data)
     assert np.isfinite(data.qpos).all()
