@@ -131,8 +131,9 @@ const channel = (() => {
     const left = socket;
     socket = null;
     // A browser complains of one that is closed before it is open.
-    if (left?.readyState === WebSocket.CONNECTING) left.addEventListener("open", () => left.close());
-    else left?.close();
+    if (!left) return;
+    if (left.readyState === WebSocket.CONNECTING) left.addEventListener("open", () => left.close());
+    else left.close();
   }
   setInterval(() => {
     if (!socket || performance.now() - heardAt < DEAD) return;

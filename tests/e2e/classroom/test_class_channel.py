@@ -42,6 +42,6 @@ def test_an_answer_counts_once_where_the_channel_is_lost_before_it_or_with_it(
     expect(row).to_contain_text("solved · 2 tries")
     expect(ann.page.locator("[data-exercises-note]")).to_contain_text("Stored for your teacher")
     expect(ann.page.locator(".kb-class-offline")).to_be_hidden()
-    assert ann.page.evaluate("kbSockets.length") == 3
+    ann.page.wait_for_function("kbSockets.length === 3")
     for member in (ann, teacher):
         member.close()

@@ -61,7 +61,7 @@ class WebSocket extends EventTarget {
 
   close() { this.readyState = 3; }
 }
-WebSocket.OPEN = 1;
+[WebSocket.CONNECTING, WebSocket.OPEN] = [0, 1];
 const hear = () => channelSocket.dispatchEvent(Object.assign(new Event("message"), { data: '{"heard": 1}' }));
 class DOMParser {
   parseFromString() { return { body: { firstElementChild: { dataset: { channel: "0/name" } } } }; }
