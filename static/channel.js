@@ -13,7 +13,7 @@ const channel = (() => {
   // Their order with changes of viser's controls matters: they go with these, in viser's connection.
   const BESIDE_CONTROLS = new Set(["undo", "redo", "travel", "released", "field", "lesson"]);
 
-  let [place, name] = ["", ""]; // of the channel: which process of the service has the session, and what proves that it is ours
+  let name = ""; // of the channel: what proves whose it is
   let socket = null;
   let opened = false; // whether this session has been connected
   let tries = 0;
@@ -103,7 +103,7 @@ const channel = (() => {
 
   function open() {
     clearTimeout(timer);
-    const address = new URL(`channel/${place}`, location.href);
+    const address = new URL("channel", location.href);
     address.protocol = address.protocol.replace("http", "ws");
     address.search = address.hash = "";
     heardAt = performance.now();
@@ -142,10 +142,10 @@ const channel = (() => {
   }, 1000);
 
   viserPage.watchHtml("<div hidden data-channel", (html) => {
-    const found = new DOMParser().parseFromString(html, "text/html").body.firstElementChild.dataset.channel.split("/");
-    if (found[1] === name) return;
+    const found = new DOMParser().parseFromString(html, "text/html").body.firstElementChild.dataset.channel;
+    if (found === name) return;
     leave();
-    [place, name] = found;
+    name = found;
     [opened, tries, number, noted, unconfirmed, again, refused] = [false, 0, 0, 0, [], false, false];
     waiting.clear();
     values.clear();
@@ -165,7 +165,7 @@ const channel = (() => {
     async sendFile(feature, key, fileName, body, signal) {
       const headers = { "X-Kinboard-Channel": name, "X-Kinboard-File": encodeURIComponent(JSON.stringify([feature, key, fileName])) };
       try {
-        const answer = await fetch(`upload/${place}`, { method: "POST", headers, body, signal });
+        const answer = await fetch("upload", { method: "POST", headers, body, signal });
         return answer.ok || answer.headers.has("X-Kinboard-Said") ? 200 : answer.status;
       } catch {
         return 0;

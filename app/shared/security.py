@@ -34,8 +34,9 @@ CAMERA = "ViewerCameraMessage"
 MEMORY = "LocalStorageGetItemResponseMessage"
 HELLO = "hello"  # in the page's channel: what it remembers
 
-# Of a page's channel and files, with the number of the process that has the page; below the prefix of the service.
-_OF_PAGE = re.compile(r"/viewer/(?:channel|upload)/([0-9]{1,3})")
+# Of a page and its first websocket, of its channel, of its files: below the prefix of the service.
+PAGE, CHANNEL, UPLOAD = "/viewer", "/viewer/channel", "/viewer/upload"
+
 _COMPUTING = re.compile(r"/(workspace|capability)\b")
 
 
@@ -75,15 +76,9 @@ class Rights(Enum):
         return self is Rights.SAVE
 
 
-def place_of_page(path: str) -> int | None:
-    """The number of the process with the page, in the address of its channel or files; None: another address."""
-    found = _OF_PAGE.fullmatch(path)
-    return None if found is None else int(found[1])
-
-
 def is_of_page(path: str) -> bool:
     """Whether it is the address of a page, of one of its websockets or of its files."""
-    return path.rstrip("/") == "/viewer" or place_of_page(path) is not None
+    return path.rstrip("/") == PAGE or path in (CHANNEL, UPLOAD)
 
 
 # Swagger UI sets inline styles and data: images; scripts come from our own files only.

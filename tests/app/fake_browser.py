@@ -204,7 +204,7 @@ class FakeBrowser:
         self._options = options
         self.viser = Wire(self._url, [f"viser-v{viser.__version__}"], options)
         self.channel: Wire | None = None
-        self._place = self.name = ""  # of the channel
+        self.name = ""  # of the channel
         self._number = self._noted = 0  # of the last message and the last notice
         self.shown: dict[str, Any] = {}  # by the channel
         self.replied: list[Any] = [0, "", []]
@@ -317,7 +317,7 @@ class FakeBrowser:
         place = urlsplit(self._url)
         assert place.hostname is not None
         request = HTTPConnection(place.hostname, place.port, timeout=PATIENCE)
-        request.putrequest("POST", f"{place.path.rstrip('/')}/upload/{self._place}")
+        request.putrequest("POST", f"{place.path.rstrip('/')}/upload")
         about = {CHANNEL_NAME: self.name, FILE: quote(json.dumps([feature, key, name])), "Content-Length": size}
         for field, value in (about | self._options.get("additional_headers", {})).items():
             request.putheader(field, str(value))
@@ -345,15 +345,15 @@ class FakeBrowser:
     def open_channel(self) -> None:
         """Open the channel of the present session, or open it anew."""
         before, protocols = self.channel, [CHANNEL_PROTOCOL, self.name]
-        self.channel = Wire(f"{self._url.rstrip('/')}/channel/{self._place}", protocols, self._options)
+        self.channel = Wire(f"{self._url.rstrip('/')}/channel", protocols, self._options)
         if before is not None:
             before.close()
             before.ended = True
 
     def _note_channel(self, content: str) -> None:
-        place, name = content.split('data-channel="', 1)[1].split('"', 1)[0].split("/")
+        name = content.split('data-channel="', 1)[1].split('"', 1)[0]
         if name != self.name:
-            self._place, self.name, self.said = place, name, []
+            self.name, self.said = name, []
             self._number, self._noted, self.replied = 0, 0, [0, "", []]
             self.shown = {}
             self.open_channel()

@@ -47,7 +47,7 @@ from app.shared.connection import (
     never_silent,
 )
 from app.shared.metrics import DROPPED, STREAMED, VISITORS
-from app.shared.security import VIEWER_POLICY, origin_allowed
+from app.shared.security import CHANNEL, UPLOAD, VIEWER_POLICY, origin_allowed
 from app.shared.slots import Slot, Slots
 from kin.parsing import Limits, TextError, read_json
 
@@ -125,8 +125,8 @@ class ViewerBridge:
             Route("/viewer/", self.page),
             WebSocketRoute("/viewer", self.websocket),
             WebSocketRoute("/viewer/", self.websocket),
-            WebSocketRoute("/viewer/channel/{place:int}", self.channel),
-            Route("/viewer/upload/{place:int}", self.upload, methods=["POST"]),
+            WebSocketRoute(CHANNEL, self.channel),
+            Route(UPLOAD, self.upload, methods=["POST"]),
         ]
 
     async def page(self, request: Request) -> Response:

@@ -107,7 +107,7 @@ class VisitorPage(ShownArm, Worker):
         self.view, self.units, self.system_dark = ViewState(), DEFAULT_UNITS, False
         self.client, self._pace = client, services.pace
         self.channel = Channel(self.post, rights)
-        client.gui.add_html(render("panel/channel", place=0, name=self.channel.name))
+        client.gui.add_html(render("panel/channel", name=self.channel.name))
         self._welcome, self._looking, self.may_save = welcome, rights is Rights.LOOK, rights.save
         self.files = Files(self.post, lambda: self.features, self.meshes.memory, rights)
         self.door = Door(services.lines, self.post, self._looking)

@@ -282,7 +282,7 @@ def test_with_a_token_students_join_but_do_not_open_rooms(make):
     assert student.post("/room", data={"hours": "2"}).status_code == 401
     assert stranger.get("/viewer/").status_code == 401
     guest = student.cookies["kinboard_guest"]
-    for path in ("/viewer", "/viewer/channel/0"):
+    for path in ("/viewer", "/viewer/channel"):
         options = {"subprotocols": ["kinboard-1", "name"]}
         headers = {"cookie": f"kinboard_guest={guest}"}
         with make().websocket_connect(path, **options, headers=headers) as line:

@@ -26,7 +26,6 @@ from app.service.web.inspection import BURST, RATE, MessageLimit
 from app.service.web.negotiation import accepts_gzip, is_current
 from app.service.web.viewer_proxy import CHANNEL_PROTOCOL, ViewerBridge, VisitorConnection, _serve
 from app.shared.connection import Connection, ConnectionEnded, FileRefused, PageConnection, SentFile
-from app.shared.security import place_of_page
 from app.shared.settings import Settings
 from app.shared.slots import Slots
 
@@ -515,7 +514,7 @@ def test_a_visitor_whose_connection_breaks_while_something_is_sent_leaves_no_err
 
 def visit_channel(port: int, *protocols: str, **options):
     return visit(
-        port, "/viewer/channel/0", subprotocols=list(protocols) or [CHANNEL_PROTOCOL, "name-1_x"], **options
+        port, "/viewer/channel", subprotocols=list(protocols) or [CHANNEL_PROTOCOL, "name-1_x"], **options
     )
 
 
@@ -532,7 +531,7 @@ def test_a_channel_passes_texts_and_its_name_stands_in_no_address(port, viser):
 )
 def test_a_channel_without_one_name_is_refused(port, protocols):
     with pytest.raises(InvalidStatus, match="403"):
-        visit(port, "/viewer/channel/0", subprotocols=protocols or None)
+        visit(port, "/viewer/channel", subprotocols=protocols or None)
 
 
 def test_pages_of_other_sites_open_no_channel(port, caplog):
@@ -572,7 +571,7 @@ def test_a_channel_waits_for_the_viewer_and_takes_no_place(viser):
 
 def post_file(port: int, about: object = ("robot", "upload", "a é.zip"), **headers: str) -> httpx2.Response:
     given = {"x-kinboard-channel": "name", "x-kinboard-file": quote(json.dumps(about))} | headers
-    address = f"http://127.0.0.1:{port}/viewer/upload/0"
+    address = f"http://127.0.0.1:{port}/viewer/upload"
     return httpx2.post(address, content=b"PK" + bytes(100_000), headers=given, trust_env=False)
 
 
@@ -602,18 +601,6 @@ def test_a_file_whose_head_is_not_ours_is_refused(port, viser, about, headers, s
 
 
 def test_a_file_needs_its_length(port, viser):
-    address = f"http://127.0.0.1:{port}/viewer/upload/0"
+    address = f"http://127.0.0.1:{port}/viewer/upload"
     assert httpx2.post(address, content=iter([b"PK"]), trust_env=False).status_code == 411
     assert viser.files == []
-
-
-def test_the_address_of_a_page_s_channel_and_files_says_where_it_is():
-    assert [place_of_page(f"/viewer/{what}/12") for what in ("channel", "upload", "other")] == [12, 12, None]
-    for path in (
-        "/viewer/channel",
-        "/viewer/channel/",
-        "/viewer/channel/1234",
-        "/viewer/channel/-1",
-        "/viewer/upload/١",
-    ):
-        assert place_of_page(path) is None

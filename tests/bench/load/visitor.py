@@ -18,7 +18,7 @@ import zstandard
 from load.raw import Socket
 
 SUBPROTOCOL = f"viser-v{viser.__version__}"
-_CHANNEL = re.compile(r'data-channel="(\d+)/([\w-]+)"')
+_CHANNEL = re.compile(r'data-channel="([\w-]+)"')
 _BASE_JOINT = re.compile(r"/arm-\d+/\d+")
 _unpack = zstandard.ZstdDecompressor().decompress
 _decode = msgspec.msgpack.Decoder().decode
@@ -207,7 +207,7 @@ class Visitor:
                 width = 3 * np.dtype(points["dtype"]).itemsize
                 self.points += said["binaryBufferLengths"][points["__binary_index"]] // width
             elif kind == "GuiHtmlMessage" and (found := _CHANNEL.search(message["props"]["content"])):
-                self._opening.add(asyncio.get_running_loop().create_task(self._open_channel(*found.groups())))
+                self._opening.add(asyncio.get_running_loop().create_task(self._open_channel(found[1])))
             elif kind == "LocalStorageGetItemRequestMessage":
                 self.send(
                     "LocalStorageGetItemResponseMessage",
@@ -224,11 +224,11 @@ class Visitor:
             elif "uuid" in message and "props" in message:
                 self.elements[message["props"].get("label", "")] = message["uuid"]
 
-    async def _open_channel(self, place: str, name: str) -> None:
+    async def _open_channel(self, name: str) -> None:
         """Open the page's channel, which remembers nothing."""
         channel = await Socket.open(
             self._port,
-            f"/viewer/channel/{place}",
+            "/viewer/channel",
             f"kinboard-1, {name}",
             self._give_sign,
             self._token,

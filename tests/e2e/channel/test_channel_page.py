@@ -45,7 +45,7 @@ def tab(browser: Browser, address: str) -> Iterator[SocketTab]:
 
 def test_a_page_has_one_channel_and_its_name_stands_in_no_address(tab: SocketTab) -> None:
     addresses = tab.page.evaluate("kbSockets.map(({ url }) => new URL(url).pathname)")
-    assert addresses == ["/viewer/channel/0"]
+    assert addresses == ["/viewer/channel"]
     name = tab.page.evaluate("channel.name()")
     assert len(name) > 20
     assert name not in tab.page.url

@@ -64,7 +64,7 @@ class WebSocket extends EventTarget {
 [WebSocket.CONNECTING, WebSocket.OPEN] = [0, 1];
 const hear = () => channelSocket.dispatchEvent(Object.assign(new Event("message"), { data: '{"heard": 1}' }));
 class DOMParser {
-  parseFromString() { return { body: { firstElementChild: { dataset: { channel: "0/name" } } } }; }
+  parseFromString() { return { body: { firstElementChild: { dataset: { channel: "name" } } } }; }
 }
 class Storage { getItem() { return null; } setItem() {} }
 
@@ -95,7 +95,7 @@ Object.defineProperty(note, "textContent", { set(text) { this.text = text; log.p
 
 const line = new Worker();
 line.postMessage({ type: "set_server" });
-const html = { type: "GuiHtmlMessage", props: { content: '<div hidden data-channel="0/name"></div>' } };
+const html = { type: "GuiHtmlMessage", props: { content: '<div hidden data-channel="name"></div>' } };
 line.dispatchEvent(Object.assign(new Event("message"), { data: { type: "message_batch", messages: [html] } }));
 const steps = {
   wait,
