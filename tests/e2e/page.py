@@ -138,11 +138,11 @@ class Tab:
         self.errors: list[str] = []
         self.spoilt = False  # a test failed here, typed at random, or left what others do not expect
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
-        self.page.on("console", self._listen)
+        self.page.on("console", self.listen)
         self._arrive()
         expect(self.status).to_have_attribute("data-status", "hand")
 
-    def _listen(self, message: ConsoleMessage) -> None:
+    def listen(self, message: ConsoleMessage) -> None:
         """Keep what the page writes into the browser's console, but for what is expected there."""
         if message.type in ("error", "warning") and not any(each in message.text for each in EXPECTED):
             self.errors.append(f"{message.type} in the console: {message.text}")

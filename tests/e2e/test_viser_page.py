@@ -256,9 +256,9 @@ def test_a_page_without_a_hook_names_it_and_moves_the_arm_by_slider_and_gizmo(
     class Without(Tab):
         scripts = Tab.scripts + TAKEN[hook]
 
-        def _listen(self, message: ConsoleMessage) -> None:
+        def listen(self, message: ConsoleMessage) -> None:
             if "This version of viser lacks" not in message.text:
-                super()._listen(message)
+                super().listen(message)
 
     tab = Without(browser, address, 1280, 720)
     note = tab.page.locator("#kb-lacks")

@@ -30,9 +30,9 @@ class SocketTab(Tab):
 
     scripts = Tab.scripts + KEEP_SOCKETS
 
-    def _listen(self, message: ConsoleMessage) -> None:
+    def listen(self, message: ConsoleMessage) -> None:
         if "413" not in message.text:  # the browser's own words for a refusal
-            super()._listen(message)
+            super().listen(message)
 
 
 @pytest.fixture

@@ -163,9 +163,9 @@ class Wired(Member):
         self.line, self.alias = Line(address), alias
         super().__init__(browser, self.line.address, code, alias, phone)
 
-    def _listen(self, message: ConsoleMessage) -> None:
+    def listen(self, message: ConsoleMessage) -> None:
         if not any(each in message.text for each in LOST):
-            super()._listen(message)
+            super().listen(message)
 
     def second_tab(self) -> Page:
         """Another tab with the same cookies, and nothing in its own storage."""
