@@ -61,6 +61,7 @@ class Pool:
         begin = pickle.dumps(Begin(settings, store.robots, every_processor()))
         self.processes = [ComputeProcess(begin) for _ in range(count)]
         self._free = deque(self.processes)
+        self._jobs: dict[Job, ComputeProcess] = {}  # under way
 
     def start(self) -> None:
         """Start the processes; returns at once. Any thread may call."""
@@ -107,6 +108,7 @@ class Pool:
         deadline.check_now()
         process = self._free.popleft()
         loop, job = asyncio.get_running_loop(), Job(b"")
+        self._jobs[job] = process
         timers = [loop.call_later(deadline.left + LATE, process.kill, job)]
 
         def left() -> None:
@@ -132,15 +134,16 @@ class Pool:
             for timer in timers:
                 timer.cancel()
             self._free.append(process)
+            del self._jobs[job]
             if took is not None and job.seconds:
                 took(job.seconds)
         return found
 
     def cancel(self) -> None:
         """End what is being computed."""
-        for process in self.processes:
-            process.cancel(process.job)
-            asyncio.get_running_loop().call_later(GRACE, process.kill, process.job)
+        for job, process in self._jobs.items():
+            process.cancel(job)
+            asyncio.get_running_loop().call_later(GRACE, process.kill, job)
 
     def stop(self) -> None:
         """End all processes. Any thread may call."""

@@ -94,19 +94,19 @@ class ComputeProcess:
                 with self._lock:
                     self.job = None
 
-    def cancel(self, job: Job | None) -> None:
-        """Tell the process that nobody waits for this job any more, if it is at it. Does not block."""
+    def cancel(self, job: Job) -> None:
+        """Tell the process that nobody waits for this job any more, or do not let it begin. Does not block."""
         with self._lock, contextlib.suppress(OSError):  # it has ended: the thread that asks sees that too
-            if job is not None and not job.cancelled:
+            if not job.cancelled:
                 job.cancelled = True
                 if job.sent and job is self.job and self.child is not None:
                     write(self.child.stdin, CANCEL)
 
-    def kill(self, job: Job | None) -> None:
-        """Kill the process if it is still at this job."""
+    def kill(self, job: Job) -> None:
+        """Kill the process if it is still at this job, or see to it that it does not begin with it."""
         with self._lock:
-            if job is not None and job is self.job and self.child is not None:
-                job.cancelled = True
+            job.cancelled = True
+            if job is self.job and self.child is not None:
                 self.child.kill()
 
     def stop(self) -> None:

@@ -151,9 +151,15 @@ def test_one_that_goes_on_for_a_client_that_has_left_is_killed(stand_ins, caplog
     assert caplog.text == "", "nothing is wrong with it"
 
 
-def test_one_whose_time_is_over_is_killed(stand_ins, monkeypatch):
+@pytest.mark.parametrize("started", [True, False], ids=["meanwhile", "before it begins"])
+def test_one_whose_time_is_over_is_killed(stand_ins, monkeypatch, started):
     monkeypatch.setattr(module, "LATE", 0.05)
     pool = stand_ins()
+    if started:
+        ask(pool, pool_jobs.pid)
+    else:
+        start = process._start
+        monkeypatch.setattr(process, "_start", lambda: time.sleep(0.3) or start())
     with pytest.raises(TooSlowError):
         ask(pool, pool_jobs.hangs, seconds=0.05)
     assert ask(pool, pool_jobs.pid)
@@ -196,11 +202,12 @@ def test_a_process_that_was_killed_while_idle_costs_nothing(stand_ins):
     assert ask(pool, pool_jobs.pid) != before
 
 
-def test_a_stop_of_the_service_ends_what_is_computed(pool):
+@pytest.mark.parametrize("after", [0.0, 0.1], ids=["before it begins", "meanwhile"])
+def test_a_stop_of_the_service_ends_what_is_computed(pool, after):
     async def stopped() -> None:
         work = ComputeSlots(1, 60.0, pool=pool)
         running = asyncio.ensure_future(pool.run(pool_jobs.goes_on, Deadline(work)))
-        await asyncio.sleep(0.01)
+        await asyncio.sleep(after)
         work.close()
         await running
 
