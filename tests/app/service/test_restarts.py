@@ -24,6 +24,7 @@ def serve(first, say):
 {body}
 
 if __name__ == "__main__":
+    {before}
     restarts.LONGEST_PAUSE = 0.01
     sys.exit(restarts.restarted(serve, {grace}))
 """
@@ -31,10 +32,10 @@ if __name__ == "__main__":
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="Linux only")
 
 
-def run(body: str, grace: float = 20.0) -> subprocess.CompletedProcess[str]:
-    """What becomes of a service that does this each time it is started."""
+def run(body: str, grace: float = 20.0, before: str = "") -> subprocess.CompletedProcess[str]:
+    """What becomes of a service that does this each time it is started; the first process does `before` at first."""
     lines = "\n".join(f"    {line}" for line in body.splitlines())
-    code = BEGIN.format(root=str(ROOT), body=lines, grace=grace)
+    code = BEGIN.format(root=str(ROOT), body=lines, grace=grace, before=before)
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
 
 
@@ -57,6 +58,14 @@ def test_one_that_has_served_is_started_again_however_it_ends(act, code):
     done = run(f"print(first, flush=True)\nsay()\nif first:\n    {act}\nstop_all()")
     assert (done.returncode, done.stdout) == (0, "True\nFalse\n")
     assert f"the service has ended with code {int(code)} and is started again now" in done.stderr
+
+
+def test_what_the_first_process_does_at_its_end_is_not_done_by_those_that_it_starts():
+    done = run(
+        "say()\nif not first:\n    stop_all()\nreturn 0",
+        before="import atexit; atexit.register(print, 'at the end')",
+    )
+    assert (done.returncode, done.stdout) == (0, "at the end\n")
 
 
 def test_one_that_ends_soon_again_and_again_is_started_more_and_more_slowly(tmp_path):
