@@ -33,7 +33,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="Linux only")
 
 
 def run(body: str, grace: float = 20.0, before: str = "") -> subprocess.CompletedProcess[str]:
-    """What becomes of a service that does this each time it is started; the first process does `before` at first."""
+    """What becomes of a service that does this each time it is started; the first process begins with `before`."""
     lines = "\n".join(f"    {line}" for line in body.splitlines())
     code = BEGIN.format(root=str(ROOT), body=lines, grace=grace, before=before)
     return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
