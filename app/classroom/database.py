@@ -235,7 +235,7 @@ class Database:
             self.newer = True
             self._log(f"{error}")
             raise ClassroomUnavailable(NEWER) from error
-        except (DataError, IntegrityError) as error:  # these values, and no others
+        except DataError as error:  # these values, and no others
             self._log(_brief(error))
             raise RefusedError(UNFIT) from None  # what caused it names the values
         except (SQLAlchemyError, sqlite3.Error, OSError) as error:
@@ -310,6 +310,8 @@ def _brief(error: Exception) -> str:
 
 
 def _sentence(error: Exception) -> str:
+    if isinstance(error, IntegrityError):  # ids are made by us: another launch or host has used one, or removed it
+        return "Somebody else has just changed the same in the classroom's database. Try again."
     words = str(getattr(error, "orig", None) or error).lower()
     if "locked" in words or "busy" in words:
         return "Another program has locked the classroom's database for too long. Try again in a moment."

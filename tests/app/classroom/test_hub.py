@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
-from sqlalchemy import event, func, select, update
-from sqlalchemy.exc import IntegrityError, OperationalError
+from sqlalchemy import event, func, insert, select, update
+from sqlalchemy.exc import DataError, OperationalError
 from stored_bytes import stored_bytes
 
 from app.classroom import (
@@ -343,7 +343,7 @@ def test_a_locked_database_delays_and_loses_nothing(hub, other, tmp_path, monkey
 
 ERRORS = [
     ZeroDivisionError("no error of the database"),
-    IntegrityError("", {}, Exception("a value of this room")),
+    DataError("", {}, Exception("a value of this room")),
     OperationalError("", {}, Exception("a page of the file that has this room")),
 ]
 
@@ -392,12 +392,18 @@ def test_what_could_not_be_stored_is_tried_again_when_the_service_stops(hub, oth
 
 
 def test_a_value_that_the_database_refuses_is_said_and_not_logged(hub, caplog):
-    refused = IntegrityError("", {}, Exception("null value\nDETAIL:  Failing row contains (Ada Lovelace)"))
+    refused = DataError("", {}, Exception("value too long\nDETAIL:  Failing row contains (Ada Lovelace)"))
     with pytest.raises(RefusedError, match="cannot be stored") as found, hub.database.write():
         raise refused
     assert found.value.__suppress_context__
-    assert "null value" in caplog.text
+    assert "value too long" in caplog.text
     assert "Lovelace" not in caplog.text
+
+
+def test_who_is_second_with_the_same_row_is_asked_to_try_again(hub):
+    room = hub.rooms.open("Kinematics", 3600)
+    with pytest.raises(ClassroomUnavailable, match="Try again"), hub.database.write() as connection:
+        connection.execute(insert(Room).values(id=room.id, code="ACDEFGHJ", title="", created=0.0, ends=9e9))
 
 
 @pytest.mark.full

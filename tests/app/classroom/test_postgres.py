@@ -12,8 +12,8 @@ from postgres_server import Postgres, running
 from sqlalchemy import create_engine, select
 from test_hub import attempt, nothing, until
 
-from app.classroom import ClassroomUnavailable, Hub, Ticket
-from app.classroom.tables import Attempt, Base, Room
+from app.classroom import ClassroomUnavailable, Hub, RefusedError, Ticket
+from app.classroom.tables import Attempt, Base, Room, Seat
 
 
 @pytest.fixture(scope="module")
@@ -88,6 +88,26 @@ def test_a_row_that_another_program_keeps_locked_holds_up_its_room_alone(hubs, m
         assert not free.room.problem
     engine.dispose()
     until(lambda: frozen(held) and not held.room.problem)
+
+
+@pytest.mark.full
+def test_a_value_that_the_server_refuses_concerns_its_room_alone(hubs):
+    hub, _ = hubs
+    bad, well = (hub.rooms.open(title, 3600) for title in ("Bad", "Well"))
+    student = hub.attend(hub.rooms.join(bad.code, "Ada"), nothing)
+    other = hub.attend(hub.rooms.join(well.code, "Bob"), nothing)
+    with pytest.raises(RefusedError, match="cannot be stored"):
+        student.submit(attempt(verdict="half\0way"))
+    confirmed = student.submit(attempt())
+    student.tell_task("no\0thing")
+    until(lambda: student.room.problem)
+    assert "cannot be stored" in student.room.problem
+    other.tell_task("swing")
+    until(lambda: not hub._lives[well.id].unsaved)
+    with hub.database.read() as connection:
+        assert connection.scalars(select(Attempt.id)).all() == [confirmed.id]
+        assert connection.scalar(select(Seat.task).where(Seat.id == other.ticket.seat)) == "swing"
+    assert not other.room.problem
 
 
 @pytest.mark.full

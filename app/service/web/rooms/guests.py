@@ -1,7 +1,7 @@
 """Whether the seat of a guest is still there: who has joined a room uses the viewer as long as the room goes on.
 
-The cookie names the room and the seat. Each process asks the database about each of them at most every few
-seconds. So the viewer is soon lost when a room ends or a student is removed, whichever worker is asked.
+The cookie names the room and the seat. The database is asked about each of them at most every few seconds. So the
+viewer is soon lost when a room ends or a student is removed.
 """
 
 from __future__ import annotations
