@@ -24,7 +24,6 @@ from app.api.schemas import Number, OneOf, Vector3, Vector4, integral, numbers
 from app.shared.options import declared
 from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
-from app.shared.targets import ORIENTATIONS, orientation, text_target, whole_matrix
 from app.shared.threads.turns import offer
 from kin import IKOptions, InputError, JointConstraints, Robot, Task, solve_path
 from kin.collision.obstacles import LONGEST_NAME, MOST_OBSTACLES, checked_obstacles
@@ -34,6 +33,7 @@ from kin.ik.problem import FAR, read_pose
 from kin.kernels.checks import straighten_many
 from kin.poses import FORMS as POSES
 from kin.poses import far_from_unit
+from kin.poses.fields import ORIENTATIONS, orientation, text_target, whole_matrix
 from kin.solvers.contract import POSE
 from kin.transforms import Array, frame_from_approach, frames_from_approaches, rotations_from_wxyz
 from kin.typed import LONGEST_LIST

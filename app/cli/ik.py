@@ -29,11 +29,11 @@ from app.cli.terminal import (
 )
 from app.shared.answers.ik import Blocked, IkAnswer, Solution, add_pendant, ik_answer
 from app.shared.options import Option, declared
-from app.shared.targets import ORIENTATIONS, orientation
 from kin import IKOptions, InputError, Robot, Task
 from kin.frames import TOOL
 from kin.ik import solve
 from kin.ik.options import MASK_NAMES
+from kin.poses.fields import ORIENTATIONS, orientation
 from kin.transforms import Array, frame_from_approach
 from kin.units import PLAIN, Unit, Units
 

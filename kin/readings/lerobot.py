@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -78,6 +78,13 @@ def motors_from_lerobot(
         names = "one motor at least that is named like a joint: " + ", ".join(joint.name for joint in robot.joints)
         raise InputError("calibration", list(table), names)
     found = checked_motors(motors)
+    _refuse_unknown(found, robot)
+    fit_joints(found, {joint.name: joint.kind == "prismatic" for joint in robot.joints})
+    return found
+
+
+def _refuse_unknown(motors: Sequence[Motor], robot: Robot) -> None:
+    """Raises `InputError` for a motor that is named like no joint while a joint has no motor."""
     moved = {motor.joint for motor in motors}
     missing = [joint.name for joint in robot.joints if joint.name not in moved]
     for motor in motors:
@@ -86,8 +93,6 @@ def motors_from_lerobot(
             expected = f"the name of a joint that has no motor: {', '.join(missing)}"
             meant = f"; perhaps {near[0]}" if near else ""
             raise InputError(f"calibration.{motor.name}", motor.name, expected + meant)
-    fit_joints(found, {joint.name: joint.kind == "prismatic" for joint in robot.joints})
-    return found
 
 
 def motors_to_lerobot(robot: Robot | str) -> dict[str, dict[str, int]]:

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from app.cli.pipes.columns import Columns
 from app.cli.pipes.parquet import MAGIC, opened_columns, rows_of
 from app.cli.pipes.poses import NOTHING, PoseTable, Wrong
-from app.shared.targets import FIELDS, ORIENTATIONS, orientation, text_target, whole_matrix
 from kin import InputError, Robot, Task
 from kin.ik.problem import read_pose
+from kin.poses.fields import FIELDS, ORIENTATIONS, orientation, text_target, whole_matrix
 from kin.solvers import contract
 from kin.transforms import frame_from_approach, pose_from_position_wxyz
 

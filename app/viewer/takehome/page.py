@@ -26,8 +26,6 @@ from numpy.typing import ArrayLike, NDArray
 from trimesh import creation
 
 from app.shared.settings import static_folder
-from app.viewer.obstacles.nodes import COLOR
-from app.viewer.obstacles.placed import pose, sizes
 from app.viewer.panel.posture import short
 from app.viewer.scene.bodies.drawing import Drawing, drawing
 from app.viewer.scene.bodies.parts import Part, joint_color
@@ -46,6 +44,7 @@ RATE = 60.0  # of the samples of a program, per second
 MOST_SAMPLES = 3000  # of a program: a longer one has fewer a second
 _STEPS = 65535  # of a coordinate of a mesh, over the size of the mesh
 _OPTIONS = IKOptions()
+_OBSTACLE = (158, 162, 168)  # as in the viewer
 _HIDDEN = ("axis", "approach")  # parts of a generated body that show how a joint moves, not how the arm looks
 
 
@@ -230,17 +229,16 @@ def _parts(made: Body, drawn: Drawing | None) -> list[tuple[Part, int, Array | N
 
 def _obstacle(obstacle: Obstacle) -> tuple[Part, int, Array]:
     """The mesh of an obstacle, beside the base; the place of a table is the middle of its top."""
-    T = pose(obstacle)
-    if obstacle.shape == "sphere":
-        mesh = creation.icosphere(3, sizes(obstacle)[0])
-    elif obstacle.shape == "cylinder":
-        radius, height = sizes(obstacle)
-        mesh = creation.cylinder(radius, height, sections=48)
-    else:
-        mesh = creation.box(sizes(obstacle))
+    T = pose_from_xyz_rpy(obstacle.xyz, obstacle.rpy)
+    if obstacle.size is not None:
+        mesh = creation.box(obstacle.size)
         if obstacle.shape == "table":
-            T = T @ pose_from_xyz_rpy([0.0, 0.0, -0.5 * sizes(obstacle)[2]])
-    return Part("obstacle", mesh, COLOR), 0, T
+            T = T @ pose_from_xyz_rpy([0.0, 0.0, -0.5 * obstacle.size[2]])
+    elif obstacle.height is not None:
+        mesh = creation.cylinder(obstacle.radius or 0.0, obstacle.height, sections=48)
+    else:
+        mesh = creation.icosphere(3, obstacle.radius or 0.0)
+    return Part("obstacle", mesh, _OBSTACLE), 0, T
 
 
 def _mesh(part: Part, link: int, T: Array | None) -> dict[str, Any]:

@@ -10,9 +10,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kin import InputError, Task
+from kin.differential.task import Task
+from kin.errors import InputError
 from kin.frames import pose_from_xyz_rpy
-from kin.poses import VECTOR, checked_wxyz, read_target, rotation_from_wxyz
+from kin.poses.quaternions import checked_wxyz, rotation_from_wxyz
+from kin.poses.reading import read_target
+from kin.poses.rotations import VECTOR
 from kin.transforms import Array, finite_array
 from kin.typed import ReadError
 
