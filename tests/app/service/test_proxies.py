@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import shutil
+import signal
 import socket
 import ssl
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
 import httpx2
@@ -25,7 +27,7 @@ from websockets.sync.client import connect
 from websockets.sync.server import serve as serve_websocket
 
 import kin
-from app.classroom import COOKIE
+from app.classroom import COOKIE, Hub
 from app.classroom.hub import LOOK
 from app.service.main import create_app
 from app.shared.settings import Settings
@@ -300,12 +302,14 @@ def test_compose_puts_https_in_front(certificate: Path, tmp_path: Path) -> None:
 
 
 @contextmanager
-def process(data: Path) -> Iterator[tuple[subprocess.Popen[str], int]]:
-    """A service of its own process, as in a container, and its port."""
+def process(data: Path) -> Iterator[tuple[subprocess.Popen[str], int, int]]:
+    """A service of its own, as in a container: the process that starts it, its port, and which process answers."""
     names = {"KINBOARD_ROOT_PATH": "/kinboard", "KINBOARD_TRUSTED_PROXIES": '["127.0.0.1"]'}
     env = {**os.environ, **names, "KINBOARD_DATA": str(data), "KINBOARD_COMPUTE": "0"}
     command = [sys.executable, "-m", "app.cli", "serve", "--port", "0"]
-    with subprocess.Popen(command, cwd=ROOT, env=env, stdout=subprocess.PIPE, text=True) as started:
+    with subprocess.Popen(
+        command, cwd=ROOT, env=env, stdout=subprocess.PIPE, text=True, start_new_session=True
+    ) as started:
         try:
             assert started.stdout is not None
             found = re.search(r"http://[^/]+:(\d+)/", started.stdout.readline())
@@ -313,39 +317,47 @@ def process(data: Path) -> Iterator[tuple[subprocess.Popen[str], int]]:
             port = int(found[1])
             with httpx2.Client(trust_env=False, base_url=f"http://127.0.0.1:{port}/kinboard", timeout=20.0) as ask:
                 wait_for(lambda: ask.get("/readyz").status_code == 200, seconds=600)
-            yield started, port
+                yield started, port, home(ask)
         finally:
-            started.kill()
+            end(started)
+
+
+def home(client: httpx2.Client, query: str = "") -> int:
+    """Which process answers."""
+    return int(client.get(f"/livez{query}").json()["pid"])
+
+
+def end(started: subprocess.Popen[str]) -> None:
+    """Kill a service, also the process that would start it again."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(started.pid, signal.SIGKILL)
 
 
 @pytest.mark.parametrize("name", PROXIES)
-def test_all_pages_of_a_room_reach_the_same_of_two_processes(
+def test_all_pages_of_a_room_reach_the_same_of_two_services(
     name: str, certificate: Path, tls: ssl.SSLContext, tmp_path: Path
 ) -> None:
-    """They see each other at once, in memory; if the process is killed, the room goes on in the other one."""
+    """They see each other at once, in memory; if the service is killed, the room goes on in the other one."""
     with (
         process(tmp_path / "data") as one,
         process(tmp_path / "data") as two,
         running(PROXIES[name], tmp_path / name, certificate, one[1], two[1]) as address,
-        ExitStack() as stack,
+        contextlib.closing(Hub(tmp_path / "data")) as hub,
+        contextlib.ExitStack() as stack,
     ):
 
         def browser() -> httpx2.Client:
             made = httpx2.Client(base_url=f"https://{address}/kinboard", verify=tls, trust_env=False, timeout=20.0)
             return stack.enter_context(made)
 
-        def home(client: httpx2.Client, query: str = "") -> int:
-            """Which process answers."""
-            return int(client.get(f"/livez{query}").json()["pid"])
-
         def opened() -> tuple[httpx2.Client, str]:
-            teacher = browser()
-            assert teacher.post("/room", data={"hours": "2"}).status_code == 303
-            return teacher, re.sub(r"\W", "", teacher.get("/room").text.split('class="code">')[1][:9])
+            room, teacher = hub.rooms.open("Class", 3600.0), browser()
+            assert teacher.get(f"/room/teach/{room.token}").status_code == 303
+            return teacher, room.code
 
         rooms = [opened()]
         while len({home(teacher) for teacher, _ in rooms}) < 2:
-            assert len(rooms) < 40, "all rooms are in one process"
+            assert len(rooms) < 40, "all rooms are in one service"
             rooms.append(opened())
         for teacher, code in rooms[-2:]:
             student = browser()
@@ -357,9 +369,9 @@ def test_all_pages_of_a_room_reach_the_same_of_two_processes(
             each.wait(lambda each=each: "data-class-bar" in each.html)
         tabs[1].say("feature", ["class", ["freeze", 1], None])  # as the button does
         tabs[0].wait(lambda: "data-class-frozen" in tabs[0].html, timeout=LOOK - 0.5)
-        first, other = (one, two) if home(student) == one[0].pid else (two, one)
-        first[0].kill()
-        wait_for(lambda: student.get("/room").status_code == 200 and home(student) == other[0].pid)
+        first, other = (one, two) if home(student) == one[2] else (two, one)
+        end(first[0])
+        wait_for(lambda: student.get("/room").status_code == 200 and home(student) == other[2])
         assert "You are in this room as a student" in student.get("/room").text
         with tab(address, tls, student) as again:
             again.wait(lambda: "data-class-bar" in again.html)
