@@ -176,7 +176,7 @@ class Rooms:
         """Change a room; raises `UnknownRoomError` if it has ended, and `ClassroomUnavailable`."""
         kept = self._lives.get(room)
         live = kept or LiveRoom(room)
-        with live.turn(WAIT if wait is None else wait):
+        with live.turn(PATIENCE):  # a whole class may answer in the same moment
             with self._database.write(durable, wait) as connection:
                 going_on = update(Room).where(Room.id == room, Room.ends > now())
                 version = connection.scalar(going_on.values(version=Room.version + 1).returning(Room.version))
