@@ -30,8 +30,8 @@ LONG = frozenset(
     TESTS / file
     for file in (
         "test_docs.py",
-        "app/api/test_generated_client.py",
-        "app/api/test_schemathesis.py",
+        "app/api/clients/test_generated_client.py",
+        "app/api/clients/test_schemathesis.py",
         "app/cli/test_cli.py",
         "app/cli/test_xacro.py",
         "app/service/test_fault_table.py",

@@ -61,7 +61,7 @@ TRUSTED = {
     "app/live/client/connection.py": "the service to which a program has connected",
     "app/notebook/child.py": "the process that started this one",
     "app/shared/answers/answer.py": "code of ours",
-    "app/shared/metrics.py": "the process itself",
+    "app/service/compute": "the service, and its own processes",
     "app/shared/options.py": "code of ours",
     "app/shared/settings.py": "the operator's settings",
     "app/shared/solver_names.py": "a file of ours",

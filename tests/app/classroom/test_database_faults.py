@@ -108,7 +108,7 @@ def test_a_page_of_a_room_reads_that_the_database_is_of_a_newer_version(tmp_path
 
 
 def test_the_start_names_a_newer_database_and_the_service_runs(teacher, tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(main, "supervise", lambda *_, **__: 0)
+    monkeypatch.setattr(main, "restarted", lambda *_, **__: 0)
     monkeypatch.setattr(main, "_serve", lambda *_, **__: 0)
     assert main.run(Settings(port=0, data=tmp_path / "data")) == 0  # type: ignore[call-arg]
     assert NEWER not in capsys.readouterr().err

@@ -18,7 +18,7 @@ from app.cli.arguments import completion
 CASES = [
     (["wor"], {"workspace"}),
     (["fk", "pio"], {"pioneer5"}),
-    (["fk", "ur5", "--form"], {"--format"}),
+    (["fk", "ur5", "--form"], {"--form", "--format"}),
     (["fk", "ur5", "--format", ""], {"csv", "npy", "ndjson"}),
     (["ik", "--redun"], {"--redundancy"}),
     (["workspace", "--strategy", "u"], {"uniform"}),

@@ -28,7 +28,19 @@ OF_A_PATH = {
     "rotation_tolerance",
 }
 OF_A_MOTION = {"avoid_self_collision", "obstacles"}
-OTHERS = {"robot", "target", "targets", "program", "options", "q_seed", "q_start", "max_step", "stop"}
+OTHERS = {
+    "robot",
+    "target",
+    "targets",
+    "program",
+    "options",
+    "q_seed",
+    "q_start",
+    "qd_start",
+    "qdd_start",
+    "max_step",
+    "stop",
+}
 PROGRAM = [kin.Ptp(kin.JointTarget(ARM.home))]
 CALLS = {
     "solve_ik": (kin.solve_ik, set(DEFAULTS), lambda **given: kin.solve_ik(ARM, T, **given)),

@@ -164,7 +164,7 @@ def test_obstacles_are_dragged_with_their_gizmo(port: int) -> None:
         tab.wait(lambda: tab.nodes[travel]["props"]["text"] == "Δ 559 mm")
         tab.send("TransformControlsDragEndMessage", name=gizmo, owner=owner)
         tab.wait(lambda: bool(kept(tab).obstacles) and kept(tab).obstacles[0].xyz == (0.1, 0.9, 0.5))
-        assert tab.script["undo"] == "Drag of an obstacle"
+        tab.wait(lambda: tab.script["undo"] == "Drag of an obstacle")
 
 
 @pytest.mark.full

@@ -123,7 +123,7 @@ def test_a_drag_is_one_step_however_long_it_takes(port: int) -> None:
             tab.release()
             tab.settle()
         assert np.allclose(tab.tool_pose(), T, atol=1e-6)
-        assert tab.script["undo"] == "Drag of the target"
+        tab.wait(lambda: tab.script["undo"] == "Drag of the target")
         tab.say("undo")
         tab.settle()
         T[1, 3] -= 0.04
@@ -203,7 +203,7 @@ def test_settings_are_undone(port: int) -> None:
             tab.say("undo")
             tab.wait(lambda name=name: tab.value(name) == before[name])  # type: ignore[misc]
         tab.settle()
-        assert tab.script["undo"] == ""
+        tab.wait(lambda: tab.script["undo"] == "")
         for name, value in changes.items():
             tab.say("redo")
             tab.wait(lambda name=name, value=value: tab.value(name) == value)  # type: ignore[misc]

@@ -88,7 +88,7 @@ def test_an_invalid_joint_value_is_named_and_moves_nothing(port: int, text: str)
         assert "Valid: 0 … 150°" in tab.script["reply"][1]
         assert tab.value(elbow) == 30
         assert np.allclose(tab.tool_pose(), kin.fk(PIONEER, PIONEER.q_home), atol=1e-9)
-        assert tab.script["undo"] == ""
+        tab.wait(lambda: tab.script["undo"] == "")
 
 
 def test_every_field_has_its_unit_and_steps(port: int) -> None:

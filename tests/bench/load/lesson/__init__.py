@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import math
 import tempfile
 import time
@@ -18,7 +17,7 @@ from app.classroom import COOKIE, Hub
 from load import latencies, percentile, table
 from load.drag import HZ
 from load.lesson.joining import join
-from load.play import JOINT, MESSAGES
+from load.play import JOINT
 from load.service import Service, serve
 from load.visitor import Visitor
 
@@ -55,7 +54,7 @@ async def members(service: Service, hub: Hub, count: int) -> list[Visitor]:
 
 async def press(visitor: Visitor, number: int, name: str) -> None:
     """Press a button of the tab Class."""
-    visitor.set(MESSAGES, json.dumps([[number, "feature", ["class", [name, number], None]]]))
+    visitor.say("feature", ["class", [name, number], None])
     await asyncio.sleep(UP)
 
 

@@ -128,7 +128,7 @@ def test_equations_that_are_derived_later_belong_to_the_choice_of_the_arm(
     begin.set()
     tab.wait(lambda: "data-equation" in tab.html)
     tab.settle()
-    assert tab.script["undo"] == "Robot"
+    tab.wait(lambda: tab.script["undo"] == "Robot")
     tab.say("undo")
     tab.wait(lambda: tab.value("Robot") == PIONEER.name)
 

@@ -112,7 +112,7 @@ def test_recorded_poses_are_played(tab: FakeBrowser) -> None:
     shows(tab, PIONEER, turned(50))
     press(tab, "scrub", value=0.0)
     shows(tab, PIONEER, turned(20))
-    assert tab.script["undo"] == "Time of the program"
+    tab.wait(lambda: tab.script["undo"] == "Time of the program")
 
 
 @pytest.mark.full

@@ -107,7 +107,7 @@ def test_a_way_around_a_post_is_put_into_the_program_in_one_step(port: int) -> N
         motion = kin.plan_motion(UR5, segments, start)
         q = motion.derivatives(np.linspace(0.0, motion.duration, 2000))[0]
         assert kin.clearance(UR5, q, [post]).min() > -1e-7
-        assert tab.script["undo"] == "Find a way"
+        tab.wait(lambda: tab.script["undo"] == "Find a way")
         tab.say("undo")
         tab.wait(lambda: rows(tab) == 3)
 

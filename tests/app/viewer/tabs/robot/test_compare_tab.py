@@ -95,11 +95,11 @@ def test_a_mistake_is_named_and_one_click_mends_it_in_one_step(port: int) -> Non
         assert tab.value("Joint of both arms") == 3  # the first axis that lies otherwise
         assert "the first that differs" in part(tab, "compared-joint")
         say(tab, "apply", value="0")
-        assert tab.script["undo"] == "Mistake mended"
+        tab.wait(lambda: tab.script["undo"] == "Mistake mended")
         tab.wait(lambda: "Identical: equal joint values give equal poses." in part(tab, "compared"))
         tab.say("undo")
         tab.wait(lambda: "a of row 2 is wrong" in part(tab, "compared"))
-        assert tab.script["undo"] == "Compare with"
+        tab.wait(lambda: tab.script["undo"] == "Compare with")
         say(tab, "other", value="")
         assert part(tab, "compared") == ""
         assert ghosts(tab) == []

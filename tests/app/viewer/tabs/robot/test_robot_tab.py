@@ -105,7 +105,7 @@ def test_a_typed_cell_changes_the_arm_and_undo_takes_it_back(port: int) -> None:
         shows(tab, longer(PIONEER, 1, 0.25), q)
         assert part(tab, "table") == table, "the table is not sent again while it is typed in"
         assert tab.value("Robot") == f"My arm ({PIONEER.name} variant)"
-        assert tab.script["undo"] == "Row 2, a"
+        tab.wait(lambda: tab.script["undo"] == "Row 2, a")
         type_in(tab, 1, "a", "255")
         shows(tab, longer(PIONEER, 1, 0.255), q)
         say(tab, "left")
@@ -131,7 +131,7 @@ def test_home_and_limits_of_motion_are_typed_and_kept(port: int) -> None:
         type_in(tab, 0, "home", "50")
         type_in(tab, 0, "velocity", "45")
         assert part(tab, "motion") == table, "it is not sent again while it is typed in"
-        assert tab.script["undo"] == "Row 1, velocity"
+        tab.wait(lambda: tab.script["undo"] == "Row 1, velocity")
         say(tab, "left")
         assert (cell(tab, "0 home"), cell(tab, "0 velocity")) == ("50", "45")
         type_in(tab, 0, "velocity", "0")
@@ -233,7 +233,7 @@ def test_a_wrong_cell_is_marked_and_the_last_valid_arm_stays(port: int) -> None:
         assert "“9o” is not a number" in wrong(tab)["2 alpha"]
         assert "Row 3, α: “9o” is not a number" in part(tab, "wrong")
         assert tab.value("Robot") == PIONEER.name
-        assert tab.script["undo"] == ""
+        tab.wait(lambda: tab.script["undo"] == "")
         type_in(tab, 1, "a", "250")
         assert list(wrong(tab)) == ["2 alpha"]
         shows(tab, longer(PIONEER, 1, 0.25), PIONEER.q_home)
@@ -373,7 +373,7 @@ def test_messages_that_the_page_does_not_send_change_nothing(port: int) -> None:
             say(tab, *key, value=value)
             assert "Invalid input" in tab.html, key
         assert tab.value("Robot") == PIONEER.name
-        assert tab.script["undo"] == "Robot"
+        tab.wait(lambda: tab.script["undo"] == "Robot")
 
 
 def test_units_of_the_page_are_those_of_the_table(port: int) -> None:

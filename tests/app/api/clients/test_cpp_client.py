@@ -11,7 +11,7 @@ from live_server import serve, without_viewer
 
 import kin
 
-PAGE = Path(__file__).parents[3] / "docs" / "integrate.md"
+PAGE = Path(__file__).parents[4] / "docs" / "integrate.md"
 
 
 def test_the_program_reads_a_motion(app, tmp_path):

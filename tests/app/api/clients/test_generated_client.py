@@ -18,7 +18,7 @@ from live_server import serve, without_viewer
 pytestmark = pytest.mark.full
 
 PACKAGE = "kinboard_client"
-INTEGRATE = Path(__file__).parents[3] / "docs" / "integrate.md"
+INTEGRATE = Path(__file__).parents[4] / "docs" / "integrate.md"
 MODULES = Path(sys.prefix) / "lint" / "node_modules"  # where scripts/lint.sh installs what comes from npm
 # What a call needs besides the arm and the body.
 ASKED = {"code": "AAAA", "n": 10}
