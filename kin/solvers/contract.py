@@ -77,7 +77,6 @@ class SolverInput:
         respect_limits: choose redundancy parameters so that the limits hold, where that is possible.
         seed, lower, upper: ``(n,)``.
         seed_roll: angle about the target's z axis from its x axis to the seed tool's (tasks with a free roll).
-        weight: what a step of the given joint counts: 0.0 where its value stands for a roll that costs no motion.
     """
 
     T: Array
@@ -88,7 +87,6 @@ class SolverInput:
     lower: Array
     upper: Array
     seed_roll: float = 0.0
-    weight: float = 1.0
 
 
 class Obstacle(NamedTuple):

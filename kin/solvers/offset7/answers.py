@@ -17,15 +17,14 @@ from kin.transforms import Array
 
 @jit
 def answer(
-    params: Array, T: Array, seed: Array, lower: Array, upper: Array, requested: float, limited: bool,
-    weight: float, arcs: Array, out: Array,
+    params: Array, T: Array, seed: Array, lower: Array, upper: Array, requested: float, limited: bool, arcs: Array,
+    out: Array,
 ) -> int:  # fmt: skip
     """out ``(8, 8)`` ← each branch at the requested value of the given joint; if that is NaN, at the feasible one
-    at which the joints move least; behind the joint values, that value. NaN where a branch does not exist.
+    nearest to the seed's; behind the joint values, that value. NaN where a branch does not exist.
 
     arcs ``(INTERVALS, 3)`` ← the feasible intervals in one turn, rows (branch, low, high); returns their number, 0
-    if a value is requested and limits do not matter. seed, lower, upper ``(7,)``: joint values of the arm. weight:
-    what a step of the given joint counts.
+    if a value is requested and limits do not matter. seed, lower, upper ``(7,)``: joint values of the arm.
     """
     back = params[REVERSED] > 0.0
     given = 6 if back else 0
@@ -38,9 +37,7 @@ def answer(
     count = 0
     if math.isnan(requested) or limited:
         span = turn_around(low, high, seed[given])
-        wanted = min(max(seed[given], span[0]), span[1])
-        near = seed[given] if math.isnan(requested) else math.nan
-        count = feasible(params, T, box, span, wanted, (near, weight), arcs, chosen)
+        count = feasible(params, T, box, span, min(max(seed[given], span[0]), span[1]), arcs, chosen)
     if math.isnan(requested):
         _rows_at(params, T, box[NEAR], chosen, q)
     else:

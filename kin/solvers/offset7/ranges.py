@@ -17,7 +17,6 @@ import numpy as np
 from kin.kernels.compile import inlined, jit
 from kin.kernels.simd import rounded, widest
 from kin.solvers.offset7.lanes import ELBOW, FIRST, ROOM, SECOND, SETUP, SIDE, SPACE, VALUE, lanes, set_up
-from kin.solvers.offset7.nearest import nearest_values
 from kin.solvers.offset7.places import marks_of, places_of
 from kin.solvers.offset7.samples import (
     DOUBT_SPACE,
@@ -50,15 +49,13 @@ Point = tuple[float, float]  # value, slack
 
 @jit
 def feasible(
-    params: Array, T: Array, box: Array, span: tuple[float, float], wanted: float, seed: tuple[float, float],
-    arcs: Array, chosen: Array,
-) -> int:  # fmt: skip
+    params: Array, T: Array, box: Array, span: tuple[float, float], wanted: float, arcs: Array, chosen: Array
+) -> int:
     """arcs ``(INTERVALS, 3)`` ← rows (branch, low, high): the feasible values of the given joint; their number.
 
     box ``(3, 7)``: seed and limits as chain angles. span: where the joint may be. chosen ``(8,)`` ← the feasible
-    value at which the joints move least from the seed, or the one nearest to `wanted` if the seed's value is NaN;
-    where there is none, the sample at which the branch is least outside the limits; NaN where it does not exist.
-    seed: its value of the given joint, and what a step of that joint counts.
+    value nearest to the wanted one; where there is none, the sample at which the branch is least outside the
+    limits; NaN where it does not exist.
     """
     setup = np.empty(SETUP)
     set_up(params, T, box, setup)
@@ -90,8 +87,6 @@ def feasible(
     for k in range(8):
         nearest = _nearest(arcs, k, found, wanted)
         chosen[k] = chosen[k] if math.isnan(nearest) else nearest
-    if not math.isnan(seed[0]):
-        nearest_values(target, seed, arcs, found, chosen, L)
     return found
 
 
