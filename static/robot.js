@@ -6,7 +6,6 @@
   const PAUSE = 40; // ms after a key until a cell is sent
   const REST = 400; // the same where the arm on show has meshes: some megabytes are sent for each change
   const PATIENCE = 3000; // ms for an answer, then the next message is sent
-  const MOMENT = 100; // ms by which the answer to a new row may come before the table
   const LEFT = 400; // ms without focus until the table is written again, so that a click on a button finds it
 
   const part = (name) => document.querySelector(`[data-arm="${name}"]`);
@@ -75,19 +74,21 @@
     if (!choice) return;
     flush();
     const key = keyOf(choice.dataset.cell);
-    if (key[0] === "start") adding = 0; // the other arm has rows of its own
+    if (key[0] === "start") coming = 0; // the other arm has rows of its own
     send(key, key[0] === "cell" ? [revision(), choice.value] : choice.value);
   });
 
   // The row for the buttons below the table
 
   let here = 0; // may be a row that is still to come
-  let adding = 0; // rows that are still to come
-  addEventListener("kinboard-connect", () => { adding = 0; });
+  let added = 0; // new rows that were asked for
+  let coming = 0; // which of these is the last that is still to come; 0: none
+  addEventListener("kinboard-connect", () => { coming = 0; });
   function mark() {
     const rows = [...document.querySelectorAll("[data-arm] tr[data-row]")];
     if (!rows.length) return;
-    if (!adding) here = Math.min(here, rows.length - 1);
+    if (here < rows.length) coming = 0;
+    if (!coming) here = Math.min(here, rows.length - 1);
     const at = Math.min(here, rows.length - 1);
     rows.forEach((row, i) => row.classList.toggle("kb-here", i === at));
     const label = document.querySelector("[data-arm-here]");
@@ -99,11 +100,19 @@
     }
   }
 
-  function added() { adding = Math.max(0, adding - 1); mark(); }
+  /** The answer to a new row comes by another connection than the table, and may be earlier, or say that there is none. */
+  function answeredRow(row) {
+    setTimeout(() => {
+      if (coming === row) coming = 0;
+      mark();
+    }, PATIENCE);
+  }
+
   function change(action) {
     flush();
-    if (action === "add") adding++;
-    send(["row", action, here], null, action === "add" ? () => setTimeout(added, MOMENT) : null);
+    if (action === "add") coming = ++added;
+    const row = added;
+    send(["row", action, here], null, action === "add" ? () => answeredRow(row) : null);
     here += { add: 1, up: -1, down: 1 }[action] ?? 0;
     focus = focus?.replace(/^(\[data-cell=")\d+/, `$1${here}`) ?? null;
   }

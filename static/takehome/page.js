@@ -355,9 +355,9 @@
       const [sign, far] = STEPS[event.key] ?? [0, 1];
       if (!sign || event.ctrlKey || event.metaKey || event.altKey) return;
       event.preventDefault();
-      const step = (joint.turns ? Math.PI / 180 : 0.001) * far * (event.shiftKey ? 0.1 : 1);
+      const size = (joint.turns ? Math.PI / 180 : 0.001) * far * (event.shiftKey ? 0.1 : 1);
       pause();
-      move(i, clamp(state.q[i] + sign * step, joint.lower, joint.upper));
+      move(i, clamp(state.q[i] + sign * size, joint.lower, joint.upper));
     });
     const typed = () => {
       const value = read(field.value, joint.turns);
