@@ -119,11 +119,10 @@ files_of() {
 # then what computes, in four processes, as many tests wait for arms that move; then alone what measures time.
 failed=
 in_processes="--dist loadfile --no-loadscope-reorder"
-# The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Four that
-# begin together would each do so, thus one does while pages wait. What cannot be collected is said by the run.
-start collection pytest --collect-only -qq
 pytest -n 3 $in_processes -m "$selected and browser" $(files_of browser) || failed="$failed browsers"
-finish collection >/dev/null || :
+# The first process that collects all tests compiles their modules, which takes twice as long as the rest of it. Four that
+# begin together would each do so. What cannot be collected is said by the run.
+pytest --collect-only -qq >/dev/null 2>&1 || :
 pytest -n 4 $in_processes -m "$selected and not browser and not bench" || failed="$failed tests"
 finish mypy || failed="$failed mypy"
 [ "$selected" = "not slow and not full" ] || pytest -m "$selected and bench" $(files_of bench) || failed="$failed measurements"

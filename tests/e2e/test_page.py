@@ -175,8 +175,8 @@ def test_the_panel_is_made_wider_at_its_edge(desktop: Tab) -> None:
     tab.page.locator("[data-dock-region-resize=right]").focus()
     tab.page.keyboard.press("ArrowLeft")
     tab.page.wait_for_function(f"Math.abs({width} - {before + 24}) < 3")
+    tab.page.wait_for_function(f"Number(localStorage.getItem('kinboard-panel-width')) === {width}")
     kept = tab.page.evaluate(width)
-    tab.page.wait_for_function(f"Number(localStorage.getItem('kinboard-panel-width')) === {kept}")
     tab.page.reload()
     tab.page.wait_for_function(
         f"document.querySelector('[data-dock-region=right]') && Math.abs({width} - {kept}) < 3"
