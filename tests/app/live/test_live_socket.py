@@ -19,8 +19,7 @@ from websockets.sync.client import ClientConnection, connect
 import kin
 from app.api import ComputeSlots, api_routes
 from app.classroom.tokens import show_code
-from app.live import VALUES, Door, Line, Lines
-from app.live.codes import unused_code
+from app.live import VALUES, Door, Line, Lines, codes
 from app.live.recording import Recording
 from app.service.web.rooms.limits import Limits
 from app.shared.problems import problem
@@ -483,8 +482,8 @@ def test_each_page_has_a_code_of_its_own(monkeypatch):
     lines = Lines()
     assert len({lines.open(ARM, lambda *_: None).code for _ in range(100)}) == 100
     drawn = iter(("AAAAAAAA", "BBBBBBBB"))
-    monkeypatch.setattr("app.live.codes.new_code", lambda: next(drawn))
-    assert unused_code({"AAAAAAAA"}) == "BBBBBBBB"
+    monkeypatch.setattr(codes, "new_code", lambda: next(drawn))
+    assert codes.unused_code({"AAAAAAAA"}) == "BBBBBBBB"
 
 
 @pytest.mark.full
