@@ -323,7 +323,8 @@ def test_a_notebook_says_what_it_drives(viewer, monkeypatch):
     arm = notebook.show("ur5", Q, None, 4.0, True, 400, 300, None, "SO-101 at /dev/ttyACM0")
     with frame(arm, viewer) as page:
         page.wait(lambda: "data-live-code" in page.html)
-        assert page.shown.get("driven") == "", "the notebook has not moved it yet"
+        page.wait(lambda: "driven" in page.shown)
+        assert page.shown["driven"] == "", "the notebook has not moved it yet"
         arm.q = Q + 0.1
         page.wait(lambda: page.shown.get("driven") == "SO-101 at /dev/ttyACM0")
         with pytest.raises(kin.InputError, match="drives"):
