@@ -15,7 +15,7 @@ from app.shared.memory.answers import Reservation
 from app.shared.threads import lower_priority
 from app.shared.threads.executor import DaemonExecutor
 from app.viewer.feature import Stage
-from app.viewer.meshes.incoming import IncomingFile
+from app.viewer.meshes.incoming import Awaited, IncomingFile
 from app.viewer.panel import Post
 from app.viewer.panel.status import Notice
 from kin import Robot
@@ -32,7 +32,7 @@ class Opening:
 
     def __init__(self, stage: Stage, post: Post, bounds: Bounds) -> None:
         self._stage, self._post, self._bounds = stage, post, bounds
-        self._incoming: IncomingFile | None = None  # on its way
+        self._awaited = Awaited(lambda *words: stage.notify(Notice("error", *words)))
         self._future: Future[Recording] | None = None
         self._number = 0
         self.name = ""  # of the file that is being read or was read last
@@ -42,25 +42,19 @@ class Opening:
         """What goes on, and how far it is, in per cent; None: nothing."""
         if self._future is not None:
             return f"Reading “{self.name}” …", 100.0
-        if (file := self._incoming) is not None and file.busy:
+        if (file := self._awaited.coming) is not None:
             return f"Receiving “{file.name}” …", round(100.0 * file.arrived / max(file.total, 1))
         return None
 
     def expect(self, file: IncomingFile) -> None:
         """A file is on its way, or has failed, which is said."""
-        if file.cancelled:
-            return
-        if file is not self._incoming:
-            self.stop()
-        self._incoming = None if file.failure else file
-        if file.failure:
-            self._stage.notify(Notice("error", *file.notice))
+        if self._awaited.expect(file):
+            self._cancel()
 
     def take(self, file: IncomingFile) -> None:
         """A file that is whole, unless it was cancelled meanwhile."""
-        if file is not self._incoming:
+        if not self._awaited.take(file):
             return
-        self._incoming = None
         self._cancel()
         self.name = file.name
         self._number += 1
@@ -77,9 +71,7 @@ class Opening:
 
     def stop(self) -> None:
         """End what goes on."""
-        if self._incoming is not None:
-            self._incoming.cancel()
-            self._incoming = None
+        self._awaited.drop()
         self._cancel()
 
     def _cancel(self) -> None:

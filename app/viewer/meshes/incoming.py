@@ -106,6 +106,48 @@ class IncomingFile:
         return self.content() if begin.startswith(ZIP) else self.text(most)
 
 
+class Awaited:
+    """The file that a part of the page waits for: one at a time, the newest.
+
+    Args:
+        refused: called with title and detail of what is said of a file that has failed.
+    """
+
+    def __init__(self, refused: Callable[[str, str], object]) -> None:
+        self._refused = refused
+        self._file: IncomingFile | None = None
+
+    @property
+    def coming(self) -> IncomingFile | None:
+        """The file, while more of it is to come."""
+        return self._file if self._file is not None and self._file.busy else None
+
+    def expect(self, file: IncomingFile) -> bool:
+        """A file is on its way, or has failed, which is said. Returns whether it replaces what went on."""
+        if file.cancelled:
+            return False
+        if another := file is not self._file:
+            self.drop()
+        self._file = None if file.failure else file
+        if file.failure:
+            self._refused(*file.notice)
+        return another
+
+    def take(self, file: IncomingFile) -> bool:
+        """A file is whole. Returns whether it is wanted: not if it was cancelled meanwhile."""
+        if file is not self._file:
+            return False
+        self._file = None
+        return True
+
+    def drop(self) -> bool:
+        """The file is not wanted any more. Returns whether there was one."""
+        file, self._file = self._file, None
+        if file is not None:
+            file.cancel()
+        return file is not None
+
+
 def not_sent(value: object) -> tuple[str, str]:
     """What is said of a file that the page could not send: title and detail.
 

@@ -10,7 +10,7 @@ from functools import partial
 from app.shared.memory.answers import MemoryFullError, Reservation
 from app.viewer.feature import Stage
 from app.viewer.meshes.archive import MeshError, TooLargeError
-from app.viewer.meshes.incoming import IncomingFile
+from app.viewer.meshes.incoming import Awaited, IncomingFile
 from app.viewer.meshes.links import drawing_of, drawing_without_meshes, fingers_of, shapes_of, size_of
 from app.viewer.meshes.placing import Shapes
 from app.viewer.meshes.reader import MOST_TRIANGLES, Meshes, full
@@ -83,7 +83,7 @@ class Uploads:
         self._stage = stage
         self._post = post
         self._begin = begin
-        self._incoming: IncomingFile | None = None  # on its way
+        self._awaited = Awaited(lambda *words: stage.notify(Notice("error", *words)))
         self._number = 0
         self._tip: str | None = None  # of the URDF that was opened last
         self._reading: _Reading | None = None
@@ -95,7 +95,7 @@ class Uploads:
     @property
     def busy(self) -> Busy | None:
         """What goes on."""
-        if (file := self._incoming) is not None and file.busy:
+        if (file := self._awaited.coming) is not None:
             return Busy(f"Receiving “{file.name}”", file.arrived, file.total, "MB")
         if self._reading is not None:
             name = self._reading.source.name
@@ -104,8 +104,7 @@ class Uploads:
 
     def stop(self) -> str:
         """End what goes on; returns what is to be said about it."""
-        receiving, reading = self._incoming is not None, self._reading
-        self._drop_incoming()
+        receiving, reading = self._awaited.drop(), self._reading
         self._reading = None
         self._cancel()
         if receiving:
@@ -114,16 +113,10 @@ class Uploads:
 
     def forget(self) -> None:
         """The visitor has left."""
-        self._drop_incoming()
+        self._awaited.drop()
         self.waiting = self._reading = None
         self.doctor.close()
         self._cancel()
-
-    def _drop_incoming(self) -> None:
-        """A file that is on its way is not wanted any more."""
-        if self._incoming is not None:
-            self._incoming.cancel()
-            self._incoming = None
 
     def _cancel(self) -> None:
         """Meshes that wait or are being read are not wanted any more."""
@@ -133,19 +126,12 @@ class Uploads:
 
     def expect(self, file: IncomingFile) -> None:
         """A file is on its way, or has failed, which is said."""
-        if file.cancelled:
-            return
-        if file is not self._incoming:
-            self._drop_incoming()
-        self._incoming = None if file.failure else file
-        if file.failure:
-            self._stage.notify(Notice("error", *file.notice))
+        self._awaited.expect(file)
 
     def take(self, file: IncomingFile) -> None:
         """A file that is whole, unless it was cancelled meanwhile; raises `kin.KinematicsError`."""
-        if file is not self._incoming:
+        if not self._awaited.take(file):
             return
-        self._incoming = None
         try:
             content = file.text_or_zip(MOST)
         except MeshError as error:
