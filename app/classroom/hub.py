@@ -66,6 +66,9 @@ class Hub:
         url: of another database.
         most: how many rooms there may be at a time.
         share: of these, for one client.
+
+    Attributes:
+        lives: the rooms that are in memory, by id.
     """
 
     def __init__(self, folder: Path, url: str | None = None, most: int = 100, share: float = 1.0) -> None:
@@ -75,7 +78,7 @@ class Hub:
         self._database: Database | None = None
         self._rooms: Rooms | None = None
         self._lock = threading.RLock()
-        self._lives: dict[str, LiveRoom] = {}
+        self.lives: dict[str, LiveRoom] = {}
         self._threads: dict[str, threading.Thread] = {}
         self._stopping = threading.Event()
         self.on_attempt: Callable[[str], None] | None = None  # called with the seat of each stored attempt
@@ -147,7 +150,7 @@ class Hub:
 
                 folder, url = self._source
                 self._database = Database(folder / DATABASE_FILE, url)
-                self._rooms = Rooms(self._database, self._most, self._share, self._lives, self._attempted)
+                self._rooms = Rooms(self._database, self._most, self._share, self.lives, self._attempted)
             return self._rooms
 
     def _attempted(self, seat: str) -> None:
@@ -182,7 +185,7 @@ class Hub:
         """
         place = Place(ticket, changed, silence)
         with self._lock:
-            live = self._lives.setdefault(ticket.room, LiveRoom(ticket.room))
+            live = self.lives.setdefault(ticket.room, LiveRoom(ticket.room))
             live.enter(place)
             if live.id not in self._threads and not self._stopping.is_set():
                 thread = threading.Thread(target=self._run, args=[live], name="kinboard-classroom", daemon=True)
@@ -217,7 +220,7 @@ class Hub:
                 if live.places or live.unsaved:
                     used = steady()
                 if stopping or steady() - used > LINGER:
-                    del self._threads[live.id], self._lives[live.id]
+                    del self._threads[live.id], self.lives[live.id]
                     return
 
     def _tick(self, live: LiveRoom, stopping: bool) -> None:

@@ -129,7 +129,7 @@ def test_what_another_program_does_is_seen_soon_and_nothing_is_lost(hub, other):
     other.rooms.submit(bob, attempt())
     ann.raise_hand(True)
     until(lambda: teacher.room.seats[1].work)
-    until(lambda: not hub._lives[room.id].unsaved)
+    until(lambda: not hub.lives[room.id].unsaved)
     assert [seat.hand > 0 for seat in other.attend(teacher.ticket, nothing).room.seats] == [True, False]
     other.rooms.remove_seat(room.id, bob.seat)
     until(lambda: len(teacher.room.seats) == 1)
@@ -157,7 +157,7 @@ def test_a_change_that_is_not_stored_is_not_in_memory(hub, monkeypatch):
     monkeypatch.setattr("app.classroom.hub.LOOK", 1e9)
     room = hub.rooms.open("Kinematics", 3600)
     teacher = hub.attend(hub.ticket(room.token), nothing)
-    until(lambda: not hub._lives[room.id].unsaved)
+    until(lambda: not hub.lives[room.id].unsaved)
 
     def fail_after(act):
         with hub.rooms.changing(room.id) as change:
@@ -274,7 +274,7 @@ def test_a_removed_seat_is_erased_and_closed(hub):
     student.raise_hand(True)
     with pytest.raises(RefusedError):
         student.submit(attempt())
-    hub._lives[room.id].take_arms()
+    hub.lives[room.id].take_arms()
     assert teacher.room.seats == ()
     with hub.database.read() as connection:
         row = connection.execute(select(Seat.alias, Seat.page, Seat.hand)).one()
@@ -377,14 +377,14 @@ def test_any_error_while_a_room_is_stored_loses_nothing_and_holds_up_no_other_ro
     assert not stored(hub, bad), "not in each tick"
     assert bad.room.problem
     assert not well.room.problem
-    hub._lives[bad.ticket.room].retry_at = 0.0  # as after RETRY or RETRY_ROOM
+    hub.lives[bad.ticket.room].retry_at = 0.0  # as after RETRY or RETRY_ROOM
     until(lambda: stored(hub, bad) == {"frozen": True})
     until(lambda: not bad.room.problem)
 
 
 def test_what_could_not_be_stored_is_tried_again_when_the_service_stops(hub, other, monkeypatch):
     page = hub.attend(hub.ticket(hub.rooms.open("Kinematics", 3600).token), nothing)
-    hub._lives[page.ticket.room].retry_at = 1e18
+    hub.lives[page.ticket.room].retry_at = 1e18
     page.set_frozen(True)
     assert not stored(other, page)
     hub.close()
@@ -584,7 +584,7 @@ def test_what_was_answered_stays_when_the_student_goes_on_or_raises_a_hand(hub, 
     late = other.attend(hub.ticket(room.token), nothing)
     assert late.room.seats[0].work == teacher.room.seats[0].work, "read as it was taken over"
     teacher.remove_seat(seat.seat)
-    assert hub._lives[seat.room].seats[seat.seat]["work"] == {}
+    assert hub.lives[seat.room].seats[seat.seat]["work"] == {}
 
 
 def test_no_two_students_have_the_same_alias(hub, other):

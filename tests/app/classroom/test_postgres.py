@@ -50,7 +50,7 @@ def test_a_class_goes_on_at_another_machine(hubs):
     pages[1].vote(1)
     pages[1].tell_page("mine")
     confirmed = pages[1].submit(attempt())
-    until(lambda: pages[0].room.seats[0].page == "mine" and not here._lives[room.id].unsaved)
+    until(lambda: pages[0].room.seats[0].page == "mine" and not here.lives[room.id].unsaved)
     teacher, student = (there.attend(page.ticket, nothing) for page in pages)
     assert teacher.room == pages[0].room
     assert student.room.page == "live"
@@ -103,7 +103,7 @@ def test_a_value_that_the_server_refuses_concerns_its_room_alone(hubs):
     until(lambda: student.room.problem)
     assert "cannot be stored" in student.room.problem
     other.tell_task("swing")
-    until(lambda: not hub._lives[well.id].unsaved)
+    until(lambda: not hub.lives[well.id].unsaved)
     with hub.database.read() as connection:
         assert connection.scalars(select(Attempt.id)).all() == [confirmed.id]
         assert connection.scalar(select(Seat.task).where(Seat.id == other.ticket.seat)) == "swing"
