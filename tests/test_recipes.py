@@ -183,6 +183,7 @@ with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port, FakeBrow
     tab.wait(lambda: "Is 7 even?" in tab.html)
     tab.say("feature", ["exercises", ["answer", 3], 1])
     tab.wait(lambda: "7 divided by two." in tab.html)
+    tab.wait(lambda: tab.script["undo"] not in ("Lesson", "Exercise"))
     found["undo"] = tab.script["undo"]
 print(json.dumps(found))
 """

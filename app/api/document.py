@@ -83,7 +83,11 @@ def _name_media_type(operation: dict[str, Any]) -> None:
 
 
 def _name_parts(schemas: dict[str, Any]) -> None:
-    """Give `_PARTS` names. The field `d` of a row comes last: openapi-python-client has a variable `d` too."""
+    """Give `_PARTS` names.
+
+    The field `d` of a row comes last, and no field of a row's answer may be absent: openapi-python-client has a
+    variable `d` too, and reads fields that may be absent after all others.
+    """
     properties = schemas["RobotDescription"]["properties"]
     for key, (name, text) in _PARTS.items():
         schemas[name] = {"description": text, **properties[key]["items"]}

@@ -58,7 +58,7 @@ EXAMPLES = {
     ),
     "pose": example(
         "A whole pose; five joints get there up to a roll, and the answer says so",
-        {"target": {"position": [0.045, 0.191, -0.211], "wxyz": [0.022, 0.921, 0.347, -0.177]}, "task": "pose"},
+        {"target": {"position": [0.045, 0.191, -0.211], "wxyz": [0.045, 0.958, 0.225, -0.173]}, "task": "pose"},
     ),
     "position": example(
         "Only a point, near a given configuration",

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.full
 
 @pytest.fixture(scope="module")
 def served():
-    with lesson.served(1) as running:
+    with lesson.served() as running:
         yield running
 
 
@@ -151,7 +151,7 @@ def test_a_message_of_numbers_that_looks_like_text_is_heard_too():
             socket.data_received(bytes([0x80 | opcode, len(data)]) + data)
         return found
 
-    assert asyncio.run(heard()) == [b"{\x01\x02\x03", b"plain"]
+    assert asyncio.run(heard()) == [b"{\x01\x02\x03", b'{"type": "progress"}', b"plain"]
 
 
 def test_visitors_leave_nothing_behind(service):
@@ -178,7 +178,7 @@ def test_a_siege_counts_what_visitors_and_attackers_met(service, monkeypatch):
     assert any(row["MB sent"] > 0 for row in under.attacks)  # on a busy machine, some attackers begin late
     statuses = asyncio.run(siege.answers(service))
     assert statuses["200"] > 0
-    report = siege.report(under, statuses | {"500": 1}, 0, 0, 1)
+    report = siege.report(under, statuses | {"500": 1}, 0, 0)
     assert "1 answers 5xx" in report["left behind"]
     assert not any("lost" in wrong for wrong in report["left behind"])
 

@@ -23,7 +23,6 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import ArrayLike, NDArray
-from trimesh import creation
 
 from app.shared.settings import static_folder
 from app.viewer.panel.posture import short
@@ -229,6 +228,8 @@ def _parts(made: Body, drawn: Drawing | None) -> list[tuple[Part, int, Array | N
 
 def _obstacle(obstacle: Obstacle) -> tuple[Part, int, Array]:
     """The mesh of an obstacle, beside the base; the place of a table is the middle of its top."""
+    from trimesh import creation  # its import takes a quarter of a second
+
     T = pose_from_xyz_rpy(obstacle.xyz, obstacle.rpy)
     if obstacle.size is not None:
         mesh = creation.box(obstacle.size)

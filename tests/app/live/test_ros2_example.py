@@ -63,7 +63,7 @@ def test_the_ghost_is_where_the_arm_of_ros_is(page, bridge, run):
 @pytest.mark.full
 def test_a_driven_arm_follows_slowly_and_starts_where_it_is(page, bridge, run, patient, capsys):
     run("--drive", "--yes", "--speed", f"{SPEED}")
-    page.wait(lambda: "ROS 2 arm at ws://127.0.0.1" in page.html)
+    page.wait(lambda: page.shown.get("driven", "").startswith("ROS 2 arm at ws://127.0.0.1"))
     page.wait(lambda: "The arm follows the page." in capsys.readouterr().out)
     page.wait(lambda: bool(np.allclose(page.tool_pose(), kin.fk(UR5, HERE), atol=1e-5)))
     assert bridge.received == [], "nothing moves before the page does"
@@ -114,7 +114,7 @@ def test_a_silent_arm_is_not_moved_any_further(page, bridge, run, patient, monke
     assert started.codes == [1]
     assert "the arm has said nothing for 0.5 s" in capsys.readouterr().err
     assert bridge.q[NAMES[0]] < np.radians(45.0)
-    page.wait(lambda: "ROS 2 arm at ws://127.0.0.1" not in page.html)
+    page.wait(lambda: page.shown["driven"] == "")
 
 
 @pytest.mark.full

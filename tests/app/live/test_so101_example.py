@@ -150,7 +150,7 @@ def test_a_servo_that_comes_and_goes_hides_the_ghost(page, bus, run, capsys):
 def test_a_driven_arm_starts_where_it_is_and_follows_slowly(page, bus, run, patient, capsys):
     started = run("--drive", "--yes", "--speed", SPEED)
     page.wait(lambda: "The arm follows the page." in capsys.readouterr().out)
-    page.wait(lambda: "SO-101 at /dev/pts" in page.html)
+    page.wait(lambda: page.shown.get("driven", "").startswith("SO-101 at /dev/pts"))
     page.wait(lambda: all(servo.memory[TORQUE] for i, servo in bus.servos.items() if i < 6))
     assert not bus.servos[6].memory[TORQUE], "the gripper is no joint of the arm"
     first_goals = {i: values for _, i, address, values in reversed(bus.written) if address == GOAL}

@@ -375,7 +375,7 @@ def test_what_is_opened_is_stored_in_the_same_step(room: Class) -> None:
     student, _ = room.join("Ann")
     student.set("Lesson", "Courses")
     student.wait(lambda: 'data-course="choose"' in student.html)
-    assert opened(student)["lesson"] == "course"
+    student.wait(lambda: bool(student.kept) and opened(student)["lesson"] == "course")
     student.say("feature", ["course", ["pick", 1], 0])
     student.wait(lambda: 'data-course="follow"' in student.html)
     student.log.clear()
@@ -391,6 +391,7 @@ def test_what_is_opened_is_stored_in_the_same_step(room: Class) -> None:
     assert len(student.kept) - count <= 1, "nothing but the viewpoint is stored again"
     student.say("feature", ["exercises", ["hint", 1], None])
     student.wait(lambda: "Hint 1." in student.html)
+    student.wait(lambda: EXERCISE in opened(student)["exercises"]["done"])
     assert opened(student)["exercises"]["done"][EXERCISE][2] == 1
 
 
