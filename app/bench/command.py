@@ -126,7 +126,7 @@ class _Progress:
         self._stream = stream
         self._on_terminal = stream.isatty()
 
-    def say(self, words: str, share: float) -> None:
+    def say(self, words: str) -> None:
         self._stream.write(f"\r\033[K{words}…" if self._on_terminal else f"{words}…\n")
         self._stream.flush()
 

@@ -22,8 +22,7 @@ from app.bench.rows import MOTIONS, ROWS, Row, Task, prepare
 from kin.solvers import closed_form_of
 from kin.transforms import Array
 
-Say = Callable[[str, float], None]  # words, and the share of the run that is done
-CHECKS = 0.6  # share of a run that prepares and checks, before the rounds
+Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,14 +127,14 @@ class Report:
         return tuple(found)
 
 
-def run(settings: Settings, say: Say = lambda words, share: None) -> Report:
+def run(settings: Settings, say: Say = lambda words: None) -> Report:
     """Measure, with status messages to `say`. Ctrl-C ends the rounds; what was measured by then is returned."""
     installed = [peer for peer in settings.peers if peer.installed]
     refused: list[tuple[str, str, str]] = []
     prepared: list[tuple[Task, list[tuple[Contestant, Check | None]]]] = []
     skipped = []
-    for done, row in enumerate(settings.rows):
-        say(f"checking {row.id}", CHECKS * done / len(settings.rows))
+    for row in settings.rows:
+        say(f"checking {row.id}")
         task = prepare(row, settings.batch if row.batch else settings.targets, settings.seed)
         if task is None:
             skipped.append(row.id)
@@ -144,15 +143,13 @@ def run(settings: Settings, say: Say = lambda words, share: None) -> Report:
     turns = [Turns(contestant) for _, checked in prepared for contestant, _ in checked]
     interrupted = False
     try:
-        say("finding out how long a turn is", CHECKS)
+        say("finding out how long a turn is")
         measure(
             turns,
             settings.rounds,
             settings.turn,
             clock=settings.clock,
-            after_round=lambda done: say(
-                f"round {done} of {settings.rounds}", CHECKS + (1.0 - CHECKS) * done / settings.rounds
-            ),
+            after_round=lambda done: say(f"round {done} of {settings.rounds}"),
         )
     except KeyboardInterrupt:
         interrupted = True

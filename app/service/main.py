@@ -7,16 +7,13 @@ documentation, ``/livez``, ``/readyz`` and ``/metrics`` for operators.
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import signal
 import socket
 import sys
-import tempfile
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from functools import cache, partial
-from pathlib import Path
 
 from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
@@ -54,7 +51,6 @@ from app.service.web.rooms import room_routes, sweeping
 from app.service.web.rooms.guests import Guests
 from app.service.web.rooms.limits import Limits
 from app.service.web.rooms.network import url_for_others
-from app.service.web.scoreboard import Scoreboard
 from app.service.web.viewer_proxy import ViewerBridge
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
@@ -96,14 +92,12 @@ def create_app(
     settings: Settings,
     store: Store | None = None,
     on_ready: Callable[[], None] | None = None,
-    bench: Path | None = None,
     courses: Courses | None = None,
     pool: Pool | None = None,
 ) -> FastAPI:
     """The whole service as one ASGI application; `on_ready` is called when it has warmed up.
 
     Args:
-        bench: folder for runs of the benchmark; None: one of its own.
         courses: those of the operator, and exercises; None: they are read when needed.
         pool: processes that compute, with these settings and this store; None: threads do.
 
@@ -116,7 +110,7 @@ def create_app(
     maps = Maps(settings.map_memory, seconds=settings.map_time)
     memory = AnswerMemory(settings.max_answer, settings.answer_memory)
     work = ComputeSlots(settings.max_requests, settings.time_budget, settings.client_share, memory, pool)
-    scoreboard, classroom = Scoreboard(settings, bench), Hub.of(settings)
+    classroom = Hub.of(settings)
     known = cache(lambda: courses or _courses(settings, store))
     lines = Lines()
     begin = settings, store, clouds, maps, summaries, classroom
@@ -133,7 +127,7 @@ def create_app(
             yield
         keeper.stop()
         work.close()  # computations still running have had their time to finish
-        for step in (startup.stop, scoreboard.close, clouds.close, maps.close, summaries.close):
+        for step in (startup.stop, clouds.close, maps.close, summaries.close):
             await run_in_threadpool(step)
 
     state = (app := _described(lifespan)).state
@@ -145,7 +139,7 @@ def create_app(
     install_problem_handlers(app)
     complete_document(app, settings)
     app.router.routes.extend([*api_routes(), *page_routes(), *embedding_routes(), *bridge.routes()])
-    app.router.routes.extend([*room_routes(classroom, settings, known, state.tries), *scoreboard.routes()])
+    app.router.routes.extend(room_routes(classroom, settings, known, state.tries))
     app.router.routes.extend(lti_routes(classroom, settings, known))
     app.include_router(status.router)
     _add_middleware(app, settings, Guests(classroom))
@@ -211,8 +205,7 @@ def run(settings: Settings, open_browser: bool = False, page: str = "", words: s
         reason = error.strerror or str(error)
         print(NO_PORT.format(settings.host, settings.port, reason), file=sys.stderr)
         return 1
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(listener)
+    with listener:
         try:
             store = Store(settings.robots)
             courses = _courses(settings, store)
@@ -232,8 +225,7 @@ def run(settings: Settings, open_browser: bool = False, page: str = "", words: s
         port = listener.getsockname()[1]
         others = url_for_others(settings.host, port, clean_prefix(settings.root_path))
         greeting = Greeting(url_of(settings, port), open_browser, others, page, words)
-        settings, bench = _with_bench_folder(settings, stack)
-        serve = partial(_serve, settings, listener, store, courses, bench)
+        serve = partial(_serve, settings, listener, store, courses)
         if not can_restart():
             return serve(greeting.show)
 
@@ -248,23 +240,11 @@ def run(settings: Settings, open_browser: bool = False, page: str = "", words: s
         return restarted(served, grace=settings.drain + STOP_TIMEOUT + 1.0)
 
 
-def _with_bench_folder(settings: Settings, stack: contextlib.ExitStack) -> tuple[Settings, Path | None]:
-    """The folder for runs of the benchmark; without one, the settings with the benchmark switched off."""
-    if not settings.bench:
-        return settings, None
-    try:
-        return settings, Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="kinboard-bench-")))
-    except OSError as error:
-        print(f"kinboard: no folder for runs of the benchmark, which are off: {error}", file=sys.stderr)
-        return settings.model_copy(update={"bench": False}), None
-
-
 def _serve(
     settings: Settings,
     listener: socket.socket,
     store: Store,
     courses: Courses,
-    bench: Path | None,
     on_start: Callable[[], None],
     alone: bool = True,
 ) -> int:
@@ -272,7 +252,6 @@ def _serve(
 
     Args:
         store, courses: of the operator.
-        bench: folder for runs of the benchmark, if there are any.
         on_start: called once it accepts connections.
         alone: whether no other process would start it again.
     """
@@ -285,7 +264,7 @@ def _serve(
     gc.set_threshold(*COLLECTIONS)
     pool = Pool(settings.processes, settings, store) if settings.processes else None
     # Kernels and routes live as long as the process: one collection among them would stop all visitors for 50 ms.
-    app = create_app(settings, store, gc.freeze, bench, courses, pool)
+    app = create_app(settings, store, gc.freeze, courses, pool)
     server = Server(app, settings, on_start, alone)
     # uvicorn shuts down in order and then raises the signal again, which is the expected end here.
     before = signal.signal(signal.SIGTERM, server.handle_exit)

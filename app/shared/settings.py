@@ -35,6 +35,7 @@ OBSOLETE: Final[Mapping[str, str]] = MappingProxyType(
         ("KINBOARD_WORKERS", "KINBOARD_REST_WORKERS"),
         "the service is one process, and KINBOARD_COMPUTE says how many compute for it",
     )
+    | {"KINBOARD_BENCH": "visitors start no benchmark; kinboard bench --html FILE makes a scoreboard"}
 )
 
 Names = Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)]
@@ -158,11 +159,6 @@ class Settings(BaseSettings):
         60.0, ge=0.1, le=3600, description="Seconds after which a client that reads nothing is disconnected."
     )
     max_visitors: int = Field(200, ge=1, description="Maximum number of open viewer tabs.")
-    bench: bool = Field(
-        False,
-        description="Visitors may start the benchmark from the scoreboard, one run at a time with low priority; "
-        "not on Windows.",
-    )
     access_log: bool = Field(False, description="Log each request to stderr, one JSON object per line.")
     cloud_memory: int = Field(
         512 * 1024 * 1024, ge=0, description="Maximum size in bytes of the cache of workspace clouds."

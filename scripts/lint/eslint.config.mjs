@@ -5,7 +5,7 @@ import stylistic from "@stylistic/eslint-plugin";
 import globals from "globals";
 
 // Scripts alone on their page. Those of viser's page share it with others: they keep their names to themselves.
-const ALONE = ["landing", "docs", "scoreboard"].map((name) => `static/${name}.js`);
+const ALONE = ["landing", "docs"].map((name) => `static/${name}.js`);
 
 export default [
   { ignores: ["static/vendor/**"] },

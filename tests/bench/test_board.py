@@ -1,23 +1,21 @@
-"""The scoreboard: the page and the picture of a run, and runs in a process of their own."""
+"""The scoreboard: the page and the picture of a run."""
 
 from __future__ import annotations
 
 import copy
-import json
 import re
-import sys
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 
 import pytest
+from fastapi.testclient import TestClient
+from starlette.applications import Starlette
 
-from app.bench import child
-from app.bench.board import runs as runs_module
-from app.bench.board.page import Service, page, recorded
+from app.bench.board.page import page, recorded
 from app.bench.board.picture import NARROW, WIDE, picture, standalone
-from app.bench.board.runs import Runs, Status, write_json, write_status
 from app.bench.board.views import busy, facts, sections, summary
 from app.bench.board.words import ratio_text, share_text, time_text
+from app.service.web.pages import page_routes
 
 
 @pytest.fixture(scope="module")
@@ -99,17 +97,21 @@ def test_the_page_says_where_and_when_it_was_measured(document):
 def test_a_file_needs_no_other_file_and_a_service_brings_its_own(document):
     alone = Tables(page(document)).loads
     assert all(place.startswith("#") for place in alone)
-    served = Tables(page(document, Service("1.2", True, False))).loads
-    assert {"static/scoreboard.js", "static/favicon.svg", "scoreboard.json", "./"} <= set(served)
+    served = Tables(page(document, served=True)).loads
+    assert {"static/favicon.svg", "scoreboard.json", "./"} <= set(served)
     assert not any(re.match(r"\w+:|/", place) for place in served)
 
 
-def test_the_page_says_how_runs_are_allowed_and_which_run_is_shown(document):
-    closed = page(document, Service("1.2", False, False))
-    assert "KINBOARD_BENCH=1" in closed
-    assert "<script" not in closed
-    assert "recorded run that is shipped with Kinboard 1.2" in closed
-    assert "the last run on this machine" in page(document, Service("1.2", True, True))
+def test_the_service_shows_the_recorded_run_and_starts_none(document):
+    client = TestClient(Starlette(routes=page_routes()))
+    shown = client.get("/scoreboard")
+    assert (shown.text, shown.headers["cache-control"]) == (page(document, served=True), "no-cache")
+    assert client.get("/scoreboard.json").json() == document
+    assert client.get("/scoreboard/", follow_redirects=False).headers["location"] == "../scoreboard"
+    for method in ("GET", "POST", "DELETE"):
+        assert client.request(method, "/scoreboard/run").status_code == 404
+    for element in ("<script", "<button"):
+        assert element not in shown.text
 
 
 @pytest.mark.parametrize("layout", [WIDE, NARROW], ids=["wide", "narrow"])
@@ -176,128 +178,3 @@ def test_figures_in_words():
     assert [time_text(x) for x in (2e-9, 1.07e-6, 0.0215, 21.0)] == ["2 ns", "1.07 µs", "21.5 ms", "21 s"]
     assert busy({"machine": {"load": "10.5"}})
     assert not busy({"machine": {"load": ""}})
-
-
-# -- runs --------------------------------------------------------------------------------------------------------
-
-RESULT = {"rows": []}
-# A run in miniature: says how far it is, watches as the real one does, and has a result when the file "go" exists.
-PLAY = """
-import sys, threading, time
-from pathlib import Path
-from app.bench import child
-from app.bench.board.runs import Status, write_status, write_json
-
-def measured(say):
-    say("working", 0.5)
-    while not Path(sys.argv[1], "go").exists():
-        time.sleep(0.01)
-    if Path(sys.argv[1], "go").read_text() == "fail":
-        raise ValueError("no luck")
-    return {"rows": []}
-
-child.LOOK = 0.02
-child._measured = measured
-child.main()
-"""
-
-
-@pytest.fixture
-def runs(tmp_path):
-    found = Runs(tmp_path, [sys.executable, "-c", PLAY])
-    yield found
-    found.close()
-
-
-def wait_for_state(runs, *states):
-    event = runs_module.threading.Event()
-    for _ in range(3000):
-        status = runs.status()
-        if status.state in states and (status.state != "running" or status.share):
-            return status
-        event.wait(0.02)
-    raise AssertionError(f"still {runs.status()}")
-
-
-@pytest.mark.full
-def test_one_run_at_a_time_with_progress_and_a_result(runs, tmp_path):
-    assert (runs.status(), runs.result(), runs.cancel()) == (Status(), None, False)
-    assert runs.start()
-    assert wait_for_state(runs, "running").words == "working"
-    beside = Runs(tmp_path)  # another process of the service
-    assert not beside.start()
-    assert beside.status().share == 0.5
-    (tmp_path / "go").write_text("on", "utf-8")
-    assert wait_for_state(runs, "done").share == 1.0
-    assert beside.result() == RESULT
-    assert not beside.cancel()
-
-
-@pytest.mark.full
-def test_a_run_is_cancelled_by_any_process_and_can_be_started_again(runs, tmp_path):
-    assert runs.start()
-    wait_for_state(runs, "running")
-    assert Runs(tmp_path).cancel()
-    assert wait_for_state(runs, "cancelled").words == "The run was cancelled."
-    assert runs.result() is None
-    assert runs.start()
-    assert wait_for_state(runs, "running").state == "running"
-
-
-@pytest.mark.full
-def test_a_run_that_fails_or_is_killed_says_so(runs, tmp_path):
-    (tmp_path / "go").write_text("fail", "utf-8")
-    assert runs.start()
-    assert wait_for_state(runs, "failed").words == "ValueError: no luck"
-    (tmp_path / "go").unlink()
-    assert runs.start()
-    wait_for_state(runs, "running")
-    runs._process.kill()
-    assert wait_for_state(runs, "failed").words == "The run ended before it was finished."
-
-
-def test_a_run_ends_when_its_service_ends(runs):
-    assert runs.start()
-    wait_for_state(runs, "running")
-    runs._process.stdin.close()
-    assert wait_for_state(runs, "failed").state == "failed"
-
-
-def test_a_run_that_takes_too_long_is_given_up(monkeypatch, tmp_path):
-    monkeypatch.setattr(child, "LOOK", 0.0)
-    ended = []
-
-    def end(status):
-        ended.append(status)
-
-    monkeypatch.setattr(child, "_end_with_the_service", lambda: None)
-    child._watch(tmp_path, 0.0, end)
-    assert [status.words for status in ended] == ["The run was given up after 15 minutes."]
-
-
-def test_the_run_of_a_service_is_a_quick_one_by_processor_time(monkeypatch):
-    import app.bench.run as run_module
-
-    asked = []
-
-    def run(settings, say):
-        asked.append(settings)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(run_module, "run", run)
-    with pytest.raises(KeyboardInterrupt):
-        child._measured(lambda words, share: None)
-    assert (asked[0].rounds, asked[0].clock.__name__) == (7, "process_time_ns")
-
-
-def test_the_process_of_a_run_gets_no_settings(monkeypatch):
-    monkeypatch.setenv("KINBOARD_TOKEN", "a-secret-token")
-    monkeypatch.setenv("KINBOARD_CACHE", "/elsewhere")  # where kernels are, which is no secret
-    assert {name for name in runs_module._environment() if name.startswith("KINBOARD")} == {"KINBOARD_CACHE"}
-
-
-def test_a_status_is_replaced_at_once(tmp_path):
-    write_status(tmp_path, Status("running", "a", 0.1, 1.0))
-    write_json(tmp_path / "result.json", {"a": 1})
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["result.json", "status.json"]
-    assert json.loads((tmp_path / "status.json").read_text("utf-8"))["words"] == "a"

@@ -2,6 +2,5 @@
 
 Everything here is made from the JSON that ``kinboard bench --json`` writes, so that a page can be made of a run of
 another machine or another day: no figure without a run behind it. :mod:`app.bench.board.views` reads the JSON,
-:mod:`app.bench.board.picture` draws it, :mod:`app.bench.board.page` makes the page. :mod:`app.bench.board.runs`
-starts a run in a process of its own (:mod:`app.bench.child`) and tells how far it is.
+:mod:`app.bench.board.picture` draws it, :mod:`app.bench.board.page` makes the page.
 """

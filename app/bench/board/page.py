@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -17,21 +16,6 @@ from app.bench.board.picture import NARROW, STYLE, WIDE, picture
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
-@dataclass(frozen=True, slots=True)
-class Service:
-    """What the page needs of the service that shows it.
-
-    Attributes:
-        version: of the service.
-        allowed: whether visitors may start a run.
-        here: whether the run shown was started here, rather than shipped with Kinboard.
-    """
-
-    version: str
-    allowed: bool
-    here: bool
-
-
 def recorded() -> views.Document:
     """The run that is shipped with Kinboard."""
     found = json.loads(resources.files(__package__).joinpath("recorded.json").read_text("utf-8"))
@@ -39,8 +23,8 @@ def recorded() -> views.Document:
     return found
 
 
-def page(document: views.Document, service: Service | None = None) -> str:
-    """HTML of a run; without a service, a page that needs no other file."""
+def page(document: views.Document, served: bool = False) -> str:
+    """HTML of a run; `served`: with links to other pages of the service, else a file that needs no other."""
     found = views.sections(document)
     return (
         _environment()
@@ -54,7 +38,7 @@ def page(document: views.Document, service: Service | None = None) -> str:
             wide=Markup(picture(found, WIDE)),
             narrow=Markup(picture(found, NARROW)),
             style=Markup((_TEMPLATES / "board.css").read_text("utf-8") + STYLE),
-            service=service,
+            served=served,
         )
     )
 

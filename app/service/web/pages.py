@@ -1,4 +1,4 @@
-"""The landing page, the page of the API documentation, and the files in ``static/``.
+"""The landing page, the page of the API documentation, the scoreboard, and the files in ``static/``.
 
 All their links are relative, so they work below any path prefix, and nothing is loaded from another host.
 """
@@ -6,11 +6,12 @@ All their links are relative, so they work below any path prefix, and nothing is
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
+from functools import partial
 from pathlib import Path
 
 from starlette.datastructures import Headers
 from starlette.requests import Request
-from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Mount, Route
 from starlette.staticfiles import StaticFiles
 from starlette.types import Message, Receive, Scope, Send
@@ -21,12 +22,15 @@ from kin import __version__, builtin_robots, classic_robots
 
 
 def page_routes() -> list[BaseRoute]:
-    """``/``, ``/docs`` and ``/static``."""
+    """``/``, ``/docs``, ``/scoreboard`` with its data, and ``/static``."""
     folder = static_folder()
     return [
         Route("/", _html_page(folder / "index.html"), name="landing"),
         Route("/docs", _html_page(folder / "docs.html"), name="docs"),
-        Route("/docs/", _without_slash),
+        Route("/docs/", partial(_without_slash, "docs")),
+        Route("/scoreboard", _scoreboard, name="scoreboard"),
+        Route("/scoreboard/", partial(_without_slash, "scoreboard")),
+        Route("/scoreboard.json", _scoreboard_data),
         Route("/favicon.ico", _favicon),
         Mount("/static", _FreshStaticFiles(directory=folder), name="static"),
     ]
@@ -42,8 +46,21 @@ def _html_page(file: Path) -> Callable[[Request], Awaitable[Response]]:
     return page
 
 
-async def _without_slash(_: Request) -> Response:
-    return RedirectResponse("../docs")
+async def _without_slash(page: str, _: Request) -> Response:
+    return RedirectResponse(f"../{page}")
+
+
+# Functions without `async` run in a thread: the run is read, and templates are loaded when first asked for.
+def _scoreboard(_: Request) -> Response:
+    from app.bench.board.page import page, recorded
+
+    return HTMLResponse(page(recorded(), served=True), headers={"cache-control": "no-cache"})
+
+
+def _scoreboard_data(_: Request) -> Response:
+    from app.bench.board.page import recorded
+
+    return JSONResponse(recorded(), headers={"cache-control": "no-cache"})
 
 
 async def _favicon(_: Request) -> Response:

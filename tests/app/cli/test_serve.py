@@ -8,7 +8,7 @@ import pytest
 
 from app.cli import serve
 from app.cli.parser import main
-from app.shared.settings import Settings
+from app.shared.settings import OBSOLETE, Settings
 
 
 def test_settings_and_options_that_do_nothing_any_more_are_accepted_and_say_so(
@@ -21,13 +21,14 @@ def test_settings_and_options_that_do_nothing_any_more_are_accepted_and_say_so(
         return 0
 
     monkeypatch.setattr(serve, "import_service", lambda: run)
-    for name in ("KINBOARD_WORKERS", "KINBOARD_REST_WORKERS"):
+    for name in OBSOLETE:
         monkeypatch.setenv(name, "2")
     assert main(["serve", "--workers", "3", "--port", "0"]) == 0
     said = capsys.readouterr().err.splitlines()
-    names = ("KINBOARD_REST_WORKERS", "KINBOARD_WORKERS", "--workers")
+    names = ("KINBOARD_BENCH", "KINBOARD_REST_WORKERS", "KINBOARD_WORKERS", "--workers")
     assert [line.partition(" does nothing")[0] for line in said] == [f"kinboard: {name}" for name in names]
-    assert all("KINBOARD_COMPUTE" in line for line in said)
+    assert "kinboard bench --html" in said[0]
+    assert all("KINBOARD_COMPUTE" in line for line in said[1:])
     assert given[0].port == 0
 
 

@@ -349,7 +349,6 @@ def running_machine(base: Path, kernels: bool = False) -> Iterator[Machine]:
         "FAULTY_SIZE": str(size),
         "TMPDIR": str(folders / "temp" / "in"),
         "KINBOARD_DATA": str(folders / "data" / "in"),
-        "KINBOARD_BENCH": "1",
         "KINBOARD_COMPUTE": "1",
         "KINBOARD_TIME_BUDGET": str(SILENCE),
         "KINBOARD_WORKER_TIMEOUT": str(SILENCE),

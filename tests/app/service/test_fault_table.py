@@ -280,7 +280,6 @@ DECLARED = {
         "app/notebook/process.py": ("app/notebook/test_notebook.py::test_the_process_serves_and_ends",),
         "app/viewer/meshes/reader.py": ("app/viewer/meshes/test_loading.py::test_the_process_says_what_is_wrong",),
         "app/cli/xacro/__init__.py": ("app/cli/test_xacro.py::test_what_is_missing_is_named",),
-        "app/bench/board/runs.py": ("bench/test_board.py::test_a_run_that_fails_or_is_killed_says_so",),
     },
     "folders": {
         "data": ("data",),
@@ -288,10 +287,8 @@ DECLARED = {
         "exercises": ("exercises",),
         "courses": ("courses",),
         "lti": ("app/classroom/test_lti.py::test_the_service_does_not_start_with_a_wrong_file",),
-        "app/service/main.py": ("temp", "shm"),
         "kin/kernels/cache.py": ("cache",),
-        "app/bench/board/runs.py": ("app/service/web/test_scoreboard.py::test_a_folder_that_cannot_be_used",),
-        "app/bench/contestants/motions.py": ("bench/test_board.py::test_a_run_that_fails_or_is_killed_says_so",),
+        "app/bench/contestants/motions.py": ("bench/test_bench.py::test_a_library_that_is_missing_or_fails",),
     },
     "peers": {
         "app/service/server.py": ("program", "visitor"),

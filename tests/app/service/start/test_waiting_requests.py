@@ -80,7 +80,7 @@ class Service:
 @pytest.fixture(scope="module")
 def served() -> Iterator[tuple[Any, int]]:
     """An app with one place for requests, which has the kernels of the first arm only."""
-    app = create_app(Settings(max_requests=1, client_share=1.0, time_budget=300.0, bench=False))
+    app = create_app(Settings(max_requests=1, client_share=1.0, time_budget=300.0))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(startup, "rest_compiled", lambda: True)
         patch.setattr(startup, "warm_up_rest", lambda stop: None)
