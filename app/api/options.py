@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from inspect import signature
 from itertools import cycle
-from typing import Annotated, Any, Literal, TypeVar, get_type_hints
+from typing import Annotated, Any, TypeVar, get_type_hints
 
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag, create_model
@@ -26,7 +26,7 @@ from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
 from app.shared.threads.turns import offer
 from kin import IKOptions, InputError, JointConstraints, Robot, Task, solve_path
-from kin.collision.obstacles import LONGEST_NAME, MOST_OBSTACLES, checked_obstacles
+from kin.collision.obstacles import KINDS, LONGEST_NAME, MOST_OBSTACLES, Shape, checked_obstacles
 from kin.frames import WORLD
 from kin.ik.options import DEFAULTS
 from kin.ik.problem import FAR, read_pose
@@ -275,18 +275,22 @@ class Goal:
     rounding: float = 0.0
 
 
+def _of(field: str) -> str:
+    """Which obstacles have a field, in words."""
+    return "Of a " + " or ".join(name for name, kind in KINDS.items() if field in kind.fields)
+
+
 class ObstacleBody(schemas.Body):
     """A body at rest in the world frame."""
 
-    shape: Literal["box", "sphere", "cylinder", "table"] = Field(
-        description="cylinder: its axis is z. table: a box whose place is the middle of its top; everything under "
-        "the top counts as solid."
+    shape: Shape = Field(
+        description=" ".join(f"{name}: {kind.about}." for name, kind in KINDS.items() if kind.about)
     )
     xyz: Vector3 = Field([0.0, 0.0, 0.0], description="Its centre in metres; of a table, the middle of its top.")
     rpy: Vector3 = Field([0.0, 0.0, 0.0], description="Roll, pitch, yaw in radians: Rz(yaw) Ry(pitch) Rx(roll).")
-    size: Vector3 | None = Field(None, description="Of a box or table: sides along x, y and z in metres.")
-    radius: Number | None = Field(None, description="Of a sphere or cylinder, in metres.")
-    height: Number | None = Field(None, description="Of a cylinder, in metres.")
+    size: Vector3 | None = Field(None, description=f"{_of('size')}: sides along x, y and z in metres.")
+    radius: Number | None = Field(None, description=f"{_of('radius')}, in metres.")
+    height: Number | None = Field(None, description=f"{_of('height')}, in metres.")
     name: str = Field("", max_length=LONGEST_NAME, description="For people.")
 
 

@@ -1,4 +1,7 @@
-"""Obstacles: boxes, spheres, cylinders and tables around an arm."""
+"""Obstacles: boxes, spheres, cylinders and tables around an arm.
+
+A kind of obstacle is a row of `KINDS`. Whoever checks, draws, asks for or stores obstacles reads it there.
+"""
 
 from __future__ import annotations
 
@@ -21,11 +24,48 @@ SMALLEST, LARGEST = 1e-4, 100.0  # m, of a size
 FARTHEST = 1e4  # m, of a place
 LONGEST_NAME = 60
 Triple = tuple[float, float, float]
-_NEEDED: dict[Shape, tuple[str, ...]] = {
-    "box": ("size",),
-    "table": ("size",),
-    "sphere": ("radius",),
-    "cylinder": ("radius", "height"),
+_NAMES = {"size": ("length", "width", "height"), "radius": ("radius",), "height": ("height",)}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of obstacle: all that tells it from others.
+
+    Attributes:
+        solid: the body that kernels and drawings have of it: `SPHERE`, `CYLINDER` or `BOX`.
+        fields: those of an `Obstacle` that hold its sizes.
+        letter: for it in links.
+        new: sizes of one that is put into a page, in reaches of the arm; a table is as high as there is room.
+        about: what has to be known of it, for documents; "" if its name says all.
+        topped: whether its place is the middle of its top, not its centre, and others can stand on it.
+    """
+
+    solid: int
+    fields: tuple[str, ...]
+    letter: str
+    new: tuple[float, ...]
+    about: str = ""
+    topped: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of its sizes, in the order of `Obstacle.sizes`."""
+        return tuple(name for key in self.fields for name in _NAMES[key])
+
+    def with_sizes(self, values: Sequence[float]) -> dict[str, Any]:
+        """The fields of an obstacle with these sizes (m), which `names` names."""
+        return {"size": tuple(values)} if "size" in self.fields else dict(zip(self.fields, values, strict=True))
+
+
+KINDS: dict[Shape, Kind] = {
+    "box": Kind(BOX, ("size",), "b", (0.14, 0.14, 0.14)),
+    "sphere": Kind(SPHERE, ("radius",), "s", (0.08,)),
+    "cylinder": Kind(CYLINDER, ("radius", "height"), "c", (0.06, 0.24), "its axis is z"),
+    "table": Kind(
+        *(BOX, ("size",), "t", (0.45, 0.7)),
+        about="a box whose place is the middle of its top; everything under the top counts as solid",
+        topped=True,
+    ),
 }
 
 
@@ -61,8 +101,8 @@ class Obstacle:
             raise InputError("shape", self.shape, "one of " + ", ".join(f'"{each}"' for each in SHAPES))
         for key, most in (("xyz", FARTHEST), ("rpy", 1e6)):
             object.__setattr__(self, key, _triple(key, getattr(self, key), -most, most))
-        needed = _NEEDED[self.shape]
-        for key in ("size", "radius", "height"):
+        needed = self.kind.fields
+        for key in _NAMES:
             value = getattr(self, key)
             if key not in needed:
                 if value is not None:
@@ -75,6 +115,16 @@ class Obstacle:
             raise InputError("name", self.name, f"a text of at most {LONGEST_NAME} printable characters")
 
     @property
+    def kind(self) -> Kind:
+        """What tells its shape from others."""
+        return KINDS[self.shape]
+
+    @property
+    def sizes(self) -> tuple[float, ...]:
+        """Its sizes (m), in the order of the names of its kind."""
+        return tuple(v for key in self.kind.fields for v in np.atleast_1d(getattr(self, key)).tolist())
+
+    @property
     def label(self) -> str:
         """Its name, or its shape."""
         return self.name or self.shape
@@ -83,34 +133,27 @@ class Obstacle:
     def T(self) -> Array:
         """Pose of its centre ``(4, 4)``."""
         T = pose_from_xyz_rpy(self.xyz, self.rpy)
-        if self.shape == "table":
-            T[:3, 3] -= 0.5 * self._sides[2] * T[:3, 2]
+        if self.kind.topped:
+            T[:3, 3] -= self.half[2] * T[:3, 2]
         return T
 
     @cached_property
     def row(self) -> Array:
         """For the kernels ``(17,)``, as in :mod:`kin.collision.solids`."""
         out = np.empty(COLUMNS)
-        radius = self.radius or 0.0
-        if self.shape == "sphere":
-            out[:4] = SPHERE, radius, radius, radius
-        elif self.shape == "cylinder":
-            out[:4] = CYLINDER, radius, radius, 0.5 * (self.height or 0.0)
-        else:
-            out[:4] = BOX, *(0.5 * side for side in self._sides)
+        out[0], out[1:4] = self.kind.solid, self.half
         out[4:13], out[13:16] = self.T[:3, :3].ravel(), self.T[:3, 3]
-        half = out[1:4]
-        out[16] = (
-            half[0]
-            if self.shape == "sphere"
-            else np.linalg.norm(half[[0, 2]] if self.shape == "cylinder" else half)
-        )
+        across = {SPHERE: self.half[:1], CYLINDER: self.half[::2], BOX: self.half}[self.kind.solid]
+        out[16] = np.linalg.norm(across)
         return out
 
-    @property
-    def _sides(self) -> Sequence[float]:
-        assert self.size is not None
-        return self.size
+    @cached_property
+    def half(self) -> Array:
+        """Half of what it measures along its own x, y and z ``(3,)``, m."""
+        if self.kind.solid == BOX:
+            return 0.5 * np.array(self.sizes)
+        radius = self.sizes[0]
+        return np.array([radius, radius, radius if self.kind.solid == SPHERE else 0.5 * self.sizes[1]])
 
     def as_dict(self) -> dict[str, Any]:
         """Its fields as plain data, without those that do not apply; `obstacle_from_dict` reads them.
@@ -124,7 +167,7 @@ class Obstacle:
             {'shape': 'sphere', 'xyz': [0.5, 0.0, 0.2], 'rpy': [0.0, 0.0, 0.0], 'radius': 0.1}
         """
         found: dict[str, Any] = {"shape": self.shape, "xyz": list(self.xyz), "rpy": list(self.rpy)}
-        for key in _NEEDED[self.shape]:
+        for key in self.kind.fields:
             value = getattr(self, key)
             found[key] = list(value) if key == "size" else value
         if self.name:

@@ -13,7 +13,7 @@ import numpy as np
 from app.viewer.feature import Feature, Stage
 from app.viewer.obstacles import placed
 from app.viewer.obstacles.nodes import ObstacleNodes
-from app.viewer.obstacles.placed import PLACE, SIZES, TURN
+from app.viewer.obstacles.placed import PLACE, TURN
 from app.viewer.panel import update_html
 from app.viewer.panel.entry import read_cell
 from app.viewer.panel.status import Notice
@@ -23,11 +23,12 @@ from app.viewer.scene.meshes import body
 from app.viewer.tabs.robot.views import text_of
 from app.viewer.views.templates import render
 from kin import Contact, InputError, Obstacle
-from kin.collision.obstacles import MOST_OBSTACLES, Shape
+from kin.collision.obstacles import KINDS, MOST_OBSTACLES
+from kin.collision.solids import SPHERE
 from kin.transforms import pose_from_position_wxyz
 from kin.typed import ReadError, cut
 
-_ORDER: tuple[Shape, ...] = ("table", "box", "sphere", "cylinder")
+_ORDER = sorted(KINDS, key=lambda shape: not KINDS[shape].topped)  # what others stand on comes first
 
 
 class ObstaclesFeature(Feature):
@@ -215,9 +216,9 @@ class ObstaclesFeature(Feature):
         if self._chosen is None:
             return []
         each = self.stage.now.obstacles[self._chosen]
-        place = "Middle of the top" if each.shape == "table" else "Centre"
-        found = [(place, PLACE, each.xyz, False), ("Size", SIZES[each.shape], placed.sizes(each), False)]
-        if each.shape != "sphere":
+        place = "Middle of the top" if each.kind.topped else "Centre"
+        found = [(place, PLACE, each.xyz, False), ("Size", each.kind.names, each.sizes, False)]
+        if each.kind.solid != SPHERE:
             found.insert(1, ("Rotation", TURN, each.rpy, True))
         return [
             (title, [self._field(*pair, angle) for pair in zip(names, values, strict=True)])

@@ -9,13 +9,14 @@ from itertools import count
 import viser
 
 from app.viewer.labels import add_label
-from app.viewer.obstacles.placed import Obstacles, pose, sizes
+from app.viewer.obstacles.placed import Obstacles, pose
 from app.viewer.panel import Post
 from app.viewer.scene import gizmo
 from app.viewer.scene.bodies.nodes import TOUCHING
 from app.viewer.scene.key_number import KeyNumber
 from app.viewer.viser_patches import assign, keep_private
 from kin import Obstacle
+from kin.collision.solids import CYLINDER, SPHERE
 from kin.transforms import Array, wxyz_from_rotation
 
 Color = tuple[int, int, int]
@@ -71,14 +72,14 @@ class _Node:
 def _meshes(scene: viser.SceneApi, root: str, each: Obstacle, deep: float) -> list[Mesh]:
     """`deep`: how far (m) under the top of a table a body may begin that casts a shadow."""
     # A body that casts a shadow and receives it is striped by its own.
-    if each.shape == "sphere":
-        ball = each.radius or 0.0
-        return [scene.add_icosphere(f"{root}/ball", ball, COLOR, subdivisions=4, receive_shadow=False)]
-    if each.shape == "cylinder":
-        radius, height = sizes(each)
-        return [scene.add_cylinder(f"{root}/can", radius, height, COLOR, radial_segments=48, receive_shadow=False)]
-    length, width, height = sizes(each)
-    if each.shape == "box":
+    half, solid = each.half, each.kind.solid
+    if solid == SPHERE:
+        return [scene.add_icosphere(f"{root}/ball", half[0], COLOR, subdivisions=4, receive_shadow=False)]
+    length, width, height = (2.0 * half).tolist()
+    if solid == CYLINDER:
+        can = scene.add_cylinder(f"{root}/can", half[0], height, COLOR, radial_segments=48, receive_shadow=False)
+        return [can]
+    if not each.kind.topped:
         return [scene.add_box(f"{root}/box", COLOR, (length, width, height), receive_shadow=False)]
     top = min(TOP * min(length, width), height)
     slab, place = (length, width, top), (0.0, 0.0, -0.5 * top)
@@ -96,7 +97,7 @@ def _meshes(scene: viser.SceneApi, root: str, each: Obstacle, deep: float) -> li
 
 def _above(each: Obstacle) -> float:
     """Height of its label over its place."""
-    return {"table": 0.0, "sphere": each.radius or 0.0}.get(each.shape, 0.5 * sizes(each)[-1]) + 0.01
+    return (0.0 if each.kind.topped else float(each.half[2])) + 0.01
 
 
 def _listen(node: Mesh, clicked: Callable[[], None]) -> None:
@@ -127,7 +128,7 @@ class ObstacleNodes:
 
         `radius`: of the sphere around the arm, whose lamp casts their shadows.
         """
-        wanted = [(each.shape, each.label, *sizes(each), radius) for each in items]
+        wanted = [(each.shape, each.label, *each.sizes, radius) for each in items]
         for i, (key, each) in enumerate(zip(wanted, items, strict=True)):
             if i < len(self._drawn) and self._drawn[i] == key:
                 continue

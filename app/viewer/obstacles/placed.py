@@ -16,47 +16,24 @@ import kin
 from app.viewer.own_arm import clean
 from app.viewer.scene.meshes import body
 from kin import InputError, Obstacle, Robot
-from kin.collision.obstacles import LARGEST, MOST_OBSTACLES, SHAPES, SMALLEST, Shape
+from kin.collision.obstacles import KINDS, LARGEST, MOST_OBSTACLES, SMALLEST, Shape
 from kin.poses import roll_pitch_yaw
 from kin.transforms import Array
 
 Obstacles = tuple[Obstacle, ...]
 NAME = 24  # characters
 FARTHEST = 1000.0  # m from the origin, as for targets
-SIZES: dict[Shape, tuple[str, ...]] = {
-    "table": ("length", "width", "height"),
-    "box": ("length", "width", "height"),
-    "sphere": ("radius",),
-    "cylinder": ("radius", "height"),
-}
 PLACE, TURN = ("x", "y", "z"), ("roll", "pitch", "yaw")
-_LETTERS: dict[Shape, str] = {"table": "t", "box": "b", "sphere": "s", "cylinder": "c"}
-_SHAPES = {letter: shape for shape, letter in _LETTERS.items()}
+_SHAPES = {kind.letter: shape for shape, kind in KINDS.items()}
 _DIGITS = 6  # of metres and radians in a link
 _TENTH = math.radians(0.1)  # to which a dragged rotation is rounded
 
 # New obstacles, in reaches of the arm.
-_TABLE, _TABLE_AT = (0.45, 0.7), 0.6
-_NEW: dict[Shape, tuple[float, ...]] = {"box": (0.14, 0.14, 0.14), "sphere": (0.08,), "cylinder": (0.06, 0.24)}
-_SMALL_AT = 0.6
+_AT = 0.6  # from the base
 _LOWER = (0.1, 0.0, -0.1, -0.2, -0.3, -0.5)  # heights of a table that are tried, from the base
 _LEAST_TABLE = 0.04  # height of a table
 _LEAST_ROOM = 0.01  # between a new obstacle and the arm
 _AROUND = [math.radians(turn) for turn in (0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180)]
-
-
-def sizes(obstacle: Obstacle) -> tuple[float, ...]:
-    """The sizes (m) that `SIZES` names."""
-    if obstacle.size is not None:
-        return tuple(obstacle.size)
-    return tuple(value for value in (obstacle.radius, obstacle.height) if value is not None)
-
-
-def of_sizes(shape: Shape, values: Sequence[float]) -> dict[str, Any]:
-    """The fields of an obstacle with these sizes."""
-    if shape in ("box", "table"):
-        return {"size": tuple(values)}
-    return dict(zip(SIZES[shape], values, strict=True))
 
 
 def pose(obstacle: Obstacle) -> Array:
@@ -70,27 +47,29 @@ def added(items: Obstacles, shape: object, robot: Robot, q: Array) -> Obstacles:
     Raises:
         InputError: no such shape, or there are as many as there may be.
     """
-    if shape not in SHAPES:
-        raise InputError("shape", shape, "one of " + ", ".join(SHAPES))
+    if not isinstance(shape, str) or shape not in KINDS:
+        raise InputError("shape", shape, "one of " + ", ".join(KINDS))
     if len(items) >= MOST_OBSTACLES:
         raise InputError("obstacles", f"{MOST_OBSTACLES + 1} obstacles", f"at most {MOST_OBSTACLES}")
     here = np.array([q, robot.q_home])
-    tried = (_tables if shape == "table" else _others)(shape, items, robot)
+    places = _tables if KINDS[shape].topped else _others
     room = _LEAST_ROOM * robot.reach
-    free = (each for each in tried if _alone(each, items) and kin.clearance(robot, here, [each]).min() >= room)
-    found = next(free, None)
-    if found is None:
-        found = next(iter((_tables if shape == "table" else _others)(shape, items, robot)))
+    free = (
+        each
+        for each in places(shape, items, robot)
+        if _alone(each, items) and kin.clearance(robot, here, [each]).min() >= room
+    )
+    found = next(free, None) or next(places(shape, items, robot))
     return (*items, replace(found, name=_name(shape, items)))
 
 
 def _tables(shape: Shape, items: Obstacles, robot: Robot) -> Iterator[Obstacle]:
     """Tables around the arm, that before it first, as high as they can be."""
     step, base, mount = _step(robot), robot.T_world_base[:3, 3], body(robot).mount
-    length, width = (_rounded(share * robot.reach, step) for share in _TABLE)
+    length, width = (_rounded(share * robot.reach, step) for share in KINDS[shape].new)
     for turn in _AROUND:
         yaw = _front(robot) + turn
-        x, y = base[:2] + _TABLE_AT * robot.reach * np.array([math.cos(yaw), math.sin(yaw)])
+        x, y = base[:2] + _AT * robot.reach * np.array([math.cos(yaw), math.sin(yaw)])
         for low in _LOWER:
             top = _rounded(base[2] + low * robot.reach, step)
             height = _rounded(top - mount.floor, step)
@@ -104,14 +83,13 @@ def _tables(shape: Shape, items: Obstacles, robot: Robot) -> Iterator[Obstacle]:
 def _others(shape: Shape, items: Obstacles, robot: Robot) -> Iterator[Obstacle]:
     """Smaller bodies around the arm, on the floor, or on a table if there is one."""
     step, base, mount = _step(robot), robot.T_world_base[:3, 3], body(robot).mount
-    values = [_rounded(share * robot.reach, step) for share in _NEW[shape]]
-    half = values[0] if shape == "sphere" else 0.5 * values[-1]
+    values = [_rounded(share * robot.reach, step) for share in KINDS[shape].new]
+    each = Obstacle(shape, **KINDS[shape].with_sizes(values))
     for turn in _AROUND:
         yaw = _front(robot) + turn
-        x, y = base[:2] + _SMALL_AT * robot.reach * np.array([math.cos(yaw), math.sin(yaw)])
-        stands = max((each.xyz[2] for each in items if _carries(each, x, y)), default=mount.surface(x, y))
-        place = (_rounded(x, step), _rounded(y, step), stands + half)
-        yield Obstacle(shape, place, (0.0, 0.0, 0.0), **of_sizes(shape, values))
+        x, y = base[:2] + _AT * robot.reach * np.array([math.cos(yaw), math.sin(yaw)])
+        stands = max((other.xyz[2] for other in items if _carries(other, x, y)), default=mount.surface(x, y))
+        yield replace(each, xyz=(_rounded(x, step), _rounded(y, step), stands + float(each.half[2])))
 
 
 def _step(robot: Robot) -> float:
@@ -135,16 +113,16 @@ def _wrapped(angle: float) -> float:
 
 def _carries(each: Obstacle, x: float, y: float) -> bool:
     """Whether a point of its top is at x, y."""
-    if each.shape != "table" or each.size is None or any(map(abs, each.rpy[:2])):
+    if not each.kind.topped or any(map(abs, each.rpy[:2])):
         return False
     local = pose(each)[:3, :3].T @ [x - each.xyz[0], y - each.xyz[1], 0.0]
-    return bool(abs(local[0]) <= 0.5 * each.size[0] and abs(local[1]) <= 0.5 * each.size[1])
+    return bool((abs(local[:2]) <= each.half[:2]).all())
 
 
 def _alone(new: Obstacle, items: Obstacles) -> bool:
     """Whether a new obstacle is beside the others, or on a table."""
-    tables = new.shape == "table"
-    others = [each for each in items if (each.shape == "table") == tables]
+    tables = new.kind.topped
+    others = [each for each in items if each.kind.topped == tables]
     share = 0.7 if tables else 1.0  # a ball around a table is much larger than the table
     return all(
         float(np.linalg.norm(new.T[:3, 3] - each.T[:3, 3])) >= share * float(new.row[16] + each.row[16])
@@ -156,7 +134,7 @@ def _alone(new: Obstacle, items: Obstacles) -> bool:
 
 def _width(one: Obstacle, other: Obstacle) -> float:
     """Half of the diagonals of two tables."""
-    return sum(0.5 * math.hypot(*each.size[:2]) for each in (one, other) if each.size is not None)
+    return math.hypot(*one.half[:2]) + math.hypot(*other.half[:2])
 
 
 def _name(shape: Shape, items: Obstacles) -> str:
@@ -171,7 +149,7 @@ def removed(items: Obstacles, index: int) -> Obstacles:
 
 
 def changed(items: Obstacles, index: int, field: str, value: float) -> Obstacles:
-    """With another value (m, rad) of x, y, z, roll, pitch, yaw or one of `SIZES`.
+    """With another value (m, rad) of x, y, z, roll, pitch, yaw or one of its sizes.
 
     Raises:
         InputError: naming the field, the value and what is valid.
@@ -183,13 +161,12 @@ def changed(items: Obstacles, index: int, field: str, value: float) -> Obstacles
         new = replace(each, xyz=_with(each.xyz, PLACE.index(field), value))
     elif field in TURN:
         new = replace(each, rpy=_with(each.rpy, TURN.index(field), value))
-    elif field in SIZES[each.shape]:
+    elif field in (names := each.kind.names):
         if not SMALLEST <= value <= LARGEST:
             raise InputError(field, f"{value:g} m", f"{1000 * SMALLEST:g} mm to {LARGEST:g} m")
-        values = _with(sizes(each), SIZES[each.shape].index(field), value)
-        new = replace(each, **of_sizes(each.shape, values))
+        new = replace(each, **each.kind.with_sizes(_with(each.sizes, names.index(field), value)))
     else:
-        raise InputError("field", field, "one of " + ", ".join((*PLACE, *TURN, *SIZES[each.shape])))
+        raise InputError("field", field, "one of " + ", ".join((*PLACE, *TURN, *names)))
     return (*items[:index], new, *items[index + 1 :])
 
 
@@ -209,9 +186,9 @@ def pack(items: Obstacles) -> list[list[object]]:
     """The obstacles as JSON for a link: letter, name, place, rotation, sizes."""
     return [
         [
-            _LETTERS[each.shape],
+            each.kind.letter,
             each.label,
-            *(round(v, _DIGITS) + 0.0 for v in (*each.xyz, *each.rpy, *sizes(each))),
+            *(round(v, _DIGITS) + 0.0 for v in (*each.xyz, *each.rpy, *each.sizes)),
         ]
         for each in items
     ]
@@ -230,10 +207,10 @@ def unpack(value: object) -> Obstacles:
 
 
 def _read(shape: Shape, name: str, values: list[Any]) -> Obstacle | None:
-    if not name or len(values) != 6 + len(SIZES[shape]):
+    if not name or len(values) != 6 + len(KINDS[shape].names):
         return None
     try:
-        each = Obstacle(shape, values[:3], values[3:6], **of_sizes(shape, values[6:]), name=name)
+        each = Obstacle(shape, values[:3], values[3:6], **KINDS[shape].with_sizes(values[6:]), name=name)
     except InputError:
         return None
     return each if max(map(abs, each.xyz)) <= FARTHEST else None

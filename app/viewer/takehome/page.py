@@ -31,7 +31,8 @@ from app.viewer.scene.bodies.parts import Part, joint_color
 from app.viewer.scene.chain import Link, chain
 from app.viewer.scene.meshes import Body, body
 from app.viewer.views.templates import render
-from kin import IKOptions, InputError, Motion, Obstacle, Robot, __version__, pose_from_xyz_rpy, solve_ik
+from kin import IKOptions, InputError, Motion, Obstacle, Robot, __version__, solve_ik
+from kin.collision.solids import BOX, CYLINDER
 from kin.named import robot_of
 from kin.robot import Joint
 from kin.transforms import Array
@@ -227,19 +228,17 @@ def _parts(made: Body, drawn: Drawing | None) -> list[tuple[Part, int, Array | N
 
 
 def _obstacle(obstacle: Obstacle) -> tuple[Part, int, Array]:
-    """The mesh of an obstacle, beside the base; the place of a table is the middle of its top."""
+    """The mesh of an obstacle, beside the base."""
     from trimesh import creation  # its import takes a quarter of a second
 
-    T = pose_from_xyz_rpy(obstacle.xyz, obstacle.rpy)
-    if obstacle.size is not None:
-        mesh = creation.box(obstacle.size)
-        if obstacle.shape == "table":
-            T = T @ pose_from_xyz_rpy([0.0, 0.0, -0.5 * obstacle.size[2]])
-    elif obstacle.height is not None:
-        mesh = creation.cylinder(obstacle.radius or 0.0, obstacle.height, sections=48)
+    half, solid = obstacle.half, obstacle.kind.solid
+    if solid == BOX:
+        mesh = creation.box(2.0 * half)
+    elif solid == CYLINDER:
+        mesh = creation.cylinder(half[0], 2.0 * half[2], sections=48)
     else:
-        mesh = creation.icosphere(3, obstacle.radius or 0.0)
-    return Part("obstacle", mesh, _OBSTACLE), 0, T
+        mesh = creation.icosphere(3, half[0])
+    return Part("obstacle", mesh, _OBSTACLE), 0, obstacle.T
 
 
 def _mesh(part: Part, link: int, T: Array | None) -> dict[str, Any]:

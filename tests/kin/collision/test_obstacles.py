@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import kin
-from kin.collision.obstacles import SHAPES
+from kin.collision.obstacles import KINDS, SHAPES
 from kin.collision.solids import nearest_on
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "data" / "golden-obstacles.json").read_text("utf-8"))
@@ -26,13 +27,8 @@ turn = st.sampled_from([0.0, math.pi / 2, 0.3, -1.1])
 def obstacles(draw):
     shape = draw(st.sampled_from(SHAPES))
     fields = {"xyz": draw(place), "rpy": draw(st.tuples(turn, turn, turn))}
-    if shape in ("box", "table"):
-        fields["size"] = draw(st.tuples(side, side, side))
-    else:
-        fields["radius"] = draw(side)
-    if shape == "cylinder":
-        fields["height"] = draw(side)
-    return kin.Obstacle(shape, **fields)
+    sizes = draw(st.tuples(*[side] * len(KINDS[shape].names)))
+    return kin.Obstacle(shape, **fields, **KINDS[shape].with_sizes(sizes))
 
 
 def measured(obstacle: kin.Obstacle, start, end) -> tuple[float, float]:
@@ -110,3 +106,16 @@ def test_the_top_of_a_table_is_at_its_place():
     table = kin.Obstacle("table", (0.0, 0.0, 0.5), size=(1.0, 1.0, 0.2))
     assert measured(table, (0.0, 0.0, 0.9), (0.1, 0.0, 0.8))[0] == pytest.approx(0.3)
     assert measured(table, (0.0, 0.0, 0.1), (0.1, 0.0, 0.2))[0] == pytest.approx(0.1)
+
+
+def test_every_kind_is_a_row_and_documented() -> None:
+    assert tuple(KINDS) == SHAPES
+    assert len({kind.letter for kind in KINDS.values()}) == len(KINDS)
+    words = (Path(__file__).parents[3] / "docs" / "rest.md").read_text("utf-8")
+    for shape, kind in KINDS.items():
+        row = next(line for line in words.splitlines() if line.startswith(f"| `{shape}` |"))
+        assert re.findall("`(size|radius|height)`", row) == list(kind.fields)
+        values = [0.1 * k for k in range(1, len(kind.names) + 1)]
+        each = kin.Obstacle(shape, **kind.with_sizes(values))
+        assert each.sizes == tuple(values)
+        assert each.row[16] >= each.half.max()
