@@ -499,7 +499,7 @@ def test_a_client_that_does_not_read_its_websocket_is_disconnected(service):
         assert connection.recv(12) == b"HTTP/1.1 101"
         wait_for(lambda: service.metric('kinboard_refused_connections_total{why="unread"}') > before, 30)
         wait_for(lambda: closed(connection), 30)
-    wait_for(lambda: "read nothing from a websocket" in service.log, 30)
+    assert "(KINBOARD_SEND_TIMEOUT)" in service.log  # perhaps of an earlier connection: one line a minute
 
 
 # -- how many --------------------------------------------------------------------------------------------------
