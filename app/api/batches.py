@@ -12,10 +12,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from fastapi import Response
+from pydantic_core import to_json
 from starlette.types import Receive, Scope, Send
 
 from app.api.problems import ProblemError
-from app.api.work import Deadline, busy
+from app.api.work import Deadline, TooSlowError, busy
 from app.shared.answers.answer import as_json
 from app.shared.memory.answers import SMALL, AnswerMemory, AnswerTooLargeError, MemoryFullError, Reservation
 from app.shared.problems import FieldError
@@ -85,12 +86,17 @@ def _refused(field: str, given: str, expected: str) -> Iterator[None]:
         ) from None
 
 
-def one_or_all(answers: Callable[[slice], Sequence[object]], batch: Batch, deadline: Deadline) -> Response:
+def one_or_all(
+    answers: Callable[[slice], Sequence[object]], batch: Batch, deadline: Deadline, partly: bool = False
+) -> Response:
     """The answer itself to a single item, ``{"results": [...]}`` in the same order to a list.
 
     `answers` computes those of a range of items. A range is serialised before the next is computed: garbage
-    collection of a hundred thousand live lists would take longer than the computation. Raises 503 after the
-    deadline, 413 if the answer is too large.
+    collection of a hundred thousand live lists would take longer than the computation. Raises 413 if the answer is
+    too large, and 503 after the deadline, unless the results until then are wanted.
+
+    Args:
+        partly: after the deadline, the answer is ``{"results": [...], "problem": ...}`` if there are results.
     """
     if batch.single and batch.size <= SMALL:
         return Response(as_json(answers(slice(0, 1))[0]), media_type=MEDIA_TYPE)
@@ -100,17 +106,23 @@ def one_or_all(answers: Callable[[slice], Sequence[object]], batch: Batch, deadl
         content = as_json(answers(slice(0, 1))[0])
         batch.resize(reservation, len(content), memory)
         return held_response([content], reservation)
-    pieces = []
-    size = 0
+    pieces: list[bytes] = []
+    size, end = 0, b"]}"
     for start in range(0, batch.count, batch.at_once):
-        deadline.check()
-        piece = as_json(list(answers(slice(start, start + batch.at_once))))
+        try:
+            deadline.check()
+            piece = as_json(list(answers(slice(start, start + batch.at_once))))
+        except TooSlowError as error:
+            if not (partly and start):
+                raise
+            end = b'],"problem":' + to_json(error.problem) + b"}"
+            break
         pieces += [b"," if start else b'{"results":[', piece[1:-1]]
         size += len(piece)
         if size > batch.count * batch.size:  # estimated too low
             batch.resize(reservation, size, memory)
     batch.resize(reservation, size, memory)
-    return held_response([*pieces, b"]}"], reservation)
+    return held_response([*pieces, end], reservation)
 
 
 def held_json(content: object, batch: Batch, reservation: Reservation, memory: AnswerMemory) -> Response:

@@ -29,7 +29,6 @@ from app.equations.expression import Expression
 from app.shared.answers.answer import Answer
 from app.shared.computations import TooManyPendingError
 from app.shared.problems import FieldError
-from app.shared.threads.turns import paused
 from kin import Robot
 from kin.transforms import Array
 
@@ -222,11 +221,10 @@ def _book(robot: Robot, deadline: Deadline) -> Book:
     with contextlib.ExitStack() as subscriptions:
         try:
             waiting = subscriptions.enter_context(book_later(robot, limited=True))
-            with paused():
-                while True:
-                    with contextlib.suppress(TimeoutError):
-                        return waiting.future.result(LOOK)
-                    deadline.check_now(GOES_ON)
+            while True:
+                with contextlib.suppress(TimeoutError):
+                    return waiting.future.result(LOOK)
+                deadline.check(GOES_ON)
         except TooManyPendingError as error:
             raise busy(f"The equations of {error.pending} arms are being derived already.") from None
         except DerivationError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Generator
 from contextlib import closing
 from functools import partial
@@ -26,7 +27,6 @@ from app.exports.motion_samples import with_joint_names
 from app.shared.answers.motion import MotionAnswer, motion_answer
 from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
-from app.shared.threads.turns import Turn
 from kin import InputError, Motion, Robot, plan_motion
 from kin.motion import program_from_dict
 
@@ -35,6 +35,7 @@ router = versioned("motion")
 MOST_RATE = 1000.0  # samples per second
 MOST_SAMPLES = 1_000_000
 NUMBER = 21  # bytes of a number in JSON, about
+_sampling = threading.Lock()  # samples are made by Python: two threads would take as long, and visitors wait twice
 _OWN_FIELDS = ("program", "q_start", "qd_start", "qdd_start")  # all others are of the program
 
 EXAMPLES = {
@@ -135,15 +136,15 @@ async def motion(request: Request, robot: Robot, body: MotionRequest) -> Respons
         return found
     kind = FORMATS[body.format]
     headers = {"content-disposition": f'attachment; filename="{robot.id}-motion{kind.suffix}"'}
-    pieces = in_turns(kind.pieces(found, body.rate), Turn(request.app.state.compute.turns))
+    pieces = one_by_one(kind.pieces(found, body.rate))
     return ComputedResponse(pieces, "motion", kind.media_type, headers, request.app.state.streams)
 
 
-def in_turns(pieces: Generator[bytes], turn: Turn) -> Generator[bytes]:
-    """The same pieces, each computed when it is the turn of this request; closing it ends their computation."""
+def one_by_one(pieces: Generator[bytes]) -> Generator[bytes]:
+    """The same pieces, each computed while no other request's is; closing it ends their computation."""
     with closing(pieces):
         while True:
-            with turn:
+            with _sampling:
                 piece = next(pieces, None)
             if piece is None:
                 return

@@ -24,7 +24,6 @@ from app.api.schemas import Number, OneOf, Vector3, Vector4, integral, numbers
 from app.shared.options import declared
 from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
-from app.shared.threads.turns import offer
 from kin import IKOptions, InputError, JointConstraints, Robot, Task, solve_path
 from kin.collision.obstacles import KINDS, LONGEST_NAME, MOST_OBSTACLES, Shape, checked_obstacles
 from kin.frames import WORLD
@@ -115,7 +114,6 @@ class Target(schemas.Body):
         Raises:
             ProblemError: 422 naming `field` and what is missing, contradicts, or is no rotation.
         """
-        offer()
         try:
             if self.text is not None:
                 return self._typed(task, field, maker)
@@ -205,7 +203,6 @@ class Target(schemas.Body):
 
 def _placed(targets: list[Target], rotations: Array | None) -> Array | None:
     """Poses ``(k, 4, 4)`` at the positions of targets with these rotations ``(k, 3, 3)``; None without them."""
-    offer()
     if rotations is None:
         return None
     T = np.zeros((len(targets), 4, 4))
@@ -220,7 +217,6 @@ def _rotations(wxyz: Array) -> Array | None:
 
 def _with_matrices(targets: list[Target]) -> Array | None:
     """The matrices of targets ``(k, 4, 4)`` as they were sent; None if one of them is not exactly a pose."""
-    offer()
     T = np.array([whole_matrix(each.matrix) for each in targets])
     errors = np.empty(len(T))
     straighten_many(T, FAR, np.empty_like(T), errors)

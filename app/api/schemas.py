@@ -15,7 +15,6 @@ from app.shared.answers.answer import as_json
 from app.shared.problems import FieldError, Problem, show
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.shared.threads.turns import offer
 from kin import InputError, Robot, from_pendant
 from kin.transforms import Array
 
@@ -76,7 +75,6 @@ class Body(BaseModel):
     @classmethod
     def forbid_unknown(cls, data: Any) -> Any:
         """Rejects a field that the schema does not have, listing those it has."""
-        offer()
         if isinstance(data, dict):
             fields = cls.__pydantic_fields__  # `model_fields` takes ten times as long, and a batch has many bodies
             for name, value in data.items():

@@ -1,10 +1,9 @@
 """Limits of computation: how many requests compute at a time, for how long, and only while the client is there.
 
-Requests are computed by other processes (:mod:`app.service.pool`), or in threads where there are none, and for
-answers that are sent while they are computed. Of both there are few. So each request needs a slot, and waits for a
-free one without occupying a thread. Its time starts when it has a slot. A thread cannot be ended from outside: the
-computation calls `Deadline.check` between targets, and ends when that raises. It also raises once the client has
-left, which is watched for after a moment: most answers are there before.
+Requests are computed by other processes (:mod:`app.service.compute`), or in threads where there are none. Of both
+there are few. So each request needs a slot, and waits for a free one without occupying a thread. Its time starts
+when it has a slot. A computation calls `Deadline.check` between targets, and ends when that raises. It also raises
+once the client has left, which is watched for after a moment: most answers are there before.
 """
 
 from __future__ import annotations
@@ -15,22 +14,22 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import Future
 from contextlib import asynccontextmanager, contextmanager
 from contextvars import ContextVar
-from typing import Annotated, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
-from fastapi import Depends, Request
+from fastapi import Request
 from starlette.concurrency import run_in_threadpool
 
 from app.api.problems import ClientLeftError, ProblemError
 from app.shared.clients import client_of
 from app.shared.memory.answers import AnswerMemory
 from app.shared.slots import Slot, Slots
-from app.shared.threads.turns import MOST, Turn, Turns, offer
 
 T = TypeVar("T")
 RETRY_AFTER = 2  # seconds
 RETRY_SLOW = 30
 POLL = 0.2  # seconds between two checks whether the service is being stopped
 WATCH_AFTER = 0.2  # seconds of a request from which on its connection is watched
+READERS = 2  # threads that validate large bodies: so a short one need not wait for a long one
 
 
 def busy(detail: str, setting: str = "", headers: dict[str, str] | None = None) -> ProblemError:
@@ -100,10 +99,9 @@ class ComputeSlots:
         self.pool = pool
         self.closed = False
         self.waiting = 0  # requests that wait for a slot
-        self.turns = Turns()
         self._slots = Slots(most, share)
         self._processes = self._slots if pool is None else Slots(pool.count, share)
-        self._reading = Slots(MOST)  # of threads that validate large bodies
+        self._reading = Slots(READERS)  # of threads that validate large bodies
 
     @asynccontextmanager
     async def slot(self, request: Request, process: bool = False) -> AsyncIterator[Deadline]:
@@ -122,15 +120,10 @@ class ComputeSlots:
     async def read(self, request: Request, validated: Callable[[], T]) -> T:
         """What a thread makes of a large body; raises 503 if it cannot begin in time."""
         client = client_of(request.scope)
-
-        def in_turn() -> T:
-            with deadline.turn:
-                return validated()
-
         with self.watched(request) as deadline:
             await self._acquire(self._reading, client, deadline, "read")
             with Slot(self._reading, client):
-                return await run_in_threadpool(in_turn)
+                return await run_in_threadpool(validated)
 
     @contextmanager
     def watched(self, request: Request) -> Iterator[Deadline]:
@@ -197,7 +190,6 @@ class Deadline:
     def __init__(self, work: ComputeSlots) -> None:
         self.slot: Slot | None = None
         self.on_left: Callable[[], None] | None = None  # called by the event loop when the client leaves
-        self.turn = Turn(work.turns)  # which its thread takes to compute
         self._work = work
         self._left = False
         self.start()
@@ -223,15 +215,7 @@ class Deadline:
         return self._ends - time.monotonic()
 
     def check(self, advice: str = ADVICE) -> None:
-        """Raises `ClientLeftError` once the client has left, 503 after the deadline or when the service stops.
-
-        Other threads may take their turn meanwhile.
-        """
-        offer()
-        self.check_now(advice)
-
-    def check_now(self, advice: str = ADVICE) -> None:
-        """As `check`, for a thread that has no turn at the moment."""
+        """Raises `ClientLeftError` once the client has left, 503 after the deadline or when the service stops."""
         self.check_client()
         if self._work.closed:
             raise stopping()
@@ -290,24 +274,13 @@ async def computed_here(
 ) -> T:
     """The same in a thread of this process."""
 
-    def in_turn() -> T:
-        with deadline.turn:
-            deadline.check()  # the thread may have waited for its turn
-            began = time.perf_counter()
-            try:
-                return answer(deadline)
-            finally:
-                if took is not None:
-                    took(time.perf_counter() - began)
+    def timed() -> T:
+        began = time.perf_counter()
+        try:
+            return answer(deadline)
+        finally:
+            if took is not None:
+                took(time.perf_counter() - began)
 
     async with compute_slots(request).slot(request) as deadline:
-        return await run_in_threadpool(in_turn)
-
-
-async def _deadline(request: Request) -> AsyncIterator[Deadline]:
-    async with compute_slots(request).slot(request) as deadline:
-        yield deadline
-
-
-# For responses that are sent while they are computed: the slot is kept while the client reads.
-DeadlineDep = Annotated[Deadline, Depends(_deadline)]
+        return await run_in_threadpool(timed)

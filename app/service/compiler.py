@@ -2,8 +2,8 @@
 
 A thread that calls a kernel which is in no cache waits here until such a process has compiled it
 (:mod:`kin.kernels.elsewhere`), and then loads it. What requests and visitors wait for does not queue behind what
-is compiled ahead: each of the two has a process. A request that waits leaves its turn to others, and ends when its
-client leaves or its time is over; the compilation goes on, and the next request finds the kernel.
+is compiled ahead: each of the two has a process. A request that waits ends when its client leaves or its time is
+over; the compilation goes on, and the next request finds the kernel.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from contextvars import ContextVar
 from app.api.problems import ProblemError
 from app.api.work import TooSlowError, current_deadline, stopping
 from app.shared.threads import NICENESS, lower_priority
-from app.shared.threads.turns import paused
 from kin.kernels.elsewhere import DONE
 
 STEP = 0.02  # s between two looks at the processes
@@ -159,12 +158,11 @@ class Compilers:
             answer = (self.ahead if ahead.get() else self.asked).submit(line)
             if _on_event_loop():
                 raise _preparing("")
-            with paused():
-                while True:
-                    with contextlib.suppress(TimeoutError):
-                        return answer.result(LOOK)
-                    if deadline is not None:
-                        deadline.check_now()
+            while True:
+                with contextlib.suppress(TimeoutError):
+                    return answer.result(LOOK)
+                if deadline is not None:
+                    deadline.check()
         except TooSlowError:
             raise _preparing(f", and is not ready after {deadline.seconds:g} s" if deadline else "") from None
         except CompilerStoppedError:

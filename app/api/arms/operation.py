@@ -41,7 +41,7 @@ def operation(
     examples: dict[str, Any] | None = None,
     **route: Any,
 ) -> Callable[[Handler], Handler]:
-    """Decorator: adds both routes of a handler, which is a coroutine or has a parameter `deadline`.
+    """Decorator: adds both routes of a handler, a coroutine.
 
     Args:
         router: where they are added.
@@ -90,17 +90,11 @@ def operation(
 def _by_id(handler: Handler, parameters: dict[str, Any]) -> Handler:
     """The endpoint of an arm of this service."""
 
-    def prepared(given: dict[str, Any]) -> dict[str, Any]:
+    async def answer(**given: Any) -> Any:
         robot = robot_of(given["request"], given.pop("robot_id"))
-        return given | {"robot": _framed(robot, given.get("body"))}
+        return await handler(**given, robot=_framed(robot, given.get("body")))
 
-    async def later(**given: Any) -> Any:
-        return await handler(**prepared(given))
-
-    def at_once(**given: Any) -> Any:
-        return handler(**prepared(given))
-
-    return _endpoint(later if inspect.iscoroutinefunction(handler) else at_once, handler, "", parameters)
+    return _endpoint(answer, handler, "", parameters)
 
 
 def _of_sent(
@@ -108,21 +102,12 @@ def _of_sent(
 ) -> Handler:
     """The endpoint of an arm that is sent along; its table is read as an answer is computed."""
 
-    def prepared(given: dict[str, Any], robot: Robot, body: Any) -> dict[str, Any]:
-        return given | {"robot": robot} | ({part: body} if part else {})
-
-    async def later(**given: Any) -> Any:
+    async def answer(**given: Any) -> Any:
         sent, body = _parted(given.pop("body"), model)
         robot = _framed(await computed(given["request"], partial(_read, sent)), body)
-        return await handler(**prepared(given, robot, body))
+        return await handler(**given, robot=robot, **({part: body} if part else {}))
 
-    def at_once(**given: Any) -> Any:
-        sent, body = _parted(given.pop("body"), model)
-        with given["deadline"].turn:
-            robot = _framed(sent.robot(), body)
-        return handler(**prepared(given, robot, body))
-
-    return _endpoint(later if inspect.iscoroutinefunction(handler) else at_once, handler, "_sent", parameters)
+    return _endpoint(answer, handler, "_sent", parameters)
 
 
 def _parted(body: Any, model: type[schemas.Body] | None) -> tuple[RobotDescription, schemas.Body | None]:

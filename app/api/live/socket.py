@@ -23,7 +23,6 @@ from app.api.live.answers import news, welcome
 from app.api.live.messages import MOST_BYTES, USUAL_RATE, Message, id_of, read
 from app.api.problems import ProblemError, internal_error, invalid
 from app.api.websockets import DONE, FAILED, POLICY, accept, close
-from app.api.work import Deadline
 from app.classroom.tokens import read_code, show_code
 from app.live import RESERVED, BusyLineError, Line, Lines, Program
 from app.live.codes import LONGEST, is_code
@@ -219,12 +218,7 @@ class Conversation:
         state, robot = self._visitor.app.state, self._line.robot
         if len(text) < LARGE or len(text) > MOST_BYTES:  # that is refused at once
             return read(text, robot, state.store)
-
-        def in_turn() -> Message:
-            with Deadline(state.compute).turn:
-                return read(text, robot, state.store)
-
-        return await run_in_threadpool(in_turn)
+        return await run_in_threadpool(read, text, robot, state.store)
 
     # What the program hears
 

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import chain
 from typing import Annotated, Any
 
 from fastapi import Request, Response
 from msgspec import UNSET, UnsetType
 from pydantic import Discriminator, Field, Tag
-from pydantic_core import to_json
 
 from app.api import schemas
 from app.api.arms.operation import operation
-from app.api.batches import MOST_AT_ONCE
+from app.api.batches import Batch, one_or_all
 from app.api.body import versioned
-from app.api.brief import BriefAnswers, Fields, brief, briefly, names_of, quick
+from app.api.brief import BriefAnswers, Fields, brief, briefly, names_of, quick, size_of
 from app.api.options import Goal, OptionsBody, Target, single_or_list
-from app.api.problems import ProblemError
-from app.api.schemas import POST_REFUSALS, example, reply, settings_of
-from app.api.work import Deadline, DeadlineDep
-from app.api.workspace.streaming import ComputedResponse
-from app.shared.answers.answer import Answer, as_json
+from app.api.schemas import POST_REFUSALS, example, settings_of
+from app.api.work import Deadline, computed
+from app.shared.answers.answer import Answer
 from app.shared.answers.ik import Brief, ReachableAnswer, WholeAnswers, reachable_answer, reachable_renewed
 from app.shared.problems import Problem
+from app.shared.settings import Settings
 from kin import IKOptions, Robot, Task
 from kin.ik import solve
 from kin.ik.table import Table
@@ -33,8 +30,7 @@ from kin.transforms import Array
 
 router = versioned("workspace")
 
-# Targets between two checks of the deadline and the client: one out of reach may take some ten milliseconds.
-AT_ONCE = 16
+ANSWER, JOINT = 700, 25  # bytes of an answer and of one joint's value, about
 Answers = Callable[[slice], Sequence[object]]
 
 EXAMPLES = {
@@ -83,38 +79,30 @@ class ReachableAnswers(Answer):
     response_model=ReachableAnswer | ReachableAnswers | BriefAnswers | Brief,
     responses=POST_REFUSALS,
 )
-def reachable(
-    request: Request,
-    robot: Robot,
-    deadline: DeadlineDep,
-    body: ReachableRequest,
-    fields: Fields = None,
-) -> Response:
+async def reachable(request: Request, robot: Robot, body: ReachableRequest, fields: Fields = None) -> Response:
     """Whether each target can be reached inside the limits; if not, why, by how much, and what comes closest.
 
     The result is that of `ik`, verified by forward kinematics, without the list of solutions. A reachable target
-    takes a tenth of a millisecond, others some milliseconds. The answer to a list is sent while it is computed,
-    and the computation ends when the client leaves.
+    takes a tenth of a millisecond, others some milliseconds. If the time of the request is over, the answer to a
+    list has the results until then and a `problem`.
     """
-    names, settings = names_of(fields), settings_of(request)
-    with deadline.turn:
-        together = None
-        if isinstance(body.target, list):
-            schemas.check_batch("target", len(body.target), settings)
-            together = body.poses_of_all(body.target)
-        if together is not None:
-            answers = _answers_together(robot, body, names, together, deadline)
-            count, at_once = len(together[1]), MOST_AT_ONCE if quick(names) else AT_ONCE
-        else:
-            targets, single = body.resolve_all(robot, body.target, settings)
-            answers = partial(_answers, robot, body, names, targets)
-            if single:
-                return reply(answers(slice(0, 1))[0])
-            count, at_once = len(targets), AT_ONCE
-    pieces = _pieces(answers, count, at_once, deadline)
-    # Invalid options show in the first piece, while the status of the response can still be set.
-    pieces = _resumed(next(pieces), pieces)
-    return ComputedResponse(pieces, "reachable", "application/json", slot=deadline.slot)
+    return await computed(request, partial(_judged, robot, body, names_of(fields), settings_of(request)))
+
+
+def _judged(
+    robot: Robot, body: ReachableRequest, names: tuple[str, ...], settings: Settings, deadline: Deadline
+) -> Response:
+    """The answer to all targets, as far as they are judged in time."""
+    together, size = None, size_of(robot, names) if quick(names) else ANSWER + JOINT * robot.n
+    if isinstance(body.target, list):
+        schemas.check_batch("target", len(body.target), settings)
+        together = body.poses_of_all(body.target)
+    if together is not None:
+        answers = _answers_together(robot, body, names, together, deadline)
+        return one_or_all(answers, Batch("target", len(together[1]), False, size), deadline, partly=True)
+    targets, single = body.resolve_all(robot, body.target, settings)
+    answers = partial(_answers, robot, body, names, targets, deadline)
+    return one_or_all(answers, Batch("target", len(targets), single, size), deadline, partly=True)
 
 
 def _options(body: ReachableRequest, task: Task) -> IKOptions:
@@ -122,12 +110,22 @@ def _options(body: ReachableRequest, task: Task) -> IKOptions:
 
 
 def _answers(
-    robot: Robot, body: ReachableRequest, names: tuple[str, ...], targets: list[Goal], some: slice
+    robot: Robot,
+    body: ReachableRequest,
+    names: tuple[str, ...],
+    targets: list[Goal],
+    deadline: Deadline,
+    some: slice,
 ) -> list[ReachableAnswer | dict[str, Any]]:
     goals = targets[some]
     options = {task: _options(body, task) for task in {goal.task for goal in goals}}
-    whole = [reachable_answer(solve(robot, goal.T, options[goal.task], rounding=goal.rounding)) for goal in goals]
-    return [brief(each, names) for each in whole] if names else [*whole]
+
+    def answer(goal: Goal) -> ReachableAnswer | dict[str, Any]:
+        deadline.check()  # one out of reach may take some ten milliseconds
+        whole = reachable_answer(solve(robot, goal.T, options[goal.task], rounding=goal.rounding))
+        return brief(whole, names) if names else whole
+
+    return [answer(goal) for goal in goals]
 
 
 def _answers_together(
@@ -145,26 +143,3 @@ def _answers_together(
     table = Table.of(robot, T, options, stop=deadline.check)
     whole = WholeAnswers(table, reachable_answer, reachable_renewed)
     return lambda some: [brief(each, names) for each in whole.of(some)] if names else whole.of(some)
-
-
-def _pieces(answers: Answers, count: int, at_once: int, deadline: Deadline) -> Generator[bytes]:
-    """``{"results": [...]}`` in pieces, with the problem if not all were computed in time."""
-    for start in range(0, count, at_once):
-        try:
-            deadline.check()
-            with deadline.turn:
-                piece = as_json(answers(slice(start, start + at_once)))[1:-1]
-        except ProblemError as error:
-            if not start:
-                raise
-            yield b'],"problem":' + to_json(error.problem) + b"}"
-            return
-        yield (b"," if start else b'{"results":[') + piece
-    yield b"]}"
-
-
-def _resumed(first: bytes, rest: Generator[bytes]) -> Generator[bytes]:
-    try:
-        yield from chain((first,), rest)
-    finally:
-        rest.close()

@@ -22,7 +22,6 @@ from app.api.arms.operation import with_robot
 from app.api.body import parsed, versioned
 from app.api.problems import ProblemError, invalid, unknown_robot
 from app.api.websockets import DONE, FAILED, LATER, POLICY, UNSUPPORTED, accept, close
-from app.api.work import Deadline
 from app.api.workspace.query import CloudQuery, read_cloud_query, validated
 from app.api.workspace.streaming import ThreadedGenerator
 from app.exports.formats import slices, table_of
@@ -66,7 +65,7 @@ async def stream_of_sent(visitor: WebSocket) -> None:
         text = await _first_message(visitor)
         state = visitor.app.state
         with state.streams.slot(client_of(visitor.scope)):  # so that few arms are read at a time
-            return await run_in_threadpool(_read, text, Deadline(state.compute))
+            return await run_in_threadpool(_read, text)
 
     await _serve(visitor, described)
 
@@ -87,11 +86,10 @@ async def _first_message(visitor: WebSocket) -> str:
     return text
 
 
-def _read(text: str, deadline: Deadline) -> tuple[CloudQuery, Robot]:
-    """The cloud and the arm of a first message, read in turn with other computations; raises `ProblemError`."""
-    with deadline.turn:
-        body: Any = validated(SentCloud, parsed(text.encode()), "body")
-        return body, body.robot.robot()
+def _read(text: str) -> tuple[CloudQuery, Robot]:
+    """The cloud and the arm of a first message; raises `ProblemError`."""
+    body: Any = validated(SentCloud, parsed(text.encode()), "body")
+    return body, body.robot.robot()
 
 
 async def _serve(visitor: WebSocket, described: Callable[[], Awaitable[tuple[CloudQuery, Robot]]]) -> None:

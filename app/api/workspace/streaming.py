@@ -5,14 +5,13 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import AsyncIterator, Generator, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from typing import Generic, TypeVar
 
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 from starlette.types import Receive, Scope, Send
 
-from app.api.problems import ClientLeftError
 from app.api.work import busy
 from app.shared.clients import client_of
 from app.shared.metrics import STREAMED
@@ -88,8 +87,7 @@ class ComputedResponse(StreamingResponse):
         pieces: the bytes to send.
         name: label of the bytes in the metrics.
         media_type, headers: of the response.
-        limit: the limit of concurrent streams, if it applies.
-        slot: the place of the request, if it has one.
+        limit: the limit of concurrent streams.
     """
 
     def __init__(
@@ -97,21 +95,19 @@ class ComputedResponse(StreamingResponse):
         pieces: Generator[bytes],
         name: str,
         media_type: str,
-        headers: dict[str, str] | None = None,
-        limit: StreamLimit | None = None,
-        slot: Slot | None = None,
+        headers: dict[str, str],
+        limit: StreamLimit,
     ) -> None:
         self._pieces = ThreadedGenerator(pieces)
         self._name = name
         self._limit = limit
-        self._slot = slot
         super().__init__(self._in_threads(), headers=headers, media_type=media_type)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self._slots = scope["app"].state.compute
         try:
-            with self._limit.slot(client_of(scope)) if self._limit else nullcontext(self._slot) as slot:
-                await super().__call__(scope, receive, send if slot is None else slot.lent(send))
+            with self._limit.slot(client_of(scope)) as slot:
+                await super().__call__(scope, receive, slot.lent(send))
         except _StoppedError:
             # The response is incomplete: the server closes the connection, which shows the client that it is.
             logger.warning("a response was cut off because the service is being stopped")
@@ -121,15 +117,9 @@ class ComputedResponse(StreamingResponse):
             self._pieces.close()
 
     async def _in_threads(self) -> AsyncIterator[bytes]:
-        while (piece := await self._next()) is not None:
-            if self._slots.closed and self._limit:
+        while (piece := await run_in_threadpool(self._pieces.take)) is not None:
+            if self._slots.closed:
                 raise _StoppedError
             if piece:
                 STREAMED.labels(self._name).inc(len(piece))
                 yield piece
-
-    async def _next(self) -> bytes | None:
-        try:
-            return await run_in_threadpool(self._pieces.take)
-        except ClientLeftError:
-            return None

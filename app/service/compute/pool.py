@@ -105,7 +105,7 @@ class Pool:
             deadline: of the request; `answer` gets one that ends with it.
             took: called with the seconds that the process took.
         """
-        deadline.check_now()
+        deadline.check()
         process = self._free.popleft()
         loop, job = asyncio.get_running_loop(), Job(b"")
         self._jobs[job] = process
@@ -123,11 +123,11 @@ class Pool:
         try:
             found: T = await run_in_threadpool(ask)
         except LostError:
-            deadline.check_now()  # it was killed because of that
+            deadline.check()  # it was killed because of that
             raise busy("The process that computed this answer has ended.") from None
         except Exception:
             if job.cancelled:
-                deadline.check_now()
+                deadline.check()
             raise
         finally:
             deadline.on_left = None

@@ -13,7 +13,6 @@ import pytest
 import kin
 from app.api import motion as motion_module
 from app.exports.motion import FORMATS
-from app.shared.threads.turns import Turn, Turns
 from kin.motion.tables import AT_ONCE, columns
 
 UR5 = kin.get_robot("ur5")
@@ -96,30 +95,22 @@ def test_tables_and_streams_hold_the_samples(client):
     assert np.allclose([line["position"] for line in lines[1:]], expected.T[:, :3, 3], atol=1e-12)
 
 
-class CountedTurns(Turns):
-    """Counts who has a turn."""
-
-    def __init__(self):
-        super().__init__()
-        self.taken = self.running = 0
-
-    def take(self, used):
-        super().take(used)
-        self.taken += 1
-        self.running += 1
-
-    def give(self):
-        self.running -= 1
-        super().give()
-
-
 @pytest.mark.parametrize("form", ["csv", "ndjson"])
-def test_samples_are_computed_in_turns(client, app, monkeypatch, form):
-    turns = CountedTurns()
-    monkeypatch.setattr(app.state.compute, "turns", turns)
+def test_one_request_at_a_time_makes_samples(client, monkeypatch, form):
+    class Counted:
+        taken, held = 0, False
+
+        def __enter__(self):
+            self.taken, self.held = self.taken + 1, True
+
+        def __exit__(self, *_):
+            self.held = False
+
+    lock = Counted()
+    monkeypatch.setattr(motion_module, "_sampling", lock)
     lines = post(client, {"rate": 1000, "format": form}).text.splitlines()
-    assert turns.taken >= 2 + len(lines) / AT_ONCE
-    assert turns.running == 0
+    assert lock.taken >= 2 + len(lines) / AT_ONCE
+    assert not lock.held
 
 
 def test_samples_that_nobody_reads_are_not_computed():
@@ -128,17 +119,16 @@ def test_samples_that_nobody_reads_are_not_computed():
     def pieces():
         try:
             for piece in (b"1", b"2", b"3"):
-                seen.append(turns.running)
+                seen.append(motion_module._sampling.locked())
                 yield piece
         finally:
             seen.append("closed")
 
-    turns = CountedTurns()
-    found = motion_module.in_turns(pieces(), Turn(turns))
+    found = motion_module.one_by_one(pieces())
     assert next(found) == b"1"
-    assert turns.running == 0
+    assert not motion_module._sampling.locked()
     found.close()
-    assert seen == [1, "closed"]
+    assert seen == [True, "closed"]
 
 
 def test_code_is_text_and_python_plans_the_same_motion(client, capsys):

@@ -22,7 +22,6 @@ from app.service import startup
 from app.service.compiler import Compilers
 from app.service.main import create_app
 from app.shared.settings import Settings
-from app.shared.threads.turns import MOST
 
 ARM = next(iter(kin.classic_robots().values()))  # whose kernels every service has
 ROUTE = f"/api/v1/robots/{ARM.id}"
@@ -148,12 +147,11 @@ def test_one_that_waits_for_a_place_gets_it_when_the_kernel_is_there(service):
         assert [each.result(20).status_code for each in waiting] == [200, 200]
 
 
-def test_those_that_wait_take_no_turn_from_others(service, monkeypatch):
-    """More of them than there are turns, also beyond the usual number."""
+def test_those_that_wait_do_not_hold_up_others(service, monkeypatch):
     slots = service.app.state.compute._slots
     monkeypatch.setattr(slots, "most", 100)
     monkeypatch.setattr(slots, "most_of_one", 100)
-    count = 2 * MOST + 1
+    count = 5
     with service.asking(count) as waiting:
         wait_for(lambda: service.used == count)
         assert len(service.post(f"{ROUTE}/fk", {"q": [HOME] * (fk.FEW + 1)}).json()["results"]) == fk.FEW + 1
