@@ -54,7 +54,7 @@ def server_config(app: FastAPI, settings: Settings, files: int | None = None) ->
         app,
         lifespan="on",
         backlog=ACCEPTED,
-        loop="asyncio",  # faster here than uvloop: see `GuardedConfig`
+        loop="asyncio",  # uvloop is no faster here
         log_level="warning",
         log_config=None,  # see `app.service.log`
         access_log=False,

@@ -42,18 +42,10 @@ _PLAIN = frozenset({str, bool, int, float})
 
 
 class LoopWaker:
-    """Calls functions in the thread of an event loop. One wake-up serves all calls that wait.
+    """Calls functions in the thread of an event loop. One wake-up serves all calls that wait."""
 
-    Args:
-        loop: the event loop.
-        when: calls a function that wakes the loop, at once or soon; any thread may call it.
-    """
-
-    def __init__(
-        self, loop: asyncio.AbstractEventLoop, when: Callable[[Callable[[], None]], None] = lambda wake: wake()
-    ) -> None:
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.loop = loop
-        self._when = when
         self._waiting: deque[Callable[[], None]] = deque()
         self._woken = False
 
@@ -63,11 +55,8 @@ class LoopWaker:
         self._waiting.append(act)
         if not self._woken:
             self._woken = True
-            self._when(self._wake)
-
-    def _wake(self) -> None:
-        with contextlib.suppress(RuntimeError):  # closed: there is no visitor left
-            self.loop.call_soon_threadsafe(self._answer)
+            with contextlib.suppress(RuntimeError):  # closed: there is no visitor left
+                self.loop.call_soon_threadsafe(self._answer)
 
     def _answer(self) -> None:
         self._woken = False

@@ -34,7 +34,6 @@ from app.shared.connection import Connection, ConnectionEnded
 from app.shared.security import Rights
 from app.shared.throttled_log import ThrottledLog
 from app.viewer import viser_names
-from app.viewer.session.worker.threads import THREADS
 from app.viewer.viser_outbox import LoopWaker, Outbox, Packer
 from app.viewer.viser_patches import drag_gizmo
 
@@ -66,7 +65,7 @@ class PortlessServer(infra.WebsockServer):
         self.visitors: dict[int, viser.ClientHandle] = {}  # viser's own, by client id
         self._open = 0  # connections
         self._throttled = ThrottledLog(log)
-        self.waker, self._packer = LoopWaker(loop, THREADS.after_steps), Packer()
+        self.waker, self._packer = LoopWaker(loop), Packer()
         self._stopping: asyncio.Future[None]
         self._all_ended: asyncio.Event
 

@@ -2,11 +2,8 @@
 
 A step takes half a millisecond, nearly all of it in Python, of which only one thread at a time runs. With a thread
 for each visitor, thirty who drag cost a dozen switches of threads per event and gain nothing. So one thread leads:
-it takes the visitors in turn, each for one step. A second one watches. If a step lasts longer than `PATIENCE`, the
-watcher leads, and the thread of that step only ends it: a visitor whose step blocks holds up the others that long.
-
-The event loop is woken once for the steps of a row (`VisitorThreads.after_steps`). Whenever it wakes, two
-threads want Python at once.
+it takes the visitors in turn, each for one step. A second one watches. If a step lasts longer than `PATIENCE`, a
+new thread leads, and the one before only ends its step: a visitor whose step blocks holds up the others that long.
 
 Visitors who are there come first, and pages are built after their steps. If two hundred arrive at once, each page
 takes some ten milliseconds, and a visitor who drags waits for one of them at most.
@@ -25,11 +22,9 @@ from collections.abc import Callable
 log = logging.getLogger(__name__)
 
 PATIENCE = 0.02  # s without a new step, after which another thread leads
-KEEP = 2.0  # s without work, after which the threads end
+KEEP = 1.0  # s without a step, after which nobody watches until the next one
 IN_A_ROW = 10  # steps, after which a page is built that waits
-TOGETHER = 8  # steps, after which the event loop is woken for them at the latest
 BUILDS = 4  # pages built at a time: more than one where the first take long
-LOG_EVERY = 10.0  # s between two log lines about threads that could not be started
 
 
 class Turn:
@@ -55,106 +50,59 @@ class Turn:
 
 
 class VisitorThreads:
-    """The threads of one process. They start with the first call and end after `KEEP` seconds without one."""
+    """The threads of one process: one leads, one watches, others end their steps. They start when called."""
 
-    def __init__(self, patience: float = PATIENCE, keep: float = KEEP) -> None:
-        self._patience, self._keep = patience, keep
-        self._lock = threading.Lock()
-        self._work = threading.Condition(self._lock)  # what the leader waits for
-        self._watch = threading.Condition(self._lock)  # what the watcher waits for
+    def __init__(self) -> None:
+        self._changed = threading.Condition()  # what the leader waits for; its lock protects all of this
         self._ready: deque[Turn] = deque()
         self._builds: deque[Turn] = deque()
+        self._due: list[tuple[float, int, Turn]] = []
         self._building = 0
         self._row = 0  # steps since a page was built
-        self._after: dict[Callable[[], None], None] = {}  # see `after_steps`
-        self._together = 0  # steps since the last of these calls
-        self._due: list[tuple[float, int, Turn]] = []
-        self._order = itertools.count()
-        self._numbers = itertools.count(1)
+        self._order, self._names = itertools.count(), itertools.count(1)
         self._leader: threading.Thread | None = None
         self._watcher: threading.Thread | None = None
         self._step = 0  # number of the leader's step; odd while it lasts
-        self._log_at = 0.0  # when a thread that could not be started is logged again
-        self._watches = False  # whether the watcher looks at the leader again and again
+        self._active = threading.Event()  # whether the watcher looks at the leader again and again
 
     def call(self, turn: Turn, build: bool) -> None:
         """See `Turn.call`."""
-        with self._lock:
+        with self._changed:
             if turn.acts:
                 turn.again = True
                 return
             if not turn.waits:
                 self._queue(turn, build)
-            if self._leader is None:
-                self._leader = self._start(True)
-            elif not self._step & 1:
-                self._work.notify()
+            self._leader = self._leader or self._start(self._lead)
 
-    def after_steps(self, act: Callable[[], None]) -> None:
-        """Call `act` once for several steps: when no visitor waits any more, or after `TOGETHER` steps.
-
-        Outside of the leading thread it is called at once. It must be quick, and not fail.
-        """
-        with self._lock:
-            if is_leader := threading.current_thread() is self._leader:
-                self._after[act] = None
-        if not is_leader:
-            act()
-
-    def _call_after(self) -> None:
-        self._together += 1
-        if self._ready and not self._builds and self._together < TOGETHER:
-            return
-        with self._lock:
-            self._together, after, self._after = 0, self._after, {}
-        for act in after:
-            act()
-
-    def _start(self, leads: bool) -> threading.Thread | None:
-        """A new thread; None if the system has none left: the next call or step tries again."""
-        thread = threading.Thread(
-            target=self._run, args=(leads,), name=f"visitors-{next(self._numbers)}", daemon=True
-        )
+    def _start(self, act: Callable[[], None]) -> threading.Thread | None:
+        """A new thread; None if the system has none left: the next call, step or look tries again."""
+        thread = threading.Thread(target=act, name=f"visitors-{next(self._names)}", daemon=True)
         try:
             thread.start()
         except RuntimeError as error:
-            if time.monotonic() >= self._log_at:
-                self._log_at = time.monotonic() + LOG_EVERY
-                log.error("a thread for visitors could not be started: %s", error)
+            log.error("a thread for visitors could not be started: %s", error)
             return None
         return thread
-
-    def _run(self, leads: bool) -> None:
-        while leads or self._take_over():
-            leads = False
-            if not self._lead():
-                return
 
     def _queue(self, turn: Turn, build: bool) -> None:
         turn.waits, turn.due, turn.builds = True, None, build
         (self._builds if build else self._ready).append(turn)
+        self._changed.notify()
 
-    # The leader
-
-    def _lead(self) -> bool:
-        """Take the visitors in turn. True: another thread leads now; False: there was nothing to do for long."""
+    def _lead(self) -> None:
+        """Take the visitors in turn, until another thread leads."""
         me = threading.current_thread()
         turn: Turn | None = None
         again: float | None = None
         while True:
-            if self._after:
-                self._call_after()
-            with self._lock:
+            with self._changed:
                 if turn is not None:
                     self._end_step(turn, again)
                 if self._leader is not me:
-                    return True
+                    return
                 self._step += self._step & 1
                 turn = self._next()
-                if turn is None:
-                    self._leader = None
-                    self._watch.notify()
-                    return False
                 self._begin_step(turn)
             try:
                 again = turn.act()
@@ -162,8 +110,8 @@ class VisitorThreads:
                 log.exception("a visitor's step failed")
                 again = None
 
-    def _next(self) -> Turn | None:
-        """The next visitor, for whom the leader waits; None: there was none for long."""
+    def _next(self) -> Turn:
+        """The next visitor, for whom the leader waits."""
         while True:
             now = time.monotonic()
             while self._due:
@@ -181,20 +129,15 @@ class VisitorThreads:
             if builds:
                 self._row = 0
                 return self._builds.popleft()
-            wait = self._due[0][0] - now if self._due else self._keep
-            if not self._work.wait(wait) and not (self._ready or self._builds or self._due):
-                return None
+            self._changed.wait(self._due[0][0] - now if self._due else None)
 
     def _begin_step(self, turn: Turn) -> None:
         turn.waits, turn.acts, turn.again = False, True, False
         self._building += turn.builds
         self._step += 1
-        if self._watcher is None:
-            self._watches = True
-            self._watcher = self._start(False)
-        elif not self._watches:
-            self._watches = True
-            self._watch.notify()
+        self._watcher = self._watcher or self._start(self._watch)
+        if not self._active.is_set():
+            self._active.set()
 
     def _end_step(self, turn: Turn, again: float | None) -> None:
         turn.acts = False
@@ -204,41 +147,23 @@ class VisitorThreads:
         elif again is not None:
             turn.due = time.monotonic() + again
             heapq.heappush(self._due, (turn.due, next(self._order), turn))
-        if self._leader is None and (self._ready or self._due):
-            self._leader = self._start(True)
-        elif self._leader is not threading.current_thread() and not self._step & 1:
-            self._work.notify()  # it sleeps, and did not know of this
+        self._changed.notify()  # another thread may lead by now
 
-    # The watcher
-
-    def _take_over(self) -> bool:
-        """Watch, and lead as soon as a step takes too long. False: this thread is not needed."""
-        me = threading.current_thread()
-        with self._lock:
-            if self._watcher not in (None, me):
-                return False  # another thread does
-            self._watcher = me
-            late = self._watch_leader()
-            self._watcher = None
-            if late:
-                self._leader = me
-                self._step += 1  # of the thread that led, and only ends its step
-            return late
-
-    def _watch_leader(self) -> bool:
-        """Wait; True: a step takes too long, False: there is no leader any more."""
-        idle, seen = 0, 0
-        while self._leader is not None:
-            if self._step & 1:
-                if self._step == seen:
-                    return True
-                idle = 0
-            else:
-                idle += 1
-            seen = self._step
-            self._watches = idle * self._patience < 1.0
-            self._watch.wait(self._patience if self._watches else None)
-        return False
+    def _watch(self) -> None:
+        """Have another thread lead as soon as a step takes too long."""
+        seen, idle = 0, 0
+        while self._active.wait():
+            time.sleep(PATIENCE)
+            with self._changed:
+                if self._step != seen:
+                    seen, idle = self._step, 0
+                elif not seen & 1:
+                    idle += 1
+                    if idle * PATIENCE > KEEP:
+                        self._active.clear()
+                elif leader := self._start(self._lead):
+                    self._leader = leader
+                    self._step += 1
 
 
 THREADS = VisitorThreads()

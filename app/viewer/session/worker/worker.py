@@ -12,7 +12,6 @@ import threading
 from collections.abc import Callable, Hashable
 
 import kin
-from app.shared.threads.turns import urgent
 from app.viewer.panel.status import Notice
 from app.viewer.session.worker.inbox import Inbox
 from app.viewer.session.worker.threads import THREADS, Turn
@@ -114,8 +113,7 @@ class Worker:
                 self._finish()
                 return None
             else:
-                with urgent:
-                    self._guard(lambda: self._step(batch))
+                self._guard(lambda: self._step(batch))
             return self._timeout
         except BaseException:  # noqa: BLE001 - logged there
             self._fail()

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from app.shared.threads.turns import Turn, Turns
 from app.viewer.arm import Arm
 from app.viewer.feature import Stage
 from app.viewer.panel import Post
@@ -30,7 +29,6 @@ from kin.way import MOST_SEED, find_way, is_installed, way_program
 
 SHORTEST, USUAL, LONGEST = 0.1, 5.0, 60.0  # seconds of a search
 REPORT = 0.1  # s between two reports of the progress
-_TURNS = Turns(1)  # visitors' events go first
 _WHOLE = Unit("", 1.0, 0)
 
 
@@ -105,37 +103,35 @@ def compute(search: Search, settings: Settings, report: Callable[[], None]) -> N
     assert before is not None
     item, arrival = items[search.index], search.plan.otherwise.get(before)
     start = np.array(items[before].q) if arrival is None else arrival.q
-    with Turn(_TURNS) as turn:
-        last = [time.monotonic()]
+    last = [time.monotonic()]
 
-        def stop() -> None:
-            if search.cancelled.is_set():
-                raise CancelledError
-            turn.offer()
+    def stop() -> None:
+        if search.cancelled.is_set():
+            raise CancelledError
 
-        def progress(share: float) -> None:
-            search.share = share
-            if time.monotonic() - last[0] >= REPORT:
-                last[0] = time.monotonic()
-                report()
+    def progress(share: float) -> None:
+        search.share = share
+        if time.monotonic() - last[0] >= REPORT:
+            last[0] = time.monotonic()
+            report()
 
-        itself = bool(arm.robot.capsules)
-        way = find_way(
-            arm.robot,
-            start,
-            item.q,
-            obstacles=arm.obstacles,
-            avoid_self_collision=itself,
-            seed=settings.seed,
-            time_limit=settings.seconds,
-            progress=progress,
-            stop=stop,
-        )
-        if way.q is None:
-            search.explain = way.explain
-            return
-        like = Ptp(JointTarget(item.q), **{name: getattr(item, name) for name in _KEPT})
-        motion = way_program(way, arm.obstacles, itself, stop, like)
+    itself = bool(arm.robot.capsules)
+    way = find_way(
+        arm.robot,
+        start,
+        item.q,
+        obstacles=arm.obstacles,
+        avoid_self_collision=itself,
+        seed=settings.seed,
+        time_limit=settings.seconds,
+        progress=progress,
+        stop=stop,
+    )
+    if way.q is None:
+        search.explain = way.explain
+        return
+    like = Ptp(JointTarget(item.q), **{name: getattr(item, name) for name in _KEPT})
+    motion = way_program(way, arm.obstacles, itself, stop, like)
     if not motion.planned:
         search.title, search.explain = "The way that was found cannot be driven", motion.explain
         return

@@ -344,7 +344,7 @@ def test_a_lead_pauses_the_exercise_of_a_course_and_returns_to_it(room: Class) -
     student.wait(lambda: "data-class-paused>Exercise paused" in student.html)
     student.wait(lambda: f'data-exercise="{EXERCISE}"' not in student.html)
     at(student, q)
-    student.wait(lambda: opened(student)["class"] == {"paused": True})  # for a reload
+    student.wait(lambda: opened(student).get("class") == {"paused": True})  # for a reload
     again = room.browser(room.hub.rooms.tokens.sign(ticket), state=student.kept[-1])
     for tab in (student, again):
         tab.wait(lambda tab=tab: "data-class-paused>Exercise paused" in tab.html)

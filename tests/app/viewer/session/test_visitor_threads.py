@@ -6,12 +6,12 @@ import logging
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable
 
 import pytest
 
 from app.viewer.panel.status import Notice
-from app.viewer.session.worker.threads import BUILDS, TOGETHER, Turn, VisitorThreads
+from app.viewer.session.worker.threads import BUILDS, Turn, VisitorThreads
 from app.viewer.session.worker.worker import Worker
 
 WAIT = 10.0  # s for what takes milliseconds
@@ -25,16 +25,14 @@ def wait_for(condition: Callable[[], object], timeout: float = WAIT) -> None:
         time.sleep(0.002)
 
 
-def thread_names() -> list[str]:
-    return [thread.name for thread in threading.enumerate() if thread.name.startswith("visitors-")]
+def count() -> int:
+    """How many threads for visitors there are."""
+    return sum(thread.name.startswith("visitors-") for thread in threading.enumerate())
 
 
-@pytest.fixture
-def threads() -> Iterator[VisitorThreads]:
-    wait_for(lambda: not thread_names())  # those of an earlier test
-    made = VisitorThreads(keep=0.2)
-    yield made
-    wait_for(lambda: not thread_names())
+@pytest.fixture(scope="module")
+def threads() -> VisitorThreads:
+    return VisitorThreads()
 
 
 class Visitor:
@@ -137,17 +135,20 @@ def test_a_step_that_blocks_holds_up_nobody_else(threads):
 
 def test_several_blocked_steps_hold_up_nobody_and_their_threads_end(threads):
     blocked, other = [Visitor(threads, 1.0) for _ in range(6)], Visitor(threads)
+    other.turn.call()
+    wait_for(lambda: other.steps)
+    before = count()
     for visitor in blocked:
         visitor.turn.call()
     wait_for(lambda: all(visitor.steps for visitor in blocked))
     other.turn.call()
-    wait_for(lambda: other.steps)
-    assert sum(visitor.within.locked() for visitor in blocked) == 6, "all of them block at a time"
-    assert len(thread_names()) <= 8
-    wait_for(lambda: not any(visitor.within.locked() for visitor in blocked))
-    wait_for(lambda: len(thread_names()) <= 2)
-    other.turn.call()
     wait_for(lambda: other.steps == 2)
+    assert sum(visitor.within.locked() for visitor in blocked) == 6, "all of them block at a time"
+    assert count() == before + 6
+    wait_for(lambda: not any(visitor.within.locked() for visitor in blocked))
+    wait_for(lambda: count() == before)
+    other.turn.call()
+    wait_for(lambda: other.steps == 3)
 
 
 def test_a_call_during_a_blocked_step_is_answered_after_it(threads):
@@ -161,7 +162,8 @@ def test_a_call_during_a_blocked_step_is_answered_after_it(threads):
     wait_for(lambda: blocks.steps == 2)
 
 
-def test_steps_go_before_pages_that_are_built(threads):
+def test_steps_go_before_pages_that_are_built():
+    threads = VisitorThreads()
     order: list[str] = []
 
     def acts(name: str) -> Callable[[], float | None]:
@@ -197,7 +199,7 @@ def test_pages_whose_building_blocks_take_no_more_threads_than_allowed(threads):
     wait_for(lambda: all(visitor.steps for visitor in builds))
 
 
-def test_threads_that_cannot_be_started_are_tried_again(threads, monkeypatch, caplog):
+def test_threads_that_cannot_be_started_are_tried_again(monkeypatch, caplog):
     start = threading.Thread.start
     refused = [True, False, True, True]  # the one that leads, once; the one that watches, twice
 
@@ -207,9 +209,10 @@ def test_threads_that_cannot_be_started_are_tried_again(threads, monkeypatch, ca
         start(thread)
 
     monkeypatch.setattr(threading.Thread, "start", starts)
+    threads, before = VisitorThreads(), count()
     visitor, other = Visitor(threads), Visitor(threads)
     visitor.turn.call()
-    assert not thread_names()
+    assert count() == before
     visitor.turn.call()
     wait_for(lambda: visitor.steps == 1)
     for k in range(1, 5):
@@ -389,55 +392,3 @@ def test_what_is_waited_for_before_a_page_is_built_fails_that_page_alone(caplog)
     assert page.join(WAIT)
     assert (failures, page.did) == ([1], ["leave"])
     assert "no answer" in caplog.text
-
-
-@pytest.mark.full
-def test_the_event_loop_is_woken_once_for_the_steps_of_a_row(threads):
-    woken: list[int] = []
-    done: list[int] = []
-    gate, count = threading.Event(), 2 * TOGETHER + 1
-
-    def wake() -> None:
-        woken.append(len(done))
-
-    def step(k: int) -> Callable[[], float | None]:
-        def act() -> None:
-            if k == 0:
-                gate.wait(WAIT)  # until all wait
-            done.append(k)
-            threads.after_steps(wake)
-
-        return act
-
-    turns = [Turn(threads, step(k)) for k in range(count)]
-    threads._patience = WAIT  # nobody takes over from the step at the gate
-    for turn in turns:
-        turn.call()
-    gate.set()
-    wait_for(lambda: woken and woken[-1] == count)
-    assert woken == [TOGETHER, 2 * TOGETHER, count]
-
-
-@pytest.mark.full
-def test_another_thread_than_the_leader_wakes_it_at_once(threads):
-    woken: list[str] = []
-    threads.after_steps(lambda: woken.append(threading.current_thread().name))
-    assert woken == [threading.current_thread().name]
-
-
-@pytest.mark.full
-def test_what_a_step_leaves_is_done_by_the_thread_that_takes_over(threads):
-    woken: list[float] = []
-    first, long = Visitor(threads), Visitor(threads, LONG)
-    act = first.act
-
-    def leaves() -> float | None:
-        long.turn.call()  # it waits, so that there is more to come after this step
-        threads.after_steps(lambda: woken.append(time.monotonic()))
-        return act()
-
-    first.turn.act = leaves
-    began = time.monotonic()
-    first.turn.call()
-    wait_for(lambda: woken)
-    assert woken[0] - began < 0.5 * LONG
