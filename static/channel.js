@@ -10,8 +10,8 @@ const channel = (() => {
   const MOST = 200; // messages that wait for the connection; later ones are refused
   const AGAIN = 500, SELDOM = 4000; // ms until another try to connect
   const DEAD = 6500; // ms without a sign of the service, which gives one every two seconds
-  // Their order with changes of viser's controls matters: they go with these, in viser's connection.
-  const BESIDE_CONTROLS = new Set(["undo", "redo", "travel", "released", "field", "lesson"]);
+  // Their order with changes of viser's controls matters: a mark tells it.
+  const IN_ORDER = new Set(["undo", "redo", "travel", "released", "field", "lesson"]);
 
   let name = ""; // of the channel: what proves whose it is
   let socket = null;
@@ -41,14 +41,15 @@ const channel = (() => {
   /** Send a message to the session. done(error, readings) gets its answer. Returns whether there is a session. */
   function send(message, argument = null, done = null) {
     if (!name) return false;
-    const text = JSON.stringify([number + 1, message, argument], wellFormed);
+    const marked = IN_ORDER.has(message) && viserPage.canMark();
+    const text = JSON.stringify([number + 1, message, argument, ...(marked ? [true] : [])], wellFormed);
     const why = bytes(text) > LONGEST ? "This text is too long." : unconfirmed.length >= MOST ? "There is no connection." : "";
     if (why) { done?.(why, []); return true; }
     number++;
     if (done) waiting.set(number, done);
-    if (BESIDE_CONTROLS.has(message) && viserPage.writeField(JSON.parse(text))) return true;
     unconfirmed.push([number, text]);
     sendText(text);
+    if (marked) viserPage.mark(number);
     return true;
   }
   /** Half letters, which no message can have, become marks. */
@@ -149,7 +150,6 @@ const channel = (() => {
     [opened, tries, number, noted, unconfirmed, again, refused] = [false, 0, 0, 0, [], false, false];
     waiting.clear();
     values.clear();
-    viserPage.emptyField();
     send("hello", greeting());
     open();
   });

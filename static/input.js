@@ -164,9 +164,9 @@
     return id !== undefined && step(id, event);
   }
 
-  // A drag is one step of the history. viser drops a control's change if another one follows within 50 ms: wait longer.
+  // A drag is one step of the history.
   addEventListener("pointerup", (event) => {
-    if (viserPage.isSlider(event.target) || document.querySelector("[data-dragging]")) setTimeout(send, 150, "released");
+    if (viserPage.isSlider(event.target) || document.querySelector("[data-dragging]")) send("released");
   }, true);
 
   // History

@@ -28,12 +28,10 @@ const viserPage = (() => {
     menu: "input.mantine-Select-input", // whose options are searched by typing
     settings: "button .tabler-icon-adjustments", // viser's own settings
     icon: "svg.tabler-icon, svg[data-combobox-chevron]",
-    messages: "div:has(> [data-messages]) + div input", // the hidden field behind our hidden HTML
   };
   // What viser calls, and how often it has since this page was loaded.
   const HOOKS = {
-    change: 0, reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0,
-    findParent: 0,
+    reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0, findParent: 0,
   };
 
   // WebKit on Linux names the locale C as a language. viser's script would end there: no Intl knows it.
@@ -82,55 +80,33 @@ const viserPage = (() => {
     new MutationObserver(dispatch).observe(document.documentElement, what);
   });
 
-  // Changes of controls. After one that is sent, viser keeps the next for 50 ms, and longer in a busy page: the newest of a
-  // whole tab. So of three controls pressed at once the second was lost, though the page showed its new value, and what
-  // waited in one tab was passed by what was sent from another, as a slider was by Undo. Here a change that waits is sent
-  // before anything else. viser's sender is within its script, which is mended as it is put into the page.
+  // viser sends one change of the controls of a tab in 50 ms, the newest. So of buttons that are pressed within one moment,
+  // as in a busy page, some would be lost: here they take turns.
+  const HELD_BACK = 60; // ms
+  let free = 0; // when (ms) the next press has its turn
+  let inTurn = false;
+  const untilFree = () => Math.max(0, free - performance.now());
+  addEventListener("click", (event) => {
+    const button = closest(event.target, PARTS.button);
+    if (!button || inTurn) return;
+    const wait = untilFree();
+    free = performance.now() + wait + HELD_BACK;
+    if (!wait) return;
+    event.stopImmediatePropagation();
+    setTimeout(() => {
+      inTurn = true;
+      button.click();
+      inTurn = false;
+    }, wait);
+  }, true);
 
-  let newest = null; // the change that was made last, and what sends it if it still waits: { change, sendIt }
-  /** viser is about to send a change, or to let it wait. */
-  function pass(change, sendIt) {
-    if (change.type !== "GuiUpdateMessage") return;
-    HOOKS.change++;
-    if (newest && change !== newest.change && !supersedes(change, newest.change)) newest.sendIt();
-    newest = { change, sendIt };
-  }
-  /** Whether a change makes an earlier one void: of a slider, or of the field that has the last messages. Each press of a
-   *  button counts. */
-  function supersedes({ uuid, updates: { value } }, earlier) {
-    return uuid === earlier.uuid && (typeof value === "number" || Array.isArray(value) || value === filled);
-  }
-  const SENDER = /\.sendMessage!==null&&\(([\w$]+)=([\w$]+),[\w$]+\?\(([\w$]+)\.sendMessage\(\2\),([\w$]+)=!1,/;
-  let mended = false;
-  const mendSender = (script) => script.replace(SENDER, (found, latest, change, page, waits) => {
-    mended = true;
-    return found.replace("(", () => `(viserPage.pass(${change},()=>{${waits}&&(${waits}=!1,${page}.sendMessage?.(${latest}))}),`);
-  });
-  const { get: readText, set: writeText } = Object.getOwnPropertyDescriptor(Node.prototype, "textContent");
-  Object.defineProperty(HTMLScriptElement.prototype, "textContent", {
-    configurable: true,
-    enumerable: true,
-    get: readText,
-    set(text) { writeText.call(this, mendSender(text)); },
-  });
-
-  // Messages whose order with changes of controls matters go in a hidden field of viser's, the last few at once;
-  // app/viewer/panel/script.py describes it.
-
-  const KEPT = 20; // messages in the field at once
-  const LONGEST = 56000; // bytes in the field; the service closes a connection that sends more than 64 KiB at once
-  let messages = [];
-  let filled = ""; // the field, as it was filled last
-  let field = null;
-  const bytes = (value) => new TextEncoder().encode(JSON.stringify(value)).length;
-  /** Send a message after the changes of controls so far; returns whether there is a field to do so. */
-  function writeField(message) {
-    if (!field?.isConnected) field = document.querySelector(PARTS.messages);
-    if (!field) return false;
-    messages = [...messages.slice(1 - KEPT), message];
-    while (bytes(messages) > LONGEST) messages.shift();
-    type(field, filled = JSON.stringify(messages));
-    return true;
+  // Marks: where a message of ours comes between the changes of viser's controls. A timer that is set now ends after those
+  // with which viser holds changes back. A mark is an answer to nobody's question about the browser's storage, which viser
+  // ignores.
+  const canMark = () => typeof window.__viserMutable?.sendMessage === "function";
+  function mark(number) {
+    const answer = { type: "LocalStorageGetItemResponseMessage", request_uuid: "kinboard-mark", value: String(number), error: null };
+    setTimeout(() => window.__viserMutable.sendMessage(answer), untilFree() + HELD_BACK);
   }
 
   const setValue = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
@@ -319,7 +295,7 @@ const viserPage = (() => {
     ["__viserMutable.nodeRefFromName", () => window.__viserMutable?.nodeRefFromName, "labels in the scene may come a moment late"],
     ["__viserMutable.messageQueue", () => window.__viserMutable?.messageQueue, "the browser’s console may show errors of removed controls"],
     ["__viserMutable.requestRender", () => window.__viserMutable?.requestRender, "the picture may be empty for a second"],
-    ["the sender of changes", () => mended, "of controls that are pressed at once, one may be lost"],
+    ["__viserMutable.sendMessage", canMark, "Undo may pass a slider that was moved just before it"],
   ];
   const lacks = () => NEEDED.filter(([, test]) => !test()).map(([what, , suffers]) => `${what}: ${suffers}`);
   addEventListener("kinboard-there", () => {
@@ -481,11 +457,10 @@ const viserPage = (() => {
     /** Call `act` when the value of a slider changes; `thumb` is what `thumbOf` returns. */
     watchValue: (thumb, act) => { valueWatchers.set(thumb, act); },
 
-    pass, // for viser's own script
-
-    writeField,
-    /** Forget what the field had: a new session must not act on it. */
-    emptyField: () => { messages = []; },
+    /** Whether there are marks. */
+    canMark,
+    /** Put the number of a message between the changes of viser's controls made before it and those made later. */
+    mark,
 
     /** Type into one of viser's fields, as if the visitor did. */
     type,

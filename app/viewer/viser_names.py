@@ -114,6 +114,15 @@ SENT_VALUES = PrivateUse(
     "A value typed while the arm moves may be lost.",
     ("viser:GuiApi._handle_gui_updates(self, client_id, message)", f"{_MESSAGES}:GuiUpdateMessage(uuid, updates)"),
 )
+MARKS = PrivateUse(
+    "viser",
+    "Undo, typed values and lessons take effect after the sliders that were moved before, and before later ones.",
+    "They take effect when they come: Undo may pass a slider.",
+    (
+        "viser:ClientHandle._websock_connection",
+        f"{_MESSAGES}:LocalStorageGetItemResponseMessage(value, error, request_uuid)",
+    ),
+)
 IDENTITY = PrivateUse(
     "viser",
     "The ids of controls, by which the page finds them, and whether a node has been removed.",
@@ -170,6 +179,6 @@ CALLBACK_ERRORS = PrivateUse(
 )
 
 ALL = (
-    *(SERVER, OUTBOX, POSES, VALUES, SENT_VALUES, IDENTITY, FILTER, DRAGS),
+    *(SERVER, OUTBOX, POSES, VALUES, SENT_VALUES, MARKS, IDENTITY, FILTER, DRAGS),
     *(WAKE_UPS, TYPE_HINTS, CALLBACK_ERRORS),
 )

@@ -115,6 +115,8 @@ def show_value(handle: Any, value: object, again: bool = False) -> None:
         state.update_timestamp = time.time()
 
 
+MARK = "kinboard-mark"  # in the place of a question's id
+_DIGITS = 16  # of a mark, at most
 _SENT = contextvars.ContextVar[dict[str, Any] | None]("sent", default=None)
 
 
@@ -183,6 +185,23 @@ def show_text(label: viser.LabelHandle, text: str) -> None:
     if text != props.text:
         props.text = text
         state.api._queue_scene_message(messages.SceneNodeUpdateMessage(state.name, {"text": text}))
+
+
+def hear_marks(client: viser.ClientHandle, act: Callable[[int], None]) -> None:
+    """Call `act` in the event loop with the numbers that a page puts between the changes of viser's controls.
+
+    A mark is an answer to nobody's question about the browser's storage, which viser ignores.
+    """
+    if not viser_names.MARKS.is_there:
+        act(10**_DIGITS)  # beyond all messages: none is waited for
+        return
+
+    def hear(_: int, message: messages.LocalStorageGetItemResponseMessage) -> None:
+        text = message.value or ""
+        if message.request_uuid == MARK and len(text) <= _DIGITS and text.isascii() and text.isdecimal():
+            act(int(text))
+
+    client._websock_connection.register_handler(messages.LocalStorageGetItemResponseMessage, hear)
 
 
 def is_removed(node: viser.SceneNodeHandle) -> bool:

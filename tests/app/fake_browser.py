@@ -28,10 +28,10 @@ from app.service.web.viewer_proxy import (
     ChannelConnection,
     VisitorConnection,
 )
-from app.viewer.panel.script import LABEL
 from app.viewer.session.persistence import SAVE_AFTER
 from app.viewer.session.state import KEY_LAST
 from app.viewer.session.worker.worker import Worker
+from app.viewer.viser_patches import MARK
 from kin.transforms import pose_from_position_wxyz, wxyz_from_rotation
 
 ANSWER = 1.5  # s until a message is answered on a busy machine, by a service in another process
@@ -118,10 +118,9 @@ def working() -> bool:
     return bool(list(_acting)) or any(not each.join(0.0) and each._inbox.waits for each in list(_workers))
 
 
-# Messages that go in viser's connection, as static/channel.js has it.
+# Messages with a mark in viser's connection, as static/channel.js has them.
 _SCRIPT = (Path(__file__).parents[2] / "static" / "channel.js").read_text(encoding="utf-8")
-_BESIDE = _SCRIPT.split("BESIDE_CONTROLS = new Set(", 1)[1].split(")", 1)[0]
-BESIDE_CONTROLS = frozenset(json.loads(_BESIDE))
+IN_ORDER = frozenset(json.loads(_SCRIPT.split("IN_ORDER = new Set(", 1)[1].split(")", 1)[0]))
 
 
 class Wire:
@@ -182,7 +181,7 @@ class FakeBrowser:
     `read` reads messages; everything shown is in `gui`, `values`, `poses` and `visible`, and `shown` by the
     channel, which it opens when it can. `memory` is the content of the page's storage, which it sends first,
     `kept` what the service has stored there, and `left_off` what it has stored for the next page of the browser.
-    `said` has the last messages in the hidden field. `camera` is where the service has moved it; unlike a real
+    `camera` is where the service has moved it; unlike a real
     page, this one reports it only with `look`.
     """
 
@@ -196,7 +195,6 @@ class FakeBrowser:
         **options: Any,
     ) -> None:
         self.memory = memory
-        self.said: list[list[Any]] = []
         self.kept: list[str] = []
         self.kept_as: list[str] = []  # the names of the notices
         self.left_off: list[str] = []
@@ -300,15 +298,18 @@ class FakeBrowser:
         self.wait(lambda: self.channel is not None)
         assert self.channel is not None
         self._number += 1
-        message = [self._number, name, argument]
-        if name in BESIDE_CONTROLS:
-            self.said = [*self.said[-19:], message]
-            self.set(LABEL, json.dumps(self.said))
+        if name in IN_ORDER:
+            self.channel.send(json.dumps([self._number, name, argument, True]))
+            self.answer_storage(MARK, str(self._number))
         else:
             self.viser.wait_until_handled()
-            self.channel.send(json.dumps(message))
-            self._owed = True
+            self.channel.send(json.dumps([self._number, name, argument]))
+        self._owed = True
         return self._number
+
+    def answer_storage(self, uuid: str, value: str | None = None) -> None:
+        """Answer a question about the browser's storage."""
+        self.send("LocalStorageGetItemResponseMessage", request_uuid=uuid, value=value, error=None)
 
     def begin_file(self, feature: str, name: str, size: int, key: str = "upload") -> HTTPConnection:
         """The request that sends a file, up to its head."""
@@ -353,7 +354,7 @@ class FakeBrowser:
     def _note_channel(self, content: str) -> None:
         name = content.split('data-channel="', 1)[1].split('"', 1)[0]
         if name != self.name:
-            self.name, self.said = name, []
+            self.name = name
             self._number, self._noted, self.replied = 0, 0, [0, "", []]
             self.shown = {}
             self.open_channel()
@@ -551,8 +552,7 @@ class FakeBrowser:
         match m["type"]:
             case "LocalStorageGetItemRequestMessage":
                 if self.answers:
-                    uuid = m["request_uuid"]
-                    self.send("LocalStorageGetItemResponseMessage", request_uuid=uuid, value=None, error=None)
+                    self.answer_storage(m["request_uuid"])
             case "SetCameraPositionMessage":
                 self.camera["position"] = m["position"]
             case "SetCameraLookAtMessage":

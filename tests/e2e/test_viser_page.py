@@ -218,14 +218,6 @@ def test_labels_of_the_scene_follow_the_colours_of_the_page(browser: Browser, ad
 WITHOUT_STATE = """
 Object.defineProperty(window, "__viserMutable", { get: () => undefined, set: () => {}, configurable: true });
 """
-WITHOUT_SENDER = """
-{
-  const { replace } = String.prototype; // which mends viser's script
-  String.prototype.replace = function (found, ...rest) {
-    return this.length > 1e6 && found instanceof RegExp ? String(this) : replace.call(this, found, ...rest);
-  };
-}
-"""
 WITHOUT_ONE = """
 {
   let viewer;
@@ -239,7 +231,7 @@ TAKEN = {
     "__viserMutable.nodeRefFromName": WITHOUT_STATE,
     "__viserMutable.messageQueue": WITHOUT_ONE % "messageQueue",
     "__viserMutable.requestRender": WITHOUT_ONE % "requestRender",
-    "the sender of changes": WITHOUT_SENDER,
+    "__viserMutable.sendMessage": WITHOUT_ONE % "sendMessage",
 }
 
 

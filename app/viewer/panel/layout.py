@@ -13,7 +13,6 @@ from app.viewer.panel.jog import JogPad
 from app.viewer.panel.joints import go_to_buttons
 from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.robots import RobotMenu
-from app.viewer.panel.script import Messages, listen_for_messages
 from app.viewer.panel.share import SharePanel
 from app.viewer.panel.status import Notice, StatusLine
 from app.viewer.panel.theme import SYSTEM_IS_DARK
@@ -33,7 +32,6 @@ class Panel:
         own: the visitor's own arm.
         system_dark: whether the visitor's system is dark.
         tabs: titles of the features' tabs.
-        messages: takes what comes in the hidden field.
 
     Attributes:
         jog: buttons that move the arm in steps.
@@ -61,11 +59,9 @@ class Panel:
         welcome: Notice,
         tabs: Sequence[str],
         post: Post,
-        messages: Messages,
     ) -> None:
         self.status = StatusLine(gui, welcome)
         listen(gui.add_checkbox(SYSTEM_IS_DARK, system_dark), post, "system-dark")
-        listen_for_messages(gui, messages)
         gui.add_html(render("panel/head"))
         self.robots = RobotMenu(gui, robots, own, robot, post)
         self.readout = PoseReadout(gui, fk(robot, robot.q_home), units)

@@ -60,7 +60,7 @@ from app.viewer.tabs.robot.motors.feature import Motors
 from app.viewer.tabs.robot.tab import RobotTab
 from app.viewer.views.templates import render
 from app.viewer.viser_outbox import in_one_frame
-from app.viewer.viser_patches import SceneFilter
+from app.viewer.viser_patches import SceneFilter, hear_marks
 from kin import IKResult, Robot, Task
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS
@@ -107,6 +107,7 @@ class VisitorPage(ShownArm, Worker):
         self.view, self.units, self.system_dark = ViewState(), DEFAULT_UNITS, False
         self.client, self._pace = client, services.pace
         self.channel = Channel(self.post, rights)
+        hear_marks(client, self.channel.mark)
         client.gui.add_html(render("panel/channel", name=self.channel.name))
         self._welcome, self._looking, self.may_save = welcome, rights is Rights.LOOK, rights.save
         self.files = Files(self.post, lambda: self.features, self.meshes.memory, rights)
@@ -447,7 +448,6 @@ class VisitorPage(ShownArm, Worker):
                 self._welcome,
                 [tab.title for tab in self.offered],
                 self.post,
-                self.channel.sequence,
             )
             self.panel.readout.use_rotations(self.view.rotations)
             self.panel.fit(gui.main_panel, self._persistence.embedded)

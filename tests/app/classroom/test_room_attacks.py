@@ -31,7 +31,7 @@ from app.service.main import create_app
 from app.service.web.rooms import limits, sweeping
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.panel.script import read_messages
+from app.viewer.panel.script import read_page_json
 
 STORE = Store()
 ADA = Outcome("course", b"\x01\x02\x03\x04", "First steps", "Ada", 100, 9, 9, 9, date(2026, 11, 23))
@@ -102,15 +102,17 @@ def test_half_a_letter_does_not_keep_the_results_from_the_teacher(tmp_path: Path
 
 
 def test_messages_with_half_a_letter_are_not_read() -> None:
-    assert read_messages('[[1, "fields", [["\\ud800"]]]]', 0) == []
-    assert read_messages('[[1, "fields", NaN]]', 0) == []
-    assert read_messages('[[1, "fields", [["\\ud83d\\ude00"]]]]', 0) == [(1, "fields", [["😀"]])]
+    for text in ('[1, "fields", [["\\ud800"]]]', '[1, "fields", NaN]'):
+        with pytest.raises(ValueError, match=r"."):
+            read_page_json(text, finite=True)
+    assert read_page_json('[1, "fields", [["\\ud83d\\ude00"]]]', finite=True) == [1, "fields", [["😀"]]]
 
 
 @pytest.mark.parametrize("argument", ["[" * 40 + "]" * 40, "[" + "0," * 20_001 + "0]", '"' + "x" * 65_536 + '"'])
 def test_messages_beyond_the_limits_are_not_read(argument: str) -> None:
-    assert read_messages(f'[[1, "fields", {argument}]]', 0) == []
-    assert read_messages(f'[[1, "fields", {json.dumps(argument[:40])}]]', 0) == [(1, "fields", argument[:40])]
+    with pytest.raises(ValueError, match=r"."):
+        read_page_json(f'[1, "fields", {argument}]', finite=True)
+    assert read_page_json(f'["fields", {json.dumps(argument[:40])}]', finite=True) == ["fields", argument[:40]]
 
 
 @pytest.mark.parametrize("alias", ["a;=1+1", "a;  @SUM(A1)", "a\t-2"])

@@ -12,8 +12,9 @@ value of each key, which may skip older ones; notices, each once and in order. W
 sent again over the next one, and counts once. At least every `BEAT` seconds there is a text, which the page
 answers: so each side notices a line that is dead.
 
-A message counts up from the one before, on whatever way it comes: those whose order with viser's controls matters
-come beside these, in viser's connection (:mod:`app.viewer.panel.script`). `Sequence` puts both in order again.
+A message whose order with viser's own controls matters, such as *Undo* after a slider was moved, is sent as
+``[number, name, argument, true]``, and a mark with its number goes the way of these controls, in viser's
+connection. It takes effect when the mark has come, and what was sent after it waits for that.
 """
 
 from __future__ import annotations
@@ -34,12 +35,12 @@ from app.shared.metrics import DROPPED
 from app.shared.security import HELLO, Rights
 from app.viewer.panel import Post
 from app.viewer.panel.script import MAX_NUMBER, Reply, read_page_json
-from app.viewer.session.channel.sequence import EARLY, Sequence
 from app.viewer.session.events import MESSAGES
 
 log = logging.getLogger(__name__)
 
 BEAT: Final = 2.0  # s
+WAITING: Final = 200  # messages that wait for a mark
 KEPT: Final = 500  # notices that a page has not confirmed; the oldest are dropped
 REPLACED: Final = 4000  # code of a connection that a newer one of the same page replaces
 MAY_LOOK: Final = "You may look here, and change nothing."
@@ -56,14 +57,14 @@ class Channel:
 
     Attributes:
         name: what a connection has to know.
-        sequence: where messages that come another way go.
     """
 
     def __init__(self, post: Post, rights: Rights = Rights.FULL) -> None:
         self.name = secrets.token_urlsafe(16)
-        self.sequence = Sequence(self._deliver)
         self._post, self._rights = post, rights
         self._received = 0  # the last number
+        self._marked = 0  # the last mark
+        self._waiting: deque[tuple[int, str, object, bool]] = deque()  # and whether it is marked
         self._heard_at = time.monotonic()
         self._lock = threading.Lock()
         self._values: dict[str, str] = {}  # in JSON, by key
@@ -178,8 +179,8 @@ class Channel:
                     self._confirm(number)
                 case ["ask"]:
                     line.woken.set()
-                case [int(number), str(name), argument] if type(number) is int and 0 < number < MAX_NUMBER:
-                    self._take(number, name, argument, connection.rights)
+                case [int(number), str(name), argument, *marked] if marked in ([], [True]) and _is_number(number):
+                    self._take((number, name, argument, bool(marked)), connection.rights)
                 case _:
                     raise ConnectionEnded(1007, "not a message of the page")
 
@@ -188,19 +189,30 @@ class Channel:
             while self._notices and self._notices[0][0] <= number:
                 self._notices.popleft()
 
-    def _take(self, number: int, name: str, argument: object, rights: Rights) -> None:
+    def _take(self, message: tuple[int, str, object, bool], rights: Rights) -> None:
+        number, name, *_ = message
         if number <= self._received:
             return  # it has come over an earlier connection
         if name not in (HELLO, *MESSAGES):
             raise ConnectionEnded(1008, "the page has no message of this name")
         if not (rights.allow_message(name) and self._rights.allow_message(name)):
             DROPPED.labels("refused").inc()
-            self._received = number
-            self.sequence.leave_out(number)
             self.reply(Reply(number, MAY_LOOK))
-        elif not self.sequence.take(number, name, argument):
-            raise ConnectionEnded(1008, f"more than {EARLY} messages are missing before this one")
+        elif len(self._waiting) == WAITING:
+            raise ConnectionEnded(1008, f"more than {WAITING} messages wait for a mark")
+        else:
+            self._waiting.append(message)
+            self._go_on()
         self._received = number
+
+    def mark(self, number: int) -> None:
+        """What the page has sent by viser's connection before its message of this number has come."""
+        self._marked = max(self._marked, number)
+        self._go_on()
+
+    def _go_on(self) -> None:
+        while self._waiting and (not self._waiting[0][3] or self._waiting[0][0] <= self._marked):
+            self._deliver(*self._waiting.popleft()[:3])
 
     def _deliver(self, number: int, name: str, argument: object) -> None:
         if name == HELLO:
@@ -209,6 +221,11 @@ class Channel:
             return
         key: Hashable = ("message", name, number)
         self._post(key, argument)
+
+
+def _is_number(number: object) -> bool:
+    """Whether it can be that of a message; JSON's true is none."""
+    return type(number) is int and 0 < number < MAX_NUMBER
 
 
 class _Line:

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-import itertools
 import json
 import math
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
+from viser._messages import LocalStorageGetItemResponseMessage
 
 from app.shared.connection import ConnectionEnded
 from app.shared.security import Rights
 from app.viewer.panel.script import Reply
 from app.viewer.session.channel import channel as module
-from app.viewer.session.channel import sequence as order
-from app.viewer.session.channel.channel import MAY_LOOK, REPLACED, Channel
-from app.viewer.session.channel.sequence import EARLY, Sequence
+from app.viewer.session.channel.channel import MAY_LOOK, REPLACED, WAITING, Channel
 from app.viewer.session.events import MESSAGES
+from app.viewer.viser_patches import MARK, hear_marks
 
 
 class Line:
@@ -179,7 +178,8 @@ def test_the_newest_connection_of_a_page_is_served_also_where_the_old_one_ends_l
         ('[1, "hold", 1]', 1008),
         ('[1, "gizmo", 1]', 1008),
         ('[1, "robot", "ur5"]', 1008),
-        (f'[{EARLY + 1}, "snap", 1]', 1008),
+        ('[1, "undo", null, false]', 1007),
+        ('[1, "undo", null, true, true]', 1007),
     ],
     ids=lambda value: f"{value!s:.30}",
 )
@@ -285,45 +285,82 @@ def test_a_closed_session_ends_its_connections() -> None:
     run(play)
 
 
-# Messages that come in two ways
+# Marks in viser's connection
 
 
-@contextmanager
-def sequence(loop: asyncio.AbstractEventLoop) -> Iterator[tuple[Sequence, list[int]]]:
-    found: list[int] = []
-    yield Sequence(lambda number, name, argument: found.append(number)), found
+def numbers(page: Page) -> list[int]:
+    return [key[2] for key, _ in page.posted]
 
 
-@pytest.mark.parametrize("order", list(itertools.permutations((1, 2, 3, 4))))
-def test_messages_of_both_ways_are_in_the_order_in_which_they_were_sent(order: tuple[int, ...]) -> None:
-    async def play() -> None:
-        with sequence(asyncio.get_running_loop()) as (put, found):
-            for number in (*order, *order):
-                assert put.take(number, "jog", None)
-            assert found == [1, 2, 3, 4]
+def test_a_message_with_a_mark_and_all_after_it_wait_for_the_mark() -> None:
+    async def play(page: Page) -> None:
+        line = page.connect()
+        line.say(1, "jog", None)
+        line.say(2, "undo", None, True)
+        line.say(3, "jog", None)
+        line.say(4, "released", None, True)
+        await rest()
+        assert numbers(page) == [1]
+        page.channel.mark(2)
+        assert numbers(page) == [1, 2, 3]
+        page.channel.mark(4)
+        page.channel.mark(4)
+        page.channel.mark(1)
+        assert numbers(page) == [1, 2, 3, 4]
 
-    asyncio.run(play())
+    run(play)
 
 
-def test_what_is_missing_is_waited_for_a_while_and_passed_on_when_it_comes_late(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(order, "PATIENCE", 0.0)
+def test_a_message_that_comes_after_its_mark_over_another_connection_counts_once() -> None:
+    async def play(page: Page) -> None:
+        line = page.connect()
+        line.say(1, "undo", None, True)
+        await rest()
+        line.cut()
+        await page.end()
+        page.channel.mark(2)
+        again = page.connect()
+        for _ in range(2):
+            again.say(1, "undo", None, True)
+            again.say(2, "redo", None, True)
+        await rest()
+        assert numbers(page) == [1, 2]
 
-    async def play() -> None:
-        with sequence(asyncio.get_running_loop()) as (put, found):
-            put.take(2, "undo", None)
-            put.take(5, "undo", None)
-            assert found == []
-            while len(found) < 2:
-                await asyncio.sleep(0)
-            assert found == [2, 5]
-            for number in (4, 3, 1, 3, 2):
-                put.take(number, "jog", None)
-            assert found == [2, 5, 4, 3, 1]
-            put.leave_out(6)
-            put.take(7, "jog", None)
-            assert found[-1] == 7
-            assert not put.take(7 + EARLY + 1, "jog", None)
+    run(play)
 
-    asyncio.run(play())
+
+def test_a_page_that_never_sends_a_mark_fills_no_memory() -> None:
+    async def play(page: Page) -> None:
+        line = page.connect()
+        for number in range(1, WAITING + 2):
+            line.say(number, "undo", None, True)
+        end = await page.end()
+        assert (end.code, numbers(page)) == (1008, [])
+        page.channel.mark(WAITING)
+        assert numbers(page) == list(range(1, WAITING + 1))
+
+    run(play)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        {"request_uuid": "other", "value": "1"},
+        {"value": None},
+        {"value": "-1"},
+        {"value": "1.0"},
+        {"value": "9" * 17},
+        {"value": "\N{SUPERSCRIPT ONE}"},
+        {"value": "1", "error": "no"},
+    ],
+)
+def test_of_the_answers_about_storage_only_marks_are_heard(answer: dict[str, Any]) -> None:
+    heard: list[int] = []
+    handlers: list[Callable[[int, Any], None]] = []
+    line = SimpleNamespace(register_handler=lambda kind, act: handlers.append(act))
+    hear_marks(cast(Any, SimpleNamespace(_websock_connection=line)), heard.append)
+    (hear,) = handlers
+    hear(0, LocalStorageGetItemResponseMessage(**({"value": "7", "error": None, "request_uuid": MARK} | answer)))
+    assert heard == ([1] if answer.get("error") else [])
+    hear(0, LocalStorageGetItemResponseMessage("7", None, MARK))
+    assert heard[-1] == 7
