@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from argparse import Namespace
+from collections.abc import Iterator
 from itertools import chain
 
 import numpy as np
 
-from app.cli.pipes.poses import PoseTable
+from app.cli.pipes.poses import INVALID, PoseTable, invalid_rows
 from app.cli.pipes.sink import Sink, form_of, opened_sink
-from app.cli.pipes.source import opened_source
+from app.cli.pipes.source import Source, opened_source
 from app.cli.terminal import (
     Notation,
     clean,
@@ -82,28 +84,43 @@ def _run_many(robot: Robot, arguments: Namespace, T_world_frame: Array | None) -
     """Write the poses for the rows of a file, or of standard input."""
     if arguments.q:
         raise InputError("q", arguments.q, "no joint values besides --configurations")
-    if arguments.pendant:
-        raise InputError("--pendant", "with --configurations", "joint values as arguments, or kin.from_pendant")
     output, table = arguments.output or "-", PoseTable.named(arguments.form)
+    count = invalid = 0
     with opened_source(arguments.configurations, "--configurations") as source:
         form = form_of(output, arguments.format, source.form)
-        pieces = source.configurations(robot)
+        pieces = _pieces(source, robot, arguments)
         first = next(pieces)  # what is wrong at once leaves no file
-        with opened_sink(output, form, [*table.names, "in_limits"]) as sink:
-            for q in chain([first], pieces):
-                _put(sink, robot, q, arguments, T_world_frame, table)
-    return 0
+        with opened_sink(output, form, [*table.names, "in_limits", "reason"]) as sink:
+            for q, reasons in chain([first], pieces):
+                _put(sink, robot, q, reasons, arguments, T_world_frame, table)
+                count, invalid = count + len(q), invalid + len(reasons)
+    if invalid:
+        said = invalid_rows(invalid, "configuration").removeprefix(";")
+        print(f"kinboard: of {count} configurations{said}", file=sys.stderr)
+    return 1 if invalid else 0
+
+
+def _pieces(source: Source, robot: Robot, arguments: Namespace) -> Iterator[tuple[Array, dict[int, str]]]:
+    """Configurations ``(m, n)``, NaN where a row has none, and what is wrong with rows of them."""
+    shown = robot.pendant_map if arguments.pendant else None
+    for q, wrong in source.configurations(robot):
+        if wrong and arguments.strict:
+            raise next(iter(wrong.values())).error()
+        q[list(wrong)] = np.nan
+        yield q if shown is None else shown.joint_values(q), {i: str(each.error()) for i, each in wrong.items()}
 
 
 def _put(
-    sink: Sink, robot: Robot, q: Array, arguments: Namespace, T_world_frame: Array | None, table: PoseTable
-) -> None:
+    sink: Sink, robot: Robot, q: Array, reasons: dict[int, str], arguments: Namespace,
+    T_world_frame: Array | None, table: PoseTable,
+) -> None:  # fmt: skip
     """Write the poses for configurations ``(m, n)``; rows of NaN get none."""
     present = [not any(row) for row in np.isnan(q).tolist()]
     if sink.form == "ndjson":
         found = fk_answers(robot, q[present], arguments.frames, arguments.frame, T_world_frame, arguments.form)
         answers = iter(found)
-        sink.answers(next(answers) if there else None for there in present)
+        invalid = {i: {"status": INVALID, "reason": reason} for i, reason in reasons.items()}
+        sink.answers(next(answers) if there else invalid.get(i) for i, there in enumerate(present))
         return
     T = np.full((len(q), 4, 4), np.nan)
     T[present] = fk(robot, q[present]) if T_world_frame is None else inverse(T_world_frame) @ fk(robot, q[present])
@@ -114,4 +131,7 @@ def _put(
     numbers[present] = np.array(table.rows(T[present])).reshape(-1, len(table.names))
     inside = robot.in_limits(q)
     within = [bool(inside[i]) if there else "" for i, there in enumerate(present)]
-    sink.rows([*row, each] for row, each in zip(numbers.tolist(), within, strict=True))
+    sink.rows(
+        [*row, each, reasons.get(i, "")]
+        for i, (row, each) in enumerate(zip(numbers.tolist(), within, strict=True))
+    )

@@ -12,7 +12,7 @@ import numpy as np
 
 from app.cli.arguments.options import flag_of
 from app.cli.pipes.ik import RowsQuestion, solve_rows
-from app.cli.pipes.poses import PoseTable
+from app.cli.pipes.poses import PoseTable, invalid_rows
 from app.cli.targets import Question, solve_file
 from app.cli.terminal import (
     Notation,
@@ -36,8 +36,6 @@ from kin.ik.options import MASK_NAMES
 from kin.poses.fields import ORIENTATIONS, orientation
 from kin.transforms import Array, frame_from_approach
 from kin.units import PLAIN, Unit, Units
-
-_NUMBERED = "solution "  # begins the name of a posture that has only a number
 
 
 def run(arguments: Namespace) -> int:
@@ -135,13 +133,10 @@ def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
     if arguments.json:
         print_json({"targets": count, "solved": solved, "invalid": invalid})
     else:
-        print(f"{arguments.output}: {solved} of {count} targets have an exact solution{_invalid(invalid)}")
+        print(
+            f"{arguments.output}: {solved} of {count} targets have an exact solution{invalid_rows(invalid, 'target')}"
+        )
     return 0 if solved == count else 1
-
-
-def _invalid(count: int) -> str:
-    """How many rows are no targets, if there are any."""
-    return f"; {count} {'row is' if count == 1 else 'rows are'} no target (column reason)" if count else ""
 
 
 def _is_piped(arguments: Namespace) -> bool:
@@ -166,9 +161,11 @@ def _run_rows(robot: Robot, arguments: Namespace, units: Units, q_seed: Array | 
     question = RowsQuestion(robot, q_seed, cache(options), cache(frame), table, arguments.strict)
     count, solved, invalid = solve_rows(question, arguments.targets, arguments.output or "-", arguments.format)
     if arguments.output not in (None, "-"):
-        print(f"{arguments.output}: {solved} of {count} targets have an exact solution{_invalid(invalid)}")
+        print(
+            f"{arguments.output}: {solved} of {count} targets have an exact solution{invalid_rows(invalid, 'target')}"
+        )
     elif invalid:
-        print(f"kinboard: of {count} targets{_invalid(invalid).removeprefix(';')}", file=sys.stderr)
+        print(f"kinboard: of {count} targets{invalid_rows(invalid, 'target').removeprefix(';')}", file=sys.stderr)
     return 0 if solved == count else 1
 
 
@@ -211,30 +208,34 @@ def _print(answer: IkAnswer, units: Notation) -> None:
         listed.append(("nearest orientation", answer.nearest_orientation))
     if listed:
         print(_solutions(units, listed))
-    numbers = {solution.branch.removeprefix(_NUMBERED) for solution in answer.solutions}
-    if any(number.isdecimal() and int(number) > len(numbers) for number in numbers):
-        print("\nPostures have no names here: they are numbered among all of them, with those outside the limits.")
     for parameter in answer.redundancy:
         ranges = ", ".join(" … ".join(units.angle(x) for x in interval) for interval in parameter.intervals)
         print(f"\n{parameter.label} = {units.angle(parameter.value)}, possible: {ranges or 'nothing'}")
     if answer.blocked:
-        print("\n" + table(["posture", "outside the limits"], _needs(units, answer.blocked)))
+        needs = _needs(units, answer.blocked, len(answer.solutions) + 1)
+        print("\n" + table(["posture", "outside the limits"], needs))
+
+
+def _posture(branch: str) -> str:
+    """The name of a posture; "" where it has only a number, which says nothing about another target."""
+    return "" if branch.startswith("solution ") else branch
 
 
 def _solutions(units: Notation, listed: list[tuple[str, Solution]]) -> str:
     """The table of solutions."""
     values = [each.pendant or each.q for _, each in listed]
     count = len(values[0])
-    head = ["", *(f"q{i + 1}" for i in range(count)), "point error", "rotation error", "posture"]
+    posture = [_posture(each.branch) + ("" if each.in_limits else " (outside limits)") for _, each in listed]
+    head = ["", *(f"q{i + 1}" for i in range(count)), "point error", "rotation error", *["posture"] * any(posture)]
     rows = [
         [
             name,
             *(units.joint(i, value) for i, value in enumerate(shown)),
             f"{units.length(solution.position_error)} {units.of_length}",
             units.angle(solution.rotation_error),
-            solution.branch + ("" if solution.in_limits else " (outside limits)"),
+            *[of_posture.strip()] * any(posture),
         ]
-        for (name, solution), shown in zip(listed, values, strict=True)
+        for (name, solution), shown, of_posture in zip(listed, values, posture, strict=True)
     ]
     return table(head, rows)
 
@@ -256,17 +257,17 @@ def _task(arguments: Namespace, implied: Task) -> Task:
     return task
 
 
-def _needs(units: Notation, blocked: list[Blocked]) -> list[list[str]]:
-    """The joint values of each posture that are outside the limits."""
+def _needs(units: Notation, blocked: list[Blocked], first: int) -> list[list[str]]:
+    """The joint values of each posture that are outside the limits; numbers of those without a name go on."""
     return [
         [
-            branch.branch,
+            _posture(branch.branch) or str(number),
             ", ".join(
                 f"q{v.joint + 1} = {units.joint(v.joint, v.value)} (limit {units.joint(v.joint, v.limit)})"
                 for v in branch.violations
             ),
         ]
-        for branch in blocked
+        for number, branch in enumerate(blocked, first)
     ]
 
 

@@ -88,7 +88,7 @@ def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     _add_rows(
         parser,
         "--configurations",
-        "many configurations, in radians (metres): a table (CSV or Parquet) with the columns q1, q2, …, a .npy "
+        "many configurations, in radians (metres; --pendant: as shown): a table (CSV or Parquet) with the columns q1, q2, …, a .npy "
         "array (k, n), or JSON lines",
         "the poses: x, y, z, qw, qx, qy, qz in metres, an array (k, 4, 4), or answers of REST",
     )
@@ -175,12 +175,6 @@ def _add_target(parser: argparse.ArgumentParser) -> None:
         "continued by the same command",
         place,
     )
-    parser.add_argument(
-        "--strict",
-        action="store_true",
-        help="with --targets: end at the first row that is no target. By default it is answered with the status "
-        "invalid and the reason, as all others are answered",
-    )
     _add_dask(parser)
     turn = parser.add_mutually_exclusive_group()
     turn.add_argument("--wxyz", nargs=4, metavar=("W", *XYZ), help="orientation as a quaternion")
@@ -208,6 +202,12 @@ def _add_rows(parser: argparse.ArgumentParser, flag: str, read: str, written: st
         "--format",
         choices=("csv", "npy", "ndjson"),
         help=f"with {flag}: what is written (default: by the name of the file; for -, what is read)",
+    )
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help=f"with {flag}: end at the first row that cannot be read. By default all others are answered, and it "
+        "gets the reason",
     )
 
 

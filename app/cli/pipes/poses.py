@@ -118,6 +118,11 @@ class Answers(NamedTuple):
     reason: tuple[str, ...]
 
 
+def invalid_rows(count: int, what: str) -> str:
+    """How many rows are no targets or configurations, if there are any."""
+    return f"; {count} {'row is' if count == 1 else 'rows are'} no {what} (column reason)" if count else ""
+
+
 class Counted(NamedTuple):
     """How many rows there were, how many of them have an exact solution, and how many are no targets."""
 

@@ -76,8 +76,10 @@ class Source:
         start = self._first.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
         self.form: Form = "npy" if self._first.startswith(_NUMPY) else "ndjson" if start in (b"{", b"[") else "csv"
 
-    def configurations(self, robot: Robot) -> Iterator[Array]:
+    def configurations(self, robot: Robot) -> Iterator[tuple[Array, dict[int, Wrong]]]:
         """Joint values ``(m, n)`` in radians (metres), piece by piece; rows of NaN where there are none.
+
+        With each piece comes what is wrong with rows of it, by their index.
 
         A table has the columns ``q1`` to ``qn`` among others, or nothing but these numbers in each row. A JSON
         line is a list of them, or an answer with `q` or `solutions`, of which the first counts.
@@ -86,17 +88,16 @@ class Source:
         if self.form == "npy":
             done = 0
             for q in self._arrays((robot.n,), f"an array of configurations (k, {robot.n})"):
-                wrong = ~np.isfinite(q).all(axis=1) & ~np.isnan(q).all(axis=1)
-                for i in np.flatnonzero(wrong).tolist():
-                    self._q(robot, q[i].tolist(), f"{self.field}[{done + i}]")
+                odd = np.flatnonzero(~np.isfinite(q).all(axis=1) & ~np.isnan(q).all(axis=1)).tolist()
+                _, wrong = self._rows(robot, [(f"{self.field}[{done + i}]", q[i].tolist) for i in odd])
                 done += len(q)
-                yield q
+                yield q, {odd[k]: each for k, each in wrong.items()}
         elif self.form == "csv":
             for rows in self._table(names):
-                yield np.array([self._q(robot, numbers(), place) for place, numbers in rows])
+                yield self._rows(robot, rows)
         else:
             for lines in self._lines():
-                yield np.array([self._q(robot, self._json(line, place), place) for place, line in lines])
+                yield self._rows(robot, [(place, partial(self._json, line, place)) for place, line in lines])
 
     def goals(self, table: PoseTable, maker: str = "") -> Iterator[list[Goal]]:
         """Targets, piece by piece; a row that is none says what is wrong with it.
@@ -127,6 +128,18 @@ class Source:
                 if not isinstance(found, dict):
                     raise InputError(place, found, "an object in braces")
                 yield place, found
+
+    def _rows(
+        self, robot: Robot, rows: Sequence[tuple[str, Callable[[], object]]]
+    ) -> tuple[Array, dict[int, Wrong]]:
+        """The configurations of rows, each with its place and what reads it."""
+        q, wrong = np.full((len(rows), robot.n), np.nan), dict[int, Wrong]()
+        for i, (place, read) in enumerate(rows):
+            try:
+                q[i] = self._q(robot, read(), place)
+            except InputError as error:
+                wrong[i] = Wrong.of(error)
+        return q, wrong
 
     def _q(self, robot: Robot, values: object, field: str) -> Array:
         if isinstance(values, dict):

@@ -171,9 +171,14 @@ def _outcome(details: Details, cause: str, task: str, units: Units) -> tuple[str
             return held, "; ".join(filter(None, parts))
 
 
+def _named(branch: str) -> str:
+    """The name of a posture in brackets; "" for one that has only a number, or was found by search."""
+    return "" if branch == "numeric" or branch.startswith("solution ") else f" ({branch})"
+
+
 def _touching(details: Touching, units: Units) -> str:
     """What touches what in the posture with the fewest contacts, before redundancy parameters were searched."""
-    contact, name = details.contact, f" ({details.branch})" if details.branch != "numeric" else ""
+    contact, name = details.contact, _named(details.branch)
     text = f"{contact.text} by {units.lengths.value(-contact.distance)}"
     if details.contacts > 1:
         text += f", the deepest of {details.contacts} contacts"
@@ -266,7 +271,7 @@ def _outside(details: OutsideLimits, units: Units) -> str:
     which = f"the posture closest to the {limits}" if details.branches > 1 else "the posture"
     given = ", ".join(f"{r.label} = {units.angles.value(r.value)}" for r in details.requested)
     needs = listed([need(violation, units) for violation in details.violations])
-    name = f" ({details.branch})" if details.branch != "numeric" else ""
+    name = _named(details.branch)
     text = f"{f'with {given} ' if given else ''}{which}{name} needs {needs}"
     if details.branches > 1:
         others = count(details.branches - 1, "other posture is", "other postures are")

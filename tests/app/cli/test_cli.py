@@ -253,6 +253,21 @@ def test_blocked_branches_are_printed_with_what_they_need(capsys):
             assert f"q{v['joint'] + 1} = {value:.3f}° (limit {limit:.3f}°)" in line
 
 
+def test_postures_without_names_are_numbered_as_they_are_listed(capsys):
+    """Their numbers count all that the solver found, also those outside the limits."""
+    words = ("ik", "crx10ia", "--position", 400, 100, 300, "--wxyz", 0, 1, 0, 0, "--all", "--limit")
+    code, out, _ = run(capsys, *words, "3=-45:0")
+    assert code == 0
+    found = answer(capsys, *words, "3=-45:0")["solutions"]
+    assert max(int(each["branch"].split()[1]) for each in found) > len(found)
+    assert "solution" not in out
+    assert [line.split()[0] for line in out.splitlines()[3:]] == [str(k + 1) for k in range(len(found))]
+    code, out, _ = run(capsys, *words, "3=0:90")
+    assert code == 1
+    assert "solution" not in out
+    assert [line.split()[0] for line in out.splitlines()[-2:]] == ["11", "12"]
+
+
 @pytest.mark.parametrize(
     ("position", "extra", "status", "said"),
     [

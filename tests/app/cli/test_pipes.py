@@ -281,7 +281,7 @@ def test_each_line_is_answered_before_the_next_one_is_sent():
 )
 def test_a_row_that_is_none_is_named(run, command, given, said):
     option = {"ik": "--targets", "fk": "--configurations"}[command]
-    code, _, err = run(command, "ur5", option, "-", *["--strict"] * (command == "ik"), given=given)
+    code, _, err = run(command, "ur5", option, "-", "--strict", given=given)
     assert code == 2
     assert re.search(said, err), err
     assert len(err) < 500
@@ -329,6 +329,37 @@ def test_a_row_that_is_none_loses_no_other(run, tmp_path, output):
     if output == "csv":
         poses = list(csv.DictReader(io.StringIO(run("fk", "ur5", "--configurations", out)[1].decode())))
         assert [row["x"] and round(float(row["x"]), 9) for row in poses] == [0.4, "", "", "", "", 0.3]
+
+
+@pytest.mark.parametrize("form", ["csv", "ndjson", "npy"])
+def test_a_configuration_that_cannot_be_read_loses_no_other(run, form):
+    given = "q1,q2,q3,q4,q5,q6\n0,-1,1,0,1,0\n\n0,-1,1,0,1,b\n,,,,,\n0,-1,1,0,inf,0\n0,-1,1,0,1,0\n"
+    code, out, err = run("fk", "ur5", "--configurations", "-", "--format", form, given=given)
+    assert code == 1
+    assert "of 5 configurations 2 rows are no configuration (column reason)" in err
+    if form == "npy":
+        assert np.flatnonzero(~np.isnan(np.load(io.BytesIO(out))).any(axis=(1, 2))).tolist() == [0, 4]
+        return
+    if form == "ndjson":
+        found = list(map(json.loads, out.splitlines()))
+        assert [None if each is None else each.get("status", "read") for each in found] == [
+            *("read", "invalid", None, "invalid", "read")
+        ]
+        reasons = ["" if each is None else each.get("reason", "") for each in found]
+    else:
+        rows = list(csv.DictReader(io.StringIO(out.decode())))
+        assert [bool(row["x"]) for row in rows] == [True, False, False, False, True]
+        reasons = [row["reason"] for row in rows]
+    assert [reason.partition(": ")[0] for reason in reasons] == [
+        *("", "--configurations line 4", "", "--configurations line 6[4]", "")
+    ], reasons
+
+
+def test_configurations_may_be_as_the_pendant_shows_them(run):
+    q = np.radians([[0, 10, 20, 0, -90, 0], [5, 30, 50, 0, -90, 0]])
+    given = lines(kin.to_pendant("lrmate200id", q).tolist())
+    _, out, _ = run("fk", "lrmate200id", "--configurations", "-", "--pendant", "--format", "npy", given=given)
+    assert np.abs(np.load(io.BytesIO(out)) - kin.fk("lrmate200id", q)).max() < 1e-12
 
 
 @pytest.mark.parametrize("mark", [",", ";"])
@@ -429,7 +460,7 @@ def test_json_lists_all_solutions_as_rest_does(run, client):
         (("ik", "ur5", "--position", "a", "2", "3"), "invalid-input", None),
         (("ik", "nobody", "--position", "1", "2", "3"), "unknown-robot", "robot_id"),
         (("fk", "ur5", "1"), "invalid-input", "q"),
-        (("fk", "ur5", "--configurations", "-"), "invalid-input", "--configurations line 1"),
+        (("fk", "ur5", "--configurations", "-", "--strict"), "invalid-input", "--configurations line 1"),
         (("move", "ur5", "none.toml"), "invalid-input", "PROGRAM"),
         (("ik", "ur5"), "bad-request", None),
         (("ik", "ur5", "--nonsense", "1", "--position", "1", "2", "3"), "bad-request", None),
