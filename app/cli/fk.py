@@ -131,7 +131,5 @@ def _put(
     numbers[present] = np.array(table.rows(T[present])).reshape(-1, len(table.names))
     inside = robot.in_limits(q)
     within = [bool(inside[i]) if there else "" for i, there in enumerate(present)]
-    sink.rows(
-        [*row, each, reasons.get(i, "")]
-        for i, (row, each) in enumerate(zip(numbers.tolist(), within, strict=True))
-    )
+    said = [reasons.get(i, "") for i in range(len(q))]
+    sink.rows([*row, *rest] for row, *rest in zip(numbers.tolist(), within, said, strict=True))

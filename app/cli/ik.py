@@ -130,12 +130,11 @@ def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
     except KeyboardInterrupt:
         print("kinboard: interrupted; the same command goes on from here", file=sys.stderr)
         return 130
+    said = invalid_rows(invalid, "target")
     if arguments.json:
         print_json({"targets": count, "solved": solved, "invalid": invalid})
     else:
-        print(
-            f"{arguments.output}: {solved} of {count} targets have an exact solution{invalid_rows(invalid, 'target')}"
-        )
+        print(f"{arguments.output}: {solved} of {count} targets have an exact solution{said}")
     return 0 if solved == count else 1
 
 
@@ -160,12 +159,11 @@ def _run_rows(robot: Robot, arguments: Namespace, units: Units, q_seed: Array | 
     table = PoseTable.named(arguments.form)
     question = RowsQuestion(robot, q_seed, cache(options), cache(frame), table, arguments.strict)
     count, solved, invalid = solve_rows(question, arguments.targets, arguments.output or "-", arguments.format)
+    said = invalid_rows(invalid, "target")
     if arguments.output not in (None, "-"):
-        print(
-            f"{arguments.output}: {solved} of {count} targets have an exact solution{invalid_rows(invalid, 'target')}"
-        )
+        print(f"{arguments.output}: {solved} of {count} targets have an exact solution{said}")
     elif invalid:
-        print(f"kinboard: of {count} targets{invalid_rows(invalid, 'target').removeprefix(';')}", file=sys.stderr)
+        print(f"kinboard: of {count} targets{said.removeprefix(';')}", file=sys.stderr)
     return 0 if solved == count else 1
 
 

@@ -19,6 +19,7 @@ from kin.errors import KinematicsError
 from kin.robot import Robot
 
 if TYPE_CHECKING:
+    from kin.collision.obstacles import Obstacle
     from kin.motion import Motion
 
 # The service's name in an installation, and in a checkout.
@@ -103,6 +104,7 @@ def save_page(
     target: ArrayLike | None = None,
     motion: Motion | None = None,
     link: str = "",
+    obstacles: Sequence[Obstacle] = (),
 ) -> Path:
     """Write an arm as one web page that needs no server and no internet: a file of at most 2 MB.
 
@@ -116,6 +118,7 @@ def save_page(
         target: pose of the tool ``(4, 4)``, metres.
         motion: of the same arm, from `plan_motion`.
         link: address of the full page, which the file names; "": none.
+        obstacles: bodies around the arm in the world frame, which the page draws and the postures keep clear of.
 
     Returns:
         The path of the file.
@@ -124,7 +127,9 @@ def save_page(
         KinematicsError: an argument is invalid, nothing of the motion can be driven, or the service is missing.
         OSError: the file cannot be written.
     """
-    return Path(_service("viewer.takehome", "save_page").save_page(robot, path, q, target, motion, link))
+    return Path(
+        _service("viewer.takehome", "save_page").save_page(robot, path, q, target, motion, link, obstacles)
+    )
 
 
 def _service(module: str, function: str) -> Any:

@@ -88,8 +88,8 @@ def add_fk(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     _add_rows(
         parser,
         "--configurations",
-        "many configurations, in radians (metres; --pendant: as shown): a table (CSV or Parquet) with the columns q1, q2, …, a .npy "
-        "array (k, n), or JSON lines",
+        "many configurations, in radians (metres; --pendant: as shown): a table (CSV or Parquet) with the columns "
+        "q1, q2, …, a .npy array (k, n), or JSON lines",
         "the poses: x, y, z, qw, qx, qy, qz in metres, an array (k, 4, 4), or answers of REST",
     )
     parser.add_argument("--frames", action="store_true", help="also print the frame after every DH row")

@@ -82,16 +82,17 @@ def save_page(
     target: ArrayLike | None = None,
     motion: Motion | None = None,
     link: str = "",
+    obstacles: Sequence[Obstacle] = (),
 ) -> Path:
     """As `kin.save_page`."""
     robot = robot_of(robot)
     if motion is not None and motion.robot != robot:
         raise InputError("motion", motion.robot.name, f"a motion of the same arm, {robot.name}")
     at = robot.q_home if q is None else robot.check_q(q)
+    options = IKOptions(obstacles=obstacles)
+    saved = SavedArm(robot, at, drawing(robot), target, options, motion, DEFAULT_UNITS, link, options.obstacles)
     file = Path(path)
-    file.write_text(
-        web_page(SavedArm(robot, at, drawing(robot), target, motion=motion, link=link)), encoding="utf-8"
-    )
+    file.write_text(web_page(saved), encoding="utf-8")
     return file
 
 

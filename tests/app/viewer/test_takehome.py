@@ -6,6 +6,7 @@ import base64
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -168,6 +169,8 @@ def test_save_page_writes_a_file(tmp_path):
     other = kin.plan_motion("puma560", Program(segments=(Ptp(JointTarget((0.1,) * 6)),)))
     with pytest.raises(kin.InputError, match="motion of the same arm"):
         save_page("ur5", tmp_path / "other.html", motion=other)
+    with pytest.raises(kin.InputError, match=r"obstacles\[0\]"):
+        kin.save_page("ur5", tmp_path / "other.html", obstacles=["table"])
     assert list(tmp_path.iterdir()) == [file]
 
 
@@ -204,12 +207,12 @@ def test_what_an_open_question_asks_for_is_not_saved():
     assert stage.notices[0].title == "Not now"
 
 
-def test_obstacles_are_drawn_where_they_are() -> None:
+def test_obstacles_are_drawn_where_they_are(tmp_path: Path) -> None:
     table = kin.Obstacle("table", [0.5, 0.1, 0.2], [0.0, 0.0, 0.5], size=[0.4, 0.6, 0.3])
     can = kin.Obstacle("cylinder", [0.3, 0.0, 0.4], [0.3, 0.2, 0.1], radius=0.05, height=0.2)
     ball = kin.Obstacle("sphere", [0.0, 0.4, 0.5], radius=0.1)
-    plain = data_of(web_page(SavedArm(UR5, Q)))["parts"]
-    parts = data_of(web_page(SavedArm(UR5, Q, obstacles=(table, can, ball))))["parts"][len(plain) :]
+    file = kin.save_page("ur5", tmp_path / "arm.html", Q, obstacles=[table, can, ball])
+    parts = data_of(file.read_text("utf-8"))["parts"][-3:]
     assert [part["link"] for part in parts] == [0, 0, 0]
     for part, each, low, high in (
         (parts[0], table, (-0.2, -0.3, -0.3), (0.2, 0.3, 0.0)),
