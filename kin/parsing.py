@@ -1,4 +1,4 @@
-"""Readers of JSON, TOML and CSV whose time and memory are bounded whatever a text contains.
+"""Readers of JSON, TOML and CSV whose time and memory are bounded whatever a text contains; the writer of TOML.
 
 The parsers of the standard library bound neither. `json.loads` runs in C and lets no other thread of the process
 run before it has finished, and sixteen megabytes of nested lists take it half a minute. `tomllib` needs time and
@@ -18,9 +18,11 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import accumulate
 from typing import Any, Final, NamedTuple
+
+import tomli_w
 
 from kin.errors import shorten
 
@@ -62,6 +64,9 @@ _TOML_STRING = re.compile(
     r"|#[^\n]*+",
     re.DOTALL,
 )
+# A list of numbers and texts as tomli_w writes it: each on a line of its own.
+_TOML_LIST = re.compile(r"\[\n((?: +[^\s\[{][^\n]*,\n)+) *\]")
+_LONGEST_LINE = 100  # characters, as in tomli_w
 _NO_BRACKETS = re.compile(r"[^][{}]++")
 _STEPS = {"[": 1, "{": 1, "]": -1, "}": -1}
 
@@ -105,6 +110,16 @@ def read_toml(text: str | bytes, limits: Limits) -> dict[str, Any]:
         return tomllib.loads(given)
     except (ValueError, RecursionError) as error:
         raise TextError(str(error), "valid TOML", syntax=True) from None
+
+
+def to_toml(data: Mapping[str, Any]) -> str:
+    """The TOML text of a table; short lists, such as limits and positions, on one line."""
+    return _TOML_LIST.sub(_on_one_line, tomli_w.dumps(data))
+
+
+def _on_one_line(found: re.Match[str]) -> str:
+    line = "[" + ", ".join(item.strip()[:-1] for item in found[1][:-1].split("\n")) + "]"
+    return line if len(line) <= _LONGEST_LINE else found[0]
 
 
 def read_csv(data: bytes, limits: Limits) -> Iterator[tuple[int, list[str]]]:

@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from app.viewer.scene.bodies.drawing import FOLDER, MM, _loft
 from kin import classic_robots, link_frames
 from kin.axes import inverse
+from kin.parsing import to_toml
 
 OUT = 0.008  # m
 POINTS = 30  # per part
@@ -113,7 +114,7 @@ def fitted(points: np.ndarray, count: int) -> np.ndarray:
 
 def main() -> None:
     for robot_id in sys.argv[1:] or sorted(path.stem for path in FOLDER.glob("*.toml")):
-        robot, lines, worst, fat = classic_robots()[robot_id], [], 0.0, []
+        robot, capsules, worst, fat = classic_robots()[robot_id], [], 0.0, []
         for link, points in surfaces(robot_id).items():
             for count in (1, 2, 3):
                 x = np.round(fitted(points, count), 3)
@@ -128,9 +129,8 @@ def main() -> None:
                 start, end, radius = (
                     [float(f"{v:.6g}") + 0.0 for v in part] for part in (row[:3], row[3:6], row[6:])
                 )
-                lines += ["", "[[capsules]]"]
-                lines += [f'row = "{robot.joints[link - 1].name}"'] if link else []
-                lines += [f"start = {start}", f"end = {end}", f"radius = {radius[0]}"]
+                name = {"row": robot.joints[link - 1].name} if link else {}
+                capsules.append({**name, "start": start, "end": end, "radius": radius[0]})
         mean = 1e3 * np.concatenate(fat).mean()
         source = (
             "Capsules fitted to our drawing of this arm, which follows its maker's dimensions: its surface is "
@@ -141,7 +141,7 @@ def main() -> None:
         head = [line for line in text.rstrip("\n").split("\n") if not line.startswith("capsules_source")]
         at = next(i for i, line in enumerate(head) if line.startswith("units"))
         head.insert(at + 1, f'capsules_source = "{source}"')
-        path.write_text("\n".join(head + lines) + "\n", "utf-8")
+        path.write_text("\n".join(head) + "\n\n" + to_toml({"capsules": capsules}), "utf-8")
 
 
 main()

@@ -30,6 +30,7 @@ MODEL = {
 }
 RULES: dict[str, set[str]] = {
     "kin": {"kin", "numpy", "numba"},
+    "kin/parsing.py": {"tomli_w", "kin.errors"},
     "kin/kernels": {"numpy", "numba", "llvmlite", "kin.kernels", "kin.tolerances", "kin.transforms"},
     "kin/comparison": {"numpy", "kin.comparison", "kin.dh", *MODEL},
     "kin/differential": {"numpy", "kin.axes", "kin.differential", "kin.fk", "kin.robot", "kin.transforms"},

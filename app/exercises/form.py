@@ -1,15 +1,14 @@
 """The fields of an exercise as a form: which there are, what each means, and what is typed into them.
 
 A draft is the data of a file, as `tomllib` reads it. `groups` says which cells stand where and what is in them,
-`with_cell`, `with_row` and `without_row` change one of them, and `to_toml` writes the file. Whether the draft is
-an exercise, only `files.parse_exercise` says: what makes no sense is kept as it was typed.
+`with_cell`, `with_row` and `without_row` change one of them. Whether the draft is an exercise, only
+`files.parse_exercise` says: what makes no sense is kept as it was typed.
 
 Long because it lists every field of every kind with its label and its help.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -34,7 +33,6 @@ Draft = dict[str, Any]
 Form = Literal["line", "text", "lines", "expression", "expressions", "number", "numbers", "choice", "flag"]
 LONGEST_CELL = 2000  # characters
 TABLES = ("vary", "let", "target", "answer")
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _UNIT = "The unit of the numbers; none: they are as they are."
 _WHEN = "Only where this expression is true."
 
@@ -467,23 +465,6 @@ def without_row(draft: Draft, path: str, index: int) -> Draft:
     return made
 
 
-def to_toml(draft: Draft, under: str = "") -> str:
-    """The file of a draft, or its part of a file that has it `under` a list of tables of this name."""
-    above = f"{under}." if under else ""
-    lines = [f"[[{under}]]"] if under else []
-    lines += [f"{_key(name)} = {_toml(value)}" for name, value in draft.items() if not isinstance(value, dict)]
-    for name, table in draft.items():
-        if isinstance(table, dict):
-            lists = {key: value for key, value in table.items() if _is_tables(value)}
-            lines += ["", f"[{above}{_key(name)}]"]
-            lines += [f"{_key(key)} = {_toml(value)}" for key, value in table.items() if key not in lists]
-            for key, rows in lists.items():
-                for row in rows:
-                    lines += ["", f"[[{above}{_key(name)}.{_key(key)}]]"]
-                    lines += [f"{_key(each)} = {_toml(value)}" for each, value in row.items()]
-    return "\n".join(lines) + "\n"
-
-
 def _placed(draft: Draft, field: Field, above: tuple[str, ...], robots: Sequence[str]) -> Entry | Rows:
     at = (*above, *field.name.split("."))
     value = _at(draft, at)
@@ -610,21 +591,3 @@ def _is_plain(value: Any) -> bool:
 
 def _is_tables(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and all(isinstance(row, dict) for row in value)
-
-
-def _key(name: str) -> str:
-    return name if _BARE.fullmatch(name) else _toml(name)
-
-
-def _toml(value: Any) -> str:
-    """A value in TOML; JSON's escapes are TOML's."""
-    match value:
-        case bool() | str():
-            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-        case list():
-            return f"[{', '.join(map(_toml, value))}]"
-        case dict():
-            return "{ " + ", ".join(f"{_key(name)} = {_toml(each)}" for name, each in value.items()) + " }"
-        case int() | float():
-            return repr(value)
-    return json.dumps(str(value))

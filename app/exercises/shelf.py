@@ -22,6 +22,7 @@ from app.exercises.exercise import TOPICS, Exercise
 from app.exercises.fields import ExerciseFileError
 from app.exercises.files import Find, builtin_exercises, load_exercise, load_folder, parse_exercise
 from kin import InputError, get_robot
+from kin.parsing import to_toml
 
 EVERY = 1.0  # s between two looks at the folder for the list
 STALE = 60.0  # s after which a file that was being written was left behind by a process that has ended
@@ -239,7 +240,7 @@ def digest(text: str) -> str:
 
 def written_in_a_page(exercise: Exercise) -> bool:
     """Whether a page would write the exercise's file as it is: nothing of it is lost when a page changes it."""
-    return form.to_toml(form.read(exercise.source)) == exercise.source
+    return to_toml(form.read(exercise.source)) == exercise.source
 
 
 def _stamps(folder: Path) -> dict[str, _Stamp]:

@@ -7,9 +7,7 @@ has a decimal that becomes exactly it when it is multiplied by π/180; such a va
 
 from __future__ import annotations
 
-import json
 import math
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -23,13 +21,13 @@ from kin.frames import matrix_of
 from kin.joint import Shown
 from kin.motor import STS3215, Motor
 from kin.named import robot_of
+from kin.parsing import to_toml
 from kin.robot import IDENTITY, LENGTHS, Capsule, Joint, Matrix, Robot, exact_cos_sin
 from kin.transforms import Array
 from kin.units import Length
 
 Angle = Literal["deg", "rad"]
 Value = int | float | str
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _DIGITS = (12, 15, 16, 17)  # tried in this order
 
 
@@ -85,16 +83,7 @@ def robot_to_toml(robot: Robot | str, length: Length | None = None, angle: Angle
     if angle is None:
         in_degrees, in_radians = (robot_to_toml(robot, length, unit) for unit in get_args(Angle))
         return in_degrees if len(in_degrees) <= len(in_radians) else in_radians
-    data = robot_to_dict(robot, length, angle)
-    home = data.pop("home")
-    tables = {key: data.pop(key, []) for key in ("rows", "motors", "capsules")}
-    lines = [f"{key} = {_toml(value)}" for key, value in data.items()]
-    for table, items in tables.items():
-        for item in items:
-            lines += ["", f"[[{table}]]", *(f"{key} = {_toml(value)}" for key, value in item.items())]
-        if table == "rows":
-            lines += ["", "[home]", f"q = {_toml(home['q'])}"]
-    return "\n".join([*lines, ""])
+    return to_toml(robot_to_dict(robot, length, angle))
 
 
 def save_robot(robot: Robot | str, path: Path | str) -> None:
@@ -264,21 +253,3 @@ def _candidates(rpy: Sequence[float]) -> Iterator[list[float]]:
 def _plain(value: float) -> int | float:
     """A whole number without its decimal point."""
     return int(value) if value == int(value) and abs(value) < 1e6 else value
-
-
-def _key(name: str) -> str:
-    """A key of a TOML table, in quotes where it needs them."""
-    return name if _BARE.fullmatch(name) else str(_toml(name))
-
-
-def _toml(value: Any) -> str:
-    """A number, text, list or flat table as TOML."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_key(key)} = {_toml(item)}" for key, item in value.items()) + " }"
-    return repr(value)

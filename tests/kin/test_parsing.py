@@ -12,7 +12,7 @@ import pytest
 import kin
 from kin import parsing
 from kin.files.read import LIMITS
-from kin.parsing import Limits, TextError, read_csv, read_json, read_toml
+from kin.parsing import Limits, TextError, read_csv, read_json, read_toml, to_toml
 
 SMALL = Limits(size=1000, values=10, depth=3)
 WIDE = Limits(size=10_000_000, values=1_000_000)
@@ -93,6 +93,15 @@ def test_json_within_the_limits_is_read_as_python_reads_it(value):
 )
 def test_toml_within_the_limits_is_read_as_python_reads_it(text):
     assert read_toml(text, SMALL) == tomllib.loads(text)
+
+
+def test_toml_that_is_written_is_read_as_the_same_values_and_its_short_lists_are_on_one_line():
+    row = {"name": "a [\n    1,\n]", "limits": [-1.5, 2], "matrix": [[1, 0], [0, 1]], "empty": [], "x.y": True}
+    data = {"texts": ["q, \u2028[", "," * 100], "home": {"q": [0, 1]}, "rows": [row, {"points": [{"at": [1]}]}]}
+    text = to_toml(data)
+    assert tomllib.loads(text) == data
+    for line in ("limits = [-1.5, 2]", "matrix = [", "    [1, 0],", "q = [0, 1]", "[[rows]]"):
+        assert line in text.split("\n"), line
 
 
 @pytest.mark.parametrize("text", ["", "{", "[1,", '"open', "1" * 5000, "nul", "'", "\\"])

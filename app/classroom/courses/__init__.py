@@ -5,7 +5,7 @@ written; in links and pages these are sealed, so that nothing there contains an 
 """
 
 from app.classroom.courses.course import Course, Item, Own, parse_item
-from app.classroom.courses.files import Courses, course_of, load_course, parse_course, parsed, to_data, to_toml
+from app.classroom.courses.files import Courses, course_of, load_course, parse_course, parsed, to_data
 from app.classroom.courses.sealing import Seal
 from app.classroom.courses.sent import SentExercises
 
@@ -22,5 +22,4 @@ __all__ = [
     "parse_item",
     "parsed",
     "to_data",
-    "to_toml",
 ]

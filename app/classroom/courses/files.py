@@ -22,6 +22,7 @@ from app.exercises import Exercise, ExerciseFileError, Exercises, Shelf, Variant
 from app.exercises.fields import Fields, text_of, toml_of
 from app.exercises.lessons import LESSONS
 from kin import InputError, KinematicsError, Robot, get_robot
+from kin.parsing import to_toml
 
 BUILTIN = Path(__file__).parent / "library"
 MOST_BYTES = 8000  # of a course as JSON: links and pages keep it
@@ -121,16 +122,6 @@ def to_data(course: Course, seal: Seal | None = None) -> dict[str, Any]:
     return data
 
 
-def to_toml(course: Course) -> str:
-    """A course as a file."""
-    data = to_data(course)
-    lines = [f"{name} = {_value(value)}" for name, value in data.items() if name not in ("item", "own")]
-    for row in data["item"]:
-        lines += ["", "[[item]]", *(f"{name} = {_value(text)}" for name, text in row.items())]
-    lines += [f"\n{form.to_toml(one, 'own')}".rstrip("\n") for one in data.get("own", ())]
-    return "\n".join(lines) + "\n"
-
-
 class Courses:
     """The built-in courses, and those of the operator's folder. Read-only, so any thread may use it.
 
@@ -175,7 +166,7 @@ def _own(fields: Fields, exercises: Exercises, find: Find, seal: Seal | None) ->
         if len(found) >= MOST_OWN:
             raise fields.refuse(name, "one more exercise", f"at most {MOST_OWN} in a course")
         if isinstance(given, dict):
-            text = form.to_toml(given)
+            text = to_toml(given)
         elif isinstance(given, str) and seal is not None:
             try:
                 text = seal.open(given)
@@ -258,11 +249,3 @@ def _pairs(fields: Fields, items: tuple[Item, ...]) -> tuple[tuple[str, ...], tu
         if places[first] > places[second]:
             raise fields.refuse(f"after[{i}]", second, f"an item that comes after {first} in the course")
     return before, after
-
-
-def _value(value: object) -> str:
-    """A text, a flag or a list of texts in TOML.
-
-    Texts have no control characters, so that JSON's escapes are TOML's.
-    """
-    return json.dumps(value, ensure_ascii=False)

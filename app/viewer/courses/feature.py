@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import viser
 
-from app.classroom.courses import Course, Item, parse_course, parse_item, to_toml
+from app.classroom.courses import Course, Item, parse_course, parse_item, to_data
 from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
 from app.classroom.results import read_code
@@ -23,6 +23,7 @@ from app.viewer.panel import update_html
 from app.viewer.panel.status import Notice
 from kin import InputError, KinematicsError
 from kin.files.numbers import index_of
+from kin.parsing import to_toml
 
 
 class CourseFeature(Feature):
@@ -249,7 +250,9 @@ class CourseFeature(Feature):
         if course is None:
             return
         stem = re.sub(r"[^a-z0-9]+", "-", course.title.lower()).strip("-") or "course"
-        self.stage.client.send_file_download(f"{stem}.toml", to_toml(course).encode(), save_immediately=True)
+        self.stage.client.send_file_download(
+            f"{stem}.toml", to_toml(to_data(course)).encode(), save_immediately=True
+        )
         self.stage.notify(
             Notice("hand", f"{stem}.toml is saved", "Your browser has put it where it puts downloads.")
         )

@@ -30,6 +30,7 @@ from app.viewer.exercises.drawing import SIZE
 from app.viewer.feature import Stage
 from app.viewer.panel.status import Notice
 from kin import InputError, KinematicsError
+from kin.parsing import to_toml
 from kin.transforms import Array
 
 FILE = "exercise"
@@ -70,7 +71,7 @@ class Drafted(Facts[AuthorSettings]):
     @property
     def is_saved(self) -> bool:
         """Whether the service has the draft as it is."""
-        return self.known is not None and self.is_mine and self.known.source == forms.to_toml(self.data)
+        return self.known is not None and self.is_mine and self.known.source == to_toml(self.data)
 
     @property
     def exercise(self) -> Exercise | None:
@@ -256,7 +257,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
 
     def _put(self, data: forms.Draft, move: bool = True) -> None:
         """The draft has changed: the arm follows if another posture is asked about."""
-        text = forms.to_toml(data)
+        text = to_toml(data)
         if len(text.encode()) > MOST_BYTES:
             raise InputError("exercise", f"{len(text.encode())} bytes", f"at most {MOST_BYTES} bytes in all")
         before = self.facts.first
@@ -313,7 +314,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         """Into the folder of the service, for all pages."""
         self.look_again()
         again = self.facts.known is not None
-        saved = self._exercises.save(forms.to_toml(self.facts.data), self._served.get(exercise.id, ""))
+        saved = self._exercises.save(to_toml(self.facts.data), self._served.get(exercise.id, ""))
         self._served[exercise.id] = digest(saved.source)
         self._offer()
         title = f"{saved.title} is {'replaced' if again else 'saved'} on the server"

@@ -18,13 +18,13 @@ from app.classroom.courses import (
     parse_course,
     parse_item,
     to_data,
-    to_toml,
 )
 from app.classroom.courses.course import LONGEST
 from app.classroom.courses.files import MOST_BYTES
 from app.cli.parser import main
 from app.exercises import ExerciseFileError, Exercises
 from app.exercises.lessons import LESSONS
+from kin.parsing import to_toml
 
 ALL = Exercises()
 FILE = """
@@ -109,7 +109,7 @@ COURSES = st.builds(
 
 @given(COURSES)
 def test_a_course_is_the_same_after_a_file_or_a_link(course: Course) -> None:
-    assert parse_course(to_toml(course), ALL) == course
+    assert parse_course(to_toml(to_data(course)), ALL) == course
     assert course_of(json.loads(json.dumps(to_data(course))), ALL) == course
 
 

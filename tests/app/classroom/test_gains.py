@@ -15,7 +15,7 @@ from fastapi.testclient import TestClient
 from sqlalchemy import update
 
 from app.classroom import COOKIE, NewAttempt, Ticket, tables
-from app.classroom.courses import Course, Item, parse_course, to_data, to_toml
+from app.classroom.courses import Course, Item, parse_course, to_data
 from app.classroom.results.gains import COLUMNS, Gain, csv_of_gains, gains, pairs_of
 from app.classroom.results.table import Member
 from app.classroom.work import ANSWER_SHOWN, Attempt
@@ -23,6 +23,7 @@ from app.cli.parser import main
 from app.exercises import ExerciseFileError, Exercises
 from app.service.main import create_app
 from app.shared.settings import Settings
+from kin.parsing import to_toml
 
 ALL = Exercises()
 PAIRS = [("two-elbows", "other-wrist"), ("swing", "row-distance")]
@@ -96,10 +97,10 @@ def test_the_file_has_items_students_and_class() -> None:
 
 
 def test_files_and_links_keep_what_is_compared() -> None:
-    assert parse_course(to_toml(COURSE), ALL) == COURSE
+    assert parse_course(to_toml(to_data(COURSE)), ALL) == COURSE
     assert pairs_of(json.dumps(to_data(COURSE))) == PAIRS
     assert pairs_of("") == pairs_of(json.dumps(to_data(Course("Mine")))) == []
-    assert "before" not in to_toml(Course("Mine", items=ITEMS))
+    assert "before" not in to_toml(to_data(Course("Mine", items=ITEMS)))
 
 
 @pytest.mark.parametrize(
@@ -118,8 +119,7 @@ def test_files_and_links_keep_what_is_compared() -> None:
 def test_mistakes_are_named(
     before: object, after: object, field: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    plain = to_toml(Course("Week 1", items=ITEMS))
-    text = plain.replace("[[item]]", f"before = {json.dumps(before)}\nafter = {json.dumps(after)}\n\n[[item]]", 1)
+    text = to_toml({**to_data(Course("Week 1", items=ITEMS)), "before": before, "after": after})
     with pytest.raises(ExerciseFileError, match=words) as caught:
         parse_course(text, ALL)
     assert f"{field}:" in str(caught.value)

@@ -12,23 +12,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.classroom.courses import Course, Item, Seal, course_of, parse_course, to_data, to_toml
+from app.classroom.courses import Course, Item, Seal, course_of, parse_course, to_data
 from app.classroom.courses.course import MOST_OWN
-from app.exercises import ExerciseFileError, Exercises, form, parse_exercise
+from app.exercises import ExerciseFileError, Exercises, parse_exercise
 from kin import InputError, KinematicsError
+from kin.parsing import to_toml
 from kin.units import Units
 
 ALL = Exercises()
 SOURCES = [tomllib.loads(Path(one.file).read_text()) for one in ALL.all]
 DATA = {**next(one for one in SOURCES if one["id"] == "planar-tool-point"), "id": "my-own", "title": "My own"}
-OWN = parse_exercise(form.to_toml(DATA))
+OWN = parse_exercise(to_toml(DATA))
 COURSE = Course("Week 1", "About it.", (Item("lesson", "dh", robot="scara"),)).bringing(OWN)
 SEAL = Seal(lambda: b"a secret")
 
 
 def test_a_course_brings_an_exercise_along_in_its_file_and_sealed() -> None:
     assert COURSE.exercises == ("my-own",)
-    again = parse_course(to_toml(COURSE), ALL)
+    again = parse_course(to_toml(to_data(COURSE)), ALL)
     assert again == COURSE
     one = again.own[0].exercise
     assert one.solution(one.variant(7), Units()) == OWN.solution(OWN.variant(7), Units())
@@ -49,7 +50,7 @@ def test_a_course_brings_an_exercise_along_in_its_file_and_sealed() -> None:
 
 @pytest.mark.parametrize("how", ["secret", "changed", "cut", "short", "junk", "unsealed"])
 def test_a_seal_that_was_not_made_here_does_not_open(how: str) -> None:
-    sealed = SEAL.close(form.to_toml(DATA))
+    sealed = SEAL.close(to_toml(DATA))
     seal: Seal | None = SEAL
     if how == "secret":
         seal = Seal(lambda: b"another")
@@ -113,12 +114,12 @@ def test_refusals_name_the_field_of_the_exercise() -> None:
     refused(long, "bytes in all", "item")
     with pytest.raises(ExerciseFileError, match="no numbers that meet the conditions"):
         parse_course(
-            to_toml(Course("T").bringing(parse_exercise(form.to_toml({**DATA, "require": ["0 > 1"]})))), ALL
+            to_toml(to_data(Course("T").bringing(parse_exercise(to_toml({**DATA, "require": ["0 > 1"]}))))), ALL
         )
 
 
 def test_an_exercise_is_replaced_and_goes_with_its_item() -> None:
-    other = parse_exercise(form.to_toml({**DATA, "title": "Other"}))
+    other = parse_exercise(to_toml({**DATA, "title": "Other"}))
     changed = COURSE.bringing(other)
     assert [one.exercise.title for one in changed.own] == ["Other"]
     assert len(changed.items) == 2
@@ -130,5 +131,5 @@ def test_an_exercise_is_replaced_and_goes_with_its_item() -> None:
 
 def test_a_course_opens_after_another_exercise_was_saved_under_the_same_id(tmp_path: Path) -> None:
     known = Exercises(tmp_path)
-    known.save(form.to_toml({**DATA, "title": "By somebody else"}))
-    assert parse_course(to_toml(COURSE), known) == COURSE
+    known.save(to_toml({**DATA, "title": "By somebody else"}))
+    assert parse_course(to_toml(to_data(COURSE)), known) == COURSE

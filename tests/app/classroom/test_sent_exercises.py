@@ -17,15 +17,16 @@ from sqlalchemy import select, update
 
 from app.classroom import COOKIE, Hub, NewAttempt, Ticket, tables
 from app.classroom.attendance import Attendance
-from app.classroom.courses import Course, Courses, Item, Seal, SentExercises, to_data, to_toml
+from app.classroom.courses import Course, Courses, Item, Seal, SentExercises, to_data
 from app.classroom.live import MOST_OWN, MOST_VERSIONS, with_own
 from app.classroom.lti.contents import contents_of
 from app.classroom.results.keys import result_key
 from app.cli.parser import main
-from app.exercises import Exercises, form, parse_exercise
+from app.exercises import Exercises, parse_exercise
 from app.service.main import create_app
 from app.shared.settings import Settings
 from kin import get_robot
+from kin.parsing import to_toml
 
 HOSTILE = '=HYPERLINK("http://evil.example") <b>Mine</b>'
 WORDS = "It slides <i>along</i> z₃"
@@ -34,7 +35,7 @@ WORDS = "It slides <i>along</i> z₃"
 def own(title: str = HOSTILE, third: str = WORDS, key: str = "my-own", robot: str = "scara") -> str:
     """The text of an exercise with three options, the last of which is right."""
     options = [{"text": text, "reason": "Joint 3 is prismatic."} for text in ("It turns", "It rests", third)]
-    return form.to_toml(
+    return to_toml(
         {
             "id": key,
             "title": title,
@@ -198,7 +199,7 @@ def test_what_a_room_keeps_of_them_is_bounded() -> None:
 
 def test_a_course_of_a_learning_platform_brings_them(tmp_path: Path) -> None:
     course = Course("Mine", items=(Item("lesson", "dh"),)).bringing(parse_exercise(own()))
-    (tmp_path / "mine.toml").write_text(to_toml(course), encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(to_toml(to_data(course)), encoding="utf-8")
     contents = {one.name: one for one in contents_of(Courses(Exercises(), tmp_path))}
     [(key, [text])] = contents["course:mine"].state(1.0)["own"].items()
     assert (key, parse_exercise(text).title) == ("my-own", HOSTILE)

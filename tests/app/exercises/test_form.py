@@ -23,13 +23,13 @@ from app.exercises.form import (
     entries,
     groups,
     read,
-    to_toml,
     with_cell,
     with_row,
     without_row,
 )
 from app.exercises.kinds import KINDS
 from kin import InputError
+from kin.parsing import to_toml
 from kin.units import Units
 
 ALL = Exercises()

@@ -12,17 +12,18 @@ from pathlib import Path
 
 import pytest
 
-from app.exercises import Exercise, ExerciseFileError, Exercises, Shelf, builtin_exercises, form, parse_exercise
+from app.exercises import Exercise, ExerciseFileError, Exercises, Shelf, builtin_exercises, parse_exercise
 from app.exercises import shelf as shelves
 from app.exercises.shelf import digest, written_in_a_page
 from kin import InputError
+from kin.parsing import to_toml
 
 SOURCE = next(one for one in builtin_exercises() if one.id == "elbow-angle")
 
 
 def text(name: str = "mine", **fields: object) -> str:
     """The file of an exercise with this id."""
-    return form.to_toml({**tomllib.loads(SOURCE.source), "id": name, "title": "Mine", **fields})
+    return to_toml({**tomllib.loads(SOURCE.source), "id": name, "title": "Mine", **fields})
 
 
 @pytest.fixture

@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 from app.classroom.courses import Course, Courses, Item
-from app.exercises import Exercise, Exercises, Verdict, form, parse_exercise
+from app.exercises import Exercise, Exercises, Verdict, parse_exercise
 from app.viewer.activity.activity import EXERCISES, Activity, GivenUp, Judged
 from app.viewer.activity.context import ExerciseContext
 from kin import KinematicsError
+from kin.parsing import to_toml
 
 ALL = Exercises()
 COURSES = Courses(ALL)
@@ -137,7 +138,7 @@ def test_the_same_note_is_reported_once(activity: Activity, changes: list[int]) 
 
 def named(title: str) -> str:
     """The file of an exercise *mine*."""
-    return form.to_toml({**tomllib.loads(OTHER.source), "id": "mine", "title": title})
+    return to_toml({**tomllib.loads(OTHER.source), "id": "mine", "title": title})
 
 
 @pytest.mark.parametrize("seated", [False, True])

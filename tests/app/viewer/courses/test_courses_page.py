@@ -12,7 +12,7 @@ import pytest
 from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
-from app.classroom.courses import Courses, parse_course, to_data, to_toml
+from app.classroom.courses import Courses, parse_course, to_data
 from app.classroom.hub import Hub
 from app.classroom.results import read_code
 from app.classroom.results.keys import result_key
@@ -31,6 +31,7 @@ from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
 from kin import Robot, classic_robots, get_robot
+from kin.parsing import to_toml
 from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -363,7 +364,7 @@ def test_a_teacher_makes_a_course(server: int) -> None:
         tab.wait(lambda: bool(block(tab, "choose")))
         press(tab, "course", ["upload", 1], ["bad.toml", "title = 3"])
         tab.wait(lambda: "bad.toml: title: got 3, expected a text" in shown(tab).replace("Bad", "bad"))
-        press(tab, "course", ["upload", 2], ["mine.toml", to_toml(made)])
+        press(tab, "course", ["upload", 2], ["mine.toml", to_toml(to_data(made))])
         tab.wait(lambda: "0 of 2 done" in block(tab, "follow"))
 
 

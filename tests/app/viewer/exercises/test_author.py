@@ -18,12 +18,12 @@ from live_server import serve_viewer
 import kin
 from app.exercises import Exercises, parse_exercise
 from app.exercises.files import MOST_BYTES
-from app.exercises.form import to_toml
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings, static_folder
 from app.shared.store import Store
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
+from kin.parsing import to_toml
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 

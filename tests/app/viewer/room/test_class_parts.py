@@ -17,7 +17,7 @@ from app.classroom import ClassroomUnavailable, Confirmed, NewAttempt, RefusedEr
 from app.classroom.courses import SentExercises
 from app.classroom.standing import standing
 from app.classroom.work import ANSWER_SHOWN, Attempt, Work, works
-from app.exercises import Exercises, form
+from app.exercises import Exercises
 from app.viewer.exercises.feature import Practising
 from app.viewer.room import submissions, views
 from app.viewer.room.member import act_of
@@ -27,6 +27,7 @@ from app.viewer.room.submissions import Submissions
 from app.viewer.room.wall import LETTER, LINES, MOST, PADS, SYMBOLS, SmallArm, layout_of
 from app.viewer.session.state import PageState
 from app.viewer.worksheet.feature import Worksheets
+from kin.parsing import to_toml
 
 EXERCISES = Exercises()
 SENT = SentExercises(EXERCISES, {}, kin.get_robot)
@@ -230,7 +231,7 @@ def test_an_answer_to_an_exercise_that_was_sent_again_has_words_while_they_are_t
     def written(third: str) -> str:
         options = [{"text": text, "reason": "It rests."} for text in ("It rests", "It turns", third)]
         options[0]["right"] = True  # type: ignore[assignment]
-        return form.to_toml(
+        return to_toml(
             {
                 "id": "own-one",
                 "title": "Own",

@@ -12,12 +12,13 @@ from students import ALL, UNITS, Room, press
 from app.classroom import NewAttempt, Ticket
 from app.classroom.courses import Course, Seal, to_data
 from app.classroom.results.keys import result_key
-from app.exercises import Exercises, form, parse_exercise
+from app.exercises import Exercises, parse_exercise
 from app.exercises.said import answer_in_words
 from app.viewer.exercises.author import Author
 from app.viewer.room.following import shared
 from app.viewer.session.state import PageState, decode, encode
 from kin import classic_robots
+from kin.parsing import to_toml
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -28,7 +29,7 @@ DATA["answer"] = {
     "method": "SECRETMETHOD",
     "mistakes": [{"value": ["1", "2"], "reason": "SECRETREASON"}],
 }
-OWN = parse_exercise(form.to_toml(DATA))
+OWN = parse_exercise(to_toml(DATA))
 
 
 def gives_away(tab) -> list[str]:  # type: ignore[no-untyped-def]
