@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.exports.svg import AxisStyle, Plot, axes, joint_colour, png_url, text_of
+from app.exports.svg import Axes, AxisStyle, Plot, joint_colour, png_url, text_of
 from kin import Robot, Section, WorkspaceChunk, WorkspaceFacts
 from kin.units import fixed, grouped
 from kin.workspace import Span
@@ -23,7 +23,7 @@ CELLS = 360  # along the longest side
 SIZE = 420.0  # pixels of the longest side
 GAP, MARGIN = 78.0, 64.0  # between views, around all
 INK, SOFT = "#18212b", "#55616e"
-AXES = AxisStyle(
+STYLE = AxisStyle(
     tick=f'stroke="{SOFT}"', label=f'font-size="11" fill="{SOFT}"', title='font-size="12"', length=5.0, across=44.0
 )
 # Cividis, sampled: dark is rare, bright is frequent. The order is the same for people with colour blindness.
@@ -140,16 +140,15 @@ class Picture:
 
     def _view(self, view: View, counts: NDArray[np.int64], box: tuple[float, float]) -> str:
         width, height = box
-        plot = Plot(
-            0.0, 0.0, width / max(view.high[0] - view.low[0], 1e-9), *zip(view.low, view.high, strict=True)
-        )
+        scale = width / max(view.high[0] - view.low[0], 1e-9)
+        plot = Plot.equal(0.0, 0.0, scale, *zip(view.low, view.high, strict=True))
         names = [f"{name.replace('along', 'z')} (mm)" for name in (view.right, view.up)]
         parts = [
             f'<text y="-12" font-size="13" font-weight="600">{text_of(view.title)}</text>',
             f'<image width="{width:.1f}" height="{height:.1f}" preserveAspectRatio="none" '
             f'style="image-rendering:pixelated" href="{png_url(coloured(counts))}"/>',
             f'<rect width="{width:.1f}" height="{height:.1f}" fill="none" stroke="{SOFT}"/>',
-            axes(plot, (names[0], names[1]), 1e3, AXES),
+            Axes(plot, titles=(names[0], names[1]), unit=1e3, style=STYLE).svg(),
         ]
         if self._section is not None and view.right == "r":
             line = '<path d="{}" fill="none" stroke="{}" stroke-width="{}"/>'

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import kin
+from app.exports.curves import Curve, Row, with_legend
 from app.exports.svg import extremes
-from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from app.viewer.tabs.program.plot import plot_html
 from kin.motion import JointTarget, Ptp, plan_motion
 from kin.units import Units
@@ -39,7 +39,7 @@ def test_one_curve_needs_no_name_and_a_constant_no_place() -> None:
 
 def test_a_chart_of_a_lesson_names_the_extremes_of_each_row_and_leaves_out_what_is_not_in_it() -> None:
     curves = (Curve("one", T, (T, None)), Curve("two", T, (-T, 1e-3 + T)))
-    drawn = chart((Row("Angle, °"), Row("Error", log=True)), curves, "Two <curves>")
+    drawn = with_legend((Row("Angle, °"), Row("Error", log=True)), curves, "Two <curves>")
     assert label(drawn) == (
         "Two <curves>. Angle, °: from −2 (two, at 2 s) to 2 (one, at 2 s); "
         "Error: from 0.001 (at 0 s) to 2.001 (at 2 s)."

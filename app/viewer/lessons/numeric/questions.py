@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from markupsafe import Markup
 
+from app.exports.curves import Curve, Row, with_legend
 from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import bar
 from app.viewer.lessons.guide.outline import Lead, Outline, Pose
@@ -14,7 +15,6 @@ from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.numeric.example import Example, example
 from app.viewer.lessons.numeric.settings import LIMITS
 from app.viewer.lessons.numeric.views import NAMES, amount, error_chart
-from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from kin import Robot, fk, get_robot
 from kin.differential import iteration
 from kin.differential.iteration import Method, Problem, Run, Settings
@@ -157,4 +157,4 @@ def _near_singularity(units: Units) -> Markup:
     )
     rows = (Row(f"Length of the first step, {unit.name}", log=True),)
     label = "First step of Newton and of damped least squares near the straight arm"
-    return chart(rows, curves, label, f"{unit.name} of θ₂")
+    return with_legend(rows, curves, label, f"{unit.name} of θ₂")

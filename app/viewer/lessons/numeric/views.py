@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from markupsafe import Markup
 
-from app.exports.svg import AxisStyle, Plot, axes, png_url
+from app.exports.curves import Curve, Row, with_legend
+from app.exports.svg import Axes, Plot, chart, png_url
 from app.viewer.lessons.numeric.basins import COLOURS, Basins, off_by, pixels, turned_within
-from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from app.viewer.views.templates import render
 from kin import Robot
 from kin.differential.iteration import MOST, Method, Problem, Run
@@ -33,13 +34,6 @@ ROWS = 8  # of the table
 LEAST = 1e-16  # errors below are drawn there
 FEWEST = 6  # iterations on the axis of the chart
 _SIDE, _LEFT, _TOP = 236.0, 46.0, 8.0
-_STYLE = AxisStyle(
-    tick='stroke="currentColor" stroke-opacity=".4"',
-    label='class="kb-axis"',
-    title='class="kb-axis"',
-    length=4.0,
-    across=33.0,
-)
 
 
 def amount(unit: Unit, value: float) -> str:
@@ -187,7 +181,7 @@ def error_chart(
         shown = tuple(np.maximum(value, least) for value in values)
         curves.append(Curve(NAMES[method], np.arange(run.count + 1.0), shown))
     label = "Error and step length over the iterations"
-    return chart(tuple(rows), tuple(curves), label, "iterations", whole=FEWEST)
+    return with_legend(tuple(rows), tuple(curves), label, "iterations", whole=FEWEST)
 
 
 def waiting_html(on: bool) -> str:
@@ -199,17 +193,25 @@ def waiting_html(on: bool) -> str:
 def basins_html(basins: Basins, name: str, units: Units) -> str:
     """The picture of the basins, with the solutions."""
     unit, plot = units.angles, _plot(basins)
+    scaled = replace(plot, x=_times(plot.x, unit.scale), y=_times(plot.y, unit.scale))  # so that ticks are round
     titles = (f"θ₁ of the start, {unit.name}", f"θ₂ of the start, {unit.name}")
-    return render(
-        "numeric/basins",
-        label=_basins_label(basins, name),
-        plot=plot,
-        wide=plot.right - plot.left,
-        high=plot.bottom - plot.top,
-        url=png_url(pixels(basins)),
-        axes=Markup(axes(_scaled(plot, unit.scale), titles, 1.0, _STYLE)),
-        marks=[(*plot.at(q).tolist(), str(k)) for k, q in enumerate(basins.solutions, 1)],
-    )
+    look = f'href="{png_url(pixels(basins))}" preserveAspectRatio="none" style="image-rendering:pixelated"'
+    place = f'x="{plot.left}" y="{plot.top}" width="{plot.width:.2f}" height="{plot.height:.2f}"'
+    marks = [f"<image {place} {look}/>"]
+    for k, (x, y) in enumerate(plot.at(basins.solutions).tolist() if len(basins.solutions) else (), 1):
+        look = 'text-anchor="middle" font-size="10" font-weight="700" fill="#000"'
+        marks.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="7" fill="#fff" stroke="#000"/>')
+        marks.append(f'<text x="{x:.1f}" y="{y + 3.6:.1f}" {look}>{k}</text>')
+    drawn = chart((), marks, (Axes(scaled, titles=titles),), _basins_label(basins, name), _size(plot))
+    return render("numeric/basins", chart=drawn)
+
+
+def _size(plot: Plot) -> tuple[float, float]:
+    return 300.0, plot.bottom + 36.0
+
+
+def _times(ends: tuple[float, float], scale: float) -> tuple[float, float]:
+    return ends[0] * scale, ends[1] * scale
 
 
 def _basins_label(basins: Basins, name: str) -> str:
@@ -220,8 +222,11 @@ def _basins_label(basins: Basins, name: str) -> str:
 
 def mark_html(basins: Basins, start: Array) -> str:
     """The present start, a layer over the picture."""
-    x, y = _plot(basins).at(np.remainder(start + math.pi, 2.0 * math.pi) - math.pi).tolist()
-    return render("numeric/mark", plot=_plot(basins), x=round(x, 1), y=round(y, 1))
+    plot = _plot(basins)
+    x, y = plot.at(np.remainder(start + math.pi, 2.0 * math.pi) - math.pi).tolist()
+    cross = f'<path d="M{x - 6:.1f} {y:.1f}h12M{x:.1f} {y - 6:.1f}v12" stroke="{{}}" stroke-width="{{}}"/>'
+    marks = (cross.format("#fff", 4), cross.format("#000", 1.6))
+    return render("numeric/mark", chart=chart((), marks, (), "the present start", _size(plot)))
 
 
 def key_html(basins: Basins, is_mine: bool, units: Units) -> str:
@@ -240,10 +245,4 @@ def _plot(basins: Basins) -> Plot:
     (left, right), (low, high) = (
         (float(1.5 * q[0] - 0.5 * q[1]), float(1.5 * q[-1] - 0.5 * q[-2])) for q in (basins.q1, basins.q2)
     )
-    return Plot(_LEFT, _TOP, _SIDE / max(right - left, high - low), (left, right), (low, high))
-
-
-def _scaled(plot: Plot, scale: float) -> Plot:
-    """The same place on the page with its ranges in a unit that a radian has `scale` of: its ticks are round."""
-    ranges = ((low * scale, high * scale) for low, high in (plot.x, plot.y))
-    return Plot(plot.left, plot.top, plot.scale / scale, *ranges)
+    return Plot.equal(_LEFT, _TOP, _SIDE / max(right - left, high - low), (left, right), (low, high))

@@ -8,9 +8,9 @@ import numpy as np
 from markupsafe import Markup
 
 from app.exercises.typed import read_number
+from app.exports.curves import Curve, Row, with_legend
 from app.viewer.lessons.figure_shapes import GREEN, VERMILION
 from app.viewer.lessons.guide.outline import Answered
-from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from app.viewer.lessons.trajectories.motions import Sketched, Ways, example, family, frequency, sampled, swing
 from kin import Robot
 from kin.motion import profiles
@@ -27,14 +27,15 @@ def _rows(unit: Unit, quantities: tuple[int, ...], limits: tuple[float, ...] = (
     """Rows of position and its derivatives; `limits` of velocity, acceleration and jerk in this unit."""
     titles = [f"{_TITLES[k]}, {unit.name}{('', '/s', '/s²', '/s³')[k]}" for k in quantities]
     return tuple(
-        Row(title, limits[k - 1] if limits and k else None) for k, title in zip(quantities, titles, strict=True)
+        Row(title, (-limits[k - 1], limits[k - 1]) if limits and k else None)
+        for k, title in zip(quantities, titles, strict=True)
     )
 
 
 def cubic(robot: Robot, unit: Unit) -> Markup:
     """Position, velocity and acceleration of a cubic."""
     times, values = sampled(family(robot)["cubic"], unit.scale)
-    return chart(_rows(unit, (0, 1, 2)), (Curve("cubic", times, values[:3]),), "A cubic from rest to rest")
+    return with_legend(_rows(unit, (0, 1, 2)), (Curve("cubic", times, values[:3]),), "A cubic from rest to rest")
 
 
 def family_of(robot: Robot, unit: Unit) -> Markup:
@@ -44,7 +45,7 @@ def family_of(robot: Robot, unit: Unit) -> Markup:
         times, values = sampled(profile, unit.scale)
         curves.append(Curve(f"{name} {profile.duration:.2f} s", times, values[:3]))
     limits = tuple((example(robot).limits * unit.scale).tolist())
-    return chart(_rows(unit, (0, 1, 2), limits), tuple(curves), "Four profiles of the same way")
+    return with_legend(_rows(unit, (0, 1, 2), limits), tuple(curves), "Four profiles of the same way")
 
 
 def ends(robot: Robot, unit: Unit) -> Markup:
@@ -59,7 +60,7 @@ def ends(robot: Robot, unit: Unit) -> Markup:
     ):
         times, values = sampled(profiles.cubic(0.0, way, duration, 0.0, end), unit.scale)
         curves.append(Curve(name, times, values[:2]))
-    return chart(_rows(unit, (0, 1)), tuple(curves), "Three cubics with different velocities at the end")
+    return with_legend(_rows(unit, (0, 1)), tuple(curves), "Three cubics with different velocities at the end")
 
 
 def two_ways(found: Ways, units: Units) -> Markup:
@@ -75,7 +76,7 @@ def two_ways(found: Ways, units: Units) -> Markup:
         Curve(f"LIN {found.lin.duration:.2f} s", lin_times, (np.zeros_like(lin_times), speeds[1])),
     )
     rows = (Row(f"Distance from the line, {lengths.name}"), Row(f"Speed of the tool, {lengths.name}/s"))
-    return chart(rows, curves, "PTP and LIN between the same two configurations")
+    return with_legend(rows, curves, "PTP and LIN between the same two configurations")
 
 
 def past_axis(past: Sequence[tuple[Array, Array]], offsets: Sequence[float], units: Units) -> Markup:
@@ -86,7 +87,7 @@ def past_axis(past: Sequence[tuple[Array, Array]], offsets: Sequence[float], uni
         for offset, (x, rate) in zip(offsets, past, strict=True)
     )
     rows = (Row(f"Rate of the joint, {angles.name}/s"),)
-    return chart(rows, curves, "Rate of the joint along three lines", lengths.name)
+    return with_legend(rows, curves, "Rate of the joint along three lines", lengths.name)
 
 
 def load(robot: Robot, unit: Unit) -> Markup:
@@ -97,7 +98,7 @@ def load(robot: Robot, unit: Unit) -> Markup:
         push = np.where(times < found[name].duration, found[name].sample(times)[2], 0.0)
         curves.append(Curve(name, times, (push * unit.scale, x * unit.scale)))
     rows = (Row(f"Acceleration, {unit.name}/s²"), Row(f"Swing of the load, {unit.name}"))
-    return chart(rows, tuple(curves), "A swinging load behind two profiles")
+    return with_legend(rows, tuple(curves), "A swinging load behind two profiles")
 
 
 def elbows(share: Array, found: Array, angles: Unit) -> Markup:
@@ -106,8 +107,8 @@ def elbows(share: Array, found: Array, angles: Unit) -> Markup:
         Curve(f"elbow {name}", 100.0 * share, (row * angles.scale,))
         for name, row in zip(("positive", "negative"), found, strict=True)
     )
-    rows = (Row(f"Joint 1, {angles.name}", np.pi * angles.scale),)
-    return chart(rows, curves, "Joint 1 along the line, both elbows", "%")
+    rows = (Row(f"Joint 1, {angles.name}", (-np.pi * angles.scale, np.pi * angles.scale)),)
+    return with_legend(rows, curves, "Joint 1 along the line, both elbows", "%")
 
 
 def timed(unit: Unit, way: float, limits: Array) -> Answered:
@@ -129,8 +130,8 @@ def timed(unit: Unit, way: float, limits: Array) -> Answered:
             curves.append(Curve(f"right {right:.2f} s", *_trapezoid(right, way, a, unit), RIGHT))
         if not curves:
             return Markup("")
-        rows = (Row(f"Velocity, {unit.name}/s", v * unit.scale, shows=(0.0,)),)
-        return chart(rows, tuple(curves), "Velocity of the trapezoidal profile")
+        rows = (Row(f"Velocity, {unit.name}/s", (-v * unit.scale, v * unit.scale), shows=(0.0,)),)
+        return with_legend(rows, tuple(curves), "Velocity of the trapezoidal profile")
 
     return figure
 
@@ -159,8 +160,8 @@ def sketched(unit: Unit, asked: Sketched, limits: Array) -> Answered:
             curves.append(Curve("a right one", times, (right * unit.scale,), RIGHT))
         if not curves:
             return Markup("")
-        rows = (Row(f"Velocity, {unit.name}/s", v * unit.scale, shows=(0.0,)),)
-        return chart(rows, tuple(curves), "Sketch of the velocity")
+        rows = (Row(f"Velocity, {unit.name}/s", (-v * unit.scale, v * unit.scale), shows=(0.0,)),)
+        return with_legend(rows, tuple(curves), "Sketch of the velocity")
 
     return figure
 

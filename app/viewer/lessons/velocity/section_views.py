@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.exports.curves import Curve, Row, with_legend
 from app.viewer.arm import Arm
-from app.viewer.lessons.trajectories.chart import Curve, Row, chart
 from app.viewer.lessons.velocity.along import SAME, SHARE, Along, along, ends
 from app.viewer.lessons.velocity.views import axis_name
 from app.viewer.panel.joints import label
@@ -103,7 +103,7 @@ def line_html(robot: Robot, found: Along, units: Units) -> str:
     words = f"Smallest σ_min {fixed(float(found.least[at]), 4)} at {100.0 * found.share[at]:.0f} % of the line, "
     words += f"κ there {general(float(found.kappa[at]), 3)}. {found.end}"
     axis = unit.name if by_length else "%"
-    return render("velocity/line", chart=chart(rows, (curve,), "along the line", axis), words=words)
+    return render("velocity/line", chart=with_legend(rows, (curve,), "along the line", axis), words=words)
 
 
 def plot_html(arm: Arm, start: Array | None, units: Units) -> str:

@@ -11,10 +11,10 @@ from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 
 import numpy as np
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 import kin
-from app.exports.svg import chart
+from app.exports.svg import Axes, AxisStyle, Plot, Series, chart
 from app.viewer.arm import Arm
 from app.viewer.panel.posture import short
 from app.viewer.tabs.program.items import Items
@@ -26,7 +26,8 @@ from kin.path.postures import STATES, Reason, State
 from kin.units import Units, typeset
 
 PLACES = 80  # along the way
-WIDTH, LEFT, RIGHT, ROW, GAP, TOP, BOTTOM = 320.0, 18.0, 4.0, 15.0, 4.0, 4.0, 18.0
+WIDTH, LEFT, RIGHT, ROW, GAP, TOP, BOTTOM = 320.0, 18.0, 16.0, 15.0, 4.0, 4.0, 18.0
+_BARE = AxisStyle('stroke="none"', 'class="kb-axis"', "", length=1.0)
 LEGEND: dict[State, str] = {
     "free": "free",
     "near limit": "near a limit",
@@ -129,39 +130,23 @@ def _row(found: PathPostures, row: int, units: Units) -> dict[str, object]:
 
 
 def _svg(found: PathPostures, index: int, units: Units) -> Markup:
-    count = len(found.postures)
-    length = WIDTH - LEFT - RIGHT
-    step = length / len(found.states)
-    bottom = TOP + count * (ROW + GAP)
-    parts = [
-        f'<text class="kb-axis" x="{LEFT - 5.0:.0f}" y="{TOP + row * (ROW + GAP) + 0.75 * ROW:.1f}" '
-        f'text-anchor="end">{row + 1}</text>'
-        for row in range(count)
-    ]
+    count, steps = len(found.postures), len(found.states)
+    plot = Plot(LEFT, TOP, WIDTH - LEFT - RIGHT, count * (ROW + GAP), (0.0, steps), (count, 0.0))
+    wide = ROW / (ROW + GAP)
+    marks = []
     for stretch in found.stretches:
-        x = LEFT + stretch.first * step
-        width = (stretch.last - stretch.first + 1) * step - (0.0 if stretch.joined else 1.0)
-        y = TOP + stretch.posture * (ROW + GAP)
-        able = found.reach[0, stretch.posture] >= 0
-        does = f' data-program-do="begin" data-argument="{stretch.posture}" data-index="{index}"' if able else ""
+        row = stretch.posture
+        able = found.reach[0, row] >= 0
+        does = f' data-program-do="begin" data-argument="{row}" data-index="{index}"' if able else ""
         middle = (stretch.first + stretch.last + 1) // 2
-        reason = typeset(found.reasons.get((middle, stretch.posture), Reason()).explain(units))
+        reason = typeset(found.reasons.get((middle, row), Reason()).explain(units))
         name = LEGEND[stretch.state] + (f": {reason}" if reason else "")
-        parts.append(
-            f'<rect class="kb-posture kb-posture-{stretch.state.replace(" ", "-")}" x="{x:.2f}" y="{y:.1f}" '
-            f'width="{max(width, 0.5):.2f}" height="{ROW}"{does}><title>{escape(name)}</title></rect>'
-        )
-    points = [
-        f"{LEFT + (i + 0.5) * step:.2f} {TOP + row * (ROW + GAP) + 0.5 * ROW:.1f}"
-        for i, row in enumerate(found.rows.tolist())
-        if row >= 0
-    ]
-    if points:
-        parts.append(f'<path class="kb-posture-best" d="M{"L".join(points)}"><title>the best path</title></path>')
-    parts += [
-        f'<text class="kb-axis" x="{LEFT + share * length:.1f}" y="{bottom + 11:.1f}" '
-        f'text-anchor="{anchor}">{100 * share:.0f} %</text>'
-        for share, anchor in ((0.0, "start"), (0.5, "middle"), (1.0, "end"))
-    ]
+        end = stretch.last + 1 - (0.0 if stretch.joined else 1.0 / plot.scale)
+        look = f'class="kb-posture kb-posture-{stretch.state.replace(" ", "-")}"{does}'
+        marks.append(plot.box((stretch.first, end), (row, row + wide), look, name))
+    best = np.array([[i + 0.5, row + 0.5 * wide] for i, row in enumerate(found.rows.tolist()) if row >= 0])
+    line = [Series(plot, best, 'class="kb-posture-best"', "the best path")] if len(best) else []
+    shares = [(share * steps, f"{100 * share:.0f} %") for share in (0.0, 0.5, 1.0)]
+    axes = Axes(plot, shares, [(row + 0.5 * wide, str(row + 1)) for row in range(count)], style=_BARE)
     label = f"Postures along the way: one row each, in the order of the list below. {_words(found)}"
-    return Markup(chart(WIDTH, bottom + BOTTOM, label, "".join(parts)))
+    return chart(line, marks, (axes,), label, (WIDTH, plot.bottom + BOTTOM))

@@ -9,9 +9,9 @@ import pytest
 from fake_browser import FakeBrowser
 
 import kin
+from app.exports.curves import WIDTH, Curve, Row, with_legend
 from app.viewer.lessons.guide.outline import Number
 from app.viewer.lessons.trajectories import motions
-from app.viewer.lessons.trajectories.chart import WIDTH, Curve, Row, chart
 from app.viewer.lessons.trajectories.questions import END, LINKS, OFFSETS, SPEED, START, outline
 from kin import Robot
 from kin.motion import profiles
@@ -91,7 +91,7 @@ def test_a_load_behind_a_ramp_of_its_own_period_rests_after_the_stop() -> None:
 @pytest.mark.parametrize("end", [0.3, 1.0, 250.0])
 def test_the_numbers_of_the_horizontal_axis_stay_inside_and_apart(end: float, axis: str) -> None:
     times = np.linspace(0.0, end, 5)
-    shown = str(chart((Row("a"),), (Curve("b", times, (times,)),), "c", axis))
+    shown = str(with_legend((Row("a"),), (Curve("b", times, (times,)),), "c", axis))
     numbers = re.findall(r'<text x="([\d.]+)" y="[\d.]+" text-anchor="middle" class="kb-axis">([^<]+)', shown)
     numbers.reverse()
     assert numbers[-1][1].endswith(f" {axis}")
@@ -103,7 +103,7 @@ def test_the_numbers_of_the_horizontal_axis_stay_inside_and_apart(end: float, ax
 
 def test_names_in_a_chart_are_escaped() -> None:
     times = np.linspace(0.0, 1.0, 5)
-    shown = str(chart((Row("<b>"),), (Curve("<i>", times, (times,)),), "<u>"))
+    shown = str(with_legend((Row("<b>"),), (Curve("<i>", times, (times,)),), "<u>"))
     assert "<b>" not in shown
     assert "<i>" not in shown
     assert "<u>" not in shown

@@ -10,10 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from markupsafe import Markup
 from numpy.typing import NDArray
 
-from app.exports.svg import AxisStyle, Plot, axes, chart, joint_colour, png_url
+from app.exports.svg import Axes, Plot, chart, joint_colour, png_url
 from app.viewer.tabs.workspace.colours import radius_and_height
 from app.viewer.views.templates import render
 from kin import Robot, Section
@@ -25,14 +24,6 @@ WIDTH, TALLEST = 320.0, 500.0
 SHORTEST = 88.0  # of the plot itself: that of an arm in a plane is flat, and the vertical axis has a title
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 12.0, 10.0, 36.0
 CELLS = 112  # along the longer side
-AXES = AxisStyle(
-    tick='stroke="currentColor" stroke-opacity=".18"',
-    label='class="kb-axis"',
-    title='class="kb-axis"',
-    length=4.0,
-    grid=True,
-    across=37.0,
-)
 
 
 def frame_of(section: Section) -> Plot:
@@ -43,7 +34,7 @@ def frame_of(section: Section) -> Plot:
     r, z = (0.0, float(right + margin)), (float(low - margin), float(high + margin))
     scale = min((WIDTH - LEFT - RIGHT) / r[1], (TALLEST - TOP - BOTTOM) / (z[1] - z[0]))
     missing = max(0.0, SHORTEST / scale - (z[1] - z[0])) / 2.0
-    return Plot(LEFT, TOP, scale, r, (z[0] - missing, z[1] + missing))
+    return Plot.equal(LEFT, TOP, scale, r, (z[0] - missing, z[1] + missing))
 
 
 class Density:
@@ -79,12 +70,18 @@ class Density:
 def plot_html(section: Section, frame: Plot, image: str, units: Units) -> str:
     """The section with its axes over an `image` of points; above it, the legend of the joints' colours."""
     unit = units.lengths
-    arcs = "".join(_arc(arc, frame, unit) for arc in section.arcs)
+    titles = (f"r: distance from joint 1's axis, {unit.name}", f"z: height, {unit.name}")
+    boundary = (
+        f'<path d="{"".join(frame.path(curve, closed=True) for curve in section.curves)}" fill="currentColor" '
+        'fill-opacity=".05" fill-rule="evenodd" stroke="currentColor" stroke-width="1.2" stroke-linejoin="round"/>'
+    )
+    marks = (image, boundary, *(_arc(arc, frame, unit) for arc in section.arcs))
+    axes = Axes(frame, titles=titles, unit=unit.scale)
     joints = sorted({arc.joint for arc in section.arcs})
     return render(
         "workspace/section",
         joints=[{"number": joint + 1, "colour": joint_colour(joint)} for joint in joints],
-        svg=_svg(frame, _label(section, unit), f"{image}{_axes(frame, unit)}{_curves(section, frame)}{arcs}"),
+        svg=chart((), marks, (axes,), _label(section, unit), _size(frame)),
     )
 
 
@@ -92,7 +89,7 @@ def tool_html(frame: Plot, r: float, z: float) -> str:
     """The tool's dot as a separate SVG. Directly after `plot_html`, it takes no space and lies over the plot."""
     x, y = frame.at(np.array([r, z])).tolist()
     dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5" fill="#d55e00" stroke="#fff" stroke-width="1.5"/>'
-    return render("workspace/tool_dot", svg=_svg(frame, "the tool", dot))
+    return render("workspace/tool_dot", svg=chart((), (dot,), (), "the tool", _size(frame)))
 
 
 def image(density: Density) -> str:
@@ -116,25 +113,8 @@ def _label(section: Section, unit: Unit) -> str:
     return f"{label}, {unit.name}: {r}, z from {general(z_low, 4)} to {general(z_high, 4)}"
 
 
-def _svg(frame: Plot, label: str, content: str) -> Markup:
-    return Markup(chart(WIDTH, frame.bottom + BOTTOM, label, content))
-
-
-def _axes(frame: Plot, unit: Unit) -> str:
-    titles = (f"r: distance from joint 1's axis, {unit.name}", f"z: height, {unit.name}")
-    return (
-        axes(frame, titles, unit.scale, AXES)
-        + f'<path d="M{LEFT} {TOP}V{frame.bottom:.1f}H{frame.right:.1f}" fill="none" stroke="currentColor" '
-        'stroke-opacity=".6"/>'
-    )
-
-
-def _curves(section: Section, frame: Plot) -> str:
-    path = "".join(f"{frame.path(curve, closed=True)}" for curve in section.curves)
-    return (
-        f'<path d="{path}" fill="currentColor" fill-opacity=".05" fill-rule="evenodd" stroke="currentColor" '
-        'stroke-width="1.2" stroke-linejoin="round"/>'
-    )
+def _size(frame: Plot) -> tuple[float, float]:
+    return WIDTH, frame.bottom + BOTTOM
 
 
 def _arc(arc: SectionArc, frame: Plot, unit: Unit) -> str:
