@@ -100,7 +100,6 @@ RULES: dict[str, set[str]] = {
         "viser",
         "zstandard",
         "app.shared.connection",
-        "app.shared.throttled_log",
         "app.viewer.viser_names",
     },
     "app/viewer/meshes": {

@@ -12,10 +12,10 @@ import logging
 from collections import Counter
 from typing import Protocol
 
+from app.service.log import KIND
 from app.shared.clients import Proxies, network_of, share_of
 from app.shared.metrics import CONNECTIONS, REFUSED
 from app.shared.settings import Settings
-from app.shared.throttled_log import ThrottledLog
 
 logger = logging.getLogger("kinboard.connections")
 
@@ -48,7 +48,6 @@ class Guard:
         self._clients: Counter[str] = Counter()
         self._watched: set[Watched] = set()
         self._timer: asyncio.TimerHandle | None = None
-        self._throttled = ThrottledLog(logger)
         if files is not None and files - SPARE_FILES < settings.max_connections:
             logger.warning(
                 "this process may have only %d files open (ulimit -n), too few for %d connections "
@@ -100,9 +99,9 @@ class Guard:
         CONNECTIONS.dec()
 
     def note(self, why: str, line: str, error: Exception | None = None) -> None:
-        """Count a refusal and log it: the first of its kind at once, those of the next seconds as a number."""
+        """Count a refusal and log it."""
         REFUSED.labels(why).inc()
-        self._throttled.note(why, line, error)
+        logger.warning("%s", line, exc_info=error, extra={KIND: why})
 
     def _schedule(self) -> None:
         tick = min(TICK, 0.25 * self.receive_timeout, 0.25 * self.send_timeout)

@@ -19,8 +19,8 @@ from collections.abc import Callable, Hashable
 from types import TracebackType
 from typing import Any, Final, TextIO
 
-from app.shared.throttled_log import KIND, LOG_EVERY
-
+LOG_EVERY: Final = 60.0  # seconds between two lines of the same kind
+KIND: Final = "kind"  # attribute of a record: what counts as the same event
 LONGEST: Final = 1000  # characters of a line
 FIRST, LAST = 40, 80  # lines of a longer traceback
 
@@ -77,8 +77,6 @@ class LogFilter(logging.Filter):
 
     def filter(self, record: logging.LogRecord) -> bool:
         kind, now = kind_of(record), self._clock()
-        if kind is None:
-            return True
         with self._lock:
             since, count = self._latest.get(kind, (-LOG_EVERY, 0))
             passes = now >= since + LOG_EVERY
@@ -90,11 +88,10 @@ class LogFilter(logging.Filter):
 def kind_of(record: logging.LogRecord) -> Hashable:
     """What counts as the same event: the places in the code; nothing that is in the message.
 
-    Records may state their own kind in the attribute `KIND`; None: all pass.
+    Records may state their own kind in the attribute `KIND`.
     """
     if hasattr(record, KIND):
-        own = getattr(record, KIND)
-        return None if own is None else (record.name, own)
+        return record.name, getattr(record, KIND)
     error = record.exc_info[1] if record.exc_info else None
     trace = None if error is None else error.__traceback__
     while trace is not None and trace.tb_next is not None:

@@ -6,9 +6,10 @@ one. A computation ends when the last caller leaves its subscription. A section 
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.threads import background_threads, lower_priority
-from app.shared.threads.executor import DaemonExecutor
 from kin import (
     Comparison,
     JointConstraints,
@@ -38,7 +39,7 @@ class Summaries:
 
     def __init__(self, kept: int = KEPT, threads: int | None = None, max_pending: int = 32) -> None:
         self._max_pending = max_pending
-        self._executor = DaemonExecutor(threads or background_threads(), "summary", lower_priority)
+        self._executor = ThreadPoolExecutor(threads or background_threads(), "summary", lower_priority)
         self._facts: ComputationCache[WorkspaceFacts] = ComputationCache(self._executor, kept)
         self._sections: ComputationCache[Section] = ComputationCache(self._executor, kept)
         self._comparisons: ComputationCache[Comparison] = ComputationCache(self._executor, kept)
@@ -106,4 +107,4 @@ class Summaries:
         self._facts.close()
         self._sections.close()
         self._comparisons.close()
-        self._executor.shutdown(wait=False)
+        self._executor.shutdown(wait=False, cancel_futures=True)

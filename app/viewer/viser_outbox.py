@@ -33,7 +33,6 @@ from viser.infra import Message, _infra
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.shared.connection import Connection
-from app.shared.throttled_log import ThrottledLog
 from app.viewer import viser_names
 
 logger = logging.getLogger("kinboard.viewer")
@@ -225,7 +224,6 @@ class Packer:
     """Messages as bytes on the wire, as viser's producer makes them. Only the event loop's thread uses it."""
 
     def __init__(self) -> None:
-        self._throttled = ThrottledLog(logger)
         self._compress = zstandard.ZstdCompressor(level=1).compress  # half a megabyte of memory
 
     def pack(self, window: Sequence[Message]) -> bytes:
@@ -239,7 +237,7 @@ class Packer:
         try:
             inner = _encode(whole)
         except (ValueError, OverflowError, TypeError) as error:
-            self._throttled.note("unencodable", f"a message for a page cannot be sent as it is: {error}")
+            logger.warning("a message for a page cannot be sent as it is: %s", error)
             inner = _encode(whole | {"messages": _encodable(whole["messages"])})
         packed = self._compress(inner)
         parts: list[bytes | memoryview] = [

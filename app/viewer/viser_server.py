@@ -32,7 +32,6 @@ from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.shared.connection import Connection, ConnectionEnded
 from app.shared.security import Rights
-from app.shared.throttled_log import ThrottledLog
 from app.viewer import viser_names
 from app.viewer.viser_outbox import LoopWaker, Outbox, Packer
 from app.viewer.viser_patches import drag_gizmo
@@ -64,7 +63,6 @@ class PortlessServer(infra.WebsockServer):
         self.silences: dict[int, Callable[[], float]] = {}  # `Connection.silence`, by client id
         self.visitors: dict[int, viser.ClientHandle] = {}  # viser's own, by client id
         self._open = 0  # connections
-        self._throttled = ThrottledLog(log)
         self.waker, self._packer = LoopWaker(loop), Packer()
         self._stopping: asyncio.Future[None]
         self._all_ended: asyncio.Event
@@ -171,7 +169,7 @@ class PortlessServer(infra.WebsockServer):
         try:
             return visitor is not None and drag_gizmo(visitor, data)
         except Exception as error:  # noqa: BLE001 - of a callback
-            self._note(error)
+            _note(error)
             return True
 
     async def _handle(
@@ -184,10 +182,11 @@ class PortlessServer(infra.WebsockServer):
         try:
             await handler._handle_incoming_message(number, message)
         except Exception as error:  # noqa: BLE001 - fields are converted without checks
-            self._note(error)
+            _note(error)
 
-    def _note(self, error: Exception) -> None:
-        self._throttled.note("unhandled", f"a message of a visitor could not be handled: {error!r:.200}")
+
+def _note(error: Exception) -> None:
+    log.warning("a message of a visitor could not be handled: %.200r", error)
 
 
 async def _call(callbacks: _Callbacks, client: infra.WebsockClientConnection) -> None:

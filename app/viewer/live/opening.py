@@ -6,21 +6,20 @@ other, for all pages of the process.
 
 from __future__ import annotations
 
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import Final
 
 from app.live.recording import Bounds, Recording, read
 from app.shared.memory.answers import Reservation
 from app.shared.threads import lower_priority
-from app.shared.threads.executor import DaemonExecutor
 from app.viewer.feature import Stage
 from app.viewer.meshes.incoming import Awaited, IncomingFile
 from app.viewer.panel import Post
 from app.viewer.panel.status import Notice
 from kin import Robot
 
-_reader: Final = DaemonExecutor(1, "recordings", lower_priority)
+_reader: Final = ThreadPoolExecutor(1, "recordings", lower_priority)
 
 
 class Opening:

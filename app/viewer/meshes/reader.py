@@ -15,7 +15,7 @@ import sys
 import threading
 from collections import Counter, deque
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from weakref import WeakValueDictionary
@@ -25,7 +25,6 @@ import numpy as np
 from app.shared.clients import share_of
 from app.shared.memory.answers import AnswerMemory, MemoryFullError, MemoryShare, Reservation
 from app.shared.threads import lower_priority
-from app.shared.threads.executor import DaemonExecutor
 from app.viewer.meshes.archive import MOST_BYTES, MeshError, TooLargeError
 from app.viewer.meshes.fitting import checked
 from app.viewer.meshes.placing import MOST_DRAWN, Shapes
@@ -93,7 +92,7 @@ class MeshReader:
         self._most_of_one = share_of(MOST_WAITING, share)
         self._memory_of_one = max(MOST_BYTES, int(most * share))
         self._shares: WeakValueDictionary[str, MemoryShare] = WeakValueDictionary()
-        self._executor = DaemonExecutor(1, "meshes", lower_priority)
+        self._executor = ThreadPoolExecutor(1, "meshes", lower_priority)
         self._lock = threading.Lock()
         self._count: Counter[str] = Counter()  # requests of each client that are not done
         self._waiting: dict[str, deque[_Request]] = {}  # the client whose turn is next is first
@@ -125,7 +124,7 @@ class MeshReader:
     def close(self) -> None:
         """End what is being read; returns at once."""
         self._closed = True
-        self._executor.shutdown()
+        self._executor.shutdown(wait=False, cancel_futures=True)
         with self._lock:
             self._kill()
 

@@ -18,10 +18,9 @@ from fastapi import FastAPI
 from uvicorn.logging import DefaultFormatter
 from viser._threadpool_exceptions import print_awaited_callback_error
 
-from app.service.log import FIRST, LAST, LONGEST, LogFormatter, LogHandler, escaped, guard_log
+from app.service.log import FIRST, LAST, LOG_EVERY, LONGEST, LogFormatter, LogHandler, escaped, guard_log
 from app.service.server import server_config
 from app.shared.settings import Settings
-from app.shared.throttled_log import LOG_EVERY, ThrottledLog
 from app.viewer.viser_patches import log_what_viser_prints, messages
 
 FORGED = "\x1b[31m\x07red\r\nworker 12 ended\u2028and\u202eback\x9b1m\ud800"
@@ -226,16 +225,10 @@ def test_kinds_are_counted_for_a_minute_each(log):
     assert log.lines == ["a 1", "another place", "a 3 (1 more times since the last)", "a 4"]
 
 
-def test_lines_that_are_counted_elsewhere_and_kinds_of_their_own_pass(log):
-    async def noted() -> None:
-        some = ThrottledLog(logging.getLogger("some"))
-        for kind in ("a", "a", "b"):
-            some.note(kind, kind)
-
-    asyncio.run(noted())
+def test_kinds_of_their_own_pass(log):
     for name in ("x", "y", "x"):
         logging.getLogger("some").warning("file %s", name, extra={"kind": name})
-    assert log.lines == ["a", "b", "file x", "file y"]
+    assert log.lines == ["file x", "file y"]
 
 
 def test_arguments_that_do_not_fit_are_no_way_around_it(log, capfd):

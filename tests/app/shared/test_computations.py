@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import threading
-import time
 from concurrent.futures import CancelledError, ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 from live_server import wait_for
 
 from app.shared.computations import ComputationCache, TooManyPendingError
-from app.shared.threads import lower_priority
-from app.shared.threads.executor import DaemonExecutor
 
 
 @pytest.fixture
@@ -192,43 +186,3 @@ def test_closing_cancels_what_is_computed_and_what_waits():
     with pytest.raises(CancelledError):
         running.result(20)
     executor.shutdown()
-
-
-# The executor for computations that cannot be cancelled
-
-
-def test_a_daemon_executor_runs_calls_hands_on_errors_and_starts_no_more_threads_than_it_may():
-    started = []
-    executor = DaemonExecutor(2, "test", lambda: started.append(threading.current_thread().name))
-    futures = [executor.submit(pow, 2, exp=k) for k in range(10)]
-    assert [future.result(20) for future in futures] == [2**k for k in range(10)]
-    with pytest.raises(ZeroDivisionError):
-        executor.submit(lambda: 1 / 0).result(20)
-    assert set(started) <= {"test-1", "test-2"}
-    executor.shutdown()
-    wait_for(lambda: not any(thread.name.startswith("test-") for thread in threading.enumerate()))
-
-
-def test_shutting_a_daemon_executor_down_cancels_what_has_not_begun_and_does_not_wait():
-    held = Held()
-    computation = type("Computation", (), {"check": lambda self: None})()
-    executor = DaemonExecutor(1, "test", lower_priority)
-    running = executor.submit(held, computation)
-    waiting = executor.submit(held, computation)
-    wait_for(lambda: held.calls == 1)
-    begun = time.monotonic()
-    executor.shutdown()
-    assert time.monotonic() - begun < 5.0
-    assert waiting.cancelled()
-    held.released.set()
-    assert running.result(20) == "result"
-
-
-def test_a_process_ends_in_the_middle_of_a_computation_of_a_daemon_executor():
-    code = (
-        "import time\n"
-        "from app.shared.threads.executor import DaemonExecutor\n"
-        "DaemonExecutor(1, 'test', lambda: None).submit(time.sleep, 600)\n"
-    )
-    root = Path(__file__).parents[3]
-    assert subprocess.run([sys.executable, "-c", code], cwd=root, timeout=60, check=False).returncode == 0
