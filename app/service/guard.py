@@ -1,16 +1,19 @@
-"""Connections of one process: how many there may be, how long they may wait, and what the log says about it.
+"""Connections of the service: how many there may be, how long they may wait, and what the log says about it.
 
 uvicorn accepts any number of connections and waits without end for their requests and for clients that read
-nothing. The protocols in :mod:`app.service.http_protocol` and :mod:`app.service.websocket_protocol` report here,
-and are asked once a second whether they have waited too long.
+nothing. :mod:`app.service.http_protocol` reports each connection here. From then on it is looked at once a second,
+also when it has become a websocket: what the system has not yet taken of an answer waits in our memory, and must
+shrink in time.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import socket
 from collections import Counter
-from typing import Protocol
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from app.service.log import KIND
 from app.shared.clients import Proxies, network_of, share_of
@@ -20,18 +23,19 @@ from app.shared.settings import Settings
 logger = logging.getLogger("kinboard.connections")
 
 SPARE_FILES = 16  # left for robot files, kernels and accepting connections to refuse them
-TICK = 1.0  # seconds between two checks of the connections
+TICK = 1.0  # seconds between two looks at the connections
 
 
-class Watched(Protocol):
-    """A connection that is asked whether it has waited too long."""
-
-    def check(self, now: float) -> None:
-        """Close the connection if its client has not sent, or not read, for too long."""
+@dataclass
+class _Open:
+    host: str
+    check: Callable[[float], None]
+    since: float  # when its client last took something of what waits for it
+    waiting: int = 0  # bytes
 
 
 class Guard:
-    """Counts connections, refuses those beyond the limits, and checks them regularly.
+    """Counts connections, refuses those beyond the limits, and looks at them regularly.
 
     Args:
         settings: the limits.
@@ -46,7 +50,7 @@ class Guard:
         self._files = files
         self._proxies = Proxies(settings.trusted_proxies)
         self._clients: Counter[str] = Counter()
-        self._watched: set[Watched] = set()
+        self._open: dict[asyncio.Transport, _Open] = {}
         self._timer: asyncio.TimerHandle | None = None
         if files is not None and files - SPARE_FILES < settings.max_connections:
             logger.warning(
@@ -55,6 +59,26 @@ class Guard:
                 files,
                 settings.max_connections,
             )
+
+    def accept(self, transport: asyncio.Transport, check: Callable[[float], None]) -> str | None:
+        """Count a new connection, or say why it must be refused.
+
+        Args:
+            transport: of the connection.
+            check: called regularly with the time of the event loop.
+        """
+        connection: socket.socket = transport.get_extra_info("socket")
+        host = (transport.get_extra_info("peername") or ("unknown",))[0]
+        if reason := self.refusal(host, connection.fileno()):
+            return reason
+        # Otherwise the body of a small answer waits for the client to acknowledge its head: 40 ms.
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._open[transport] = _Open(host, check, asyncio.get_running_loop().time())
+        self._clients[network_of(host)] += 1
+        CONNECTIONS.inc()
+        if self._timer is None:
+            self._schedule()
+        return None
 
     def refusal(self, host: str, file: int) -> str | None:
         """Why a new connection is not accepted; None if it is.
@@ -67,7 +91,7 @@ class Guard:
         if self._files is not None and file >= self._files - SPARE_FILES:
             why = "too many open files"
             line = f"only {self._files} files may be open (ulimit -n); new connections are refused"
-        elif len(self._watched) >= self._most:
+        elif len(self._open) >= self._most:
             why = "full"
             line = f"{self._most} connections are open (KINBOARD_MAX_CONNECTIONS); new ones are refused"
         elif self._clients[client] >= self._most_of_one and host not in self._proxies:
@@ -81,60 +105,42 @@ class Guard:
         self.note(why, line)
         return line.partition(";")[0]
 
-    def add(self, connection: Watched, host: str) -> None:
-        """Count a connection and check it from now on."""
-        self._watched.add(connection)
-        self._clients[network_of(host)] += 1
-        CONNECTIONS.inc()
-        if self._timer is None:
-            self._schedule()
+    def forget(self, transport: asyncio.Transport) -> None:
+        """A connection is closed; nothing happens if it was refused."""
+        if (known := self._open.pop(transport, None)) is not None:
+            client = network_of(known.host)
+            self._clients[client] -= 1
+            if self._clients[client] <= 0:
+                del self._clients[client]
+            CONNECTIONS.dec()
 
-    def remove(self, connection: Watched, host: str) -> None:
-        """Forget a connection that is closed."""
-        self._watched.discard(connection)
-        client = network_of(host)
-        self._clients[client] -= 1
-        if self._clients[client] <= 0:
-            del self._clients[client]
-        CONNECTIONS.dec()
-
-    def note(self, why: str, line: str, error: Exception | None = None) -> None:
+    def note(self, why: str, line: str) -> None:
         """Count a refusal and log it."""
         REFUSED.labels(why).inc()
-        logger.warning("%s", line, exc_info=error, extra={KIND: why})
+        logger.warning("%s", line, extra={KIND: why})
 
     def _schedule(self) -> None:
-        tick = min(TICK, 0.25 * self.receive_timeout, 0.25 * self.send_timeout)
-        self._timer = asyncio.get_running_loop().call_later(tick, self._check)
+        tick = min(TICK, self.receive_timeout / 4, self.send_timeout / 16)
+        self._timer = asyncio.get_running_loop().call_later(tick, self._look)
 
-    def _check(self) -> None:
+    def _look(self) -> None:
         now = asyncio.get_running_loop().time()
-        for connection in tuple(self._watched):
-            connection.check(now)
-        if self._watched:
+        for transport, known in tuple(self._open.items()):
+            waiting = transport.get_write_buffer_size()
+            if not waiting or waiting < known.waiting:
+                known.since = now
+            known.waiting = waiting
+            if now - known.since > self.send_timeout:
+                self.note(
+                    "unread",
+                    f"{known.host} read nothing of what it was sent for {self.send_timeout:g} s "
+                    "(KINBOARD_SEND_TIMEOUT); the connection is closed",
+                )
+                transport.abort()
+            elif not waiting and transport.is_closing():  # it was a websocket
+                self.forget(transport)
+            else:
+                known.check(now)
+        self._timer = None
+        if self._open:
             self._schedule()
-        else:
-            self._timer = None
-
-
-class Outflow:
-    """Whether a client still takes what it is sent.
-
-    What the system has not yet taken of an answer waits in our memory. It must shrink within `seconds`.
-    """
-
-    def __init__(self, transport: asyncio.Transport, seconds: float) -> None:
-        self._transport = transport
-        self._seconds = seconds
-        self._waiting = 0
-        self._since: float | None = None
-        self.flowed = False  # set when the transport asks for more
-
-    def stuck(self, now: float) -> bool:
-        """Whether nothing has flowed for too long."""
-        waiting = self._transport.get_write_buffer_size()
-        if not waiting or waiting < self._waiting or self.flowed or self._since is None:
-            self._since = now
-        self._waiting = waiting
-        self.flowed = False
-        return now - self._since > self._seconds

@@ -119,6 +119,8 @@ def guard_log(clock: Callable[[], float] = time.monotonic) -> LogHandler:
     """
     handler = LogHandler(clock)
     logging.getLogger().handlers[:] = [handler]
+    # It warns of each piece that is written to a client who has just left.
+    logging.getLogger("asyncio").setLevel(logging.ERROR)
     warnings.showwarning = _show_warning
     threading.excepthook = _log_thread_error
     sys.unraisablehook = _log_unraisable

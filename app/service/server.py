@@ -41,6 +41,8 @@ QUEUE = 2048  # connections that may wait to be accepted
 ACCEPTED = 4
 STOP_TIMEOUT = 3.0  # s for the end of the service itself, after requests have ended
 PING_INTERVAL = 20.0  # seconds between two pings of a websocket
+# For an answer to one, in times of `send_timeout`: it may wait behind a large scene on a slow line.
+PING_PATIENCE = 3.0
 
 
 def server_config(app: FastAPI, settings: Settings, files: int | None = None) -> GuardedConfig:
@@ -65,8 +67,7 @@ def server_config(app: FastAPI, settings: Settings, files: int | None = None) ->
         ws_per_message_deflate=False,
         ws_max_size=MAX_MESSAGE + 1024,
         ws_ping_interval=min(PING_INTERVAL, settings.send_timeout / 3),
-        # A ping behind a large scene on a slow line has more time: see `WebSocketProtocol`.
-        ws_ping_timeout=settings.send_timeout - min(PING_INTERVAL, settings.send_timeout / 3),
+        ws_ping_timeout=PING_PATIENCE * settings.send_timeout,
         timeout_graceful_shutdown=max(1, round(settings.drain)),
         proxy_headers=bool(settings.trusted_proxies),
         forwarded_allow_ips=list(settings.trusted_proxies),
@@ -77,12 +78,9 @@ def server_config(app: FastAPI, settings: Settings, files: int | None = None) ->
 
 def protocols() -> tuple[Any, Any]:
     """What speaks HTTP and websockets: ours, or uvicorn's own where it lacks what ours are made of."""
-    if not uvicorn_names.HTTP.is_there:
+    if not uvicorn_names.PROTOCOLS.is_there:
         return "auto", "auto"
     from app.service.http_protocol import HttpProtocol
-
-    if not uvicorn_names.WEBSOCKET.is_there:
-        return HttpProtocol, "auto"
     from app.service.websocket_protocol import WebSocketProtocol
 
     return HttpProtocol, WebSocketProtocol

@@ -5,20 +5,14 @@ Messages pass between both by function calls in one event loop; there is no seco
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Protocol
 
 from app.shared.security import Rights
 
-SILENCE = "kinboard.silence"  # what a websocket's scope has `Connection.silence` as, in its state
-DELAY = "kinboard.delay"  # and there: a function, the seconds from the last ping to its answer, None before one
-LINE = "kinboard.line"  # and there: a `Line`
-
-
-def never_silent() -> float:
-    """The silence of a connection of which nothing is known."""
-    return 0.0
+# In the state of a websocket's scope: a function, the seconds from the last ping to its answer, None before one.
+DELAY = "kinboard.delay"
 
 
 class ConnectionEnded(Exception):  # noqa: N818 - not an error
@@ -30,25 +24,12 @@ class ConnectionEnded(Exception):  # noqa: N818 - not an error
         self.reason = reason
 
 
-class Line(Protocol):
-    """What a websocket can do without a task of the event loop, besides ASGI; only the loop's thread calls it."""
-
-    sent: int  # bytes of messages that `send_now` has sent
-
-    def hear(self, take: Callable[[bytes], bool]) -> None:
-        """Give `take` the binary messages that come while the application waits for one; see `Connection.hear`."""
-
-    def send_now(self, data: bytes) -> bool:
-        """Send a binary message; False, and nothing is sent, if the line is full or has ended."""
-
-
 class Connection(Protocol):
     """One visitor's connection. Messages of the visitor have been inspected."""
 
     subprotocol: str | None
     rights: Rights
     client: str  # as `app.shared.clients` names it
-    silence: Callable[[], float]  # for how many seconds nothing has come, not even an answer to a ping
     room_token: str  # of a classroom, as the browser's cookie has it; not verified; empty: none
 
     async def receive(self) -> bytes:
@@ -56,16 +37,6 @@ class Connection(Protocol):
 
     async def send(self, data: bytes) -> None:
         """Send a message; returns when the connection takes the next one. Raises `ConnectionEnded`."""
-
-    def hear(self, take: Callable[[bytes], bool]) -> None:
-        """Have messages that come while `receive` waits go to `take` first, at once and without an inspection.
-
-        What it returns True for is handled. It must be quick, and refuse all but messages that it has read wholly.
-        Some messages never get there, such as those that come in a burst: `receive` returns them.
-        """
-
-    def send_now(self, data: bytes) -> bool:
-        """Send a message if that needs no wait; False: nothing was sent, and `send` may wait or raise."""
 
 
 class PageConnection(Protocol):

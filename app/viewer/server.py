@@ -22,7 +22,6 @@ from app.shared.connection import (
     FileRefused,
     PageConnection,
     SentFile,
-    never_silent,
 )
 from app.shared.maps import Maps
 from app.shared.security import Rights
@@ -199,12 +198,7 @@ class ViewerServer:
             rights,
             self._connections.clients.get(client.client_id, ""),
         )
-        silence = self._connections.silences.get(client.client_id, never_silent)
-        page = (
-            VisitorPage(*arguments)
-            if ticket is None
-            else ClassroomPage(*arguments, ticket=ticket, silence=silence)
-        )
+        page = VisitorPage(*arguments) if ticket is None else ClassroomPage(*arguments, ticket=ticket)
         with self._lock:
             if client.client_id not in self._connections.rights:
                 return  # the visitor has left: nobody would end the page

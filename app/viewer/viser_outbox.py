@@ -102,8 +102,6 @@ class Outbox(AsyncMessageBuffer):
         self._asked: Callable[[], None] | None = None  # while it is held: what to call at the end
         self._waiter: asyncio.Future[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
-        self._send_now: Callable[[bytes], bool] = _never
-        self._refused: bytes | None = None  # packed, but not sent
 
     # Any thread
 
@@ -164,22 +162,7 @@ class Outbox(AsyncMessageBuffer):
             self._timer = None
         if self._waiter is None or self._waiter.done():
             return
-        try:
-            if not self.done and self._all_sent():
-                return
-        except Exception as error:  # noqa: BLE001 - raised where the connection is served
-            self._waiter.set_exception(error)
-        else:
-            self._waiter.set_result(None)
-
-    def _all_sent(self) -> bool:
-        """Send what is pushed without a wait; False: a part must wait for the connection."""
-        while window := self._take():
-            data = self._packer.pack(window)
-            if not self._send_now(data):
-                self._refused = data
-                return False
-        return True
+        self._waiter.set_result(None)
 
     def _send_soon(self) -> None:
         if self.done:
@@ -188,17 +171,10 @@ class Outbox(AsyncMessageBuffer):
             self._timer = self._waker.loop.call_later(self.window_duration_sec, self._send)
 
     async def send_to(self, connection: Connection) -> None:
-        """Send what is pushed, until the buffer is done or the connection ends; raises `ConnectionEnded`.
-
-        It sleeps while the connection takes everything at once.
-        """
-        self._send_now = connection.send_now
+        """Send what is pushed, until the buffer is done or the connection ends; raises `ConnectionEnded`."""
         try:
             while not self.done:
-                if self._refused is not None:
-                    data, self._refused = self._refused, None
-                    await connection.send(data)
-                elif window := self._take():
+                if window := self._take():
                     await connection.send(self._packer.pack(window))
                 else:
                     self._waiter = self._waker.loop.create_future()
@@ -247,10 +223,6 @@ class Packer:
         ]
         _infra._append_aligned_buffers(parts, binary, 16 + len(packed))
         return b"".join(parts)
-
-
-def _never(_: bytes) -> bool:
-    return False
 
 
 def _encodable(value: Any) -> Any:

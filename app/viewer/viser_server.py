@@ -60,7 +60,6 @@ class PortlessServer(infra.WebsockServer):
         self.rights: dict[int, Rights] = {}  # of connected visitors, by client id
         self.clients: dict[int, str] = {}  # their names in limits per client, by client id
         self.room_tokens: dict[int, str] = {}  # of classrooms, not verified, by client id
-        self.silences: dict[int, Callable[[], float]] = {}  # `Connection.silence`, by client id
         self.visitors: dict[int, viser.ClientHandle] = {}  # viser's own, by client id
         self._open = 0  # connections
         self.waker, self._packer = LoopWaker(loop), Packer()
@@ -110,9 +109,7 @@ class PortlessServer(infra.WebsockServer):
         client = infra.WebsockClientConnection(number, _infra._ClientHandleState(buffer, self._loop))
         self._client_state_from_id[number] = client._state
         self.rights[number], self.clients[number] = connection.rights, connection.client
-        self.room_tokens[number], self.silences[number] = connection.room_token, connection.silence
-        if connection.rights.allow_message("TransformControlsUpdateMessage"):
-            connection.hear(functools.partial(self._drag, number))
+        self.room_tokens[number] = connection.room_token
         flows: list[asyncio.Task[Any]] = []
         try:
             await _call(self._client_connect_cb, client)
@@ -135,7 +132,6 @@ class PortlessServer(infra.WebsockServer):
             self.rights.pop(number, None)
             self.clients.pop(number, None)
             self.room_tokens.pop(number, None)
-            self.silences.pop(number, None)
             self._broadcast_buffer.generator_cursors.pop(number, None)
             await _call(self._client_disconnect_cb, client)
 
@@ -164,7 +160,7 @@ class PortlessServer(infra.WebsockServer):
             await asyncio.sleep(0)  # others come between the messages of a burst
 
     def _drag(self, number: infra.ClientId, data: bytes) -> bool:
-        """Whether a message, which nobody need have inspected, was an event of a drag, and has been handled."""
+        """Whether a message was an event of a drag, and has been handled."""
         visitor = self.visitors.get(number)
         try:
             return visitor is not None and drag_gizmo(visitor, data)

@@ -63,49 +63,28 @@ def _watched_act(self: Worker) -> float | None:
 
 def _watched_channel(self: ChannelConnection, visitor: WebSocket) -> None:
     _connect_channel(self, visitor)
-    _count_messages(self, visitor)
+    _count_messages(visitor)
 
 
-def _count_messages(self: ChannelConnection | VisitorConnection, visitor: WebSocket) -> Callable[[], None]:
-    """Note how many messages of a connection have been handled; returns what counts one more."""
+def _count_messages(visitor: WebSocket) -> None:
+    """Note how many messages of a connection have been handled."""
     receive, received = visitor.receive, 0
     port = visitor.client.port if visitor.client else 0
 
-    def count() -> None:
-        nonlocal received
-        received += 1
-
     async def watched() -> Message:
+        nonlocal received
         _handled[port] = received  # it asks for the next one
         event = await receive()
         if event["type"] == "websocket.receive":
-            count()
+            received += 1
         return event
 
     visitor.receive = watched  # type: ignore[method-assign]
 
-    def count_now() -> None:
-        count()
-        _handled[port] = received
-
-    return count_now
-
 
 def _watched_connect(self: VisitorConnection, visitor: WebSocket) -> None:
     _connect(self, visitor)
-    count = _count_messages(self, visitor)
-    hear = self.hear
-
-    def watched_hear(take: Callable[[bytes], bool]) -> None:
-        def counted(data: bytes) -> bool:
-            taken = take(data)
-            if taken:
-                count()
-            return taken
-
-        hear(counted)
-
-    self.hear = watched_hear  # type: ignore[method-assign]
+    _count_messages(visitor)
 
 
 Worker.post, Worker._act_once = _watched_post, _watched_act  # type: ignore[method-assign]

@@ -16,7 +16,6 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.shared.clients import client_of
-from app.shared.connection import LINE, Line
 from app.shared.metrics import REQUEST_SECONDS, REQUESTS
 
 logger = logging.getLogger("kinboard.access")
@@ -71,8 +70,6 @@ class Observe:
             failed = False
         finally:
             status = status or (500 if failed else CLIENT_LEFT)
-            line: Line | None = scope.get("state", {}).get(LINE)
-            sent += 0 if line is None else line.sent
             self._record(scope, path, status, sent, time.perf_counter() - began)
 
     def _record(self, scope: Scope, path: str, status: int, sent: int, seconds: float) -> None:

@@ -8,8 +8,8 @@ it have a second websocket, their channel (:mod:`app.viewer.session.channel.chan
 Messages of visitors are inspected first (:mod:`app.service.web.inspection`); a visitor who sends invalid ones is
 disconnected without affecting others. A slow visitor must not fill our memory: sending waits until the socket
 takes more, so the backlog stays in viser's bounded buffer, with back pressure by TCP. A visitor who reads nothing
-for a minute (``KINBOARD_SEND_TIMEOUT``) is disconnected by :mod:`app.service.websocket_protocol`, which limits the
-rate of messages too.
+for a minute (``KINBOARD_SEND_TIMEOUT``) is disconnected by :mod:`app.service.guard`;
+:mod:`app.service.websocket_protocol` limits the rate of messages.
 """
 
 from __future__ import annotations
@@ -37,14 +37,10 @@ from app.service.web.negotiation import accepts_gzip, is_current
 from app.service.web.short_page import short_page
 from app.shared.clients import client_of
 from app.shared.connection import (
-    LINE,
-    SILENCE,
     ConnectionEnded,
     FileRefused,
-    Line,
     SentFile,
     Viewer,
-    never_silent,
 )
 from app.shared.metrics import DROPPED, STREAMED, VISITORS
 from app.shared.security import CHANNEL, UPLOAD, VIEWER_POLICY, origin_allowed
@@ -294,10 +290,8 @@ class VisitorConnection(_SocketConnection):
         super().__init__(visitor)
         self.subprotocol: str | None = next(iter(visitor.scope.get("subprotocols", ())), None)
         self.client = client_of(visitor.scope)
-        self.silence: Callable[[], float] = visitor.scope.get("state", {}).get(SILENCE, never_silent)
         self.room_token: str = visitor.cookies.get(ROOM_COOKIE, "")
         self._streamed = STREAMED.labels("viewer")
-        self._line: Line | None = visitor.scope.get("state", {}).get(LINE)
 
     async def receive(self) -> bytes:
         """The visitor's next message that is passed on; raises `ConnectionEnded`."""
@@ -315,18 +309,6 @@ class VisitorConnection(_SocketConnection):
         """Send a message of the viewer; raises `ConnectionEnded`."""
         await self._send("bytes", data)
         self._streamed.inc(len(data))
-
-    def hear(self, take: Callable[[bytes], bool]) -> None:
-        """Have messages that come while `receive` waits go to `take` first, without an inspection."""
-        if self._line is not None:
-            self._line.hear(take)
-
-    def send_now(self, data: bytes) -> bool:
-        """Send a message of the viewer if that needs no wait; False, and nothing is sent, otherwise."""
-        if self._line is None or not self.is_open or not self._line.send_now(data):
-            return False
-        self._streamed.inc(len(data))
-        return True
 
 
 async def _turn_away(visitor: WebSocket, why: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from typing import Any
 
 from app.classroom.views import Role, Ticket
@@ -15,11 +15,10 @@ from app.viewer.session.persistence import SAVE_AFTER
 
 
 class ClassroomPage(MemberPage):
-    """The page of a teacher or a student, with the tab of that role; `silence` as in `Attendance`."""
+    """The page of a teacher or a student, with the tab of that role."""
 
-    def __init__(self, *arguments: Any, ticket: Ticket, silence: Callable[[], float], **options: Any) -> None:
+    def __init__(self, *arguments: Any, ticket: Ticket, **options: Any) -> None:
         super().__init__(*arguments, ticket=ticket, **options)
-        self._silence = silence
         self.offered = (*self.offered, Teacher if ticket.role is Role.TEACHER else Student)
         self._member: Member | None = None
 
@@ -32,9 +31,7 @@ class ClassroomPage(MemberPage):
             return
         # Not while the page is built: a database that does not answer would hold up the pages of everybody.
         news = ("news", Member.key, NEWS)
-        self.attendance = self._hub.attend(
-            self._ticket, lambda: self.post(news), lambda: min(self._silence(), self.channel.silence())
-        )
+        self.attendance = self._hub.attend(self._ticket, lambda: self.post(news), self.channel.silence)
 
     def _build(self) -> None:
         super()._build()

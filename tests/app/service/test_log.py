@@ -7,6 +7,7 @@ import gc
 import io
 import logging
 import re
+import socket
 import sys
 import threading
 import warnings
@@ -48,6 +49,7 @@ class Log:
 def log(monkeypatch) -> Iterator[Log]:
     root, made = logging.getLogger(), Log()
     monkeypatch.setattr(root, "handlers", [])
+    monkeypatch.setattr(logging.getLogger("asyncio"), "level", logging.NOTSET)
     for owner, name in ((warnings, "showwarning"), (threading, "excepthook"), (sys, "unraisablehook")):
         monkeypatch.setattr(owner, name, getattr(owner, name))
     with warnings.catch_warnings():
@@ -62,6 +64,22 @@ def mismatch(text: str) -> None:
     sent = {"type": "ViewerCameraMessage", "wxyz": (1, 0, 0, 0), "position": text, "image_height": 1}
     sent |= {"image_width": 1, "fov": 1.0, "near": 0.1, "far": 9.0, "look_at": text, "up_direction": (0, 0, 1)}
     messages.Message.deserialize(msgspec.msgpack.encode(sent))
+
+
+def test_a_client_who_leaves_while_it_is_sent_to_writes_no_line(log):
+    ends = socket.socketpair()
+
+    async def send() -> None:
+        transport, _ = await asyncio.get_running_loop().create_connection(asyncio.Protocol, sock=ends[0])
+        ends[1].close()
+        for _ in range(20):  # in one round of the event loop
+            transport.write(bytes(1000))
+        transport.abort()
+
+    asyncio.run(send())
+    assert not log.lines
+    logging.getLogger("asyncio").error("an error of its own")
+    assert len(log.lines) == 1
 
 
 def test_what_viser_warns_of_is_one_clean_line_a_minute(log):
@@ -138,7 +156,7 @@ def test_a_long_traceback_is_cut_in_its_middle(log):
 def test_loggers_of_all_libraries_go_through_it(log, name):
     server_config(FastAPI(), Settings())  # uvicorn would give its loggers handlers of their own
     for k in range(50):
-        logging.getLogger(name).warning("refused %s %d", FORGED, k)
+        logging.getLogger(name).error("refused %s %d", FORGED, k)
     assert len(log.lines) == 1
     assert log.clean()
     assert not any(

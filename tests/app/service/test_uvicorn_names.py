@@ -1,9 +1,8 @@
-"""uvicorn's undocumented names: without one, uvicorn's own protocols serve, and several processes are one."""
+"""uvicorn's undocumented names: without one, uvicorn's own protocols serve."""
 
 from __future__ import annotations
 
 import logging
-from typing import Any
 
 import httpx2
 import pytest
@@ -12,30 +11,29 @@ from live_server import serve
 from private_names import asked_again, leave_out, take_away
 from websockets.sync.client import connect
 
-from app.service import uvicorn_names
 from app.service.http_protocol import HttpProtocol
 from app.service.server import protocols
+from app.service.uvicorn_names import PROTOCOLS
 from app.service.websocket_protocol import WebSocketProtocol
 
 
 def test_the_installed_version_has_all_names() -> None:
-    assert [use.missing() for use in uvicorn_names.ALL] == [[]] * len(uvicorn_names.ALL)
+    assert PROTOCOLS.missing() == []
     assert protocols() == (HttpProtocol, WebSocketProtocol)
 
 
-@pytest.mark.parametrize("name", [name for use in uvicorn_names.ALL for name in use.names])
+@pytest.mark.parametrize("name", PROTOCOLS.names)
 def test_without_a_name_uvicorn_s_own_protocol_is_taken(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, name: str
 ) -> None:
-    (use,) = (use for use in uvicorn_names.ALL if name in use.names)
     take_away(monkeypatch, name)
-    asked_again(monkeypatch, use)
+    asked_again(monkeypatch, PROTOCOLS)
     with caplog.at_level(logging.WARNING, "kinboard.libraries"):
         found = [protocols() for _ in range(2)]
-    assert found == 2 * [("auto", "auto") if use is uvicorn_names.HTTP else (HttpProtocol, "auto")]
+    assert found == 2 * [("auto", "auto")]
     (line,) = caplog.messages
     assert name in line
-    assert line.endswith(use.without)
+    assert line.endswith(PROTOCOLS.without)
 
 
 @pytest.fixture
@@ -55,12 +53,12 @@ def app() -> FastAPI:
     return app
 
 
-@pytest.mark.parametrize("lacking", [(), (uvicorn_names.WEBSOCKET,), uvicorn_names.ALL])
+@pytest.mark.parametrize("lacking", [False, True])
 def test_requests_and_websockets_are_served_all_the_same(
-    monkeypatch: pytest.MonkeyPatch, app: FastAPI, lacking: tuple[Any, ...]
+    monkeypatch: pytest.MonkeyPatch, app: FastAPI, lacking: bool
 ) -> None:
-    for use in lacking:
-        leave_out(monkeypatch, use)
+    if lacking:
+        leave_out(monkeypatch, PROTOCOLS)
     with serve(app) as port:
         assert httpx2.get(f"http://127.0.0.1:{port}/double?number=21").json() == 42
         with connect(f"ws://127.0.0.1:{port}/echo") as websocket:

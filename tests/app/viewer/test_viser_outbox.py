@@ -35,15 +35,6 @@ class Line:
         self.open = asyncio.Event()
         self.open.set()
         self.broken = False
-        self.quick = False  # whether it takes messages at once
-        self.at_once = 0  # how many it has taken so
-
-    def send_now(self, data: bytes) -> bool:
-        if not self.quick or self.broken or not self.open.is_set():
-            return False
-        self.frames.append(data)
-        self.at_once += 1
-        return True
 
     async def send(self, data: bytes) -> None:
         await self.open.wait()
@@ -100,13 +91,12 @@ class Sending:
             time.sleep(0.005)
 
 
-@pytest.fixture(params=["waits", "takes at once"])
-def sending(request: pytest.FixtureRequest) -> Iterator[Sending]:
+@pytest.fixture
+def sending() -> Iterator[Sending]:
     loop = asyncio.new_event_loop()
     thread = threading.Thread(target=loop.run_forever)
     thread.start()
     made = Sending(loop)
-    made.line.quick = request.param == "takes at once"
     yield made
     made.box.set_done()
     made.line.broken = False
@@ -219,29 +209,6 @@ def test_a_hold_that_an_error_ends_still_sends(sending: Sending) -> None:
     with pytest.raises(ValueError, match="step"):
         step()
     sending.wait([["/a"]])
-
-
-def test_what_a_line_takes_at_once_wakes_no_task_and_keeps_its_order(sending: Sending) -> None:
-    sending.line.quick = True
-
-    def push(k: int) -> None:
-        with sending.box.hold():
-            sending.box.push(turn(f"/{k}"))
-            sending.box.flush()
-
-    push(0)
-    sending.wait([["/0"]])
-    waiter = sending.on_loop(lambda: sending.box._waiter)
-    push(1)
-    sending.wait([["/0"], ["/1"]])
-    assert sending.line.at_once == 2
-    assert sending.on_loop(lambda: sending.box._waiter) is waiter, "the sender has slept on"
-    sending.on_loop(sending.line.open.clear)
-    for k in (2, 3, 4):
-        push(k)
-        sending.on_loop(lambda: None)
-    sending.on_loop(sending.line.open.set)
-    sending.wait([["/0"], ["/1"], ["/2"], ["/3", "/4"]])
 
 
 def made(uuid: str) -> messages.GuiHtmlMessage:

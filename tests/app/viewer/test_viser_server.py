@@ -19,7 +19,7 @@ from viser import _messages as messages
 from viser import infra
 from viser.infra import _infra
 
-from app.shared.connection import ConnectionEnded, never_silent
+from app.shared.connection import ConnectionEnded
 from app.shared.security import Rights
 from app.viewer.viser_patches import drag_gizmo, keep_private
 from app.viewer.viser_server import PROTOCOL, PortlessServer, start_viser
@@ -56,25 +56,12 @@ class Visit:
         self.rights = rights
         self.client = "10.0.0.1"
         self.room_token = ""
-        self.silence = never_silent
         self.sent = 0
         self._messages = list(messages)
         self._stays = stays
-        self.take: Callable[[bytes], bool] | None = None
-        self.at_once = 0  # messages that were handled without `receive`
-
-    def hear(self, take: Callable[[bytes], bool]) -> None:
-        self.take = take
-
-    def send_now(self, data: bytes) -> bool:
-        self.sent += 1
-        return True
 
     async def receive(self) -> bytes:
         await asyncio.sleep(0.02)  # so that what the last message has caused is there
-        while self._messages and self.take is not None and self.take(msgspec.msgpack.encode(self._messages[0])):
-            self._messages.pop(0)
-            self.at_once += 1
         if self._messages:
             return msgspec.msgpack.encode(self._messages.pop(0))
         if self._stays:
@@ -330,7 +317,6 @@ def test_a_drag_has_the_same_effect_as_viser_s_own_way(server, serve, fast):
 
     visits.append(Visit(CAMERA | {"type": "ViewerCameraMessage"}))
     assert serve(visits[0]) == (1001, "left")
-    assert visits[0].at_once == (2 if fast else 0)
     assert seen == [
         ("update", True, 0, [1.0, 2.5, 3.0]),
         [0.0, 1.0, 0.0, 0.0],
@@ -350,12 +336,6 @@ def test_a_drag_with_more_fields_or_more_bytes_than_any_is_left_to_viser():
     nobody: Any = object()
     for more in ({"depth": [[[]]]}, {"name": 2000 * "x"}):
         assert not drag_gizmo(nobody, msgspec.msgpack.encode(drag("", **more)))
-
-
-def test_drags_of_a_visitor_who_may_only_look_are_not_heard(serve):
-    looking = Visit(rights=Rights.LOOK)
-    assert serve(looking) == (1001, "left")
-    assert looking.take is None
 
 
 def test_a_callback_of_a_private_gizmo_that_waits_is_an_error_with_its_name(server, serve, caplog):
