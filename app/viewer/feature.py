@@ -26,6 +26,7 @@ from app.viewer.frames import Frames
 from app.viewer.meshes.bodies import Bodies
 from app.viewer.meshes.reader import ClientMeshes
 from app.viewer.own_arm import OwnArm
+from app.viewer.panel.fence import Fence
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
 from kin import Contact, IKResult, InputError, Obstacle, Robot, Task
@@ -45,6 +46,7 @@ class Stage(Protocol):
     frames: Frames  # the workpieces, and the frame in which poses are shown
     activity: Activity  # what is open, and what is withheld
     door: Door  # the line to a program, if there is one
+    fence: Fence  # shows which values have crossed on the way
     may_save: bool  # whether the visitor may save in a folder of the service
 
     @property

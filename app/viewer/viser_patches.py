@@ -187,19 +187,20 @@ def show_text(label: viser.LabelHandle, text: str) -> None:
         state.api._queue_scene_message(messages.SceneNodeUpdateMessage(state.name, {"text": text}))
 
 
-def hear_marks(client: viser.ClientHandle, act: Callable[[int], None]) -> None:
+def hear_marks(client: viser.ClientHandle, act: Callable[[int], Coroutine[Any, Any, None]]) -> None:
     """Call `act` in the event loop with the numbers that a page puts between the changes of viser's controls.
+
+    Later messages of viser's connection are heard when it has returned.
 
     A mark is an answer to nobody's question about the browser's storage, which viser ignores.
     """
     if not viser_names.MARKS.is_there:
-        act(10**_DIGITS)  # beyond all messages: none is waited for
         return
 
-    def hear(_: int, message: messages.LocalStorageGetItemResponseMessage) -> None:
+    async def hear(_: int, message: messages.LocalStorageGetItemResponseMessage) -> None:
         text = message.value or ""
         if message.request_uuid == MARK and len(text) <= _DIGITS and text.isascii() and text.isdecimal():
-            act(int(text))
+            await act(int(text))
 
     client._websock_connection.register_handler(messages.LocalStorageGetItemResponseMessage, hear)
 

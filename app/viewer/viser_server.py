@@ -173,7 +173,8 @@ class PortlessServer(infra.WebsockServer):
     ) -> None:
         """At once: as a task of its own, as in viser, a drag would wait for more rounds of the event loop.
 
-        No handler waits for a later message: callbacks that may wait run in threads, or post to the inbox.
+        No handler waits for a later message of this connection: callbacks that may wait run in threads, or post to
+        the inbox.
         """
         try:
             await handler._handle_incoming_message(number, message)

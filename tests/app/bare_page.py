@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import asyncio
 import math
+import threading
 import time
 from collections.abc import Hashable, Iterator
 from contextlib import contextmanager
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import viser
@@ -21,6 +22,7 @@ import kin
 from app.shared.store import Store
 from app.viewer.arm import Arm
 from app.viewer.feature import Feature
+from app.viewer.panel.fence import Fence
 from kin.transforms import Array, pose_from_position_wxyz
 from kin.units import DEFAULT_UNITS
 
@@ -54,7 +56,12 @@ class BarePage:
     """
 
     def __init__(self, server: viser.ViserServer, robot: kin.Robot) -> None:
-        self.client = SimpleNamespace(gui=server.gui, scene=server.scene, camera=_camera(), client_id=0)
+        storage = SimpleNamespace(get_item=lambda *_, **__: None)
+        self.client = SimpleNamespace(
+            gui=server.gui, scene=server.scene, camera=_camera(), client_id=0, local_storage=storage
+        )
+        self._answered = threading.Event()
+        self.fence = Fence(cast(Any, self.client), self._answered.set)
         self.store, self.units, self.dark = STORE, DEFAULT_UNITS, False
         self.frame, self.reading = 1 / 30, 0.05
         self.own: Any = None
@@ -75,6 +82,16 @@ class BarePage:
 
     def post(self, key: Hashable, value: object = None) -> None:
         self.events.append((key, value))
+
+    def answer(self) -> None:
+        """The browser says what it has heard, as long as there is something to be said."""
+        while True:
+            self.fence.ask()
+            if self.fence.last == self.fence.asked:
+                return
+            assert self._answered.wait(10.0)
+            self._answered.clear()
+            self.fence.passed()
 
     def move_to(self, q: Array, notice: Any = None, at_once: bool = False) -> None:
         self.now = Arm(self.now.robot, np.array(q), np.array(q), task=self.now.task)

@@ -6,6 +6,7 @@ import contextlib
 import json
 import time
 import weakref
+from collections import deque
 from collections.abc import Callable, Hashable
 from http.client import HTTPConnection
 from pathlib import Path
@@ -103,9 +104,9 @@ IN_ORDER = frozenset(json.loads(_SCRIPT.split("IN_ORDER = new Set(", 1)[1].split
 
 
 class Wire:
-    """A websocket."""
+    """A websocket; `delay` is how long (s) a message is on its way, in either direction."""
 
-    def __init__(self, url: str, protocols: list[str], options: Any) -> None:
+    def __init__(self, url: str, protocols: list[str], options: Any, delay: float = 0.0) -> None:
         self._socket = connect(
             url,
             subprotocols=protocols,  # type: ignore[arg-type]
@@ -119,9 +120,27 @@ class Wire:
             self.port = self._socket.local_address[1]
         self.sent = 0  # messages
         self.ended = False
+        self._delay = delay
+        self._leaving: deque[tuple[float, bytes | str]] = deque()  # and when they arrive
+        self._coming: deque[tuple[float, bytes | str]] = deque()
 
     def receive(self, timeout: float) -> bytes | str | None:
         """The next message; None: there is none within this time. Raises `ConnectionClosed`."""
+        if not self._delay:
+            return self._receive(timeout)
+        end = time.monotonic() + timeout
+        while True:
+            while self._leaving and self._leaving[0][0] <= time.monotonic():
+                self._socket.send(self._leaving.popleft()[1])
+            while (data := self._receive(0.0)) is not None:
+                self._coming.append((time.monotonic() + self._delay, data))
+            if self._coming and self._coming[0][0] <= time.monotonic():
+                return self._coming.popleft()[1]
+            if time.monotonic() >= end:
+                return None
+            time.sleep(0.002)
+
+    def _receive(self, timeout: float) -> bytes | str | None:
         try:
             return self._socket.recv(timeout=timeout)
         except TimeoutError:
@@ -131,7 +150,10 @@ class Wire:
             raise
 
     def send(self, data: bytes | str) -> None:
-        self._socket.send(data)
+        if self._delay:
+            self._leaving.append((time.monotonic() + self._delay, data))
+        else:
+            self._socket.send(data)
         self.sent += 1
 
     def ping(self) -> None:
@@ -145,12 +167,12 @@ class Wire:
     @property
     def is_handled(self) -> bool:
         """Whether a service in this process has handled all that was sent; of another process: True."""
-        return self.ended or _handled.get(self.port, self.sent) >= self.sent
+        return self.ended or (_handled.get(self.port, self.sent) >= self.sent and not self._coming)
 
     def wait_until_handled(self) -> None:
         """For a moment: what comes over the other connection must not pass what was sent over this one."""
         end = time.monotonic() + WORK
-        while not self.is_handled and time.monotonic() < end:
+        while not (self._delay or self.is_handled) and time.monotonic() < end:
             time.sleep(0.0005)
 
 
@@ -161,7 +183,7 @@ class FakeBrowser:
     channel, which it opens when it can. `memory` is the content of the page's storage, which it sends first,
     `kept` what the service has stored there, and `left_off` what it has stored for the next page of the browser.
     `camera` is where the service has moved it; unlike a real
-    page, this one reports it only with `look`.
+    page, this one reports it only with `look`. `delays` are those of its two wires: viser's, and of the channel.
     """
 
     def __init__(
@@ -171,6 +193,7 @@ class FakeBrowser:
         height: int = 720,
         path: str = "/viewer",
         memory: str | None = None,
+        delays: tuple[float, float] = (0.0, 0.0),
         **options: Any,
     ) -> None:
         self.memory = memory
@@ -179,7 +202,8 @@ class FakeBrowser:
         self.left_off: list[str] = []
         self._url = where if isinstance(where, str) else f"ws://127.0.0.1:{where}{path}"
         self._options = options
-        self.viser = Wire(self._url, [f"viser-v{viser.__version__}"], options)
+        self._delays = delays
+        self.viser = Wire(self._url, [f"viser-v{viser.__version__}"], options, delays[0])
         self.channel: Wire | None = None
         self.name = ""  # of the channel
         self._number = self._noted = 0  # of the last message and the last notice
@@ -325,7 +349,7 @@ class FakeBrowser:
     def open_channel(self) -> None:
         """Open the channel of the present session, or open it anew."""
         before, protocols = self.channel, [CHANNEL_PROTOCOL, self.name]
-        self.channel = Wire(f"{self._url.rstrip('/')}/channel", protocols, self._options)
+        self.channel = Wire(f"{self._url.rstrip('/')}/channel", protocols, self._options, self._delays[1])
         if before is not None:
             before.close()
             before.ended = True
@@ -341,13 +365,13 @@ class FakeBrowser:
                 self.say("hello", _value(self.memory))
 
     def _read_channel(self) -> bool:
-        """Take what has come by the channel; returns whether it was more than a beat."""
+        """Take what has come by the channel; returns whether it was more than a beat, such as its end."""
         wire = self.channel
         try:
             text = None if wire is None else wire.receive(0.0)
         except ConnectionClosed:
             self.channel = None
-            return False
+            return True
         if wire is None or text is None:
             return False
         heard = json.loads(text)
@@ -506,14 +530,13 @@ class FakeBrowser:
                 return True
             left = max(0.0, end - time.monotonic())
             data = self.viser.receive(left if self.channel is None else min(left, LOOK))
-            if data is not None:
-                self._apply_frame(data)
+            if data is not None and self._apply_frame(data):
                 return True
             if left == 0.0:
                 return False
 
-    def _apply_frame(self, data: bytes | str) -> None:
-        """Show a frame of viser's messages."""
+    def _apply_frame(self, data: bytes | str) -> bool:
+        """Show a frame of viser's messages; returns whether it had more than a question."""
         assert isinstance(data, bytes)
         size, packed = (int.from_bytes(data[i : i + 8], "little") for i in (0, 8))
         inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
@@ -525,6 +548,7 @@ class FakeBrowser:
                     if isinstance(value, dict) and "__binary_index" in value:
                         values[key] = np.frombuffer(arrays[value["__binary_index"]], value["dtype"])
             self._apply(message)
+        return any(message["type"] != "LocalStorageGetItemRequestMessage" for message in decoded["messages"])
 
     def _apply(self, m: dict[str, Any]) -> None:
         self.log.append(m)

@@ -66,7 +66,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
         self.settings: S = cast(S, self.settings_of.fresh(stage.now.robot))
-        self._panel = PanelView(stage.client.gui, self.post)
+        self._panel = PanelView(stage.client.gui, self.post, stage.fence)
         self._scene = SceneView(stage.client.scene, self.key, self.post)
         self.shown_at = 0.0
         self._write = self._stale = False

@@ -8,7 +8,6 @@ in that unit.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,11 +19,10 @@ import viser
 
 from app.viewer.declared.fields import Settings, Spec
 from app.viewer.declared.press import Press
+from app.viewer.panel.fence import Crossings, Fence
 from app.viewer.viser_patches import sent_value, show_content, show_value
 from kin import InputError, Robot
 from kin.units import Units
-
-CROSSING = 1.0  # s that a message to the page and one from it may take
 
 Event = tuple[Hashable, ...]
 Post = Callable[[Hashable, object], None]
@@ -126,8 +124,6 @@ class _Mounted:
     Attributes:
         serial: in its events.
         known: the value of the setting that it shows.
-        written: when it was last made to show a value (`time.monotonic`'s).
-        crossed: whether it may show that value in place of the one that it has sent.
     """
 
     handle: Any
@@ -136,8 +132,6 @@ class _Mounted:
     serial: int
     spec: Spec | None = None
     known: Any = None
-    written: float = -math.inf
-    crossed: bool = False
     props: dict[str, Any] = field(default_factory=dict)
     args: tuple[Any, ...] = ()
     events: Mapping[str, Event] = field(default_factory=dict)
@@ -150,8 +144,11 @@ class PanelView:
     Events are posted as ``("at", path, serial)`` with a value, and ``("do", event, serial, press)``.
     """
 
-    def __init__(self, gui: viser.GuiApi, post: Post, top: viser.GuiFolderHandle | None = None) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, post: Post, fence: Fence, top: viser.GuiFolderHandle | None = None
+    ) -> None:
         self._gui, self._post = gui, post
+        self._crossings = Crossings[int](fence, self._show_again)  # by serial
         self._top = gui.add_folder(None) if top is None else top  # each one more makes labels narrower
         self._mounted: dict[Hashable, _Mounted] = {}
         self._live: dict[int, _Mounted] = {}
@@ -167,8 +164,8 @@ class PanelView:
     def received(self, settings: S, path: str, serial: int, posted: object) -> S | None:
         """The settings with what a control has sent; None: it has been replaced since, by one in other units.
 
-        Its own value is not sent back to it, so that a slider follows its finger; unless the control was made to
-        show another one meanwhile, as by a motion: both messages may have crossed.
+        Its own value is not sent back to it, so that a slider follows its finger; but where it has crossed
+        another one, as of a motion (:mod:`app.viewer.panel.fence`).
 
         Raises:
             InputError: for an invalid value. What was typed stays; a list, which cannot show what is not in it,
@@ -183,7 +180,8 @@ class PanelView:
             if one.spec.kind == "dropdown":
                 one.known = object()
             raise
-        one.known, one.crossed = found, time.monotonic() - one.written < CROSSING
+        one.known = found
+        self._crossings.heard(serial)
         return settings.with_value(path, found)
 
     def is_live(self, serial: object) -> bool:
@@ -328,11 +326,15 @@ class PanelView:
         elif isinstance(node, Control):
             one.spec = spec = self._spec(node)
             value = self._value(node)
-            if self._write or value != one.known or one.crossed:
-                if not one.crossed:
-                    one.written = time.monotonic()
-                show_value(one.handle, spec.shown(value, self._robot, self._units), again=one.crossed)
-                one.known, one.crossed = value, False
+            if self._write or value != one.known:
+                show_value(one.handle, spec.shown(value, self._robot, self._units))
+                self._crossings.sent([one.serial])
+                one.known = value
+
+    def _show_again(self, serial: int) -> None:
+        one = self._live.get(serial)
+        if one is not None and one.spec is not None:
+            show_value(one.handle, one.spec.shown(one.known, self._robot, self._units), again=True)
 
     def _listen(self, handle: Any, path: str, serial: int) -> None:
         async def changed(event: Any) -> None:

@@ -14,8 +14,8 @@ import numpy as np
 import viser
 
 from app.viewer.panel import Post, assign, listen, listen_click, update_html
-from app.viewer.panel.crossing import Crossings
 from app.viewer.panel.entry import read_value
+from app.viewer.panel.fence import Crossings, Fence
 from app.viewer.panel.fields import field, fields_html, limit_marks, shown
 from app.viewer.panel.status import Notice
 from app.viewer.views.templates import render
@@ -92,12 +92,13 @@ class JointSliders:
         locked: Sequence[bool],
         units: Units,
         post: Post,
+        fence: Fence,
         before: JointSliders | None = None,
     ) -> None:
         self.robot = robot
         self._units = units
         self._held = 0  # index of the folder whose slider was moved last
-        self._crossings = Crossings[tuple[int, int]]()  # by folder and joint
+        self._crossings = Crossings[tuple[int, int]](fence, self._show_again)  # by folder and joint
         if before is not None:  # what was sent to a slider is on its way to the one that replaces it
             self._crossings.sent(itertools.product(range(len(folders)), range(robot.n)))
         # Of each field: index and kind of its joint, and the unit of what is typed there.
@@ -183,11 +184,9 @@ class JointSliders:
         for html in self._pendants:
             update_html(html, pendant_html(self.robot, q, self._units))
 
-    def show_again(self, q: Array) -> None:
-        """Show what has crossed a visitor's change of the same slider, now that the visitor rests."""
-        for place, i in self._crossings.pop():
-            slider = self._sliders[place][i]
-            show_value(slider, self._value(slider, i, q), again=True)
+    def _show_again(self, key: tuple[int, int]) -> None:
+        slider = self._sliders[key[0]][key[1]]
+        show_value(slider, slider.value, again=True)
 
     def _value(self, slider: viser.GuiSliderHandle[float], i: int, q: Array) -> float:
         """What the slider of joint i shows at a configuration ``(n,)``."""
@@ -218,6 +217,7 @@ class JointSliders:
 
     def remove(self) -> None:
         """Remove the sliders from the panel."""
+        self._crossings.clear()
         for control in (
             *self._locks,
             *self._others,

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import viser
 
 from app.viewer.panel import Post, assign, listen, update_html
-from app.viewer.panel.crossing import Crossings
 from app.viewer.panel.entry import read_value
+from app.viewer.panel.fence import Crossings, Fence
 from app.viewer.panel.fields import field, fields_html, limit_marks
 from app.viewer.views.templates import render
 from app.viewer.viser_patches import show_value
@@ -107,7 +107,7 @@ class RedundancySliders:
     Posts ``("redundancy", robot id, name, units)`` with the slider's value in screen units.
     """
 
-    def __init__(self, gui: viser.GuiApi, folder: viser.GuiFolderHandle, post: Post) -> None:
+    def __init__(self, gui: viser.GuiApi, folder: viser.GuiFolderHandle, post: Post, fence: Fence) -> None:
         self._gui = gui
         self._folder = folder
         self._post = post
@@ -116,7 +116,7 @@ class RedundancySliders:
         self._tracks: dict[str, viser.GuiHtmlHandle] = {}
         self._html: viser.GuiHtmlHandle | None = None
         self._uuids: dict[str, str] = {}
-        self._crossings = Crossings[str]()
+        self._crossings = Crossings[str](fence, self._show_again)
         self._unit = DEFAULT_UNITS.angles
 
     def show(
@@ -162,10 +162,8 @@ class RedundancySliders:
         self._crossings.heard(name)
         return self._unit.read(float(value))
 
-    def show_again(self) -> None:
-        """Show what has crossed a visitor's change of the same slider, now that the visitor rests."""
-        for name in self._crossings.pop():
-            show_value(self._sliders[name], self._sliders[name].value, again=True)
+    def _show_again(self, name: str) -> None:
+        show_value(self._sliders[name], self._sliders[name].value, again=True)
 
     def remove(self) -> None:
         """Remove the sliders from the panel."""

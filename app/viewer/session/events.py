@@ -17,6 +17,7 @@ from typing import Final
 SHORT_PAUSE: Final = 1.0
 LONG_PAUSE: Final = 20.0
 LINK: Final = "link"  # event of a stored state that waits for kernels
+FENCE: Final = "fence"  # event of an answer of the page
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,7 @@ RULES: Final[dict[str, Rule]] = {
     "redo": Rule(step=False, message=True, act=True, replaces=True),
     "travel": Rule(step=False, message=True, act=True, replaces=True),
     LINK: Rule(step=False, replaces=True),
+    FENCE: Rule(step=False),
 }
 MESSAGES: Final = tuple(name for name, rule in RULES.items() if rule.message)
 

@@ -12,6 +12,7 @@ from app.viewer.arm import Arm
 from app.viewer.declared.panel import Buttons, Control, Html, Node, PanelView
 from app.viewer.labels import TEXT_SIZES
 from app.viewer.panel import Post
+from app.viewer.panel.fence import Fence
 from app.viewer.panel.layout import Panel
 from app.viewer.scene.viewpoints import SIDES
 from app.viewer.session.choices import PageChoices, ViewState
@@ -25,6 +26,7 @@ class FormsPage(Protocol):
 
     units: Units
     view: ViewState
+    fence: Fence
 
     @property
     def now(self) -> Arm:
@@ -53,7 +55,7 @@ class Forms:
         self._views: dict[str, PanelView] = {}
         containers = {"view": panel.view, "target": panel.target, "obstacles": panel.avoid}
         for place, container in containers.items():
-            self._views[place] = PanelView(gui, partial(self._forward, place), container)
+            self._views[place] = PanelView(gui, partial(self._forward, place), page.fence, container)
         self.show()
 
     def show(self) -> None:

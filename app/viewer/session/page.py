@@ -20,6 +20,7 @@ from app.classroom.results.keys import result_key
 from app.exports.snippets import Service
 from app.live import Door, reserved
 from app.shared.security import Rights
+from app.viewer import viser_names
 from app.viewer.activity.activity import Activity
 from app.viewer.feature import Feature
 from app.viewer.frames import Frames
@@ -29,6 +30,7 @@ from app.viewer.meshes.bodies import Bodies
 from app.viewer.obstacles.feature import ObstaclesFeature
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
+from app.viewer.panel.fence import Fence
 from app.viewer.panel.joints import JointSliders, lock_notice
 from app.viewer.panel.layout import LEARN, Panel
 from app.viewer.panel.status import READY, Notice, StatusLine
@@ -41,7 +43,7 @@ from app.viewer.session.channel.channel import Channel
 from app.viewer.session.channel.files import Files
 from app.viewer.session.choices import ViewState
 from app.viewer.session.controller import ArmController
-from app.viewer.session.events import LINK
+from app.viewer.session.events import FENCE, LINK
 from app.viewer.session.forms import Forms
 from app.viewer.session.lessons import LessonChoice
 from app.viewer.session.live import LiveInput
@@ -106,8 +108,9 @@ class VisitorPage(ShownArm, Worker):
         self.arm = ArmController(client, services.pace, self.post, self)
         self.view, self.units, self.system_dark = ViewState(), DEFAULT_UNITS, False
         self.client, self._pace = client, services.pace
-        self.channel = Channel(self.post, rights)
+        self.channel = Channel(self.post, rights, viser_names.MARKS.is_there)
         hear_marks(client, self.channel.mark)
+        self.fence = Fence(client, lambda: self.post(FENCE))
         client.gui.add_html(render("panel/channel", name=self.channel.name))
         self._welcome, self._looking, self.may_save = welcome, rights is Rights.LOOK, rights.save
         self.files = Files(self.post, lambda: self.features, self.meshes.memory, rights)
@@ -382,13 +385,13 @@ class VisitorPage(ShownArm, Worker):
             self.live.publish(self._result)
             self.client.flush()
             self.numbers.update()
-        if batch or (played and not self.arm.playing):
+        if not (self.arm.moving or self.arm.dragging or self.arm.playing):
+            self.fence.ask()
+        if any(key != FENCE for key, _ in batch) or (played and not self.arm.playing):
             self._persistence.postpone(now)
         elif not (self.arm.moving or self.arm.dragging) and self._persistence.rested(now):
             self._save()
             self._show_hints()
-            self.sliders.show_again(self.arm.goal)
-            self.posture.show_again()
             self.arm.show_gizmo_again()
             self.place_scale()
 
@@ -505,7 +508,7 @@ class VisitorPage(ShownArm, Worker):
         arm = self.arm
         before = getattr(self, "sliders", None)
         return JointSliders(
-            self.client.gui, folders, arm.robot, arm.goal, arm.locks, self.units, self.post, before
+            self.client.gui, folders, arm.robot, arm.goal, arm.locks, self.units, self.post, self.fence, before
         )
 
 

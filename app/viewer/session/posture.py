@@ -29,7 +29,7 @@ class PosturePanel:
         self._post = post
         self._dragged: str | None = None
         self._asked = False  # an open question asks for the posture
-        self._sliders = RedundancySliders(stage.client.gui, folder, post)
+        self._sliders = RedundancySliders(stage.client.gui, folder, post, stage.fence)
         self._choice: BranchChoice
         self._result: tuple[tuple[object, ...], IKSolution] | None = None
 
@@ -54,10 +54,6 @@ class PosturePanel:
             self._choice.show(kin.branch_of(robot, self._stage.now.goal))
         self._sliders.show(parameters, robot, self._stage.units, self._dragged)
         self._dragged = None
-
-    def show_again(self) -> None:
-        """Show what has crossed a visitor's change of a slider, now that the visitor rests."""
-        self._sliders.show_again()
 
     def use_activity(self) -> None:
         """Something else is open or withheld."""

@@ -19,7 +19,7 @@ from app.viewer.session.actions.arm import ArmControls
 from app.viewer.session.actions.looks import LookControls
 from app.viewer.session.actions.typed import TypedInput
 from app.viewer.session.choices import PageChoices
-from app.viewer.session.events import MESSAGES, RULES, belongs_before, pause_within
+from app.viewer.session.events import FENCE, MESSAGES, RULES, belongs_before, pause_within
 from app.viewer.session.history import History, Step, same, without_results
 from app.viewer.session.live import LiveInput
 from app.viewer.session.parts import Page
@@ -47,6 +47,7 @@ class Actions:
             **LookControls(page).handlers,
             **live.handlers,
             "grab": self._on_grab,
+            FENCE: lambda _: page.fence.passed(),
             "feature": self._on_feature,
             "news": self._on_feature,
             "lesson": self._choose_lesson,

@@ -14,7 +14,7 @@ answers: so each side notices a line that is dead.
 
 A message whose order with viser's own controls matters, such as *Undo* after a slider was moved, is sent as
 ``[number, name, argument, true]``, and a mark with its number goes the way of these controls, in viser's
-connection. It takes effect when the mark has come, and what was sent after it waits for that.
+connection. It takes effect when the mark has come. What was sent later, by either connection, waits for both.
 """
 
 from __future__ import annotations
@@ -54,16 +54,18 @@ class Channel:
     Args:
         post: takes ``("message", name, number)`` with the argument of each message.
         rights: of the page.
+        marks: whether marks can be heard.
 
     Attributes:
         name: what a connection has to know.
     """
 
-    def __init__(self, post: Post, rights: Rights = Rights.FULL) -> None:
+    def __init__(self, post: Post, rights: Rights = Rights.FULL, marks: bool = True) -> None:
         self.name = secrets.token_urlsafe(16)
         self._post, self._rights = post, rights
         self._received = 0  # the last number
-        self._marked = 0  # the last mark
+        self._marked = 0 if marks else MAX_NUMBER  # the last mark
+        self._news = asyncio.Event()  # is set for a moment when a message has come, or the connection has ended
         self._waiting: deque[tuple[int, str, object, bool]] = deque()  # and whether it is marked
         self._heard_at = time.monotonic()
         self._lock = threading.Lock()
@@ -142,6 +144,7 @@ class Channel:
             with self._lock:
                 if self._line is line:
                     self._line = None
+            self._tell()
 
     async def _speak(self, line: _Line, connection: PageConnection) -> None:
         while not self._closed:
@@ -204,11 +207,22 @@ class Channel:
             self._waiting.append(message)
             self._go_on()
         self._received = number
+        self._tell()
 
-    def mark(self, number: int) -> None:
-        """What the page has sent by viser's connection before its message of this number has come."""
+    async def mark(self, number: int) -> None:
+        """What the page has sent by viser's connection before its message of this number has come.
+
+        Returns when the message has come too, or the channel has no connection: nothing that was sent later by
+        viser's connection must be heard before that.
+        """
         self._marked = max(self._marked, number)
         self._go_on()
+        while self._received < number and self._line is not None:
+            await self._news.wait()
+
+    def _tell(self) -> None:
+        self._news.set()
+        self._news.clear()
 
     def _go_on(self) -> None:
         while self._waiting and (not self._waiting[0][3] or self._waiting[0][0] <= self._marked):

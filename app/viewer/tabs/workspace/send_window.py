@@ -8,16 +8,15 @@ may be unconfirmed, fewer while the arm moves.
 
 from __future__ import annotations
 
-import contextlib
 import threading
 from collections.abc import Callable
 
 import viser
 
+from app.viewer.panel.fence import wait_for_page
+
 WINDOW = 1 << 18  # unconfirmed points
 WHILE_MOVING = 1 << 16
-ANSWER_WITHIN = 30.0  # s; a page in the background does not answer
-QUESTION = "kinboard-workspace"  # a key that is never set: any answer will do
 
 
 class SendWindow:
@@ -56,13 +55,7 @@ class SendWindow:
                 if mark == self._arrived:
                     self._asking = False
                     return
-            self._wait()
+            wait_for_page(self._client)
             with self._lock:
                 self._arrived = mark
             self._notify()
-
-    def _wait(self) -> None:
-        # A missing answer (page gone, asleep, or without storage) counts as one, or nothing would ever be sent
-        # again.
-        with contextlib.suppress(TimeoutError, RuntimeError):
-            self._client.local_storage.get_item(QUESTION, timeout=ANSWER_WITHIN)

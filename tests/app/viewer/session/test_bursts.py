@@ -23,7 +23,6 @@ import kin
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
-from app.viewer.panel.crossing import ON_ITS_WAY
 from app.viewer.panel.joints import label, lock_buttons
 from app.viewer.server import ViewerServer
 from app.viewer.session import persistence
@@ -137,10 +136,10 @@ def differences(tab: FakeBrowser, page: VisitorPage) -> list[str]:
     return [name for name, holds in checks.items() if not holds]
 
 
-def follow(server: tuple[ViewerServer, int], seed: int, bursts: int) -> None:
+def follow(server: tuple[ViewerServer, int], seed: int, bursts: int, delay: float = 0.0) -> None:
     viewer, port = server
     chance = random.Random(seed)
-    with FakeBrowser(port) as tab:
+    with FakeBrowser(port, delays=(delay, delay)) as tab:
         tab.settle()
         (page,) = viewer.pages.values()
         for k in range(bursts):
@@ -156,6 +155,40 @@ def follow(server: tuple[ViewerServer, int], seed: int, bursts: int) -> None:
 @pytest.mark.full
 def test_after_bursts_of_acts_the_page_shows_what_is(server: tuple[ViewerServer, int]) -> None:
     follow(server, 4, 3)
+
+
+@pytest.mark.full
+def test_so_it_does_over_a_slow_line(server: tuple[ViewerServer, int]) -> None:
+    follow(server, 5, 3, 0.3)
+
+
+@pytest.mark.slow
+def test_so_it_does_over_a_line_of_three_seconds(server: tuple[ViewerServer, int]) -> None:
+    follow(server, 6, 4, 3.0)
+
+
+@pytest.mark.parametrize(
+    "delays", [(0.0, 0.0), (0.1, 0.0), (0.0, 0.1)], ids=["at once", "viser late", "channel late"]
+)
+def test_undo_passes_no_slider_and_none_passes_it(
+    server: tuple[ViewerServer, int], delays: tuple[float, float]
+) -> None:
+    viewer, port = server
+    with FakeBrowser(port, delays=delays) as tab:
+        tab.settle()
+        (page,) = viewer.pages.values()
+        base = label(PIONEER, 0)
+        tab.set(base, 20.0)
+        tab.say("released")
+        tab.set(base, 40.0)
+        tab.say("undo")
+        tab.set(base, 60.0)
+        tab.settle()
+        for degrees in (60.0, 20.0, math.degrees(PIONEER.q_home[0])):
+            assert math.degrees(page.arm.goal[0]) == pytest.approx(degrees, abs=1e-3)
+            shows_what_is(tab, page, f"{degrees}")
+            tab.say("undo")
+            tab.settle()
 
 
 @pytest.mark.slow
@@ -180,23 +213,6 @@ def slider_after_home(tab: FakeBrowser, page: VisitorPage) -> None:
     tab.set(ELBOW, 50.0)
 
 
-def slider_after_a_repeat(tab: FakeBrowser, page: VisitorPage) -> None:
-    """What has crossed a change is sent again later, and this crosses the next change."""
-    persistence.SAVE_AFTER = ON_ITS_WAY + 0.1  # as long as `server` is there
-    repeated: list[float] = []
-    show_again = page.sliders.show_again
-
-    def show(q: np.ndarray) -> None:
-        show_again(q)
-        repeated.append(q[1])
-
-    page.sliders.show_again = show  # type: ignore[method-assign]
-    slider_after_home(tab, page)
-    while not np.isclose(repeated, math.radians(50)).any():
-        time.sleep(0.002)
-    tab.set(ELBOW, 20.0)
-
-
 def target_after_a_slider(tab: FakeBrowser, page: VisitorPage) -> None:
     tab.set(ELBOW, 75.0)
     unheard(page, 75.0)
@@ -206,9 +222,7 @@ def target_after_a_slider(tab: FakeBrowser, page: VisitorPage) -> None:
 
 
 @pytest.mark.full
-@pytest.mark.parametrize(
-    ("acts", "joint"), [(slider_after_home, 50), (slider_after_a_repeat, 20), (target_after_a_slider, None)]
-)
+@pytest.mark.parametrize(("acts", "joint"), [(slider_after_home, 50), (target_after_a_slider, None)])
 def test_what_crosses_an_earlier_answer_on_the_way_is_shown(
     server: tuple[ViewerServer, int], acts: Callable[[FakeBrowser, VisitorPage], None], joint: float | None
 ) -> None:

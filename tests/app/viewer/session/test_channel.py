@@ -301,11 +301,10 @@ def test_a_message_with_a_mark_and_all_after_it_wait_for_the_mark() -> None:
         line.say(4, "released", None, True)
         await rest()
         assert numbers(page) == [1]
-        page.channel.mark(2)
+        await page.channel.mark(2)
         assert numbers(page) == [1, 2, 3]
-        page.channel.mark(4)
-        page.channel.mark(4)
-        page.channel.mark(1)
+        for number in (4, 4, 1):
+            await page.channel.mark(number)
         assert numbers(page) == [1, 2, 3, 4]
 
     run(play)
@@ -318,13 +317,42 @@ def test_a_message_that_comes_after_its_mark_over_another_connection_counts_once
         await rest()
         line.cut()
         await page.end()
-        page.channel.mark(2)
+        await page.channel.mark(2)
         again = page.connect()
         for _ in range(2):
             again.say(1, "undo", None, True)
             again.say(2, "redo", None, True)
         await rest()
         assert numbers(page) == [1, 2]
+
+    run(play)
+
+
+def test_what_follows_a_mark_waits_for_its_message_as_long_as_there_is_a_connection() -> None:
+    async def play(page: Page) -> None:
+        line = page.connect()
+        await rest()
+        heard, lost = (asyncio.ensure_future(page.channel.mark(number)) for number in (2, 3))
+        line.say(1, "jog", None)
+        await rest()
+        assert not heard.done()
+        line.say(2, "undo", None, True)
+        await rest()
+        assert heard.done()
+        assert not lost.done()
+        line.cut()
+        await rest()
+        assert lost.done()
+
+    run(play)
+
+
+def test_where_marks_cannot_be_heard_none_is_awaited() -> None:
+    async def play(page: Page) -> None:
+        page.channel = Channel(lambda key, value: page.posted.append((key, value)), marks=False)
+        page.connect().say(1, "undo", None, True)
+        await rest()
+        assert numbers(page) == [1]
 
     run(play)
 
@@ -336,7 +364,7 @@ def test_a_page_that_never_sends_a_mark_fills_no_memory() -> None:
             line.say(number, "undo", None, True)
         end = await page.end()
         assert (end.code, numbers(page)) == (1008, [])
-        page.channel.mark(WAITING)
+        await page.channel.mark(WAITING)
         assert numbers(page) == list(range(1, WAITING + 1))
 
     run(play)
@@ -356,11 +384,16 @@ def test_a_page_that_never_sends_a_mark_fills_no_memory() -> None:
 )
 def test_of_the_answers_about_storage_only_marks_are_heard(answer: dict[str, Any]) -> None:
     heard: list[int] = []
-    handlers: list[Callable[[int, Any], None]] = []
+    handlers: list[Callable[[int, Any], Coroutine[Any, Any, None]]] = []
+
+    async def act(number: int) -> None:
+        heard.append(number)
+
     line = SimpleNamespace(register_handler=lambda kind, act: handlers.append(act))
-    hear_marks(cast(Any, SimpleNamespace(_websock_connection=line)), heard.append)
+    hear_marks(cast(Any, SimpleNamespace(_websock_connection=line)), act)
     (hear,) = handlers
-    hear(0, LocalStorageGetItemResponseMessage(**({"value": "7", "error": None, "request_uuid": MARK} | answer)))
+    fields = {"value": "7", "error": None, "request_uuid": MARK} | answer
+    asyncio.run(hear(0, LocalStorageGetItemResponseMessage(**fields)))
     assert heard == ([1] if answer.get("error") else [])
-    hear(0, LocalStorageGetItemResponseMessage("7", None, MARK))
+    asyncio.run(hear(0, LocalStorageGetItemResponseMessage("7", None, MARK)))
     assert heard[-1] == 7

@@ -21,6 +21,17 @@ def test_the_newest_value_of_a_key_wins_and_order_is_that_of_the_last_touch() ->
     assert not inbox.waits
 
 
+def test_a_message_separates_the_values_of_before_from_those_of_after_it() -> None:
+    inbox = Inbox()
+    undo = ("message", "undo", 1)
+    for key, value in [("slider", 1), ("slider", 2), (undo, None), ("slider", 3), ("slider", 4)]:
+        inbox.post(key, value)
+    assert inbox.take() == [("slider", 2), (undo, None), ("slider", 4)]
+    assert inbox.take() == []
+    inbox.post(undo, None)
+    assert inbox.waits
+
+
 def test_a_closed_inbox_gives_nothing_and_takes_nothing() -> None:
     inbox = Inbox()
     inbox.post("late", 1)
