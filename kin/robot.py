@@ -96,6 +96,8 @@ class Robot:
             moves nothing: an arm that is made from another may keep its motors.
         pendant: what a pendant shows of joints otherwise than their values, see `kin.to_pendant`. An entry that
             names no joint counts for nothing, for the same reason.
+        ros_joints: by the names of joints, what the published description for ROS calls them; the others have the
+            same name there.
 
     Raises:
         InputError: an unknown convention, unit or mounting, no moving joint, a row that follows what is no joint
@@ -122,6 +124,7 @@ class Robot:
     floor: float | None = None
     motors: tuple[Motor, ...] = ()
     pendant: tuple[Shown, ...] = ()
+    ros_joints: tuple[tuple[str, str], ...] = ()
 
     def __repr__(self) -> str:
         """Id, name and joints in one line; `kin.robot_to_toml` writes out the table."""
@@ -288,6 +291,12 @@ class Robot:
         Their limits are the *effective* ones, which keep the limits of the rows that follow them too.
         """
         return joints_of(self.rows)
+
+    @property
+    def ros_names(self) -> list[str]:
+        """The names of the joints for ROS."""
+        found = dict(self.ros_joints)
+        return [found.get(joint.name, joint.name) for joint in self.joints]
 
     @property
     def n(self) -> int:

@@ -25,7 +25,7 @@ _NANO = 1_000_000_000
 def trajectory_yaml(motion: Motion, rate: float) -> Generator[bytes]:
     """The message as YAML, with comments."""
     yield "".join(f"# {key}: {value}\n" for key, value in about(motion)).encode()
-    names = json.dumps([joint.name for joint in motion.robot.joints])
+    names = json.dumps(motion.robot.ros_names)
     yield f"header:\n  stamp: {{sec: 0, nanosec: 0}}\n  frame_id: world\njoint_names: {names}\npoints:\n".encode()
     for sample in motion.steps(rate):
         yield "".join(_yaml_point(*row) for row in _points(sample)).encode()
@@ -50,7 +50,7 @@ def trajectory_json(motion: Motion, rate: float) -> Generator[bytes]:
     head: dict[str, Any] = dict(about(motion))
     head["joint_trajectory"] = {
         "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": "world"},
-        "joint_names": [joint.name for joint in motion.robot.joints],
+        "joint_names": motion.robot.ros_names,
         "points": [],
     }
     text = json.dumps(head, ensure_ascii=False)
@@ -148,7 +148,7 @@ def mcap(motion: Motion, rate: float) -> Generator[bytes]:
     writer.add_metadata("motion", dict(about(motion)))
     program = json.dumps(program_to_dict(motion.program), ensure_ascii=False, indent=1).encode()
     writer.add_attachment(0, 0, "program.json", "application/json", program)
-    names = [joint.name for joint in motion.robot.joints]
+    names = motion.robot.ros_names
     rows = [f"{i + 1} {row.name}".strip() for i, row in enumerate(motion.robot.rows)]
     for sample in motion.steps(rate):
         frames = motion.robot.T_world_base @ link_frames(motion.robot, sample.q)

@@ -19,7 +19,7 @@ def with_joint_names(motion: Motion, names: Sequence[str], field: str) -> Motion
         raise InputError(field, list(names), f"{robot.n} different names, one for each of: {joints}")
     left = iter(names)
     rows = tuple(replace(row, name=next(left)) if row.kind != "fixed" else row for row in robot.rows)
-    return replace(motion, robot=replace(robot, rows=rows, motors=()))
+    return replace(motion, robot=replace(robot, rows=rows, motors=(), ros_joints=()))
 
 
 def about(motion: Motion) -> list[tuple[str, str]]:

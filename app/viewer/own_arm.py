@@ -27,7 +27,8 @@ MY_ARM = "My arm"
 NAME, ROW_NAME, SOURCE, DESCRIPTION, CAPSULES_SOURCE = 60, 40, 200, 400, 400  # characters
 SMALLEST, LARGEST = 1e-3, 1000.0  # m: reach of an arm that can be shown
 LONGEST = 10_000  # characters of the compact form; a link holds 12 000 in all
-OF_MAKER = ("maker", "payload", "mass")  # fields that an own arm has not: nobody has built or weighed it
+# Fields that an own arm has not: nobody has built, weighed or published it.
+OF_MAKER = ("maker", "payload", "mass", "ros_joints")
 _KINDS = {"revolute": "", "prismatic": "p", "fixed": "f"}
 _ROW = (
     *("theta", "d", "a", "alpha", "limits", "kind", "name", "velocity", "effort", "acceleration", "jerk"),

@@ -44,6 +44,7 @@ MAX_REACH = 1e5  # metres; targets may have coordinates up to 1e6 m
 _TOP = {
     *("id", "name", "source", "description", "convention", "units", "rows", "home", "base", "tool"),
     *("capsules", "capsules_source", "maker", "payload", "mass", "mounting", "floor", "motors", "pendant"),
+    "ros_joints",
 }
 _CAPSULE = {"row", "start", "end", "radius", "assumed"}
 _MOTOR = {
@@ -246,6 +247,7 @@ class Reader:
             floor=self.length_of("floor", data["floor"]) if "floor" in data else None,
             motors=self.motors(data, joints),
             pendant=self.pendant(data, joints),
+            ros_joints=self.ros_joints(data, joints),
         )
         if robot.reach + float(np.linalg.norm(robot.T_world_base[:3, 3])) > MAX_REACH:
             raise self.refuse(
@@ -325,6 +327,18 @@ class Reader:
             name = error.field.removeprefix("pendant of ")
             raise self.refuse(f"pendant.{name}", table.get(name), error.expected) from None
         return tuple(found)
+
+    def ros_joints(self, data: dict[str, Any], joints: Sequence[Joint]) -> tuple[tuple[str, str], ...]:
+        """What joints are called in the description for ROS."""
+        table = self.table(data, "ros_joints", "a name for each joint") if "ros_joints" in data else {}
+        names = [joint.name for joint in joints]
+        for joint in table:
+            if joint not in names:
+                raise self.refuse(f"ros_joints.{joint}", table[joint], "one of the joints " + ", ".join(names))
+        found = {joint: self.text(table, joint, None, "ros_joints.") for joint in table}
+        if len({found.get(name, name) for name in names}) < len(names):
+            raise self.refuse("ros_joints", table, "a different name for each joint")
+        return tuple(found.items())
 
     def sign(
         self, index: int, row: dict[str, Any], slides: dict[str, bool], table: dict[Any, Any]

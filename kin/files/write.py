@@ -143,6 +143,9 @@ class _Writer:
         data["home"] = {"q": [self.value(value, joint.kind == "prismatic") for joint, value in pairs]}
         if shown := [each for each in robot.pendant if self.is_known(robot, each)]:
             data["pendant"] = {each.joint: self.shown(robot, each) for each in shown}
+        names = {joint.name for joint in robot.joints}
+        if called := {joint: name for joint, name in robot.ros_joints if joint in names}:
+            data["ros_joints"] = called
         if robot.motors:
             data["motors"] = [self.motor(each) for each in robot.motors]
         if robot.capsules:

@@ -114,6 +114,15 @@ def test_joint_limits_are_the_published_ones_or_it_says_why_not(name):
     assert bool(list(differing_limits(name))) == ("other_limits" in PUBLISHED[name])
 
 
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_joints_have_the_names_of_the_published_description(name):
+    names = [joint["name"] for joint in PUBLISHED[name]["joints"] if joint["type"] != "fixed"]
+    if " " in names[0]:  # a textbook's
+        assert ROBOTS[name].ros_joints == ()
+    else:
+        assert ROBOTS[name].ros_names == names
+
+
 def test_every_makers_arm_is_checked_and_every_check_names_its_source():
     assert {name for name, robot in ROBOTS.items() if robot.maker} == set(PUBLISHED)
     assert len(LIBRARY) >= 25

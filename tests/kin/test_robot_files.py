@@ -494,3 +494,27 @@ def test_a_path_instead_of_the_text_of_a_robot_file_is_named(path):
 
 def test_a_folder_may_be_given_as_text(tmp_path):
     assert kin.load_robots(str(tmp_path)) == {}
+
+
+@pytest.mark.parametrize(
+    ("table", "field", "expected"),
+    [
+        ('{ tilt = "joint_2" }', "ros_joints.tilt", "one of the joints turn, slide"),
+        ('{ turn = "" }', "ros_joints.turn", "a text of 1 to 4000 characters"),
+        ('{ turn = "slide" }', "ros_joints", "a different name for each joint"),
+        ('"joint_1"', "ros_joints", "a name for each joint"),
+    ],
+)
+def test_names_for_ros_are_of_joints_and_different(table, field, expected):
+    with pytest.raises(RobotFileError, match=expected) as caught:
+        kin.parse_robot(f"ros_joints = {table}{GOOD}")
+    assert caught.value.field == field
+
+
+def test_names_for_ros_are_kept_and_one_may_be_missing():
+    robot = kin.parse_robot('ros_joints = { slide = "lift_joint" }' + GOOD)
+    assert robot.ros_names == ["turn", "lift_joint"]
+    assert kin.parse_robot(kin.robot_to_toml(robot)) == robot
+    fewer = replace(robot, rows=tuple(row for row in robot.rows if row.name != "slide"), home=robot.home[:1])
+    assert fewer.ros_names == ["turn"]
+    assert kin.parse_robot(kin.robot_to_toml(fewer)).ros_joints == ()

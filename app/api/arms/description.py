@@ -224,6 +224,12 @@ _SCHEMA: dict[str, Any] = {
             "additionalProperties": {"type": "object", "maxProperties": MAX_ROWS + 1},
             "description": "By joint, what its pendant shows: how many times joints count, and `offset`.",
         },
+        "ros_joints": {
+            "type": "object",
+            "maxProperties": MAX_ROWS,
+            "additionalProperties": _TEXT,
+            "description": "By joint, its name in the published description for ROS.",
+        },
         "base": {**_TRANSFORM, "description": "Constant transform before the first row."},
         "tool": {**_TRANSFORM, "description": "Constant transform after the last row."},
     },

@@ -38,7 +38,7 @@ def written(motion: kin.Motion, name: str) -> bytes:
 
 def check_trajectory(message: dict, motion: kin.Motion) -> None:
     times = motion.step_times(RATE)
-    assert message["joint_names"] == [joint.name for joint in motion.robot.joints]
+    assert message["joint_names"] == motion.robot.ros_names
     assert message["header"]["stamp"] == {"sec": 0, "nanosec": 0}
     points = message["points"]
     at = [point["time_from_start"] for point in points]
@@ -102,7 +102,7 @@ def test_a_recording_is_read_by_the_reader_of_mcap(motion: kin.Motion) -> None:
     for k, (at, state) in enumerate(found["/joint_states"]):
         assert at == round(times[k] * 1e9)
         assert state["timestamp"] == {"sec": at // 10**9, "nsec": at % 10**9}
-        assert [joint["name"] for joint in state["joints"]] == [joint.name for joint in motion.robot.joints]
+        assert [joint["name"] for joint in state["joints"]] == motion.robot.ros_names
         for name, row in (("position", q), ("velocity", qd), ("acceleration", qdd)):
             assert [joint[name] for joint in state["joints"]] == row[k].tolist()
     for k, (_, transforms) in enumerate(found["/tf"]):
