@@ -45,6 +45,18 @@ SHOWN = [
         "Z =   300.000  mm,\n  W =   180.000 deg, P =     0.000 deg, R =     0.000 deg\n};",
         *(None, (600, 100, 300), DOWN),
     ),
+    # A program of a press shop, near W P R's singularity (gratownik.ls), and one of a palletiser.
+    (
+        "P[1]{\n   GP1:\n\tUF : 7, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =   856.686  mm,\t"
+        "Y =   197.400  mm,\tZ =   172.511  mm,\n\tW =  -126.099 deg,\tP =    87.946 deg,\tR =   142.594 deg\n};",
+        *(None, (856.686, 197.4, 172.511), turned("xyz", -126.099, 87.946, 142.594)),
+    ),
+    (
+        "P[1]{\n   GP1:\n\tUF : 5, UT : 3,\t\tCONFIG : 'N U T, 0, 0, -1',\n\tX = -1833.942  mm,\t"
+        "Y =  1271.066  mm,\tZ = -1485.331  mm,\n"
+        "\tW =   179.925 deg,\tP =     -.131 deg,\tR =   -38.673 deg\n};",
+        *(None, (-1833.942, 1271.066, -1485.331), turned("xyz", 179.925, -0.131, -38.673)),
+    ),
     ("X 600 Y 100 Z 300 W 170 P 20 R -35", None, (600, 100, 300), turned("xyz", 170, 20, -35)),
     # uniVAL: VAL_DefineTrsf(10, −13.125, 115.10, 45.5, 25.3, −90.25).
     (
@@ -56,8 +68,30 @@ SHOWN = [
         "X 460.000 mm Y 0.000 mm Z 715.000 mm Rx 180.0000 deg. Ry -90.0000 deg. Rz 0.0000 deg.",
         *("yaskawa", (460, 0, 715), np.array([[0, 0, 1], [0, -1, 0], [1, 0, 0]])),
     ),
+    # A job of a true Motoman arm, quoted in RoboDK's post processor: both rows stand for a tool along the x axis.
+    ("0.001,0.006,-9.794,-170.32,90.00,-170.32", "yaskawa", (0.001, 0.006, -9.794), turned("y", 90)),
+    ("0.000,0.000,0.000,180.00,90.00,180.00", "yaskawa", (0, 0, 0), turned("y", 90)),
+    # What the controller of an A0509 answered (DoosanRobotics/doosan-robot2, issue 109).
+    (
+        "-390.9466857910156, -154.82888793945312, 113.21481323242188, 89.90401458740234, -89.98841857910156, "
+        "-179.06837463378906",
+        *("doosan", (-390.9466857910156, -154.82888793945312, 113.21481323242188)),
+        turned("ZYZ", 89.90401458740234, -89.98841857910156, -179.06837463378906),
+    ),
     ("posx(559, 34.5, 651.5, 0, 180, 0)", None, (559, 34.5, 651.5), np.diag([-1.0, 1.0, -1.0])),
     ("posx(559, 34.5, 651.5, 45, 170, -10)", None, (559, 34.5, 651.5), turned("ZYZ", 45, 170, -10)),
+    # Taught points of an RS005L (nguyen1024/rs005la).
+    (
+        "495.507904 -83.463379 192.623932 -35.992920 112.299080 -179.965958",
+        *("kawasaki", (495.507904, -83.463379, 192.623932), turned("ZYZ", -35.99292, 112.29908, -179.965958)),
+    ),
+    # Kawasaki programs of a tool for offline programming, beside the roll, pitch and yaw that it wrote them from.
+    ("2.2 141.71 431.71 -90 -45 90", "kawasaki", (2.2, 141.71, 431.71), turned("x", -45)),
+    (
+        "TRANS (118.75, 1191.11, 1093.61, 90, -135, -90)",
+        *(None, (118.75, 1191.11, 1093.61), turned("x", 135)),
+    ),
+    ("0 0 0 180 -135 -90", "kawasaki", (0, 0, 0), turned("xyz", 135, 0, 90)),
     ("TRANS(0, 500, 300, 90, 180, 0)", None, (0, 500, 300), turned("ZYZ", 90, 180, 0)),
     ("X 0 Y 500 Z 300 O 30 A 150 T -60", None, (0, 500, 300), turned("ZYZ", 30, 150, -60)),
     # rc8.tech-guild.com/000456.html, and 001939.html for the order of the turns.
@@ -84,8 +118,26 @@ def test_what_a_maker_shows_is_read(
 def test_the_arms_of_the_makers_are_where_their_pendants_say() -> None:
     ahead = np.radians([0, -90, 90, 0, 0, 0])
     assert kin.pose_to_text(kin.fk("kr6", ahead), "kuka") == "{X 525, Y 0, Z 890, A 0, B 90, C 0}"
+    # tool0 of ROS-Industrial's descriptions is the flange as the controller has it: rpy = "pi -pi/2 0" at zero.
+    for fanuc in ("lrmate200id", "crx10ia"):
+        T = kin.fk(fanuc, [0.0] * 6)
+        assert np.allclose(T[:3, :3], kin.pose_from_text("X 0 Y 0 Z 0 W 180 P -90 R 0")[:3, :3], atol=1e-12)
     shown = "p[-0.120113, -0.431763, 0.146073, -0.001221, 3.116277, 0.038892]"
     assert kin.pose_to_text(kin.fk("ur5", UR5_STARTS_AT), "ur") == shown
+
+
+def test_a_doosan_arm_is_where_its_manual_says() -> None:
+    """An M1013 (lengths 152.5, 620, 34.5, 559, 121 mm) at posj(0, 0, 90, 0, 90, 0)."""
+    quarter = math.pi / 2
+    rows = [
+        *((0.0, 0.1525, 0.0, -quarter), (-quarter, 0.0345, 0.62, 0.0), (quarter, 0.0, 0.0, quarter)),
+        *((0.0, 0.559, 0.0, -quarter), (0.0, 0.0, 0.0, quarter), (0.0, 0.121, 0.0, 0.0)),
+    ]
+    arm = kin.Robot.from_dh(rows)
+    shown = kin.pose_from_text("posx(559.0, 34.5, 651.5, 45.0, 180.0, 45.0)")
+    assert np.allclose(kin.fk(arm, np.radians([0, 0, 90, 0, 90, 0])), shown, atol=1e-9)
+    turned_base = kin.fk(arm, np.radians([30, 0, 90, 0, 90, 0]))
+    assert np.allclose(turned_base[:3, 2], [0, 0, -1], atol=1e-9)
 
 
 @pytest.mark.parametrize("key", FORMS)
