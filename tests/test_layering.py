@@ -51,14 +51,14 @@ RULES: dict[str, set[str]] = {
     "kin/poses": {"numpy", "kin.frames", "kin.poses", "kin.typed", *MODEL},
     "kin/way": {"numpy", "ompl", "kin.collision", "kin.ik", "kin.motion", "kin.way", *MODEL},
     # It looks the service up by name when it is called.
-    "kin/notebook": {"numpy", "kin.errors", "kin.motion", "kin.robot"},
+    "kin/notebook": {"numpy", "kin.collision", "kin.errors", "kin.motion", "kin.robot"},
     "kin/workspace": {"numpy", "kin.kernels", "kin.solvers", "kin.ik", "kin.workspace", *MODEL},
     "app": {"app", "kin"},
     "app/shared": {
         *("kin", "numpy", "app.shared", "pydantic", "pydantic_settings", "prometheus_client", "starlette"),
         *("typing_extensions", "distributed", "platformdirs", "msgspec"),
     },
-    "app/exports": {"kin", "mcap", "numpy", "scipy", "tqdm", "trimesh", "PIL", "app.exports", "app.shared"},
+    "app/exports": {"kin", "markupsafe", "mcap", "numpy", "scipy", "tqdm", "trimesh", "PIL", "app.exports", "app.shared"},
     "app/equations": {"kin", "numpy", "sympy", "app.equations", "app.shared.computations"},
     "app/exercises": {"kin", "numpy", "app.exercises"},
     "app/classroom/courses": {"kin", "app.exercises", "app.classroom.courses"},

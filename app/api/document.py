@@ -85,8 +85,8 @@ def _name_media_type(operation: dict[str, Any]) -> None:
 def _name_parts(schemas: dict[str, Any]) -> None:
     """Give `_PARTS` names.
 
-    The field `d` of a row comes last, and no field of a row's answer may be absent: openapi-python-client has a
-    variable `d` too, and reads fields that may be absent after all others.
+    The field `d` of a row comes last, after those that may be absent and so as if it might be absent too:
+    openapi-python-client has a variable `d`, and reads the fields that are required first.
     """
     properties = schemas["RobotDescription"]["properties"]
     for key, (name, text) in _PARTS.items():
@@ -95,4 +95,5 @@ def _name_parts(schemas: dict[str, Any]) -> None:
     for name in ("RowDescription", "RowAnswer"):
         row = dict(schemas[name]["properties"])
         row["d"] = row.pop("d")
-        schemas[name] = schemas[name] | {"properties": row}
+        required = [field for field in schemas[name].get("required", ()) if field != "d"]
+        schemas[name] = schemas[name] | {"properties": row} | ({"required": required} if required else {})

@@ -1,6 +1,6 @@
 """Obstacles: boxes, spheres, cylinders and tables around an arm.
 
-A kind of obstacle is a row of `KINDS`. Whoever checks, draws, asks for or stores obstacles reads it there.
+A kind of obstacle is a row of `KINDS`. What checks, draws, asks for or stores obstacles reads it there.
 """
 
 from __future__ import annotations

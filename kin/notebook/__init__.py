@@ -19,7 +19,7 @@ from kin.errors import KinematicsError
 from kin.robot import Robot
 
 if TYPE_CHECKING:
-    from kin.collision.obstacles import Obstacle
+    from kin.collision import Obstacle
     from kin.motion import Motion
 
 # The service's name in an installation, and in a checkout.

@@ -26,7 +26,7 @@ def test_roll_pitch_yaw_are_three_turns_about_fixed_axes(rpy):
     roll, pitch, yaw = rpy
     expected = turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)
     expected[:3, 3] = [1.0, 2.0, 3.0]
-    assert np.allclose(kin.pose_from_xyz_rpy([1, 2, 3], rpy), expected, atol=1e-15)
+    assert np.allclose(kin.pose_from_xyz_rpy([1, 2, 3], rpy), expected, atol=1e-14)
 
 
 def test_each_frame_has_its_pose():

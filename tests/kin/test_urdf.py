@@ -259,12 +259,12 @@ BOMB = '<!DOCTYPE robot [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><robot name="&
     ids=lambda value: value[:24],
 )
 def test_hostile_xml_is_refused_at_once(text, field):
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(RobotFileError) as caught:
         kin.load_urdf(text)
     assert caught.value.field == field
     assert len(str(caught.value)) < 400
-    assert time.perf_counter() - start < 5.0
+    assert time.process_time() - start < 5.0
 
 
 def test_files_that_cannot_be_read(tmp_path):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from math import isfinite
 from typing import Annotated, Literal
 
+from msgspec import UNSET, UnsetType
+
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.fk import Matrix
 from app.shared.solver_names import solver_names
@@ -54,10 +56,10 @@ class RowAnswer(Answer):
     """Translation along x in metres."""
     alpha: float
     """Rotation about x in radians."""
-    follows: Annotated[str | None, From(lambda row: row.follows or None)]
-    """Name of the joint that moves this row, which is none itself; null for any other row."""
-    ratio: Annotated[float | None, From(lambda row: row.ratio if row.follows else None)]
-    """By how many times that joint's value it moves, radians (metres) for each; null for any other row."""
+    follows: Annotated[str | UnsetType, From("follows", unless_empty=True)] = UNSET
+    """Name of the joint that moves this row, which is none itself; absent for any other row."""
+    ratio: Annotated[float | UnsetType, From(lambda row: row.ratio if row.follows else UNSET)] = UNSET
+    """By how many times that joint's value it moves, radians (metres) for each; absent for any other row."""
 
 
 class MotorAnswer(Answer):

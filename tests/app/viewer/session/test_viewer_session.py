@@ -365,7 +365,8 @@ def test_stopping_ends_sessions_and_connections() -> None:
             tab.settle()
     assert closed.value.rcvd is not None
     assert closed.value.rcvd.code == 1001
-    wait_for(lambda: not [t for t in set(threading.enumerate()) - before if not t.name.startswith("Thread-")])
+    others = ("Thread-", "visitors-")  # those of the connection, which end by themselves, and of all visitors
+    wait_for(lambda: not [t for t in set(threading.enumerate()) - before if not t.name.startswith(others)])
     assert server.visitors == 0
     server.stop()  # a second time is harmless
 
