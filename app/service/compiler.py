@@ -12,16 +12,17 @@ import asyncio
 import contextlib
 import logging
 import os
-import queue
 import subprocess
 import sys
 import threading
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from contextvars import ContextVar
+from functools import partial
 
 from app.api.problems import ProblemError
 from app.api.work import TooSlowError, current_deadline, stopping
 from app.shared.threads import NICENESS, lower_priority
+from app.shared.threads.executor import DaemonExecutor
 from kin.kernels.elsewhere import DONE
 
 STEP = 0.02  # s between two looks at the processes
@@ -57,16 +58,16 @@ class KernelCompiler:
         niceness: of the process.
 
     Attributes:
-        running: whether there are kernels to compile, or were a moment ago.
         child: the process; None: there is none.
     """
 
     def __init__(self, niceness: int = NICENESS) -> None:
-        self._niceness = niceness
+        # The process inherits the priority of the thread that starts it.
+        self._executor = DaemonExecutor(1, "kinboard-compiler", partial(lower_priority, niceness))
         self._lock = threading.Lock()
-        self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._answers: dict[str, Future[bool]] = {}  # to lines that wait or are being compiled
-        self.running = self._stopped = self._warned = False
+        self._idle: threading.Timer | None = None
+        self._stopped = self._warned = False
         self.child: subprocess.Popen[str] | None = None
 
     def submit(self, line: str) -> Future[bool]:
@@ -74,67 +75,51 @@ class KernelCompiler:
         with self._lock:
             if self._stopped:
                 raise CompilerStoppedError
-            if (answer := self._answers.get(line)) is None:
-                answer = self._answers[line] = Future()
-                self._lines.put(line)
-            if not self.running:
-                self.running = True
-                threading.Thread(target=self._run, name="kinboard-compiler", daemon=True).start()
-        return answer
+            if line not in self._answers:
+                self._answers[line] = self._executor.submit(self._ask, line)
+            return self._answers[line]
 
     def stop(self) -> None:
-        """End the process, whatever it compiles. Any thread may call."""
+        """End the process, whatever it compiles, and all waiting. Any thread may call."""
         with self._lock:
             self._stopped = True
-            answers, self._answers = self._answers, {}
-            if self.child is not None:
-                self.child.kill()
-        self._lines.put("")  # so that the thread looks
-        for answer in answers.values():
-            answer.set_exception(CompilerStoppedError())
-
-    def _run(self) -> None:
-        lower_priority(self._niceness)  # which the process inherits
-        while (line := self._next()) is not None:
-            done = self._ask(line)
-            with self._lock:
-                answer = self._answers.pop(line, None)
-                stopped = self._stopped
-            if not (done or stopped or self._warned):
-                self._warned = True
-                logger.warning("a compiling process ended early; another one is started when it is needed")
-            if answer is not None:
-                answer.set_result(done)
-
-    def _next(self) -> str | None:
-        """The next line; None, without a process, when nothing is left to do."""
-        with contextlib.suppress(queue.Empty):
-            if not self._stopped:
-                return self._lines.get(timeout=IDLE)
-        with self._lock:
-            if not self._stopped and not self._lines.empty():
-                return self._lines.get()
-            self._end_child()
-            self.running = False
-        return None
+            self._executor.shutdown()
+            self._answers = {line: answer for line, answer in self._answers.items() if not answer.cancelled()}
+            if self.child is not None and self._answers:
+                self.child.kill()  # the thread that waits for it sees that
+        self._end_idle()
 
     def _ask(self, line: str) -> bool:
         with self._lock:
             if self._stopped:
-                return False
+                raise CompilerStoppedError
+            if self._idle is not None:
+                self._idle.cancel()
             if self.child is None:
                 self.child = start_process("from kin.kernels.elsewhere import serve; serve()", subprocess.PIPE)
             child = self.child
         done = _answer(child, line) == DONE
-        if not done:
-            with self._lock:
-                self._end_child()
+        with self._lock:
+            del self._answers[line]
+            if not done:
+                _end(child)
+                self.child = None
+            if self._stopped:
+                raise CompilerStoppedError
+            if not (done or self._warned):
+                self._warned = True
+                logger.warning("a compiling process ended early; another one is started when it is needed")
+            self._idle = threading.Timer(IDLE, self._end_idle)
+            self._idle.daemon = True
+            self._idle.start()
         return done
 
-    def _end_child(self) -> None:
-        if self.child is not None:
-            _end(self.child)
-            self.child = None
+    def _end_idle(self) -> None:
+        """End the process if nothing waits for it."""
+        with self._lock:
+            if self.child is not None and not self._answers:
+                _end(self.child)
+                self.child = None
 
 
 class Compilers:
@@ -165,10 +150,8 @@ class Compilers:
                     deadline.check()
         except TooSlowError:
             raise _preparing(f", and is not ready after {deadline.seconds:g} s" if deadline else "") from None
-        except CompilerStoppedError:
-            if deadline is None:
-                raise
-            raise stopping() from None
+        except (CompilerStoppedError, CancelledError):
+            raise (CompilerStoppedError() if deadline is None else stopping()) from None
 
     def stop(self) -> None:
         """End both processes; threads that wait for them get `CompilerStoppedError`."""

@@ -13,7 +13,6 @@ import viser
 from app.classroom.views import ClassroomUnavailable, RefusedError, RoomView
 from app.viewer.feature import Feature, Stage
 from app.viewer.panel import update_html
-from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice
 from app.viewer.room.following import Follower
 from app.viewer.room.member_page import MemberPage
@@ -186,10 +185,7 @@ class Member(Feature):
             return False
         leader, why = self.leader, self.refusal(act)
         if why:
-            self.page.put_back()
-            self.page.status.show(Notice("advice", "Not now", why))
-            if isinstance(key, tuple) and key[0] == "message":
-                self.page.channel.reply(Reply(int(key[2]), why))
+            self.page.refuse(key, why)
         self._dirty |= self.leader != leader
         self.due = 0.0
         return not why

@@ -31,10 +31,9 @@ class Rule:
         message: whether the page's own script may send it.
         answered: whether its handler replies to that message.
         act: whether it moves the arm or opens something, which ends a lead and is refused in a class that is
-            frozen. Of a feature's events only messages count: features also post what they have computed.
+            frozen, and while a stored state waits for its kernels. Of a feature's events only messages count:
+            features also post what they have computed.
         replaces: whether nobody waits any more for another robot, or for a stored state.
-        follows: whether it is meant for a stored state that the page cannot show yet, and waits for it.
-        present: whether it is about the arm on show, so that it is refused while a stored state of another waits.
     """
 
     label: str = ""
@@ -44,32 +43,30 @@ class Rule:
     answered: bool = False
     act: bool = False
     replaces: bool = False
-    follows: bool = False
-    present: bool = False
 
 
 RULES: Final[dict[str, Rule]] = {
     # The arm
-    "gizmo": Rule("Drag of the target", gradual=math.inf, act=True, present=True),
-    "grab": Rule(step=False, act=True, present=True),
-    "joint": Rule(gradual=LONG_PAUSE, act=True, follows=True),
-    "redundancy": Rule("Redundancy", gradual=LONG_PAUSE, act=True, present=True),
-    "lock": Rule("Lock", act=True, present=True),
-    "branch": Rule("Posture", act=True, present=True),
+    "gizmo": Rule("Drag of the target", gradual=math.inf, act=True),
+    "grab": Rule(step=False, act=True),
+    "joint": Rule(gradual=LONG_PAUSE, act=True),
+    "redundancy": Rule("Redundancy", gradual=LONG_PAUSE, act=True),
+    "lock": Rule("Lock", act=True),
+    "branch": Rule("Posture", act=True),
     "robot": Rule("Robot", act=True, replaces=True),
     "find": Rule(step=False),
-    "task": Rule("Target must match", act=True, present=True),
-    "home": Rule("Home", act=True, present=True),
-    "random": Rule("Random", act=True, present=True),
-    "recall": Rule("Move target to tool", act=True, present=True),
+    "task": Rule("Target must match", act=True),
+    "home": Rule("Home", act=True),
+    "random": Rule("Random", act=True),
+    "recall": Rule("Move target to tool", act=True),
     "shown": Rule(step=False),
-    "live": Rule("Connected program", gradual=LONG_PAUSE, act=True, follows=True),
+    "live": Rule("Connected program", gradual=LONG_PAUSE, act=True),
     "drawn": Rule(step=False),
     # Typed, and keys
-    "field": Rule("Typed value", message=True, answered=True, act=True, follows=True),
-    "target": Rule("Typed target", message=True, answered=True, act=True, follows=True),
-    "nudge": Rule("Target moved by keys", gradual=SHORT_PAUSE, message=True, act=True, present=True),
-    "jog": Rule("Jog", gradual=LONG_PAUSE, message=True, act=True, present=True),
+    "field": Rule("Typed value", message=True, answered=True, act=True),
+    "target": Rule("Typed target", message=True, answered=True, act=True),
+    "nudge": Rule("Target moved by keys", gradual=SHORT_PAUSE, message=True, act=True),
+    "jog": Rule("Jog", gradual=LONG_PAUSE, message=True, act=True),
     "snap": Rule(step=False, message=True),
     "released": Rule(step=False, message=True),
     # The looks of the page, and the camera
@@ -87,7 +84,7 @@ RULES: Final[dict[str, Rule]] = {
     "looked": Rule(step=False),
     "resized": Rule(step=False),
     # What is open, and the history
-    "lesson": Rule("Lesson", message=True, act=True, follows=True),
+    "lesson": Rule("Lesson", message=True, act=True),
     "feature": Rule(message=True, act=True),
     "news": Rule(step=False),
     "undo": Rule(step=False, message=True, act=True, replaces=True),

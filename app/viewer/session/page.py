@@ -33,6 +33,7 @@ from app.viewer.panel import update_html
 from app.viewer.panel.fence import Fence
 from app.viewer.panel.joints import JointSliders, lock_notice
 from app.viewer.panel.layout import LEARN, Panel
+from app.viewer.panel.script import Reply
 from app.viewer.panel.status import READY, Notice, StatusLine
 from app.viewer.panel.theme import configure_theme
 from app.viewer.scene.camera import Sphere, VisitorCamera
@@ -284,6 +285,13 @@ class VisitorPage(ShownArm, Worker):
         self.panel.robots.show(self.arm.robot, self.own)
         self.forms.show()
         self.posture.choose(self.arm.branch)
+
+    def refuse(self, key: Hashable, why: str) -> None:
+        """Say why an event is not handled, and show in all controls of the arm what is true."""
+        self.put_back()
+        self.status.show(Notice("advice", "Not now", why))
+        if isinstance(key, tuple) and key[0] == "message":
+            self.channel.reply(Reply(int(key[2]), why))
 
     def snapshot(self) -> PageState:
         """The present state."""

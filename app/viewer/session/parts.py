@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Protocol
 
 from app.viewer.feature import Feature, Stage
@@ -49,6 +49,9 @@ class Page(Stage, Protocol):
 
     def put_back(self) -> None:
         """Show in all controls of the arm what is true."""
+
+    def refuse(self, key: Hashable, why: str) -> None:
+        """Say why an event is not handled."""
 
     def snapshot(self) -> PageState:
         """The present state."""

@@ -3,9 +3,8 @@
 Compiling takes seconds. If an event were handled before that, the page would stand still without a reason. So it
 is held, the status card says what is being prepared, and the page can be used meanwhile.
 
-A page that opens with a stored state of such an arm shows another arm until then. Meanwhile, sliders, typed joint
-values and targets, messages of a program and the choice of a lesson are meant for the stored state: they wait, and
-are applied to it. A jog starts from the arm on show, so it is refused in words. That arm has no arrows to drag.
+A page that opens with a stored state of such an arm shows another arm until then, which has no arrows to drag.
+What would move that arm is refused in words; the choice of a lesson and what a program sends wait.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from typing import Final
 
 from app.viewer.feature import Feature, message_of
 from app.viewer.own_arm import own_arm
-from app.viewer.panel.status import Notice
 from app.viewer.session.events import LINK, RULES, name_of
 from app.viewer.session.lessons import lesson_titled, lesson_with_key
 from app.viewer.session.parts import Page
@@ -28,6 +26,7 @@ from kin.warmup.preparation import Preparation
 
 LOOK_AGAIN: Final = 0.2  # s
 HELD: Final = 64  # events of one page; the oldest are dropped
+FOR_STATE: Final = ("live", "lesson")  # events that wait for a stored state with another arm
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,6 @@ class Preparing:
         self._page = page
         self._preparation = preparation
         self._held: dict[Hashable, _Held] = {}
-        self._coming: Robot  # of the stored state that is held
 
     @property
     def due(self) -> float | None:
@@ -53,24 +51,20 @@ class Preparing:
         return LOOK_AGAIN if self._held else None
 
     def admits(self, key: Hashable, value: object) -> bool:
-        """Whether an event can be handled now. Otherwise it is held, and posted again when it can."""
+        """Whether an event can be handled now. Otherwise it is held, and posted again when it can, or refused."""
         if self._preparation.complete and not self._held:
             return True
         event = key[1] if isinstance(key, tuple) and key[0] == "message" else key
-        rule = RULES.get(name_of(key))
+        name = name_of(key)
+        rule = RULES.get(name)
         if rule is not None and rule.replaces:
             self._give_up(key)
-        elif rule is not None and (state := self._held.get(LINK)) is not None:
-            if self._lacks_joint(key):
-                self._page.put_back()
-                self._refuse(f"{state.what[:1].upper()}{state.what[1:]} has no such joint.")
-                return False
-            if rule.present:
-                self._refuse(f"The page waits for {state.what}. It can be moved when it is there.")
-                return False
-            if rule.follows:
+        elif rule is not None and rule.act and name != "feature" and (state := self._held.get(LINK)) is not None:
+            if name in FOR_STATE:
                 self._hold(key, _Held(key, value, state.parts, state.what))
-                return False
+            else:
+                self._page.refuse(key, f"The page waits for {state.what}. It can be moved when it is there.")
+            return False
         try:
             parts, what = self._needs(event, value)
         except InputError:  # who handles it says what is wrong
@@ -87,7 +81,6 @@ class Preparing:
 
     def hold_state(self, state: PageState, robot: Robot, tabs: Sequence[type[Feature]]) -> None:
         """Post a stored state as `LINK` when it can be shown."""
-        self._coming = robot
         self._page.arm.scene.gizmo.visible = False
         self._hold(LINK, _Held(LINK, state, _parts_of(state, robot, tabs), f"the {robot.name}"))
 
@@ -97,46 +90,19 @@ class Preparing:
             if self._preparation.ready(held.parts):
                 if name != LINK:  # which is waited for until it is handled
                     del self._held[name]
-                self._page.post(self._meant(held.key), held.value)
+                self._page.post(held.key, held.value)
         self._show()
 
-    def _meant(self, key: Hashable) -> Hashable:
-        """The key of a held event; of a slider, for the same joint of the arm that has come."""
-        match key:
-            case ("joint", _, *rest):
-                return "joint", self._coming.id, *rest
-        return key
-
-    def _lacks_joint(self, key: Hashable) -> bool:
-        """Whether an event is of a slider whose joint the arm of the stored state does not have."""
-        match key:
-            case ("joint", _, int(index), *_):
-                kinds = [joint.kind for joint in self._coming.joints[index : index + 1]]
-                return kinds != [self._page.now.robot.joints[index].kind]
-        return False
-
-    def _refuse(self, why: str) -> None:
-        """Say why something cannot be done; sliders keep what is meant for the arm that comes."""
-        page = self._page
-        page.sliders.show_locks(page.arm.locks)
-        page.forms.show()
-        page.posture.show()
-        page.posture.choose(page.arm.branch)
-        page.status.show(Notice("advice", "Not now", why))
-
     def _give_up(self, key: Hashable) -> None:
-        """Drop held events that this one replaces. Drop those for a stored state too, if it will not be shown."""
-        linked = LINK in self._held and key != LINK
+        """Drop held events that this one replaces, a stored state among them."""
         if LINK in self._held:
             self._page.arm.scene.gizmo.visible = True
         for name in list(self._held):
-            rule = RULES[name_of(name)]
-            if rule.replaces or (linked and rule.follows):
+            if RULES[name_of(name)].replaces:
+                del self._held[name]
+            elif name_of(name) in FOR_STATE and key != LINK:  # any arm can have them
                 held = self._held.pop(name)
-                if name == "live":  # a program learns what became of it
-                    self._page.post(name, None)
-                elif name_of(name) == "lesson":  # which any arm can have
-                    self._page.post(held.key, held.value)
+                self._page.post(held.key, held.value)
 
     def _hold(self, event: Hashable, held: _Held) -> None:
         self._held.pop(event, None)
@@ -156,13 +122,8 @@ class Preparing:
         if (asked := self._held.get("live")) is not None and self._page.door.line is not None:
             self._page.door.line.prepare(asked.what, *self._step(asked))
         step = f"step {at} of {of}"
-        follows = (
-            " Joint values that you set or type, typed targets, and the lesson you choose are applied then."
-            if LINK in self._held
-            else ""
-        )
         self._page.status.wait(
-            f"Preparing {held.what} for the first time on this machine: {step}. This continues by itself.{follows}"
+            f"Preparing {held.what} for the first time on this machine: {step}. This continues by itself."
         )
 
     def _step(self, held: _Held) -> tuple[int, int]:
