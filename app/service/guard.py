@@ -15,6 +15,8 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import uvicorn
+
 from app.service.log import KIND
 from app.shared.clients import Proxies, network_of, share_of
 from app.shared.metrics import CONNECTIONS, REFUSED
@@ -144,3 +146,9 @@ class Guard:
         self._timer = None
         if self._open:
             self._schedule()
+
+
+class GuardedConfig(uvicorn.Config):
+    """uvicorn's configuration, and the guard of its connections."""
+
+    guard: Guard

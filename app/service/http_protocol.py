@@ -23,7 +23,7 @@ from pydantic_core import to_json
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from app.api.problems import ProblemError
-from app.service.config import GuardedConfig
+from app.service.guard import GuardedConfig
 from app.shared.problems import MEDIA_TYPE
 
 MAX_PIPELINE: Final = 16  # requests of a connection that wait for the one being answered

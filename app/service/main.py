@@ -14,6 +14,7 @@ import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from functools import cache, partial
+from typing import TYPE_CHECKING, Any
 
 from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
@@ -64,6 +65,9 @@ from app.shared.summaries import Summaries
 from app.shared.threads import end_process, pin
 from kin import InputError, RobotFileError, __version__
 
+if TYPE_CHECKING:
+    from app.viewer.server import ViewerServer
+
 # Seconds that a thread may keep the interpreter while others wait. A drag passes through three threads; next to a
 # REST batch, Python's default of 5 ms would make one drag in twenty take 36 ms instead of 13.
 SWITCH_INTERVAL = 5e-4
@@ -113,8 +117,8 @@ def create_app(
     classroom = Hub.of(settings)
     known = cache(lambda: courses or _courses(settings, store))
     lines = Lines()
-    begin = settings, store, clouds, maps, summaries, classroom
-    startup = Startup(*begin, known, bridge, lines, pool, on_ready)
+    begin = store, settings, clouds, maps, summaries, classroom
+    startup = Startup(lambda kernels: _viewer(*begin, kernels, known(), lines), bridge, pool, on_ready)
 
     def idle() -> bool:
         return not (bridge.slots.taken or work.used or state.streams.open or summaries.pending or maps.pending)
@@ -131,7 +135,7 @@ def create_app(
             await run_in_threadpool(step)
 
     state = (app := _described(lifespan)).state
-    state.settings, state.store, state.clouds, state.maps, state.summaries, state.classroom = begin
+    state.store, state.settings, state.clouds, state.maps, state.summaries, state.classroom = begin
     state.lines, state.tries, state.startup = lines, Limits(), startup
     state.streams, state.compute = StreamLimit(settings.max_streams, settings.client_share), work
     state.uploads = UploadMemory(max(settings.upload_memory, settings.max_body), settings.client_share)
@@ -144,6 +148,13 @@ def create_app(
     app.include_router(status.router)
     _add_middleware(app, settings, Guests(classroom))
     return app
+
+
+def _viewer(*arguments: Any) -> ViewerServer:
+    # Importing viser takes half a second, for which the landing page and REST need not wait.
+    from app.viewer.server import ViewerServer
+
+    return ViewerServer(*arguments)
 
 
 def _courses(settings: Settings, store: Store) -> Courses:

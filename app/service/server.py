@@ -21,8 +21,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from app.service import uvicorn_names
-from app.service.config import GuardedConfig
-from app.service.guard import Guard
+from app.service.guard import Guard, GuardedConfig
 from app.service.restarts import Watchdog, is_orphan
 from app.service.web.inspection import MAX_MESSAGE
 from app.service.web.prefix import clean_prefix

@@ -17,18 +17,10 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
-from app.classroom import Hub
-from app.classroom.courses import Courses
-from app.live import Lines
 from app.service.compiler import Compilers, CompilerStoppedError, ahead, compile_first
 from app.service.compute.child import load_first, load_rest
 from app.service.compute.pool import Pool
 from app.service.web.viewer_proxy import ViewerBridge
-from app.shared.clouds import Clouds
-from app.shared.maps import Maps
-from app.shared.settings import Settings
-from app.shared.store import Store
-from app.shared.summaries import Summaries
 from app.shared.threads import lower_priority, processors, unpin
 from kin.kernels.elsewhere import compile_elsewhere
 from kin.warmup import compiled, parts, rest_compiled, warm_up_first, warm_up_rest
@@ -46,8 +38,8 @@ class Startup:
     """Starts the viewer and compiles the kernels in a thread; ``/readyz`` reports `status`.
 
     Args:
-        courses: those that pages offer, and their exercises.
-        lines: of the pages, to the programs that are connected to them.
+        make_viewer: makes the viewer, which is told which kernels are compiled.
+        bridge: has the viewer serve visitors once it has started.
         pool: processes that compute, if there are any.
         on_ready: called by that thread when everything is ready, just before `status` says so.
 
@@ -59,29 +51,15 @@ class Startup:
 
     def __init__(
         self,
-        settings: Settings,
-        store: Store,
-        clouds: Clouds,
-        maps: Maps,
-        summaries: Summaries,
-        classroom: Hub,
-        courses: Callable[[], Courses],
+        make_viewer: Callable[[Preparation], ViewerServer],
         bridge: ViewerBridge,
-        lines: Lines,
         pool: Pool | None = None,
         on_ready: Callable[[], None] | None = None,
     ) -> None:
         self.status: Status = "warming"
         self.complete = False
-        self._settings = settings
-        self._store = store
-        self._clouds = clouds
-        self._maps = maps
-        self._summaries = summaries
-        self._classroom = classroom
-        self._courses = courses
+        self._make_viewer = make_viewer
         self._bridge = bridge
-        self._lines = lines
         self._pool = pool
         self._on_ready = on_ready
         self._viewer: ViewerServer | None = None
@@ -172,12 +150,7 @@ class Startup:
 
     def _start_viewer(self) -> None:
         try:
-            # Importing viser takes half a second, for which the landing page and REST need not wait.
-            from app.viewer.server import ViewerServer
-
-            caches = self._clouds, self._maps, self._summaries
-            shared = self._classroom, self.preparation, self._courses()
-            viewer = ViewerServer(self._store, self._settings, *caches, *shared, lines=self._lines)
+            viewer = self._make_viewer(self.preparation)
             viewer.start(self._loop)
             self._viewer = self._bridge.viewer = viewer
         finally:

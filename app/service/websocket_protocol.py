@@ -18,7 +18,7 @@ from websockets.http11 import Request
 
 from app.api.problems import ProblemError
 from app.live.codes import PATH as LIVE
-from app.service.config import GuardedConfig
+from app.service.guard import GuardedConfig
 from app.service.http_protocol import raw_answer
 from app.service.web.inspection import BURST, RATE, MessageLimit
 from app.shared.connection import DELAY

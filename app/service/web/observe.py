@@ -73,8 +73,6 @@ class Observe:
             self._record(scope, path, status, sent, time.perf_counter() - began)
 
     def _record(self, scope: Scope, path: str, status: int, sent: int, seconds: float) -> None:
-        if scope.get("client") is None:  # the supervisor, once a second
-            return
         websocket = scope["type"] == "websocket"
         # Unknown methods share one label, so that clients cannot create new time series.
         method = "WEBSOCKET" if websocket else scope["method"] if scope["method"] in _METHODS else "OTHER"
