@@ -18,10 +18,10 @@ from app.cli.terminal import configuration, quantity, units_of
 from app.exercises.questions import Number
 from app.viewer.panel.entry import read_cell, read_value
 from app.viewer.panel.readout import html
-from app.viewer.tabs.program.items import Item
 from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.robot.edits import quantity as quantity_of_cell
 from kin import KinematicsError
+from kin.motion import Circ, Ptp
 from kin.poses import read_pose, roll_pitch_yaw
 from kin.typed import EntryError, ReadError
 from kin.units import PLAIN, Unit, Units
@@ -55,9 +55,9 @@ def in_table(text: str, unit: Unit) -> float:
 def in_program(text: str, unit: Unit) -> float:
     fields = Fields(UR5, units_with(unit), np.eye(4), "pose")
     if unit.is_angle:
-        (q0, *_) = fields.read("q0", text, Item("ptp", q=tuple(UR5.q_home)))["q"]
+        (q0, *_) = fields.read("q0", text, Ptp(UR5.q_home), [UR5.q_home]).target.q
         return float(q0)
-    via = fields.read("via", f"0; 0; {text}", Item("circ", q=tuple(UR5.q_home)))["via"]
+    via = fields.read("via", f"0; 0; {text}", Circ([0, 0, 0], UR5.q_home), [UR5.q_home]).via
     return float(via[2])
 
 

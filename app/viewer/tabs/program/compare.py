@@ -10,10 +10,9 @@ from typing import Literal, get_args
 import numpy as np
 
 import kin
-from app.viewer.tabs.program.items import Items, start_of
-from app.viewer.tabs.program.planning import program_of
-from kin import Robot
-from kin.motion import Dwell, Motion, Ptp, profiles
+from app.viewer.tabs.program.plan import Plan, looped, start
+from app.viewer.tabs.program.program import as_kind
+from kin.motion import Dwell, Motion, Program, Ptp, profiles
 from kin.motion.pieces import Piece, look_between
 from kin.motion.profiles import Profile
 from kin.transforms import Array
@@ -67,19 +66,19 @@ class Straight:
         return bool(np.abs(after - before).max() > _JUMP * largest)
 
 
-def other_motion(items: Items, robot: Robot, loop: bool, choice: Choice, zone: float) -> Motion:
-    """The other motion of a list with at least one waypoint; it may be refused."""
-    first = start_of(items)
-    assert first is not None
+def other_motion(program: Program, plan: Plan, loop: bool, choice: Choice, zone: float) -> Motion:
+    """The other motion of a program and its plan; it may be refused."""
+    robot, segments = plan.motion.robot, program.segments
     if choice in ("ptp", "lin"):
-        kind: Literal["ptp", "lin"] = "ptp" if choice == "ptp" else "lin"
-        items = tuple(replace(item, kind=kind, via=None) if item.q else item for item in items)
+        for index in reversed(range(1, len(segments))):
+            before = plan.before(index)
+            if before is not None and plan.q[index]:
+                kind: Literal["ptp", "lin"] = "ptp" if choice == "ptp" else "lin"
+                segments, _ = as_kind(segments, index, kind, plan.q[index], plan.q[before][-1], robot)
     elif choice == "zone":
-        items = tuple(replace(item, blend=zone) if item.q else item for item in items)
-    program = program_of(items, robot, loop)
-    if choice == "fastest":
-        program = replace(program, jerk_limited=False)
-    motion = kin.plan_motion(robot, program, first.q)
+        segments = tuple(each if isinstance(each, Dwell) else replace(each, blend=zone) for each in segments)
+    program = replace(program, segments=segments, jerk_limited=program.jerk_limited and choice != "fastest")
+    motion = kin.plan_motion(robot, looped(program) if loop else program, start(program))
     return motion if choice not in _PROFILES or not motion.planned else with_profile(motion, _PROFILES[choice])
 
 

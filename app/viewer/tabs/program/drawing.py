@@ -11,11 +11,10 @@ import viser
 from app.viewer.labels import add_label
 from app.viewer.scene.meshes import body
 from app.viewer.skeleton import cylinder, places, skeleton
-from app.viewer.tabs.program.faults import Fault
-from app.viewer.tabs.program.items import Items
+from app.viewer.tabs.program.plan import Fault, Plan
 from app.viewer.tabs.workspace.colours import table
-from kin import Robot, fk
-from kin.motion import Motion
+from kin import fk
+from kin.motion import Circ, Motion
 from kin.transforms import Array, wxyz_from_rotation
 
 MAP = "viridis"
@@ -41,7 +40,7 @@ class Drawing:
     """The drawings of one program; the visitor's worker calls it.
 
     Args:
-        names: the text at each waypoint.
+        plan: of the program.
         fault: what cannot be driven; None: nothing.
 
     Attributes:
@@ -49,29 +48,27 @@ class Drawing:
         top_speed: of the tool on the path that is drawn.
     """
 
-    def __init__(
-        self, scene: viser.SceneApi, robot: Robot, items: Items, names: list[str], fault: Fault | None
-    ) -> None:
+    def __init__(self, scene: viser.SceneApi, plan: Plan, fault: Fault | None) -> None:
+        robot = plan.motion.robot
         self._scene, self._robot = scene, robot
         self._root = f"/program-{next(_NUMBERS)}"
         self._size = body(robot).size
         self._top = scene.add_frame(self._root, show_axes=False)
         self.top_speed = 0.0
-        waypoints = [item for item in items if item.q]
-        self._q = np.array([item.q for item in waypoints])
+        self._q = np.array([q for row in plan.q for q in row])
         poses = fk(robot, self._q)
         self.points = poses[:, :3, 3]
         self._axes("waypoints", poses, 2.2, 0.11)
-        labels = [(pose[:3, 3], name) for pose, name in zip(poses, names, strict=True)]
+        labels = list(zip(self.points, _names(plan), strict=True))
         if fault is not None and fault.place is not None:
             labels.append((np.array(fault.place), "✕ cannot go on"))
         for i, (place, words) in enumerate(shared(labels, LABEL * self._size)):
             add_label(scene, f"{self._root}/name-{i}", words, position=place, scale=0.9)
-        for i, item in enumerate(waypoints[1:]):
-            if item.kind == "circ" and item.via is not None:
-                self._dot(f"via-{i}", 0.3, VIA, 1.0, np.array(item.via))
-        if fault is not None and fault.index < len(items) and items[fault.index].q:
-            self._show_fault(fault, poses[sum(bool(item.q) for item in items[: fault.index])][:3, 3])
+        for i, row in enumerate(plan.segments):
+            if isinstance(row, Circ):
+                self._dot(f"via-{i}", 0.3, VIA, 1.0, np.array(row.via))
+        if fault is not None and fault.index < len(plan.q) and plan.q[fault.index]:
+            self._show_fault(fault, fk(robot, plan.q[fault.index][-1])[:3, 3])
 
     def _show_fault(self, fault: Fault, end: Array) -> None:
         self._dot("fault", 0.5, FAULT, 0.55, end)
@@ -158,6 +155,15 @@ class Drawing:
     def remove(self) -> None:
         """Remove everything from the scene."""
         self._top.remove()
+
+
+def _names(plan: Plan) -> list[str]:
+    """The label of each target: the number of its row and, at its end, its name; other points have two numbers."""
+    found = []
+    for i, (row, q) in enumerate(zip(plan.segments, plan.q, strict=True)):
+        found += [f"{i + 1}.{k + 1}" for k in range(len(q) - 1)]
+        found += [f"{i + 1} {row.name}".strip()] if q else []
+    return found
 
 
 def _path(motion: Motion) -> tuple[Array, Array]:

@@ -9,9 +9,8 @@ import numpy as np
 
 from app.viewer.feature import Stage
 from app.viewer.panel.status import Notice
-from app.viewer.tabs.program.items import Items
-from app.viewer.tabs.program.planning import Plan
-from kin.motion import Motion
+from app.viewer.tabs.program.plan import Plan
+from kin.motion import Dwell, Motion
 from kin.transforms import Array
 
 RATES = (0.1, 0.25, 0.5, 1.0, 2.0)  # of the real speed
@@ -75,18 +74,14 @@ class Playback:
         return None if self.plan is None else self.plan.driven
 
     @property
-    def _items(self) -> Items:
-        return () if self.plan is None else self.plan.items
-
-    @property
     def duration(self) -> float:
         """Seconds of the motion."""
         return 0.0 if self.motion is None else self.motion.duration
 
     @property
     def here(self) -> int | None:
-        """Index of the item that is driven at the present time; that of the way back is the number of items."""
-        return None if self.plan is None else self.plan.item_at(self.player.time)
+        """Index of the row that is driven at the present time; that of the way back is the number of rows."""
+        return None if self.plan is None else self.plan.row_at(self.player.time)
 
     def use(self, plan: Plan | None) -> None:
         """Take another motion, at the same time if it lasts as long."""
@@ -154,20 +149,21 @@ class Playback:
             self._report()
 
     def _notice(self) -> Notice:
-        here = self.here
-        if here is None or here >= len(self._items):
+        here, rows = self.here, () if self.plan is None else self.plan.segments
+        if here is None or here >= len(rows):
             return Notice("hand", "Playing", "" if here is None else "Back to the start")
-        item = self._items[here]
-        words = f"Waits {item.seconds:g} s" if item.kind == "pause" else f"To waypoint {here + 1}"
-        return Notice("hand", "Playing", f"{words}: {item.name}" if item.name else words)
+        row = rows[here]
+        words = f"Waits {row.seconds:g} s" if isinstance(row, Dwell) else f"To waypoint {here + 1}"
+        return Notice("hand", "Playing", f"{words}: {row.name}" if row.name else words)
 
     def _ended(self) -> Notice:
         assert self.plan is not None
-        if self.plan.motion.planned:
+        refusal = self.plan.motion.refusal
+        if refusal is None:
             words = f"{self.duration:.2f} s, as planned." if self.player.rate == 1.0 else ""
             return Notice("hand", "The program has ended", words)
-        index = self.plan.item_of(self.plan.motion.refusal.segment) if self.plan.motion.refusal else 0
-        return Notice("error", f"The program ends on the way to {index + 1}", self.plan.explain(self._stage.units))
+        where = f"The program ends on the way to {refusal.segment + 1}"
+        return Notice("error", where, self.plan.explain(self._stage.units))
 
     def _go(self, notice: Notice, ease: bool = False) -> None:
         """Move the arm to where it is at the present time."""

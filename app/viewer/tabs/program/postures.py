@@ -17,8 +17,8 @@ import kin
 from app.exports.svg import Axes, AxisStyle, Plot, Series, chart
 from app.viewer.arm import Arm
 from app.viewer.panel.posture import short
-from app.viewer.tabs.program.items import Items
-from app.viewer.tabs.program.planning import Plan
+from app.viewer.tabs.program.plan import Plan
+from app.viewer.tabs.program.program import Segments
 from app.viewer.views.templates import render
 from kin import IKOptions, PathPostures
 from kin.motion import segment_poses
@@ -43,8 +43,8 @@ class Chart:
     """The chart of one waypoint: being computed, done, or failed.
 
     Attributes:
-        index: of the item.
-        plan, arm: of the list and the arm for which it is computed.
+        index: of the row.
+        plan, arm: of the program and the arm for which it is computed.
         found: the postures; None: not known yet.
         words: why there is no chart.
         cancelled: set when it is not wanted any more.
@@ -62,19 +62,18 @@ class Chart:
         if self.cancelled.is_set():
             raise CancelledError
 
-    def fits(self, items: Items, arm: Arm) -> bool:
-        """Whether the list and what the arm avoids are unchanged since this computation began."""
+    def fits(self, segments: Segments, arm: Arm) -> bool:
+        """Whether the program and what the arm avoids are unchanged since this computation began."""
         mine = self.arm
         avoided = (arm.avoid, arm.obstacles) == (mine.avoid, mine.obstacles)
-        return items == self.plan.items and arm.robot == mine.robot and avoided
+        return segments == self.plan.segments and arm.robot == mine.robot and avoided
 
 
 def compute(chart: Chart) -> None:
     """Fill a chart; in a background thread."""
     plan, avoid = chart.plan, chart.arm.avoid
-    segment = plan.segments[chart.index]
-    poses = segment_poses(plan.motion, segment, PLACES)
-    before = plan.motion.q_before(segment)
+    poses = segment_poses(plan.motion, chart.index, PLACES)
+    before = plan.motion.q_before(chart.index)
     if poses is None or before is None:
         chart.words = "There is no way to show: the program ends before this waypoint, or it has no length."
         return

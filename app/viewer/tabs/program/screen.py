@@ -1,149 +1,205 @@
-"""The parts of the tab *Program* in the panel and in the scene; each is sent again only when it has changed."""
+"""What the tab *Program* shows: the parts of its panel and its drawings in the scene.
+
+A part is sent again only when it has changed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from app.exports.motion_snippets import SNIPPETS
-from app.viewer.feature import Stage
+from app.viewer.feature import Feature, Stage
 from app.viewer.live.tape import BYTES
+from app.viewer.own_arm import KEY
 from app.viewer.panel import update_html
 from app.viewer.panel.share import box_html
 from app.viewer.scene.camera import Sphere, round_points
-from app.viewer.tabs.program import views, ways
-from app.viewer.tabs.program.compare import Choice
+from app.viewer.tabs.program import program as rows
+from app.viewer.tabs.program import views
+from app.viewer.tabs.program.compare import ZONE, Choice, other_motion
 from app.viewer.tabs.program.drawing import Drawing, Shown
-from app.viewer.tabs.program.faults import Fault
 from app.viewer.tabs.program.files import LARGEST, MOTIONS
-from app.viewer.tabs.program.items import Items
-from app.viewer.tabs.program.planning import Plan
+from app.viewer.tabs.program.plan import Fault, Plan, find_fault, plan
 from app.viewer.tabs.program.playback import Playback
 from app.viewer.tabs.program.plot import plot_html
 from app.viewer.tabs.program.postures import Chart, html
+from app.viewer.tabs.program.program import Segments
 from app.viewer.tabs.program.typed import Fields
-from app.viewer.tabs.program.ways import Search, Settings
+from app.viewer.tabs.program.ways import Ways
 from app.viewer.views.templates import render
-from kin.motion import Motion
+from kin.motion import Motion, Program
 
 PARTS = ("player", "clock", "list", "postures", "way", "plot", "summary", "compare", "files")
 
 
-class Screen:
-    """What a visitor sees of a program.
-
-    Attributes:
-        shown: what is drawn in the scene.
-        joint: the one in the plots; None: all.
-        chosen: index of the item that is open.
-        by_pose: whether the open item shows the pose of the tool, not joint values.
-        language: the one in which the program can be copied.
-    """
+class Screen(Feature):
+    """The programs of a visitor, one for each robot, as they are shown."""
 
     def __init__(self, stage: Stage) -> None:
-        self._stage = stage
-        self.shown = Shown()
-        self.joint: int | None = None
-        self.chosen: int | None = None
-        self.by_pose = False
-        self.language = next(iter(SNIPPETS))
+        super().__init__(stage)
+        self._html = {name: stage.client.gui.add_html("") for name in PARTS}
+        self._programs: dict[str, Program] = {}  # by robot; `KEY` stands for the visitor's own arm
+        self._playback = Playback(stage, self._show_clock)
+        self._player = self._playback.player
+        self._plan: Plan | None = None
+        self._fault: Fault | None = None
+        self._stale: float | None = None  # when the motion is planned again, after the obstacles have changed
+        # What is shown
+        self._chosen: int | None = None  # the row that is open
+        self._point = 0  # of an open spline
+        self._by_pose = False  # whether the open row shows the pose of the tool, not joint values
+        self._joint: int | None = None  # in the plots; None: all
+        self._shown = Shown()
+        self._language = next(iter(SNIPPETS))
         self._revision = 0
         self._drawing: Drawing | None = None
         self._drawn: tuple[object, ...] = ()
-        gui = stage.client.gui
-        self._html = {name: gui.add_html("") for name in PARTS}
+        # What is compared and searched
+        self._compared: Choice | None = None
+        self._zone = ZONE
+        self._other: Motion | None = None
+        self._chart: Chart | None = None
+        self._ways = Ways(stage, lambda html: self._show("way", html), self.post)
+        self._progress: dict[str, object] = {}
+        self._refresh()
+
+    # The program
+
+    @property
+    def _own(self) -> bool:
+        """Whether the visitor's own arm is on show."""
+        own = self.stage.own
+        return own is not None and own.robot == self.stage.now.robot
+
+    @property
+    def _key(self) -> str:
+        return KEY if self._own else self.stage.now.robot.id
+
+    @property
+    def _program(self) -> Program | None:
+        """That of the robot on show; a visitor's own arm may have another number of joints by now."""
+        found = self._programs.get(self._key)
+        return found if found is not None and rows.fits(found.segments, self.stage.now.robot) else None
+
+    @property
+    def _segments(self) -> Segments:
+        return () if self._program is None else self._program.segments
+
+    @property
+    def _motion(self) -> Motion | None:
+        """The motion of the program, or the part of it that can be driven; None: there is none."""
+        return self._playback.motion
+
+    @property
+    def _whole(self) -> Motion | None:
+        """The motion of the whole program; None: it cannot be driven."""
+        return self._motion if self._plan is not None and self._plan.motion.planned else None
+
+    @property
+    def _blocked(self) -> bool:
+        """Whether nothing may be played, as a locked joint would move."""
+        return self._fault is not None and self._fault.whole
+
+    def _refresh(self) -> None:
+        """Plan the motion, and show everything."""
+        arm, loop = self.stage.now, self._player.loop
+        self._keep_postures()
+        self._ways.keep(self._segments)
+        self._plan, self._stale = plan(self._program, arm.robot, loop, arm.avoid, arm.obstacles), None
+        self._fault = find_fault(self._plan, self.stage)
+        self._playback.use(self._plan if self._plan is not None and self._plan.driven is not None else None)
+        self._other = None
+        if self._compared is not None and self._whole is not None and self._plan and self._program:
+            self._other = other_motion(self._program, self._plan, loop, self._compared, self._zone)
+        self._draw()
+        self._show_player()
+        self._show_list()
+        self._show_plot()
+        self._show_summary()
+        self._show_comparison()
+        self._show_files()
+        self._show_clock()
+
+    # What is shown; each part is sent again only when it has changed
 
     def _show(self, name: str, html: str) -> None:
         update_html(self._html[name], html)
 
     @property
-    def fields(self) -> Fields:
+    def _fields(self) -> Fields:
         """How values are written and read."""
-        arm = self._stage.now
-        stage = self._stage
+        arm, stage = self.stage.now, self.stage
         return Fields(arm.robot, stage.units, stage.frames.pose(arm.robot, arm.goal), arm.task)
 
-    def player(self, playback: Playback, any_items: bool, playable: bool) -> None:
-        """Buttons, slider of time, and the legend of the path."""
+    def _show_player(self) -> None:
+        playable = self._motion is not None and self._motion.duration > 0.0 and not self._blocked
         top = 0.0 if self._drawing is None else self._drawing.top_speed
-        shown = views.player(playback.player, playback.motion, playable, self.shown, top, self._stage.units)
-        self._show("player", shown if any_items else "")
+        shown = views.player(self._player, self._motion, playable, self._shown, top, self.stage.units)
+        self._show("player", shown if self._segments else "")
 
-    def clock(self, playback: Playback) -> None:
-        """The present moment."""
-        self._show("clock", views.clock(playback.player, playback.duration, playback.here))
+    def _show_clock(self) -> None:
+        self._show("clock", views.clock(self._player, self._playback.duration, self._playback.here))
 
-    def list(self, items: Items, plan: Plan | None, fault: Fault | None, loop: bool, anew: bool = False) -> None:
-        """The waypoints; `anew`: what was typed into the fields is replaced."""
+    def _show_list(self, anew: bool = False) -> None:
+        """The rows; `anew`: what was typed into the fields is replaced."""
         self._revision += anew
+        if self._chosen is not None:
+            self._point = max(0, min(self._point, len(rows.targets(self._segments[self._chosen])) - 1))
+        opened, by_pose = (self._chosen, self._point), self._by_pose
+        loop = self._player.loop
         self._show(
-            "list",
-            views.items_html(items, self.chosen, plan, fault, loop, self.fields, self.by_pose, self._revision),
+            "list", views.list_html(self._plan, opened, self._fault, loop, self._fields, by_pose, self._revision)
         )
 
-    def postures(self, chart: Chart | None) -> None:
-        """The chart of postures on the way to a waypoint."""
-        self._show("postures", "" if chart is None else html(chart, self._stage.units))
-
-    def way(self, search: Search | None, settings: Settings) -> None:
-        """The form in which a way is searched, and how far the search is."""
-        self._show("way", "" if search is None else ways.html(search, settings, self._stage.units))
-
-    def plot(self, motion: Motion | None, other: Motion | None) -> None:
-        """The curves over time."""
+    def _show_plot(self) -> None:
+        motion, other = self._motion, self._other
         lasts = motion is not None and motion.duration > 0.0
         other = other if other is not None and other.planned and other.duration > 0.0 else None
-        self._show(
-            "plot",
-            plot_html(motion, self.joint, self._stage.units, other) if motion is not None and lasts else "",
-        )
+        self._show("plot", plot_html(motion, self._joint, self.stage.units, other) if motion and lasts else "")
 
-    def summary(self, plan: Plan | None, own: bool) -> None:
+    def _show_summary(self) -> None:
         """Duration, peaks and limits."""
-        stage = self._stage
-        driven = plan is not None and (
-            plan.motion.planned or (plan.driven is not None and plan.driven.duration > 0)
-        )
-        self._show("summary", views.summary(plan, stage.now.robot, own, stage.units) if plan and driven else "")
+        found = self._plan
+        driven = found is not None and (found.motion.planned or (found.driven and found.driven.duration > 0.0))
+        self._show("summary", views.summary(found, self._own, self.stage.units) if found and driven else "")
 
-    def compare(self, motion: Motion | None, other: Motion | None, choice: Choice | None, zone: float) -> None:
-        """The motion that the program is compared with."""
+    def _show_comparison(self) -> None:
+        motion, other = self._whole, self._other
         if motion is None or motion.duration == 0.0:
             self._show("compare", "")
             return
-        words = "" if other is None or other.planned else other.explain(self._stage.units)
-        self._show("compare", views.comparison(motion, other, choice, zone, self.fields, words))
+        words = "" if other is None or other.planned else other.explain(self.stage.units)
+        self._show("compare", views.comparison(motion, other, self._compared, self._zone, self._fields, words))
 
-    def files(self, motion: Motion | None, any_items: bool, own: bool) -> None:
+    def _show_files(self) -> None:
         """Saving, opening, and the program as code."""
         code = ""
-        if motion is not None:
-            code = box_html(SNIPPETS[self.language](motion, own, self._stage.service), "Copy code")
-        self._show(
-            "files",
-            render(
-                "program/files",
-                any=any_items,
-                most=f"{LARGEST // 1000} kB",
-                most_recording=f"{BYTES // 1_000_000} MB",
-                code=code,
-                languages=list(SNIPPETS),
-                language=self.language,
-                motions=MOTIONS if motion is not None else {},
-            ),
+        if self._motion is not None:
+            code = box_html(SNIPPETS[self._language](self._motion, self._own, self.stage.service), "Copy code")
+        shown = render(
+            "program/files",
+            any=bool(self._segments),
+            most=f"{LARGEST // 1000} kB",
+            most_recording=f"{BYTES // 1_000_000} MB",
+            code=code,
+            languages=list(SNIPPETS),
+            language=self._language,
+            motions=MOTIONS if self._motion is not None else {},
         )
+        self._show("files", shown)
 
-    def draw(self, items: Items, plan: Plan | None, fault: Fault | None, loop: bool, other: Motion | None) -> None:
+    def _draw(self) -> None:
         """Draw the program in the scene, if it is another one than before."""
-        stage, shown = self._stage, self.shown
-        drawn = (stage.now.robot, items, loop, fault, shown, None if other is None else other.pieces)
+        other, motion, shown = self._other, self._motion, self._shown
+        pieces = None if other is None else other.pieces
+        drawn = (self.stage.now.robot, self._segments, self._player.loop, self._fault, shown, pieces)
         if drawn == self._drawn:
             return
         self._drawn = drawn
-        self.remove()
-        if not any(item.q for item in items) or not shown.path:
+        self._erase()
+        if self._plan is None or not shown.path:
             return
-        self._drawing = Drawing(stage.client.scene, stage.now.robot, items, views.shown_names(items), fault)
-        motion = None if plan is None else plan.driven
+        self._drawing = Drawing(self.stage.client.scene, self._plan, self._fault)
         if shown.ghosts:
             self._drawing.show_ghosts()
         if motion is not None and motion.duration > 0.0:
@@ -153,13 +209,22 @@ class Screen:
         if other is not None and other.planned and other.duration > 0.0:
             self._drawing.show_other(other)
 
-    @property
-    def extents(self) -> Sequence[Sphere]:
-        """A sphere around the drawing, if there is one."""
-        return [] if self._drawing is None else [round_points(self._drawing.points)]
-
-    def remove(self) -> None:
-        """Remove the drawing from the scene."""
+    def _erase(self) -> None:
         if self._drawing is not None:
             self._drawing.remove()
             self._drawing = None
+
+    def _keep_postures(self) -> None:
+        """Show the chart, unless something has changed that it depends on; its words may have other units."""
+        if self._chart is not None and not self._chart.fits(self._segments, self.stage.now):
+            self._close_postures()
+        self._show("postures", "" if self._chart is None else html(self._chart, self.stage.units))
+
+    def _close_postures(self) -> None:
+        if self._chart is not None:
+            self._chart.cancelled.set()
+            self._chart = None
+            self._show("postures", "")
+
+    def extents(self) -> Sequence[Sphere]:
+        return [] if self._drawing is None else [round_points(self._drawing.points)]

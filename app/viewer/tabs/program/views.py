@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from app.viewer.tabs.program.compare import CHOICES, Choice, about, jerk_is_infinite
 from app.viewer.tabs.program.drawing import Shown
-from app.viewer.tabs.program.faults import Fault
-from app.viewer.tabs.program.items import MOST, Item, Items, Kind, passed_through, start_of
-from app.viewer.tabs.program.planning import Plan
+from app.viewer.tabs.program.plan import Fault, Plan
 from app.viewer.tabs.program.playback import RATES, Player
+from app.viewer.tabs.program.program import MOST, Segments, places, start_of
 from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.workspace.colours import bar
 from app.viewer.views.templates import render
-from kin import Robot
-from kin.motion import Arrival, Motion, MotionLimits, Peak
+from kin.motion import Arrival, Dwell, Motion, MotionLimits, Peak, Spline
+from kin.motion.program import Kind, Segment, kind_of
 from kin.motion.results import Quantity
+from kin.transforms import Array
 from kin.units import Units, fixed
 
 KINDS: dict[Kind, tuple[str, str]] = {
@@ -62,60 +61,76 @@ def player(
 
 
 def clock(player: Player, duration: float, here: int | None) -> str:
-    """The present moment, for the page's own script; `here`: index of the item that is driven."""
+    """The present moment, for the page's own script; `here`: index of the row that is driven."""
     return render(
         "program/clock", time=f"{player.time:.3f}", duration=f"{duration:.3f}", playing=player.playing, here=here
     )
 
 
-def items_html(
-    items: Items,
-    chosen: int | None,
+def list_html(
     plan: Plan | None,
+    opened: tuple[int | None, int],
     fault: Fault | None,
     loop: bool,
     fields: Fields,
     by_pose: bool,
     revision: int,
 ) -> str:
-    """The list; the chosen item is open. `by_pose`: its values are those of the tool, not of the joints."""
-    first = start_of(items)
-    ends = plan.ends if plan is not None else ()
-    whole = plan is not None and plan.motion.planned
-    otherwise = {} if plan is None else plan.otherwise
-    start = None
-    if plan is not None and chosen in otherwise and items[chosen].kind != "spline":
-        start = plan.start_as_recorded(chosen)
+    """The rows of a program.
+
+    Args:
+        opened: index of the row that is open, and which of its points the fields are of.
+        by_pose: whether its values are those of the tool, not of the joints.
+        revision: another one replaces what was typed into the fields.
+    """
+    segments = () if plan is None else plan.segments
+    ends = () if plan is None else plan.ends
+    first, chosen = start_of(segments), opened[0]
     rows = []
-    for i, item in enumerate(items):
+    for i, segment in enumerate(segments):
+        otherwise = None if plan is None else plan.arrives_otherwise(i)
         rows.append(
             {
-                "title": item.name or ("Pause" if item.kind == "pause" else f"Waypoint {i + 1}"),
-                "words": _words(items, i, fields),
+                "title": segment.name or _title(i, segment),
+                "words": _words(segments, i, fields),
                 "time": f"{ends[i]:.2f} s" if i < len(ends) else "",
-                "item": item,
-                "otherwise": None if i not in otherwise else _otherwise(otherwise[i], fields),
-                "starts": item is first,
-                "inner": item is not first and passed_through(items, i),
+                "kind": kind_of(segment),
+                "row": segment,
+                "otherwise": None if otherwise is None else _otherwise(otherwise, fields),
+                "starts": i == first,
                 "fault": fault if fault is not None and fault.index == i else None,
             }
         )
     back = None
     if loop and first is not None:
-        time = f"{ends[-1]:.2f} s" if whole else ""
-        back = {"time": time, "fault": fault if fault is not None and fault.index == len(items) else None}
+        time = f"{ends[-1]:.2f} s" if plan is not None and plan.motion.planned else ""
+        back = {"time": time, "fault": fault if fault is not None and fault.index == len(segments) else None}
+    q: tuple[Array, ...] = () if plan is None or chosen is None else plan.q[chosen]
+    begins = None
+    if plan is not None and chosen is not None and plan.arrives_otherwise(chosen) is not None:
+        begins = plan.start_as_recorded(chosen)
     return render(
         "program/list",
         rows=rows,
         chosen=chosen,
+        count=len(q),
+        point=opened[1],
+        q=q[opened[1]] if q else None,
         back=back,
         kinds=KINDS,
-        full=len(items) >= MOST,
+        full=places(segments) >= MOST,
         revision=revision,
         fields=fields,
         by_pose=by_pose,
-        start=None if start is None else start[0] + 1,
+        way=plan is not None and chosen is not None and plan.can_have_way(chosen),
+        begins=None if begins is None else begins[0] + 1,
     )
+
+
+def _title(index: int, segment: Segment) -> str:
+    if isinstance(segment, Dwell):
+        return "Pause"
+    return "Spline" if isinstance(segment, Spline) else f"Waypoint {index + 1}"
 
 
 class Otherwise(NamedTuple):
@@ -141,28 +156,28 @@ def _otherwise(arrival: Arrival, fields: Fields) -> Otherwise:
     return Otherwise(title, detail, values)
 
 
-def _words(items: Items, index: int, fields: Fields) -> str:
-    """How the arm comes to an item, in a few words."""
-    item, lengths = items[index], fields.units.lengths
-    if item.kind == "pause":
-        return f"waits {item.seconds:g} s"
-    if item is start_of(items):
+def _words(segments: Segments, index: int, fields: Fields) -> str:
+    """How the arm comes to a row, in a few words."""
+    row, lengths = segments[index], fields.units.lengths
+    if isinstance(row, Dwell):
+        return f"waits {row.seconds:g} s"
+    if index == start_of(segments):
         return "start"
-    if passed_through(items, index):
-        return "spline, passed"
-    words = KINDS[item.kind][1]
-    if item.speed != 1.0:
-        words += f" at {100.0 * item.speed:g} %"
-    if item.tool_speed is not None:
-        words += f" ≤ {fields.size(item.tool_speed)} {lengths.name}/s"
-    if item.blend:
-        words += f", zone {fields.size(item.blend)} {lengths.name}"
+    words = KINDS[kind_of(row)][1]
+    if isinstance(row, Spline):
+        words += f" through {len(row.points)} point{'s' * (len(row.points) != 1)}"
+    if row.speed != 1.0:
+        words += f" at {100.0 * row.speed:g} %"
+    if row.tool_speed is not None:
+        words += f" ≤ {fields.size(row.tool_speed)} {lengths.name}/s"
+    if row.blend:
+        words += f", zone {fields.size(row.blend)} {lengths.name}"
     return words
 
 
-def summary(plan: Plan, robot: Robot, own: bool, units: Units) -> str:
+def summary(plan: Plan, own: bool, units: Units) -> str:
     """How long the motion takes, how near each joint comes to its limits, and what is assumed of them."""
-    motion, limits = plan.driven, plan.motion.limits
+    motion, limits, robot = plan.driven, plan.motion.limits, plan.motion.robot
     assert motion is not None
     heads = [f"{units.angles.name}{per}" for per in ("/s", "/s²", "/s³")]
     if not robot.revolute.all():
@@ -180,7 +195,7 @@ def summary(plan: Plan, robot: Robot, own: bool, units: Units) -> str:
         words=("" if plan.motion.planned else "Up to where the program ends: ") + _busiest(motion),
         notes=plan.notes(units),
         touches=plan.touches(),
-        touched=plan.touched_on_way_to,
+        touched=plan.touch.segment if plan.touch is not None and plan.can_have_way(plan.touch.segment) else None,
         assumed=assumption(limits, own, units),
         heads=list(zip(QUANTITIES, heads, strict=True)),
         rows=rows,
@@ -286,8 +301,3 @@ def assumption(limits: MotionLimits, own: bool, units: Units) -> str:
 
 def _number(value: float) -> str:
     return fixed(value, 0 if value >= 100 else 1 if value >= 10 else 2)
-
-
-def shown_names(items: Sequence[Item]) -> list[str]:
-    """The label of each waypoint in the scene: its number, and its name if it has one."""
-    return [f"{i + 1} {item.name}".strip() for i, item in enumerate(items) if item.q]

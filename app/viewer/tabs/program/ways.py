@@ -1,4 +1,4 @@
-"""*Find a way*: waypoints around obstacles are searched in the background and put into the list of a program.
+"""*Find a way*: waypoints around obstacles are searched in the background and put into a program.
 
 The search is random and has a time limit: that it finds nothing is not said to mean that there is nothing.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError
 from dataclasses import dataclass, field, replace
 
@@ -17,12 +17,13 @@ from app.viewer.arm import Arm
 from app.viewer.feature import Stage
 from app.viewer.panel import Post
 from app.viewer.panel.status import Notice
-from app.viewer.tabs.program.items import MOST, Item, Items, configuration
-from app.viewer.tabs.program.planning import Plan
+from app.viewer.tabs.program.plan import Plan
+from app.viewer.tabs.program.program import MOST, Segments, options, places, recorded
 from app.viewer.tabs.program.typed import SECONDS, read_number
 from app.viewer.tabs.workspace.background import run_in_background
 from app.viewer.views.templates import render
-from kin.motion import JointTarget, Ptp
+from kin.motion import Dwell, JointTarget, Ptp
+from kin.motion.program import Segment
 from kin.typed import EntryError
 from kin.units import Unit, Units
 from kin.way import MOST_SEED, find_way, is_installed, way_program
@@ -55,10 +56,10 @@ class Search:
 
     Attributes:
         index: of the waypoint.
-        plan, arm: of the list and the arm for which it is searched.
+        plan, arm: of the program and the arm for which it is searched.
         share: part of the time that has passed while it is searched; None: it is not.
-        title, explain: why the list stays as it is, the second in the units of the page; None: not known yet.
-        found: the list with the waypoints of the way; None: not found.
+        title, explain: why the program stays as it is, the second in the units of the page; None: not known yet.
+        found: the rows with the waypoints of the way; None: not found.
         count: how many waypoints were put in.
         cancelled: set when it is not wanted any more.
     """
@@ -69,22 +70,22 @@ class Search:
     share: float | None = None
     title: str = "No way was found"
     explain: Callable[[Units], str] | None = None
-    found: Items | None = None
+    found: Segments | None = None
     count: int = 0
     cancelled: threading.Event = field(default_factory=threading.Event)
 
     @property
     def start(self) -> int | None:
         """Index of the waypoint before; None: it is the first one, to which there is no way."""
-        return max((i for i, item in enumerate(self.plan.items[: self.index]) if item.q), default=None)
+        return self.plan.before(self.index)
 
-    def fits(self, items: Items, arm: Arm) -> bool:
-        """Whether the list and what the arm can touch are unchanged since this search began."""
+    def fits(self, segments: Segments, arm: Arm) -> bool:
+        """Whether the program and what the arm can touch are unchanged since this search began."""
         mine = self.arm
-        return items == self.plan.items and arm.robot == mine.robot and arm.obstacles == mine.obstacles
+        return segments == self.plan.segments and arm.robot == mine.robot and arm.obstacles == mine.obstacles
 
     def leads_by(self, index: int) -> bool:
-        """Whether an item of the list with the way is on it."""
+        """Whether a row of the program with the way is on it."""
         return self.index <= index <= self.index + self.count
 
     def said(self) -> tuple[str, str]:
@@ -99,10 +100,9 @@ def compute(search: Search, settings: Settings, report: Callable[[], None]) -> N
     Raises:
         CancelledError: it is not wanted any more.
     """
-    items, arm, before = search.plan.items, search.arm, search.start
+    plan, arm, before = search.plan, search.arm, search.start
     assert before is not None
-    item, arrival = items[search.index], search.plan.otherwise.get(before)
-    start = np.array(items[before].q) if arrival is None else arrival.q
+    start, goal = plan.met(before, len(plan.q[before]) - 1)[1], plan.q[search.index][-1]
     last = [time.monotonic()]
 
     def stop() -> None:
@@ -119,7 +119,7 @@ def compute(search: Search, settings: Settings, report: Callable[[], None]) -> N
     way = find_way(
         arm.robot,
         start,
-        item.q,
+        goal,
         obstacles=arm.obstacles,
         avoid_self_collision=itself,
         seed=settings.seed,
@@ -130,32 +130,25 @@ def compute(search: Search, settings: Settings, report: Callable[[], None]) -> N
     if way.q is None:
         search.explain = way.explain
         return
-    like = Ptp(JointTarget(item.q), **{name: getattr(item, name) for name in _KEPT})
+    like = Ptp(JointTarget(tuple(goal.tolist())), **options(plan.segments[search.index]) | {"blend": 0.0})
     motion = way_program(way, arm.obstacles, itself, stop, like)
     if not motion.planned:
         search.title, search.explain = "The way that was found cannot be driven", motion.explain
         return
     between = [
-        Item(
-            "ptp",
-            configuration(np.array(segment.target.q)),
-            blend=segment.blend,
-            **{name: getattr(item, name) for name in _KEPT},
-        )
-        for segment in motion.program.segments[:-1]
-        if isinstance(segment, Ptp) and isinstance(segment.target, JointTarget)
+        replace(each, target=recorded(np.array(each.target.q)), name="")
+        for each in motion.program.segments[:-1]
+        if isinstance(each, Ptp) and isinstance(each.target, JointTarget)
     ]
-    search.found, search.count = with_way(items, before, search.index, between), len(between)
+    search.found, search.count = with_way(plan.segments, before, search.index, between, like), len(between)
 
 
-_KEPT = ("speed", "acceleration", "tool_speed", "tool_turn")
-
-
-def with_way(items: Items, before: int, index: int, between: list[Item]) -> Items:
-    """The list with waypoints put in before an item, met by PTP; the arm stops at both ends of the way."""
-    end = replace(items[index], kind="ptp", via=None, blend=0.0)
-    start = replace(items[before], blend=0.0)
-    return (*items[:before], start, *items[before + 1 : index], *between, end, *items[index + 1 :])
+def with_way(segments: Segments, before: int, index: int, between: Sequence[Segment], end: Ptp) -> Segments:
+    """The rows with waypoints put in before one, which is met by PTP; the arm stops at both ends of the way."""
+    start = segments[before]
+    assert not isinstance(start, Dwell)
+    stop = replace(start, blend=0.0)
+    return (*segments[:before], stop, *segments[before + 1 : index], *between, end, *segments[index + 1 :])
 
 
 def html(search: Search, settings: Settings, units: Units) -> str:
@@ -187,22 +180,21 @@ class Ways:
     """The searches of one page, one at a time; the visitor's worker calls it.
 
     Args:
-        show: shows a search; None: nothing.
+        show: shows the form of a search as HTML; "": nothing.
         post: posts ``("searching",)`` and ``("searched",)`` with the search, or ``("failed",)`` with an exception.
     """
 
-    def __init__(self, stage: Stage, show: Callable[[Search | None, Settings], None], post: Post) -> None:
+    def __init__(self, stage: Stage, show: Callable[[str], None], post: Post) -> None:
         self._stage, self._show, self._post = stage, show, post
         self._search: Search | None = None
         self._settings = Settings()
 
     def open(self, plan: Plan | None, index: int) -> None:
-        """Show the form for the way to an item."""
+        """Show the form for the way to a row."""
         self.cancel()
         self._search = None
-        if plan is not None and index < len(plan.items) and plan.items[index].q:
-            search = Search(index, plan, self._stage.now)
-            self._search = None if search.start is None else search
+        if plan is not None and plan.can_have_way(index):
+            self._search = Search(index, plan, self._stage.now)
         self._redraw()
 
     def start(self) -> None:
@@ -230,7 +222,7 @@ class Ways:
         if mine is None or search is not mine:
             return None
         mine.share = None
-        if mine.found is not None and len(mine.found) > MOST:
+        if mine.found is not None and places(mine.found) > MOST:
             mine.found, mine.title = None, "The way has too many waypoints"
             too_many = f"It has {mine.count}; the program may have {MOST} waypoints and pauses in all."
             mine.explain = lambda _: too_many
@@ -255,9 +247,9 @@ class Ways:
         self._search = Search(mine.index, mine.plan, mine.arm) if mine is not None and running else None
         self._redraw()
 
-    def keep(self, items: Items) -> None:
+    def keep(self, segments: Segments) -> None:
         """Close the form, unless nothing has changed that its way depends on."""
-        if self._search is not None and not self._search.fits(items, self._stage.now):
+        if self._search is not None and not self._search.fits(segments, self._stage.now):
             self.cancel()
             self._search = None
         self._redraw()
@@ -268,4 +260,4 @@ class Ways:
             self._search.cancelled.set()
 
     def _redraw(self) -> None:
-        self._show(self._search, self._settings)
+        self._show("" if self._search is None else html(self._search, self._settings, self._stage.units))

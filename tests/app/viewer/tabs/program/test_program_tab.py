@@ -19,8 +19,8 @@ from app.exports.snippets import Service
 from app.shared.store import Store
 from app.viewer.session.state import decode
 from app.viewer.tabs.program.files import MOTIONS
-from app.viewer.tabs.program.items import MOST
 from app.viewer.tabs.program.postures import PLACES
+from app.viewer.tabs.program.program import MOST
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -492,10 +492,50 @@ def test_an_arc_has_a_via_point_and_a_spline_its_points(tab: FakeBrowser) -> Non
     ]
     press(tab, "via", 2)  # where the tool is: at the waypoint itself
     assert "Segment 3 (CIRC) cannot be driven" in part(tab, "list")
-    for index in (1, 2):
-        press(tab, "field", index, value=["kind", "spline"])
-    assert "spline, passed" in part(tab, "list")
+    press(tab, "field", 1, value=["kind", "spline"])
+    press(tab, "field", 2, value=["kind", "spline"])
+    assert titles(tab) == ["Waypoint 1", "Spline"]
+    assert "spline through 2 points" in part(tab, "list")
     assert "kb-fault" not in part(tab, "list")
+
+
+def test_the_points_of_a_spline_are_added_typed_moved_and_deleted_in_its_row(tab: FakeBrowser) -> None:
+    record(tab, 20, 50)
+    press(tab, "choose", 1)
+    press(tab, "field", 1, value=["kind", "spline"])
+
+    def points() -> list[np.ndarray]:
+        tab.wait(lambda: bool(tab.kept) and "pioneer5" in programs(tab.kept[-1]))
+        row = kin.program_from_dict(programs(tab.kept[-1])["pioneer5"], PIONEER).segments[-1]  # type: ignore[arg-type]
+        return [np.array(each.position) for each in getattr(row, "points", ())]
+
+    def shown(count: int) -> bool:
+        return len(re.findall(r'data-program-do="point"', part(tab, "list"))) == count
+
+    tab.set(TURN, 80)
+    shows(tab, PIONEER, turned(80))
+    press(tab, "add-point", 1)
+    assert shown(2)
+    at = [kin.fk(PIONEER, turned(angle))[:3, 3] for angle in (50, 80)]
+    tab.wait(lambda: len(points()) == 2 and np.allclose(points(), at, atol=1e-6))
+    press(tab, "shift-point", 1, value="-1")
+    tab.wait(lambda: np.allclose(points(), at[::-1], atol=1e-6))
+    press(tab, "shift-point", 1, value="-1")  # the first one stays the first
+    press(tab, "point", 1, value="1")
+    press(tab, "field", 1, value=["values", "joints"])
+    assert float(inputs(tab)["q0"]) == pytest.approx(50, abs=2e-3)
+    press(tab, "field", 1, value=["q0", "60"])
+    at[0] = kin.fk(PIONEER, turned(60))[:3, 3]
+    tab.wait(lambda: np.allclose(points(), at[::-1], atol=1e-6))
+    press(tab, "go", 1)
+    tab.wait(lambda: np.allclose(tab.tool_pose()[:3, 3], at[0], atol=1e-3))
+    press(tab, "point", 1, value="7")
+    press(tab, "delete-point", 1)
+    tab.wait(lambda: len(points()) == 1)
+    press(tab, "delete-point", 1)
+    assert shown(1), "a spline has a point"
+    press(tab, "field", 1, value=["kind", "ptp"])
+    assert titles(tab) == ["Waypoint 1", "Waypoint 2"]
 
 
 def test_two_motions_are_compared_and_code_is_copied(tab: FakeBrowser) -> None:

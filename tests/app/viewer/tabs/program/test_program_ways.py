@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ from app.shared.store import Store
 from app.viewer.session.choices import ViewState
 from app.viewer.session.state import PageState, decode, encode
 from app.viewer.tabs.program import ways
-from app.viewer.tabs.program.items import MOST, Item, waypoint
+from app.viewer.tabs.program.program import MOST, recorded
+from kin.motion import Circ, Dwell, Ptp
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -96,15 +98,11 @@ def test_a_way_around_a_post_is_put_into_the_program_in_one_step(port: int) -> N
         assert "A way to 3 was found" in html.unescape(tab.html)
         tab.wait(lambda: bool(tab.kept) and len(programs(tab)) > 3)
         found = programs(tab)
-        assert found[0][:2] == ["p", pytest.approx(start.tolist())]
-        assert found[1] == ["w", 0.5]
-        assert found[-1][:4] == ["p", pytest.approx(goal.tolist()), "above", 0.5]
-        assert all(row[3] == 0.5 for row in found[2:])
-        segments = [
-            kin.motion.Ptp(kin.motion.JointTarget(tuple(q)), speed=speed, blend=(more or [{}])[0].get("b", 0.0))
-            for _, q, _, speed, *more in found[2:]
-        ]
-        motion = kin.plan_motion(UR5, segments, start)
+        assert found[0].target.q == pytest.approx(start.tolist())
+        assert found[1] == Dwell(0.5)
+        assert (found[-1].target.q, found[-1].name) == (pytest.approx(goal.tolist()), "above")
+        assert all(row.speed == 0.5 for row in found[2:])
+        motion = kin.plan_motion(UR5, found[2:], start)
         q = motion.derivatives(np.linspace(0.0, motion.duration, 2000))[0]
         assert kin.clearance(UR5, q, [post]).min() > -1e-7
         tab.wait(lambda: tab.script["undo"] == "Find a way")
@@ -112,10 +110,10 @@ def test_a_way_around_a_post_is_put_into_the_program_in_one_step(port: int) -> N
         tab.wait(lambda: rows(tab) == 3)
 
 
-def programs(tab: FakeBrowser) -> list[list[object]]:
+def programs(tab: FakeBrowser) -> tuple[Any, ...]:
     """The rows of the only program in the page's link."""
     (found,) = decode(tab.kept[-1], ROBOTS).features["program"]["programs"].values()  # type: ignore[union-attr]
-    return found  # type: ignore[no-any-return]
+    return kin.program_from_dict(found, UR5).segments
 
 
 @needs_ompl
@@ -217,8 +215,8 @@ def test_units_that_are_changed_while_a_search_goes_on_neither_end_it_nor_lose_a
         assert "touches" not in part(tab, "summary")
         tab.wait(lambda: bool(tab.kept) and len(programs(tab)) > 2)
         found = programs(tab)
-        assert found[-1][1] == pytest.approx(goal.tolist())
-        assert [row[4]["v"] for row in found[1:]] == [0.25] * (len(found) - 1)  # type: ignore[index]
+        assert found[-1].target.q == pytest.approx(goal.tolist())
+        assert [row.tool_speed for row in found[1:]] == [0.25] * (len(found) - 1)
         assert f'value="{goal[0]:.5f}"' in part(tab, "list"), "joint values in radians"
 
 
@@ -293,12 +291,7 @@ def test_a_way_that_has_no_room_in_the_program_is_said(port: int) -> None:
 
 
 def test_a_line_to_the_end_of_a_way_becomes_a_ptp_and_the_arm_stops_at_both_ends() -> None:
-    a, b, c, d = (waypoint(np.array([k, 0.0])) for k in range(4))
-    items = (
-        a,
-        replace(b, blend=0.05),
-        Item("pause", seconds=1.0),
-        replace(c, kind="circ", via=(1.0, 0.0, 0.0), blend=0.1),
-    )
-    found = ways.with_way((*items, d), 1, 3, [d])
-    assert found == (a, b, items[2], d, c, d)
+    a, b, c, d = (Ptp(recorded(np.array([k, 0.0]))) for k in range(4))
+    arc = Circ((1.0, 0.0, 0.0), c.target, blend=0.1)
+    found = ways.with_way((a, replace(b, blend=0.05), Dwell(1.0), arc, d), 1, 3, [d], c)
+    assert found == (a, b, Dwell(1.0), d, c, d)
