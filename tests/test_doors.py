@@ -62,7 +62,6 @@ TRUSTED = {
     "app/notebook/child.py": "the process that started this one",
     "app/shared/answers/answer.py": "code of ours",
     "app/service/compute": "the service, and its own processes",
-    "app/shared/options.py": "code of ours",
     "app/shared/settings.py": "the operator's settings",
     "app/shared/solver_names.py": "a file of ours",
     "app/viewer/courses/feature.py": "a course of our database",

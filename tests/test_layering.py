@@ -153,6 +153,7 @@ RULES: dict[str, set[str]] = {
         "app.shared",
     },
     "app/cli/parser.py": {"kin", "app.bench.command", "app.cli"},
+    "app/cli/arguments/completion.py": {"kin", "shtab"},
     "app/cli/arguments": {"app.cli.arguments", "app.shared.options"},
     "app/cli/bodies.py": {"kin", "app.viewer.meshes"},
     "app/cli/page.py": {"kin", "app.cli", "app.exports", "app.viewer.scene.bodies", "app.viewer.takehome"},

@@ -19,7 +19,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, NoReturn
 
 from app.cli import arguments as declare
-from app.cli.arguments.completion import add_completion, script
 from app.cli.arguments.shared import Parents
 from app.cli.classroom.arguments import add_lti, add_result, add_results, add_room
 from app.cli.startup import disable_compiler, no_collections
@@ -42,6 +41,7 @@ class Command(NamedTuple):
     """One command.
 
     Attributes:
+        name: the first word of the command line.
         declare: adds its arguments.
         load: imports the function that runs it and returns the exit code.
         interpreted: whether its kernels run as plain Python. One pose takes a tenth of a millisecond that way;
@@ -49,6 +49,7 @@ class Command(NamedTuple):
         compiled_with: an argument with which they are compiled all the same, as there is much to compute.
     """
 
+    name: str
     declare: Callable[[Any, Parents], argparse.ArgumentParser]
     load: Callable[[], Run]
     interpreted: bool = False
@@ -63,7 +64,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # for terminals that cannot print θ or ·
     try:
-        arguments, unknown = _parser().parse_known_args([_not_an_option(word) for word in words])
+        with no_collections():
+            parser = _parser(words[0])
+        arguments, unknown = parser.parse_known_args([_not_an_option(word) for word in words])
         if unknown:
             arguments.parser.error("unrecognized arguments: " + " ".join(unknown))
     except SystemExit as stop:  # argparse has printed the help
@@ -142,7 +145,8 @@ class _Parser(argparse.ArgumentParser):
         raise _UsageError(self, message)
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(name: str = "") -> argparse.ArgumentParser:
+    """The parser of one command; without its name, or for a name that there is not, that of all."""
     parser = _Parser(
         prog="kinboard",
         description=DESCRIPTION,
@@ -152,7 +156,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     parents = Parents()
-    for command in COMMANDS:
+    for command in [each for each in COMMANDS if each.name == name] or COMMANDS:
         declared = command.declare(subparsers, parents)
         declared.set_defaults(command=command, parser=declared)
     return parser
@@ -261,8 +265,11 @@ def _load_page() -> Run:
 
 
 def _load_completion() -> Run:
+    from app.cli.arguments.completion import script
+
     def run(arguments: argparse.Namespace) -> int:
-        print(script(arguments.shell, _parser()), end="")
+        parser = _parser()
+        print(script(arguments.shell, parser, subcommands(parser).values()))
         return 0
 
     return run
@@ -311,26 +318,26 @@ def _load_lti() -> Run:
 
 
 COMMANDS = (
-    Command(declare.add_serve, _load_serve),
-    Command(declare.add_open, _load_open),
-    Command(declare.add_fk, _load_fk, interpreted=True, compiled_with="configurations"),
-    Command(declare.add_ik, _load_ik),
-    Command(declare.add_move, _load_move),
-    Command(declare.add_way, _load_way),
-    Command(declare.add_page, _load_page),
-    Command(declare.add_robots, _load_robots, interpreted=True),
-    Command(declare.add_workspace, _load_workspace),
-    Command(add_room, _load_room),
-    Command(add_result, _load_result, interpreted=True),
-    Command(add_results, _load_results, interpreted=True),
-    Command(add_lti, _load_lti, interpreted=True),
-    Command(declare.add_bench, _load_bench),
-    Command(declare.add_check, _load_check, interpreted=True),
-    Command(declare.add_compare, _load_compare, interpreted=True),
-    Command(declare.add_motors, _load_motors, interpreted=True),
-    Command(declare.add_doctor, _load_doctor, interpreted=True),
-    Command(declare.add_capability, _load_capability),
-    Command(declare.add_import, _load_import, interpreted=True),
-    Command(declare.add_export, _load_export, interpreted=True),
-    Command(add_completion, _load_completion, interpreted=True),
+    Command("serve", declare.add_serve, _load_serve),
+    Command("open", declare.add_open, _load_open),
+    Command("fk", declare.add_fk, _load_fk, interpreted=True, compiled_with="configurations"),
+    Command("ik", declare.add_ik, _load_ik),
+    Command("move", declare.add_move, _load_move),
+    Command("way", declare.add_way, _load_way),
+    Command("page", declare.add_page, _load_page),
+    Command("robots", declare.add_robots, _load_robots, interpreted=True),
+    Command("workspace", declare.add_workspace, _load_workspace),
+    Command("room", add_room, _load_room),
+    Command("result", add_result, _load_result, interpreted=True),
+    Command("results", add_results, _load_results, interpreted=True),
+    Command("lti", add_lti, _load_lti, interpreted=True),
+    Command("bench", declare.add_bench, _load_bench),
+    Command("check", declare.add_check, _load_check, interpreted=True),
+    Command("compare", declare.add_compare, _load_compare, interpreted=True),
+    Command("motors", declare.add_motors, _load_motors, interpreted=True),
+    Command("doctor", declare.add_doctor, _load_doctor, interpreted=True),
+    Command("capability", declare.add_capability, _load_capability),
+    Command("import", declare.add_import, _load_import, interpreted=True),
+    Command("export", declare.add_export, _load_export, interpreted=True),
+    Command("completion", declare.add_completion, _load_completion, interpreted=True),
 )

@@ -1,20 +1,16 @@
 """The options of inverse kinematics as `kin.IKOptions` declares them, for REST and the command line.
 
-They are read from the source of :mod:`kin.ik.options`, which is not imported: help and usage errors of the command
-line appear at once, and importing the core takes half a second.
+The core is imported when they are asked for: it takes half a second, which other commands do not need.
 """
 
 from __future__ import annotations
 
-import ast
+import inspect
 import re
+from dataclasses import fields
 from functools import cache
-from importlib.util import find_spec
-from pathlib import Path
 from textwrap import dedent
-from typing import NamedTuple
-
-SOURCES = ("differential/task.py", "ik/options.py")  # of the tasks, and of everything else
+from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
 
 
 class Option(NamedTuple):
@@ -46,46 +42,23 @@ class Option(NamedTuple):
 @cache
 def declared() -> dict[str, Option]:
     """The options by name, in the order of the keywords of `kin.solve_ik`."""
-    found = find_spec("kin")  # of the package alone, which does not run it
-    assert found is not None
-    assert found.submodule_search_locations
-    folder = Path(found.submodule_search_locations[0])
-    task, module = (ast.parse((folder / path).read_text(encoding="utf-8")) for path in SOURCES)
-    words = {name: _words(value) for each in (task, module) for name, value in _assignments(each)}
-    classes = {node.name: node for node in module.body if isinstance(node, ast.ClassDef)}
-    limits, options = (_fields(classes[name], words) for name in ("JointConstraints", "IKOptions"))
+    from kin.ik.options import IKOptions, JointConstraints
+
     rows: dict[str, Option] = {}
-    for name, option in options.items():
-        rows |= limits if name == "constraints" else {name: option}
+    for name, option in _options(IKOptions).items():
+        rows |= _options(JointConstraints) if name == "constraints" else {name: option}
     return rows
 
 
-def _assignments(module: ast.Module) -> list[tuple[str, ast.expr]]:
-    return [
-        (node.targets[0].id, node.value)
-        for node in module.body
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
-    ]
-
-
-def _words(value: ast.expr) -> tuple[str, ...]:
-    """The words of a `Literal`; none for anything else."""
-    if isinstance(value, ast.Subscript) and ast.unparse(value.value) == "Literal":
-        found = ast.literal_eval(value.slice)
-        return found if isinstance(found, tuple) else (found,)
-    return ()
-
-
-def _fields(node: ast.ClassDef, words: dict[str, tuple[str, ...]]) -> dict[str, Option]:
-    texts = _texts(ast.get_docstring(node) or "")
+def _options(cls: type[Any]) -> dict[str, Option]:
+    texts, hints = _texts(inspect.getdoc(cls) or ""), get_type_hints(cls, include_extras=True)
     rows = {}
-    for each in node.body:
-        if isinstance(each, ast.AnnAssign) and isinstance(each.target, ast.Name):
-            name, kind = each.target.id, ast.unparse(each.annotation)
-            unit = re.search(r"Range\(.*'(\w+)'\)", kind)
-            default = each.value.value if isinstance(each.value, ast.Constant) else None
-            of = "" if unit is None else unit[1]
-            rows[name] = Option(name, texts[name], default, words.get(kind, ()), kind == "bool", of)
+    for each in fields(cls):
+        name, hint = each.name, hints[each.name]
+        default = each.default if isinstance(each.default, str | int) else None
+        choices = get_args(hint) if get_origin(hint) is Literal else ()
+        unit = hint.__metadata__[0].unit if get_origin(hint) is Annotated else ""
+        rows[name] = Option(name, texts[name], default, choices, hint is bool, unit)
     return rows
 
 

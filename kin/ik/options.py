@@ -6,9 +6,7 @@ value is made; :mod:`kin.ik.problem` checks the rest against an arm, once for ea
 
 The class is the only description of the options: its annotations hold the choices, ranges and units, its docstring
 the texts. The fields of REST requests and the flags of the command line follow from it, and tests compare the
-keywords of `kin.solve_ik`, `kin.solve_ik_many`, `kin.solve_path` and `kin.plan_motion` with it. The command line
-reads this module without importing it: the choices of an option are an alias of `Literal` here, those of the task
-in :mod:`kin.differential.task`.
+keywords of `kin.solve_ik`, `kin.solve_ik_many`, `kin.solve_path` and `kin.plan_motion` with it.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from app.shared.options import declared
 
 ROBOT_HELP = "id of the robot (`kinboard robots` lists them), or a robot file (*.toml, *.urdf)"
 XYZ = ("X", "Y", "Z")
+SHELLS = ("bash", "zsh", "fish")
 POSE_FORMS = (
     *("wxyz", "xyzw", "rpy", "rotvec", "zyz", "axis", "matrix", "kuka", "fanuc", "abb", "ur", "polyscope"),
     *("staubli", "yaskawa", "doosan", "kawasaki", "denso", "mitsubishi"),
@@ -548,4 +549,12 @@ def add_capability(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     )
     _add_dask(parser)
     parser.add_argument("-o", "--output", metavar="FILE", help="write the map to a file: .npz, .ply or .csv")
+    return parser
+
+
+def add_completion(commands: Any, _: Parents) -> argparse.ArgumentParser:
+    """``kinboard completion``."""
+    about = "print a script with which a shell completes commands, options and robots"
+    parser = _command(commands, "completion", about, takes_robot=False)
+    parser.add_argument("shell", choices=SHELLS, metavar="SHELL", help="bash, zsh or fish")
     return parser

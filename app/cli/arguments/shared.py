@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from functools import cached_property
 
 from app.cli.arguments.options import UNITS_NOTE, add_options
 from app.cli.arguments.values import frame, workpiece
@@ -38,8 +39,6 @@ class Parents:
             default=False,
             help="read and print radians and metres",
         )
-        self.joints = argparse.ArgumentParser(add_help=False)
-        add_options(self.joints, ["limits", "locked", "wider_limits"])
         self.pendant = argparse.ArgumentParser(add_help=False)
         self.pendant.add_argument(
             "--pendant",
@@ -67,3 +66,10 @@ class Parents:
             help="a frame of your own, such as a table, with its pose in the world frame; --frame may name it; "
             f"{UNITS_NOTE}; may be repeated",
         )
+
+    @cached_property
+    def joints(self) -> argparse.ArgumentParser:
+        """``--lock`` and ``--limit``; options of inverse kinematics, for which the core is imported."""
+        parser = argparse.ArgumentParser(add_help=False)
+        add_options(parser, ["limits", "locked", "wider_limits"])
+        return parser

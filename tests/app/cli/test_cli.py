@@ -427,6 +427,10 @@ def test_flags_reach_the_settings_and_win_over_the_environment(served, monkeypat
     assert opened is True
 
 
+def test_each_row_of_the_commands_is_named_as_the_command():
+    assert [name for name in parser.subcommands() if " " not in name] == [each.name for each in parser.COMMANDS]
+
+
 def test_version_and_help(capsys):
     assert run(capsys, "--version") == (0, f"kinboard {kin.__version__}\n", "")
     code, out, _ = run(capsys, "--help")
