@@ -15,14 +15,13 @@ import os
 import subprocess
 import sys
 import threading
-from concurrent.futures import CancelledError, Future
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextvars import ContextVar
 from functools import partial
 
 from app.api.problems import ProblemError
 from app.api.work import TooSlowError, current_deadline, stopping
 from app.shared.threads import NICENESS, lower_priority
-from app.shared.threads.executor import DaemonExecutor
 from kin.kernels.elsewhere import DONE
 
 STEP = 0.02  # s between two looks at the processes
@@ -63,7 +62,7 @@ class KernelCompiler:
 
     def __init__(self, niceness: int = NICENESS) -> None:
         # The process inherits the priority of the thread that starts it.
-        self._executor = DaemonExecutor(1, "kinboard-compiler", partial(lower_priority, niceness))
+        self._executor = ThreadPoolExecutor(1, "kinboard-compiler", partial(lower_priority, niceness))
         self._lock = threading.Lock()
         self._answers: dict[str, Future[bool]] = {}  # to lines that wait or are being compiled
         self._idle: threading.Timer | None = None
@@ -83,7 +82,7 @@ class KernelCompiler:
         """End the process, whatever it compiles, and all waiting. Any thread may call."""
         with self._lock:
             self._stopped = True
-            self._executor.shutdown()
+            self._executor.shutdown(wait=False, cancel_futures=True)
             self._answers = {line: answer for line, answer in self._answers.items() if not answer.cancelled()}
             if self.child is not None and self._answers:
                 self.child.kill()  # the thread that waits for it sees that
