@@ -38,7 +38,7 @@ class Startup:
     """Starts the viewer and compiles the kernels in a thread; ``/readyz`` reports `status`.
 
     Args:
-        make_viewer: makes the viewer, which is told which kernels are compiled.
+        make_viewer: makes the viewer from the state of the kernels.
         bridge: has the viewer serve visitors once it has started.
         pool: processes that compute, if there are any.
         on_ready: called by that thread when everything is ready, just before `status` says so.

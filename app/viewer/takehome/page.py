@@ -89,8 +89,9 @@ def save_page(
     if motion is not None and motion.robot != robot:
         raise InputError("motion", motion.robot.name, f"a motion of the same arm, {robot.name}")
     at = robot.q_home if q is None else robot.check_q(q)
-    options = IKOptions(obstacles=obstacles)
-    saved = SavedArm(robot, at, drawing(robot), target, options, motion, DEFAULT_UNITS, link, options.obstacles)
+    bodies = tuple(obstacles)
+    options = IKOptions(obstacles=bodies)
+    saved = SavedArm(robot, at, drawing(robot), target, options, motion, DEFAULT_UNITS, link, bodies)
     file = Path(path)
     file.write_text(web_page(saved), encoding="utf-8")
     return file
