@@ -10,11 +10,11 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
-from app.exercises.fields import Fields
+from app.exercises.cell import Declared
 from app.exercises.questions import Asked, Question, Verdict
 from app.exercises.variant import Variant
 from kin import InputError, KinematicsError
@@ -26,8 +26,8 @@ DIGITS = (4, 5, 6, 8)  # significant ones of a right answer on show: the fewest 
 NOISE = 9  # decimals beyond which a computed number is zero
 
 
-class Kind(ABC):
-    """One question; a class per kind of exercise.
+class Kind(Declared, ABC):
+    """One question; a class per kind of exercise. Its fields are those of a file's table ``[answer]``.
 
     Attributes:
         name: as in files.
@@ -43,11 +43,6 @@ class Kind(ABC):
     shows_posture: ClassVar[bool] = False
     in_words: ClassVar[bool] = False
     withholds: ClassVar[frozenset[str]] = frozenset()
-
-    @classmethod
-    @abstractmethod
-    def read(cls, fields: Fields) -> Self:
-        """The question of a file's table ``[answer]``; raises `ExerciseFileError`."""
 
     @abstractmethod
     def asked(self, variant: Variant, units: Units) -> Asked:

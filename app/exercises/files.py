@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
+from app.exercises import cell
+from app.exercises.cell import Declared
 from app.exercises.exercise import TOPICS, Drawn, Exercise, Target
 from app.exercises.expressions import Expression
 from app.exercises.fields import ExerciseFileError, Fields, text_of, toml_of
@@ -28,6 +32,42 @@ _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
 Find = Callable[[str], Robot]
 
 
+@dataclass(frozen=True)
+class Head(Declared):
+    """What lists and the page show of an exercise."""
+
+    title: str = cell.line("Title", "Shown in the list.")
+    id: str = cell.line("Id", "Lower-case letters, digits and hyphens; different from all others.")
+    topic: str = cell.choice("Topic", "", TOPICS)
+    level: int = cell.whole("Level", "1 is easy, 3 is hard; empty: 1.", 1, 3, 1)
+    place: int = cell.whole(
+        "Place", f"Orders the exercises of one level, 1 to {LAST}; empty: at the end.", 1, LAST, LAST
+    )
+    lesson: str = cell.choice(
+        "Lesson", "The lesson that it belongs to. The checks of later lessons may ask it.", LESSONS, ""
+    )
+    robot: str = cell.special("Arm", "An arm of this service.", "choice", Fields.text)
+
+    def check(self, table: Fields) -> None:
+        if not _ID.fullmatch(self.id):
+            raise table.refuse("id", self.id, "lower-case letters, digits and hyphens, at most 40")
+
+
+@dataclass(frozen=True)
+class Task(Declared):
+    """Its texts."""
+
+    text: str = cell.text("Text", "What is asked.")
+    hints: tuple[str, ...] = cell.lines(
+        "Hints", f"One in each line, at most {MOST_HINTS}; shown one after the other."
+    )
+    shown: str = cell.text("Why", "Why the answer is right; shown at the end.", "")
+
+    def check(self, table: Fields) -> None:
+        if len(self.hints) > MOST_HINTS:
+            raise table.refuse("hints", len(self.hints), f"at most {MOST_HINTS} hints")
+
+
 def parse_exercise(text: str, file: str = "exercise", find: Find = get_robot, builtin: bool = False) -> Exercise:
     """The exercise described by TOML text; `find` gives the arm of an id, `file` is the name in messages.
 
@@ -42,14 +82,9 @@ def parse_exercise(text: str, file: str = "exercise", find: Find = get_robot, bu
     fields = Fields(file, data, names=names, found=computed.found)
     for table in ("vary", "let"):
         fields.get(table)
-    robot = _robot(fields, find)
+    head, task = Head.read(fields), Task.read(fields)
+    robot = _robot(fields, head.robot, find)
     kind = KINDS[fields.choice("kind", KINDS)]
-    exercise_id = fields.text("id")
-    if not _ID.fullmatch(exercise_id):
-        raise fields.refuse("id", exercise_id, "lower-case letters, digits and hyphens, at most 40")
-    hints = fields.texts("hints")
-    if len(hints) > MOST_HINTS:
-        raise fields.refuse("hints", len(hints), f"at most {MOST_HINTS} hints")
     q = fields.expressions("q")
     if q and len(q) != robot.n:
         raise fields.refuse("q", len(q), f"{robot.n} values, one per joint")
@@ -57,35 +92,26 @@ def parse_exercise(text: str, file: str = "exercise", find: Find = get_robot, bu
     question = kind.read(answer)
     answer.done()
     require, target = fields.expressions("require"), _target(fields, robot)
+    fields.done()
     known = names | frozenset(Facts(robot, robot.q_home))
     for expression in fields.found:
         if unknown := sorted(expression.names - known):
             valid = f"a name from [vary] or [let], or of the arm: {', '.join(sorted(known))}"
             raise ExerciseFileError(file, expression.field, unknown[0], valid)
-    exercise = Exercise(
-        exercise_id,
-        fields.text("title"),
-        fields.choice("topic", TOPICS),
-        fields.whole("level", 1, 3, 1),
-        fields.whole("place", 1, LAST, LAST),
-        fields.choice("lesson", LESSONS) if fields.has("lesson") else "",
-        robot,
-        fields.text("text"),
-        hints,
-        fields.text("shown", ""),
-        vary,
-        let,
-        require,
-        q,
-        target,
-        question,
-        tuple(fields.found),
-        file,
-        text,
-        builtin,
+    described: dict[str, Any] = {**vars(head), **vars(task), "robot": robot}
+    return Exercise(
+        **described,
+        vary=vary,
+        let=let,
+        require=require,
+        q=q,
+        target=target,
+        kind=question,
+        expressions=tuple(fields.found),
+        file=file,
+        source=text,
+        builtin=builtin,
     )
-    fields.done()
-    return exercise
 
 
 def load_exercise(path: Path | str, find: Find = get_robot, builtin: bool = False) -> Exercise:
@@ -118,8 +144,7 @@ def builtin_exercises() -> tuple[Exercise, ...]:
     return load_folder(BUILTIN, builtin=True)
 
 
-def _robot(fields: Fields, find: Find) -> Robot:
-    robot_id = fields.text("robot")
+def _robot(fields: Fields, robot_id: str, find: Find) -> Robot:
     try:
         return find(robot_id)
     except KinematicsError as error:

@@ -3,8 +3,6 @@
 A draft is the data of a file, as `tomllib` reads it. `groups` says which cells stand where and what is in them,
 `with_cell`, `with_row` and `without_row` change one of them. Whether the draft is an exercise, only
 `files.parse_exercise` says: what makes no sense is kept as it was typed.
-
-Long because it lists every field of every kind with its label and its help.
 """
 
 from __future__ import annotations
@@ -13,68 +11,20 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Any
 
-from app.exercises.exercise import TOPICS
+from app.exercises.cell import Cell, Table
 from app.exercises.fields import LIMITS, MOST_ITEMS
-from app.exercises.files import LAST, MOST_HINTS, UNITS
+from app.exercises.files import UNITS, Head, Task
 from app.exercises.kinds import KINDS
-from app.exercises.kinds.find import MEASURES, NONE
-from app.exercises.kinds.mistake import MISTAKES
-from app.exercises.kinds.number import OTHER, SCALES
-from app.exercises.lessons import LESSONS
 from kin import InputError
-from kin.ik.options import TASKS
 from kin.parsing import TextError, read_toml
-from kin.robot import CONVENTIONS
 
 Draft = dict[str, Any]
-Form = Literal["line", "text", "lines", "expression", "expressions", "number", "numbers", "choice", "flag"]
 LONGEST_CELL = 2000  # characters
 TABLES = ("vary", "let", "target", "answer")
 _UNIT = "The unit of the numbers; none: they are as they are."
-_WHEN = "Only where this expression is true."
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One field.
-
-    Attributes:
-        name: in the file.
-        label, help: what stands beside it.
-        form: how it is typed. Of ``lines``, ``expressions`` and ``numbers`` there is one in each line.
-        options: of a choice.
-        default: of a flag.
-    """
-
-    name: str
-    label: str
-    help: str = ""
-    form: Form = "line"
-    options: tuple[str, ...] = ()
-    default: bool = False
-
-
-@dataclass(frozen=True)
-class Table:
-    """Rows of cells: a list of tables in the file, or, if they are `named`, a table of tables.
-
-    Attributes:
-        one: what a row is called.
-        fresh: what a new row holds.
-    """
-
-    name: str
-    label: str
-    help: str
-    one: str
-    columns: tuple[Cell, ...]
-    fresh: dict[str, Any]
-    named: bool = False
-
-
 Field = Cell | Table
 
 
@@ -118,52 +68,9 @@ class Group:
     members: tuple[Entry | Rows, ...]
 
 
-_MOTIONS = Table(
-    "motions",
-    "Motions",
-    "In their order; each turns or slides.",
-    "motion",
-    (
-        Cell("turn", "Turn about", "", "choice", ("x", "y", "z")),
-        Cell("slide", "Slide along", "", "choice", ("x", "y", "z")),
-        Cell("by", "By", "An angle or a length.", "expression"),
-    ),
-    {"turn": "z", "by": "90*deg"},
-)
-_FIXED_AXES = Cell("fixed_axes", "About the axes of the base", "Otherwise about the frame’s own.", "flag")
-_NEAR = Cell("position_tolerance", "Accepted distance, mm", "", "number")
-_TURNED = Cell("rotation_tolerance", "Accepted rotation, degrees", "", "number")
 _HEAD: tuple[tuple[str, str, tuple[Field, ...]], ...] = (
-    (
-        "About it",
-        "",
-        (
-            Cell("title", "Title", "Shown in the list."),
-            Cell("id", "Id", "Lower-case letters, digits and hyphens; different from all others."),
-            Cell("topic", "Topic", "", "choice", TOPICS),
-            Cell("level", "Level", "1 is easy, 3 is hard; empty: 1.", "number"),
-            Cell(
-                "place", "Place", f"Orders the exercises of one level, 1 to {LAST}; empty: at the end.", "number"
-            ),
-            Cell(
-                "lesson",
-                "Lesson",
-                "The lesson that it belongs to. The checks of later lessons may ask it.",
-                "choice",
-                tuple(LESSONS),
-            ),
-            Cell("robot", "Arm", "An arm of this service.", "choice"),
-        ),
-    ),
-    (
-        "Task",
-        "{t1} is the number t1 from below, in the reader’s unit.",
-        (
-            Cell("text", "Text", "What is asked.", "text"),
-            Cell("hints", "Hints", f"One in each line, at most {MOST_HINTS}; shown one after the other.", "lines"),
-            Cell("shown", "Why", "Why the answer is right; shown at the end.", "text"),
-        ),
-    ),
+    ("About it", "", Head.cells()),
+    ("Task", "{t1} is the number t1 from below, in the reader’s unit.", Task.cells()),
     (
         "Numbers",
         "Each student gets other ones. Expressions are in radians and metres: 30*deg, 250*mm, pi/2.",
@@ -213,164 +120,6 @@ _HEAD: tuple[tuple[str, str, tuple[Field, ...]], ...] = (
         ),
     ),
 )
-_REASON = Cell("reason", "Reason", "Said to whom answers this.", "text")
-ANSWERS: dict[str, tuple[Field, ...]] = {
-    "number": (
-        Cell("value", "Right value", "An expression; of a vector one in each line.", "expressions"),
-        Cell("labels", "Names", "Of the parts of a vector, one in each line.", "lines"),
-        Cell("unit", "Unit", "In which it is typed.", "choice", (*SCALES, *OTHER)),
-        Cell("tolerance", "Tolerance", "In this unit, or a share such as 2 %.", "number"),
-        Cell("least", "Finest tolerance", "It then also keeps off mistakes and zero.", "expression"),
-        Cell("method", "Method", "How it is computed.", "text"),
-        Cell("whole_turns", "Whole turns count", "360° more is another answer.", "flag"),
-        Table(
-            "mistakes",
-            "Known mistakes",
-            "Values that students get by a mistake, and what is said.",
-            "mistake",
-            (
-                Cell("value", "Value", "", "expressions"),
-                Cell("when", "When", _WHEN, "expression"),
-                _REASON,
-                Cell("beyond", "All larger sizes", "No right value is as large.", "flag"),
-            ),
-            {"value": "0", "reason": "Why this is wrong."},
-        ),
-    ),
-    "choice": (
-        Table(
-            "options",
-            "Options",
-            "At least two.",
-            "option",
-            (
-                Cell("text", "Text", "", "text"),
-                Cell("right", "Right", "", "flag"),
-                Cell("when", "Right when", "Instead: where this expression is true.", "expression"),
-                Cell("offered", "Offered when", _WHEN, "expression"),
-                _REASON,
-            ),
-            {"text": "Another answer", "reason": "Why this is wrong."},
-        ),
-        Cell("shuffle", "Shuffle the options", "", "flag", default=True),
-    ),
-    "dh": (
-        Cell("rows", "Rows", "Consecutive numbers from 1, one in each line.", "numbers"),
-        Cell("convention", "Convention", "None: that of the arm.", "choice", tuple(CONVENTIONS)),
-    ),
-    "mistake": (Cell("mistakes", "Mistakes", "One in each line: " + ", ".join(MISTAKES) + ".", "lines"),),
-    "reach": (
-        Cell("task", "What must match", "", "choice", tuple(TASKS)),
-        Cell("branch", "Posture", "Such as: elbow up."),
-        Table(
-            "locked",
-            "Locked joints",
-            "Joints that must be at a value.",
-            "joint",
-            (Cell("joint", "Joint", "Its number.", "number"), Cell("value", "Value", "", "expression")),
-            {"joint": 1, "value": "0"},
-        ),
-        Cell("margin", "Margin to the limits, %", "Of the range of each joint.", "number"),
-        Cell("manipulability", "Least manipulability", "", "expression"),
-        _NEAR,
-        _TURNED,
-        Cell("line", "Line to", "x, y and z of the end of a line that the tool drives from there.", "expressions"),
-    ),
-    "find": (
-        Table(
-            "conditions",
-            "Conditions",
-            "All of them must hold where the arm is driven.",
-            "condition",
-            (
-                Cell("text", "Required", "As a part of a sentence.", "text"),
-                Cell("holds", "Holds if", "An expression about the arm at the answer.", "expression"),
-                Cell("wrong", "Otherwise", "Said if it does not hold.", "text"),
-                Cell("value", "Value", "Said after that.", "expression"),
-                Cell("measure", "Shown as", "", "choice", MEASURES),
-            ),
-            {"text": "the tool is above the base", "holds": "z > pz(0)", "wrong": "It is not above the base."},
-        ),
-        Cell("stays", "What stays", "Of the tool, as in the target.", "choice", (NONE, *TASKS)),
-        Cell("at", "For instance at", "One right configuration, one joint in each line.", "expressions"),
-        Cell("method", "Method", "How one is found.", "text"),
-    ),
-    "solutions": (
-        Cell("task", "What must match", "", "choice", tuple(TASKS)),
-        Cell("rows", "Rows", "Of the form.", "number"),
-        Cell("tolerance", "Tolerance, degrees", "", "number"),
-    ),
-    "singularity": (
-        Cell("asks", "Asks for", "", "choice", ("name", "direction")),
-        Cell("tolerance", "Tolerance, degrees", "Of a direction.", "number"),
-    ),
-    "term": (
-        Cell("name", "Name of the entry", "Such as: p_x."),
-        Cell("entry", "Its value", "", "expression"),
-        Table(
-            "terms",
-            "Terms",
-            "At least two; their sum is the entry.",
-            "term",
-            (Cell("value", "Value", "", "expression"), Cell("shown", "As printed")),
-            {"value": "0", "shown": "0"},
-        ),
-        Table(
-            "misprints",
-            "Misprints",
-            "One of them is drawn.",
-            "misprint",
-            (
-                Cell("term", "Term", "Its number.", "number"),
-                Cell("value", "Value", "", "expression"),
-                Cell("shown", "As printed"),
-                _REASON,
-            ),
-            {"term": 1, "value": "0", "shown": "0", "reason": "Why this is wrong."},
-        ),
-    ),
-    "frame": (
-        _MOTIONS,
-        Cell("row", "Or the frame of row", "Instead of motions.", "number"),
-        _FIXED_AXES,
-        _NEAR,
-        _TURNED,
-    ),
-    "order": (_MOTIONS, _FIXED_AXES),
-    "sort": (
-        Table(
-            "items",
-            "Things",
-            "At least two.",
-            "thing",
-            (
-                Cell("text", "Text", "", "text"),
-                Cell("value", "Size", "", "expression"),
-                Cell("shown", "Size in words", "Instead of the number."),
-                Cell("offered", "Offered when", _WHEN, "expression"),
-            ),
-            {"text": "Another one", "value": "0"},
-        ),
-        Cell("larger", "Larger ones are", "Such as: farther away."),
-        Cell("measure", "Sizes are shown as", "", "choice", MEASURES),
-        Cell("method", "Method", "How sizes are found.", "text"),
-    ),
-    "sketch": (
-        Cell("turns", "The joint turns", "0: it slides.", "expression"),
-        Cell("way", "Way", "", "expression"),
-        Cell("time", "Time, s", "", "expression"),
-        Cell("parts", "Parts", "Of the time; there is a value at the end of each.", "number"),
-        Cell("velocity", "Largest velocity", "In rad/s or m/s.", "expression"),
-        Cell("acceleration", "Largest acceleration", "In rad/s² or m/s².", "expression"),
-        Cell("method", "Method", "How one is found.", "text"),
-    ),
-    "program": (
-        Cell("straight", "Off the line at most, mm", "", "number"),
-        Cell("arrives", "Off the target at most, mm", "", "number"),
-        Cell("time", "Longest time, s", "0: no limit.", "expression"),
-        Cell("tool_speed", "Fastest tool, m/s", "0: no limit.", "expression"),
-    ),
-}
 
 
 def read(text: str) -> Draft:
@@ -388,7 +137,9 @@ def groups(draft: Draft, robots: Sequence[str] = ()) -> tuple[Group, ...]:
     for title, about, fields in _HEAD:
         found.append(Group(title, about, tuple(_placed(draft, field, (), robots) for field in fields)))
     kind = str(draft.get("kind"))
-    answer = tuple(_placed(draft, field, ("answer",), robots) for field in ANSWERS.get(kind, ()))
+    answer = tuple(
+        _placed(draft, field, ("answer",), robots) for field in (KINDS[kind].cells() if kind in KINDS else ())
+    )
     about = f"Kind {kind}: {KINDS[kind].about}" if kind in KINDS else ""
     return (*found, Group("Answer", about, answer))
 
@@ -471,7 +222,7 @@ def _placed(draft: Draft, field: Field, above: tuple[str, ...], robots: Sequence
     name = ".".join(at)
     if isinstance(field, Cell):
         if field.name == "robot":
-            field = Cell(field.name, field.label, field.help, field.form, tuple(robots))
+            field = replace(field, options=tuple(robots))
         return _entry(field, name, name, at, value)
     rows: list[tuple[Entry, ...]] = []
     if field.named:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import reduce
+from typing import Any
 
 import numpy as np
 
+from app.exercises import cell
+from app.exercises.cell import Declared
 from app.exercises.expressions import Expression
-from app.exercises.fields import Fields
+from app.exercises.fields import MOST_ITEMS, Fields
 from app.exercises.variant import Variant
 from kin import wxyz_from_rotation
 from kin.transforms import Array, rotation_angle
@@ -19,23 +22,26 @@ AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
-class Elementary:
-    """A turn about one axis, or a slide along it, by an expression."""
+class Elementary(Declared):
+    """A turn about one axis, or a slide along it, by an expression: ``{ turn = "z", by = "t1" }``."""
 
-    turns: bool
-    axis: int
-    by: Expression
+    turn: str = cell.choice("Turn about", "", AXES, "")
+    slide: str = cell.choice("Slide along", "", AXES, "")
+    by: Expression = cell.expression("By", "An angle or a length.")
 
-    @classmethod
-    def read(cls, fields: Fields) -> Elementary:
-        """From a table ``{ turn = "z", by = "t1" }`` or ``{ slide = "x", by = "a1" }``."""
-        turns = fields.has("turn")
-        if turns == fields.has("slide"):
-            raise fields.refuse("turn", fields.table, "either turn or slide, with the axis x, y or z")
-        axis = fields.choice("turn" if turns else "slide", AXES)
-        motion = cls(turns, AXES.index(axis), fields.expression("by"))
-        fields.done()
-        return motion
+    def check(self, table: Fields) -> None:
+        if bool(self.turn) == bool(self.slide):
+            raise table.refuse("turn", table.table, "either turn or slide, with the axis x, y or z")
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is a turn."""
+        return bool(self.turn)
+
+    @property
+    def axis(self) -> int:
+        """The index of its axis."""
+        return AXES.index(self.turn or self.slide)
 
     def matrix(self, variant: Variant, factor: float = 1.0) -> Array:
         """The motion as a transform ``(4, 4)``; a factor of −1 is the motion the other way."""
@@ -46,6 +52,12 @@ class Elementary:
         value, name = variant.number(self.by), AXES[self.axis]
         amount = units.of(self.turns).brief(value)
         return f"turn by {amount} about {name}" if self.turns else f"slide by {amount} along {name}"
+
+
+def list_of_motions(least: int, most: int = MOST_ITEMS) -> Any:
+    """A list of elementary motions, as a field of a kind."""
+    fresh = {"turn": "z", "by": "90*deg"}
+    return cell.rows(Elementary, "Motions", "In their order; each turns or slides.", "motion", fresh, least, most)
 
 
 def elementary(turns: bool, axis: int, value: float) -> Array:

@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
+from app.exercises import cell
+from app.exercises.cell import ONLY_WHERE, TO_WHOM, Declared
 from app.exercises.contract import Kind
 from app.exercises.expressions import Expression
 from app.exercises.fields import Fields, Words
 from app.exercises.questions import Asked, Choice, Option, Verdict
 from app.exercises.variant import Variant
 from kin.units import Units
+
+
+@dataclass(frozen=True)
+class Offer(Declared):
+    """One of the answers."""
+
+    text: str = cell.text("Text")
+    right: bool = cell.flag("Right")
+    when: Expression | None = cell.optional_expression("Right when", "Instead: where this expression is true.")
+    offered: Expression = cell.expression("Offered when", ONLY_WHERE, "1")
+    reason: Words = cell.words("Reason", TO_WHOM)
 
 
 @dataclass(frozen=True)
@@ -21,26 +34,30 @@ class ChoiceKind(Kind):
     about: ClassVar[str] = "One of several answers is chosen; each has its reason."
     in_words: ClassVar[bool] = True
 
-    options: tuple[tuple[str, Expression, Words, Expression], ...]
-    shuffle: bool
+    options: tuple[Offer, ...] = cell.rows(
+        Offer,
+        "Options",
+        "At least two.",
+        "option",
+        {"text": "Another answer", "reason": "Why this is wrong."},
+        least=2,
+    )
+    shuffle: bool = cell.flag("Shuffle the options", default=True)
 
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        options = []
-        for item in fields.tables("options", 2):
-            right = "1" if item.flag("right") else "0"
-            when, offered = item.expression("when", right), item.expression("offered", "1")
-            options.append((item.text("text"), when, item.words("reason"), offered))
-            item.done()
-        if len({text for text, *_ in options}) < len(options):
-            raise fields.refuse("options", [text for text, *_ in options], "a different text for each option")
-        return cls(tuple(options), fields.flag("shuffle", True))
+    def check(self, table: Fields) -> None:
+        texts = [each.text for each in self.options]
+        if len(set(texts)) < len(texts):
+            raise table.refuse("options", texts, "a different text for each option")
 
     def _options(self, variant: Variant, units: Units) -> list[Option]:
         options = [
-            Option(variant.text(text, units), variant.text(reason, units), bool(variant.number(when)))
-            for text, when, reason, offered in self.options
-            if variant.number(offered)
+            Option(
+                variant.text(each.text, units),
+                variant.text(each.reason, units),
+                each.right if each.when is None else bool(variant.number(each.when)),
+            )
+            for each in self.options
+            if variant.number(each.offered)
         ]
         if self.shuffle:
             variant.draw("options").shuffle(options)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 import kin
+from app.exercises import cell
 from app.exercises.contract import Kind, typed
 from app.exercises.fields import Fields
 from app.exercises.questions import Asked, Verdict
@@ -22,6 +23,13 @@ from kin.units import DEGREES, Units
 
 ACCEPTED = Accepted(math.radians(1.0), 2e-3)
 _WORDS: dict[Convention, str] = {"standard": "the standard convention", "modified": "Craig’s convention"}
+
+
+def _read_numbers_of_rows(table: Fields, name: str) -> tuple[int, ...]:
+    rows = table.items(name, 1)
+    if not all(type(row) is int and row >= 1 for row in rows) or rows != [*range(rows[0], rows[0] + len(rows))]:
+        raise table.refuse(name, rows, "consecutive numbers of rows, from 1")
+    return tuple(rows)
 
 
 @dataclass(frozen=True)
@@ -37,19 +45,26 @@ class DHKind(Kind):
     shows_posture: ClassVar[bool] = True
     withholds: ClassVar[frozenset[str]] = frozenset({"table"})
 
-    first: int
-    last: int
-    convention: Convention | None
+    rows: tuple[int, ...] = cell.special(
+        "Rows", "Consecutive numbers from 1, one in each line.", "numbers", _read_numbers_of_rows
+    )
+    convention: Convention | None = cell.special(
+        "Convention",
+        "None: that of the arm.",
+        "choice",
+        lambda table, name: table.choice(name, CONVENTIONS) if table.has(name) else None,
+        options=CONVENTIONS,
+    )
 
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        rows = fields.items("rows", 1)
-        if not all(type(row) is int and row >= 1 for row in rows) or rows != list(
-            range(rows[0], rows[0] + len(rows))
-        ):
-            raise fields.refuse("rows", rows, "consecutive numbers of rows, from 1")
-        convention = fields.choice("convention", CONVENTIONS) if fields.has("convention") else None
-        return cls(rows[0] - 1, rows[-1] - 1, convention)  # type: ignore[arg-type]  # checked by choice()
+    @property
+    def first(self) -> int:
+        """The index of the first row."""
+        return self.rows[0] - 1
+
+    @property
+    def last(self) -> int:
+        """The index of the last row."""
+        return self.rows[-1] - 1
 
     def _arm(self, variant: Variant) -> Robot:
         robot = variant.robot

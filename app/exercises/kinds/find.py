@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import ClassVar
 
+from app.exercises import cell
+from app.exercises.cell import Declared
 from app.exercises.contract import Kind, listed, numbers
 from app.exercises.expressions import Expression
 from app.exercises.fields import Fields, Words
@@ -28,34 +30,14 @@ _MOST = 6  # conditions
 
 
 @dataclass(frozen=True)
-class Condition:
-    """What an answer has to meet.
+class Condition(Declared):
+    """What an answer has to meet. Names of the arm in `holds` and `value` are of the arm at the answer."""
 
-    Attributes:
-        text: what is required, as a part of a sentence.
-        holds: whether it is met; of the arm at the answer, as all names of the arm are.
-        wrong: what is said if it is not.
-        value, measure: said after `wrong`: a number, and whether it is an angle, a length or a plain number.
-    """
-
-    text: Words
-    holds: Expression
-    wrong: Words
-    value: Expression | None
-    measure: str
-
-    @classmethod
-    def read(cls, fields: Fields) -> Condition:
-        """From a table."""
-        found = cls(
-            fields.words("text"),
-            fields.expression("holds"),
-            fields.words("wrong"),
-            fields.expression("value") if fields.has("value") else None,
-            fields.choice("measure", MEASURES, MEASURES[0]),
-        )
-        fields.done()
-        return found
+    text: Words = cell.words("Required", "As a part of a sentence.")
+    holds: Expression = cell.expression("Holds if", "An expression about the arm at the answer.")
+    wrong: Words = cell.words("Otherwise", "Said if it does not hold.")
+    value: Expression | None = cell.optional_expression("Value", "Said after that.")
+    measure: str = cell.choice("Shown as", "", MEASURES, MEASURES[0])
 
     def judge(self, asked: Variant, there: Variant, units: Units) -> tuple[bool, str]:
         """Whether it is met `there`, and what is said."""
@@ -67,6 +49,14 @@ class Condition:
         return False, f"{asked.text(self.wrong, units)}{value}"
 
 
+def _read_instance(table: Fields, name: str) -> tuple[Expression, ...] | str:
+    if not isinstance(table.get(name), str):
+        return table.expressions(name, 1)
+    function = table.text(name)
+    table.check_function(name, function)
+    return function
+
+
 @dataclass(frozen=True)
 class FindKind(Kind):
     """See the module. The answer is a configuration: in the page, that of the arm.
@@ -74,29 +64,25 @@ class FindKind(Kind):
     Attributes:
         stays: what of the tool must be as in the target, or at the configuration asked about; `NONE`: nothing.
         at: one right configuration, or the name of a function of the number of a joint that gives it.
-        method: how it is found.
     """
 
     name: ClassVar[str] = "find"
     about: ClassVar[str] = "The arm is driven to where conditions hold."
 
-    conditions: tuple[Condition, ...]
-    stays: str
-    at: tuple[Expression, ...] | str
-    method: Words
-
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        conditions = tuple(Condition.read(item) for item in fields.tables("conditions", 1))
-        if len(conditions) > _MOST:
-            raise fields.refuse("conditions", len(conditions), f"1 to {_MOST} conditions")
-        at: tuple[Expression, ...] | str = ()
-        if isinstance(fields.get("at"), str):
-            at = fields.text("at")
-            fields.check_function("at", at)
-        else:
-            at = fields.expressions("at", 1)
-        return cls(conditions, fields.choice("stays", (NONE, *TASKS), NONE), at, fields.words("method"))
+    conditions: tuple[Condition, ...] = cell.rows(
+        Condition,
+        "Conditions",
+        "All of them must hold where the arm is driven.",
+        "condition",
+        {"text": "the tool is above the base", "holds": "z > pz(0)", "wrong": "It is not above the base."},
+        least=1,
+        most=_MOST,
+    )
+    stays: str = cell.choice("What stays", "Of the tool, as in the target.", (NONE, *TASKS), NONE)
+    at: tuple[Expression, ...] | str = cell.special(
+        "For instance at", "One right configuration, one joint in each line.", "expressions", _read_instance
+    )
+    method: Words = cell.words("Method", "How one is found.")
 
     def asked(self, variant: Variant, units: Units) -> Asked:
         wanted = [variant.text(one.text, units) for one in self.conditions]

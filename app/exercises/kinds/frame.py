@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 import kin
+from app.exercises import cell
+from app.exercises.cell import DEGREE, MILLIMETRE
 from app.exercises.contract import Kind, numbers
 from app.exercises.fields import Fields
-from app.exercises.poses import Elementary, as_numbers, errors, pose_text, product
+from app.exercises.poses import Elementary, as_numbers, errors, list_of_motions, pose_text, product
 from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 from kin import InputError
@@ -29,27 +30,16 @@ class FrameKind(Kind):
     name: ClassVar[str] = "frame"
     about: ClassVar[str] = "A ghost of a frame is placed where the frame will be."
 
-    motions: tuple[Elementary, ...]
-    row: int
-    fixed_axes: bool
-    position_tolerance: float
-    rotation_tolerance: float
+    motions: tuple[Elementary, ...] = list_of_motions(least=0)
+    row: int = cell.whole("Or the frame of row", "Instead of motions.", 0, 32, 0)
+    fixed_axes: bool = cell.flag("About the axes of the base", "Otherwise about the frame’s own.")
+    position_tolerance: float = cell.number("Accepted distance, mm", "", 10.0, MILLIMETRE)
+    rotation_tolerance: float = cell.number("Accepted rotation, degrees", "", 5.0, DEGREE)
 
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        motions = tuple(Elementary.read(item) for item in fields.tables("motions"))
-        row = fields.whole("row", 0, 32, 0)
-        if bool(motions) == bool(row):
-            raise fields.refuse(
-                "motions", fields.get("motions"), "either motions, or the row whose frame is asked"
-            )
-        return cls(
-            motions,
-            row,
-            fields.flag("fixed_axes"),
-            1e-3 * fields.number("position_tolerance", 10.0, above=0.0),
-            math.radians(fields.number("rotation_tolerance", 5.0, above=0.0)),
-        )
+    def check(self, table: Fields) -> None:
+        if bool(self.motions) == bool(self.row):
+            valid = "either motions, or the row whose frame is asked"
+            raise table.refuse("motions", table.get("motions"), valid)
 
     def _right(self, variant: Variant) -> Array:
         if self.row:

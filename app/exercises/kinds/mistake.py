@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
-from typing import ClassVar, Self, cast
+from typing import ClassVar, cast
 
 import numpy as np
 
 import kin
+from app.exercises import cell
 from app.exercises.contract import Kind, typed
 from app.exercises.fields import Fields
 from app.exercises.questions import Asked, Verdict
@@ -47,6 +48,14 @@ _CALLED: messages.Names = ("the arm", "your table")
 _COUNTS = {1: "One change", 2: "Two changes"}
 
 
+def _read_mistakes(table: Fields, name: str) -> tuple[Mistake, ...]:
+    found = table.items(name, 1)
+    for i, one in enumerate(found):
+        if one not in MISTAKES:
+            raise table.refuse(f"{name}[{i}]", one, "one of " + ", ".join(f'"{each}"' for each in MISTAKES))
+    return tuple(found)
+
+
 @dataclass(frozen=True)
 class MistakeKind(Kind):
     """See the module.
@@ -60,15 +69,9 @@ class MistakeKind(Kind):
     shows_posture: ClassVar[bool] = True
     withholds: ClassVar[frozenset[str]] = frozenset({"table"})
 
-    mistakes: tuple[Mistake, ...]
-
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        named = fields.items("mistakes", 1)
-        for i, name in enumerate(named):
-            if name not in MISTAKES:
-                raise fields.refuse(f"mistakes[{i}]", name, "one of " + ", ".join(f'"{one}"' for one in MISTAKES))
-        return cls(tuple(cast(Mistake, name) for name in named))
+    mistakes: tuple[Mistake, ...] = cell.special(
+        "Mistakes", "One in each line: " + ", ".join(MISTAKES) + ".", "lines", _read_mistakes
+    )
 
     def _wrong(self, variant: Variant) -> Robot:
         """The arm's table with the mistake drawn for this variant."""

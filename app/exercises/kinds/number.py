@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple
 
+from app.exercises import cell
+from app.exercises.cell import ONLY_WHERE, TO_WHOM, Declared
 from app.exercises.contract import PLAIN_UNITS, Kind, typed
 from app.exercises.expressions import Expression
 from app.exercises.fields import Fields, Words
@@ -26,59 +28,76 @@ _PERCENT = re.compile(r"([0-9]{1,15}(?:\.[0-9]{1,15})?) ?%")
 
 
 @dataclass(frozen=True)
-class NumberKind(Kind):
-    """See the module.
+class Wrong(Declared):
+    """Values that come of a mistake."""
 
-    Attributes:
-        tolerance: the accepted error, or as `part` of the value.
-        part: the tolerance as a part of the value, in place of `tolerance`; 0: it is no part.
-        least: the finest tolerance; with it, the tolerance keeps off known mistakes and zero as well.
-        mistakes: known wrong values, whether they are, the reason, and whether all larger sizes are meant.
-    """
+    value: tuple[Expression, ...] = cell.expressions("Value", least=1)
+    when: Expression = cell.expression("When", ONLY_WHERE, "1")
+    reason: Words = cell.words("Reason", TO_WHOM)
+    beyond: bool = cell.flag("All larger sizes", "No right value is as large.")
+
+
+class Tolerance(NamedTuple):
+    """The accepted error, or, if it is not 0, which part of the value it is."""
+
+    size: float
+    part: float
+
+
+def _read_tolerance(table: Fields, name: str) -> Tolerance:
+    unit, given = table.get("unit") or "", table.get(name)
+    if unit in COUNTED:
+        return Tolerance(WHOLE, 0.0)
+    if not isinstance(given, str):
+        return Tolerance(table.number(name, above=0.0) * SCALES.get(unit, 1.0), 0.0)
+    percent = _PERCENT.fullmatch(given)
+    if percent is None or not 0.0 < float(percent[1]) < 100.0:
+        raise table.refuse(name, given, 'a number, or a share of the value such as "2 %"')
+    return Tolerance(0.0, 0.01 * float(percent[1]))
+
+
+@dataclass(frozen=True)
+class NumberKind(Kind):
+    """See the module."""
 
     name: ClassVar[str] = "number"
     about: ClassVar[str] = "A number or a vector is typed; a unit may follow it."
     in_words: ClassVar[bool] = True
 
-    values: tuple[Expression, ...]
-    labels: tuple[str, ...]
-    unit: str
-    tolerance: float
-    method: Words
-    whole_turns: bool
-    mistakes: tuple[tuple[tuple[Expression, ...], Expression, Words, bool], ...]
-    part: float = 0.0
-    least: Expression | None = None
+    value: tuple[Expression, ...] = cell.expressions(
+        "Right value", "An expression; of a vector one in each line.", least=1
+    )
+    labels: tuple[str, ...] = cell.lines("Names", "Of the parts of a vector, one in each line.")
+    unit: str = cell.choice("Unit", "In which it is typed.", (*SCALES, *OTHER), "")
+    tolerance: Tolerance = cell.special(
+        "Tolerance", "In this unit, or a share such as 2 %.", "number", _read_tolerance
+    )
+    least: Expression | None = cell.optional_expression(
+        "Finest tolerance", "It then also keeps off mistakes and zero."
+    )
+    method: Words = cell.words("Method", "How it is computed.")
+    whole_turns: bool = cell.flag("Whole turns count", "360° more is another answer.")
+    mistakes: tuple[Wrong, ...] = cell.rows(
+        Wrong,
+        "Known mistakes",
+        "Values that students get by a mistake, and what is said.",
+        "mistake",
+        {"value": "0", "reason": "Why this is wrong."},
+    )
 
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        values = fields.expressions("value", 1)
-        unit = fields.choice("unit", (*SCALES, *OTHER), "")
-        labels = fields.texts("labels") or ("",) * len(values)
-        if len(labels) != len(values):
-            raise fields.refuse("labels", list(labels), f"as many labels as values: {len(values)}")
-        tolerance = part = 0.0
-        given = fields.get("tolerance")
-        if unit in COUNTED:
-            tolerance = WHOLE
-        elif isinstance(given, str):
-            percent = _PERCENT.fullmatch(given)
-            if percent is None or not 0.0 < float(percent[1]) < 100.0:
-                raise fields.refuse("tolerance", given, 'a number, or a share of the value such as "2 %"')
-            part = 0.01 * float(percent[1])
-        else:
-            tolerance = fields.number("tolerance", above=0.0) * SCALES.get(unit, 1.0)
-        mistakes = []
-        for item in fields.tables("mistakes"):
-            wrong = item.expressions("value", 1)
-            if len(wrong) != len(values):
-                raise item.refuse("value", len(wrong), f"as many values as the answer has: {len(values)}")
-            reason, beyond = item.words("reason"), item.flag("beyond")
-            mistakes.append((wrong, item.expression("when", "1"), reason, beyond))
-            item.done()
-        least = fields.expression("least") if fields.has("least") else None
-        method, turns = fields.words("method"), fields.flag("whole_turns")
-        return cls(values, labels, unit, tolerance, method, turns, tuple(mistakes), part, least)
+    def check(self, table: Fields) -> None:
+        count = len(self.value)
+        if self.labels and len(self.labels) != count:
+            raise table.refuse("labels", list(self.names), f"as many labels as values: {count}")
+        for i, each in enumerate(self.mistakes):
+            if len(each.value) != count:
+                valid = f"as many values as the answer has: {count}"
+                raise table.refuse(f"mistakes[{i}].value", len(each.value), valid)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The labels; "" for each value without one."""
+        return self.labels or ("",) * len(self.value)
 
     def _shown_unit(self, units: Units) -> Unit:
         match MEASURES.get(self.unit):
@@ -93,14 +112,14 @@ class NumberKind(Kind):
     def _questions(self, variant: Variant, units: Units) -> list[Number]:
         unit, method = self._shown_unit(units), variant.text(self.method, units)
         wrong = [
-            (variant.vector(values), variant.text(reason, units), beyond)
-            for values, when, reason, beyond in self.mistakes
-            if variant.number(when)
+            (variant.vector(each.value), variant.text(each.reason, units), each.beyond)
+            for each in self.mistakes
+            if variant.number(each.when)
         ]
         found = []
-        for i, (expression, label) in enumerate(zip(self.values, self.labels, strict=True)):
+        for i, (expression, label) in enumerate(zip(self.value, self.names, strict=True)):
             value = variant.number(expression)
-            tolerance = share(value, self.part) if self.part else self.tolerance
+            tolerance = share(value, self.tolerance.part) if self.tolerance.part else self.tolerance.size
             question = Number(
                 label or "Your answer",
                 value,
@@ -123,9 +142,7 @@ class NumberKind(Kind):
 
     def asked(self, variant: Variant, units: Units) -> Asked:
         questions = self._questions(variant, units)
-        return Asked(
-            "fields", self.labels, (questions[0].unit.name,) * len(questions), questions[0].tolerance_text
-        )
+        return Asked("fields", self.names, (questions[0].unit.name,) * len(questions), questions[0].tolerance_text)
 
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
         verdict = self.in_stages(variant, given, units)
@@ -140,17 +157,17 @@ class NumberKind(Kind):
         found = [question.judge(value) for question, value in zip(questions, values, strict=True)]
         if len(questions) == 1:
             return found[0]
-        parts = [(one.right, f"{label}: {one.full}") for label, one in zip(self.labels, found, strict=True)]
+        parts = [(one.right, f"{label}: {one.full}") for label, one in zip(self.names, found, strict=True)]
         verdict = Verdict.of(parts, "All parts are right.")
         if verdict.right:
             return verdict
-        if swap := _swapped(questions, values, self.labels):
+        if swap := _swapped(questions, values, self.names):
             return replace(verdict, reason=swap)
-        label, wrong = next(pair for pair in zip(self.labels, found, strict=True) if not pair[1].right)
+        label, wrong = next(pair for pair in zip(self.names, found, strict=True) if not pair[1].right)
         return replace(verdict, reason=f"{label}: {wrong.reason or 'This is not right.'}", way=wrong.way)
 
     def answer(self, variant: Variant) -> object:
-        return [typed(variant.number(value), self._shown_unit(Units())) for value in self.values]
+        return [typed(variant.number(value), self._shown_unit(Units())) for value in self.value]
 
     def verify(self, variant: Variant) -> None:
         super().verify(variant)
@@ -162,7 +179,7 @@ class NumberKind(Kind):
         questions = self._questions(variant, units)
         shown = ", ".join(
             f"{label} = {question.value_text}" if label else question.value_text
-            for label, question in zip(self.labels, questions, strict=True)
+            for label, question in zip(self.names, questions, strict=True)
         )
         return f"{shown}. {questions[0].method}"
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
+from app.exercises import cell
 from app.exercises.contract import Kind
-from app.exercises.fields import Fields
-from app.exercises.poses import Elementary, axes_text, errors, pose_text, product
+from app.exercises.poses import Elementary, axes_text, errors, list_of_motions, pose_text, product
 from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 from kin import InputError
@@ -30,15 +30,8 @@ class OrderKind(Kind):
     about: ClassVar[str] = "Motions are put in order; every order with the same product is right."
     in_words: ClassVar[bool] = True
 
-    motions: tuple[Elementary, ...]
-    fixed_axes: bool
-
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        motions = tuple(Elementary.read(item) for item in fields.tables("motions", 2))
-        if len(motions) > MOST:
-            raise fields.refuse("motions", len(motions), f"2 to {MOST} motions")
-        return cls(motions, fields.flag("fixed_axes"))
+    motions: tuple[Elementary, ...] = list_of_motions(2, MOST)
+    fixed_axes: bool = cell.flag("About the axes of the base", "Otherwise about the frame’s own.")
 
     def _places(self, variant: Variant) -> list[int]:
         """The motion behind each label; never in the right order."""

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 import kin
+from app.exercises import cell
+from app.exercises.cell import MILLIMETRE
 from app.exercises.contract import LONGEST_PROGRAM, Kind
 from app.exercises.expressions import Expression
-from app.exercises.fields import Fields
 from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
 from kin import InputError, Motion
@@ -19,7 +20,6 @@ from kin.units import Units, general
 
 MOST_SEGMENTS = 12
 _SAMPLES = 200
-_NO_LIMIT = "0"
 
 
 @dataclass(frozen=True)
@@ -30,19 +30,10 @@ class ProgramKind(Kind):
     about: ClassVar[str] = "A program is written that drives the tool along a line within limits."
     shows_posture: ClassVar[bool] = True
 
-    straight: float
-    arrives: float
-    longest: Expression
-    fastest: Expression
-
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        return cls(
-            1e-3 * fields.number("straight", 1.0, above=0.0),
-            1e-3 * fields.number("arrives", 1.0, above=0.0),
-            fields.expression("time", _NO_LIMIT),
-            fields.expression("tool_speed", _NO_LIMIT),
-        )
+    straight: float = cell.number("Off the line at most, mm", "", 1.0, MILLIMETRE)
+    arrives: float = cell.number("Off the target at most, mm", "", 1.0, MILLIMETRE)
+    longest: Expression = cell.expression("Longest time, s", "0: no limit.", "0", "time")
+    fastest: Expression = cell.expression("Fastest tool, m/s", "0: no limit.", "0", "tool_speed")
 
     def asked(self, variant: Variant, units: Units) -> Asked:
         conditions = [f"the tool point within {units.lengths.brief(self.straight)} of the straight line"]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 import kin
+from app.exercises import cell
+from app.exercises.cell import DEGREE, MILLIMETRE, Declared
 from app.exercises.contract import Kind, listed, numbers
 from app.exercises.expressions import Expression
 from app.exercises.fields import Fields
@@ -26,40 +28,36 @@ LOCKED = (math.radians(0.5), 5e-4)  # rad, m: a locked joint may be off by this
 
 
 @dataclass(frozen=True)
+class Lock(Declared):
+    """A joint, counted from 1, that must be at a value."""
+
+    joint: int = cell.whole("Joint", "Its number.", 1, 32)
+    value: Expression = cell.expression("Value")
+
+
+@dataclass(frozen=True)
 class ReachKind(Kind):
     """See the module. The answer is a configuration: in the page, that of the arm."""
 
     name: ClassVar[str] = "reach"
     about: ClassVar[str] = "The arm is moved to a target, in a posture that meets further conditions."
 
-    task: Task
-    branch: str
-    locked: tuple[tuple[int, Expression], ...]
-    margin: float
-    manipulability: Expression
-    position_tolerance: float
-    rotation_tolerance: float
-    line: tuple[Expression, ...]
+    task: Task = cell.choice("What must match", "", TASKS, "position")
+    branch: str = cell.line("Posture", "Such as: elbow up.", "")
+    locked: tuple[Lock, ...] = cell.rows(
+        Lock, "Locked joints", "Joints that must be at a value.", "joint", {"joint": 1, "value": "0"}
+    )
+    margin: float = cell.number("Margin to the limits, %", "Of the range of each joint.", 0.0, above=-math.inf)
+    manipulability: Expression = cell.expression("Least manipulability", "", "0")
+    position_tolerance: float = cell.number("Accepted distance, mm", "", 3.0, MILLIMETRE)
+    rotation_tolerance: float = cell.number("Accepted rotation, degrees", "", 3.0, DEGREE)
+    line: tuple[Expression, ...] = cell.expressions(
+        "Line to", "x, y and z of the end of a line that the tool drives from there."
+    )
 
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        locked = []
-        for item in fields.tables("locked"):
-            locked.append((item.whole("joint", 1, 32) - 1, item.expression("value")))
-            item.done()
-        line = fields.expressions("line")
-        if line and len(line) != 3:
-            raise fields.refuse("line", len(line), "three values x, y, z")
-        return cls(
-            fields.choice("task", TASKS, "position"),  # type: ignore[arg-type]  # checked by choice()
-            fields.text("branch", ""),
-            tuple(locked),
-            fields.number("margin", 0.0),
-            fields.expression("manipulability", "0"),
-            1e-3 * fields.number("position_tolerance", 3.0, above=0.0),
-            math.radians(fields.number("rotation_tolerance", 3.0, above=0.0)),
-            line,
-        )
+    def check(self, table: Fields) -> None:
+        if self.line and len(self.line) != 3:
+            raise table.refuse("line", len(self.line), "three values x, y, z")
 
     def asked(self, variant: Variant, units: Units) -> Asked:
         robot = variant.robot
@@ -69,7 +67,8 @@ class ReachKind(Kind):
             conditions.append(f"its {what} within {units.angles.brief(self.rotation_tolerance)}")
         if branch := variant.text(self.branch, units):
             conditions.append(f"posture: {branch}")
-        for joint, value in self.locked:
+        for lock in self.locked:
+            joint, value = lock.joint - 1, lock.value
             unit = units.of(bool(robot.revolute[joint]))
             conditions.append(f"joint {joint + 1} at {unit.brief(variant.number(value))}")
         if self.margin:
@@ -90,7 +89,8 @@ class ReachKind(Kind):
             name = kin.branch_of(robot, q)
             fits = has_parts(name, branch)
             parts.append((fits, f"The posture is “{name}”{'' if fits else f', asked is “{branch}”'}."))
-        for joint, value in self.locked:
+        for lock in self.locked:
+            joint, value = lock.joint - 1, lock.value
             unit, wanted = units.of(bool(robot.revolute[joint])), variant.number(value)
             fits = abs(q[joint] - wanted) <= LOCKED[0 if robot.revolute[joint] else 1]
             there = unit.text(float(q[joint]), 1)
@@ -128,7 +128,7 @@ class ReachKind(Kind):
 
     def answer(self, variant: Variant) -> object:
         robot = variant.robot
-        locks = dict(self.locked)
+        locks = {lock.joint - 1: lock.value for lock in self.locked}
         limits, locked = None, None
         if locks:
             locked = tuple(variant.number(locks[i]) if i in locks else None for i in range(robot.n))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 import kin
+from app.exercises import cell
+from app.exercises.cell import DEGREE
 from app.exercises.contract import Kind
-from app.exercises.fields import Fields
 from app.exercises.questions import Asked, Verdict, index, texts
 from app.exercises.typed import read_number
 from app.exercises.variant import Variant
@@ -32,13 +33,8 @@ class SingularityKind(Kind):
     about: ClassVar[str] = "The singularity is named, or the lost direction of the tool point is given."
     shows_posture: ClassVar[bool] = True
 
-    direction: bool
-    tolerance: float
-
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        asks = fields.choice("asks", ("name", "direction"))
-        return cls(asks == "direction", math.radians(fields.number("tolerance", 3.0, above=0.0)))
+    asks: str = cell.choice("Asks for", "", ("name", "direction"))
+    tolerance: float = cell.number("Tolerance, degrees", "Of a direction.", 3.0, DEGREE)
 
     def _known(self, variant: Variant) -> list[Singularity]:
         """The singularities of the arm by what aligns, in an order of the seed's."""
@@ -56,7 +52,7 @@ class SingularityKind(Kind):
         raise ValueError(f"not exactly one direction of the tool point is lost: σ = {sizes.round(6).tolist()}")
 
     def asked(self, variant: Variant, units: Units) -> Asked:
-        if self.direction:
+        if self.asks == "direction":
             angle = units.angles.brief(self.tolerance)
             note = f"± {angle}. Only the direction counts, not its length or sign."
             return Asked("fields", ("x", "y", "z"), ("", "", ""), note)
@@ -67,7 +63,7 @@ class SingularityKind(Kind):
         return Asked("options", tuple(labels))
 
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
-        if self.direction:
+        if self.asks == "direction":
             return self._judge_direction(variant, given, units)
         known = self._known(variant)
         chosen = known[index(given, len(known))]
@@ -99,12 +95,12 @@ class SingularityKind(Kind):
         )
 
     def answer(self, variant: Variant) -> object:
-        if self.direction:
+        if self.asks == "direction":
             return [repr(float(value)) for value in self._lost(variant)]
         return next((i for i, each in enumerate(self._known(variant)) if each.distance <= AT), 0)
 
     def solution(self, variant: Variant, units: Units) -> str:
-        if self.direction:
+        if self.asks == "direction":
             shown = ", ".join(fixed(float(value)) for value in self._lost(variant))
             return f"({shown}), or the opposite."
         at = [each for each in self._known(variant) if each.distance <= AT]

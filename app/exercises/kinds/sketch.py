@@ -7,13 +7,14 @@ covers the way is right.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
+from app.exercises import cell
 from app.exercises.contract import Kind, typed
 from app.exercises.expressions import Expression
-from app.exercises.fields import Fields, Words
+from app.exercises.fields import Words
 from app.exercises.questions import Asked, Verdict, texts
 from app.exercises.typed import read_number
 from app.exercises.variant import Variant
@@ -55,25 +56,13 @@ class SketchKind(Kind):
     about: ClassVar[str] = "The velocity of a motion from rest to rest is sketched: its values at equal times."
     in_words: ClassVar[bool] = True
 
-    turns: Expression
-    way: Expression
-    time: Expression
-    parts: int
-    velocity: Expression
-    acceleration: Expression
-    method: Words
-
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        return cls(
-            fields.expression("turns", "1"),
-            fields.expression("way"),
-            fields.expression("time"),
-            fields.whole("parts", FEWEST, MOST, 6),
-            fields.expression("velocity"),
-            fields.expression("acceleration"),
-            fields.words("method"),
-        )
+    turns: Expression = cell.expression("The joint turns", "0: it slides.", "1")
+    way: Expression = cell.expression("Way")
+    time: Expression = cell.expression("Time, s")
+    parts: int = cell.whole("Parts", "Of the time; there is a value at the end of each.", FEWEST, MOST, 6)
+    velocity: Expression = cell.expression("Largest velocity", "In rad/s or m/s.")
+    acceleration: Expression = cell.expression("Largest acceleration", "In rad/s² or m/s².")
+    method: Words = cell.words("Method", "How one is found.")
 
     def sketch(self, variant: Variant) -> Sketch:
         """The numbers of a variant."""

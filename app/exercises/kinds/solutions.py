@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 import kin
+from app.exercises import cell
+from app.exercises.cell import DEGREE
 from app.exercises.contract import Kind, typed
-from app.exercises.fields import Fields
 from app.exercises.poses import errors
 from app.exercises.questions import Asked, Verdict
 from app.exercises.typed import read_number
@@ -33,17 +34,9 @@ class SolutionsKind(Kind):
     name: ClassVar[str] = "solutions"
     about: ClassVar[str] = "All configurations that reach a target are typed, one per row."
 
-    task: Task
-    rows: int
-    tolerance: float
-
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        return cls(
-            fields.choice("task", TASKS, "pose"),  # type: ignore[arg-type]  # checked by choice()
-            fields.whole("rows", 1, MOST_ROWS, 4),
-            math.radians(fields.number("tolerance", 2.0, above=0.0)),
-        )
+    task: Task = cell.choice("What must match", "", TASKS, "pose")
+    rows: int = cell.whole("Rows", "Of the form.", 1, MOST_ROWS, 4)
+    tolerance: float = cell.number("Tolerance, degrees", "", 2.0, DEGREE)
 
     def _solutions(self, variant: Variant) -> list[Array]:
         found = kin.ik.solve(variant.robot, variant.pose, IKOptions(task=self.task), variant.robot.q_home)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import ClassVar, Self
+from typing import ClassVar
 
+from app.exercises import cell
+from app.exercises.cell import ONLY_WHERE, Declared
 from app.exercises.contract import Kind
 from app.exercises.expressions import Expression
 from app.exercises.fields import Fields, Words
@@ -20,44 +22,43 @@ SAME = 1e-6  # of the largest value: closer than this are equal
 
 
 @dataclass(frozen=True)
-class SortKind(Kind):
-    """See the module. The smallest comes first; equal ones may stand either way.
+class Thing(Declared):
+    """One of the things."""
 
-    Attributes:
-        items: each with its value, whether it is offered, and how its value is shown; "": as a number.
-        larger: what is said of a larger one, such as "farther away".
-        measure: of the values, which are shown with the answer.
-    """
+    text: str = cell.text("Text")
+    value: Expression = cell.expression("Size")
+    shown: str = cell.line("Size in words", "Instead of the number.", "")
+    offered: Expression = cell.expression("Offered when", ONLY_WHERE, "1")
+
+
+@dataclass(frozen=True)
+class SortKind(Kind):
+    """See the module. The smallest comes first; equal ones may stand either way."""
 
     name: ClassVar[str] = "sort"
     about: ClassVar[str] = "Things are sorted by size, the smallest first; equal ones may stand either way."
     in_words: ClassVar[bool] = True
 
-    items: tuple[tuple[str, Expression, Expression, str], ...]
-    larger: str
-    measure: str
-    method: Words
+    items: tuple[Thing, ...] = cell.rows(
+        Thing, "Things", "At least two.", "thing", {"text": "Another one", "value": "0"}, least=2, most=MOST
+    )
+    larger: str = cell.line("Larger ones are", "Such as: farther away.", "larger")
+    measure: str = cell.choice("Sizes are shown as", "", MEASURES, MEASURES[0])
+    method: Words = cell.words("Method", "How sizes are found.")
 
-    @classmethod
-    def read(cls, fields: Fields) -> Self:
-        items = []
-        for item in fields.tables("items", 2):
-            value, offered = item.expression("value"), item.expression("offered", "1")
-            items.append((item.text("text"), value, offered, item.text("shown", "")))
-            item.done()
-        if len(items) > MOST or len({text for text, *_ in items}) < len(items):
-            raise fields.refuse("items", [text for text, *_ in items], f"2 to {MOST} items with different texts")
-        larger, measure = fields.text("larger", "larger"), fields.choice("measure", MEASURES, MEASURES[0])
-        return cls(tuple(items), larger, measure, fields.words("method"))
+    def check(self, table: Fields) -> None:
+        texts = [each.text for each in self.items]
+        if len(set(texts)) < len(texts):
+            raise table.refuse("items", texts, f"2 to {MOST} items with different texts")
 
     def _items(self, variant: Variant, units: Units) -> list[tuple[str, float, str]]:
         """What is offered: its text, its value, and how this is shown; never in the right order."""
         items = []
-        for text, expression, offered, shown in self.items:
-            if variant.number(offered):
-                value = variant.number(expression)
-                words = variant.text(shown, units) or size_text(value, self.measure, units)
-                items.append((variant.text(text, units), value, words))
+        for each in self.items:
+            if variant.number(each.offered):
+                value = variant.number(each.value)
+                shown = variant.text(each.shown, units) or size_text(value, self.measure, units)
+                items.append((variant.text(each.text, units), value, shown))
         random = variant.draw("items")
         for _ in range(100):
             random.shuffle(items)

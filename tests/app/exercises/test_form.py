@@ -12,11 +12,10 @@ from hypothesis import strategies as st
 
 import kin
 from app.exercises import Exercises, VariantError, parse_exercise, tried
-from app.exercises.fields import ExerciseFileError, Fields
+from app.exercises.cell import Cell
+from app.exercises.fields import ExerciseFileError
 from app.exercises.form import (
-    ANSWERS,
     LONGEST_CELL,
-    Cell,
     Draft,
     Entry,
     Rows,
@@ -27,7 +26,6 @@ from app.exercises.form import (
     with_row,
     without_row,
 )
-from app.exercises.kinds import KINDS
 from kin import InputError
 from kin.parsing import to_toml
 from kin.units import Units
@@ -65,28 +63,6 @@ def test_every_exercise_passes_through_the_form_unchanged(path: Path) -> None:
     for seed in range(3):
         assert mine.solution(mine.variant(seed), UNITS) == theirs.solution(theirs.variant(seed), UNITS)
         assert mine.variant(seed).text(mine.text, UNITS) == theirs.variant(seed).text(theirs.text, UNITS)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_form_has_every_field_that_a_kind_reads(kind: str) -> None:
-    found: set[str] = set()
-    for path in FILES:
-        answer = tomllib.loads(path.read_text())
-        if answer["kind"] == kind:
-            fields = Fields(
-                "file", answer["answer"], names=frozenset({*answer.get("vary", ()), *answer.get("let", ())})
-            )
-            KINDS[kind].read(fields)
-            with pytest.raises(ExerciseFileError) as refused:
-                Fields.done(_with(fields, "no such"))
-            found |= set(refused.value.expected.partition("valid are ")[2].split(", "))
-    assert found, "the library has an exercise of each kind"
-    assert {field.name for field in ANSWERS[kind]} == found
-
-
-def _with(fields: Fields, name: str) -> Fields:
-    fields.table = {**fields.table, name: 1}
-    return fields
 
 
 def test_values_stand_beside_expressions_in_the_readers_unit() -> None:

@@ -130,8 +130,8 @@ class _Maker:
             return None
         names = [
             name
-            for name, (*_, offered) in zip(text.leads, text.kind.options, strict=True)
-            if self.variant.number(offered)
+            for name, each in zip(text.leads, text.kind.options, strict=True)
+            if self.variant.number(each.offered)
         ]
         known = {**self.facts.leads, NOWHERE: None}
         return Leads(tuple(self.named("leads", name, known) for name in names))

@@ -276,7 +276,7 @@ def test_whole_turns_do_not_matter_and_lengths_do(factor: Factor) -> None:
 def test_the_lesson_and_an_exercise_judge_rows_alike(robot: kin.Robot) -> None:
     """Rows that the lesson accepts are right in an exercise, and those that it refuses are wrong there."""
     count = robot.n - 1  # rows that end at a joint's axis
-    kind = DHKind(0, count - 1, robot.convention)
+    kind = DHKind(tuple(range(1, count + 1)), robot.convention)
     variant = Variant("x", robot, np.zeros(robot.n))
     # In Craig's convention a wrong θ or d is seen at the axis after.
     judged = range(count if robot.convention == "standard" else count - 1)
