@@ -193,6 +193,7 @@ __all__ = [
     "fk_positions",
     "frame_pose",
     "from_pendant",
+    "generate",
     "get_robot",
     "ik_branches",
     "jacobian",
@@ -251,9 +252,15 @@ __all__ = [
 ]
 
 
-if not TYPE_CHECKING:  # a type checker knows no name that has gone
+if TYPE_CHECKING:
+    from kin.codegen.files import generate
+else:  # a type checker knows no name that has gone
 
     def __getattr__(name: str) -> object:
+        if name == "generate":  # few programs translate kernels
+            from kin.codegen.files import generate
+
+            return generate
         if name in deprecated.MOVED:
             return deprecated.moved(name)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

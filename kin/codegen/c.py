@@ -1,0 +1,320 @@
+"""C99 that is C++ as well: kernels as static functions that need nothing but the mathematical library.
+
+An array is a pointer and its shape, a tuple is a struct; both are passed by value. Every array that a kernel
+makes has a place of constant size on the stack (:mod:`kin.codegen.rooms`), and one that it returns has its place
+with the caller. So there is no heap, no buffer that could overflow and no static state but constants.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from itertools import groupby
+from pathlib import Path
+
+from kin.codegen.emit import ADD, ATOM, MULTIPLY, UNARY, Emitter, Text
+from kin.codegen.rooms import Rooms
+from kin.codegen.source import OutsideSubsetError
+from kin.codegen.tree import (
+    Call,
+    Cast,
+    Copy,
+    Entry,
+    Expr,
+    Fill,
+    Instance,
+    New,
+    Operation,
+    Primitive,
+    Reshaped,
+    Table,
+    View,
+    walk,
+)  # fmt: skip
+from kin.codegen.types import (
+    BOOL,
+    COMPLEX,
+    FLOAT,
+    INT,
+    NONE,
+    ArrayOf,
+    Kernel,
+    Scalar,
+    TupleOf,
+    Type,
+    holds_arrays,
+)  # fmt: skip
+from kin.codegen.typing import Program
+
+RUNTIME = (Path(__file__).parent / "runtime.h").read_text(encoding="utf-8")
+_LETTERS = {FLOAT: "f", INT: "i", BOOL: "b", COMPLEX: "z"}
+_ZEROS: dict[Type, str] = {FLOAT: "0.0", INT: "0", BOOL: "false"}
+_NAMES = {FLOAT: "double", INT: "int64_t", BOOL: "bool", COMPLEX: "cplx", NONE: "void"}
+_TAKEN = (
+    "auto break case char const continue default do double else enum extern float for goto if inline int "
+    "long register restrict return short signed sizeof static struct switch typedef union unsigned void "
+    "volatile while bool true false near far huge small y0 y1 yn j0 j1 jn gamma signgam index div and or "
+    "not xor class new delete this template typename namespace private public protected operator friend "
+    "using try catch throw asm export linux unix w_t NAN INFINITY "
+)
+WORDS = frozenset(_TAKEN.split()).union(
+    re.findall(r"\b(\w+)\(", RUNTIME), (f"{letter}{ndim}" for letter in "fibz" for ndim in range(1, 5))
+)
+
+
+def mangled(kind: Type) -> str:
+    """The name of an array or a tuple, or a letter for a number."""
+    match kind:
+        case Scalar():
+            return _LETTERS[kind]
+        case ArrayOf(item=item, ndim=ndim):
+            return f"{_LETTERS[item]}{ndim}"
+        case TupleOf(items=items):
+            runs = [(each, len(list(group))) for each, group in groupby(map(mangled, items))]
+            return "t_" + "_".join(f"{each}x{count}" if count > 1 else each for each, count in runs)
+    raise TypeError(kind)
+
+
+def name_of(kind: Type) -> str:
+    """The name of a type."""
+    return _NAMES[kind] if isinstance(kind, Scalar) else mangled(kind)
+
+
+class C(Emitter):
+    """The text of one kernel."""
+
+    def __init__(self, made: Instance, taken: frozenset[str], rooms: Rooms, kinds: list[Type]) -> None:
+        super().__init__(made, taken)
+        self.rooms, self.kinds = rooms, kinds
+        self.storage: list[str] = []
+        self.used = 0  # entries of the room that the caller gives
+
+    def function(self) -> str:
+        """The definition."""
+        it = self.made
+        self.depth = 0
+        self.block(it.body)
+        passed = [(n, k) for n, k in zip(it.parameters, it.kinds, strict=True) if not isinstance(k, Kernel)]
+        names = [f"{name_of(kind)} {self.name(name)}" for name, kind in passed]
+        if self.returned_kind is not None:
+            names.insert(0, f"{_NAMES[self.returned_kind]} *room")
+        lines = [f"  (void){self.name(name)};" for name, _ in passed if name not in self.read]
+        for name, kind in it.variables.items():
+            if name not in it.parameters and name in self.read and name not in self.own:
+                zero = _ZEROS.get(kind, "KINBOARD_ZERO")
+                lines.append(f"  {name_of(kind)} {self.name(name)} = {zero};")
+        self.kinds += [*it.variables.values(), *it.kinds, it.result]
+        self.kinds += [node.kind for node in walk(it.body) if isinstance(node, Expr)]
+        head = f"static {name_of(it.result)} {it.name}({', '.join(names) or 'void'}) {{"
+        return "\n".join([*([f"// {it.note}"] if it.note else []), head, *self.storage, *lines, *self.lines, "}"])
+
+    @property
+    def returned_kind(self) -> Scalar | None:
+        """Of what the arrays are that it makes and returns; None if it returns none that it made."""
+        return room_of(self.made)
+
+    def declared(self, kind: Type, name: str, value: str) -> str:
+        return f"{name_of(kind)} {name} = {value}"
+
+    def literal(self, kind: Type, value: float | complex) -> Text:
+        if isinstance(value, complex):
+            return f"cplx_of({value.real!r}, {value.imag!r})", ATOM
+        if kind == BOOL:
+            return ("true" if value else "false"), ATOM
+        text = "NAN" if math.isnan(value) else repr(value).replace("inf", "INFINITY")
+        return text, UNARY if text.startswith("-") else ATOM
+
+    def items(self, kind: TupleOf, items: Iterable[str]) -> str:
+        return f"{mangled(kind)}_of({', '.join(items)})"
+
+    def item(self, base: str, kind: TupleOf, index: int | str) -> str:
+        return f"{base}.v[{index}]" if kind.alike else f"{base}._{index}"
+
+    def entry(self, array: Expr, kind: ArrayOf, place: str) -> str:
+        if isinstance(array, Table):
+            return f"{array.name}[{place or 0}]"
+        return f"{self.text(array, ATOM)}.p[{place or 0}]"
+
+    def length(self, array: Expr, axis: int) -> str:
+        return f"{self.text(array, ATOM)}.n{axis}"
+
+    def of(self, kind: Type, place: str, sizes: Iterable[str]) -> str:
+        return f"{mangled(kind)}_of({', '.join([place, *sizes])})"
+
+    def view(self, value: View) -> str:
+        kind, array = value.array.kind, value.array
+        assert isinstance(kind, ArrayOf)
+        first = len(value.indices)
+        base = " + ".join(filter(None, [f"{self.text(array, ATOM)}.p", self.offset(array, value.indices)]))
+        sizes = [self.length(array, k) for k in range(first, kind.ndim)]
+        if value.sliced:
+            low = "0" if value.low is None else self.text(value.low)
+            high = sizes[0] if value.high is None else self.text(value.high)
+            step = " * ".join([f"clamped({low}, {sizes[0]})", *sizes[1:]])
+            base = base if low == "0" else f"{base} + {step}"
+            sizes[0] = f"span({low}, {high}, {sizes[0]})"
+        return self.of(value.kind, base, sizes)
+
+    def expr(self, value: Expr) -> Text:
+        if isinstance(value, Table):  # as an array: where it is passed on
+            shape = map(str, self.shapes[value.name])
+            assert isinstance(value.kind, ArrayOf)
+            return self.of(value.kind, f"({_NAMES[value.kind.item]} *){value.name}", shape), ATOM
+        return super().expr(value)
+
+    shapes: dict[str, tuple[int, ...]]
+
+    def room(self, node: New | Copy, item: Scalar) -> str:
+        """The place of an array that is made: on the stack, or with the caller if it may be returned."""
+        size = self.rooms.sizes[id(node)]
+        if self.returned_kind is not None:
+            if item != self.returned_kind:
+                what = "a kernel that returns arrays and makes some of another type"
+                raise OutsideSubsetError(self.made.function, self.made.function, what, "let the caller make them")
+            self.used += size
+            return f"room + {self.used - size}" if self.used > size else "room"
+        name = self.fresh("room")
+        self.storage.append(f"  {_NAMES[item]} {name}[{size}];")
+        return name
+
+    def new(self, value: New) -> str:
+        assert isinstance(value.kind, ArrayOf)
+        place, item = self.room(value, value.kind.item), value.kind.item
+        if value.fill is not None:
+            count = " * ".join(self.text(each, MULTIPLY) for each in value.shape)
+            place = f"filled_{_LETTERS[item]}({place}, {count}, {self.text(value.fill)})"
+        return self.of(value.kind, place, map(self.text, value.shape))
+
+    def copied(self, value: Copy) -> str:
+        assert isinstance(value.kind, ArrayOf)
+        item, array = value.kind.item, self.text(value.array, ATOM)
+        sizes = [self.length(value.array, k) for k in range(value.kind.ndim)]
+        size = f"sizeof({_NAMES[item]}) * (size_t)({' * '.join(sizes)})"
+        return self.of(value.kind, f"({_NAMES[item]} *)copied({self.room(value, item)}, {array}.p, {size})", sizes)
+
+    def reshaped(self, value: Reshaped) -> str:
+        return self.of(value.kind, f"{self.text(value.array, ATOM)}.p", map(self.text, value.shape))
+
+    def operator(self, value: Operation) -> Text:
+        symbol = value.symbol
+        if symbol == "*":
+            return f"{self.text(value.a, MULTIPLY)} * {self.text(value.b, UNARY)}", MULTIPLY
+        if symbol in ("//", "%", "<<"):
+            name = {"//": "floordiv", "%": "mod", "<<": "shift_left"}[symbol]
+            name += "_whole" * (value.kind == INT and symbol != "<<")
+            return f"{name}({self.text(value.a)}, {self.text(value.b)})", ATOM
+        text = f"{self.text(value.a, ATOM)} {symbol} {self.text(value.b, ATOM)}"
+        return (f"(({text}) != 0)", ATOM) if value.kind == BOOL else (f"({text})", ATOM)
+
+    def primitive(self, value: Primitive, arguments: list[str]) -> str:
+        name, kind = value.name, value.kind
+        if name in ("real", "imag"):
+            return f"{arguments[0]}.{name[:2]}"
+        if name == "complex":
+            return f"cplx_of({', '.join(arguments)})"
+        if name == "abs":
+            inner = value.arguments[0]
+            if inner.kind == COMPLEX:
+                return f"hypot({self.text(inner, ATOM)}.re, {self.text(inner, ATOM)}.im)"
+            return f"{'fabs' if kind == FLOAT else 'abs_whole'}({arguments[0]})"
+        if name in ("least", "most"):
+            name += "_whole" * (kind == INT)
+        return f"{name}({', '.join(arguments)})"
+
+    def cast(self, value: Cast) -> Text:
+        if value.kind == COMPLEX:
+            return f"cplx_of({self.text(value.a)}, 0.0)", ATOM
+        return f"({name_of(value.kind)}){self.text(value.a, UNARY)}", UNARY
+
+    def called(self, value: Call, arguments: list[str]) -> str:
+        if (kind := room_of(value.callee)) is not None:
+            if self.returned_kind is not None:
+                what = "a kernel that returns arrays and calls another one that does"
+                raise OutsideSubsetError(self.made.function, self.made.function, what, "let the caller make them")
+            name = self.fresh("room")
+            self.storage.append(f"  {_NAMES[kind]} {name}[{self.rooms.of_result(value.callee)}];")
+            arguments = [name, *arguments]
+        return f"{value.callee.name}({', '.join(arguments)})"
+
+    def stored(self, place: Entry, value: Expr) -> str:
+        return f"{self.text(place)} = {self.text(value)};"
+
+    def filled(self, node: Fill) -> list[str]:
+        kind = node.place.kind
+        assert isinstance(kind, ArrayOf)
+        to, k = self.fresh("to"), self.fresh("at")
+        size = " * ".join(f"{to}.n{axis}" for axis in range(kind.ndim))
+        loop = f"for (int64_t {k} = 0; {k} < {size}; {k}++)"
+        number = self.number_at(node.value, k)[0]
+        return [f"{{ {mangled(kind)} {to} = {self.text(node.place)}; {loop} {to}.p[{k}] = {number}; }}"]
+
+    def returned(self, value: Expr | None) -> list[str]:
+        return ["return;" if value is None else f"return {self.text(value)};"]
+
+
+def room_of(made: Instance) -> Scalar | None:
+    """Of what the arrays are that a kernel makes and returns; None if it returns none."""
+    if not holds_arrays(made.result):
+        return None
+    kinds = [e.kind for e in walk(made.body) if isinstance(e, New | Copy)]
+    return next((kind.item for kind in kinds if isinstance(kind, ArrayOf)), None)
+
+
+def _definitions(kinds: Iterable[Type]) -> list[str]:
+    """Structs of arrays and tuples, and functions that make them; those first that others hold."""
+    found: dict[str, str] = {}
+
+    def define(kind: Type) -> None:
+        if isinstance(kind, Scalar | Kernel) or mangled(kind) in found:
+            return
+        name = mangled(kind)
+        if isinstance(kind, ArrayOf):
+            item, sizes = _NAMES[kind.item], [f"n{k}" for k in range(kind.ndim)]
+            fields = f"{item} *p; int64_t {', '.join(sizes)};"
+            given = ", ".join([f"{item} *p", *(f"int64_t {size}" for size in sizes)])
+            puts = " ".join(f"x.{each} = {each};" for each in ("p", *sizes))
+        else:
+            for item_kind in kind.items:
+                define(item_kind)
+            names, count = [name_of(each) for each in kind.items], len(kind.items)
+            fields = " ".join(f"{each} _{k};" for k, each in enumerate(names))
+            if kind.alike:
+                fields = f"{names[0]} v[{count}];"
+            given = ", ".join(f"{each} a{k}" for k, each in enumerate(names))
+            puts = " ".join(f"x.{f'v[{k}]' if kind.alike else f'_{k}'} = a{k};" for k in range(count))
+        head = f"typedef struct {{ {fields} }} {name};"
+        found[name] = f"{head}\nstatic inline {name} {name}_of({given}) {{ {name} x; {puts} return x; }}"
+
+    for kind in kinds:
+        define(kind)
+    return list(found.values())
+
+
+def unit(program: Program, rooms: Rooms) -> str:
+    """All kernels of a program as static functions, with what they need."""
+    kinds: list[Type] = [ArrayOf(FLOAT, 1), ArrayOf(FLOAT, 2), ArrayOf(INT, 1), TupleOf((FLOAT, FLOAT))]
+    names = {each.name for each in program.instances} | set(program.tables)
+    C.shapes = {name: value.shape for name, value in program.tables.items()}
+    texts = [C(each, WORDS | names, rooms, kinds).function() for each in program.instances]
+    tables = []
+    for name, value in program.tables.items():
+        numbers = ", ".join(map(repr, value.ravel().tolist()))
+        item = _NAMES[_item_of(value.dtype.kind)]
+        tables.append(f"static const {item} {name}[{value.size}] = {{{numbers}}};")
+    more = [
+        "static inline t_fx2 sin_cos(double x) { return t_fx2_of(sin(x), cos(x)); }",
+        "static inline bool all_finite(f1 a) {",
+        "  for (int64_t k = 0; k < a.n0; k++) if (!isfinite(a.p[k])) return false;",
+        "  return true;",
+        "}",
+        "static inline i1 counted(i1 a) { for (int64_t k = 0; k < a.n0; k++) a.p[k] = k; return a; }",
+    ]
+    return "\n".join([RUNTIME, *_definitions(dict.fromkeys(kinds)), *more, *tables, "", *texts, ""])
+
+
+def _item_of(letter: str) -> Scalar:
+    return {"f": FLOAT, "i": INT, "b": BOOL}[letter]
+
+
+__all__ = ["ADD", "C", "unit"]

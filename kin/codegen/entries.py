@@ -1,0 +1,226 @@
+"""The kernels that generated code calls, in the subset: what `kin.solve_ik` does of one target without words.
+
+They are never compiled by numba. A closed form enters as two kernels: `rows`, one of those of
+:mod:`kin.codegen.families`, and the kernel of the family that it calls.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from kin.ik.candidates import (
+    DISTANCE,
+    OVERRUN,
+    ROLL,
+    Requirement,
+    Rows,
+    accept,
+    measure_and_sort,
+    measure_rows,
+    ranges,
+    select,
+)  # fmt: skip
+from kin.ik.problem import FAR
+from kin.kernels.checks import straighten
+from kin.solvers.contract import APPROACH, POSE, POSITION
+from kin.solvers.numeric import each_of
+from kin.tolerances import TOLERANCES
+from kin.transforms import Array
+
+Inner = Callable[..., Any]
+Limits = tuple[Array, Array, Array]  # lower, upper, whole turns
+
+# What an entry answers with, as the generated files name it.
+SOLVED, APPROXIMATE, LIMITS, UNMET, ORIENTATION, UNREACHABLE = range(6)
+INVALID = -1
+ROWS_OF_ARCS = 256
+MEETINGS, WEIGHT = 12, 0.1  # as in `kin.ik.nearest`
+_POSITION, _ROTATION = TOLERANCES.closure_position, TOLERANCES.closure_rotation
+_SAME, _MET = TOLERANCES.same_branch, TOLERANCES.point_met
+_ALIKE, _SHARE = TOLERANCES.better_minimum, TOLERANCES.better_minimum_share
+
+
+def branches(
+    rows: Inner, inner: Inner, params: Array, signs: Array, T: Array, seed: Array, limits: Limits,
+    value: float, arcs: Array, q: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """q ``(k, n)`` ← the rows of the closed form, of which some joints may be reversed: (gap, number of arcs)."""
+    lower, upper, _ = limits
+    n = seed.shape[0]
+    near, low, high = np.empty(n), np.empty(n), np.empty(n)
+    for j in range(n):
+        reversed_ = signs[j] < 0.0
+        near[j] = signs[j] * seed[j]
+        low[j] = -upper[j] if reversed_ else lower[j]
+        high[j] = -lower[j] if reversed_ else upper[j]
+    gap, count = rows(inner, params, T, value, near, (low, high), arcs, q)
+    for i in range(q.shape[0]):
+        for j in range(n):
+            q[i, j] = q[i, j] * signs[j]
+    return gap, count
+
+
+def solve(
+    rows: Inner, inner: Inner, model: Array, params: Array, signs: Array, target: Array, seed: Array,
+    limits: Limits, value: float, arcs: Array, found: Rows,
+) -> tuple[int, int]:  # fmt: skip
+    """All configurations of a pose: (what kind of answer, how many of found.order).
+
+    SOLVED: those inside the limits, nearest to the seed first. APPROXIMATE, of an arm with fewer than six joints:
+    those that meet the point and the approach direction, the smallest rotation about it first. LIMITS: those
+    outside the limits, the least outside first. UNMET: none. INVALID: the target ``(4, 4)`` is no pose, or the
+    seed not finite. value: that of the redundancy parameter, NaN for one near the seed.
+    """
+    lower, upper, turns = limits
+    T = np.empty((4, 4))
+    if not _is_valid(target, seed, T):
+        return INVALID, 0
+    branches(rows, inner, params, signs, T, seed, limits, value, arcs, found.q)
+    pose = Requirement(model, np.zeros(7), lower, upper, turns, POSE, True, _POSITION, _ROTATION)
+    count = measure_and_sort(pose, T, seed, seed, found)
+    if count < 0:
+        count = _with_seed(pose, T, seed, found) if math.isnan(value) else -1 - count
+    if count > 0:
+        return SOLVED, count
+    blocked = _ordered(found, OVERRUN)
+    if blocked > 0:
+        return LIMITS, blocked
+    if seed.shape[0] < 6:
+        approach = Requirement(model, np.zeros(7), lower, upper, turns, APPROACH, True, _POSITION, _ROTATION)
+        stats = np.empty(found.stats.shape)
+        for i in range(found.q.shape[0]):
+            for k in range(5):
+                stats[i, k] = found.stats[i, k]
+        measure_rows(approach, T, seed, seed, found.q, found.stats)
+        accept(approach, found.stats, True, found.closed, found.good)
+        for i in range(found.q.shape[0]):
+            found.closed[i] = found.good[i]
+            found.stats[i, 1] = stats[i, 1]
+        count = _ordered(found, ROLL)
+        if count > 0:
+            return APPROXIMATE, count
+    return UNMET, 0
+
+
+def _is_valid(target: Array, seed: Array, T: Array) -> bool:
+    """T ← the target with its rotation made orthonormal, as `kin.solve_ik` does it; whether both can be used."""
+    for j in range(seed.shape[0]):
+        if not abs(seed[j]) <= FAR:
+            return False
+    return straighten(target, FAR, T) >= 0.0
+
+
+def _with_seed(pose: Requirement, T: Array, seed: Array, found: Rows) -> int:
+    """Make the seed, which meets the target, the row of the branch that it is on, and the first solution."""
+    k, n = found.q.shape
+    one, stats = np.empty((1, n)), np.empty((1, 5))
+    for j in range(n):
+        one[0, j] = seed[j]
+    measure_rows(pose, T, seed, seed, one, stats)
+    row, least = -1, _SAME
+    for i in range(k):
+        apart = 0.0
+        for j in range(n):
+            apart = max(apart, abs(found.q[i, j] - one[0, j]))
+        if found.good[i] and apart < least:
+            row, least = i, apart
+    for i in range(k):
+        if row < 0 and not found.good[i]:
+            row = i
+    row = max(row, 0)
+    for j in range(n):
+        found.q[row, j] = one[0, j]
+    for j in range(5):
+        found.stats[row, j] = stats[0, j]
+    found.closed[row] = True
+    found.good[row] = True
+    key = np.empty(k)
+    for i in range(k):
+        key[i] = found.stats[i, DISTANCE] if found.good[i] else math.inf
+    return _taken(found, key)
+
+
+def _ordered(found: Rows, column: int) -> int:
+    """found.order ← the rows that meet the task, the smallest statistic first; their number."""
+    key = np.empty(found.q.shape[0])
+    for i in range(found.q.shape[0]):
+        key[i] = abs(found.stats[i, column]) if found.closed[i] else math.inf
+    return _taken(found, key)
+
+
+def _taken(found: Rows, key: Array) -> int:
+    kept, count = select(found.q, key)
+    for i in range(count):
+        found.order[i] = kept[i]
+    return count
+
+
+def intervals(
+    rows: Inner, inner: Inner, params: Array, signs: Array, target: Array, seed: Array, limits: Limits,
+    sense: float, q: Array, out: Array,
+) -> int:  # fmt: skip
+    """out ``(m, 3)`` ← rows (branch, low, high): the values of the redundancy parameter that the limits allow.
+
+    Those of each branch, sorted and joined; on a circle in (−π, π]. sense: −1.0 if the parameter is a joint that
+    is reversed. Returns their number, or INVALID.
+    """
+    T = np.empty((4, 4))
+    if not _is_valid(target, seed, T):
+        return INVALID
+    arcs = np.empty((ROWS_OF_ARCS, 3))
+    count = branches(rows, inner, params, signs, T, seed, limits, math.nan, arcs, q)[1]
+    together = np.zeros(q.shape[0], dtype=np.bool_)
+    for i in range(max(count, 0)):
+        if sense < 0.0:
+            low = -arcs[i, 2]
+            arcs[i, 2] = -arcs[i, 1]
+            arcs[i, 1] = low
+    return ranges(arcs[: max(count, 0)], np.arange(q.shape[0]), together, True, out)
+
+
+def nearest(
+    rows: Inner, inner: Inner, model: Array, params: Array, signs: Array, target: Array, seed: Array, known: Array,
+    starts: Array, limits: Limits, point: bool, found: Rows,
+) -> int:  # fmt: skip
+    """found.q[0] ← the configuration inside the limits that comes nearest to a pose, or to its point alone.
+
+    At 0.1 m per radian, as `kin.solve_ik` does it: descents from the seed, from the branches (known ``(k, n)`` is
+    scratch) and from points spread over the limits ``(m, n)``. ORIENTATION if it meets the point, else
+    UNREACHABLE, or INVALID.
+    """
+    T = np.empty((4, 4))
+    if not _is_valid(target, seed, T):
+        return INVALID
+    branches(rows, inner, params, signs, T, seed, limits, math.nan, np.empty((ROWS_OF_ARCS, 3)), known)
+    n, m = seed.shape[0], starts.shape[0]
+    size = 1 + known.shape[0] + m
+    q, costs = np.empty((size, n)), np.empty(size)
+    for j in range(n):
+        q[0, j] = seed[j]
+    count = 1
+    for i in range(known.shape[0]):
+        if not math.isnan(known[i, 0]):
+            for j in range(n):
+                q[count, j] = known[i, j]
+            count += 1
+    for i in range(m):
+        for j in range(n):
+            q[count, j] = starts[i, j]
+        count += 1
+    task, weight, enough = (POSITION, 1.0, 1e-11) if point else (POSE, WEIGHT, 0.0)
+    goal = (T, task, np.zeros(7), weight)
+    count = each_of(model, goal, limits, enough, MEETINGS, q[:count], costs)
+    best = 0
+    for i in range(count):
+        if costs[i] < costs[best] * (1.0 - _SHARE) - _ALIKE:
+            best = i
+    for j in range(n):
+        found.q[0, j] = q[best, j]
+    lower, upper, turns = limits
+    pose = Requirement(model, np.zeros(7), lower, upper, turns, POSE, True, _POSITION, _ROTATION)
+    measure_rows(pose, T, seed, seed, found.q[:1], found.stats[:1])
+    return ORIENTATION if found.stats[0, 0] <= _MET else UNREACHABLE

@@ -1,0 +1,161 @@
+"""How large every array of a program is at most, so that C needs neither a heap nor a buffer that could overflow.
+
+The arrays that an entry is called with have known shapes. From them follow the shapes of all views and the numbers
+in all shapes, kernel by kernel: upper bounds, since a slice may show less. An array whose size does not follow is
+refused.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from kin.codegen.source import OutsideSubsetError
+from kin.codegen.tree import (
+    Assign,
+    Call,
+    Cast,
+    Choice,
+    Copy,
+    Expr,
+    For,
+    Instance,
+    Item,
+    Items,
+    Length,
+    Literal,
+    New,
+    Operation,
+    Primitive,
+    Reshaped,
+    Return,
+    Variable,
+    View,
+    walk,
+)  # fmt: skip
+from kin.codegen.types import INT, ArrayOf, TupleOf, Type, holds_arrays
+
+# Of a whole number its largest value, of an array and of a tuple those of its axes and items; None: not known.
+Bound = Any
+_PASSES = 6
+
+
+class Rooms:
+    """The numbers of entries of all arrays that kernels make, found by following the entries' calls.
+
+    Args:
+        known: bounds of parameters that do not follow, by the names of kernel and parameter.
+    """
+
+    def __init__(self, known: Mapping[tuple[str, str], int]) -> None:
+        self.known = known
+        self.sizes: dict[int, int] = {}  # by the id of a `New` or `Copy`
+        self._results: dict[tuple[Instance, Bound], Bound] = {}
+
+    def enter(self, made: Instance, arguments: Sequence[Bound]) -> Bound:
+        """Follow a call; the bound of its result."""
+        key = made, tuple(arguments)
+        if key not in self._results:
+            self._results[key] = _Following(self, made, key[1]).run()
+        return self._results[key]
+
+    def of_result(self, made: Instance) -> int:
+        """How many entries the arrays have that a kernel makes and returns, with those of what it calls."""
+        sites = [e for e in walk(made.body) if isinstance(e, New | Copy)]
+        calls = [e for e in walk(made.body) if isinstance(e, Call) and holds_arrays(e.kind)]
+        return sum(self.sizes[id(e)] for e in sites) + sum(self.of_result(e.callee) for e in calls)
+
+
+class _Following:
+    """One kernel, called with arguments of these bounds."""
+
+    def __init__(self, rooms: Rooms, made: Instance, arguments: Sequence[Bound]) -> None:
+        self.rooms, self.made = rooms, made
+        self.bounds = dict(zip(made.parameters, arguments, strict=True))
+        self.bounds |= {name: rooms.known.get((made.name, name), bound) for name, bound in self.bounds.items()}
+
+    def run(self) -> Bound:
+        for settling in range(_PASSES):
+            before = dict(self.bounds)
+            for node in walk(self.made.body):
+                if isinstance(node, Assign):
+                    self._note(node.name, node.value.kind, self.of(node.value))
+                elif isinstance(node, For):
+                    self._note(node.name, INT, self.of(node.end if node.step > 0 else node.start))
+            if self.bounds == before:
+                break
+            if settling > 2:  # what still grows has no bound
+                self.bounds |= {k: _unknown(self.made.variables[k]) for k in before if before[k] != self.bounds[k]}
+        result = None
+        for node in walk(self.made.body):
+            if isinstance(node, New | Copy):
+                self._measure(node)
+            elif isinstance(node, Call):
+                self.of(node)
+            elif isinstance(node, Return) and node.value is not None:
+                bound = self.of(node.value)
+                result = bound if result is None else _largest(result, bound)
+        return result
+
+    def _note(self, name: str, kind: Type, bound: Bound) -> None:
+        known = self.bounds.get(name)
+        self.bounds[name] = bound if name not in self.bounds else _largest(known, bound)
+
+    def _measure(self, node: New | Copy) -> None:
+        shape = self.of(node)
+        if None in shape:
+            what = "an array whose size does not follow from the arguments"
+            raise OutsideSubsetError(self.made.function, self.made.function, what, "give it a constant shape")
+        self.rooms.sizes[id(node)] = max(math.prod(shape), 1, self.rooms.sizes.get(id(node), 0))
+
+    def of(self, value: Expr) -> Bound:
+        """The bound of an expression."""
+        match value:
+            case Literal(value=number):
+                return number if isinstance(number, int) else None
+            case Variable(kind=kind, name=name):
+                return self.bounds.get(name, _unknown(kind))
+            case Length(array=array, axis=axis):
+                return self.of(array)[axis]
+            case Items(items=items):
+                return tuple(map(self.of, items))
+            case Item(base=base, index=int(k)):
+                return self.of(base)[k]
+            case View(array=array, indices=indices):
+                return self.of(array)[len(indices) :]
+            case New(shape=shape) | Reshaped(shape=shape):
+                return tuple(map(self.of, shape))
+            case Copy(array=inner) | Cast(a=inner) | Primitive(name="counted", arguments=(inner,)):
+                return self.of(inner)
+            case Choice(a=a, b=b):
+                return _largest(self.of(a), self.of(b))
+            case Call(callee=callee, arguments=arguments):
+                return self.rooms.enter(callee, tuple(map(self.of, arguments)))
+            case Primitive(name="least", arguments=(a, b)):
+                known = [x for x in (self.of(a), self.of(b)) if x is not None]
+                return min(known, default=None)
+            case Operation(kind=kind, symbol=symbol, a=a, b=b) if kind == INT:
+                return _computed(symbol, self.of(a), self.of(b), b)
+        return _unknown(value.kind)
+
+
+def _computed(symbol: str, a: Bound, b: Bound, second: Expr) -> Bound:
+    if a is None or b is None:
+        return None
+    if symbol == "-" and isinstance(second, Literal):
+        return a - b
+    compute: Callable[[int, int], int] | None = {"+": int.__add__, "*": int.__mul__}.get(symbol)
+    return None if compute is None else compute(a, b)
+
+
+def _largest(a: Bound, b: Bound) -> Bound:
+    if isinstance(a, tuple) and isinstance(b, tuple):
+        return tuple(map(_largest, a, b))
+    return None if a is None or b is None else max(a, b)
+
+
+def _unknown(kind: Type) -> Bound:
+    if isinstance(kind, ArrayOf):
+        return (None,) * kind.ndim
+    return tuple(map(_unknown, kind.items)) if isinstance(kind, TupleOf) else None

@@ -1,0 +1,71 @@
+"""The types of the subset of Python that kernels are written in, as numba sees them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import FunctionType
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A number; `rank` orders what Python promotes: bool → int → float → complex."""
+
+    name: str
+    rank: int
+
+
+BOOL, INT, FLOAT, COMPLEX = (Scalar(name, k) for k, name in enumerate(("bool", "int", "float", "complex")))
+NONE = Scalar("none", -1)
+
+
+@dataclass(frozen=True)
+class ArrayOf:
+    """A C-contiguous array with a shape that is known when it runs."""
+
+    item: Scalar
+    ndim: int
+
+
+@dataclass(frozen=True)
+class TupleOf:
+    """A tuple; `names` are the fields of a named tuple."""
+
+    items: tuple[Type, ...]
+    names: tuple[str, ...] = ()
+
+    @property
+    def alike(self) -> bool:
+        """Whether all items have one type, so that an index may be a variable."""
+        return len(set(self.items)) == 1
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A kernel that is passed as an argument: its callee is compiled once for each."""
+
+    function: FunctionType
+
+
+Type = Scalar | ArrayOf | TupleOf | Kernel
+
+
+def widest(*kinds: Type) -> Scalar | None:
+    """The number that these are promoted to, None if one of them is none."""
+    numbers = [kind for kind in kinds if isinstance(kind, Scalar) and kind != NONE]
+    return max(numbers, key=lambda kind: kind.rank) if len(numbers) == len(kinds) else None
+
+
+def joined(a: Type, b: Type) -> Type | None:
+    """The type of a variable that is assigned both, None if there is none."""
+    if a == b:
+        return a
+    if isinstance(a, TupleOf) and isinstance(b, TupleOf) and len(a.items) == len(b.items):
+        items = [joined(x, y) for x, y in zip(a.items, b.items, strict=True)]
+        names = a.names if a.names == b.names else ()
+        return None if None in items else TupleOf(tuple(kind for kind in items if kind is not None), names)
+    return widest(a, b)
+
+
+def holds_arrays(kind: Type) -> bool:
+    """Whether a value of this type shows memory."""
+    return isinstance(kind, ArrayOf) or (isinstance(kind, TupleOf) and any(map(holds_arrays, kind.items)))

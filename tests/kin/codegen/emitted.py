@@ -1,0 +1,147 @@
+"""Generated C in this process, targets for it, and what the core answers to them."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import kin
+from kin.codegen import families, files, source
+from kin.codegen.arm import Arm, arm_of
+from kin.codegen.types import FLOAT, INT
+from kin.ik.candidates import Requirement, Rows, measure_and_sort
+from kin.kernels import simd
+from kin.kernels.checks import straighten
+from kin.solvers.contract import POSE, SolverInput
+
+STATUSES = ("solved", "approximate", "limits", "unmet", "orientation", "unreachable")
+STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
+# With these C computes what numba does, to the last bit: the kernels' own polynomials, no fusing of operations.
+EXACT = ("-O1", "-mfma", "-ffp-contract=off", "-fno-tree-vectorize")
+BITS = {simd._bits: ("bits_of", (FLOAT,), INT), simd._float: ("float_of", (INT,), FLOAT)}
+OWN = {k: row for k, row in source.PRIMITIVES.items() if row[0] not in ("sin_cos", "arctan2")} | BITS
+
+
+@dataclass
+class Built:
+    """A library, with the functions of an arm."""
+
+    arm: Arm
+    name: str
+    library: Any
+
+    def __post_init__(self):
+        class Solution(ctypes.Structure):
+            _fields_ = (
+                ("q", ctypes.c_double * self.arm.robot.n),
+                ("branch", ctypes.c_int),
+                ("s", ctypes.c_double * 4),
+            )
+
+        self.found = (Solution * self.arm.rows)()
+
+    def call(self, name, *arguments):
+        """The status that a function returns, with NumPy arrays and floats as arguments."""
+        given = [
+            a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) if isinstance(a, np.ndarray)
+            else ctypes.c_double(a) if isinstance(a, float) else a
+            for a in arguments
+        ]  # fmt: skip
+        return getattr(self.library, f"{self.name}_{name}")(*given)
+
+    def ik(self, T, seed, value=math.nan):
+        """(status, joint values ``(k, n)``, errors and distances ``(k, 4)``, branches)."""
+        count = ctypes.c_int()
+        T, seed = np.ascontiguousarray(T), np.ascontiguousarray(seed)
+        if math.isnan(value):
+            status = self.call("ik", T, seed, self.found, ctypes.byref(count))
+        else:
+            status = self.call("ik_at", T, value, seed, self.found, ctypes.byref(count))
+        rows = [self.found[k] for k in range(count.value)]
+        q, s = np.array([list(r.q) for r in rows]), np.array([list(r.s) for r in rows])
+        return STATUSES[status] if status >= 0 else "invalid", q, s, [r.branch for r in rows]
+
+
+def compiled(arm: Arm, folder: Path, *options: str) -> Built:
+    """The C file of an arm as a library; warnings are errors."""
+    name = files.name_for(arm.robot, None)
+    file, library = folder / f"{name}.c", folder / f"{name}.so"
+    file.write_text(files.c_file(arm, name))
+    define = f"-D{name.upper()}_IMPLEMENTATION"
+    command = ["gcc", "-std=c99", "-shared", "-fPIC", *STRICT, define, *options, file, "-o", library, "-lm"]
+    subprocess.run(command, check=True)
+    return Built(arm, name, ctypes.CDLL(str(library)))
+
+
+def exact(robot: kin.Robot, folder: Path) -> Built:
+    """A library with the kernels' own sine and arc tangent."""
+    return compiled(arm_of(robot, False, OWN), folder, *EXACT)
+
+
+def targets(robot: kin.Robot, random: int, hard: int):
+    """Poses, seeds, and a configuration of each pose that has one: random, then hard ones."""
+    rng = np.random.default_rng(7)
+    low, high = np.maximum(robot.lower, -math.pi), np.minimum(robot.upper, math.pi)
+    q = rng.uniform(low, high, (random + hard, robot.n))
+    seeds = rng.uniform(low, high, q.shape)
+    for i in range(random, len(q)):
+        _harden(q[i], i % 5, rng, robot, (low, high))
+        seeds[i] = q[i] + rng.normal(0.0, 0.2, robot.n)
+    T = kin.fk(robot, q)
+    for i in range(random, len(q)):
+        kind = i % 16
+        if kind == 5:
+            T[i, :3, 3] *= rng.uniform(1.0, 3.0)
+        elif kind in (6, 14):
+            T[i, :2, 3] *= 0.0 if kind == 6 else 1e-9
+        elif kind == 7:
+            T[i, :3, 3] = rng.uniform(-1.0, 1.0, 3) * robot.reach
+        elif kind == 15:
+            seeds[i] = q[i]
+    return T, seeds, q
+
+
+def _harden(q, kind, rng, robot, limits):
+    """Quarter turns, zeros, the home pose, beside a quarter turn, and joints at their limits."""
+    low, high = limits
+    some = rng.random(robot.n) < 0.5
+    quarters = np.clip(np.round(q / (math.pi / 2)) * (math.pi / 2), low, high)
+    if kind == 0:
+        q[some] = quarters[some]
+    elif kind == 1:
+        q[rng.integers(1, robot.n)] = 0.0
+        q[:] = np.clip(q, low, high)
+    elif kind == 2:
+        q[:] = robot.q_home
+    elif kind == 3:
+        j = rng.integers(robot.n)
+        q[j] = np.clip(quarters[j] + 10.0 ** rng.uniform(-12, -4), low[j], high[j])
+    else:
+        q[some] = np.where(rng.random(robot.n) < 0.5, low, high)[some]
+
+
+def answer(arm: Arm, T, seed, value):
+    """What the core's kernels find: joint values and statistics of the solutions, the nearest first."""
+    robot, form = arm.robot, arm.form
+    pose = np.empty((4, 4))
+    assert straighten(np.ascontiguousarray(T), 1e6, pose) >= 0.0
+    if arm.alone.rows in (families.without_limits, families.of_general6):
+        q = np.empty((arm.rows, robot.n))
+        form.kernels.one(form.kernels.params, pose, value, seed, q)
+    else:
+        values = (value,) * len(form.redundancies(POSE))
+        q = np.array(
+            form.solve(SolverInput(pose, POSE, values, True, seed, robot.lower, robot.upper)).q, order="C"
+        )
+    k = len(q)
+    rows = Rows(q, np.empty((k, 5)), np.empty(k, bool), np.empty(k, bool), np.empty(k, np.int64))
+    turns = arm.constants["turns" if math.isnan(value) else "held"]
+    requirement = Requirement(robot.model, np.zeros(7), robot.lower, robot.upper, turns, POSE, True)
+    count = measure_and_sort(requirement, pose, seed, seed, rows)
+    return count, rows

@@ -1,0 +1,164 @@
+"""Generated C beside numba: the same bits, and the same types."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from emitted import STRICT, answer, exact, targets
+from numba import types
+
+import kin
+from kin.codegen import files
+from kin.codegen.arm import arm_of
+from kin.codegen.families import without_limits
+from kin.codegen.types import BOOL, COMPLEX, FLOAT, INT, NONE, ArrayOf, Kernel, TupleOf
+from kin.kernels.compile import PLAIN
+from kin.warmup import one_of_each_family
+
+FAMILIES = [robot for robot in one_of_each_family() if not isinstance(robot, str)]
+QUICK = ("puma560", "pioneer5")
+ALL = [
+    pytest.param(robot.id, marks=() if robot.id in QUICK else pytest.mark.full)
+    for robot in kin.builtin_robots().values()
+]
+HAS_FMA = Path("/proc/cpuinfo").exists() and " fma " in Path("/proc/cpuinfo").read_text()
+
+
+def emitted_or_skip(robot_id):
+    """The arm, unless it is refused: which ones are, and in which words, is tested elsewhere."""
+    robot = kin.get_robot(robot_id)
+    try:
+        return robot, arm_of(robot)
+    except kin.InputError:
+        pytest.skip("refused")
+
+
+@pytest.mark.skipif(not HAS_FMA, reason="numba uses fused operations only where the processor has them")
+@pytest.mark.skipif(PLAIN, reason="kernels are not compiled")
+@pytest.mark.parametrize("robot_id", ALL)
+def test_c_computes_the_bits_of_the_compiled_kernels(robot_id, tmp_path):
+    robot, _ = emitted_or_skip(robot_id)
+    built = exact(robot, tmp_path)
+    random, hard = (60, 48) if robot_id in QUICK else (1000, 300)
+    solved = 0
+    for T, seed, q in zip(*targets(robot, random, hard), strict=True):
+        value = float(q[built.arm.parameter.joint]) if built.arm.alone.needs_value else math.nan
+        count, rows = answer(built.arm, T, seed, value)
+        status, found, stats, branches = built.ik(T, seed, value)
+        assert (status == "solved") == (count != 0)
+        if count > 0:
+            order = rows.order[:count]
+            assert branches == order.tolist()
+            assert np.array_equal(found, rows.q[order])
+            assert np.array_equal(stats, rows.stats[order, :4])
+            solved += 1
+    assert solved > random // 2
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("robot_id", ALL)
+def test_c_is_also_strict_cpp_and_clean_under_sanitizers(robot_id, tmp_path):
+    robot, arm = emitted_or_skip(robot_id)
+    name = files.name_for(robot, None)
+    text = files.c_file(arm, name)
+    define = f"-D{name.upper()}_IMPLEMENTATION"
+    plus = tmp_path / "arm.cpp"
+    plus.write_text(text)
+    subprocess.run(["g++", "-std=c++11", *STRICT, define, "-c", plus, "-o", tmp_path / "arm.o"], check=True)
+    T, seeds, _ = targets(robot, 20, 100)
+    (tmp_path / f"{name}.c").write_text(text)
+    at = "_at" if arm.alone.needs_value else ""
+    value = "0.3, " if at else ""
+    numbers = ", ".join(repr(float(x)) for i in range(len(T)) for x in (*T[i].ravel(), *seeds[i]))
+    main = f"""#define {name.upper()}_IMPLEMENTATION
+#include "{name}.c"
+#include <stdio.h>
+static const double data[{len(T)}][{16 + robot.n}] = {{{numbers}}};
+int main(void) {{
+  {name}_solution found[{arm.rows}];
+  int count, total = 0;
+  for (int i = 0; i < {len(T)}; i++) {{
+    {name}_ik{at}(data[i], {value}data[i] + 16, found, &count);
+    total += count;
+    if (i % 20 == 0) {name}_nearest(data[i], data[i] + 16, i % 40 == 0, found);
+  }}
+  printf("%d\\n", total);
+  return 0;
+}}
+"""
+    (tmp_path / "main.c").write_text(main)
+    checks = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-Wno-missing-braces"]
+    command = ["gcc", "-std=c99", "-O1", "-g", *checks, tmp_path / "main.c", "-o", tmp_path / "main", "-lm"]
+    subprocess.run(command, check=True, cwd=tmp_path)
+    done = subprocess.run([tmp_path / "main"], check=True, capture_output=True, text=True)
+    assert int(done.stdout) > 0
+    assert done.stderr == ""
+
+
+def kind_of(numba_type):
+    """A type of numba as one of the translator's."""
+    match numba_type:
+        case types.Boolean():
+            return BOOL
+        case types.Integer():
+            return INT
+        case types.Float():
+            return FLOAT
+        case types.Complex():
+            return COMPLEX
+        case types.NoneType():
+            return NONE
+        case types.Array():
+            return ArrayOf(kind_of(numba_type.dtype), numba_type.ndim)
+    return TupleOf(tuple(map(kind_of, numba_type.types)))
+
+
+def signature_of(kinds):
+    """Types of the translator as those of numba."""
+    plain = {BOOL: types.boolean, INT: types.int64, FLOAT: types.float64, COMPLEX: types.complex128}
+
+    def one(kind):
+        if isinstance(kind, ArrayOf):
+            return types.Array(plain[kind.item], kind.ndim, "C")
+        if isinstance(kind, TupleOf):
+            return types.Tuple(tuple(map(one, kind.items)))
+        return plain[kind]
+
+    return tuple(map(one, kinds))
+
+
+def unnamed(kind):
+    return TupleOf(tuple(map(unnamed, kind.items))) if isinstance(kind, TupleOf) else kind
+
+
+@pytest.mark.full
+@pytest.mark.skipif(PLAIN, reason="kernels are not compiled")
+@pytest.mark.parametrize("robot_id", ALL)
+def test_results_have_the_types_that_numba_infers(robot_id):
+    _, arm = emitted_or_skip(robot_id)
+    compared = 0
+    for made in arm.program.instances:
+        kernel = getattr(__import__(made.function.__module__, fromlist=["_"]), made.function.__name__)
+        kinds = [*made.kinds, *(k for kind in made.kinds if isinstance(kind, TupleOf) for k in kind.items)]
+        named = any(isinstance(kind, TupleOf) and kind.names for kind in kinds)
+        if not hasattr(kernel, "overloads") or named or any(isinstance(kind, Kernel) for kind in made.kinds):
+            continue
+        signature = signature_of(made.kinds)
+        kernel.compile(signature)
+        assert kind_of(kernel.overloads[signature].signature.return_type) == unnamed(made.result), made.name
+        compared += 1
+    assert compared > 20
+
+
+def test_a_family_without_limits_has_nothing_that_they_would_decide():
+    for robot in FAMILIES:
+        try:
+            arm = arm_of(robot)
+        except kin.InputError:
+            continue
+        if arm.alone.rows is without_limits:
+            assert arm.parameter is None or arm.alone.needs_value

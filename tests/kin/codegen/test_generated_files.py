@@ -1,0 +1,235 @@
+"""The generated files as users have them: what they answer, what they refuse, and what their heads say."""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import json
+import math
+import subprocess
+
+import numpy as np
+import pytest
+from emitted import Built, compiled, targets
+from playwright._impl._driver import compute_driver_executable
+
+import kin
+from kin.codegen import files, js
+from kin.codegen.arm import arm_of
+
+QUICK_C, QUICK_JS = "ur5e", "so101"
+REFUSED = {
+    "gen3": "made of kernels alone",
+    "prr": "made of kernels alone",
+    "palletiser": "rows that follow other joints",
+    "gantry": "whose kernels can be translated",
+}
+NOT_EMITTED = {*REFUSED, "rrp", "sawyer", "baxter"}
+
+
+def others(quick):
+    return [
+        pytest.param(i, marks=() if i == quick else pytest.mark.full)
+        for i in kin.builtin_robots()
+        if i not in REFUSED
+    ]
+
+
+@pytest.mark.parametrize("robot_id", REFUSED)
+def test_an_arm_that_cannot_be_emitted_is_refused_with_why(robot_id):
+    with pytest.raises(kin.InputError, match=REFUSED[robot_id]) as refused:
+        kin.generate(robot_id)
+    assert refused.value.field == "robot"
+
+
+def test_a_table_that_is_near_a_family_is_refused_and_never_emitted_as_that():
+    text = kin.robot_to_toml("puma560").replace("90", "89.999").replace('id = "', 'id = "typed-')
+    robot = kin.parse_robot(text)
+    with pytest.raises(kin.InputError, match=r"exact numbers.*pi/2"):
+        kin.generate(robot)
+
+
+@pytest.mark.parametrize(
+    ("field", "arguments"),
+    [
+        ("language", {"language": "fortran"}),
+        ("name", {"name": "2r"}),
+        ("name", {"name": "double"}),
+        ("name", {"name": "a b"}),
+    ],
+)
+def test_bad_arguments_are_named(field, arguments):
+    with pytest.raises(kin.InputError) as refused:
+        kin.generate("planar2r", **arguments)
+    assert refused.value.field == field
+
+
+def test_names_in_a_file_are_made_of_the_id():
+    robot = kin.get_robot("redundant7-craig")
+    assert files.name_for(robot, None) == "redundant7_craig"
+    assert files.name_for(robot, "left_arm") == "left_arm"
+
+
+def compare(robot, answers, targets_, value):
+    """Statuses, joint values and branches beside `kin.solve_ik`."""
+    worst = 0.0
+    for (T, seed, q), (status, found, names) in zip(zip(*targets_, strict=True), answers, strict=True):
+        options = {} if value is None else {"redundancy": float(q[value])}
+        expected = kin.solve_ik(robot, T, q_seed=seed, **options)
+        wanted = expected.status.value
+        assert status == ("unmet" if wanted in ("orientation", "unreachable") else wanted)
+        if wanted == "solved" and not expected.details.infinite:
+            assert len(found) == len(expected.solutions)
+            worst = max([worst, *(np.abs(a - b.q).max() for a, b in zip(found, expected.solutions, strict=True))])
+            assert names == [files._ascii(each.branch) for each in expected.solutions]
+    return worst
+
+
+@pytest.mark.parametrize("robot_id", others(QUICK_C))
+def test_c_answers_as_the_core_does(robot_id, tmp_path):
+    robot = kin.get_robot(robot_id)
+    arm = arm_of(robot)
+    built = compiled(arm, tmp_path, "-O1")
+    built.library[f"{built.name}_branch"].restype = ctypes.c_char_p
+    names = [built.library[f"{built.name}_branch"](k).decode() for k in range(arm.rows)]
+    given = arm.parameter.joint if arm.alone.needs_value else None
+    asked = targets(robot, 40, 0)
+    answers = []
+    for T, seed, q in zip(*asked, strict=True):
+        status, found, _, branches = built.ik(T, seed, math.nan if given is None else float(q[given]))
+        answers.append((status, found, [names[b] for b in branches]))
+        pose, J = np.empty((4, 4)), np.empty((6, robot.n))
+        assert built.call("fk", q, pose) == built.call("jacobian", q, J) == 0
+        assert np.abs(pose - T).max() < 1e-14
+        assert np.abs(J - kin.jacobian(robot, q)).max() < 1e-14
+    assert compare(robot, answers, asked, given) < 1e-7
+    assert names == [files._ascii(each) for each in arm.form.branches]
+    check_refusals(built)
+    if not arm.alone.needs_value:
+        check_nearest(built, asked)
+
+
+def check_refusals(built: Built):
+    n = built.arm.robot.n
+    at = (0.3,) if built.arm.alone.needs_value else ()
+    for T, seed in (
+        (np.full((4, 4), math.nan), np.zeros(n)),
+        (2.0 * np.eye(4), np.zeros(n)),
+        (np.eye(4), np.full(n, math.inf)),
+    ):
+        assert built.ik(T, seed, *at)[0] == "invalid"
+    assert built.call("fk", np.full(n, math.nan), np.empty((4, 4))) == -1
+
+
+def check_nearest(built: Built, asked):
+    robot, one = built.arm.robot, type(built.found[0])()
+    for T, seed in list(zip(*asked[:2], strict=True))[:2]:
+        far = T.copy()
+        far[:3, 3] += 3.0 * robot.reach
+        status = built.call("nearest", far, seed, ctypes.c_bool(True), ctypes.byref(one))
+        expected = kin.solve_ik(robot, far, q_seed=seed)
+        assert expected.status.value == "unreachable" == ("orientation", "unreachable")[status - 4]
+        assert one.s[0] == pytest.approx(expected.distance, abs=1e-6)
+
+
+@pytest.mark.parametrize("robot_id", others(QUICK_JS))
+def test_javascript_answers_as_the_core_does(robot_id, tmp_path):
+    robot = kin.get_robot(robot_id)
+    arm = arm_of(robot)
+    given = arm.parameter.joint if arm.alone.needs_value else None
+    T, seeds, q = targets(robot, 40, 0)
+    (tmp_path / "arm.js").write_text(kin.generate(robot, "js", name="arm"))
+    (tmp_path / "asked.json").write_text(json.dumps({"T": T.tolist(), "seeds": seeds.tolist(), "q": q.tolist()}))
+    bad = "arm.ik(T, seed)" if given is None else "arm.ik_at(T, 0.1, seed)"
+    ask = "arm.ik(T, seeds[i])" if given is None else f"arm.ik_at(T, q[i][{given}], seeds[i])"
+    run = f"""
+const arm = require("./arm.js"), {{ T: poses, seeds, q }} = require("./asked.json");
+const far = poses[0].map((row, r) => row.map((x, c) => (c === 3 && r < 3 ? x + 50 : x)));
+const refused = [];
+const scaled = far.map((row) => row.map((x) => 2 * x));
+for (const [T, seed] of [[poses[0], [1]], [[[NaN]], seeds[0]], [scaled, seeds[0]]])
+  try {{ {bad}; }} catch (error) {{ refused.push(error.message); }}
+console.log(JSON.stringify({{
+  answers: poses.map((T, i) => {ask}), fk: q.map((each) => arm.fk(each)), J: arm.jacobian(q[0]),
+  near: arm.nearest(far, seeds[0], true), refused,
+}}));
+"""
+    (tmp_path / "run.js").write_text(run)
+    command = [compute_driver_executable()[0], "run.js"]
+    done = json.loads(subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True).stdout)
+    answers = [
+        (each["status"], [np.array(s["q"]) for s in each["solutions"]], [s["branch"] for s in each["solutions"]])
+        for each in done["answers"]
+    ]
+    assert compare(robot, answers, (T, seeds, q), given) < 1e-7
+    assert np.abs(np.array(done["fk"]) - T).max() < 1e-14
+    assert np.abs(np.array(done["J"]) - kin.jacobian(robot, q[0])).max() < 1e-14
+    assert done["near"]["status"] == "unreachable"
+    assert len(done["refused"]) == 3
+
+
+def test_a_heap_that_overflows_is_an_error_of_its_own_and_leaves_the_solver_working(tmp_path):
+    text = kin.generate("planar2r", "js", name="arm").replace(f"Float64Array({js.SIZE})", "Float64Array(1000)")
+    (tmp_path / "arm.js").write_text(text)
+    run = """
+const arm = require("./arm.js"), said = [];
+for (let k = 0; k < 3; k++) {
+  const T = arm.fk([0.3, 0.8]);
+  said.push(T[0][3].toFixed(9));
+  try { arm.ik(T, [0, 0]); } catch (error) { said.push(error.constructor.name + ": " + error.message); }
+}
+console.log(JSON.stringify(said));
+"""
+    command = [compute_driver_executable()[0], "-e", run]
+    done = json.loads(subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True).stdout)
+    assert done[::2] == [f"{kin.fk('planar2r', [0.3, 0.8])[0, 3]:.9f}"] * 3
+    assert [each.partition(":")[0] for each in done[1::2]] == ["RangeError"] * 3
+    assert "more memory" in done[1]
+
+
+def test_an_es_module_and_its_types_name_the_same_functions():
+    module, types = (kin.generate("iiwa14", language) for language in ("mjs", "d.ts"))
+    assert "export { iiwa14 };\nexport default iiwa14;\n" in module
+    for name in ("fk", "jacobian", "ik", "ik_at", "intervals", "nearest"):
+        assert f"  {name}: entry(" in module
+        assert f"  {name}(" in types
+    assert "nearest(" not in kin.generate("iiwa14", "d.ts", closest=False)
+
+
+def test_the_intervals_of_a_redundancy_parameter_are_those_of_the_core(tmp_path):
+    robot = kin.get_robot("iiwa14")
+    built = compiled(arm_of(robot, closest=False), tmp_path, "-O0")
+    count, out = ctypes.c_int(), np.empty((files._INTERVALS, 3))
+    for T, seed in list(zip(*targets(robot, 12, 0)[:2], strict=True)):
+        assert built.call("intervals", T, seed, out, ctypes.byref(count)) == 0
+        found = {built.arm.form.branches[int(row)]: [] for row, _, _ in out[: count.value]}
+        for row, low, high in out[: count.value].tolist():
+            found[built.arm.form.branches[int(row)]].append((low, high))
+        for solution in kin.solve_ik(robot, T, q_seed=seed).solutions:
+            expected = solution.redundancy[0].intervals
+            assert np.allclose(found[solution.branch], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("language", ["c", "js", "d.ts"])
+def test_names_of_arms_and_joints_stay_in_their_comment(language):
+    hostile = 'a\nint evil;\r\u2028b\\??/ */ "'
+    robot = kin.get_robot("planar2r")
+    rows = (dataclasses.replace(robot.rows[0], name=hostile), *robot.rows[1:])
+    text = kin.generate(dataclasses.replace(robot, name=hostile, rows=rows), language)
+    found = [line for line in text.splitlines() if "evil" in line]
+    assert len(found) == 2
+    for line in found:
+        assert line.startswith("// ")
+        assert line.isascii()
+        assert "\\" not in line
+        assert "??" not in line
+
+
+def test_a_head_says_what_is_promised_and_what_not():
+    text = kin.generate("crx10ia", "c")
+    head = text.partition("#ifndef")[0]
+    limits = "Nor that the list is complete"
+    for words in ("MIT License", "Promised:", "Not promised:", limits, kin.__version__, "-DCRX10IA_EXAMPLE"):
+        assert words in head
+    assert all(len(line) <= 115 for line in head.splitlines())
+    assert head.isascii()
