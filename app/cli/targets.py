@@ -30,7 +30,7 @@ from app.cli.pipes.parquet import arrow_with_parquet, opened_columns, rows_of
 from app.cli.pipes.poses import INVALID, Answers, Counted, PoseTable, Target, answered, target_of
 from app.exports.progress import progress_bar
 from app.shared.mapreduce import dask_client
-from app.shared.threads import processors
+from app.shared.threads import every_processor
 from kin import IKOptions, InputError, Robot, Status
 
 Array = NDArray[np.float64]
@@ -104,8 +104,9 @@ def solve_file(question: Question, source: Path, output: Path, dask: str | None 
 def _solvers(dask: str | None) -> Iterator[tuple[Executor, int]]:
     """What solves pieces, and how many it solves at a time: threads, or the workers of a Dask cluster."""
     if dask is None:
-        with ThreadPoolExecutor(processors(), thread_name_prefix="targets") as pool:
-            yield pool, processors()
+        count = len(every_processor())
+        with ThreadPoolExecutor(count, thread_name_prefix="targets") as pool:
+            yield pool, count
         return
     with dask_client(dask, "--dask") as client:
         yield client.get_executor(pure=False, retries=_RETRIES), sum(client.nthreads().values())

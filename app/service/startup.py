@@ -21,7 +21,7 @@ from app.service.compiler import Compilers, CompilerStoppedError, ahead, compile
 from app.service.compute.child import load_first, load_rest
 from app.service.compute.pool import Pool
 from app.service.web.viewer_proxy import ViewerBridge
-from app.shared.threads import lower_priority, processors, unpin
+from app.shared.threads import every_processor, lower_priority, unpin
 from kin.kernels.elsewhere import compile_elsewhere
 from kin.warmup import compiled, parts, rest_compiled, warm_up_first, warm_up_rest
 from kin.warmup.preparation import Preparation
@@ -98,7 +98,7 @@ class Startup:
             self._start_viewer()
             if not compiled():
                 unpin()  # also what this thread starts
-                second = ["warm_up_first(backwards=True)"] if processors() > 1 else []
+                second = ["warm_up_first(backwards=True)"] if len(every_processor()) > 1 else []
                 compile_first("warm_up_first()", *second, stopping=self._stopping)
             if not self._stopping.is_set():
                 warm_up_first()

@@ -1,9 +1,9 @@
 """Threads: which processors they run on, their priority, and how a process ends in spite of them.
 
-Of a process's threads only one at a time runs Python. A gizmo drag passes through five of them in turn; if each
-wakes up on another processor, a drag among many visitors takes two to ten times as long as on a single one. So
-`pin` keeps a process on one processor. Threads that compute outside the interpreter for long, such as those of
-clouds and maps, call `lower_priority` first: it unpins them and lets visitors go first.
+Of a process's threads only one at a time runs Python. A gizmo drag passes from the event loop to the thread of
+visitors and back; if each wakes up on another processor, a drag among many visitors may take longer than on a
+single one. So `pin` keeps a process on one processor. Threads that compute outside the interpreter for long, such
+as those of clouds and maps, call `lower_priority` first: it unpins them and lets visitors go first.
 """
 
 from __future__ import annotations
@@ -84,14 +84,6 @@ def forget_exit_handlers() -> None:
     atexit.register(multiprocessing.util._exit_function)  # type: ignore[attr-defined] # its list is cleared by the fork
 
 
-def processors() -> int:
-    """Number of processors that this thread may use: one where it is pinned."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on Linux
-        return os.cpu_count() or 1
-
-
 def background_threads() -> int:
     """How many threads a background computation uses: all processors but one."""
-    return max(1, (os.cpu_count() or 2) - 1)
+    return max(1, len(every_processor()) - 1)

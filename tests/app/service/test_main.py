@@ -94,7 +94,7 @@ def test_missing_kernels_are_compiled_by_other_processes_which_a_stop_ends(monke
     monkeypatch.setattr(app.service.compiler.subprocess, "Popen", start)
     monkeypatch.setattr(app.service.startup, "compiled", lambda: False)
     monkeypatch.setattr(app.service.startup, "rest_compiled", lambda: False)
-    monkeypatch.setattr(app.service.startup, "processors", lambda: processors)
+    monkeypatch.setattr(app.service.startup, "every_processor", lambda: range(processors))
     service = create_app(Settings())
     missing = {name: (lambda: service.state.startup.compilers.compile("a kernel"),) for name in parts()}
     monkeypatch.setattr(app.service.startup, "parts", lambda: missing)
