@@ -139,23 +139,13 @@ FILTER = PrivateUse(
         f"{_MESSAGES}:SetSceneNodeVisibilityMessage(name, visible, owner)",
     ),
 )
-DRAGS = PrivateUse(
+GIZMOS = PrivateUse(
     "viser",
-    "Events of a drag in one function instead of six coroutines.",
-    "viser handles drags itself, which takes longer.",
+    "Motions of a gizmo are not repeated to other visitors, of which its scene has none.",
+    "Each event of a drag is sent back, which takes longer.",
     (
-        _HANDLE,
         f"{_SCENE}:TransformControlsHandle._impl_aux",
-        f"{_SCENE}:_SceneNodeHandleState.position",
-        f"{_SCENE}:_SceneNodeHandleState.wxyz",
         f"{_SCENE}:_TransformControlsState(last_updated, update_cb, sync_cb)",
-        "viser:SceneApi._active_transform_drag_handles",
-        "viser:SceneApi._handle_from_transform_controls_name",
-        "viser:SceneApi._handle_transform_controls_updates",
-        "viser:SceneApi._fire_transform_controls_callbacks",
-        "viser:SceneApi._owner_id",
-        "viser:ViserServer._connected_clients",
-        f"{_MESSAGES}:TransformControlsUpdateMessage(name, wxyz, position, owner)",
     ),
 )
 WAKE_UPS = PrivateUse(
@@ -179,6 +169,6 @@ CALLBACK_ERRORS = PrivateUse(
 )
 
 ALL = (
-    *(SERVER, OUTBOX, POSES, VALUES, SENT_VALUES, MARKS, IDENTITY, FILTER, DRAGS),
+    *(SERVER, OUTBOX, POSES, VALUES, SENT_VALUES, MARKS, IDENTITY, FILTER, GIZMOS),
     *(WAKE_UPS, TYPE_HINTS, CALLBACK_ERRORS),
 )

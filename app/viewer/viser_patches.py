@@ -14,10 +14,6 @@ the type of that property. When a visitor sets a value, viser's callbacks read i
 may have shown a newer value there meanwhile, as a moving arm does, and what was typed was lost. `keep_sent_values`
 and `sent_value` have the value as it was sent.
 
-Drags: viser converts each field of an event by its type hints and passes it through six coroutines, of the shared
-scene and of the visitor's own. `drag_gizmo` does the same for a gizmo of the visitor alone, in one function, which
-needs no task of the event loop.
-
 Pages: viser evaluates the type hints of a class for each of its objects, a quarter of the cost of a page.
 `cache_type_hints` caches them.
 
@@ -38,7 +34,6 @@ from __future__ import annotations
 import asyncio
 import contextvars
 import functools
-import inspect
 import logging
 import sys
 import threading
@@ -49,7 +44,6 @@ from collections.abc import Callable, Coroutine, Sequence
 from types import SimpleNamespace, TracebackType
 from typing import Any
 
-import msgspec
 import numpy as np
 import viser
 from viser import _messages as messages
@@ -265,62 +259,9 @@ def uuid_of(handle: Any) -> str:
     return str(handle._impl.uuid) if viser_names.IDENTITY.is_there else ""
 
 
-class _Drag(msgspec.Struct, tag_field="type", tag="TransformControlsUpdateMessage", forbid_unknown_fields=True):
-    """An event of a drag; lists of other lengths, anything but numbers, and other fields, are refused."""
-
-    name: str
-    owner: str
-    position: tuple[float, float, float]
-    wxyz: tuple[float, float, float, float]
-
-
-_LARGEST = 1024  # bytes of an event of a drag
-_DRAG = _Drag.__struct_config__.tag.encode()  # type: ignore[union-attr]
-_read_drag = msgspec.msgpack.Decoder(_Drag).decode
-
-
-def drag_gizmo(client: viser.ClientHandle, data: bytes) -> bool:
-    """Handle a message if it is an event of a drag of the visitor's own gizmo; False: viser must handle it.
-
-    Callbacks of such a gizmo are coroutines that do not wait.
-    """
-    if len(data) > _LARGEST or _DRAG not in data or not viser_names.DRAGS.is_there:
-        return False
-    try:
-        drag = _read_drag(data)
-    except msgspec.MsgspecError:
-        return False
-    scene, number = client.scene, ClientId(client.client_id)
-    # While it is dragged, a gizmo that is removed keeps its callbacks.
-    gizmo = scene._active_transform_drag_handles.get((number, drag.name))
-    gizmo = gizmo or scene._handle_from_transform_controls_name.get(drag.name)
-    if gizmo is None or drag.owner != scene._owner_id or gizmo._impl_aux.sync_cb is not None:
-        return False
-    calls: list[Any] = gizmo._impl_aux.update_cb
-    if not all(inspect.iscoroutinefunction(call) for call in calls):
-        return False
-    gizmo._impl.position, gizmo._impl.wxyz = np.array(drag.position), np.array(drag.wxyz)
-    gizmo._impl_aux.last_updated = time.time()
-    event: Any = viser.TransformControlsEvent(client=client, client_id=number, target=gizmo, phase="update")
-    for call in calls:
-        _run(call, event)
-    return True
-
-
-def _run(call: Callable[[Any], Coroutine[Any, Any, None]], event: Any) -> None:
-    """Call a function whose coroutine does not wait."""
-    coroutine = call(event)
-    try:
-        coroutine.send(None)
-    except StopIteration:
-        return
-    coroutine.close()
-    raise RuntimeError(f"{call.__qualname__} waits, which a callback of a private gizmo may not")
-
-
 def keep_private(gizmo: viser.TransformControlsHandle) -> None:
     """Stop viser from copying a gizmo's motion to other visitors: a visitor's own scene has no others."""
-    if viser_names.DRAGS.is_there:
+    if viser_names.GIZMOS.is_there:
         gizmo._impl_aux.sync_cb = None
 
 

@@ -34,7 +34,6 @@ from app.shared.connection import Connection, ConnectionEnded
 from app.shared.security import Rights
 from app.viewer import viser_names
 from app.viewer.viser_outbox import LoopWaker, Outbox, Packer
-from app.viewer.viser_patches import drag_gizmo
 
 log = logging.getLogger(__name__)
 
@@ -60,7 +59,6 @@ class PortlessServer(infra.WebsockServer):
         self.rights: dict[int, Rights] = {}  # of connected visitors, by client id
         self.clients: dict[int, str] = {}  # their names in limits per client, by client id
         self.room_tokens: dict[int, str] = {}  # of classrooms, not verified, by client id
-        self.visitors: dict[int, viser.ClientHandle] = {}  # viser's own, by client id
         self._open = 0  # connections
         self.waker, self._packer = LoopWaker(loop), Packer()
         self._stopping: asyncio.Future[None]
@@ -149,24 +147,14 @@ class PortlessServer(infra.WebsockServer):
         number = infra.ClientId(client.client_id)
         while True:
             data = await connection.receive()
-            if not self._drag(number, data):
-                try:
-                    message = self._message_class.deserialize(data)
-                except Exception as error:  # fields are converted without checks
-                    raise ConnectionEnded(1007, f"not a message of the viewer: {error!r:.80}") from error
-                for handler in (self, client):
-                    if type(message) in handler._incoming_handlers:
-                        await self._handle(handler, number, message)
+            try:
+                message = self._message_class.deserialize(data)
+            except Exception as error:  # fields are converted without checks
+                raise ConnectionEnded(1007, f"not a message of the viewer: {error!r:.80}") from error
+            for handler in (self, client):
+                if type(message) in handler._incoming_handlers:
+                    await self._handle(handler, number, message)
             await asyncio.sleep(0)  # others come between the messages of a burst
-
-    def _drag(self, number: infra.ClientId, data: bytes) -> bool:
-        """Whether a message was an event of a drag, and has been handled."""
-        visitor = self.visitors.get(number)
-        try:
-            return visitor is not None and drag_gizmo(visitor, data)
-        except Exception as error:  # noqa: BLE001 - of a callback
-            _note(error)
-            return True
 
     async def _handle(
         self, handler: infra.WebsockMessageHandler, number: infra.ClientId, message: infra.Message
@@ -222,8 +210,6 @@ def start_viser(loop: asyncio.AbstractEventLoop, label: str) -> tuple[viser.Vise
     if not isinstance(portless, PortlessServer):
         server.stop()
         raise RuntimeError(f"viser {viser.__version__} listens on a port; install viser==1.1.*")
-    if viser_names.DRAGS.is_there:
-        portless.visitors = server._connected_clients
     # Visitors leave while something is drawn for them or asked of their page.
     warnings.filterwarnings("ignore", r"Queued a \w+ on a closed connection", UserWarning)
     # A visitor could ask viser for a public tunnel to this service.

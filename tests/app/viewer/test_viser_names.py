@@ -10,12 +10,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 import viser
 from private_names import asked_again, leave_out, take_away
-from test_viser_server import CAMERA, Visit, drag, gizmo, loop, serve, server  # noqa: F401 - fixtures
+from test_viser_server import CAMERA, Visit, loop, serve, server  # noqa: F401 - fixtures
 from viser.infra._async_message_buffer import AsyncMessageBuffer
 
 from app.viewer import viser_names, viser_server
@@ -24,7 +23,6 @@ from app.viewer.viser_patches import (
     SceneFilter,
     assign,
     cache_type_hints,
-    drag_gizmo,
     is_removed,
     keep_sent_values,
     sent_value,
@@ -109,21 +107,6 @@ def test_without_the_outbox_viser_s_own_buffer_sends(
             client.scene.add_frame("/a")
 
     assert visited(act, Visit(VIEW)).sent >= 2, "what all see, and what this one sees"
-
-
-def test_without_the_handling_of_drags_viser_handles_them(
-    monkeypatch: pytest.MonkeyPatch, visited: Callable[..., Visit]
-) -> None:
-    leave_out(monkeypatch, viser_names.DRAGS)
-    seen: list[Any] = []
-
-    def act(client: viser.ClientHandle) -> None:
-        gizmo(client, seen)
-        assert not drag_gizmo(client, msgspec.msgpack.encode(drag("0")))
-
-    visit = visited(act, Visit(VIEW, drag("0")))  # of the first visitor's own scene
-    assert visit.at_once == 0
-    assert seen == [("update", True, 0, [1.0, 2.5, 3.0]), [0.0, 1.0, 0.0, 0.0]]
 
 
 def test_without_the_private_names_of_nodes_viser_s_setters_pose_them(
