@@ -30,7 +30,6 @@ from kin.ik.batch import solve_ik_many
 from kin.ik.candidates import unchecked
 from kin.ik.table import Table
 from kin.kernels.cache import is_cached
-from kin.kernels.compiler import record_compilations
 from kin.kernels.fk import fk_one
 from kin.motion import JointTarget, Lin, PoseTarget, Ptp, plan_motion
 from kin.path import path_postures, solve_path
@@ -80,9 +79,8 @@ def warm_up(everything: bool = False) -> None:
             that takes minutes.
     """
     first, *others = one_of_each_family()
-    with record_compilations() as compiled:
-        _move(first)
-    if compiled:
+    _move(first)
+    if not fk_one.stats.cache_hits:  # type: ignore[attr-defined] # a dispatcher
         for robot in others:
             _move(robot)
         for robot in (first, *others):
