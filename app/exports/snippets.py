@@ -139,16 +139,18 @@ for solution in result.solutions:
 """
 
 
+_EXPANSION = "values of all moving rows: those of joints, and of what follows them"
+
+
 def robotics_toolbox(moment: Moment) -> str:
     """Python, with Corke's Robotics Toolbox.
 
     It knows no fixed rows: those before the first joint go into its base, those after the last into its tool.
-    For an arm with one between two joints a comment says so instead.
+    For an arm with one between two joints a comment says so instead. It knows no rows that follow joints either:
+    its values are those of all moving rows, which a matrix gives.
     """
-    robot = moment.robot
+    coupled, robot = moment.robot.coupled, moment.robot.free
     first, last = robot.joint_rows[0], robot.joint_rows[-1]
-    if robot.coupled:
-        return f"# {_comment(robot.name)} has rows that follow joints, which DHRobot cannot express.\n"
     if last - first + 1 != robot.n:
         return f"# {_comment(robot.name)} has a fixed row between two joints, which DHRobot cannot express.\n"
     suffix = "MDH" if robot.convention == "modified" else "DH"
@@ -160,6 +162,14 @@ def robotics_toolbox(moment: Moment) -> str:
         for name, T in (("base", base), ("tool", tool))
         if not np.array_equal(T, np.eye(4))
     )
+    values, expansion = "q", ""
+    solve = f"""
+target = {_se3(moment.target)}
+print(robot.ikine_LM(target, q0=q))  # numerical, the whole pose, one solution
+"""
+    if coupled:
+        values, solve = "A @ q", "# Its inverse kinematics would move each row alone.\n"
+        expansion = f"A = np.array([\n{_rows(moment.robot.expansion)}])  # {_EXPANSION}\n"
     return f"""import numpy as np
 from roboticstoolbox import DHRobot, Prismatic{suffix}, Revolute{suffix}
 from spatialmath import SE3
@@ -170,18 +180,13 @@ robot = DHRobot(
     name={json.dumps(robot.name)},
 {ends})
 q = {_list(moment.q)}
-print(robot.fkine(q))  # pose of the tool in the world frame
-
-target = {_se3(moment.target)}
-print(robot.ikine_LM(target, q0=q))  # numerical, the whole pose, one solution
-"""
+{expansion}print(robot.fkine({values}))  # pose of the tool in the world frame
+{solve}"""
 
 
 def matlab(moment: Moment) -> str:
-    """MATLAB, with the Robotics System Toolbox. For an arm with rows that follow joints a comment says why not."""
-    robot = moment.robot
-    if robot.coupled:
-        return f"% {_comment(robot.name)} has rows that follow joints, which rigidBodyTree cannot express.\n"
+    """MATLAB, with the Robotics System Toolbox; with rows that follow joints, as for `robotics_toolbox`."""
+    coupled, robot = moment.robot.coupled, moment.robot.free
     kind = "mdh" if robot.convention == "modified" else "dh"
     lines = [f"% {_comment(robot.name)}", "robot = rigidBodyTree('DataFormat', 'row');"]
     parent = "base"
@@ -217,8 +222,15 @@ def matlab(moment: Moment) -> str:
     lines += [
         "",
         f"offset = [{_row(np.array(offsets))}];  % MATLAB's joint values contain the table's constant part",
-        f"q = [{_row(moment.q)}];",
-        f"T = getTransform(robot, q + offset, '{parent}')  % pose of the tool in the world frame",
+    ]
+    lines.append(f"q = [{_row(moment.q)}];")
+    if coupled:
+        A = "; ".join(map(_row, moment.robot.expansion))
+        lines += [f"A = [{A}];  % {_EXPANSION}", "q = q * A';"]
+    lines.append(f"T = getTransform(robot, q + offset, '{parent}')  % pose of the tool in the world frame")
+    if coupled:
+        return "\n".join([*lines, "% Its inverse kinematics would move each row alone."]) + "\n"
+    lines += [
         "",
         f"target = {_matlab(moment.target)};",
         "solver = inverseKinematics('RigidBodyTree', robot);",

@@ -132,7 +132,7 @@ def screws(robot: Robot | str, q: ArrayLike | None = None) -> Screws:
     """
     robot = robot_of(robot)
     if robot.coupled:
-        expected = "an arm without rows that follow joints, which have no screw of their own; `Robot.free` is one"
+        expected = "no rows that follow joints, as of `Robot.free`: screws(robot.free).pose(robot.expand(q))"
         raise InputError("robot", robot.id, expected)
     zero = robot.check_q(np.zeros(robot.n) if q is None else q)
     if zero.ndim != 1:

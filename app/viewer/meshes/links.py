@@ -58,10 +58,12 @@ def _motions(visuals: Sequence[Visual]) -> list[FingerMotion]:
 def fingers_of(robot: Robot, visuals: Sequence[Visual]) -> tuple[Finger, ...]:
     """The fingers of a robot from a URDF, without parts, in the order in which `shapes_of` has them."""
     poses = [inverse(T) for T in link_poses(robot, np.zeros((1, robot.n)))[0]]
-    return tuple(
-        Finger(each.carrier, (), poses[each.carrier] @ each.T_root_axis, each.slides, each.closed, each.open)
-        for each in _motions(visuals)
-    )
+
+    def finger(each: FingerMotion) -> Finger:
+        on, T = None if each.on is None else finger(each.on), poses[each.carrier] @ each.T_root_axis
+        return Finger(each.carrier, (), T, each.slides, each.closed, each.open, on)
+
+    return tuple(map(finger, _motions(visuals)))
 
 
 def drawing_without_meshes(shapes: Shapes, fingers: Sequence[Finger] = ()) -> Drawing:

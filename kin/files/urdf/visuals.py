@@ -58,7 +58,7 @@ class Visual:
         carrier: how many joints of the chain move it: 0, and it stands still.
         T_root_visual: its pose ``(4, 4)`` in the root link with all joints of the chain at zero.
         color: red, green and blue from 0 to 1; None if the URDF names none.
-        finger: the joint beside the chain that moves it, None if none does.
+        finger: how joints beside the chain move it, None if none does.
     """
 
     link: str
@@ -73,7 +73,7 @@ def read_visuals(text: str, tip: str | None = None, file: str = "URDF") -> tuple
     """The visible bodies of all links that belong to the arm up to the link `tip`, in the order of the file.
 
     Links beside the chain, such as fingers, move with the link that carries them; their own joints are at zero,
-    or at the limit closest to it. Where one joint moves such a link, `finger` says how.
+    or at the limit closest to it. Where they have a range, `finger` says how they move it.
 
     Raises:
         RobotFileError: the file is invalid; the message names the link.

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.viewer.scene.bodies.parts import Part
-from kin.transforms import Array
+from kin.transforms import Array, pose_from_position_wxyz, wxyz_from_rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +26,7 @@ class Finger:
         T_link_axis: frame ``(4, 4)`` along whose z axis they slide, or about which they turn.
         slides: whether they slide.
         closed, open: how far they are from where they are drawn when the gripper is closed and open, m or rad.
+        on: the part of the finger that carries them; None: they are on the link.
     """
 
     link: int
@@ -34,9 +35,16 @@ class Finger:
     slides: bool
     closed: float
     open: float
+    on: Finger | None = None
 
     def place(self, share: float) -> tuple[Array, Array]:
         """Position ``(3,)`` and wxyz ``(4,)`` of the parts in the link with the gripper open to a share."""
+        if self.on is None:
+            return self._own_place(share)
+        T = pose_from_position_wxyz(*self.on.place(share)) @ pose_from_position_wxyz(*self._own_place(share))
+        return T[:3, 3], wxyz_from_rotation(T[:3, :3])
+
+    def _own_place(self, share: float) -> tuple[Array, Array]:
         value = self.closed + share * (self.open - self.closed)
         z, origin = self.T_link_axis[:3, 2], self.T_link_axis[:3, 3]
         if self.slides:
@@ -47,4 +55,5 @@ class Finger:
 
     def moved(self, parts: tuple[Part, ...], T: Array) -> Finger:
         """The same in another frame of the link, with parts that have been moved there by `T` ``(4, 4)``."""
-        return replace(self, parts=parts, T_link_axis=T @ self.T_link_axis)
+        on = None if self.on is None else self.on.moved((), T)
+        return replace(self, parts=parts, T_link_axis=T @ self.T_link_axis, on=on)

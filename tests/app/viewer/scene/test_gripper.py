@@ -169,6 +169,32 @@ def test_fingers_without_a_range_of_their_own_stay_as_they_are_drawn(old: str, n
     assert bodies
 
 
+def test_a_finger_of_several_joints_moves_as_its_joints_do() -> None:
+    """As those of grippers with knuckles: the nail turns on the finger, which slides; all follow one joint."""
+    limit = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'
+    mimic = '<mimic joint="finger" multiplier="-5" offset="0.1"/>'
+    turning = f'name="tip" type="revolute"><axis xyz="1 0 0"/>{limit}{mimic}'
+    text = HAND.replace('name="tip" type="fixed">', turning)
+    robot, visuals = kin.load_urdf(text, tip="tool"), read_visuals(text, "tool")
+    drawn = drawing_without_meshes(shapes_of(robot, visuals), fingers_of(robot, visuals))
+    (nail,) = [finger for finger in drawn.fingers if finger.on is not None]
+    assert len(drawn.fingers) == 3
+    points = nail.parts[0].mesh.vertices
+    drawn_at = [*(0.5 * (points.min(axis=0) + points.max(axis=0))), 1.0]
+    whole = kin.load_urdf(text, tip="nail")
+    craig = kin.convert_dh(robot, "modified")
+    moved = carried_over(drawn, robot, craig)
+    assert moved is not None
+    (same,) = [finger for finger in moved.fingers if finger.on is not None]
+    for share, bend in ((0.0, 0.3), (0.75, -0.5), (1.0, 0.9)):
+        T = link_poses(robot, np.array([[bend]]))[0][1] @ pose_from_position_wxyz(*nail.place(share))
+        assert (T @ drawn_at)[:3] == pytest.approx(kin.fk(whole, [bend, 0.04 * share])[:3, 3], abs=1e-6)
+        there = link_poses(craig, np.array([[bend]]))[0][1] @ pose_from_position_wxyz(*same.place(share))
+        vertices = same.parts[0].mesh.vertices[:1]
+        expected = T[:3, :3] @ points[0] + T[:3, 3]
+        assert there[:3, :3] @ vertices[0] + there[:3, 3] == pytest.approx(expected, abs=1e-6)
+
+
 @pytest.fixture
 def tab() -> Iterator[FakeBrowser]:
     with serve_viewer(ViewerServer(Store(), Settings(), Clouds())) as port, FakeBrowser(port) as opened:
