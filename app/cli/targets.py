@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from app.cli.pipes.columns import Columns
 from app.cli.pipes.parquet import arrow_with_parquet, opened_columns, rows_of
 from app.cli.pipes.poses import INVALID, Answers, Counted, PoseTable, Target, answered, target_of
+from app.cli.pipes.source import UTF16
 from app.exports.progress import progress_bar
 from app.shared.mapreduce import dask_client
 from app.shared.threads import every_processor
@@ -248,10 +249,15 @@ def _pieces(source: Path, first: int, table: PoseTable) -> Iterator[list[Target]
 
 def _lines(source: Path, table: PoseTable) -> Iterator[tuple[str, list[str], Columns]]:
     """The rows of a .csv file with the place of each, without the heading and empty lines."""
-    with source.open(newline="", encoding="utf-8-sig", errors="replace") as file:
-        separator = Columns.separator(file.readline())
-        file.seek(0)
-        rows, columns = csv.reader(file, delimiter=separator), None
+    with source.open("rb") as file:
+        encoding = "utf-16" if file.read(2) in UTF16 else "utf-8-sig"
+    with source.open(newline="", encoding=encoding, errors="replace") as file:
+        preface = 0
+        while Columns.is_preface(line := file.readline()):
+            preface += 1
+        separator = Columns.separator(line)
+        lines = itertools.chain([line], file)
+        rows, columns = csv.reader(lines, delimiter=separator, skipinitialspace=True), None
         try:
             for row in rows:
                 if columns is None:
@@ -260,9 +266,11 @@ def _lines(source: Path, table: PoseTable) -> Iterator[tuple[str, list[str], Col
                     if columns.has_heading:
                         continue
                 if row:
-                    yield f"{_FIELD} line {rows.line_num}", row, columns
+                    yield f"{_FIELD} line {preface + rows.line_num}", row, columns
         except csv.Error as error:
-            raise InputError(f"{_FIELD} line {rows.line_num}", str(error), "a row of a CSV file") from None
+            raise InputError(
+                f"{_FIELD} line {preface + rows.line_num}", str(error), "a row of a CSV file"
+            ) from None
 
 
 # -- Parquet ---------------------------------------------------------------------------------------------------

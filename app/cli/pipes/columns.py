@@ -33,6 +33,7 @@ class Columns:
             return cls(tuple(names), tuple(map(head.index, names)), True, decimal)
         if len(head) != len(names) or not all(_is_number(cell, decimal) for cell in head):
             expected = f"a heading with the columns {', '.join(names)}, or rows of {len(names)} numbers"
+            expected += "; --form reads other columns, such as x, y, z, roll, pitch, yaw" if "x" in names else ""
             if decimal == "." and len(head) == 2 * len(names) and all(map(_is_number, head)):
                 expected += "; where commas are decimal points, semicolons separate the numbers"
             raise InputError(field, list(first), expected)
@@ -40,8 +41,13 @@ class Columns:
 
     @staticmethod
     def separator(line: str) -> str:
-        """What separates the cells of a line: a comma, a tab, or a semicolon where commas are decimal points."""
-        return next((mark for mark in (";", "\t") if mark in line), ",")
+        """What separates the cells of a line; where it is no comma, commas are decimal points."""
+        return next((mark for mark in (";", "\t", ",", " ") if mark in line.strip()), ",")
+
+    @staticmethod
+    def is_preface(line: str) -> bool:
+        """Whether a line before the heading is none: a comment, or what tells a spreadsheet the separator."""
+        return line.startswith(("#", "sep="))
 
     def numbers(self, row: Sequence[str], field: str) -> list[float]:
         """The numbers of a row; not-a-number if all cells are empty. Raises `InputError` with the row."""

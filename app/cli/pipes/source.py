@@ -6,6 +6,7 @@ its answer before it sends the next one.
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import json
@@ -13,6 +14,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
+from itertools import dropwhile
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, NamedTuple
 
@@ -34,6 +36,7 @@ AT_ONCE = 4096  # rows of one piece
 LONGEST_LINE = 1 << 20
 _CHUNK = 1 << 16
 _NUMPY = b"\x93NUMPY"
+UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)  # as spreadsheets write “Unicode text”
 _EXAMPLE = '{"position": [0.4, 0.1, 0.3], "wxyz": [0, 1, 0, 0]}'
 
 
@@ -72,6 +75,9 @@ class Source:
             if not more:
                 break
             self._first += more
+        if self._first.startswith(UTF16):
+            text = (self._first + self._file.read()).decode("utf-16", "replace")
+            self._first, self._file = text.encode(), io.BytesIO()
         self.field = field
         start = self._first.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
         self.form: Form = "npy" if self._first.startswith(_NUMPY) else "ndjson" if start in (b"{", b"[") else "csv"
@@ -205,6 +211,9 @@ class Source:
         done, separator = 0, ","
         for lines in self._lines():
             if columns is None:
+                lines = list(dropwhile(lambda line: Columns.is_preface(line[1]), lines))
+                if not lines:
+                    continue
                 separator = Columns.separator(lines[0][1])
             cells = list(self._cells(lines, separator))
             if columns is None:
@@ -223,7 +232,7 @@ class Source:
         """The cells of each line."""
         for place, line in lines:
             try:
-                yield next(csv.reader([line], delimiter=separator))
+                yield next(csv.reader([line.strip(" ")], delimiter=separator, skipinitialspace=True))
             except csv.Error as error:
                 raise InputError(place, str(error), "a row of a table") from None
 

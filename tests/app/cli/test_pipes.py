@@ -209,6 +209,37 @@ def test_a_table_with_decimal_commas_is_the_table_with_points(run, mark, heading
     assert expected[0] == 0
 
 
+@pytest.mark.parametrize("to_file", [False, True])
+@pytest.mark.parametrize(
+    "given",
+    [
+        "sep=;\nx;y;z;qw;qx;qy;qz\n0,4;0,1;0,3;0;1;0;0\n",
+        "# exported by a spreadsheet\n#\nx,y,z,qw,qx,qy,qz\n0.4,0.1,0.3,0,1,0,0\n",
+        "x y z  qw qx qy qz\n 0.4  0.1 0.3 0 1 0 0\n",
+        "x, y, z, qw, qx, qy, qz\n0.4, 0.1, 0.3, 0, 1, 0, 0\n",
+        "x\ty\tz\tqw\tqx\tqy\tqz\n0,4\t0,1\t0,3\t0\t1\t0\t0\n".encode("utf-16"),
+    ],
+    ids=["sep", "comment", "spaces", "comma and space", "UTF-16"],
+)
+def test_what_programs_write_around_a_table_is_read(run, tmp_path, given, to_file):
+    expected = run("ik", "ur5", "--targets", "-", given="x,y,z,qw,qx,qy,qz\n0.4,0.1,0.3,0,1,0,0\n")[1]
+    if not to_file:
+        assert run("ik", "ur5", "--targets", "-", given=given)[:2] == (0, expected)
+        return
+    (tmp_path / "in.csv").write_bytes(given if isinstance(given, bytes) else given.encode())
+    assert run("ik", "ur5", "--targets", tmp_path / "in.csv", "-o", tmp_path / "out.csv")[0] == 0
+    assert (tmp_path / "out.csv").read_bytes() == expected
+
+
+@pytest.mark.parametrize("to_file", [False, True])
+def test_a_row_behind_comments_is_named_by_its_line(run, tmp_path, to_file):
+    given = "# a\nx,y,z,qw,qx,qy,qz\n0.4,0.1,0.3,0,1,0,b\n"
+    (tmp_path / "in.csv").write_text(given)
+    words = (tmp_path / "in.csv", "-o", tmp_path / "out.csv") if to_file else ("-",)
+    code, _, err = run("ik", "ur5", "--strict", "--targets", *words, given=given)
+    assert (code, "--targets line 3:" in err) == (2, True), err
+
+
 def test_more_rows_than_one_piece_are_answered_in_order(run, monkeypatch):
     monkeypatch.setattr(source, "AT_ONCE", 4)
     monkeypatch.setattr(source, "_CHUNK", 100)
@@ -239,6 +270,8 @@ def test_each_line_is_answered_before_the_next_one_is_sent():
         ("ik", "", "at least one row"),
         ("ik", "x,y,z,qw,qx,qy,qz\n", "at least one row"),
         ("ik", "a,b\n1,2\n", "a heading with the columns x, y, z, qw, qx, qy, qz"),
+        ("ik", "x,y,z,roll,pitch,yaw\n1,2,3,0,0,0\n", "--form reads other columns"),
+        ("ik", "# nothing else\n", "at least one row"),
         ("ik", "0.4,0.1,0.3,0,1,0,0\n0.4,0.1,0.3,0,1,0,b\n", r"--targets line 2"),
         ("ik", "0.4,0.1,0.3,0,0,0,0\n", r"--targets line 1.* norm of w x y z is 0; valid is 1"),
         ("ik", "0.4,0.1,0.3,0,0.24,0,0\n", r"--targets line 1.*qw, qx, qy, qz. The norm of w x y z is 0.24"),
@@ -256,7 +289,7 @@ def test_each_line_is_answered_before_the_next_one_is_sent():
         ("ik", lines([{"position": [1e999, 0, 0]}]), r"--targets line 1\.position"),
         ("ik", '{"position": [0.4, 0.1', "a line of JSON"),
         ("ik", "[" * 100_000, "a line of JSON"),
-        ("ik", b"\xff\xfe\x00{", "text in UTF-8"),
+        ("ik", b"\xff\xfd\x00{", "text in UTF-8"),
         ("ik", array(np.eye(4)), "an array of poses"),
         ("ik", array(np.array([object()])), "a broken .npy file"),
         ("ik", b"\x93NUMPY\x01\x00", "a broken .npy file"),
