@@ -7,13 +7,14 @@ import re
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
-from kin.errors import RobotFileError
+from kin.errors import RobotFileError, shorten
 from kin.files.urdf.xml import MAX_BYTES, MalformedXmlError, TagPosition, parse_xml
 
 _FAULTS = 4  # that one text has: an encoding, a header, ampersands, and a last look
 LFS = "version https://git-lfs.github.com/spec/"
 _HEADER = re.compile(r"<\?xml\s[^>]{0,200}\?>[ \t]*\r?\n?")
 _MARKER = re.compile(r"^(?:<{7}|>{7}) .*$", re.MULTILINE)
+_ROOT = re.compile(r"<(robot|mujoco)\b")
 # An ampersand that begins no reference, outside of CDATA, comments and processing instructions. One that is not
 # closed goes to the end of the text, which so is passed once.
 _AMPERSAND = re.compile(
@@ -121,6 +122,10 @@ def cause_of(text: str) -> Cause | None:
             _line(text, marker.start()), what, "a file in which the conflict is resolved: one of both versions"
         )
     header = _HEADER.search(text)
+    begins = text.lstrip("\ufeff \t\r\n")
+    if not begins.startswith("<") and header is None:
+        what = f"no XML: it begins with {shorten(begins[:40])}"
+        return Cause(1, what, "a URDF or MJCF file itself, not an archive, a list or the answer of a web site")
     if header and text[: header.start()].strip("\ufeff"):
         line = _line(text, header.start())
         what = f"<?xml …?> in line {line}, with something before it"
@@ -131,6 +136,10 @@ def cause_of(text: str) -> Cause | None:
         line = _line(text, plain.start())
         mended = _AMPERSAND.sub(lambda match: "&amp;" if match[1] else match[0], text)
         return Cause(line, f"an ampersand in line {line} that stands for itself", "&amp; in its place", mended)
+    opened = _ROOT.search(text)
+    if opened and f"</{opened[1]}" not in text:
+        line = _line(text, len(text.rstrip()))
+        return Cause(line, f"an end in line {line} before </{opened[1]}>", "the whole file: this one breaks off")
     return None
 
 

@@ -341,6 +341,8 @@ def _joint(joint: UrdfJoint, notes: list[str], followers: Followers, terms: Term
 
 def _limits(joint: UrdfJoint, notes: list[str], terms: Terms) -> tuple[float, float] | None:
     limits, unit = _in_order(joint, notes), "m" if joint.kind == "prismatic" else "rad"
+    if limits is not None and joint.unstated:
+        notes.append(f"Joint {joint.name} states no {joint.unstated} limit, which is 0 then.")
     if joint.type == "continuous" or (limits is not None and -math.inf < limits[0] < limits[1]):
         return limits
     why = f"states no {terms.limits}"

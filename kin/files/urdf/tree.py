@@ -141,6 +141,11 @@ class UrdfJoint(UrdfElement):
         return self.type != "fixed"
 
     @property
+    def follows(self) -> bool:
+        """Whether another joint moves it."""
+        return self.element.find("mimic") is not None
+
+    @property
     def kind(self) -> Kind:
         """The kind of the row."""
         return "prismatic" if (self.held or (self.type,))[0] == "prismatic" else "revolute"
@@ -167,6 +172,13 @@ class UrdfJoint(UrdfElement):
             return -math.inf, math.inf
         lower, upper = (self.number("limit", key, text) for key, text in texts.items())
         return lower, upper
+
+    @property
+    def unstated(self) -> str:
+        """Which of both limits is missing beside the other one; "" if none is."""
+        limit = self.element.find("limit")
+        missing = {"lower", "upper"} - set(() if limit is None else limit.keys())
+        return missing.pop() if len(missing) == 1 else ""
 
     def resting(self) -> float:
         """The value of a joint beside the arm: zero, or the limit closest to it.
@@ -257,7 +269,7 @@ class UrdfTree:
 
     @cached_property
     def depths(self) -> dict[str, int]:
-        """For each link, the moving joints from its root to it; links of or behind a cycle are missing.
+        """For each link, the joints from its root to it that lead; links of or behind a cycle are missing.
 
         A floating or planar joint below the root counts as none: the arm begins behind it.
         """
@@ -266,16 +278,28 @@ class UrdfTree:
         for link in links:  # grows meanwhile
             for joint in self.children.get(link, ()):
                 floats = joint.type in FREE and not found[link]
-                found[joint.child] = 0 if floats else found[link] + joint.moves
+                found[joint.child] = 0 if floats else found[link] + (joint.moves and not self._is_led(joint))
                 links.append(joint.child)
         return found
 
+    def _is_led(self, joint: UrdfJoint) -> bool:
+        """Whether a joint follows one before it."""
+        mimic = joint.element.find("mimic")
+        return mimic is not None and any(each.name == mimic.get("joint") for each in self.to_root(joint.parent))
+
     @cached_property
     def tips(self) -> tuple[Tip, ...]:
-        """Links without children that joints move, those with the most joints first."""
+        """What carries fingers, and the links without children that joints move, those with the most joints first.
+
+        Fingers are joints of one link of which some follow another.
+        """
         inner = {joint.parent for joint in self.joints}
-        found = [Tip(link, self.depths.get(link, 0)) for link in self.links if link not in inner]
-        return tuple(sorted((tip for tip in found if tip.joints), key=lambda tip: -tip.joints))
+        fingers = {link: [each for each in joints if each.moves] for link, joints in self.children.items()}
+        hands = {link for link, each in fingers.items() if len(each) > 1 and any(joint.follows for joint in each)}
+        found = [Tip(link, self.depths.get(link, 0)) for link in self.links if link not in inner - hands]
+        return tuple(
+            sorted((tip for tip in found if tip.joints), key=lambda tip: (tip.link not in hands, -tip.joints))
+        )
 
     def to_root(self, link: str) -> list[UrdfJoint]:
         """The joints from the root of a link's tree to the link."""
@@ -398,6 +422,9 @@ def tree_of(root: Element, file: str, notes: Sequence[str] = ()) -> UrdfTree:
         raise RobotFileError(file, "root element", root.tag, "<robot>, the root of a URDF, or <mujoco>")
     notes = [*notes, *_leftover_xacro(root, file)]
     elements = root.findall("link")
+    if not elements and root.find("group") is not None:
+        expected = "links and joints: this is an SRDF, which stands beside the URDF of its arm"
+        raise RobotFileError(file, "link", "none", expected)
     if len(elements) > MAX_LINKS:
         raise RobotFileError(file, "link", f"{len(elements)} links", f"at most {MAX_LINKS} links")
     unread: list[Unread] = []
@@ -443,7 +470,7 @@ def _leftover_xacro(root: Element, file: str) -> list[str]:
     used = next((value for value in values if "${" in value or "$(" in value), None)
     other = next((each.tag for each in outside if each.tag.startswith("xacro:")), None)
     if not left:
-        return []
+        return [f"Names such as {used} have expressions of xacro: they are taken as they stand."] if used else []
     if other is None and used is None:
         names = ", ".join(f"<{tag}>" for tag in dict.fromkeys(left))
         return [f"The file has elements of xacro that nothing in it uses ({names}): they are left out."]

@@ -69,7 +69,8 @@ def parse_xml(text: bytes | str, file: str, places: dict[Element, TagPosition] |
             places[element] = TagPosition(line, first, last)
 
     def doctype(name: str, *_: object) -> None:
-        raise RobotFileError(file, "DOCTYPE", name, "a file without DOCTYPE and entities")
+        page = "; this is a web page: the button Raw leads to the file itself" if name.lower() == "html" else ""
+        raise RobotFileError(file, "DOCTYPE", name, f"a file without DOCTYPE and entities{page}")
 
     parser.StartElementHandler = start
     parser.EndElementHandler = end

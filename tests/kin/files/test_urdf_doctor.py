@@ -198,7 +198,7 @@ def test_what_is_wrong_is_found_on_its_line_and_mended(old, new, symptom, rank, 
         ),
         ('lower="-2" upper="2"', 'lower="0.5" upper="0.5"', "limit", "cannot move"),
         ("<robot", "<robots", "file", "mismatched tag"),
-        ("</robot>", "<joint", "file", "well-formed"),
+        ("</robot>", "<joint", "file", "breaks off"),
         ('<robot name="small">', "<!DOCTYPE robot><robot>", "file", "DOCTYPE"),
     ],
 )
@@ -373,7 +373,7 @@ def test_what_is_no_file_is_refused(tmp_path):
         kin.examine_urdf(7)
     path = tmp_path / "bytes.urdf"
     path.write_bytes(b"\xff\x00<robot/>\x9d")
-    assert "not well-formed" in kin.examine_urdf(path).refusal
+    assert "no XML" in kin.examine_urdf(path).refusal
     path.write_bytes(b'<?xml version="1.0" encoding="klingon"?><robot/>')
     with pytest.raises(RobotFileError, match="encoding"):
         kin.examine_urdf(path)

@@ -75,6 +75,64 @@ def test_what_is_no_file_of_an_arm_is_named(name, words):
     assert words in kin.examine_urdf(path).findings[0].text
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("404: Not Found", r"no XML: it begins with '404: Not Found'.*the answer of a web site"),
+        ('{"robot": 1}', r"no XML: it begins with .*a list"),
+        ("PK\x03\x04\x00", r"no XML: it begins with .*an archive"),
+        ("<!DOCTYPE html>\n<html><body>", r"DOCTYPE: got 'html'.*the button Raw leads to the file itself"),
+        (OK.replace("</robot>", ""), r"an end in line 6 before </robot>.*this one breaks off"),
+        ('<robot name="r"><group name="arm"/></robot>', r"link: got 'none'.*this is an SRDF"),
+    ],
+)
+def test_another_file_in_its_place_is_named(tmp_path, text, words):
+    path = tmp_path / "arm.urdf"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(RobotFileError, match=words):
+        kin.read_urdf(path)
+    assert re.search(words.replace(": got", ":"), kin.examine_urdf(path).findings[0].text)
+
+
+def test_a_limit_that_is_not_stated_is_zero_and_that_is_said():
+    found = kin.examine_urdf(OK.replace('lower="-2" upper="2"', 'lower="-2"'))
+    assert found.arm.robot.joints[1].limits == (-2.0, 0.0)
+    assert found.arm.report.notes == ("Joint j2 states no upper limit, which is 0 then.",)
+    assert [(each.rank, each.automatic) for each in found.findings] == [("suspicious", False)]
+
+
+def test_expressions_in_numbers_are_mended():
+    found = kin.examine_urdf(OK.replace('lower="-2" upper="2"', 'lower="-pi/2" upper="2*pi/4"'))
+    assert found.arm is None
+    assert found.mended_arm.robot.joints[1].limits == pytest.approx((-math.pi / 2, math.pi / 2))
+    assert kin.examine_urdf(OK.replace('upper="2"', 'upper="two"')).mended_arm is None
+
+
+def test_expressions_of_xacro_in_names_are_noted():
+    found = kin.read_urdf(OK.replace('name="j1"', 'name="${prefix}j1"'))
+    assert found.report.notes == (
+        "Names such as ${prefix}j1 have expressions of xacro: they are taken as they stand.",
+    )
+
+
+def test_what_carries_fingers_is_offered_as_the_tip_and_all_say_as_many_joints():
+    fingers = "".join(
+        f'<link name="{side}"/><joint name="{side}_j" type="prismatic">'
+        f'<parent link="tool0"/><child link="{side}"/><axis xyz="0 {sign} 0"/>'
+        f'<limit lower="0" upper="0.04" effort="1" velocity="1"/>{mimic}</joint>'
+        for side, sign, mimic in (("left", 1, ""), ("right", -1, '<mimic joint="left_j"/>'))
+    )
+    text = OK.replace("</robot>", fingers + "</robot>")
+    with pytest.raises(
+        RobotFileError, match=r"tool0 \(3 joints\), left \(4 joints\), right \(4 joints\)"
+    ) as caught:
+        kin.read_urdf(text)
+    ends = re.findall(r"(\w+) \((\d) joints\)", caught.value.expected)
+    assert ends == re.findall(r"(\w+) \((\d) joints\)", " ".join(kin.examine_urdf(text).read))
+    for tip, joints in ends:
+        assert kin.read_urdf(text, tip=tip).robot.n == int(joints)
+
+
 @pytest.mark.parametrize("name", ["comment_first", "blank_first", "amp", "latin1_undeclared", "type_case"])
 def test_the_doctor_mends_what_has_one_meaning(name):
     found = kin.examine_urdf(FILES / f"{name}.urdf")

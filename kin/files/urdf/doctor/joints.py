@@ -88,6 +88,9 @@ def _check_limits(notes: FindingLog, joint: Element, place: str, kind: str) -> b
     if found[0] is None or found[1] is None:
         return False
     lower, upper = found[0][0], found[1][0]
+    if missing := {"lower", "upper"} - set(limit.attrib):
+        words = f"It states no {missing.pop()} limit, which is 0 then."
+        notes.add(limit, place, "limit", "suspicious", words, "State both.")
     shown = f"{general(lower)} to {general(upper)}"
     if lower == upper == 0.0:
         assumed = "0 to 1 m are" if kind == "prismatic" else "−180° to 180° are"

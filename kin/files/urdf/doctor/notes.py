@@ -7,6 +7,8 @@ from xml.etree.ElementTree import Element
 from kin.files.numbers import number_of
 from kin.files.urdf.doctor.findings import Rank, Symptom, UrdfFinding
 from kin.files.urdf.doctor.source import Edit, SourceText
+from kin.typed import ReadError, read
+from kin.units import PLAIN
 
 _LONGEST = 60  # characters of a name or a text in a sentence
 
@@ -38,7 +40,7 @@ class FindingLog:
     def numbers(self, element: Element, place: str, key: str, count: int = 1) -> list[float] | None:
         """The finite numbers of an attribute; None, and a note, if it has not so many; also None without it.
 
-        A decimal comma, and commas between numbers, are mended.
+        A decimal comma, commas between numbers, and expressions such as ``-pi/2`` are mended.
         """
         text = element.get(key)
         if text is None:
@@ -51,14 +53,25 @@ class FindingLog:
         mended = text.replace(",", " " if split else ".")
         parts = [number_of(part) for part in mended.split()]
         words = f"{key} is “{cut(text)}”, not {what}."
-        if mended != text and len(parts) == count and all(abs(value) < float("inf") for value in parts):
-            clean = " ".join(mended.split())
+        clean = " ".join(mended.split())
+        if "$" not in text and len(text) <= _LONGEST and not all(abs(value) < float("inf") for value in parts):
+            clean, parts = _evaluated(text, count)
+        if clean != text and len(parts) == count and all(abs(value) < float("inf") for value in parts):
             edit = self.source.with_attribute(element, key, clean)
             self.add(element, place, "number", "wrong", words, f"Write “{clean}”.", edit)
             return None
         hint = " Expand xacro first." if "$" in text else ""
         self.add(element, place, "number", "wrong", words, f"Write {what}.{hint}")
         return None
+
+
+def _evaluated(text: str, count: int) -> tuple[str, list[float]]:
+    """An attribute with expressions, as numbers; nothing where it has another count of them."""
+    try:
+        values = [read(part, PLAIN) for part in (text.split() if count > 1 else [text])]
+    except ReadError:
+        return text, []
+    return spelled(*values), values
 
 
 def cut(text: str) -> str:
