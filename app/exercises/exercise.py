@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 import time
 from collections.abc import Callable, Mapping
@@ -10,8 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 import kin
+from app.exercises import cell
+from app.exercises.cell import Declared
 from app.exercises.contract import Kind
 from app.exercises.expressions import Expression, ExpressionError, Function
+from app.exercises.fields import Fields
 from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Facts, Joined, Quantity, Variant
 from kin import Robot
@@ -22,6 +26,10 @@ TOPICS = ("Frames and DH tables", "Forward kinematics", "Inverse kinematics", "V
 CHECKED_SEEDS = range(8)
 LONGEST = 5.0  # s of computing until numbers are drawn
 _DRAWS = 500
+MOST_VALUES = 1_000_000  # from which a number is drawn
+# What one is in SI units, and what is measured.
+UNITS = {"deg": (math.pi / 180, "angle"), "rad": (1.0, "angle"), "mm": (1e-3, "length"), "m": (1.0, "length")}
+UNIT_HELP = "The unit of the numbers; none: they are as they are."
 
 
 class VariantError(ValueError):
@@ -36,28 +44,52 @@ class VariantError(ValueError):
         self.field = field
 
 
+def _read_bound(above: Callable[[Fields], float]) -> cell.Read:
+    """Reads a part of a range, for which a list of values may stand."""
+    return lambda table, name: 0.0 if table.get("choose") else table.number(name, above=above(table))
+
+
+def _read_values(table: Fields, name: str) -> tuple[float, ...]:
+    found = table.items(name)
+    if not all(type(value) in (int, float) and math.isfinite(value) for value in found):
+        raise table.refuse(name, found, "numbers")
+    return tuple(found)
+
+
 @dataclass(frozen=True)
-class Drawn:
-    """A number that the seed draws.
+class Drawn(Declared):
+    """A number that the seed draws: one of a range with steps, or one of a list, in its unit."""
 
-    Attributes:
-        low, high, step: the values that are drawn from, in radians, metres or as they are.
-        chosen: instead, a list of values.
-        measure: ``"angle"``, ``"length"`` or "".
-    """
+    low: float = cell.special("From", "", "number", _read_bound(lambda table: -math.inf), "from")
+    high: float = cell.special("To", "", "number", _read_bound(lambda table: table.number("from")), "to")
+    step: float = cell.special("Step", "", "number", _read_bound(lambda table: 0.0))
+    choose: tuple[float, ...] = cell.special("Or one of", "One in each line.", "numbers", _read_values)
+    unit: str = cell.choice("Unit", UNIT_HELP, UNITS, "")
 
-    low: float
-    high: float
-    step: float
-    chosen: tuple[float, ...]
-    measure: str
+    def check(self, table: Fields) -> None:
+        if not self.choose and not (self.high - self.low) / self.step <= MOST_VALUES:
+            raise table.refuse("step", self.step, f"a step that gives at most {MOST_VALUES} values")
 
     def draw(self, source: random.Random) -> Quantity:
         """One of the values."""
-        if self.chosen:
-            return Quantity(source.choice(self.chosen), self.measure)
-        steps = int((self.high - self.low) / self.step + 1e-9)
-        return Quantity(self.low + source.randint(0, steps) * self.step, self.measure)
+        scale, measure = UNITS.get(self.unit, (1.0, ""))
+        if self.choose:
+            return Quantity(scale * source.choice(self.choose), measure)
+        low, high, step = (scale * value for value in (self.low, self.high, self.step))
+        return Quantity(low + source.randint(0, int((high - low) / step + 1e-9)) * step, measure)
+
+
+@dataclass(frozen=True)
+class Computed(Declared):
+    """A number that is computed from those drawn and from the arm."""
+
+    value: Expression = cell.expression("Value")
+    unit: str = cell.choice("Shown in", UNIT_HELP, UNITS, "")
+
+    @property
+    def measure(self) -> str:
+        """``"angle"``, ``"length"`` or ""."""
+        return UNITS.get(self.unit, (1.0, ""))[1]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ from typing import Any
 
 from app.exercises import cell
 from app.exercises.cell import Declared
-from app.exercises.exercise import TOPICS, Drawn, Exercise, Target
+from app.exercises.exercise import TOPICS, Computed, Drawn, Exercise, Target
 from app.exercises.expressions import Expression
 from app.exercises.fields import ExerciseFileError, Fields, text_of, toml_of
 from app.exercises.kinds import KINDS
@@ -21,10 +20,8 @@ from app.exercises.variant import Facts
 from kin import KinematicsError, Robot, get_robot
 
 BUILTIN = Path(__file__).parent / "library"
-UNITS = {"deg": (math.pi / 180, "angle"), "rad": (1.0, "angle"), "mm": (1e-3, "length"), "m": (1.0, "length")}
 MOST_HINTS = 5
 MOST_BYTES = 4000  # of an exercise that is written in a page
-MOST_VALUES = 1_000_000  # from which a number is drawn
 LAST = 999  # place of an exercise without one
 _ID = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
@@ -156,18 +153,7 @@ def _vary(fields: Fields) -> dict[str, Drawn]:
     for name in fields.table:
         _check_name(fields, name)
         rule = fields.sub(name)
-        scale, measure = _unit(rule)
-        chosen = rule.items("choose")
-        if not all(type(value) in (int, float) and math.isfinite(value) for value in chosen):
-            raise rule.refuse("choose", chosen, "numbers")
-        if chosen:
-            found[name] = Drawn(0.0, 0.0, 0.0, tuple(scale * value for value in chosen), measure)
-        else:
-            low = rule.number("from")
-            high, step = rule.number("to", above=low), rule.number("step", above=0.0)
-            if not (high - low) / step <= MOST_VALUES:
-                raise rule.refuse("step", step, f"a step that gives at most {MOST_VALUES} values")
-            found[name] = Drawn(scale * low, scale * high, scale * step, (), measure)
+        found[name] = Drawn.read(rule)
         rule.done()
     return found
 
@@ -180,7 +166,8 @@ def _let(fields: Fields, drawn: frozenset[str]) -> dict[str, tuple[Expression, s
             raise fields.refuse(name, value, "a name that is not in [vary]")
         if isinstance(value, dict):
             rule = fields.sub(name)
-            found[name] = rule.expression("value"), _unit(rule)[1]
+            made = Computed.read(rule)
+            found[name] = made.value, made.measure
             rule.done()
         else:
             found[name] = fields.expression(name), ""
@@ -190,12 +177,6 @@ def _let(fields: Fields, drawn: frozenset[str]) -> dict[str, tuple[Expression, s
 def _check_name(fields: Fields, name: str) -> None:
     if not _NAME.fullmatch(name):
         raise fields.refuse(name, name, "a name of lower-case letters, digits and _, at most 20")
-
-
-def _unit(rule: Fields) -> tuple[float, str]:
-    if not rule.has("unit"):
-        return 1.0, ""
-    return UNITS[rule.choice("unit", UNITS)]
 
 
 def _target(fields: Fields, robot: Robot) -> Target | None:

@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from app.exercises.cell import Cell, Table
+from app.exercises.exercise import Computed, Drawn
 from app.exercises.fields import LIMITS, MOST_ITEMS
-from app.exercises.files import UNITS, Head, Task
+from app.exercises.files import Head, Task
 from app.exercises.kinds import KINDS
 from kin import InputError
 from kin.parsing import TextError, read_toml
@@ -24,7 +25,6 @@ from kin.parsing import TextError, read_toml
 Draft = dict[str, Any]
 LONGEST_CELL = 2000  # characters
 TABLES = ("vary", "let", "target", "answer")
-_UNIT = "The unit of the numbers; none: they are as they are."
 Field = Cell | Table
 
 
@@ -80,13 +80,7 @@ _HEAD: tuple[tuple[str, str, tuple[Field, ...]], ...] = (
                 "Drawn",
                 "From, to and step; or a list to choose from.",
                 "number",
-                (
-                    Cell("from", "From", "", "number"),
-                    Cell("to", "To", "", "number"),
-                    Cell("step", "Step", "", "number"),
-                    Cell("choose", "Or one of", "One in each line.", "numbers"),
-                    Cell("unit", "Unit", _UNIT, "choice", tuple(UNITS)),
-                ),
+                Drawn.cells(),
                 {"from": -60, "to": 60, "step": 10, "unit": "deg"},
                 named=True,
             ),
@@ -95,10 +89,7 @@ _HEAD: tuple[tuple[str, str, tuple[Field, ...]], ...] = (
                 "Computed",
                 "From those, and from the arm at its posture.",
                 "number",
-                (
-                    Cell("value", "Value", "", "expression"),
-                    Cell("unit", "Shown in", _UNIT, "choice", tuple(UNITS)),
-                ),
+                Computed.cells(),
                 {"value": "0"},
                 named=True,
             ),
