@@ -64,7 +64,7 @@ from app.exercises.worked import WorkedText, read_worked
 _FACT = re.compile(r"([a-z][a-z0-9_]*)(?:\([a-z0-9_, ]+\))?")
 MOST_JOINTS = 12
 POINTS = ("tool", "end", "target")  # of the tool at the pose of a step, or at its end, and the step's target
-NOWHERE = "nowhere"
+NO_PREVIEW = "nowhere"
 _NONE = ""  # the name of no pose and of no figure
 
 
@@ -73,8 +73,8 @@ class QuestionText:
     """A question: when it is asked, its prompt, its kind with its fields, and the facts that it withholds.
 
     Attributes:
-        leads: of a choice, names of where its options lead, in the order of the file; `NOWHERE` for those that do
-            not. Empty: it is not drawn.
+        leads: of a choice, names of where its options lead, in the order of the file; `NO_PREVIEW` for those that
+            do not. Empty: it is not drawn.
     """
 
     when: Expression

@@ -4,16 +4,16 @@
 with this code talk to the page, and :mod:`app.viewer.live` lets the page answer. Neither knows the other.
 """
 
-from app.live.line import EVENTS, RESERVED, VALUES, BusyLineError, Door, Line, Lines, Program, invite, reserved
+from app.live.line import EVENTS, RESERVED, VALUES, BusyLineError, Line, Lines, Listener, Program, invite, reserved
 
 __all__ = [
     "EVENTS",
     "RESERVED",
     "VALUES",
     "BusyLineError",
-    "Door",
     "Line",
     "Lines",
+    "Listener",
     "Program",
     "invite",
     "reserved",

@@ -28,7 +28,7 @@ MOVES, DRAWS = EVENTS = ("live", "drawn")  # what a page is to take: what undo r
 MERGED: Final = "draw"  # of this kind the newest value of each name is kept
 QUIET: Final = frozenset({"drives", "readings", "measured", "draw", "clear"})  # changes nothing that undo restores
 PREPARING: Final = 2.0  # s between two messages about the same step of what is compiled
-LETTERS: Final = 64  # answers that may wait for a program; older ones are dropped
+REPLIES: Final = 64  # answers that may wait for a program; older ones are dropped
 REVOKED: Final = "The page has withdrawn the code."
 LEFT: Final = "The page was closed."
 
@@ -85,7 +85,7 @@ class Program:
 
 
 @dataclass(frozen=True)
-class Letter:
+class Reply:
     """What a program hears once: that what the message of this number asks for is done, or why it is not.
 
     Attributes:
@@ -98,7 +98,7 @@ class Letter:
 
 
 @dataclass
-class Parcel:
+class PendingUpdate:
     """What a program has sent since the page last took it, by kind, in the order of the last posts."""
 
     values: dict[str, Any] = field(default_factory=dict)
@@ -120,10 +120,10 @@ class Line:
         self._post = post
         self._lock = threading.Lock()
         self._program: Program | None = None
-        self._parcels = {key: Parcel() for key in EVENTS}
+        self._pending = {key: PendingUpdate() for key in EVENTS}
         self._values: dict[str, tuple[int, Any]] = {}
         self._count = 0
-        self._letters: deque[Letter] = deque(maxlen=LETTERS)
+        self._replies: deque[Reply] = deque(maxlen=REPLIES)
         self.ended = ""  # why, once it has
         self.readings: Sequence[float] | None = None  # the newest ones of the motors of a real arm
         self.recording: Recording | None = None
@@ -155,7 +155,7 @@ class Line:
             if before is not None and before.session != program.session:
                 raise BusyLineError(before.name)
             self._program = program
-            self._letters.clear()
+            self._replies.clear()
         if before is not None:
             before.wake()
         self._post(DRAWS, None)
@@ -166,7 +166,7 @@ class Line:
             if self._program is not program:
                 return
             self._program, self.readings = None, None
-            self._parcels[DRAWS] = Parcel({"drives": None, "clear": True, "measured": None})
+            self._pending[DRAWS] = PendingUpdate({"drives": None, "clear": True, "measured": None})
         self._post(DRAWS, None)
 
     def send(self, values: Mapping[str, Any], number: int | None = None) -> None:
@@ -176,7 +176,7 @@ class Line:
         with self._lock:
             self.readings = quiet.get("readings", self.readings)
             for key, some in ((DRAWS, quiet), (MOVES, moving)):
-                waiting = self._parcels[key].values
+                waiting = self._pending[key].values
                 for name, value in some.items():
                     if name == MERGED:
                         value = {**waiting.get(name, {}), **value}
@@ -185,7 +185,7 @@ class Line:
                     waiting.pop(name, None)
                     waiting[name] = value
             if number is not None:
-                self._parcels[MOVES if moving else DRAWS].numbers.append(number)
+                self._pending[MOVES if moving else DRAWS].numbers.append(number)
         if quiet:
             self._post(DRAWS, None)
         if moving:
@@ -201,25 +201,25 @@ class Line:
                 if name in wants and known.get(name) != value[0]
             }
 
-    def letters(self) -> list[Letter]:
+    def replies(self) -> list[Reply]:
         """What the program hears once, since the last call."""
         with self._lock:
-            letters = list(self._letters)
-            self._letters.clear()
-        return letters
+            replies = list(self._replies)
+            self._replies.clear()
+        return replies
 
     # The page
 
-    def take(self, key: str) -> Parcel:
+    def take(self, key: str) -> PendingUpdate:
         """What the program has sent for this event of the page since the last call."""
         with self._lock:
-            parcel, self._parcels[key] = self._parcels[key], Parcel()
-        return parcel
+            pending, self._pending[key] = self._pending[key], PendingUpdate()
+        return pending
 
     def waiting(self, name: str) -> Any:
         """What the program has sent under this name, and the page has not taken yet; None: nothing."""
         with self._lock:
-            return self._parcels[MOVES].values.get(name)
+            return self._pending[MOVES].values.get(name)
 
     def prepare(self, what: str, step: int, of: int) -> None:
         """Tell the program how far the page is that compiles what its message needs.
@@ -231,9 +231,9 @@ class Line:
             return
         self._prepared = found, now
         with self._lock:
-            numbers = self._parcels[MOVES].numbers
+            numbers = self._pending[MOVES].numbers
             number = numbers[-1] if numbers else None
-        self._post_letter(Letter(number, preparing=found))
+        self._post_reply(Reply(number, preparing=found))
 
     def publish(self, name: str, value: object, anew: bool = True) -> None:
         """What the page shows now; unless `anew`, only where it is another object than before."""
@@ -257,13 +257,13 @@ class Line:
 
     def write(self, number: int | None = None, problem: Problem | None = None) -> None:
         """Tell the program something once."""
-        self._post_letter(Letter(number, problem))
+        self._post_reply(Reply(number, problem))
 
-    def _post_letter(self, letter: Letter) -> None:
+    def _post_reply(self, reply: Reply) -> None:
         with self._lock:
             program = self._program
             if program is not None:
-                self._letters.append(letter)
+                self._replies.append(reply)
         if program is not None:
             program.wake()
 
@@ -304,7 +304,7 @@ class Lines:
         line.end(why)
 
 
-class Door:
+class Listener:
     """The line of one page, while there is one.
 
     Args:

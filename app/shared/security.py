@@ -1,10 +1,10 @@
 """What a client may cause, content security policies, cookies, and the check of a websocket's origin.
 
-`Rights` decides for every door, REST, both websockets of a page and what a link restores. Who has the access
-token, or everybody if there is none and the service is not read-only, may do everything, but for one thing:
-exercises are saved on the service only by who has the token or, without one, by browsers on the same machine. A
-read-only visitor may look: read pages and robots, and see the arm of a link from all sides. Nothing is moved,
-solved, sampled or mapped for a visitor who may only look.
+`Rights` decides for REST, both websockets of a page and what a link restores. Holders of the access token have
+full access; without a token everybody has it, unless the service is read-only. The one exception: exercises are
+saved on the service only by holders of the token or, without one, by browsers on the same machine. A read-only
+visitor may read pages and robots, and see the arm of a link from all sides. Nothing is moved, solved, sampled or
+mapped for a read-only visitor.
 
 The query of the viewer's address can name another server (``?websocket=ws://elsewhere``), which could then run
 scripts in our origin: ``connect-src 'self'`` prevents that. Browsers do not apply the same-origin rule to

@@ -15,7 +15,7 @@ from typing import ClassVar, Protocol
 import viser
 
 from app.exports.snippets import Service
-from app.live import Door
+from app.live import Listener
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
 from app.shared.store import Store
@@ -45,7 +45,7 @@ class Stage(Protocol):
     bodies: Bodies
     frames: Frames  # the workpieces, and the frame in which poses are shown
     activity: Activity  # what is open, and what is withheld
-    door: Door  # the line to a program, if there is one
+    door: Listener  # the line to a program, if there is one
     fence: Fence  # shows which values have crossed on the way
     may_save: bool  # whether the visitor may save in a folder of the service
 

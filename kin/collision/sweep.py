@@ -29,7 +29,7 @@ LOOKS = 64  # for the deepest contact of a motion that touches something
 Rows = NDArray[np.int64]
 
 
-def first_touches(
+def first_contacts(
     near: Surroundings,
     at: Callable[[Rows, Array], Array],
     moves: Array,
@@ -46,7 +46,7 @@ def first_touches(
         stop: cancels by raising.
     """
     body = near.bodies
-    couples, paces = _paces(near, moves, farthest)
+    couples, paces = _approach_bounds(near, moves, farthest)
     top = paces.max(axis=1, initial=0.0)
     hit, close = np.full(len(moves), math.inf), np.full(len(moves), math.inf)
 
@@ -88,16 +88,16 @@ def first_touches(
     return np.where(np.isfinite(hit), hit, close)
 
 
-def _paces(near: Surroundings, moves: Array, farthest: Array) -> tuple[Rows, Array]:
+def _approach_bounds(near: Surroundings, moves: Array, farthest: Array) -> tuple[Rows, Array]:
     """What is compared ``(c, 2)``, as `margins` takes it, and how far each can come nearer ``(k, c)``."""
-    lever, (first, second) = levers(near, farthest), near.pairs.T
+    lever, (first, second) = lever_arms(near, farthest), near.pairs.T
     between = np.where(lever[first] > 0.0, 0.0, lever[second])
     watched = near.bodies.moving if len(near.solids) else near.bodies.moving[:0]
     couples = np.concatenate([near.pairs, np.column_stack([watched, np.full_like(watched, -1)])])
     return couples, np.ascontiguousarray(moves @ np.concatenate([between, lever[watched]]).T)
 
 
-def levers(near: Surroundings, farthest: Array) -> Array:
+def lever_arms(near: Surroundings, farthest: Array) -> Array:
     """How far a point of the axis of each capsule can be from the axis of each joint ``(m, n)``, m.
 
     1 for a prismatic joint, 0 for a joint that does not carry the capsule. Rows that follow a joint add theirs,
@@ -145,7 +145,7 @@ def touches_along(
     still = np.array([i == 0 or i in jumps for i in range(len(path))])
     start = np.where(still[:, None], path, np.concatenate([path[:1], path[:-1]]))
     ways = path - start
-    shares = first_touches(
+    shares = first_contacts(
         near, lambda rows, s: start[rows] + s[:, None] * ways[rows], np.abs(ways), np.abs(path).max(axis=0), stop
     )
     found = []

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kin.collision.contacts import Surroundings
-from kin.collision.sweep import first_touches
+from kin.collision.sweep import first_contacts
 from kin.ik.details import JointKind, LimitViolation
 from kin.ik.options import IKOptions
 from kin.robot import Robot
@@ -57,7 +57,7 @@ class Space:
         """Whether the straight motion of the joints between two configurations ``(n,)`` is proven free."""
         way = end - start
         farthest = np.maximum(np.abs(start), np.abs(end))
-        found = first_touches(
+        found = first_contacts(
             self.near, lambda rows, share: start + share[:, None] * way, np.abs(way)[None], farthest, self.stop
         )
         return not bool(np.isfinite(found[0]))

@@ -11,7 +11,7 @@ import pytest
 import kin
 from kin import InputError, Joint, Robot
 from kin.collision.contacts import surroundings
-from kin.collision.sweep import levers
+from kin.collision.sweep import lever_arms
 
 
 def arm(convention: str = "standard") -> Robot:
@@ -390,7 +390,7 @@ def test_levers_bound_how_far_bodies_move_with_what_follows(robot):
     body, rng = near.bodies, np.random.default_rng(8)
     for q in robot.random_q(rng, 30):
         step = rng.uniform(-0.05, 0.05, robot.n)
-        bound = levers(near, np.maximum(np.abs(q), np.abs(q + step))) @ np.abs(step)
+        bound = lever_arms(near, np.maximum(np.abs(q), np.abs(q + step))) @ np.abs(step)
         ends = []
         for at in (q, q + step):
             frames = np.concatenate([robot.T_world_base[None], kin.link_frames(robot, at)])[body.rows + 1]

@@ -80,7 +80,7 @@ async def _find(lines: Lines, tries: Tries, client: str, code: str) -> Line:
             return line
         if code not in RESERVED:  # its page is not open yet
             tries.wrong(client)
-        expected = "the code of an open page" if is_code(code) else "8 letters and digits, such as K7QF-2M4A"
+        expected = "the code of an open page" if is_code(code) else "8 replies and digits, such as K7QF-2M4A"
         error = FieldError(field="code", value=show(show_code(code)), expected=expected)
         hint = "Press Connect a program in the tab Program of the page; the code is there."
         detail = f"No page has the code {show_code(code)}."
@@ -248,15 +248,15 @@ class Conversation:
                 await close(self._visitor, DONE, reason)
                 return
             now = self._loop.time()
-            letters = self._line.letters()
-            if now < next_news and not letters:
+            replies = self._line.replies()
+            if now < next_news and not replies:
                 self._loop.call_later(next_news - now, self._woken.set)
             elif values := self._line.news(self._known):  # before `done`: what was done has been heard then
                 next_news = now + self._interval
                 self._known.update({name: number for name, (number, _) in values.items()})
                 await self._send(news({name: value for name, (_, value) in values.items()}))
-            for letter in letters:
-                self._own.append(_letter(letter.number, letter.problem, letter.preparing))
+            for reply in replies:
+                self._own.append(_letter(reply.number, reply.problem, reply.preparing))
             while self._own:
                 await self._send(self._own.popleft())
 

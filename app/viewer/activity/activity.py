@@ -185,7 +185,7 @@ class Activity:
         sent, opened = ([one.exercise for one in c.own] if c else [] for c in (self.sent, self.progress.course))
         mine = [] if self.practice.seated else opened  # of a student in a room, none takes the place of the task
         self.exercises.put([*sent, *mine, *filter(None, (self.lent, self.draft))], weak=[*self.kept, *opened])
-        self.practice.look_again()
+        self.practice.invalidate()
 
     # Where exercises are done
 

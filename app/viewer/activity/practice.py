@@ -216,7 +216,7 @@ class Practice:
         elif isinstance(label, str):
             self._claims = {label[:LABEL]: claim}
 
-    def look_again(self) -> None:
+    def invalidate(self) -> None:
         """There may be other exercises: open what a restored state has open, if it is there now."""
         if self.at is None and (found := self._exercises.get(self._wanted)) is not None:
             self.at, self._wanted = found, None

@@ -47,8 +47,8 @@ class DeclaredFeature(Feature, Generic[S, F]):
         undo: what undo calls an event, by the method that it calls, if not by the feature's title.
         pace: the panel follows a moving arm at this interval (s), or more seldom where many visitors' arms move:
             nobody reads faster, and HTML is long.
-        facts: what is known of settings and arm now, made by `look`; the same object as long as both are. While an
-            event is handled, they are those before it.
+        facts: what is known of settings and arm now, made by `compute_facts`; the same object as long as both are.
+            While an event is handled, they are those before it.
         read: the facts that the panel shows. Drawings that change no faster than the panel use these.
         shown_at: when the panel was last made to show them (`time.perf_counter`).
     """
@@ -82,12 +82,12 @@ class DeclaredFeature(Feature, Generic[S, F]):
     def started(self) -> None:
         """There is a robot: the first, or another one."""
 
-    def look(self) -> F:
+    def compute_facts(self) -> F:
         """The facts of the present settings and arm."""
         return cast(F, self.facts_of(self.settings, self.stage.now))
 
-    def besides(self) -> tuple[object, ...]:
-        """What `look` depends on beside settings and arm, such as the last answer of long work."""
+    def extra_dependencies(self) -> tuple[object, ...]:
+        """What `compute_facts` depends on beside settings and arm, such as the last answer of long work."""
         return ()
 
     def panel(self) -> Sequence[PanelNode]:
@@ -120,7 +120,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         """The event that calls one of the feature's methods; the arguments are hashable."""
         return method.__name__, *args
 
-    def wake(self, seconds: float = 0.0) -> None:
+    def schedule(self, seconds: float = 0.0) -> None:
         """Ask for `advance`, and show what is declared, in so many seconds or earlier."""
         self._stale = self._stale or seconds == 0.0
         self.due = seconds if self.due is None else min(self.due, seconds)
@@ -143,7 +143,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
         if self._withheld != self.stage.activity.withheld:
             self._withheld = self.stage.activity.withheld
             self._scene.remove()  # hidden nodes too: the browser has their data
-        self.look_again()
+        self.invalidate()
         self.read = self.facts
         stage = self.stage
         self._panel.show(self.panel(), self.settings, stage.now.robot, stage.units, self._write)
@@ -154,11 +154,11 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def draw(self) -> None:
         """Show the scene that is declared now: a frame of a motion, between two times of the panel."""
-        self.look_again()
+        self.invalidate()
         self._scene.show(self.scene())
 
-    def look_again(self) -> None:
-        """Make `facts` anew if settings, arm, or what is `besides` have changed."""
+    def invalidate(self) -> None:
+        """Make `facts` anew if settings, arm, or `extra_dependencies` have changed."""
         arm = self.stage.now
         target = None if arm.target is None else arm.target.tobytes()
         places = (arm.q.tobytes(), arm.goal.tobytes(), target)
@@ -172,9 +172,9 @@ class DeclaredFeature(Feature, Generic[S, F]):
             arm.obstacles,
             arm.avoid,
         )
-        seen += self.besides()
+        seen += self.extra_dependencies()
         if seen != self._seen:
-            self._seen, self.facts = seen, self.look()
+            self._seen, self.facts = seen, self.compute_facts()
 
     @property
     def _interval(self) -> float:
@@ -189,8 +189,8 @@ class DeclaredFeature(Feature, Generic[S, F]):
     # Feature
 
     def handle(self, key: Hashable, value: object) -> None:
-        self.look_again()
-        self.wake()  # shown once, after all events that wait, and after errors
+        self.invalidate()
+        self.schedule()  # shown once, after all events that wait, and after errors
         match key:
             case ("at", str(path), int(serial)):
                 if (found := self._panel.received(self.settings, path, serial, value)) is not None:
@@ -223,7 +223,7 @@ class DeclaredFeature(Feature, Generic[S, F]):
 
     def on_pose(self, T_base_tool: Array) -> None:
         self.draw()
-        self.wake(max(0.0, self._interval - (time.perf_counter() - self.shown_at)))
+        self.schedule(max(0.0, self._interval - (time.perf_counter() - self.shown_at)))
 
     def on_style(self) -> None:
         self._begin()

@@ -119,12 +119,12 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
 
     # Declared
 
-    def look(self) -> Drafted:
+    def compute_facts(self) -> Drafted:
         known = self._exercises.get(self._id)
         mine = known is not None and self._served.get(known.id) == digest(known.source)
         return Drafted(self.settings, self.stage.now, known, mine, self.stage.store.get)
 
-    def besides(self) -> tuple[object, ...]:
+    def extra_dependencies(self) -> tuple[object, ...]:
         return (self._exercises.get(self._id), *self._served.items())
 
     @property
@@ -179,14 +179,14 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
             case (str(name), *rest) if name in self.messages:
                 if self.stage.activity.practice.seated:
                     raise InputError("exercise", name, "a page of a teacher: this one is a student’s in a room")
-                self.look_again()
-                self.wake()
+                self.invalidate()
+                self.schedule()
                 self._error = views.Refusal()
                 try:
                     self._act(name, rest, value)
                 except (ExerciseFileError, InputError) as error:
                     self._error = views.Refusal(error.field, f"got {error.value}, expected {error.expected}")
-                self.look_again()
+                self.invalidate()
             case _:
                 super().handle(key, value)
 
@@ -262,7 +262,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
             raise InputError("exercise", f"{len(text.encode())} bytes", f"at most {MOST_BYTES} bytes in all")
         before = self.facts.first
         self.change(draft=text)
-        self.look_again()
+        self.invalidate()
         now = self.facts.first
         moved = before is None or now is None or now.robot != before.robot or (now.q != before.q).any()
         if move and moved:
@@ -312,7 +312,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
 
     def _serve(self, exercise: Exercise) -> None:
         """Into the folder of the service, for all pages."""
-        self.look_again()
+        self.invalidate()
         again = self.facts.known is not None
         saved = self._exercises.save(to_toml(self.facts.data), self._served.get(exercise.id, ""))
         self._served[exercise.id] = digest(saved.source)
@@ -351,7 +351,7 @@ class Author(DeclaredFeature[AuthorSettings, Drafted]):
         if isinstance(served, str) and isinstance(draft, str):
             self._served.setdefault(str(_id_of(draft)), served)
         super().restore({"draft": "", **state})
-        self.look_again()
+        self.invalidate()
         self._offer()
 
 

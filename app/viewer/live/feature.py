@@ -83,7 +83,7 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
 
     def use(self, values: Mapping[str, Any]) -> None:
         """Take what the program draws and measures; raises `kin.InputError`."""
-        self.wake()
+        self.schedule()
         if "drives" in values:
             self._driven = values["drives"] or ""
             self.stage.show_driven(self._driven)
@@ -104,16 +104,16 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
     def handle(self, key: Hashable, value: object) -> None:
         match key:
             case ("arriving", "upload") if isinstance(value, IncomingFile):
-                self.wake()
+                self.schedule()
                 self._opening.expect(value)
             case ("upload",):
-                self.wake()
+                self.schedule()
                 if isinstance(value, IncomingFile):
                     self._opening.take(value)
                 else:
                     self.stage.notify(Notice("error", *not_sent(value)))
             case ("read", int(number)):
-                self.wake()
+                self.schedule()
                 self._try(lambda: self._use(self._opening.result(number, value)))
             case _:
                 super().handle(key, value)
@@ -188,7 +188,7 @@ class Connect(DeclaredFeature[TapeSettings, ConnectFacts]):
 
     # Declared
 
-    def besides(self) -> tuple[object, ...]:
+    def extra_dependencies(self) -> tuple[object, ...]:
         measured = None if self._measured is None else self._measured.tobytes()
         return measured, self._opening.busy, tuple(number for number, _ in self._drawings.values())
 

@@ -18,7 +18,7 @@ from app.viewer.panel import update_html
 from app.viewer.panel.entry import read_cell
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
-from app.viewer.scene.gizmo import Pull, travel
+from app.viewer.scene.gizmo import DragEvent, travel
 from app.viewer.scene.meshes import body
 from app.viewer.tabs.robot.views import text_of
 from app.viewer.views.templates import render
@@ -61,7 +61,7 @@ class ObstaclesFeature(Feature):
                 self._remove()
             case (("set", str(field), int()), str(text)):
                 self._type(field, text)
-            case ("grab" | "gizmo", Pull()):
+            case ("grab" | "gizmo", DragEvent()):
                 self._pull(value)
             case _:
                 raise InputError("obstacles", key, "the key of a button or a field, with its value")
@@ -134,7 +134,7 @@ class ObstaclesFeature(Feature):
         self.stage.notify(Notice("hand", f"Removed: {gone}", "Undo brings it back."))
         self._use(placed.removed(self.stage.now.obstacles, index))
 
-    def _pull(self, pull: Pull) -> None:
+    def _pull(self, pull: DragEvent) -> None:
         """One event of the gizmo. Obstacles do not avoid the arm: it may avoid them. What touches is red."""
         if self._chosen is None:
             return

@@ -79,12 +79,12 @@ class Member(Feature):
     def attach(self, bar: viser.GuiHtmlHandle) -> None:
         """Use this element, outside of all tabs, for the bar over the scene."""
         self._bar = bar
-        self.take_news()
+        self.apply_updates()
 
     # To be overridden
 
     @abstractmethod
-    def take_news(self) -> None:
+    def apply_updates(self) -> None:
         """The room has changed: do at once what concerns the arm."""
 
     @abstractmethod
@@ -149,7 +149,7 @@ class Member(Feature):
         before, leader = self.room, self.leader
         self.room = self.attendance.room
         if self._bar is not None:
-            self.take_news()
+            self.apply_updates()
         self._dirty |= self.leader != leader or self.words(before) != self.words(self.room)
 
     def tick(self, now: float) -> None:
@@ -174,7 +174,7 @@ class Member(Feature):
     def on_style(self) -> None:
         self._dirty = True
 
-    def admit(self, key: Hashable, value: object) -> bool:
+    def allows(self, key: Hashable, value: object) -> bool:
         """Whether an event may act on the page."""
         act = act_of(key, value, self.page.features)
         if not act:
@@ -198,7 +198,7 @@ class Member(Feature):
             if not self.leader and title and before is not None:
                 self.page.record(title, before)
             self.leader, self._began = leader, time.perf_counter()
-            self.page.be_led(True)
+            self.page.set_following(True)
             self.follower.begin()
         self.follower.show(text)
         if self.follower.moving:
@@ -208,7 +208,7 @@ class Member(Feature):
         """Nobody leads this page any more."""
         if self.leader:
             self.leader, self._settles = "", None
-            self.page.be_led(False)
+            self.page.set_following(False)
 
     def twice(self, what: Hashable) -> bool:
         """Whether a button that needs two presses was pressed for the second time."""

@@ -51,7 +51,7 @@ class MemberPage(VisitorPage):
         """Let undo lead back to the state `before`."""
         self._actions.record(label, before)
 
-    def be_led(self, led: bool) -> None:
+    def set_following(self, led: bool) -> None:
         """Another page leads this one, or none does."""
         self._persistence.led = led
         if led:

@@ -43,7 +43,7 @@ class ClassroomPage(MemberPage):
         self.client.flush()
 
     def _act(self, key: Hashable, value: object) -> None:
-        if self._member is None or self._member.admit(key, value):
+        if self._member is None or self._member.allows(key, value):
             super()._act(key, value)
         elif key == "live":
             self.live.refuse(self._member.refusal("live"))

@@ -68,7 +68,7 @@ class Student(Member):
             self._take_room()
         super().handle(key, value)
 
-    def take_news(self) -> None:
+    def apply_updates(self) -> None:
         if self.room.closed:
             self._end()
             return
@@ -305,7 +305,7 @@ class Student(Member):
             case "back":
                 self._gone = False
                 self.follower.begin()
-                self.take_news()
+                self.apply_updates()
             case "hand" if room.seat is not None:
                 self.try_to(lambda: self.attendance.raise_hand(wanted(value, bool(room.seat and room.seat.hand))))
             case "vote" if type(value) is int:

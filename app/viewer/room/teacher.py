@@ -73,7 +73,7 @@ class Teacher(Member):
         self._filter: SceneFilter | None = None  # before all but the wall
         self._before: PageState | None = None  # the own page while a student's is on show, or the wall
 
-    def take_news(self) -> None:
+    def apply_updates(self) -> None:
         room = self.room
         if room.own != self._own:
             self._keep(room.own)

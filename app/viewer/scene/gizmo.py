@@ -19,7 +19,7 @@ _SMALLEST = 1e-9
 _TURNED = 1e-4  # rad; smaller turns are not said
 
 
-class Pull(NamedTuple):
+class DragEvent(NamedTuple):
     """One event of the gizmo, or of a ring attached to it.
 
     Attributes:
@@ -35,14 +35,14 @@ class Pull(NamedTuple):
 
 
 def listen(handle: viser.TransformControlsHandle, ring: bool, post: Post) -> None:
-    """Post a `Pull`: ``"grab"`` when the visitor grabs the gizmo, ``"gizmo"`` when it is dragged or released."""
+    """Post a `DragEvent`: ``"grab"`` when the gizmo is grabbed, ``"gizmo"`` when it is dragged or released."""
 
     @handle.on_update
     async def _(event: viser.TransformControlsEvent) -> None:
         if event.client is not None:
             gizmo = event.target
             key = "grab" if event.phase == "start" else "gizmo"  # the next event must not replace the start
-            post(key, Pull(event.phase, gizmo.position.tolist(), gizmo.wxyz.tolist(), ring))
+            post(key, DragEvent(event.phase, gizmo.position.tolist(), gizmo.wxyz.tolist(), ring))
 
 
 def travel(start: Array, T: Array, units: Units) -> str:

@@ -294,7 +294,7 @@ class ArmController:
         if saved <= solved + 1e-6:
             self._head_for(q, ease)
 
-    def pull(self, pull: gizmo.Pull) -> None:
+    def pull(self, pull: gizmo.DragEvent) -> None:
         """Process one event of the gizmo, or of a ring attached to it."""
         phase, position, wxyz, ring = pull
         self._pulled, self.dragging = True, phase != "end"

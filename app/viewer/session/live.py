@@ -55,27 +55,27 @@ class LiveInput:
     def _move(self, _: object) -> None:
         if (line := self._page.door.line) is None:
             return
-        parcel = line.take("live")
+        pending = line.take("live")
         problem: Problem | None = None
-        for name, value in parcel.values.items():
+        for name, value in pending.values.items():
             if self._page.arm.dragging and name in ("q", "target"):
                 problem = problem_document(409, "not-allowed", HELD, "Send again when it is released.")
                 continue
             problem = self._problem_of(lambda name=name, value=value: self._used[name](value)) or problem  # type: ignore[misc]
-        self._answer(line, parcel.numbers, problem)
+        self._answer(line, pending.numbers, problem)
 
     def _draw(self, _: object) -> None:
         feature = next((each for each in self._page.features if isinstance(each, Connect)), None)
         if (line := self._page.door.line) is None or feature is None:
             return
-        parcel = line.take("drawn")
-        self._answer(line, parcel.numbers, self._problem_of(lambda: feature.use(parcel.values)))
+        pending = line.take("drawn")
+        self._answer(line, pending.numbers, self._problem_of(lambda: feature.use(pending.values)))
 
     def refuse(self, why: str) -> None:
         """Drop what the program has sent, and tell it why."""
         if (line := self._page.door.line) is not None:
-            parcel = line.take("live")
-            self._answer(line, parcel.numbers, problem_document(409, "not-allowed", why, "Try again later."))
+            pending = line.take("live")
+            self._answer(line, pending.numbers, problem_document(409, "not-allowed", why, "Try again later."))
 
     def _answer(self, line: Line, numbers: list[int], problem: Problem | None) -> None:
         """The newest message gets the problem; the others are done when the page shows it."""

@@ -18,7 +18,7 @@ import viser
 import kin
 from app.classroom.results.keys import result_key
 from app.exports.snippets import Service
-from app.live import Door, reserved
+from app.live import Listener, reserved
 from app.shared.security import Rights
 from app.viewer import viser_names
 from app.viewer.activity.activity import Activity
@@ -115,7 +115,7 @@ class VisitorPage(ShownArm, Worker):
         client.gui.add_html(render("panel/channel", name=self.channel.name))
         self._welcome, self._looking, self.may_save = welcome, rights is Rights.LOOK, rights.save
         self.files = Files(self.post, lambda: self.features, self.meshes.memory, rights)
-        self.door = Door(services.lines, self.post, self._looking)
+        self.door = Listener(services.lines, self.post, self._looking)
         self._persistence = Persistence(self, token, self._guard, rights)
         self.offered: tuple[type[Feature], ...] = TABS
         self.tabs: list[Feature] = []

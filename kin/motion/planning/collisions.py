@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kin.collision.contacts import Surroundings
-from kin.collision.sweep import Rows, first_touches
+from kin.collision.sweep import Rows, first_contacts
 from kin.motion.details import Collides, Help
 from kin.motion.pieces import Hold, Piece
 from kin.motion.planning.parts import part_of
@@ -44,7 +44,7 @@ def checked(motion: Motion, near: Surroundings, stop: Callable[[], None]) -> Mot
             q[these] = pieces[k].at(times[these])[0]
         return q
 
-    found = first_touches(near, at, speeds * spans[:, None], farthest, stop)
+    found = first_contacts(near, at, speeds * spans[:, None], farthest, stop)
     touching = np.flatnonzero(np.isfinite(found))
     if not len(touching):
         return motion

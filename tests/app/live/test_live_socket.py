@@ -19,7 +19,7 @@ from websockets.sync.client import ClientConnection, connect
 import kin
 from app.api import ComputeSlots, api_routes
 from app.classroom.tokens import show_code
-from app.live import VALUES, Door, Line, Lines, codes
+from app.live import VALUES, Line, Lines, Listener, codes
 from app.live.recording import Recording
 from app.service.web.rooms.limits import Limits
 from app.shared.problems import problem
@@ -41,7 +41,7 @@ class Page:
     def __init__(self, lines: Lines) -> None:
         self.posts: list[str] = []
         self.taken: dict[str, Any] = {}
-        self.door = Door(lines, self._post)
+        self.door = Listener(lines, self._post)
         self.door.open(ARM)
         assert self.door.line is not None
         self.line = self.door.line
@@ -53,9 +53,9 @@ class Page:
             self.take()
 
     def take(self) -> None:
-        for parcel in map(self.line.take, ("live", "drawn")):
-            self.taken |= parcel.values
-            for number in parcel.numbers:
+        for pending in map(self.line.take, ("live", "drawn")):
+            self.taken |= pending.values
+            for number in pending.numbers:
                 self.line.write(number)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import kin
 from kin.collision.contacts import surroundings
-from kin.collision.sweep import CLOSE, first_touches, levers, touches_along
+from kin.collision.sweep import CLOSE, first_contacts, lever_arms, touches_along
 
 OBSTACLES = (
     kin.Obstacle("table", (0.6, 0.0, -0.1), size=(0.5, 0.8, 0.4)),
@@ -29,7 +29,7 @@ def test_first_touches_are_those_of_many_samples(robot):
     start = robot.random_q(rng, 40)
     ways = rng.normal(size=start.shape) * 0.3
     farthest = np.maximum(np.abs(start), np.abs(start + ways)).max(axis=0)
-    found = first_touches(
+    found = first_contacts(
         near, lambda rows, s: start[rows] + s[:, None] * ways[rows], np.abs(ways), farthest, lambda: None
     )
     shares = np.linspace(0.0, 1.0, 801)
@@ -49,7 +49,7 @@ def test_no_point_of_a_capsule_moves_farther_than_its_lever_says(robot):
     near = surroundings(robot)
     rng = np.random.default_rng(5)
     q = robot.random_q(rng, 50)
-    bound = levers(near, np.abs(q).max(axis=0) + 1.0)
+    bound = lever_arms(near, np.abs(q).max(axis=0) + 1.0)
     frames = kin.link_frames(robot, q)
     for j in range(robot.n):
         step = np.zeros(robot.n)

@@ -132,7 +132,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
 
     def handle(self, key: Hashable, value: object) -> None:
         if isinstance(key, tuple) and key[0] in self.messages:
-            self.wake()
+            self.schedule()
             self._do(key, value)
         else:
             super().handle(key, value)
@@ -186,7 +186,7 @@ class DHLesson(DeclaredFeature[DHSettings, DHFacts], Lesson):
         self.change(at=self._player.advance(arm.robot, arm.q, s.at, s.speed, now))
         if self.settings.at >= length(arm.robot):
             self._player = None
-            self.wake()
+            self.schedule()
             return None
         self.draw()
         return FRAME

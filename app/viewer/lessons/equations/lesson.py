@@ -59,10 +59,10 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
         else:
             self._derive()
 
-    def besides(self) -> tuple[object, ...]:
+    def extra_dependencies(self) -> tuple[object, ...]:
         return (self._book,)
 
-    def look(self) -> EquationsFacts:
+    def compute_facts(self) -> EquationsFacts:
         return EquationsFacts(self.settings, self.stage.now, self._book)
 
     def state(self) -> dict[str, object]:
@@ -158,7 +158,7 @@ class EquationsLesson(DeclaredFeature[EquationsSettings, EquationsFacts], Lesson
         if now < self._derive_at:
             return self._derive_at - now
         self._derive()
-        self.wake()
+        self.schedule()
         return None
 
     def _derive(self) -> None:

@@ -14,7 +14,7 @@ from app.exercises.expressions import Expression, Function
 from app.exercises.fields import ExerciseFileError
 from app.exercises.kinds.choice import ChoiceKind
 from app.exercises.lesson_text import (
-    NOWHERE,
+    NO_PREVIEW,
     BarText,
     LessonText,
     QuestionText,
@@ -133,7 +133,7 @@ class _Maker:
             for name, each in zip(text.leads, text.kind.options, strict=True)
             if self.variant.number(each.offered)
         ]
-        known = {**self.facts.leads, NOWHERE: None}
+        known = {**self.facts.leads, NO_PREVIEW: None}
         return Leads(tuple(self.named("leads", name, known) for name in names))
 
     def drawn(self, text: StepText, asked: QuestionText | None) -> Drawn | Bar | SemiAxis | Leads | None:

@@ -71,16 +71,16 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         self._at, self._answered = 0, tuple[bool, ...]()
         self._figure = FigureNodes(body(self.stage.now.robot).size)
         self._figure_of: StepKey = "centre"
-        f = self.look()
+        f = self.compute_facts()
         if f.exists or self._drawn:
             self.stage.see_through(f.exists, gizmo=f.exists)
             self.stage.fit_view(room(f.derived, f.followed.derivation, f.keys) if f.exists else ())
         self._drawn = f.exists
 
-    def besides(self) -> tuple[object, ...]:
+    def extra_dependencies(self) -> tuple[object, ...]:
         return self._at, self._answered
 
-    def look(self) -> InverseFacts:
+    def compute_facts(self) -> InverseFacts:
         return InverseFacts(self.settings, self.stage.now, self._at, self._answered)
 
     # What is shown
@@ -129,7 +129,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
             self._restart = False
             self.change(taken={})
         units = self.stage.units
-        progress.use(outline_of(self.look().exercise, units))
+        progress.use(outline_of(self.compute_facts().exercise, units))
         for number, key in enumerate(self.facts.keys, 1):
             self._take_way(progress, str(number), key)
         asked = dict(progress.outline.questions())
@@ -137,7 +137,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         self._answered = tuple(
             progress.is_closed(number) if number in asked else i <= progress.at for i, number in enumerate(numbers)
         )
-        self.wake()
+        self.schedule()
         return progress.outline
 
     def _take_way(self, progress: Progress, number: str, key: StepKey) -> None:
@@ -148,17 +148,17 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
         if self.settings.taken.get(number) == answer:
             return
         self.change(taken={**self.settings.taken, number: answer})
-        given = self.look().exercise
+        given = self.compute_facts().exercise
         step = given.followed.derivation.step(key)
         if question.way_of(answer) > 0 and step is not None and step.split >= 0:
             self.change(signs=flipped(given.signs, step.split))
-            progress.use(outline_of(self.look().exercise, self.stage.units))
+            progress.use(outline_of(self.compute_facts().exercise, self.stage.units))
 
     # Events
 
     def on_offer(self) -> None:
         """Go on with the branch that a step offers where the derivation has ended."""
-        if (back := self.look().exercise.way_back) is not None:
+        if (back := self.compute_facts().exercise.way_back) is not None:
             self.on_follow(back.number - 1)
 
     def on_follow(self, index: int) -> None:
@@ -196,7 +196,7 @@ class InverseLesson(DeclaredFeature[InverseSettings, InverseFacts], Lesson):
 
     def on_result(self, result: kin.IKResult) -> None:
         self.change(turned=False)
-        self.wake()
+        self.schedule()
 
     def on_robot(self) -> None:
         self._arms[self._robot] = self.settings

@@ -60,10 +60,10 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
         self._plays, self._next = False, 0.0  # when the next iterate is played
         self._in_view = False
 
-    def besides(self) -> tuple[object, ...]:
+    def extra_dependencies(self) -> tuple[object, ...]:
         return self._iterated, self._picture.found
 
-    def look(self) -> NumericFacts:
+    def compute_facts(self) -> NumericFacts:
         return NumericFacts(self.settings, self.stage.now, self._iterated, self._picture.found)
 
     def remove(self) -> None:
@@ -161,7 +161,7 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
     # Iterating
 
     def advance(self, now: float) -> float | None:
-        self.look_again()
+        self.invalidate()
         wait = self._renew(now)
         if self._work is not None:
             if (found := next(self._work)) is not None:
@@ -169,13 +169,13 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
             return 0.0
         if self._picture.work():
             if self._picture.found is not None:
-                self.wake()
+                self.schedule()
             return 0.0
         if self._plays:
             if now >= self._next:
                 self._next = now + PACE
                 self.on_move("Next")
-                self.wake()
+                self.schedule()
             wait = min(wait or PACE, max(0.0, self._next - now))
         return wait
 
@@ -204,4 +204,4 @@ class NumericLesson(DeclaredFeature[NumericSettings, NumericFacts], Lesson):
             self._in_view = True
             frames = kin.link_frames(found.problem.robot, found.run.q)
             self.stage.fit_view((), frames[..., :3, 3].reshape(-1, 3))
-        self.wake()
+        self.schedule()

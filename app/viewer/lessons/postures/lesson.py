@@ -68,10 +68,10 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
         self._offers: tuple[Remedy, ...] = ()
         self._cone: Cone | None = None
 
-    def besides(self) -> tuple[object, ...]:
+    def extra_dependencies(self) -> tuple[object, ...]:
         return self._result, self.stage.units, self._offers
 
-    def look(self) -> PosturesFacts:
+    def compute_facts(self) -> PosturesFacts:
         arm, units = self.stage.now, self.stage.units
         if arm.target is None:  # the arm has reached the target, or was moved elsewhere
             self._result = None
@@ -170,18 +170,18 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
     def on_result(self, result: IKResult) -> None:
         self._result, self._answered = result, time.perf_counter()
         # While a target is dragged there are many: the panel keeps its pace.
-        self.wake(max(1e-3, self.pace - (self._answered - self.shown_at)))
+        self.schedule(max(1e-3, self.pace - (self._answered - self.shown_at)))
 
     def on_request(self) -> None:
-        self.wake()
+        self.schedule()
 
     def on_obstacles(self) -> None:
-        self.wake()
+        self.schedule()
 
     # Long work
 
     def advance(self, now: float) -> float | None:
-        self.look_again()
+        self.invalidate()
         waits = self._draw_cone(now), self._try_remedies(now)
         return min((wait for wait in waits if wait is not None), default=None)
 
@@ -194,7 +194,7 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
             return wait
         self._drawn = now
         self._cone = Cone.of(robot, T) if self._cone is None else self._cone.at(T)
-        self.wake()
+        self.schedule()
         return None
 
     def _try_remedies(self, now: float) -> float | None:
@@ -216,7 +216,7 @@ class Postures(DeclaredFeature[PosturesSettings, PosturesFacts], Lesson):
             return None
         if remedy is not None:
             self._offers = (*self._offers, remedy)
-            self.wake()
+            self.schedule()
         return 0.0
 
 

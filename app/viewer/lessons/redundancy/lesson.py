@@ -65,7 +65,7 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
         self._stepped = self._changed = 0.0
         self._hold()
 
-    def look(self) -> RedundancyFacts:
+    def compute_facts(self) -> RedundancyFacts:
         arm = self.stage.now
         if not np.array_equal(self._sent, arm.goal):  # something else has moved the arm
             self._stop()
@@ -115,7 +115,7 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
         self._item = self.read.item
         if self.read is not before:
             self._changed = self.shown_at
-            self.wake(QUIET)
+            self.schedule(QUIET)
 
     def restore(self, state: dict[str, object]) -> None:
         if not np.array_equal(self._sent, self.stage.now.goal):
@@ -151,7 +151,7 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
         found = () if exact is None else ends(f.robot, f.T_held, f.arm.options, f.arm.goal, exact)
         shown = exact if f.arm.task == "pose" or (exact is not None and exact.name == "psi") else None
         self._ring = Ring(f.robot, f.arm.goal, f.T_held, shown, found)
-        self.wake()
+        self.schedule()
         return None
 
     # Events
@@ -165,16 +165,16 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
     def on_result(self, result: IKResult) -> None:
         # The visitor has set a target, which has priority over the self-motion.
         self._stop()
-        self.wake()
+        self.schedule()
 
     def on_request(self) -> None:
         self._target = None
-        self.wake()
+        self.schedule()
 
     # The motion
 
     def advance(self, now: float) -> float | None:
-        self.look_again()
+        self.invalidate()
         again = None
         if moving := self._target is not None or self.settings.swing:
             again = FRAME - (now - self._stepped)
@@ -231,7 +231,7 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
         item, found = self._item, self._range()
         if item is None or found is None:
             self._stop()
-            self.wake()
+            self.schedule()
             return
         low, high = found
         value, whole = item.value, False
@@ -260,7 +260,7 @@ class RedundancyLesson(DeclaredFeature[RedundancySettings, RedundancyFacts], Les
             if numeric and self._target is not None:
                 stage.notify(BLOCKED)
             self._up, self._target = not self._up, None
-            self.wake()
+            self.schedule()
             return
         self._sent = q
         if numeric:

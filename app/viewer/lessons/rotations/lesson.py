@@ -143,7 +143,7 @@ class RotationsLesson(DeclaredFeature[RotationsSettings, RotationsFacts], Lesson
             return None
         if self._turning.turn(now) > self._turning.last:
             self._turning = None
-            self.wake()
+            self.schedule()
             return None
         self.draw()
         return FRAME

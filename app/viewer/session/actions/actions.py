@@ -14,7 +14,7 @@ from app.viewer.feature import Feature, message_of
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.panel.script import Reply
 from app.viewer.panel.status import Notice
-from app.viewer.scene.gizmo import Pull
+from app.viewer.scene.gizmo import DragEvent
 from app.viewer.session.actions.arm import ArmControls
 from app.viewer.session.actions.looks import LookControls
 from app.viewer.session.actions.typed import TypedInput
@@ -197,7 +197,7 @@ class Actions:
 
     # Controls of the panel
 
-    def _on_grab(self, pull: Pull) -> None:
+    def _on_grab(self, pull: DragEvent) -> None:
         self._gesture = None
         self._page.arm.pull(pull)
 

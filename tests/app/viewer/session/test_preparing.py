@@ -19,7 +19,7 @@ from app.classroom.tokens import read_code
 from app.live import Lines
 from app.live import line as live_line
 from app.live.client import page as client_page
-from app.live.line import Letter, Line, Program
+from app.live.line import Line, Program, Reply
 from app.service.web.rooms.limits import Limits
 from app.shared.clouds import Clouds
 from app.shared.settings import Settings
@@ -245,12 +245,12 @@ def test_what_a_program_sends_waits_for_the_arm_of_a_link(port, preparation, lin
         line = program(tab, lines)
         line.send({"q": q}, 1)
         tab.settle()
-        assert all(letter.preparing is not None for letter in line.letters())
+        assert all(reply.preparing is not None for reply in line.replies())
         compile_parts(preparation, parts())
         tab.wait(lambda: "Preparing" not in tab.html)
         tab.settle()
         assert np.allclose(tab.tool_pose(), kin.fk(SCARA, q))
-        assert [letter for letter in line.letters() if letter.preparing is None] == [Letter(1)]
+        assert [reply for reply in line.replies() if reply.preparing is None] == [Reply(1)]
 
 
 def test_a_program_that_sends_q_for_a_link_is_answered_if_another_robot_is_chosen(port, preparation, lines):
@@ -262,9 +262,9 @@ def test_a_program_that_sends_q_for_a_link_is_answered_if_another_robot_is_chose
         tab.set("Robot", PLANAR.name)
         waits_for(tab, f"the {PLANAR.name}")
         tab.settle()
-        (letter,) = [letter for letter in line.letters() if letter.preparing is None]
-        assert letter.number == 1
-        assert letter.problem is not None, "it has too many values for the arm on show"
+        (reply,) = [reply for reply in line.replies() if reply.preparing is None]
+        assert reply.number == 1
+        assert reply.problem is not None, "it has too many values for the arm on show"
 
 
 def test_a_robot_that_a_program_sends_waits_for_its_kernels(port, preparation, lines):
@@ -275,7 +275,7 @@ def test_a_robot_that_a_program_sends_waits_for_its_kernels(port, preparation, l
         line.send({"robot": UR5, "q": q}, 1)
         waits_for(tab, "the UR5")
         assert tab.value("Robot") == PIONEER.name
-        first, *more = line.letters()
+        first, *more = line.replies()
         assert (first.number, first.problem) == (1, None)
         assert first.preparing is not None
         what, step, of = first.preparing
@@ -283,7 +283,7 @@ def test_a_robot_that_a_program_sends_waits_for_its_kernels(port, preparation, l
         assert set(more) <= {first}, "again now and then, so that the program knows that the page is there"
         compile_parts(preparation, (COLLISIONS,))
         tab.wait(lambda: f"step 1 of {of}" not in tab.html)
-        later = [letter.preparing for letter in line.letters()]
+        later = [reply.preparing for reply in line.replies()]
         assert later
         assert all(at is not None and at[0] == what and 1 < at[1] <= at[2] for at in later)
         tab.say("undo")  # the page can be used meanwhile
@@ -291,7 +291,7 @@ def test_a_robot_that_a_program_sends_waits_for_its_kernels(port, preparation, l
         tab.wait(lambda: "Preparing" not in tab.html)
         tab.settle()
         assert np.allclose(tab.tool_pose(), kin.fk(UR5, q))
-        assert [letter for letter in line.letters() if letter.preparing is None] == [Letter(1)]
+        assert [reply for reply in line.replies() if reply.preparing is None] == [Reply(1)]
 
 
 @pytest.mark.full

@@ -82,7 +82,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
         if self._run is not None and not self._run.of(self.stage.now.robot):
             self._run = None
 
-    def besides(self) -> tuple[object, ...]:
+    def extra_dependencies(self) -> tuple[object, ...]:
         return self._run, self._streamed() is not None
 
     def advance(self, now: float) -> float | None:
@@ -97,7 +97,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
         found = tuple(line.readings)
         return found if len(found) == len(moving_motors(self._run.robot)) else None
 
-    def look(self) -> MotorFacts:
+    def compute_facts(self) -> MotorFacts:
         return MotorFacts(self.settings, self.stage.now, self._run)
 
     # What is shown
@@ -159,7 +159,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
 
     def handle(self, key: Hashable, value: object) -> None:
         if key == ("upload",):
-            self.wake()
+            self.schedule()
             self._open(value)
         else:
             super().handle(key, value)
@@ -182,7 +182,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
             self.stage.notify(Notice("error", "The file was not used", str(error)))
 
     def changed(self, path: str) -> None:
-        motor = self.look().motor
+        motor = self.compute_facts().motor
         if path == "calibration" and self.settings.calibration.strip():
             typed = self.settings.calibration
             self.change(calibration="")
