@@ -47,7 +47,6 @@ GUARDED = {
     "app/viewer/meshes/child.py": "a process of its own",
     "app/viewer/meshes/loading.py": "a process of its own",
     "app/viewer/session/state.py": "characters, and bytes while it is unpacked",
-    "app/viewer/viser_patches.py": "bytes",
 }
 # Modules, or folders, whose text comes from nobody else.
 TRUSTED = {
