@@ -18,6 +18,7 @@ import threading
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextvars import ContextVar
 from functools import partial
+from typing import Any, Final
 
 from app.api.problems import ProblemError
 from app.api.work import TooSlowError, current_deadline, stopping
@@ -28,6 +29,7 @@ STEP = 0.02  # s between two looks at the processes
 LOOK = 0.2  # s between two looks at the client and the time of a request that waits
 IDLE = 20.0  # s without a kernel to compile, after which a process ends
 RETRY_AFTER = 5  # s
+SILENT: Final = {"stderr": subprocess.DEVNULL}
 ASKED_NICENESS = NICENESS // 2  # before what is compiled ahead, behind requests and visitors
 
 logger = logging.getLogger("kinboard.compiler")
@@ -41,13 +43,13 @@ class CompilerStoppedError(RuntimeError):
 
 def compile_first(*calls: str, stopping: threading.Event) -> None:
     """Let other processes, one per call of `kin.warmup`, fill the cache, which this one then loads."""
-    children = [start_process(f"from kin import warmup; warmup.{call}", subprocess.DEVNULL) for call in calls]
+    children = [start_process(f"from kin import warmup; warmup.{call}", **SILENT) for call in calls]
     try:
         while any(child.poll() is None for child in children) and not stopping.wait(STEP):
             pass
     finally:
         for child in children:
-            _end(child)
+            kill(child)
 
 
 class KernelCompiler:
@@ -95,13 +97,13 @@ class KernelCompiler:
             if self._idle is not None:
                 self._idle.cancel()
             if self.child is None:
-                self.child = start_process("from kin.kernels.elsewhere import serve; serve()", subprocess.PIPE)
+                self.child = start_process("from kin.kernels.elsewhere import serve; serve()", text=True, **SILENT)
             child = self.child
         done = _answer(child, line) == DONE
         with self._lock:
             del self._answers[line]
             if not done:
-                _end(child)
+                kill(child)
                 self.child = None
             if self._stopped:
                 raise CompilerStoppedError
@@ -117,7 +119,7 @@ class KernelCompiler:
         """End the process if nothing waits for it."""
         with self._lock:
             if self.child is not None and not self._answers:
-                _end(self.child)
+                kill(self.child)
                 self.child = None
 
 
@@ -184,23 +186,24 @@ def _answer(child: subprocess.Popen[str], line: str) -> str:
     return child.stdout.readline().strip()
 
 
-def start_process(program: str, pipe: int) -> subprocess.Popen[str]:
-    """A Python process in a session of its own, so that it gets no Ctrl-C."""
+def start_process(program: str, **options: Any) -> subprocess.Popen[Any]:
+    """A Python process with two pipes to it, in a session of its own, so that it gets no Ctrl-C."""
     return subprocess.Popen(
         [sys.executable, "-c", program],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-        stdin=pipe,
-        stdout=pipe,
-        stderr=subprocess.DEVNULL,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
         start_new_session=True,
-        text=True,
+        **options,
     )
 
 
-def _end(child: subprocess.Popen[str]) -> None:
+def kill(child: subprocess.Popen[Any]) -> int:
+    """End a process and close its pipes; returns its exit code."""
     child.kill()
-    child.wait()
+    code = child.wait()
     for pipe in (child.stdin, child.stdout):
         if pipe is not None:
             with contextlib.suppress(OSError):  # what was not read by the process is lost
                 pipe.close()
+    return code

@@ -25,7 +25,7 @@ PROGRAM = (
 def stand_in_for_the_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     """From now on compiling processes run `PROGRAM`."""
     start = compiler.start_process
-    monkeypatch.setattr(compiler, "start_process", lambda _, pipe: start(PROGRAM, pipe))
+    monkeypatch.setattr(compiler, "start_process", lambda _, **options: start(PROGRAM, **options))
 
 
 def kernel(folder: Path, name: str, ready: bool = True) -> str:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
 import pickle
 import subprocess
-import sys
 import threading
 import time
 from dataclasses import dataclass
@@ -15,6 +13,7 @@ from typing import IO, Any
 
 from app.api.batches import response_of
 from app.api.work import busy
+from app.service.compiler import kill, start_process
 from app.service.compute import child
 from app.service.compute.child import CANCEL, Failure, Head, read, write
 from app.shared.memory.answers import AnswerMemory, MemoryFullError
@@ -152,7 +151,7 @@ class ComputeProcess:
         with self._lock:
             if self._stopped:
                 raise LostError
-            started = self.child = _start()
+            started = self.child = start_process(f"from {child.__name__} import main; main()")
         try:
             write(started.stdin, self._begin)
         except OSError:
@@ -164,22 +163,6 @@ class ComputeProcess:
         with self._lock:
             self.child = None
             silent = expected or self._stopped
-        ended.kill()
-        code = ended.wait()
-        for pipe in (ended.stdin, ended.stdout):
-            if pipe is not None:
-                with contextlib.suppress(OSError):  # what was not read by the process is lost
-                    pipe.close()
+        code = kill(ended)
         if not silent:
             logger.error("a process that computes has ended with code %s; another one takes its place", code)
-
-
-def _start() -> subprocess.Popen[bytes]:
-    """A process in a session of its own, so that it gets no Ctrl-C."""
-    return subprocess.Popen(
-        [sys.executable, "-c", f"from {child.__name__} import main; main()"],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        start_new_session=True,
-    )

@@ -272,11 +272,11 @@ DECLARED = {
             "service",
             "app/service/test_restarts.py::test_one_that_does_not_stop_is_killed",
         ),
-        "app/service/compute/process.py": (
+        "app/service/compiler.py": (
             "compute",
             "app/service/compute/test_pool.py::test_a_process_that_ends_loses_one_request",
+            "app/service/start/test_compiler.py::test_a_process_that_ends_says_so",
         ),
-        "app/service/compiler.py": ("app/service/start/test_compiler.py::test_a_process_that_ends_says_so",),
         "app/notebook/process.py": ("app/notebook/test_notebook.py::test_the_process_serves_and_ends",),
         "app/viewer/meshes/reader.py": ("app/viewer/meshes/test_loading.py::test_the_process_says_what_is_wrong",),
         "app/cli/xacro/__init__.py": ("app/cli/test_xacro.py::test_what_is_missing_is_named",),

@@ -44,7 +44,7 @@ def stand_ins(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Pool]]:
     """Makes pools of processes that start at once."""
     made: list[Pool] = []
 
-    def start() -> subprocess.Popen[bytes]:
+    def start(_: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-S", "-c", pool_jobs.STAND_IN]
         return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
 
@@ -52,7 +52,7 @@ def stand_ins(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Pool]]:
         made.append(Pool(count, SETTINGS, STORE))
         return made[-1]
 
-    monkeypatch.setattr(process, "_start", start)
+    monkeypatch.setattr(process, "start_process", start)
     monkeypatch.setattr(process, "APART", 0.0)
     yield make
     for each in made:
@@ -158,16 +158,16 @@ def test_one_whose_time_is_over_is_killed(stand_ins, monkeypatch, started):
     if started:
         ask(pool, pool_jobs.pid)
     else:
-        start = process._start
-        monkeypatch.setattr(process, "_start", lambda: time.sleep(0.3) or start())
+        start = process.start_process
+        monkeypatch.setattr(process, "start_process", lambda program: time.sleep(0.3) or start(program))
     with pytest.raises(TooSlowError):
         ask(pool, pool_jobs.hangs, seconds=0.05)
     assert ask(pool, pool_jobs.pid)
 
 
 def test_a_client_that_leaves_while_its_process_is_started_is_forgotten(stand_ins, monkeypatch):
-    start = process._start
-    monkeypatch.setattr(process, "_start", lambda: time.sleep(0.1) or start())
+    start = process.start_process
+    monkeypatch.setattr(process, "start_process", lambda program: time.sleep(0.1) or start(program))
     pool = stand_ins()
     with pytest.raises(ClientLeftError):
         ask(pool, pool_jobs.hangs, leave=0.01)
