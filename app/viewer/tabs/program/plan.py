@@ -98,8 +98,8 @@ class Plan:
     def met(self, index: int, k: int) -> tuple[float | None, Array]:
         """When and in which configuration the arm is at a target; the recorded one if the motion ends before."""
         if self.driven is None or index >= len(self.ends):
-            rows = [q for row in self.q[: index + 1] for q in row]
-            return None, self.q[index][k] if self.q[index] else rows[-1] if rows else self.motion.q_start
+            before = [q for row in self.q[:index] for q in row] or [self.motion.q_start]
+            return None, (self.q[index] or before[-1:])[min(k, len(self.q[index]) - 1)]
         times, points = self.driven.segments[index], targets(self.segments[index])
         if k >= len(points) - 1:
             arrival = times.arrival

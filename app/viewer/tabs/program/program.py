@@ -50,6 +50,12 @@ def point(values: Array) -> Point:
     return x, y, z
 
 
+def posed(q: Array, robot: Robot) -> PoseTarget:
+    """The pose of the tool at q ``(n,)`` as a target, its position rounded as in a link."""
+    found = PoseTarget.of(kin.fk(robot, q))
+    return replace(found, position=point(np.array(found.position)))
+
+
 def targets(segment: Segment) -> tuple[Target, ...]:
     """The points of a spline, or the one target; none of a pause."""
     if isinstance(segment, Dwell):
@@ -124,7 +130,7 @@ def with_target(segment: Segment, index: int, q: JointTarget, robot: Robot) -> S
 
 def as_point(spline: Spline, q: JointTarget, robot: Robot) -> Target:
     """A configuration as a point of this spline."""
-    return q if isinstance(spline.points[0], JointTarget) else PoseTarget.of(kin.fk(robot, np.array(q.q)))
+    return q if isinstance(spline.points[0], JointTarget) else posed(np.array(q.q), robot)
 
 
 def as_kind(
@@ -140,7 +146,7 @@ def as_kind(
     """
     row = segments[index]
     if kind == "spline":
-        points: list[Target] = [PoseTarget.of(kin.fk(robot, each)) for each in q]
+        points: list[Target] = [posed(each, robot) for each in q]
         first, last = index, index
         if index > 0 and _of_poses(segments[index - 1]):
             points, first = [*targets(segments[index - 1]), *points], index - 1
@@ -188,13 +194,13 @@ def opened(program: Program, robot: Robot, q: Array) -> Program:
     Raises:
         InputError: a pose that the arm cannot reach, or more than a page holds.
     """
-    segments = tuple(replace(each, name=clean(each.name, NAME)) for each in program.segments)
-    check_places(segments)
+    program = _held(program)
+    segments = program.segments
     first = start_of(segments)
     if first is not None and not isinstance(segments[first], Ptp):
         segments = (Ptp(recorded(robot.clip(q))), *segments)
-        check_places(segments)
-    motion, seed = kin.plan_motion(robot, replace(program, segments=segments), q), q
+        program = _held(replace(program, segments=segments))
+    motion, seed = kin.plan_motion(robot, program, q), q
     done = () if motion.driven is None else motion.driven.segments
     done = done if motion.refusal is None else done[: motion.refusal.segment]
     for index, segment in enumerate(segments):
@@ -210,10 +216,12 @@ def opened(program: Program, robot: Robot, q: Array) -> Program:
     return replace(program, segments=begun(segments, robot, q))
 
 
-def check_places(segments: Segments) -> None:
-    """Raise `InputError` if there are more than a page holds."""
-    if (count := places(segments)) > MOST:
+def _held(program: Program) -> Program:
+    """The program with names as a page shows them; raises `InputError` if there is more than a page holds."""
+    if (count := places(program.segments)) > MOST:
         raise InputError("segments", f"{count} waypoints and pauses", f"at most {MOST} in this page")
+    segments = tuple(replace(each, name=clean(each.name, NAME)) for each in program.segments)
+    return replace(program, name=clean(program.name, NAME), segments=segments)
 
 
 def pack(program: Program) -> dict[str, object]:
@@ -225,10 +233,10 @@ def unpack(value: object, robot: Robot) -> Program | None:
     """The program of a link, which anybody may have written; None: it is none for this arm."""
     try:
         data: Any = value  # checked by the reader
-        found = Program(_of_rows(value, robot)) if isinstance(value, list) else program_from_dict(data, robot)
-        segments = tuple(replace(each, name=clean(each.name, NAME)) for each in found.segments)
-        check_places(segments)
-        return replace(found, segments=begun(segments, robot, robot.q_home))
+        found = _held(
+            Program(_of_rows(value, robot)) if isinstance(value, list) else program_from_dict(data, robot)
+        )
+        return replace(found, segments=begun(found.segments, robot, robot.q_home))
     except InputError:
         return None
 
@@ -246,7 +254,7 @@ def _of_rows(rows: list[Any], robot: Robot) -> Segments:
     found: list[Segment] = []
     for row, segment in zip(rows, read, strict=True):
         if row[0] == "s" and start_of(tuple(found)) is not None and isinstance(segment, Lin):
-            here = PoseTarget.of(kin.fk(robot, np.array(row[1])))
+            here = posed(np.array(row[1]), robot)
             before = targets(found.pop()) if isinstance(found[-1], Spline) else ()
             segment = Spline((*before, here), **options(segment))
         found.append(segment)

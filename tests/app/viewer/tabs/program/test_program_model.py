@@ -187,7 +187,7 @@ def test_links_of_earlier_versions_are_read() -> None:
         ["c", q[4], "", 1.0, {"o": [0.1, 0.2, 0.3], "v": 0.1}],
         ["l", q[3], "end", 1.0, {"a": 0.5, "t": 0.3}],
     ]
-    points = [PoseTarget.of(kin.fk(UR5, np.array(each))) for each in q[1:3]]
+    points = [model.posed(np.array(each), UR5) for each in q[1:3]]
     found = unpack(rows, UR5)
     assert found is not None
     assert found.segments == (
@@ -309,6 +309,7 @@ def test_a_spline_leads_through_its_points_and_a_circle_through_its_via_point() 
     assert ends[0] == 0.0 < ends[1] < ends[2]
     assert ends[-1] == found.motion.duration
     passed, q = found.met(1, 0)
+    assert found.met(2, model.MOST)[0] == ends[2], "a pause ends where it began"
     assert passed is not None
     assert ends[0] < passed < ends[1]
     assert np.linalg.norm(kin.fk(UR5, q)[:3, 3] - POINTS[1].position) < 0.01, "when the tool passes it"
@@ -332,6 +333,8 @@ def test_refusals_and_notes_have_the_numbers_of_the_rows() -> None:
     assert found is not None
     assert found.motion.refusal is not None
     assert found.motion.refusal.segment == 3
+    for index, q in ((2, found.q[1][-1]), (3, far.target.q)):
+        assert np.allclose(found.met(index, model.MOST)[1], q, atol=1e-6)
     assert "Segment 4 (LIN" in found.explain(DEFAULT_UNITS)
 
 
