@@ -44,12 +44,13 @@ from kin.joint import Joint as Joint
 from kin.joint import Kind as Kind
 from kin.motor import Motor, checked_motors
 from kin.transforms import Array, as_transform, finite_array
+from kin.units import METRES
 
 Convention = Literal["standard", "modified"]
 Mounting = Literal["pedestal", "floor", "table", "wall", "ceiling"]
 CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
 MOUNTINGS: tuple[Mounting, ...] = get_args(Mounting)
-LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+LENGTHS = METRES
 Matrix = tuple[tuple[float, ...], ...]
 _ROUNDING = 1e-14  # a rotation further from orthonormal than this is made orthonormal
 IDENTITY: Matrix = tuple(tuple(float(i == j) for j in range(4)) for i in range(4))

@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple, TypeVar
 
 from kin.errors import KinematicsError
-from kin.units import ANGLES, LENGTH_UNITS, RADIANS, Unit, family
+from kin.units import ANGLES, LENGTH_UNITS, NAMES, RADIANS, Unit, family
 
 T = TypeVar("T")
 
@@ -195,7 +195,7 @@ def bound(text: str) -> None:
 
 def unit_at_end(text: str) -> str:
     """The name of the unit that ends the text of a number or a matrix, or ""."""
-    found = re.search(r"(?:(?<![a-zµ])(?:deg|rad|mm|cm|m)|°)$", text)
+    found = re.search(rf"(?:°|(?<![a-zµ])(?:{NAMES}))$", text)
     return found[0] if found else ""
 
 
@@ -411,7 +411,7 @@ class _Reader:
         word = self._tokens[0] if self._tokens else ""
         if not (word.isalpha() or word == "°") or word in ("pi", "π"):
             return _SyntaxError()
-        if word in ("°", "deg", "rad", "mm", "cm", "m", "s"):
+        if word in (*ANGLES, *LENGTH_UNITS, "s"):
             what = "an angle" if self._unit.is_angle else "a length" if self._unit.is_length else "this number"
             names = ", ".join(filter(None, family(self._unit))) or "none"
             return ReadError(f"“{word}” in “{cut(self._typed)}” is not a unit of {what}; units: {names}")

@@ -64,11 +64,13 @@ class Unit:
         name: symbol of the unit.
         scale: how many of it make a radian, or a metre.
         finer: additional decimals compared with degrees or millimetres.
+        words: its name in full, of more than one.
     """
 
     name: str
     scale: float
     finer: int
+    words: str = ""
 
     @property
     def suffix(self) -> str:
@@ -136,12 +138,20 @@ class Unit:
         return f"{size:.{self.decimals(digits)}f}{self.suffix}"
 
 
-DEGREES, RADIANS = Unit("°", 180.0 / math.pi, 0), Unit("rad", 1.0, 2)
-_OF_LENGTH: dict[Length, Unit] = {"mm": Unit("mm", 1e3, 0), "cm": Unit("cm", 1e2, 1), "m": Unit("m", 1.0, 3)}
+DEGREES, RADIANS = Unit("°", 180.0 / math.pi, 0, "degrees"), Unit("rad", 1.0, 2, "radians")
+# Every list of units of length is made of this one, but for that in `static/takehome/page.js`.
+_OF_LENGTH: dict[Length, Unit] = {
+    "mm": Unit("mm", 1e3, 0, "millimetres"),
+    "cm": Unit("cm", 1e2, 1, "centimetres"),
+    "m": Unit("m", 1.0, 3, "metres"),
+}
 PLAIN = Unit("", 1.0, 2)  # of counts and ratios
 # By the names that people type and read.
 ANGLES: dict[str, Unit] = {"°": DEGREES, "deg": DEGREES, "rad": RADIANS}
 LENGTH_UNITS: dict[str, Unit] = dict(_OF_LENGTH.items())
+METRES = {name: 1.0 / unit.scale for name, unit in reversed(LENGTH_UNITS.items())}  # that one of each is
+# For regular expressions.
+NAMES = "|".join(sorted((*ANGLES, *LENGTH_UNITS), key=len, reverse=True))
 
 
 def family(unit: Unit) -> dict[str, Unit]:

@@ -152,7 +152,8 @@ def _named(answer: Any, asked: Asked) -> object:
 
 def _with_units(cells: Sequence[str], units: Sequence[str]) -> list[str]:
     pairs = zip(cells, units, strict=True)
-    known = {*ANGLES, *LENGTH_UNITS, "°/s", "rad/s", "mm/s", "cm/s", "m/s"}  # those that depend on the reader
+    lengths = (*LENGTH_UNITS, *(f"{name}/s" for name in LENGTH_UNITS))
+    known = {*ANGLES, "°/s", "rad/s", *lengths}  # those that depend on the reader
     return [f"{text} {unit}" if unit in known and _BARE.fullmatch(text) else text for text, unit in pairs]
 
 

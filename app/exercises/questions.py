@@ -19,7 +19,7 @@ from app.exercises.typed import read_number, units_like
 from kin import InputError
 from kin.transforms import Array
 from kin.typed import LONGEST
-from kin.units import DEGREES, PLAIN, RADIANS, Unit, general
+from kin.units import ANGLES, DEGREES, LENGTH_UNITS, PLAIN, RADIANS, Unit, general
 
 Form = Literal["fields", "options", "order", "posture", "postures", "frame", "table", "program"]
 
@@ -372,11 +372,9 @@ class Number(Question):
 
 def _other_units(unit: Unit) -> list[tuple[str, float, str]]:
     """Name, how many make one SI unit, and words of the units that a number may have been meant in."""
-    angles = [("rad", RADIANS.scale, "radians"), ("°", DEGREES.scale, "degrees")]
-    lengths = [("m", 1.0, "metres"), ("cm", 1e2, "centimetres"), ("mm", 1e3, "millimetres")]
-    for family in (angles, lengths):
-        if unit.name in [name for name, *_ in family]:
-            return [row for row in family if row[0] != unit.name]
+    for family in ((RADIANS, DEGREES), tuple(reversed(LENGTH_UNITS.values()))):
+        if unit.name in [one.name for one in family]:
+            return [(one.name, one.scale, one.words) for one in family if one.name != unit.name]
     if unit == PLAIN:
         return [("%", 100.0, "per cent")]
     others = [(name, 1.0 / size, name) for name, size in units_like(unit).items()]
@@ -384,8 +382,8 @@ def _other_units(unit: Unit) -> list[tuple[str, float, str]]:
 
 
 def _words(unit: Unit) -> str:
-    known = {"°": "degrees", "rad": "radians", "mm": "millimetres", "cm": "centimetres", "m": "metres"}
-    return known.get(unit.name, unit.name)
+    known = {**ANGLES, **LENGTH_UNITS}
+    return known[unit.name].words if unit.name in known else unit.name
 
 
 WHOLE = 0.1  # accepted error of a count

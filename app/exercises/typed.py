@@ -6,13 +6,13 @@ import math
 import re
 
 from kin.typed import EntryError, ReadError, read, valid
-from kin.units import PLAIN, Unit
+from kin.units import METRES, PLAIN, Unit
 
 # Units of one quantity each, and what one of them is in SI units. Angles and lengths are in `kin.units`.
 QUANTITIES: tuple[dict[str, float], ...] = (
-    {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
+    {f"{name}/s": size for name, size in METRES.items()},
     {"rad/s": 1.0, "°/s": math.radians(1.0), "deg/s": math.radians(1.0)},
-    {"m/rad": 1.0, "cm/rad": 1e-2, "mm/rad": 1e-3},
+    {f"{name}/rad": size for name, size in METRES.items()},
     {"N·m": 1.0, "N·mm": 1e-3},
     {"N": 1.0, "kN": 1e3},
     {"s": 1.0, "ms": 1e-3},

@@ -35,7 +35,7 @@ from kin.robot import (
 from kin.transforms import as_transform
 from kin.typed import ReadError, cut, read, valid
 from kin.units import ANGLES as ANGLE_UNITS
-from kin.units import LENGTH_UNITS, PLAIN
+from kin.units import LENGTH_UNITS, NAMES, PLAIN
 
 ANGLES = {"deg": math.pi / 180, "rad": 1.0}
 MAX_ROWS, MAX_CAPSULES, MAX_MOTORS = 32, 64, 64
@@ -51,7 +51,7 @@ _MOTOR = {
     *("joint", "id", "name", "sign", "offset", "unit", "ticks", "lead", "range", "drive_mode", "homing_offset"),
 }
 _ROW = {"name", "kind", "theta", "d", "a", "alpha", "limits", "follows", "ratio", "sign", *PEAK_FIELDS}
-_QUANTITY = re.compile(rf"\s*({NUMBER})\s*(rad|deg|°|m|cm|mm)(/s[23²³]?)?\s*")
+_QUANTITY = re.compile(rf"\s*({NUMBER})\s*({NAMES})(/s[23²³]?)?\s*")
 PER = {"velocity": "/s", "acceleration": "/s2", "jerk": "/s3"}
 _POWERS = str.maketrans("²³", "23")
 _LONGEST = 80  # characters of a number with a unit

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -21,7 +22,7 @@ SCALES = {**ANGLES, **LENGTHS, "°": ANGLES["deg"]}
 
 _TEXT = {"type": "string", "minLength": 1, "maxLength": 4000, "pattern": r"\S"}
 # Digits before the point of a number smaller than a million radians or metres, in each unit.
-_DIGITS = {"rad": 6, "deg": 7, "°": 7, "m": 6, "cm": 8, "mm": 9}
+_DIGITS = {unit: math.floor(math.log10(LARGEST / scale)) for unit, scale in SCALES.items()}
 
 
 def _number(units: Iterable[str]) -> dict[str, Any]:
@@ -55,7 +56,7 @@ def _items(item: dict[str, Any], count: int, description: str = "") -> dict[str,
     return schema | ({"description": description} if description else {})
 
 
-_ANGLE, _LENGTH = ("rad", "deg", "°"), ("m", "cm", "mm")
+_ANGLE, _LENGTH = ("rad", "deg", "°"), tuple(LENGTHS)
 _ANY = _quantity((*_ANGLE, *_LENGTH), "A value in the units of this object, or a text with its unit.")
 _MATRIX = _items(_items(_ANY, 4), 4, "4×4 homogeneous transform, row by row; positions in the length unit.")
 _TRANSFORM: dict[str, Any] = {
@@ -187,7 +188,7 @@ _SCHEMA: dict[str, Any] = {
             "additionalProperties": False,
             "required": ["length", "angle"],
             "properties": {
-                "length": {"enum": ["m", "cm", "mm"], "description": "Unit of lengths."},
+                "length": {"enum": list(LENGTHS), "description": "Unit of lengths."},
                 "angle": {"enum": ["deg", "rad"], "description": "Unit of angles."},
             },
         },

@@ -14,15 +14,15 @@ from app.exercises.expressions import Expression
 from app.exercises.fields import Fields, Words
 from app.exercises.questions import WHOLE, Asked, Mistake, Number, Question, Verdict, apart, share, texts
 from app.exercises.variant import Variant
-from kin.units import PLAIN, Unit, Units, general
+from kin.units import METRES, PLAIN, Unit, Units, general
 
 RATE = "deg/s"  # in the angles of the reader; rad/s is not
 # Units of a file, and what one of them is in radians, metres or SI.
 _DEGREE = math.pi / 180
 COUNTED = ("count", "joint")  # whole numbers
 _PLAIN = dict.fromkeys(("", *COUNTED), 1.0)
-SCALES = {"deg": _DEGREE, "rad": 1.0, "mm": 1e-3, "cm": 1e-2, "m": 1.0, **_PLAIN, RATE: _DEGREE}
-MEASURES = {"deg": "angle", "rad": "angle", "mm": "length", "cm": "length", "m": "length"}
+SCALES = {"deg": _DEGREE, "rad": 1.0, **METRES, **_PLAIN, RATE: _DEGREE}
+MEASURES = {"deg": "angle", "rad": "angle", **dict.fromkeys(METRES, "length")}
 OTHER = {"m/s": 3, "m/rad": 3, "rad/s": 3, "N": 2, "N·m": 2, "s": 3, "kg": 3, "J": 3}  # decimals
 _PERCENT = re.compile(r"([0-9]{1,15}(?:\.[0-9]{1,15})?) ?%")
 

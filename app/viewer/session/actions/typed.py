@@ -16,6 +16,7 @@ from app.viewer.session.parts import Page
 from kin.axes import inverse
 from kin.poses import FORMS, PoseKind, read_pose
 from kin.typed import EntryError
+from kin.units import NAMES
 
 _NO_FURTHER = Notice("unreachable", "No further in this direction", "The tool does not follow the target there.")
 _AT_LIMIT = Notice("limits", "The joint is at its limit", "It goes no further in this direction.")
@@ -23,7 +24,7 @@ BY_HAND = Notice("hand", "Joints moved by hand", "The target follows the tool.")
 
 
 LONGEST_LABEL = 40  # characters
-_UNIT = re.compile(r"(?<=[\d)\]] )(?:mm|cm|m|deg|rad|°)(?![a-z])")
+_UNIT = re.compile(rf"(?<=[\d)\]] )(?:{NAMES})(?![a-z])")
 
 
 def _amount(step: int, turn: bool) -> float:
