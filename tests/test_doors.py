@@ -72,6 +72,7 @@ TRUSTED = {
     "app/viewer/room/views.py": "a course of our database",
     "app/viewer/scene/bodies/drawing.py": "a file of ours",
     "kin/chapter.py": "code of ours",
+    "kin/codegen/source.py": "code of ours",
     "kin/kernels": "the folder of compiled kernels",
 }
 

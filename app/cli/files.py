@@ -1,4 +1,4 @@
-"""``kinboard import``, ``kinboard export`` and ``kinboard check``: files of arms, exercises, courses and lessons.
+"""``kinboard import``, ``export``, ``code`` and ``check``: files of arms, exercises, courses and lessons.
 
 A file that is not a valid robot is rejected earlier, by :mod:`kin.files`.
 """
@@ -11,6 +11,7 @@ from argparse import Namespace
 from collections import Counter
 from pathlib import Path
 
+import kin
 from app.cli.bodies import MeshesBeside
 from app.cli.classroom.courses import check_course
 from app.cli.terminal import Notation, print_json, robot_of, table
@@ -18,7 +19,7 @@ from app.cli.xacro import expanded, is_xacro
 from app.exercises import Exercise, ExerciseFileError, VariantError, load_exercise
 from app.exercises.exercise import CHECKED_SEEDS
 from app.exercises.lesson_text import load_lesson
-from app.exports.robots import robot_file
+from app.exports.robots import FORMATS, robot_file
 from app.shared.answers.exchange import import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
 from app.shared.store import Store
@@ -70,6 +71,19 @@ def run_export(arguments: Namespace) -> int:
     else:
         write_file(arguments.output, text)
         print(f"{arguments.output}: {len(text.encode())} bytes")
+    return 0
+
+
+def run_code(arguments: Namespace) -> int:
+    """Print or write the solver of an arm in a language."""
+    robot, language, name = robot_of(arguments), arguments.language, arguments.name
+    text = kin.generate(robot, language, name=name, closest=not arguments.no_closest)
+    file = arguments.output or f"{name or robot.id}{FORMATS[language].suffix}"
+    if file == "-":
+        print(text, end="")
+    else:
+        write_file(file, text)
+        print(f"{file}: {len(text.encode()) / 1000:.0f} kB; its first lines say how to use it")
     return 0
 
 

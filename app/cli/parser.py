@@ -258,6 +258,12 @@ def _load_way() -> Run:
     return run
 
 
+def _load_code() -> Run:
+    from app.cli.files import run_code
+
+    return run_code
+
+
 def _load_page() -> Run:
     from app.cli.page import run
 
@@ -325,6 +331,7 @@ COMMANDS = (
     Command("move", declare.add_move, _load_move),
     Command("way", declare.add_way, _load_way),
     Command("page", declare.add_page, _load_page),
+    Command("code", declare.add_code, _load_code),
     Command("robots", declare.add_robots, _load_robots, interpreted=True),
     Command("workspace", declare.add_workspace, _load_workspace),
     Command("room", add_room, _load_room),

@@ -1,9 +1,10 @@
-"""Arms as files: robot files in either convention, URDF and MJCF."""
+"""Arms as files: robot files in either convention, URDF, MJCF, and source of their kinematics."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import kin
 from kin import Robot, convert_dh, robot_to_mjcf, robot_to_toml, robot_to_urdf
 
 
@@ -28,6 +29,10 @@ FORMATS = {
     "mjcf": RobotFormat("MJCF for MuJoCo, with capsules and assumed masses", ".xml", "application/xml"),
     "dh": RobotFormat("a robot file in the standard convention", "-standard.toml", "application/toml"),
     "mdh": RobotFormat("a robot file in the modified convention", "-modified.toml", "application/toml"),
+    "c": RobotFormat("source of forward and inverse kinematics in C99", ".c", "text/x-c"),
+    "js": RobotFormat("the same in JavaScript, a script", ".js", "text/javascript"),
+    "mjs": RobotFormat("the same as an ES module", ".mjs", "text/javascript"),
+    "d.ts": RobotFormat("the types of that module", ".d.ts", "text/plain"),
 }
 
 
@@ -39,4 +44,6 @@ def robot_file(robot: Robot, name: str) -> str:
         return robot_to_mjcf(robot)
     if name == "toml":
         return robot_to_toml(robot)
+    if name in ("c", "js", "mjs", "d.ts"):
+        return kin.generate(robot, name)  # type: ignore[arg-type]  # one of these
     return robot_to_toml(convert_dh(robot, "standard" if name == "dh" else "modified"))

@@ -163,10 +163,14 @@ def _example(arm: Arm, name: str) -> str:
 
 
 def _constants(arm: Arm, name: str) -> str:
+    """The arrays that are read: an unused one is a warning."""
+    unused = {"held"} if arm.parameter is None else set()
+    unused |= set() if _sections(arm) & {"ik", "intervals", "nearest"} else {"turns"}
+    used = arm.constants.keys() - unused
     return "\n".join(
         f"static const double {name}_{each}[{value.size}] = {{{_numbers(value)}}};"
         for each, value in arm.constants.items()
-        if each != "held" or arm.parameter is not None
+        if each in used
     )
 
 

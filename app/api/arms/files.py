@@ -174,7 +174,11 @@ class ExportQuery(schemas.Body):
     },
 )
 async def export_robot(request: Request, robot: Robot, query: ExportQuery) -> Response:
-    """The arm as a robot file in its own or another convention, as URDF without bodies, or as MJCF."""
+    """The arm as a robot file in its own or another convention, as URDF without bodies, as MJCF, or as source.
+
+    Source of its forward and inverse kinematics needs nothing of Kinboard. Where an arm's solver is more than can
+    be written that way, the problem document says why, and what would help.
+    """
     kind = FORMATS[query.format]
     text = await computed(request, partial(_exported, robot, query.format))
     name = f"{robot.id}{kind.suffix}"

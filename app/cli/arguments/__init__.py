@@ -319,6 +319,30 @@ def add_page(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     return parser
 
 
+def add_code(commands: Any, parents: Parents) -> argparse.ArgumentParser:
+    """``kinboard code``."""
+    parser = _command(
+        commands,
+        "code",
+        "the forward and inverse kinematics of an arm as one file of C or JavaScript",
+        parents.robots,
+    )
+    parser.add_argument(
+        "--language",
+        choices=("c", "js", "mjs", "d.ts"),
+        default="c",
+        help="c: C99, and C++; js: a script; mjs: an ES module; d.ts: its types (default: c)",
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", help="file to write (default: ROBOT.c or the like); - is standard output"
+    )
+    parser.add_argument("--name", metavar="NAME", help="what the names in it begin with (default: the arm's id)")
+    parser.add_argument(
+        "--no-closest", action="store_true", help="leave out what comes closest to a pose that cannot be reached"
+    )
+    return parser
+
+
 def add_robots(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     """``kinboard robots``."""
     parser = _command(

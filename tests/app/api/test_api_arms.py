@@ -403,6 +403,11 @@ def test_export(client):
     response = client.get("/api/v1/robots/panda/export?format=urdf")
     assert response.headers["content-type"].startswith("application/xml")
     assert kin.load_urdf(response.text).n == 7
+    response = client.get("/api/v1/robots/panda/export?format=js")
+    assert response.headers["content-disposition"] == 'attachment; filename="panda.js"'
+    assert response.text == kin.generate("panda", "js")
+    refused = client.get("/api/v1/robots/gen3/export?format=c")
+    assert (refused.status_code, refused.json()["errors"][0]["field"]) == (422, "robot")
     assert client.get("/api/v1/robots/panda/export?format=dxf").status_code == 422
 
 

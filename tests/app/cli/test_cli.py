@@ -651,6 +651,24 @@ def test_import_offers_the_tips(capsys, tmp_path):
 
 
 @pytest.mark.full
+def test_code_writes_a_file_and_names_bad_input(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = run(capsys, "code", "planar2r", "--no-closest")
+    assert (code, out.startswith("planar2r.c: ")) == (0, True)
+    assert Path("planar2r.c").read_text(encoding="utf-8") == kin.generate("planar2r", closest=False)
+    _, out, _ = run(capsys, "code", "planar2r", "--language", "d.ts", "--name", "arm", "-o", "-")
+    assert "export default arm;" in out
+    for words, field in (
+        (("gen3",), "robot: got 'gen3'"),
+        (("planar2r", "-o", "missing/arm.c"), "--output: got 'missing/arm.c'"),
+        (("planar2r", "--name", "2r"), "name: got '2r'"),
+        (("planar2r", "--language", "fortran"), "invalid choice: 'fortran'"),
+    ):
+        code, _, error = run(capsys, "code", *words)
+        assert (code, field in error) == (2, True)
+
+
+@pytest.mark.full
 @pytest.mark.parametrize("form", ["toml", "dh", "mdh", "urdf", "mjcf"])
 def test_export_in_every_format(capsys, tmp_path, form):
     code, out, _ = run(capsys, "export", "puma560", "--format", form)

@@ -20,7 +20,7 @@ from kin.kernels.compile import PLAIN
 from kin.warmup import one_of_each_family
 
 FAMILIES = [robot for robot in one_of_each_family() if not isinstance(robot, str)]
-QUICK = ("puma560", "pioneer5")
+QUICK = ("irb120", "pioneer5")
 ALL = [
     pytest.param(robot.id, marks=() if robot.id in QUICK else pytest.mark.full)
     for robot in kin.builtin_robots().values()

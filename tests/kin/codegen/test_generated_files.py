@@ -17,7 +17,7 @@ import kin
 from kin.codegen import files, js
 from kin.codegen.arm import arm_of
 
-QUICK_C, QUICK_JS = "ur5e", "so101"
+QUICK_C, QUICK_JS = "ur5", "pioneer5"
 REFUSED = {
     "gen3": "made of kernels alone",
     "prr": "made of kernels alone",
@@ -90,8 +90,9 @@ def test_c_answers_as_the_core_does(robot_id, tmp_path):
     robot = kin.get_robot(robot_id)
     arm = arm_of(robot)
     built = compiled(arm, tmp_path, "-O1")
-    built.library[f"{built.name}_branch"].restype = ctypes.c_char_p
-    names = [built.library[f"{built.name}_branch"](k).decode() for k in range(arm.rows)]
+    branch = built.library[f"{built.name}_branch"]
+    branch.restype = ctypes.c_char_p
+    names = [branch(k).decode() for k in range(arm.rows)]
     given = arm.parameter.joint if arm.alone.needs_value else None
     asked = targets(robot, 40, 0)
     answers = []
