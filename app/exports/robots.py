@@ -33,6 +33,7 @@ FORMATS = {
     "js": RobotFormat("the same in JavaScript, a script", ".js", "text/javascript"),
     "mjs": RobotFormat("the same as an ES module", ".mjs", "text/javascript"),
     "d.ts": RobotFormat("the types of that module", ".d.ts", "text/plain"),
+    "c-test": RobotFormat("a C file that checks the one in C99", "_test.c", "text/x-c"),
 }
 
 
@@ -44,6 +45,6 @@ def robot_file(robot: Robot, name: str) -> str:
         return robot_to_mjcf(robot)
     if name == "toml":
         return robot_to_toml(robot)
-    if name in ("c", "js", "mjs", "d.ts"):
+    if name in ("c", "js", "mjs", "d.ts", "c-test"):
         return kin.generate(robot, name)  # type: ignore[arg-type]  # one of these
     return robot_to_toml(convert_dh(robot, "standard" if name == "dh" else "modified"))

@@ -15,13 +15,14 @@ import numpy as np
 from kin._version import __version__
 from kin.codegen import c, entries, js
 from kin.codegen.arm import Arm, arm_of
+from kin.codegen.vectors import c_test
 from kin.errors import InputError
 from kin.kernels.cache import fingerprint
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.transforms import Array
 
-Language = Literal["c", "js", "mjs", "d.ts"]
+Language = Literal["c", "js", "mjs", "d.ts", "c-test"]
 _FOLDER = Path(__file__).parent
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 _INTERVALS = 4 * entries.ROWS_OF_ARCS + 2
@@ -34,8 +35,8 @@ def generate(
 
     Args:
         robot: the arm, or the id of a built-in one.
-        language: ``"c"`` (C99, and C++), ``"js"`` (a script for a page or `require`), ``"mjs"`` (an ES module) or
-            ``"d.ts"`` (the types of that).
+        language: ``"c"`` (C99, and C++), ``"js"`` (a script for a page or `require`), ``"mjs"`` (an ES module),
+            ``"d.ts"`` (the types of that), or ``"c-test"`` (a C file with poses that checks the first one).
         name: what the names in it begin with; by default made of the arm's id.
         closest: whether it also finds what comes closest to a pose that no configuration meets.
 
@@ -56,6 +57,8 @@ def generate(
     if language not in get_args(Language):
         raise InputError("language", language, "one of " + ", ".join(get_args(Language)))
     arm, name = arm_of(robot, closest), name_for(robot, name)
+    if language == "c-test":
+        return c_test(arm, name)
     return c_file(arm, name) if language == "c" else js_file(arm, name, language)
 
 

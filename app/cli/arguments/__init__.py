@@ -329,9 +329,10 @@ def add_code(commands: Any, parents: Parents) -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--language",
-        choices=("c", "js", "mjs", "d.ts"),
+        choices=("c", "js", "mjs", "d.ts", "c-test"),
         default="c",
-        help="c: C99, and C++; js: a script; mjs: an ES module; d.ts: its types (default: c)",
+        help="c: C99, and C++ (default); js: a script; mjs: an ES module; d.ts: its types; "
+        "c-test: a C file that checks the one in C",
     )
     parser.add_argument(
         "-o", "--output", metavar="FILE", help="file to write (default: ROBOT.c or the like); - is standard output"

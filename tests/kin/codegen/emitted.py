@@ -23,7 +23,7 @@ from kin.solvers.contract import POSE, SolverInput
 STATUSES = ("solved", "approximate", "limits", "unmet", "orientation", "unreachable")
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 # With these C computes what numba does, to the last bit: the kernels' own polynomials, no fusing of operations.
-EXACT = ("-O1", "-mfma", "-ffp-contract=off", "-fno-tree-vectorize")
+EXACT = ("-mfma", "-ffp-contract=off", "-fno-tree-vectorize")
 BITS = {simd._bits: ("bits_of", (FLOAT,), INT), simd._float: ("float_of", (INT,), FLOAT)}
 OWN = {k: row for k, row in source.PRIMITIVES.items() if row[0] not in ("sin_cos", "arctan2")} | BITS
 
@@ -79,9 +79,9 @@ def compiled(arm: Arm, folder: Path, *options: str) -> Built:
     return Built(arm, name, ctypes.CDLL(str(library)))
 
 
-def exact(robot: kin.Robot, folder: Path) -> Built:
+def exact(robot: kin.Robot, folder: Path, level: str) -> Built:
     """A library with the kernels' own sine and arc tangent."""
-    return compiled(arm_of(robot, False, OWN), folder, *EXACT)
+    return compiled(arm_of(robot, False, OWN), folder, level, *EXACT)
 
 
 def targets(robot: kin.Robot, random: int, hard: int):

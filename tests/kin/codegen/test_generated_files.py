@@ -10,7 +10,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from emitted import Built, compiled, targets
+from emitted import STRICT, Built, compiled, targets
 from playwright._impl._driver import compute_driver_executable
 
 import kin
@@ -89,7 +89,7 @@ def compare(robot, answers, targets_, value):
 def test_c_answers_as_the_core_does(robot_id, tmp_path):
     robot = kin.get_robot(robot_id)
     arm = arm_of(robot)
-    built = compiled(arm, tmp_path, "-O1")
+    built = compiled(arm, tmp_path, "-O0")
     branch = built.library[f"{built.name}_branch"]
     branch.restype = ctypes.c_char_p
     names = [branch(k).decode() for k in range(arm.rows)]
@@ -224,6 +224,21 @@ def test_names_of_arms_and_joints_stay_in_their_comment(language):
         assert line.isascii()
         assert "\\" not in line
         assert "??" not in line
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("robot_id", ["pioneer5", "irb120", "panda", "redundant7-craig"])
+def test_vectors_check_the_file_and_notice_a_wrong_one(robot_id, tmp_path):
+    text = kin.generate(robot_id, "c", name="arm")
+    (tmp_path / "arm_test.c").write_text(kin.generate(robot_id, "c-test", name="arm"))
+    wrong = text.replace("to->q[j] = q[j]", "to->q[j] = q[j] + 1e-3")
+    for source, code in ((text, 0), (wrong, 1)):
+        (tmp_path / "arm.c").write_text(source)
+        command = ["gcc", "-std=c99", "-O1", *STRICT, "arm_test.c", "-o", "check", "-lm"]
+        subprocess.run(command, cwd=tmp_path, check=True)
+        done = subprocess.run(["./check"], cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == code
+        assert ("50 of 50 poses are right" in done.stdout) == (code == 0)
 
 
 def test_a_head_says_what_is_promised_and_what_not():
