@@ -27,6 +27,9 @@ const channel = (() => {
   const waiting = new Map(); // number of a message → what to do with its reply
   const values = new Map(); // by key
   const watchers = new Map(); // key → what to call with its value
+  let followed = 0; // the number of the last message that the values follow
+  const textWatchers = [];
+  const sendWatchers = [];
   const doers = new Map(); // name of a notice → what to call with its value
   const lineWatchers = [];
   let greeting = () => null; // what a new session is sent first
@@ -48,6 +51,7 @@ const channel = (() => {
     number++;
     if (done) waiting.set(number, done);
     unconfirmed.push([number, text]);
+    for (const act of sendWatchers) attempt(act, number);
     sendText(text);
     if (marked) viserPage.mark(number);
     return true;
@@ -71,21 +75,25 @@ const channel = (() => {
   });
 
   function hear({ data }) {
-    const { set = {}, notices = [], heard } = JSON.parse(data);
+    const { set = {}, notices = [], heard, done: acted = followed } = JSON.parse(data);
     heardAt = performance.now();
     unconfirmed = unconfirmed.filter(([sent]) => sent > heard);
     if (again) sendAgain();
+    followed = acted;
     for (const [key, value] of Object.entries(set)) {
-      values.set(key, value);
+      if (value === null) values.delete(key);
+      else values.set(key, value);
       for (const act of watchers.get(key) ?? []) attempt(act, value);
     }
+    for (const act of textWatchers) attempt(act);
     for (const [count, what, value] of notices) {
       if (count <= noted) continue;
       noted = count;
       const act = doers.get(what);
       if (act) attempt(act, value);
     }
-    if (isOpen()) socket.send(JSON.stringify(["heard", noted]));
+    // A picture of a moving arm needs no answer.
+    if (isOpen() && (notices.length || !Object.keys(set).length)) socket.send(JSON.stringify(["heard", noted]));
     tellLine("heard");
   }
 
@@ -142,12 +150,12 @@ const channel = (() => {
     open();
   }, 1000);
 
-  viserPage.watchHtml("<div hidden data-channel", (html) => {
-    const found = new DOMParser().parseFromString(html, "text/html").body.firstElementChild.dataset.channel;
+  viserPage.watch(() => {
+    const found = document.querySelector("[data-channel]")?.dataset.channel ?? name;
     if (found === name) return;
     leave();
     name = found;
-    [opened, tries, number, noted, unconfirmed, again, refused] = [false, 0, 0, 0, [], false, false];
+    [opened, tries, number, noted, followed, unconfirmed, again, refused] = [false, 0, 0, 0, 0, [], false, false];
     waiting.clear();
     values.clear();
     send("hello", greeting());
@@ -180,6 +188,12 @@ const channel = (() => {
       watchers.set(key, [...(watchers.get(key) ?? []), act]);
       if (values.has(key)) act(values.get(key));
     },
+    /** Call `act` after each text of the service, when its values are known. */
+    watchTexts: (act) => { textWatchers.push(act); },
+    /** Call `act` with the number of each message that is sent. */
+    watchSent: (act) => { sendWatchers.push(act); },
+    /** The number of the last message that the values follow. */
+    followed: () => followed,
     /** The value of a key, or undefined. */
     value: (key) => values.get(key),
     /** Call `act` with the value of each notice of this name. */

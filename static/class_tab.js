@@ -141,7 +141,7 @@
     }
     tell(); // the page may have come into a room, or left it
   }
-  viserPage.watchLine((what) => { if (what !== "heard") doubt(); });
+  viserPage.watchLine(doubt);
   channel.watchLine((what) => { if (what === "heard") heard(); else doubt(); });
   addEventListener("offline", () => { doubt(); become(false); });
   addEventListener("online", () => tell());

@@ -128,38 +128,8 @@
     event.target.blur();
   }, true);
 
-  // Focus: kept when the server sends a part of the tab again
-
-  const NAMES = ["data-program-do", "data-program-field", "data-program-choice", "data-argument", "data-index"];
-  let focus = null;
-  let gone = false;
-  addEventListener("focusin", (event) => {
-    const node = event.target.closest?.("[data-program] :is([data-program-do], [data-program-field], [data-program-choice])");
-    gone = false;
-    focus = node ? NAMES.filter((name) => node.hasAttribute(name)).map((name) => `[${name}="${node.getAttribute(name)}"]`).join("") : null;
-  });
-  addEventListener("focusout", (event) => {
-    const node = event.target;
-    if (event.relatedTarget || !node.closest?.("[data-program]")) return;
-    queueMicrotask(() => { if (node.isConnected && document.activeElement === document.body) gone = true; });
-  });
-  function restore() {
-    if (!focus || gone || document.activeElement !== document.body) return;
-    document.querySelector(`[data-program] ${focus}`)?.focus({ preventScroll: true });
-  }
-
-  // A table that was opened stays open when it is sent again.
-  const opened = new Set();
-  addEventListener("toggle", (event) => {
-    const name = event.target.dataset?.programDetails;
-    if (name) opened[event.target.open ? "add" : "delete"](name);
-  }, true);
-  function reopen() { for (const node of all("[data-program-details]")) if (opened.has(node.dataset.programDetails) && !node.open) node.open = true; }
-
   function follow() {
     if (!part("clock")) return;
-    restore();
-    reopen();
     reveal();
     showClock();
   }

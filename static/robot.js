@@ -1,7 +1,6 @@
 "use strict";
 // Runs in viser's page: the table of the tab Robot (app/viewer/tabs/robot). It sends what is typed, cell by cell, and one
-// message at a time, so that a slow answer delays only itself. The server sends the table again when its rows change;
-// then the cell that had the focus gets it back, and what was typed since the last answer stays and is sent.
+// message at a time, so that a slow answer delays only itself. What was typed since the last answer stays and is sent.
 (() => {
   const PAUSE = 40; // ms after a key until a cell is sent
   const REST = 400; // the same where the arm on show has meshes: some megabytes are sent for each change
@@ -115,14 +114,14 @@
     send(["row", action, here], null, action === "add" ? () => answeredRow(row) : null);
     here += { add: 1, up: -1, down: 1 }[action] ?? 0;
     focus = focus?.replace(/^(\[data-cell=")\d+/, `$1${here}`) ?? null;
+    moves = true;
   }
 
-  // Focus: kept when the server sends a part of the tab again
+  // Focus: it follows a row that moves
 
   let focus = null; // a selector of the field or button that has it
+  let moves = false; // its row moves
   let gone = false; // the visitor has left it
-  let caret = null;
-  let scrolled = 0; // the list of findings in which a button was pressed
   let left = 0;
   addEventListener("focusin", (event) => {
     const row = event.target.closest?.("[data-arm] tr[data-row]");
@@ -153,19 +152,12 @@
     flush();
     send(["left"], null);
   }
-  document.addEventListener("selectionchange", () => {
-    const cell = document.activeElement;
-    if (cell?.matches("[data-arm] input[data-cell]")) caret = [cell.selectionStart, cell.selectionEnd];
-  });
-
   function restore() {
-    if (!focus || gone || document.activeElement !== document.body) return;
+    if (!focus || gone || !(moves || document.activeElement === document.body)) return;
     const cell = document.querySelector(`[data-arm] ${focus}`);
     if (!cell) return;
+    moves = false;
     cell.focus({ preventScroll: true });
-    const list = cell.closest(".kb-arm-findings ul");
-    if (list) list.scrollTop = scrolled;
-    if (caret && cell.matches("input")) cell.setSelectionRange(...caret);
   }
 
   // What is wrong
@@ -246,7 +238,6 @@
     const row = target.closest("[data-arm-row]");
     if (row) { here = Number(row.dataset.armRow); mark(); }
     const button = target.closest("[data-arm-do]");
-    scrolled = button?.closest(".kb-arm-findings ul")?.scrollTop ?? scrolled;
     if (button && button.ariaDisabled !== "true") {
       const action = button.dataset.armDo;
       if (["add", "up", "down", "remove"].includes(action)) change(action);

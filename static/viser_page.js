@@ -31,7 +31,7 @@ const viserPage = (() => {
   };
   // What viser calls, and how often it has since this page was loaded.
   const HOOKS = {
-    reportCamera: 0, writeHtml: 0, hear: 0, shadeLabel: 0, findParent: 0,
+    reportCamera: 0, hear: 0, shadeLabel: 0, findParent: 0,
   };
 
   // WebKit on Linux names the locale C as a language. viser's script would end there: no Intl knows it.
@@ -75,6 +75,8 @@ const viserPage = (() => {
       try { act(); } catch (error) { reportError(error); } // the others are called all the same
     }
   }
+  /** The page was changed in a way that is not observed, as by other values of attributes. */
+  const noteChange = () => dispatch([{ type: "childList" }]);
   addEventListener("DOMContentLoaded", () => {
     const what = { subtree: true, childList: true, characterData: true, attributeFilter: ATTRIBUTES };
     new MutationObserver(dispatch).observe(document.documentElement, what);
@@ -113,112 +115,6 @@ const viserPage = (() => {
   function type(input, text) {
     setValue.call(input, text);
     input.dispatchEvent(new Event("input", { bubbles: true }));
-  }
-
-  // viser's connection is in a worker.
-  const cameraWatchers = [];
-  const htmlWatchers = new Map(); // what HTML of the panel begins with → what to call
-  const workers = new WeakSet(); // that are listened to
-  const lineWatchers = [];
-  const tellLine = (what) => { for (const act of lineWatchers) act(what); };
-  function hear({ data }) {
-    if (data?.type === "closed") tellLine("closed");
-    else if (data?.type === "connected" || data?.type === "message_batch") tellLine("heard");
-    if (!Array.isArray(data?.messages)) return;
-    HOOKS.hear++;
-    dropVoidUpdates(data.messages);
-    for (const { type: kind, props, updates } of data.messages) {
-      const html = kind === "GuiHtmlMessage" ? props.content : kind === "GuiUpdateMessage" ? updates.content : null;
-      if (typeof html !== "string") continue;
-      for (const [start, act] of htmlWatchers) if (html.startsWith(start)) act(html);
-    }
-  }
-
-  // viser applies all updates that wait for a frame after all removals that wait for it. In a slow page an update then
-  // finds no component, which is an error in the console. It is void: it is taken from the queue when the removal comes.
-  let queue = null; // messages that viser has received and not applied yet
-  function dropVoidUpdates(received) {
-    if (!queue?.length) return;
-    const removed = new Set(received.filter(({ type: kind }) => kind === "GuiRemoveMessage").map(({ uuid }) => uuid));
-    if (!removed.size) return;
-    const kept = queue.filter(({ type: kind, uuid }) => kind !== "GuiUpdateMessage" || !removed.has(uuid));
-    queue.splice(0, queue.length, ...kept);
-  }
-
-  const { postMessage } = Worker.prototype;
-  Worker.prototype.postMessage = function (data, ...rest) {
-    if (!workers.has(this)) {
-      workers.add(this);
-      this.addEventListener("message", hear);
-    }
-    if (data?.type === "send" && data.message?.type === "ViewerCameraMessage") {
-      HOOKS.reportCamera++;
-      for (const act of cameraWatchers) act(data.message.wxyz);
-    }
-    if (data?.type === "send") tellLine("sent");
-    return postMessage.call(this, data, ...rest);
-  };
-  // HTML that the server sends again: the control that is in use stays where it is, and all around it is new. So a text
-  // that is being typed stays, and a button that is held down is still there when it is released.
-
-  const KEPT_IN = ".kb-program, .kb-guide"; // the DH table has its own way: its rows move
-  const CONTROLS = "input, textarea, select, button";
-  let held = null; // the control under the pressed pointer
-  const unsent = new WeakSet(); // fields whose text has changed since it was sent
-  addEventListener("pointerdown", (event) => { held = closest(event.target, CONTROLS); }, true);
-  for (const kind of ["pointerup", "pointercancel"]) addEventListener(kind, () => setTimeout(() => { held = null; }), true); // after its click
-  addEventListener("input", (event) => unsent.add(event.target), true);
-  addEventListener("change", (event) => unsent.delete(event.target), true);
-  addEventListener("keydown", (event) => { if (event.key === "Enter" && event.target.matches?.("input")) unsent.delete(event.target); }, true);
-
-  const { get: readHtml, set: writeHtml } = Object.getOwnPropertyDescriptor(Element.prototype, "innerHTML");
-  Object.defineProperty(Element.prototype, "innerHTML", {
-    configurable: true,
-    enumerable: true,
-    get: readHtml,
-    set(html) {
-      const used = [held, document.activeElement].find((node) => node !== this && this.contains(node) && node.closest(KEPT_IN));
-      if (closest(this, PARTS.contents)) HOOKS.writeHtml++;
-      if (used?.matches(CONTROLS)) {
-        const fresh = this.cloneNode(false);
-        writeHtml.call(fresh, html);
-        const twin = twinOf(used, this, fresh);
-        if (twin) { renewAround(used, this, twin, fresh); return; }
-      }
-      writeHtml.call(this, html);
-    },
-  });
-
-  /** The control of new HTML that stands for one of the old HTML: of the same name, and at the same depth. */
-  function twinOf(node, old, fresh) {
-    const names = [...node.attributes].filter(({ name: key }) => key === "id" || key.startsWith("data-"));
-    if (!names.length) return null;
-    const selector = node.localName + names.map(({ name: key, value }) => `[${key}="${CSS.escape(value)}"]`).join("");
-    const [before, after] = [all(selector, old), all(selector, fresh)];
-    const twin = before.length === after.length ? after[before.indexOf(node)] : null;
-    return twin && wayTo(node, old) === wayTo(twin, fresh) ? twin : null;
-  }
-
-  const wayTo = (node, root) => (node === root ? "" : `${wayTo(node.parentElement, root)} ${node.localName}`);
-
-  /** Make `old` like `fresh`, but for the node at `used`, which only takes the attributes of its twin. */
-  function renewAround(used, old, twin, fresh) {
-    const listed = (node) => [...node.attributes].filter(({ name: key }) => key !== "open"); // details stay as they were left
-    for (const { name: key } of listed(old)) if (!fresh.hasAttribute(key)) old.removeAttribute(key);
-    for (const { name: key, value } of listed(fresh)) if (old.getAttribute(key) !== value) old.setAttribute(key, value);
-    if (old === used) {
-      const { value, checked } = fresh;
-      if (old.matches("button, select") && readHtml.call(old) !== readHtml.call(fresh)) old.replaceChildren(...fresh.childNodes);
-      if (!unsent.has(old) && held !== old && old.value !== value) old.value = value;
-      if (old.checked !== checked) old.checked = checked;
-      return;
-    }
-    const [kept, next] = [[old, used], [fresh, twin]].map(([root, node]) => [...root.children].find((child) => child.contains(node)));
-    for (const node of [...old.childNodes]) if (node !== kept) node.remove();
-    const nodes = [...fresh.childNodes], at = nodes.indexOf(next);
-    kept.before(...nodes.slice(0, at));
-    kept.after(...nodes.slice(at + 1));
-    renewAround(used, kept, twin, next);
   }
 
   // Labels of the scene: viser draws black letters on a white box, whatever the colours of the page. Both are written into
@@ -264,17 +160,33 @@ const viserPage = (() => {
     }
   }, { on: [COLOURS] });
 
-  // viser places the labels of a frame before it draws, where their parents were drawn last: a label came a frame after
-  // what it names, and a new one stood elsewhere for a frame. The parent it asks for is here moved to its present place.
   // viser puts its own state of the scene into `window.__viserMutable`, for its tests.
 
-  const placed = new WeakSet(); // tables of nodes that move what they are asked for
+  const cameraWatchers = [];
+  const lineWatchers = [];
+  const tellLine = (what) => { for (const act of lineWatchers) act(what); };
+  const entered = new WeakSet(); // what is looked into
   function enterViewer() {
     const canvas = document.querySelector(PARTS.scene);
     const viewer = window.__viserMutable;
     if (!canvas || !viewer) return;
-    queue = viewer.messageQueue ?? null;
-    if (!viewer.nodeRefFromName || placed.has(viewer.nodeRefFromName)) return;
+    if (isNew(viewer.nodeRefFromName)) placeLabels(viewer);
+    if (isNew(viewer.messageQueue)) dropVoidUpdates(viewer.messageQueue);
+    if (!isNew(viewer)) return;
+    if (viewer.sendMessage) hearSent(viewer);
+    // A picture that rests is empty when viser changes its resolution, until it is drawn again.
+    new MutationObserver(() => viewer.requestRender?.()).observe(canvas, { attributeFilter: ["width", "height"] });
+  }
+  watch(enterViewer, { delay: 50 });
+  function isNew(thing) {
+    const found = thing && !entered.has(thing);
+    if (found) entered.add(thing);
+    return found;
+  }
+
+  /** viser places the labels of a frame before it draws, where their parents were drawn last: a label came a frame after
+   *  what it names, and a new one stood elsewhere for a frame. The parent it asks for is here moved to its present place. */
+  function placeLabels(viewer) {
     viewer.nodeRefFromName = new Proxy(viewer.nodeRefFromName, {
       get(nodes, name) {
         const node = nodes[name];
@@ -283,11 +195,39 @@ const viserPage = (() => {
         return node;
       },
     });
-    placed.add(viewer.nodeRefFromName);
-    // A picture that rests is empty when viser changes its resolution, until it is drawn again.
-    new MutationObserver(() => viewer.requestRender?.()).observe(canvas, { attributeFilter: ["width", "height"] });
+    entered.add(viewer.nodeRefFromName);
   }
-  watch(enterViewer, { delay: 50 });
+
+  /** viser applies all updates that wait for a frame after all removals that wait for it. In a slow page an update then
+   *  finds no component, which is an error in the console. It is void: it is taken away when the removal comes. */
+  function dropVoidUpdates(queue) {
+    queue.push = (...received) => {
+      for (const { type: kind, uuid } of received) {
+        HOOKS.hear++;
+        if (kind !== "GuiRemoveMessage") continue;
+        const kept = queue.filter((waiting) => waiting.type !== "GuiUpdateMessage" || waiting.uuid !== uuid);
+        queue.splice(0, queue.length, ...kept);
+      }
+      return Array.prototype.push.apply(queue, received);
+    };
+  }
+
+  /** See what viser sends. */
+  function hearSent(viewer) {
+    let send = viewer.sendMessage;
+    const pass = (message) => {
+      if (message.type === "ViewerCameraMessage") {
+        HOOKS.reportCamera++;
+        for (const act of cameraWatchers) act(message.wxyz);
+      }
+      tellLine("sent");
+      send(message);
+    };
+    // viser has another function for each connection, and one while there is none.
+    const set = (given) => { send = given; tellLine("closed"); };
+    Object.defineProperty(viewer, "sendMessage", { configurable: true, enumerable: true, get: () => pass, set });
+    viewer.sendCamera?.();
+  }
 
   // What another version of viser may lack, and what suffers. The page goes on without it, and says so.
 
@@ -448,12 +388,11 @@ const viserPage = (() => {
     /** Call `act` after changes of the page of the kinds `on`: childList, characterData or an attribute of ATTRIBUTES.
      *  With a delay in ms, changes until then are one. */
     watch,
+    noteChange,
     /** Call `act` with the camera's orientation (w, x, y, z) in the world frame when viser reports it. */
     watchCamera: (act) => { cameraWatchers.push(act); },
-    /** Call `act` with "sent" or "heard" when something goes to the service or comes from it, and with "closed". */
+    /** Call `act` with "sent" when viser sends something to the service, and with "closed" when its connection ends or begins. */
     watchLine: (act) => { lineWatchers.push(act); },
-    /** Call `act` with HTML of the panel that begins with `start`, when it comes: the panel itself may be folded away. */
-    watchHtml: (start, act) => { htmlWatchers.set(start, act); },
     /** Call `act` when the value of a slider changes; `thumb` is what `thumbOf` returns. */
     watchValue: (thumb, act) => { valueWatchers.set(thumb, act); },
 

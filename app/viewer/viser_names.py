@@ -94,14 +94,13 @@ POSES = PrivateUse(
 )
 VALUES = PrivateUse(
     "viser",
-    "Values and HTML in the panel without a task of the event loop for each callback.",
+    "Values in the panel without a task of the event loop for each callback.",
     "viser's own setters show values, which takes longer.",
     (
         _HANDLE,
         f"{_GUI}:_GuiHandleState.uuid",
         f"{_GUI}:_GuiHandleState.gui_api",
         f"{_GUI}:_GuiHandleState.value",
-        f"{_GUI}:_GuiHandleState.props",
         f"{_GUI}:_GuiHandleState.update_timestamp",
         f"{_GUI}:_GuiHandleState.removed",
         "viser:GuiApi._websock_interface",

@@ -9,10 +9,9 @@ frame: with thirty visitors it was a fifth of all processor time. `assign` sends
 same queue.
 
 Values: viser's setter of an input element's value starts a task of the event loop for each callback, for each
-slider that follows the arm. `show_value` starts none. `show_content` sets the HTML of an element without a look at
-the type of that property. When a visitor sets a value, viser's callbacks read it from the element. Another thread
-may have shown a newer value there meanwhile, as a moving arm does, and what was typed was lost. `keep_sent_values`
-and `sent_value` have the value as it was sent.
+slider that follows the arm. `show_value` starts none. When a visitor sets a value, viser's callbacks read it from
+the element. Another thread may have shown a newer value there meanwhile, as a moving arm does, and what was typed
+was lost. `keep_sent_values` and `sent_value` have the value as it was sent.
 
 Pages: viser evaluates the type hints of a class for each of its objects, a quarter of the cost of a page.
 `cache_type_hints` caches them.
@@ -143,24 +142,6 @@ def sent_value(event: Any) -> Any:
     if isinstance(shown, tuple):
         return tuple(map(type(shown[0]), value)) if shown else tuple(value)
     return type(shown)(value)
-
-
-def show_content(element: viser.GuiHtmlHandle, content: str) -> None:
-    """Show other HTML in an element; unchanged HTML is not sent.
-
-    Raises:
-        RuntimeError: the element has been removed.
-    """
-    if not viser_names.VALUES.is_there:
-        element.content = content
-        return
-    state = element._impl
-    if state.removed:
-        raise RuntimeError("a GuiHtmlHandle was removed and cannot be set")
-    props: Any = state.props
-    if content != props.content:
-        state.gui_api._websock_interface.queue_message(messages.GuiUpdateMessage(state.uuid, {"content": content}))
-        props.content = content
 
 
 def show_text(label: viser.LabelHandle, text: str) -> None:

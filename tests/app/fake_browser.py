@@ -120,6 +120,7 @@ class Wire:
             self.port = self._socket.local_address[1]
         self.sent = 0  # messages
         self.ended = False
+        self._pinged = 0.0  # when
         self._delay = delay
         self._leaving: deque[tuple[float, bytes | str]] = deque()  # and when they arrive
         self._coming: deque[tuple[float, bytes | str]] = deque()
@@ -157,7 +158,9 @@ class Wire:
         self.sent += 1
 
     def ping(self) -> None:
-        """Wait until what the service has sent so far has arrived."""
+        """Wait until what the service has sent so far has arrived; the service takes thirty in a second."""
+        time.sleep(max(0.0, self._pinged + 0.04 - time.monotonic()))
+        self._pinged = time.monotonic()
         with contextlib.suppress(ConnectionClosed):
             self._socket.ping().wait(1.0)
 
@@ -209,6 +212,7 @@ class FakeBrowser:
         self._number = self._noted = 0  # of the last message and the last notice
         self.shown: dict[str, Any] = {}  # by the channel
         self.replied: list[Any] = [0, "", []]
+        self._parts: dict[str, str] = {}  # uuids by the keys of what comes by the channel
         self.gui: dict[str, dict[str, Any]] = {}
         self.values: dict[str, Any] = {}
         self.poses: dict[str, dict[str, tuple[float, ...]]] = {}
@@ -277,8 +281,10 @@ class FakeBrowser:
         return self.local(self.gizmo)
 
     def tool_pose(self) -> np.ndarray:
-        """Pose of the gripper, composed from every node above it."""
-        name = next(n for n in self.nodes if n.endswith("/gripper") and not n.startswith(self.gizmo))
+        """Pose of the gripper, composed from every node above it; NaN while another arm is on its way."""
+        name = next((n for n in self.nodes if n.endswith("/gripper") and not n.startswith(self.gizmo)), None)
+        if name is None:
+            return np.full((4, 4), np.nan)
         T = np.eye(4)
         parts = name.strip("/").split("/")
         for k in range(len(parts)):
@@ -338,6 +344,11 @@ class FakeBrowser:
         answer.read()
         request.close()
         self._catch_up()
+        if self.channel is not None:
+            for _ in range(2):  # the event loop brings what the worker has shown in the round after that
+                self.channel.ping()
+        while self._read_channel():
+            pass
         return answer.status
 
     @property
@@ -376,8 +387,11 @@ class FakeBrowser:
             return False
         heard = json.loads(text)
         self.shown |= heard.get("set", {})
-        if "notices" in heard:
-            self._catch_up()
+        parts = [key for key, html in heard.get("set", {}).items() if key.startswith("part-") and html is not None]
+        if parts or "notices" in heard:
+            self._catch_up("notices" in heard)
+        for key in parts:
+            self._show_part(key)
         for number, name, value in heard.get("notices", []):
             if number > self._noted:
                 self._noted = number
@@ -386,13 +400,23 @@ class FakeBrowser:
             wire.send(json.dumps(["heard", self._noted]))
         return "set" in heard or "notices" in heard
 
-    def _catch_up(self) -> None:
-        """Show what belongs to the step that a notice comes from, as a person sees both at once."""
+    def _show_part(self, key: str) -> None:
+        """Show the HTML of a part that has come by the channel."""
+        if key in self._parts:
+            updates = {"content": self.shown[key]}
+            self._apply({"type": "GuiUpdateMessage", "uuid": self._parts[key], "updates": updates})
+
+    def _catch_up(self, all_sent: bool = True) -> None:
+        """Show what belongs to the step that a notice comes from, as a person sees both at once.
+
+        Without `all_sent` only what has come: the service takes few pings a second.
+        """
         if self.viser.port in _handled:
             end = time.monotonic() + ANSWER
             while working() and time.monotonic() < end:
                 time.sleep(0.0005)
-        self.viser.ping()
+        if all_sent:
+            self.viser.ping()
         while not self.viser.ended and (data := self.viser.receive(0.0)) is not None:
             self._apply_frame(data)
 
@@ -590,8 +614,14 @@ class FakeBrowser:
                 self.gui.pop(m["uuid"], None)
             case kind if kind.startswith("Gui") and "props" in m and "uuid" in m:
                 self.gui[m["uuid"]] = m
-                if "data-channel=" in m["props"].get("content", ""):
-                    self._note_channel(m["props"]["content"])
+                content = m["props"].get("content", "")
+                if "data-channel=" in content:
+                    self._note_channel(content)
+                if content.startswith('<div data-part="'):
+                    self._parts[key := content.split('"')[1]] = m["uuid"]
+                    m["props"]["content"] = content.partition(">")[2].removesuffix("</div>")
+                    if self.shown.get(key) is not None:
+                        self._show_part(key)
                 self.values[m["uuid"]] = m.get("value")
             case _ if "props" in m and "name" in m:
                 self.nodes[m["name"]] = m

@@ -80,6 +80,8 @@ _SCRIPTS = (
     b"start",  # says so if one of the others fails
     b"viser_page",  # the others call it
     b"channel",  # the others send by it
+    b"vendor/morphdom/morphdom.min",  # parts.js calls it
+    b"parts",  # brings HTML up to date before the others look at it
     b"keys",  # may keep keys from the others
     b"viewer",
     b"input",

@@ -7,8 +7,6 @@ import re
 from collections.abc import Hashable
 from dataclasses import replace
 
-import viser
-
 from app.classroom.courses import Course, Item, parse_course, parse_item, to_data
 from app.classroom.courses.course import MOST_ITEMS
 from app.classroom.courses.files import MOST_IN_FILE
@@ -20,6 +18,7 @@ from app.viewer.courses.views import CourseView
 from app.viewer.feature import Feature, Stage
 from app.viewer.lessons import LESSONS
 from app.viewer.panel import update_html
+from app.viewer.panel.part import Block, add_html
 from app.viewer.panel.status import Notice
 from kin import InputError, KinematicsError
 from kin.files.numbers import index_of
@@ -63,12 +62,12 @@ class CourseFeature(Feature):
         super().__init__(stage)
         self._courses, self._progress = stage.activity.courses, stage.activity.progress
         self._view = CourseView()
-        self._bar = stage.client.gui.add_html("")
-        self._page: viser.GuiHtmlHandle | None = None
+        self._bar = add_html(stage.client.gui)
+        self._page: Block | None = None
 
     def show(self) -> None:
         """Build the HTML in the container that is open."""
-        self._page = self.stage.client.gui.add_html("")
+        self._page = add_html(self.stage.client.gui)
         self._progress.at = None
         self._update()
 

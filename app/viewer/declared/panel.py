@@ -19,8 +19,10 @@ import viser
 
 from app.viewer.declared.fields import Settings, Spec
 from app.viewer.declared.press import Press
+from app.viewer.panel import update_html
 from app.viewer.panel.fence import Crossings, Fence
-from app.viewer.viser_patches import sent_value, show_content, show_value
+from app.viewer.panel.part import add_html
+from app.viewer.viser_patches import sent_value, show_value
 from kin import InputError, Robot
 from kin.units import Units
 
@@ -281,7 +283,7 @@ class PanelView:
         one = _Mounted(None, identity, order, next(self._serials), props=props, args=self._inputs(node))
         match node:
             case Html(view=view, args=args):
-                one.handle = gui.add_html(view(*args), order=order)
+                one.handle = add_html(gui, view(*args), order=order)
             case Folder(open=is_open):
                 one.handle = gui.add_folder(**props, expand_by_default=is_open, order=order)
             case Control(path=path):
@@ -308,7 +310,7 @@ class PanelView:
         if not same(args, one.args):
             one.args = args
             if isinstance(node, Html):
-                show_content(one.handle, node.view(*args))
+                update_html(one.handle, node.view(*args))
             else:
                 props, before = self._props(node), one.props
                 for name, value in props.items():

@@ -18,6 +18,7 @@ from app.viewer.exercises.drawing import GHOST, SIZE, Drawing
 from app.viewer.exercises.sheet import Sheet
 from app.viewer.feature import Feature, Stage
 from app.viewer.panel import update_html
+from app.viewer.panel.part import Block, add_html
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import round_points
 from kin import InputError
@@ -52,7 +53,7 @@ class Practising(Feature):
         self._shown = Record()  # of the exercise, as it is on show
         self._since = 0.0
         self._box: viser.GuiFolderHandle | None = None
-        self._blocks: list[viser.GuiHtmlHandle] = []
+        self._blocks: list[Block] = []
         self._container: viser.GuiFolderHandle
         self._joints: viser.GuiFolderHandle | None = None
         self._drawing = Drawing(stage.client.scene, self.post)
@@ -62,10 +63,10 @@ class Practising(Feature):
         gui = self.stage.client.gui
         self._box = gui.add_folder(None)
         with self._box:
-            self._blocks = [gui.add_html(""), gui.add_html("")]
+            self._blocks = [add_html(gui), add_html(gui)]
             with gui.add_folder(None) as self._container:
                 pass
-            self._blocks.append(gui.add_html(""))
+            self._blocks.append(add_html(gui))
         if self._practice.at is not None:
             self._begin(self._practice.at)
         self._update()
@@ -340,7 +341,9 @@ class Practising(Feature):
                     activity.exercises.is_own(exercise.id) and not practice.seated,
                     replace(self.door, back="") if led else self.door,
                 ),
-                views.question_html(self._asked, self._sheet, closed, self.door),
+                views.question_html(
+                    self._asked, self._sheet, closed, self.door, f"{exercise.id} {self._shown.variant}"
+                ),
                 views.foot_html(
                     exercise,
                     variant,

@@ -130,9 +130,9 @@ def entry_of(
     return Entry(asked, key, rows, text, places, sheet.chosen, closed, rights, complete, bool(sheet.error))
 
 
-def question_html(asked: Asked, sheet: Sheet, closed: bool, door: Door = DOOR) -> str:
-    """The fields, options or buttons of the answer."""
-    return render("exercises/question", entry=entry_of(asked, sheet, closed), door=door)
+def question_html(asked: Asked, sheet: Sheet, closed: bool, door: Door = DOOR, of: str = "") -> str:
+    """The fields, options or buttons of the answer; `of` names the exercise and its variant."""
+    return render("exercises/question", entry=entry_of(asked, sheet, closed), door=door, of=of)
 
 
 @dataclass(frozen=True)

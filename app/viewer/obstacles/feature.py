@@ -16,6 +16,7 @@ from app.viewer.obstacles.nodes import ObstacleNodes
 from app.viewer.obstacles.placed import PLACE, TURN
 from app.viewer.panel import update_html
 from app.viewer.panel.entry import read_cell
+from app.viewer.panel.part import add_html
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
 from app.viewer.scene.gizmo import DragEvent, travel
@@ -46,7 +47,7 @@ class ObstaclesFeature(Feature):
         self._held = False
         self._start = np.eye(4)  # pose of the chosen one when it was grabbed
         self._nodes = ObstacleNodes(stage.client.scene, self.post)
-        self._html = stage.client.gui.add_html("")
+        self._html = add_html(stage.client.gui)
         self._show()
 
     def handle(self, key: Hashable, value: object) -> None:

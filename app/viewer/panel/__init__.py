@@ -14,8 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from typing import Any
 
-import viser
-
+from app.viewer.panel.part import Block
 from app.viewer.viser_patches import sent_value, show_value
 
 Post = Callable[[Hashable, object], None]
@@ -35,7 +34,7 @@ def assign(handle: Any, value: object) -> None:
     show_value(handle, value)
 
 
-def update_html(element: viser.GuiHtmlHandle, content: str) -> None:
+def update_html(element: Block, content: str) -> None:
     """Show other HTML in an element; unchanged HTML is not sent."""
     if element.content != content:
         element.content = content

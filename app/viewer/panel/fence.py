@@ -30,7 +30,8 @@ def wait_for_page(client: viser.ClientHandle) -> None:
 
     A missing answer (page gone, asleep, or without storage) counts as one, or nothing would ever go on.
     """
-    with contextlib.suppress(TimeoutError, RuntimeError):
+    # viser warns of a question to a page that has gone.
+    with contextlib.suppress(TimeoutError, RuntimeError, UserWarning):
         client.local_storage.get_item(QUESTION, timeout=ANSWER_WITHIN)
 
 

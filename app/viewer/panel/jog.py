@@ -9,6 +9,7 @@ import viser
 
 from app.viewer.panel import update_html
 from app.viewer.panel.joints import label
+from app.viewer.panel.part import add_html
 from app.viewer.views.templates import render
 from kin import Robot
 
@@ -22,7 +23,7 @@ class JogPad:
     def __init__(self, gui: viser.GuiApi, robot: Robot) -> None:
         self.folder = gui.add_folder("Jog", expand_by_default=False)
         with self.folder:
-            self._html = gui.add_html(self._pad(robot))
+            self._html = add_html(gui, self._pad(robot))
 
     def use_robot(self, robot: Robot) -> None:
         """Offer the joints of this robot."""

@@ -17,6 +17,7 @@ from app.viewer.panel import Post, assign, listen, listen_click, update_html
 from app.viewer.panel.entry import read_value
 from app.viewer.panel.fence import Crossings, Fence
 from app.viewer.panel.fields import field, fields_html, limit_marks, shown
+from app.viewer.panel.part import Block, add_html
 from app.viewer.panel.status import Notice
 from app.viewer.views.templates import render
 from app.viewer.viser_patches import show_value
@@ -105,16 +106,16 @@ class JointSliders:
         self._fields: dict[object, tuple[int, str, Unit]] = {} if before is None else before._fields
         self._sliders: list[list[viser.GuiSliderHandle[float]]] = []
         self._others: list[Any] = []  # controls besides sliders
-        self._pendants: list[viser.GuiHtmlHandle] = []
+        self._pendants: list[Block] = []
         self._locks: list[viser.GuiButtonGroupHandle] = []
         for place, folder in enumerate(folders):
             with folder:
                 self._sliders.append([self._slider(gui, i, q, place, post) for i in range(robot.n)])
                 locks = gui.add_button_group("Locked", lock_buttons(locked), hint=LOCK_HINT)
                 fields = dict(field(slider, self._unit(i)) for i, slider in enumerate(self._sliders[-1]))
-                self._others.append(gui.add_html(fields_html(fields)))
+                self._others.append(add_html(gui, fields_html(fields)))
                 if robot.pendant_map is not None:
-                    self._pendants.append(gui.add_html(pendant_html(robot, q, units)))
+                    self._pendants.append(add_html(gui, pendant_html(robot, q, units)))
             joints = [(i, joint.kind, self._unit(i)) for i, joint in enumerate(robot.joints)]
             self._fields |= zip(fields, joints, strict=True)
             self._locks.append(locks)

@@ -11,6 +11,7 @@ from app.viewer.panel import Post, listen
 from app.viewer.panel.gripper import GripperSlider
 from app.viewer.panel.jog import JogPad
 from app.viewer.panel.joints import go_to_buttons
+from app.viewer.panel.part import add_html
 from app.viewer.panel.readout import PoseReadout
 from app.viewer.panel.robots import RobotMenu
 from app.viewer.panel.share import SharePanel
@@ -62,7 +63,7 @@ class Panel:
     ) -> None:
         self.status = StatusLine(gui, welcome)
         listen(gui.add_checkbox(SYSTEM_IS_DARK, system_dark), post, "system-dark")
-        gui.add_html(render("panel/head"))
+        add_html(gui, render("panel/head"))
         self.robots = RobotMenu(gui, robots, own, robot, post)
         self.readout = PoseReadout(gui, fk(robot, robot.q_home), units)
         group = gui.add_tab_group()
@@ -74,9 +75,9 @@ class Panel:
             self.posture = gui.add_folder("Posture and redundancy")
             self.jog = JogPad(gui, robot)
             self.obstacles = gui.add_folder("Obstacles", expand_by_default=False)
-        self.legend = gui.add_html("")
-        self.hints = gui.add_html("")
-        self.sheet = gui.add_html("")
+        self.legend = add_html(gui)
+        self.hints = add_html(gui)
+        self.sheet = add_html(gui)
         self.learn = group.add_tab(LEARN)
         self.tabs = [group.add_tab(title) for title in tabs]
         for title, tab in zip(tabs, self.tabs, strict=True):

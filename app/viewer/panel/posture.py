@@ -15,6 +15,7 @@ from app.viewer.panel import Post, assign, listen, update_html
 from app.viewer.panel.entry import read_value
 from app.viewer.panel.fence import Crossings, Fence
 from app.viewer.panel.fields import field, fields_html, limit_marks
+from app.viewer.panel.part import Block, add_html
 from app.viewer.views.templates import render
 from app.viewer.viser_patches import show_value
 from kin import InputError, Redundancy, Robot, branch_meanings, branch_names
@@ -67,7 +68,7 @@ class BranchChoice:
         )
         listen(self._choice, post, ("branch", robot.id))
         self._now = ""
-        self._line = gui.add_html("")
+        self._line = add_html(gui)
 
     def read(self, value: object) -> str | None:
         """A choice as `kin.solve_ik` takes it; raises `InputError` for an unknown one."""
@@ -113,8 +114,8 @@ class RedundancySliders:
         self._post = post
         self._key: tuple[object, ...] = ()
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
-        self._tracks: dict[str, viser.GuiHtmlHandle] = {}
-        self._html: viser.GuiHtmlHandle | None = None
+        self._tracks: dict[str, Block] = {}
+        self._html: Block | None = None
         self._uuids: dict[str, str] = {}
         self._crossings = Crossings[str](fence, self._show_again)
         self._unit = DEFAULT_UNITS.angles
@@ -196,9 +197,9 @@ class RedundancySliders:
                 )
                 listen(slider, self._post, ("redundancy", robot.id, item.name, units))
                 self._sliders[item.name] = slider
-                self._tracks[item.name] = self._gui.add_html("")
+                self._tracks[item.name] = add_html(self._gui)
             fields = dict(field(slider, unit) for slider in self._sliders.values())
-            self._html = self._gui.add_html(fields_html(fields))
+            self._html = add_html(self._gui, fields_html(fields))
             self._uuids = dict(zip(fields, self._sliders, strict=True))
 
 

@@ -13,8 +13,8 @@ from markupsafe import Markup
 
 from app.viewer.frames import TITLES, Frames
 from app.viewer.panel import update_html
+from app.viewer.panel.part import add_html
 from app.viewer.views.templates import render
-from app.viewer.viser_patches import show_content
 from kin.frames import WORLD
 from kin.poses import DEFAULT, Notation, Rotations
 from kin.transforms import Array
@@ -95,9 +95,9 @@ class PoseReadout:
     """Shows the tool's pose in a frame, and the form for a typed target, which ``static/input.js`` opens."""
 
     def __init__(self, gui: viser.GuiApi, T_world_tool: Array, units: Units) -> None:
-        self._choice = gui.add_html("")
-        self._html = gui.add_html(html(T_world_tool, units))
-        self._form = gui.add_html("")
+        self._choice = add_html(gui)
+        self._html = add_html(gui, html(T_world_tool, units))
+        self._form = add_html(gui)
         self.use_rotations(DEFAULT)
 
     def use_rotations(self, rotations: Rotations) -> None:
@@ -128,4 +128,4 @@ class PoseReadout:
         withheld: Collection[str] = (),
     ) -> None:
         """Replace the numbers; see `html`."""
-        show_content(self._html, html(T, units, target, frame, withheld, self._rotations))
+        update_html(self._html, html(T, units, target, frame, withheld, self._rotations))

@@ -10,6 +10,7 @@ import viser
 from app.shared.finding import find_robots
 from app.viewer.own_arm import OwnArm, label
 from app.viewer.panel import Post, assign, listen, update_html
+from app.viewer.panel.part import add_html
 from app.viewer.views.templates import render
 from kin import InputError, Robot, builtin_robots
 
@@ -29,7 +30,7 @@ class RobotMenu:
         self._options = self._named(own)
         self._shown = robot
         self._query = ""
-        self._about = gui.add_html("")
+        self._about = add_html(gui)
         self._menu = gui.add_dropdown("Robot", tuple(self._options), initial_value=self._name(robot))
         self._field: viser.GuiInputHandle[str] | None = None
         listen(self._menu, post, "robot")

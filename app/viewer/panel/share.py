@@ -11,6 +11,7 @@ import viser
 from app.exports.snippets import SNIPPETS, Moment
 from app.shared.answers.embedding import MODES, frame
 from app.viewer.panel import Post, assign, listen, update_html
+from app.viewer.panel.part import add_html
 from app.viewer.views.templates import render
 from kin import InputError
 
@@ -24,16 +25,16 @@ class SharePanel:
     """The link, a code snippet in a language of the visitor's choice, and frames. Posts ``"copy-as"``."""
 
     def __init__(self, gui: viser.GuiApi, post: Post) -> None:
-        self._link = gui.add_html("")
+        self._link = add_html(gui)
         self._name = next(iter(SNIPPETS))
         hint = "The present configuration and target, for another program"
         self._choice = gui.add_dropdown("Copy as", tuple(SNIPPETS), initial_value=self._name, hint=hint)
         listen(self._choice, post, "copy-as")
-        self._code = gui.add_html("")
+        self._code = add_html(gui)
         with gui.add_folder("Embed in a web page", expand_by_default=False):
-            gui.add_html(render("panel/embed_note"))
-            self._frames = {mode: gui.add_html("") for mode in MODES}
-        gui.add_html(render("sheet/in_view"))
+            add_html(gui, render("panel/embed_note"))
+            self._frames = {mode: add_html(gui) for mode in MODES}
+        add_html(gui, render("sheet/in_view"))
         self._moment: Moment | None = None
         self._withheld = False
 

@@ -10,9 +10,10 @@ from typing import Literal
 import viser
 
 from app.exports.worksheet.sheet import indexed
+from app.viewer.panel import update_html
+from app.viewer.panel.part import add_html
 from app.viewer.panel.posture import short
 from app.viewer.views.templates import render
-from app.viewer.viser_patches import show_content
 from kin import IKResult, IKSolution, Robot
 from kin.ik.details import OrientationNotMet, OutOfReach, OutsideLimits, RollError, RotationError, Solved, Touching
 from kin.units import Units, typeset
@@ -169,7 +170,7 @@ class StatusLine:
         self._shown = first
         self._warning = self._waiting = self._failure = ""
         self._cover: Notice | None = None
-        self._html = gui.add_html(html(first))
+        self._html = add_html(gui, html(first))
 
     @property
     def shows_result(self) -> bool:
@@ -211,9 +212,9 @@ class StatusLine:
 
     def _write(self) -> None:
         if self._cover is not None:
-            show_content(self._html, html(self._cover))
+            update_html(self._html, html(self._cover))
             return
-        show_content(self._html, html(self._shown, self._warning, self._waiting, self._failure))
+        update_html(self._html, html(self._shown, self._warning, self._waiting, self._failure))
 
     def show_result(self, result: IKResult, units: Units) -> None:
         """Show the result for a target."""

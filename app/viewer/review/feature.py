@@ -19,6 +19,7 @@ from app.viewer.feature import Stage
 from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.panel import update_html
+from app.viewer.panel.part import add_html
 from app.viewer.review import views
 from app.viewer.review.arms import other_arm
 from kin import InputError, UnknownRobotError
@@ -44,8 +45,8 @@ class Reviewing(Practising):
         self._review = stage.activity.review
         self._asked_in = ""  # the key of the lesson that was opened last, until it is left
         self._arrived = False  # whether it is open by now
-        self._bar = stage.client.gui.add_html("")
-        self._row = stage.client.gui.add_html("")
+        self._bar = add_html(stage.client.gui)
+        self._row = add_html(stage.client.gui)
         self._show_row()
 
     # Events

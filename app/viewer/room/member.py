@@ -8,11 +8,10 @@ from collections.abc import Callable, Hashable, Iterable
 from dataclasses import replace
 from typing import cast
 
-import viser
-
 from app.classroom.views import ClassroomUnavailable, RefusedError, RoomView
 from app.viewer.feature import Feature, Stage
 from app.viewer.panel import update_html
+from app.viewer.panel.part import Block
 from app.viewer.panel.status import Notice
 from app.viewer.room.following import Follower
 from app.viewer.room.member_page import MemberPage
@@ -74,9 +73,9 @@ class Member(Feature):
         self._next = 0.0
         self._sharing = Sharing(self.shared_state, self.attendance.tell_page, lambda: self.share_every)
         self._armed: tuple[Hashable, float] = "", 0.0
-        self._bar: viser.GuiHtmlHandle | None = None
+        self._bar: Block | None = None
 
-    def attach(self, bar: viser.GuiHtmlHandle) -> None:
+    def attach(self, bar: Block) -> None:
         """Use this element, outside of all tabs, for the bar over the scene."""
         self._bar = bar
         self.apply_updates()

@@ -7,6 +7,7 @@ from collections.abc import Hashable
 from typing import Any
 
 from app.classroom.views import Role, Ticket
+from app.viewer.panel.part import add_html
 from app.viewer.room.member import NEWS, Member
 from app.viewer.room.member_page import MemberPage
 from app.viewer.room.student import Student
@@ -39,7 +40,7 @@ class ClassroomPage(MemberPage):
         if self._member is None:
             return
         with self.client.atomic():
-            self._member.attach(self.client.gui.add_html(""))
+            self._member.attach(add_html(self.client.gui))
         self.client.flush()
 
     def _act(self, key: Hashable, value: object) -> None:

@@ -14,6 +14,7 @@ from app.viewer.activity.activity import EXERCISES, REVIEW, GivenUp, Judged
 from app.viewer.activity.context import ExerciseContext
 from app.viewer.feature import Stage
 from app.viewer.panel import update_html
+from app.viewer.panel.part import add_html
 from app.viewer.panel.status import Notice
 from app.viewer.room import views
 from app.viewer.room.member import Member, wanted
@@ -43,9 +44,9 @@ class Student(Member):
         super().__init__(stage)
         self.activity = stage.activity
         gui = stage.client.gui
-        self._head = gui.add_html("")
-        self._question = gui.add_html("")
-        self._stored = gui.add_html("")
+        self._head = add_html(gui)
+        self._question = add_html(gui)
+        self._stored = add_html(gui)
         self._gone = False  # whether the student has stopped following
         self._leader_before = ""
         self._task_at: float | None = None

@@ -15,6 +15,7 @@ from app.exercises import Exercise, ExerciseFileError
 from app.viewer.feature import Stage
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
+from app.viewer.panel.part import add_html
 from app.viewer.panel.status import Notice
 from app.viewer.room import views
 from app.viewer.room.following import decoded, shared
@@ -47,23 +48,23 @@ class Teacher(Member):
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
         gui = stage.client.gui
-        self._head = gui.add_html("")
+        self._head = add_html(gui)
         self._folders = [gui.add_folder(title) for title in ("Join", "Students", "Task", "Question")]
         join, students, task, question = self._folders
         with join:
-            self._join = gui.add_html("")
+            self._join = add_html(gui)
         with students:
-            self._tools = gui.add_html("")
-            self._list = gui.add_html("")
-            self._one = gui.add_html("")  # below the student that it is about
-            self._rest = gui.add_html("")
+            self._tools = add_html(gui)
+            self._list = add_html(gui)
+            self._one = add_html(gui)  # below the student that it is about
+            self._rest = add_html(gui)
         with task:
-            self._task = gui.add_html("")
-            self._course = gui.add_html("")
+            self._task = add_html(gui)
+            self._course = add_html(gui)
         with question:
-            self._ask = gui.add_html("")
-            self._tally = gui.add_html("")
-        self._end = gui.add_html("")
+            self._ask = add_html(gui)
+            self._tally = add_html(gui)
+        self._end = add_html(gui)
         self._picked = ""  # the student whose details are open
         self._open_tab = 0
         self._chosen: Exercise | None = None  # the exercise in the form of the task

@@ -17,6 +17,7 @@ from app.viewer.lessons import LESSONS
 from app.viewer.lessons.guide.feature import Guide
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import Post, assign, listen
+from app.viewer.panel.part import Block, add_html
 from app.viewer.review.feature import Reviewing
 from app.viewer.views.templates import render
 from app.viewer.worksheet.feature import Worksheets
@@ -45,7 +46,7 @@ class LessonChoice:
         self,
         gui: viser.GuiApi,
         parent: viser.GuiTabHandle,
-        page: viser.GuiHtmlHandle,
+        page: Block,
         stage: Stage,
         post: Post,
     ) -> None:
@@ -60,7 +61,7 @@ class LessonChoice:
             self._choice = gui.add_dropdown("Lesson", self._titles, initial_value=NONE, hint=HINT)
             self.author = Author(stage)
             self.reviewing = Reviewing(stage)
-            self._overview: viser.GuiHtmlHandle | None = gui.add_html(_overview())
+            self._overview: Block | None = add_html(gui, _overview())
             self.sheets: Worksheets | None = Worksheets(stage, None, page)
         listen(self._choice, post, "lesson")
         self._box: viser.GuiFolderHandle | None = None
@@ -98,10 +99,10 @@ class LessonChoice:
         activity, always = self._stage.activity, (self.exercises, self.courses, self.author, self.reviewing)
         if chosen is not None and issubclass(chosen, Lesson) and chosen.by_rows and self._stage.now.robot.coupled:
             assign(self._choice, NONE)
-            self._overview = self._gui.add_html(_not_for(chosen, self._stage.now.robot))
+            self._overview = add_html(self._gui, _not_for(chosen, self._stage.now.robot))
             chosen = None
         elif chosen is None:
-            self._overview = self._gui.add_html(_overview())
+            self._overview = add_html(self._gui, _overview())
         elif issubclass(chosen, Lesson):
             self._box = self._gui.add_folder(None)
             with self._box:

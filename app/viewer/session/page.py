@@ -33,6 +33,7 @@ from app.viewer.panel import update_html
 from app.viewer.panel.fence import Fence
 from app.viewer.panel.joints import JointSliders, lock_notice
 from app.viewer.panel.layout import LEARN, Panel
+from app.viewer.panel.part import bring_parts
 from app.viewer.panel.script import Reply
 from app.viewer.panel.status import READY, Notice, StatusLine
 from app.viewer.panel.theme import configure_theme
@@ -113,6 +114,7 @@ class VisitorPage(ShownArm, Worker):
         hear_marks(client, self.channel.mark)
         self.fence = Fence(client, lambda: self.post(FENCE))
         client.gui.add_html(render("panel/channel", name=self.channel.name))
+        bring_parts(client.gui, self.channel)
         self._welcome, self._looking, self.may_save = welcome, rights is Rights.LOOK, rights.save
         self.files = Files(self.post, lambda: self.features, self.meshes.memory, rights)
         self.door = Listener(services.lines, self.post, self._looking)
@@ -370,7 +372,8 @@ class VisitorPage(ShownArm, Worker):
 
     def _step(self, batch: list[tuple[Hashable, object]]) -> None:
         played = self.arm.playing
-        with in_one_frame(self.client):
+        numbers = (key[2] for key, _ in batch if isinstance(key, tuple) and key[0] == "message")
+        with in_one_frame(self.client), self.channel.step(max(numbers, default=0)):
             with self.client.atomic():
                 for key, value in batch:
                     # Guarded one by one, so that one bad value does not discard the others.
@@ -443,7 +446,7 @@ class VisitorPage(ShownArm, Worker):
         later = self._preparing.lacks(saved, robot, self.offered)
         if later:
             saved, robot = without_arm(saved), self.store.robots[0]
-        with self.client.atomic():
+        with self.client.atomic(), self.channel.step(0):
             if self.dark:
                 configure_theme(gui, True)
             self.camera = VisitorCamera(self.client, self.post)

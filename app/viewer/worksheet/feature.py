@@ -16,6 +16,7 @@ from app.viewer.feature import Feature, Stage
 from app.viewer.lessons.guide import outline as guide
 from app.viewer.lessons.guide.lesson import Lesson
 from app.viewer.panel import update_html
+from app.viewer.panel.part import Block, add_html
 from app.viewer.panel.status import Notice
 from app.viewer.takehome.sending import send_page
 from app.viewer.views.templates import render
@@ -43,9 +44,7 @@ class Worksheets(Feature):
     acts = False
     messages = frozenset({"page", "web", *FILES})
 
-    def __init__(
-        self, stage: Stage, lesson: Lesson | None, page: viser.GuiHtmlHandle, folder: bool = True
-    ) -> None:
+    def __init__(self, stage: Stage, lesson: Lesson | None, page: Block, folder: bool = True) -> None:
         super().__init__(stage)
         self._lesson = lesson
         self._page = page
@@ -53,7 +52,7 @@ class Worksheets(Feature):
         if folder:
             self._folder = stage.client.gui.add_folder("Worksheet", expand_by_default=lesson is not None)
             with self._folder:
-                stage.client.gui.add_html(render("sheet/buttons", lesson=lesson is not None))
+                add_html(stage.client.gui, render("sheet/buttons", lesson=lesson is not None))
 
     def handle(self, key: Hashable, value: object) -> None:
         match key:

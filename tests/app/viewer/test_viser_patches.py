@@ -24,7 +24,6 @@ from app.viewer.viser_patches import (
     keep_sent_values,
     sent_value,
     set_events_in_their_loop,
-    show_content,
     show_text,
     show_value,
 )
@@ -143,25 +142,6 @@ def test_a_value_is_sent_as_the_setter_sends_it_and_no_callback_is_called(wire, 
     with pytest.raises(RuntimeError, match="GuiTextHandle was removed"):
         show_value(handle, "c")
     assert called == []
-
-
-def test_html_is_sent_as_the_setter_sends_it_and_unchanged_html_is_not(wire, monkeypatch):
-    _, scene = wire
-    gui, messages = scene._owner.gui, []
-    monkeypatch.setattr(gui._websock_interface, "queue_message", messages.append)
-    shown = []
-    for show in (lambda handle, value: setattr(handle, "content", value), show_content):
-        handle = gui.add_html("<b>old</b>")
-        messages.clear()
-        show(handle, "<b>new</b>")
-        show(handle, "<b>new</b>")
-        (message,) = messages
-        assert message.uuid == state_of(handle).uuid
-        shown.append((type(message), message.updates, handle.content))
-    assert shown[0] == shown[1]
-    handle.remove()
-    with pytest.raises(RuntimeError, match="GuiHtmlHandle was removed"):
-        show_content(handle, "late")
 
 
 def test_text_of_a_label_is_sent_as_by_its_setter_and_once(wire):

@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 
 import numpy as np
-import viser
 
 from app.exercises.worked import WorkedText
 from app.viewer.declared.scene import SceneView
@@ -17,6 +16,7 @@ from app.viewer.feature import Stage
 from app.viewer.lessons.guide.example import Example, Player, example_of
 from app.viewer.lessons.guide.example_drawing import ExampleDrawing, View
 from app.viewer.panel import update_html
+from app.viewer.panel.part import Block, add_html
 from app.viewer.panel.status import Notice
 from app.viewer.views.templates import render
 from kin import InputError
@@ -37,7 +37,7 @@ class ExampleView:
     def __init__(self, stage: Stage, text: WorkedText | None) -> None:
         self._stage, self._text = stage, text
         self._scene = SceneView(stage.client.scene, KEY, stage.post)
-        self._html: viser.GuiHtmlHandle = stage.client.gui.add_html("")
+        self._html: Block = add_html(stage.client.gui)
         self._player: Player | None = None
         self._drawing: ExampleDrawing | None = None
         self._left: Array | None = None  # where the visitor's arm was heading when it began

@@ -26,6 +26,7 @@ from app.viewer.lessons.guide.outline import Outline, Pose
 from app.viewer.lessons.guide.progress import Progress
 from app.viewer.panel import assign, listen, update_html
 from app.viewer.panel.joints import go_to_buttons
+from app.viewer.panel.part import add_html
 from app.viewer.panel.status import Notice
 from kin import InputError, Robot
 from kin.transforms import Array, pose_from_position_wxyz
@@ -78,10 +79,10 @@ class Guide(Feature):
         self._answer_ends = np.zeros((0, 3))  # what the picture has to contain to show the last answer
         self._target: Array | None = None  # of the step on show, of which the picture has to contain it
         gui = stage.client.gui
-        self._goal = gui.add_html("")
+        self._goal = add_html(gui)
         self._example = ExampleView(stage, written_example(lesson.key))
         with gui.add_folder("Steps"):
-            self._steps = gui.add_html("")
+            self._steps = add_html(gui)
         self._joints_box = gui.add_checkbox("Joint sliders", False, hint=JOINTS_HINT)
         listen(self._joints_box, self.post, "joints")
         with gui.add_folder(None) as self._container:

@@ -7,10 +7,10 @@ proxies log these.
 
 The page sends ``[number, name, argument]``, first of all ``hello`` with what it remembers, or ``["heard", k]`` for
 the notices that have arrived, up to the k-th, or ``["ask"]`` for a sign of life. The session sends ``{"heard": n,
-"set": {key: value}, "notices": [[k, name, value]]}``: the number of the last message that has come; the newest
-value of each key, which may skip older ones; notices, each once and in order. What was lost with a connection is
-sent again over the next one, and counts once. At least every `BEAT` seconds there is a text, which the page
-answers: so each side notices a line that is dead.
+"done": n, "set": {key: value}, "notices": [[k, name, value]]}``: the number of the last message that has come, and
+of the last that the values follow; the newest value of each key, null for none, which may skip older ones; and
+notices, each once and in order. What was lost with a connection is sent again over the next one, and counts once.
+At least every `BEAT` seconds there is a text, which the page answers: so each side notices a line that is dead.
 
 A message whose order with viser's own controls matters, such as *Undo* after a slider was moved, is sent as
 ``[number, name, argument, true]``, and a mark with its number goes the way of these controls, in viser's
@@ -20,13 +20,14 @@ connection. It takes effect when the mark has come. What was sent later, by eith
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import logging
 import secrets
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import Future
 from typing import Final
 
@@ -70,6 +71,9 @@ class Channel:
         self._heard_at = time.monotonic()
         self._lock = threading.Lock()
         self._values: dict[str, str] = {}  # in JSON, by key
+        self._held: set[str] | None = None  # keys that have changed within `step`
+        self._due = False  # whether something is to be sent at its end
+        self._done = 0  # see `step`
         self._notices: deque[tuple[int, str]] = deque(maxlen=KEPT)  # in JSON, with their numbers
         self._count = 0  # of notices
         self._line: _Line | None = None
@@ -87,9 +91,42 @@ class Channel:
             if self._values.get(key) == text:
                 return
             self._values[key] = text
-            if self._line is not None:
-                self._line.changed.add(key)
+            self._note(key)
         self._wake()
+
+    def forget(self, key: str) -> None:
+        """The key has no value any more."""
+        with self._lock:
+            if self._values.pop(key, None) is not None:
+                self._note(key)
+        self._wake()
+
+    def _note(self, key: str) -> None:
+        if self._held is not None:
+            self._held.add(key)
+        elif self._line is not None:
+            self._line.changed.add(key)
+
+    @contextlib.contextmanager
+    def step(self, done: int) -> Iterator[None]:
+        """Have the values that are shown within this context sent together.
+
+        Args:
+            done: the number of the last message that they follow; 0: of the step before.
+        """
+        with self._lock:
+            self._held = set()
+        try:
+            yield
+        finally:
+            with self._lock:
+                held, self._held = self._held or set(), None
+                self._done = max(self._done, done)
+                if self._line is not None:
+                    self._line.changed |= held
+                due, self._due = self._due or bool(done), False
+            if due:
+                self._wake()
 
     def notify(self, name: str, value: object) -> None:
         """Have the page do something once; raises `ValueError` as `show`."""
@@ -115,7 +152,8 @@ class Channel:
 
     def _wake(self) -> None:
         line = self._line
-        if line is not None:
+        self._due = self._held is not None
+        if line is not None and not self._due:
             line.wake()
 
     # The event loop
@@ -160,11 +198,14 @@ class Channel:
     def _text(self, line: _Line) -> str:
         """What the page has not been sent over this line."""
         with self._lock:
-            values = ", ".join(f"{json.dumps(key)}: {self._values[key]}" for key in sorted(line.changed))
+            known = ((key, self._values.get(key, "null")) for key in sorted(line.changed))
+            values = ", ".join(f"{json.dumps(key)}: {value}" for key, value in known)
             notices = ", ".join(text for number, text in self._notices if number > line.sent)
             line.changed.clear()
             line.sent = self._count
+            news, line.done = self._done > line.done, self._done
         parts = [f'"heard": {self._received}']
+        parts += [f'"done": {line.done}'] if news else []
         parts += [f'"set": {{{values}}}'] if values else []
         parts += [f'"notices": [{notices}]'] if notices else []
         return "{" + ", ".join(parts) + "}"
@@ -248,13 +289,14 @@ class _Line:
     Attributes:
         changed: keys whose values the page has not been sent over it.
         sent: the last notice that was.
+        done: the number in the last text.
         woken: something is to be sent.
         ended: why it has ended.
     """
 
     def __init__(self, call: Call) -> None:
         self.changed: set[str] = set()
-        self.sent = 0
+        self.sent = self.done = 0
         self.woken = asyncio.Event()
         self.ended: asyncio.Future[ConnectionEnded] = asyncio.get_running_loop().create_future()
         self._call = call

@@ -12,6 +12,7 @@ from app.viewer.feature import Feature, Stage
 from app.viewer.live.tape import BYTES
 from app.viewer.own_arm import KEY
 from app.viewer.panel import update_html
+from app.viewer.panel.part import add_html
 from app.viewer.panel.share import box_html
 from app.viewer.scene.camera import Sphere, round_points
 from app.viewer.tabs.program import program as rows
@@ -37,7 +38,7 @@ class Screen(Feature):
 
     def __init__(self, stage: Stage) -> None:
         super().__init__(stage)
-        self._html = {name: stage.client.gui.add_html("") for name in PARTS}
+        self._html = {name: add_html(stage.client.gui) for name in PARTS}
         self._programs: dict[str, Program] = {}  # by robot; `KEY` stands for the visitor's own arm
         self._playback = Playback(stage, self._show_clock)
         self._player = self._playback.player

@@ -19,6 +19,7 @@ from app.viewer.meshes.archive import MOST_BYTES, MeshError
 from app.viewer.meshes.incoming import IncomingFile, not_sent
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import update_html
+from app.viewer.panel.part import add_html
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits, views, workpieces
 from app.viewer.tabs.robot.beginnings import Beginnings
@@ -65,9 +66,9 @@ class RobotTab(Feature):
         self._beginnings = Beginnings(stage, lambda: self._uploads.last)
         self._converting = False
         gui = stage.client.gui
-        self._html = {name: gui.add_html("") for name in PARTS}
+        self._html = {name: add_html(gui) for name in PARTS}
         self._comparing = Comparing(stage, self.post)
-        self._html |= {name: gui.add_html("") for name in ("files", "doctor")}
+        self._html |= {name: add_html(gui) for name in ("files", "doctor")}
         self._handlers: dict[str, Callable[[object], None]] = {
             "start": self._beginnings.start,
             "convention": self._reread,

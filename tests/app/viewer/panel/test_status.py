@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
@@ -20,21 +21,20 @@ UNDONE = Notice("hand", "Undone: Home")
 
 @pytest.fixture(autouse=True)
 def seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    """News may end at once; the element is no control of viser."""
+    """News may end at once."""
     monkeypatch.setattr(module, "UNSEEN", 0.0)
-    monkeypatch.setattr(module, "show_content", lambda element, content: setattr(element, "content", content))
 
 
 def line(first: Notice = READY) -> tuple[StatusLine, Any]:
     element = SimpleNamespace(content="")
-    outbox = SimpleNamespace(_websock_interface=SimpleNamespace(queue_message=lambda _: None))
-    element._impl = SimpleNamespace(removed=False, uuid="status", props=element, gui_api=outbox)
 
-    def add_html(content: str) -> Any:
+    def add_html(content: str, order: float | None = None) -> Any:
         element.content = content
         return element
 
-    return StatusLine(SimpleNamespace(add_html=add_html), first), element  # type: ignore[arg-type]
+    gui = Mock()
+    gui.add_html = add_html
+    return StatusLine(gui, first), element
 
 
 def test_news_end_after_some_seconds_and_the_present_state_follows() -> None:

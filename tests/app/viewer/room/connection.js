@@ -8,7 +8,8 @@ const fs = require("node:fs");
 const path = require("node:path");
 const vm = require("node:vm");
 
-let now = 1e6;
+const BEFORE = 100; // ms until viser's page is looked into
+let now = 1e6 - BEFORE;
 let timers = [];
 let cut = false;
 const log = [];
@@ -42,7 +43,6 @@ const standIn = (name, ...properties) => {
   for (const each of properties) Object.defineProperty(made.prototype, each, { configurable: true, get() { return ""; }, set() {} });
   return made;
 };
-class Worker extends EventTarget { postMessage() {} }
 class WebGL2RenderingContext { shaderSource() {} attachShader() {} linkProgram() {} }
 let channelSocket = null;
 class WebSocket extends EventTarget {
@@ -63,29 +63,32 @@ class WebSocket extends EventTarget {
 }
 [WebSocket.CONNECTING, WebSocket.OPEN] = [0, 1];
 const hear = () => channelSocket.dispatchEvent(Object.assign(new Event("message"), { data: '{"heard": 1}' }));
-class DOMParser {
-  parseFromString() { return { body: { firstElementChild: { dataset: { channel: "name" } } } }; }
-}
 class Storage { getItem() { return null; } setItem() {} }
 
 const page = new EventTarget();
+let changed = () => {}; // the page has
 const note = { classList: [], textContent: "", hidden: true, isConnected: true };
 const bar = { dataset: {}, offsetHeight: 0 };
 const root = { dataset: {}, style: { setProperty() {} }, toggleAttribute() {} };
 const document = Object.assign(new EventTarget(), {
   hidden: false,
   documentElement: root,
+  body: Object.assign(new EventTarget(), { append() {} }),
   createElement: () => note,
-  querySelector: (selector) => (selector.startsWith("[data-class-bar]") ? bar : null),
+  querySelector: (selector) => (selector.startsWith("[data-class-bar]") ? bar
+    : selector === "[data-channel]" ? { dataset: { channel: "name" } } : selector.startsWith("canvas") ? {} : null),
   querySelectorAll: () => [],
 });
 const world = vm.createContext({
-  document, setTimeout, clearTimeout, setInterval, WebSocket, DOMParser, performance: { now: () => now }, Date: FakeDate, Worker, WebGL2RenderingContext, Storage, Event, CustomEvent, URL, TextEncoder,
+  document, setTimeout, clearTimeout, setInterval, WebSocket, performance: { now: () => now }, Date: FakeDate, WebGL2RenderingContext, Storage, Event, CustomEvent, URL, TextEncoder,
   Intl, navigator: { language: "en", languages: ["en"] }, history: { replaceState() {} }, location: new URL("http://127.0.0.1/viewer/"),
   addEventListener: page.addEventListener.bind(page), dispatchEvent: page.dispatchEvent.bind(page),
   localStorage: new Storage(), sessionStorage: new Storage(), ResizeObserver: class { observe() {} disconnect() {} },
   Node: standIn("Node", "textContent"), Element: standIn("Element", "innerHTML"), HTMLScriptElement: standIn("HTMLScriptElement"),
-  HTMLInputElement: standIn("HTMLInputElement", "value"), Navigator: standIn("Navigator"), MutationObserver: class { observe() {} },
+  HTMLInputElement: standIn("HTMLInputElement", "value"), Navigator: standIn("Navigator"), MutationObserver: class {
+    constructor(act) { this.act = act; }
+    observe(node) { if (node === root) changed = () => this.act([{ type: "childList" }]); }
+  },
 });
 world.window = world;
 for (const name of ["viser_page.js", "channel.js", "class_tab.js"]) {
@@ -93,13 +96,12 @@ for (const name of ["viser_page.js", "channel.js", "class_tab.js"]) {
 }
 Object.defineProperty(note, "textContent", { set(text) { this.text = text; log.push([now - 1e6, text]); }, get() { return this.text ?? ""; } });
 
-const line = new Worker();
-line.postMessage({ type: "set_server" });
-const html = { type: "GuiHtmlMessage", props: { content: '<div hidden data-channel="name"></div>' } };
-line.dispatchEvent(Object.assign(new Event("message"), { data: { type: "message_batch", messages: [html] } }));
+world.__viserMutable = { sendMessage() {} };
+page.dispatchEvent(new Event("DOMContentLoaded"));
+changed();
 const steps = {
   wait,
-  sent: () => line.postMessage({ type: "send", message: { type: "GuiUpdateMessage", uuid: "a", updates: { value: 1 } } }),
+  sent: () => world.__viserMutable.sendMessage({ type: "GuiUpdateMessage", uuid: "a", updates: { value: 1 } }),
   heard: hear,
   closed: () => channelSocket.dispatchEvent(Object.assign(new Event("close"), { code: 1006 })),
   cut: () => { cut = true; },
@@ -108,6 +110,7 @@ const steps = {
   hide: () => { document.hidden = true; },
 };
 (async () => {
+  await wait(BEFORE);
   for (const [step, ...rest] of JSON.parse(fs.readFileSync(0, "utf8"))) await steps[step](...rest);
   await settle();
   console.log(JSON.stringify(log));

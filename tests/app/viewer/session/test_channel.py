@@ -285,6 +285,47 @@ def test_a_closed_session_ends_its_connections() -> None:
     run(play)
 
 
+def test_values_of_one_step_come_together_with_the_message_that_they_follow() -> None:
+    async def play(page: Page) -> None:
+        line = page.connect()
+        await rest()
+        with page.channel.step(3):
+            page.channel.show("a", 1)
+            await rest()
+            page.channel.show("b", 2)
+            page.channel.reply(Reply(3, ""))
+            await rest()
+            assert len(line.sent) == 1
+        await rest()
+        assert line.sent[1:] == [
+            {"heard": 0, "done": 3, "set": {"a": 1, "b": 2}, "notices": [[1, "reply", [3, "", []]]]}
+        ]
+        with page.channel.step(0):
+            await rest()
+        with page.channel.step(4):
+            pass
+        await rest()
+        assert line.sent[2:] == [{"heard": 0, "done": 4}]
+
+    run(play)
+
+
+def test_a_key_that_is_forgotten_has_no_value_in_the_page_and_is_not_sent_again() -> None:
+    async def play(page: Page) -> None:
+        line = page.connect()
+        page.channel.show("a", 1)
+        await rest()
+        page.channel.forget("a")
+        page.channel.forget("none such")
+        await rest()
+        assert [text.get("set") for text in line.sent] == [{"a": 1}, {"a": None}]
+        again = page.connect()
+        await rest()
+        assert "set" not in again.sent[0]
+
+    run(play)
+
+
 # Marks in viser's connection
 
 

@@ -15,6 +15,7 @@ from app.viewer.feature import Stage
 from app.viewer.meshes.incoming import IncomingFile
 from app.viewer.own_arm import OwnArm
 from app.viewer.panel import Post, assign, listen, update_html
+from app.viewer.panel.part import add_html
 from app.viewer.panel.status import Notice
 from app.viewer.tabs.robot import edits
 from app.viewer.tabs.robot.compare import reference, views
@@ -50,7 +51,7 @@ class Comparing:
         self._overlay: Overlay | None = None
         self._joint = 0
         gui = stage.client.gui
-        self._form, self._answer = gui.add_html(""), gui.add_html("")
+        self._form, self._answer = add_html(gui), add_html(gui)
         self._walk = gui.add_slider(
             "Joint of both arms",
             1,
@@ -61,7 +62,7 @@ class Comparing:
             hint="Marks the axis of one joint in both arms, in the scene",
         )
         listen(self._walk, post, ("walk",))
-        self._about = gui.add_html("")
+        self._about = add_html(gui)
         self.refresh()
 
     # What is chosen

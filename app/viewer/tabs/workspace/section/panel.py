@@ -14,6 +14,7 @@ from app.shared.computations import Subscription
 from app.shared.summaries import Summaries
 from app.viewer.feature import Stage
 from app.viewer.panel import Post, update_html
+from app.viewer.panel.part import add_html
 from app.viewer.tabs.workspace.background import run_in_background
 from app.viewer.tabs.workspace.colours import radius_and_height
 from app.viewer.tabs.workspace.section import plot
@@ -70,8 +71,8 @@ class SectionPanel:
         self._left = np.zeros(3)
         self._panel = client.gui.add_panel()
         with self._panel.add_tab("Section (r, z)"):
-            self._html = client.gui.add_html(render("workspace/section_note", text="Computing the section…"))
-            self._dot = client.gui.add_html("")
+            self._html = add_html(client.gui, render("workspace/section_note", text="Computing the section…"))
+            self._dot = add_html(client.gui)
         self._panel.dock_left()
         self._panel.set_width(WIDTH)
         self._panel.expand()  # on a phone it would be collapsed at the end of the sheet

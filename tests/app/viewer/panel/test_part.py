@@ -1,0 +1,61 @@
+"""Blocks of HTML that come by the channel: what is sent, and what is forgotten."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import Mock
+
+from app.viewer.panel.part import add_html, bring_parts
+
+
+class Shown:
+    """A channel that keeps what it is given."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[Any, ...]] = []
+
+    def show(self, key: str, value: object) -> None:
+        self.calls.append((key, value))
+
+    def forget(self, key: str) -> None:
+        self.calls.append((key,))
+
+
+def gui() -> Any:
+    """A panel of viser's that keeps its blocks."""
+    made = Mock()
+    made.blocks = []
+
+    def add(content: str, order: float | None = None) -> Any:
+        made.blocks.append(SimpleNamespace(content=content, order=order, visible=True, remove=Mock()))
+        return made.blocks[-1]
+
+    made.add_html = add
+    return made
+
+
+def test_a_block_has_its_first_html_in_viser_and_later_ones_by_the_channel() -> None:
+    panel, channel = gui(), Shown()
+    bring_parts(panel, channel)
+    part, other = add_html(panel, "<b>1</b>", 2.0), add_html(panel)
+    place = panel.blocks[0]
+    key = place.content.split('"')[1]
+    assert place.content == f'<div data-part="{key}"><b>1</b></div>'
+    assert f'data-part="{key}"' not in panel.blocks[1].content
+    part.content = "<b>2</b>"
+    part.content = "<b>2</b>"
+    assert part.content == "<b>2</b>"
+    assert channel.calls == [(key, "<b>2</b>")]
+    part.visible, part.order = False, 3.0
+    assert (place.visible, place.order, part.visible, part.order) == (False, 3.0, False, 3.0)
+    part.remove()
+    assert place.remove.called
+    assert channel.calls[1:] == [(key,)]
+    assert other.content == ""
+
+
+def test_without_a_channel_viser_shows_it() -> None:
+    panel = gui()
+    add_html(panel, "<b>1</b>").content = "<b>2</b>"
+    assert [block.content for block in panel.blocks] == ["<b>2</b>"]
