@@ -165,8 +165,10 @@
   }
 
   // A drag is one step of the history.
-  addEventListener("pointerup", (event) => {
-    if (viserPage.isSlider(event.target) || document.querySelector("[data-dragging]")) send("released");
+  let slides = false; // the pointer was pressed on a slider
+  addEventListener("pointerdown", (event) => { slides = viserPage.isSlider(event.target); }, true);
+  for (const kind of ["pointerup", "pointercancel"]) addEventListener(kind, () => {
+    if (slides || document.querySelector("[data-dragging]")) send("released");
   }, true);
 
   // History

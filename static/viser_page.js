@@ -199,8 +199,10 @@ const viserPage = (() => {
   }
 
   /** viser applies all updates that wait for a frame after all removals that wait for it. In a slow page an update then
-   *  finds no component, which is an error in the console. It is void: it is taken away when the removal comes. */
+   *  finds no component, which is an error in the console. It is void: it is taken away when the removal comes.
+   *  A slider does not jump under the pointer that holds it: when it is released, the service says what it shows. */
   function dropVoidUpdates(queue) {
+    const isFor = (id) => ({ type: kind, uuid, updates }) => kind === "GuiUpdateMessage" && uuid === id && "value" in updates;
     queue.push = (...received) => {
       for (const { type: kind, uuid } of received) {
         HOOKS.hear++;
@@ -208,9 +210,13 @@ const viserPage = (() => {
         const kept = queue.filter((waiting) => waiting.type !== "GuiUpdateMessage" || waiting.uuid !== uuid);
         queue.splice(0, queue.length, ...kept);
       }
-      return Array.prototype.push.apply(queue, received);
+      const jumps = isFor(held);
+      return Array.prototype.push.apply(queue, received.filter((message) => !jumps(message)));
     };
   }
+  let held = null; // the id of the slider under the pressed pointer
+  addEventListener("pointerdown", ({ target }) => { held = closest(target, PARTS.slider)?.id ?? null; }, true);
+  for (const kind of ["pointerup", "pointercancel"]) addEventListener(kind, () => { held = null; }, true);
 
   /** See what viser sends. */
   function hearSent(viewer) {

@@ -5,6 +5,9 @@ the slider after that, and the slider would stay elsewhere than its joint. So a 
 are sent. What the visitor has changed is heard before the page's answer if it may have crossed them. That is sent
 once more, when a whole question and answer have passed without another change: the visitor no longer moves the
 control. However slow the line is, in the end both sides show the same.
+
+While a slider is held, the page shows no other value in it than the visitor's (``static/viser_page.js``). So what
+it shows is also sent once more when it is released.
 """
 
 from __future__ import annotations
@@ -61,6 +64,11 @@ class Fence:
         """Have these controls shown again where that is needed."""
         self._controls.add(controls)
 
+    def released(self) -> None:
+        """The visitor has released a control."""
+        for controls in list(self._controls):
+            controls.released()
+
     def ask(self) -> None:
         """Ask, if something was sent since the last question and that one is answered."""
         if self._wanted and self.asked == self.last:
@@ -92,6 +100,7 @@ class Crossings(Generic[K]):
         self._fence, self._show = fence, show
         self._sent: dict[K, int] = {}  # the question that followed the last value of each
         self._crossed: dict[K, int] = {}  # the question that has to pass before each is shown again
+        self._moved: set[K] = set()  # by the visitor, and not released
         fence.join(self)  # type: ignore[arg-type]
 
     def sent(self, keys: Iterable[K]) -> None:
@@ -100,8 +109,14 @@ class Crossings(Generic[K]):
 
     def heard(self, key: K) -> None:
         """The visitor has changed a control."""
+        self._moved.add(key)
         if key in self._crossed or self._sent.get(key, 0) > self._fence.last:
             self._crossed[key] = self._fence.next
+
+    def released(self) -> None:
+        """The visitor holds none of them any more."""
+        while self._moved:
+            self._crossed[self._moved.pop()] = self._fence.next
 
     def show_again(self) -> None:
         """Show what may have crossed and rests by now."""
@@ -115,3 +130,4 @@ class Crossings(Generic[K]):
         """The controls are removed."""
         self._sent.clear()
         self._crossed.clear()
+        self._moved.clear()

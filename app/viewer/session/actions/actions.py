@@ -194,6 +194,7 @@ class Actions:
     def _on_release(self, _: object) -> None:
         """The visitor has released a control: what follows is another step."""
         self._gesture = None
+        self._page.fence.released()
 
     # Controls of the panel
 

@@ -275,6 +275,24 @@ def test_a_value_that_was_overwritten_before_it_arrived_is_shown_again(page: Bar
     assert page.sent == ["GuiUpdateMessage"]
 
 
+def test_what_a_released_slider_shows_is_sent_once_more(page: BarePage) -> None:
+    toy = page.open(Toy)
+    page.answer()
+    page.set("Count", 3)
+    page.rest()
+    toy.change(count=5)  # the page shows it in no slider that is held
+    toy.refresh()
+    page.answer()
+    page.watch()
+    page.fence.released()
+    page.answer()
+    assert page.sent == ["GuiUpdateMessage"]
+    assert page.control("Count").value == 5
+    page.fence.released()
+    page.answer()
+    assert page.sent == ["GuiUpdateMessage"]
+
+
 def test_events_of_controls_that_are_gone_are_void(page: BarePage) -> None:
     toy = page.open(Toy)
     page.set("Step, mm", 50.0)
