@@ -233,5 +233,12 @@ def _same_pose(problem: IKProblem, q: Array) -> Array:
         T[:3, 3] = problem.T[:3, 3]
     form = problem.closed_form
     rolls = problem.robot.n < 6 and form is not None and form.handles(APPROACH)
-    found = solve_branches(problem, T, APPROACH if rolls else POSE, q)
+    code = APPROACH if rolls else POSE
+    free = code == POSE and form is not None and not all(p.rare for p in form.redundancies(POSE))
+    nearest = problem.options.prefer == "nearest"
+    found = solve_branches(problem, T, code, problem.seed if free and nearest else q)
+    if found is not None and free and not nearest and not np.isnan(found.q).all():
+        # The other branches at the same values of the redundancy parameters: they are as far from singularities.
+        own = int(np.nanargmin(np.abs(found.q - q).max(axis=1)))
+        found = solve_branches(problem, T, code, q, tuple(found.values[own].tolist()))
     return np.empty((0, problem.robot.n)) if found is None else found.q[~np.isnan(found.q[:, 0])]

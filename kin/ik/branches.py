@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kin.fk import fk
-from kin.ik.candidates import DISTANCE, Rows, accept, measure_rows, ranges, select, unchecked
+from kin.ik.candidates import DISTANCE, ROLL, Rows, accept, measure_rows, ranges, select, unchecked
 from kin.ik.candidates import Flags as Flags
 from kin.ik.details import JointKind, LimitViolation, Redundancy
 from kin.ik.problem import IKProblem
@@ -114,8 +114,9 @@ def _put_seed(problem: IKProblem, form: ClosedForm, branches: Branches) -> None:
     branches.closed[row] = branches.good[row] = True
     branches.values = branches.values.copy()
     for k, parameter in enumerate(branches.redundancies):
-        if parameter.joint >= 0 and not (parameter.rare and math.isnan(branches.values[row, k])):
-            value = branches.values[row, k] = q[0, parameter.joint]
+        value = _value_at(problem, form, parameter, q[0], float(stats[0, ROLL]))
+        if not (math.isnan(value) or (parameter.rare and math.isnan(branches.values[row, k]))):
+            branches.values[row, k] = value
             arcs = branches.arcs[k]
             _, low, high = arcs[arcs[:, 0] == row].T
             past = (value - low) % TURN if parameter.circular else value - low
@@ -123,6 +124,15 @@ def _put_seed(problem: IKProblem, form: ClosedForm, branches: Branches) -> None:
                 branches.arcs[k] = np.concatenate([arcs, [[row, value, value]]])
     kept, count = select(branches.q, np.where(branches.good, branches.stats[:, DISTANCE], math.inf))
     branches.order = kept[:count].tolist()
+
+
+def _value_at(
+    problem: IKProblem, form: ClosedForm, parameter: RedundancyParameter, q: Array, roll: float
+) -> float:
+    """The value of a redundancy parameter at a configuration ``(n,)`` that meets the target; NaN if unknown."""
+    if parameter.joint >= 0:
+        return float(q[parameter.joint])
+    return roll if parameter.name == "roll" else form.value_at(problem.T, q)
 
 
 def candidates_of(

@@ -77,6 +77,7 @@ class SolverInput:
         respect_limits: choose redundancy parameters so that the limits hold, where that is possible.
         seed, lower, upper: ``(n,)``.
         seed_roll: angle about the target's z axis from its x axis to the seed tool's (tasks with a free roll).
+        weight: what a step of the given joint counts: 0.0 where its value stands for a roll that costs no motion.
     """
 
     T: Array
@@ -87,6 +88,7 @@ class SolverInput:
     lower: Array
     upper: Array
     seed_roll: float = 0.0
+    weight: float = 1.0
 
 
 class Obstacle(NamedTuple):
@@ -248,6 +250,13 @@ class ClosedForm(ABC):
         Rows that exist only by that are close to postures at the end of the arm's reach. `by` may be negative.
         """
         return self
+
+    def value_at(self, T: Array, q: Array) -> float:
+        """The redundancy parameter of a pose T ``(4, 4)``, if it is no joint's value, at q ``(n,)`` that meets it.
+
+        NaN if the family cannot tell.
+        """
+        return math.nan
 
     @abstractmethod
     def branch_of(self, q: Array) -> int:

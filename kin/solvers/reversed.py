@@ -188,6 +188,10 @@ class ReversedJoints(ClosedForm):
         reversed_ = self.signs < 0.0
         return np.where(reversed_, -upper, lower), np.where(reversed_, -lower, upper)
 
+    def value_at(self, T: Array, q: Array) -> float:
+        """The redundancy parameter of the family's arm."""
+        return self.form.value_at(T, q * self.signs)
+
     def branch_of(self, q: Array) -> int:
         """The branch a configuration ``(n,)`` is on."""
         return self.form.branch_of(q * self.signs)

@@ -52,7 +52,9 @@ def solve_approach(form: ClosedForm, problem: SolverInput, sense: float) -> Cand
     seed, lower, upper = problem.seed.copy(), problem.lower.copy(), problem.upper.copy()
     seed[6], lower[6], upper[6] = value - sense * problem.seed_roll, -UNBOUNDED, UNBOUNDED
     found = form.solve(
-        replace(problem, task=POSE, values=(value - sense * roll,), seed=seed, lower=lower, upper=upper)
+        replace(
+            problem, task=POSE, values=(value - sense * roll,), seed=seed, lower=lower, upper=upper, weight=0.0
+        )
     )
     there = ~np.isnan(found.q[:, 0])
     rolls = sense * (value - found.values[:, 0])

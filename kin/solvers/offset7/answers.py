@@ -17,17 +17,18 @@ from kin.transforms import Array
 
 @jit
 def answer(
-    params: Array, T: Array, seed: Array, lower: Array, upper: Array, requested: float, limited: bool, arcs: Array,
-    out: Array,
-) -> int:  # fmt: skip
+    params: Array, T: Array, joints: Array, requested: float, limited: bool, weight: float, arcs: Array, out: Array
+) -> int:
     """out ``(8, 8)`` ← each branch at the requested value of the given joint; if that is NaN, at the feasible one
-    nearest to the seed's; behind the joint values, that value. NaN where a branch does not exist.
+    at which the joints move least; behind the joint values, that value. NaN where a branch does not exist.
 
     arcs ``(INTERVALS, 3)`` ← the feasible intervals in one turn, rows (branch, low, high); returns their number, 0
-    if a value is requested and limits do not matter. seed, lower, upper ``(7,)``: joint values of the arm.
+    if a value is requested and limits do not matter. joints ``(3, 7)``: seed, lower and upper limits. weight:
+    what a step of the given joint counts.
     """
     back = params[REVERSED] > 0.0
     given = 6 if back else 0
+    seed, lower, upper = joints[0], joints[1], joints[2]
     box, chosen, q = np.empty((3, 7)), np.empty(8), np.empty((8, 7))
     order = -1 if back else 1
     signed_box(
@@ -37,7 +38,9 @@ def answer(
     count = 0
     if math.isnan(requested) or limited:
         span = turn_around(low, high, seed[given])
-        count = feasible(params, T, box, span, min(max(seed[given], span[0]), span[1]), arcs, chosen)
+        wanted = min(max(seed[given], span[0]), span[1])
+        near = seed[given] if math.isnan(requested) else math.nan
+        count = feasible(params, T, box, span, wanted, (near, weight), arcs, chosen)
     if math.isnan(requested):
         _rows_at(params, T, box[NEAR], chosen, q)
     else:

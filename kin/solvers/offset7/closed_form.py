@@ -46,9 +46,9 @@ _OBSTACLES: dict[int, ObstacleCode] = {
 
 
 @cache
-def _answer() -> Callable[[Array, Array, Array, Array, Array, float, bool, Array, Array], int]:
+def _answer() -> Callable[[Array, Array, Array, float, bool, float, Array, Array], int]:
     """`answer` without type dispatch."""
-    return direct(answer, 1, 2, 1, 1, 1, float, bool, 2, 2)
+    return direct(answer, 1, 2, 2, float, bool, float, 2, 2)
 
 
 def match(robot: Robot) -> Offset7 | None:
@@ -98,14 +98,13 @@ class Offset7(ClosedForm):
         return rolled.parameters(self._parameter) if task == APPROACH else (self._parameter,)
 
     def solve(self, problem: SolverInput) -> Candidates:
-        """All branches, each at the feasible value of the given joint nearest to the seed's, or as requested."""
+        """All branches, each at the given joint's value at which it is nearest to the seed, or as requested."""
         if problem.task == APPROACH:
             return rolled.solve_approach(self, problem, self._roll)
         p, requested, i = problem, problem.values[0], self.given
         out, arcs = np.empty((8, 8)), np.empty((INTERVALS, 3))
-        count = _answer()(
-            self.kernels.params, p.T, p.seed, p.lower, p.upper, requested, p.respect_limits, arcs, out
-        )
+        joints = np.array((p.seed, p.lower, p.upper))
+        count = _answer()(self.kernels.params, p.T, joints, requested, p.respect_limits, p.weight, arcs, out)
         found = at_every_turn(arcs[:count], float(p.lower[i]), float(p.upper[i]))
         gap, obstacle = 0.0, None
         if all(map(math.isnan, out[:, 0].tolist())):

@@ -1,11 +1,12 @@
-"""Kernels that find the values of the given joint at which a branch exists inside the limits, and choose one.
+"""Kernels that find the values of the given joint at which a branch exists inside the limits.
 
 First, where branches exist (:mod:`kin.solvers.offset7.places`). Then, for each branch, one continuous function,
 the *slack*, says how far its joints are inside their limits. It is sampled where the branch exists, more closely
 beside where it begins to exist, and where a joint turns by more, from sample to sample, than it is away from its
 limit (:mod:`kin.solvers.offset7.samples`): near a singularity joints turn fast. Zeros are found between samples of
 opposite signs, all of a target at the same time, and a peak or a dip between samples that could pass zero is
-searched for by golden sections.
+searched for by golden sections. Of each branch's values, the one at which the joints move least from the seed is
+chosen (:mod:`kin.solvers.offset7.nearest`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from kin.kernels.compile import inlined, jit
 from kin.kernels.simd import rounded, widest
 from kin.solvers.offset7.lanes import ELBOW, FIRST, ROOM, SECOND, SETUP, SIDE, SPACE, VALUE, lanes, set_up
+from kin.solvers.offset7.nearest import nearest_values
 from kin.solvers.offset7.places import marks_of, places_of
 from kin.solvers.offset7.samples import (
     DOUBT_SPACE,
@@ -49,13 +51,15 @@ Point = tuple[float, float]  # value, slack
 
 @jit
 def feasible(
-    params: Array, T: Array, box: Array, span: tuple[float, float], wanted: float, arcs: Array, chosen: Array
-) -> int:
+    params: Array, T: Array, box: Array, span: tuple[float, float], wanted: float, seed: tuple[float, float],
+    arcs: Array, chosen: Array,
+) -> int:  # fmt: skip
     """arcs ``(INTERVALS, 3)`` ← rows (branch, low, high): the feasible values of the given joint; their number.
 
     box ``(3, 7)``: seed and limits as chain angles. span: where the joint may be. chosen ``(8,)`` ← the feasible
-    value nearest to the wanted one; where there is none, the sample at which the branch is least outside the
-    limits; NaN where it does not exist.
+    value at which the joints move least from the seed, or the one nearest to `wanted` if the seed's value is NaN;
+    where there is none, the sample at which the branch is least outside the limits; NaN where it does not exist.
+    seed: its value of the given joint, and what a step of that joint counts.
     """
     setup = np.empty(SETUP)
     set_up(params, T, box, setup)
@@ -87,6 +91,8 @@ def feasible(
     for k in range(8):
         nearest = _nearest(arcs, k, found, wanted)
         chosen[k] = chosen[k] if math.isnan(nearest) else nearest
+    if not math.isnan(seed[0]):
+        nearest_values(target, seed, arcs, found, chosen, L)
     return found
 
 

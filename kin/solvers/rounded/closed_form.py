@@ -174,6 +174,10 @@ class Rounded(ClosedForm):
                 out[:, i] = math.pi - (math.pi - q[:, i]) % (2.0 * math.pi)
         return out
 
+    def value_at(self, T: Array, q: Array) -> float:
+        """The redundancy parameter of the arm that was meant."""
+        return self.form.value_at(T, q)
+
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on, as the family has it."""
         return self.form.branch_of(q)

@@ -145,7 +145,7 @@ def choose_rows(
     for k in range(rows.shape[0]):
         row, value = rows[k, :7], rows[k, 7]
         there = not math.isnan(row[0])
-        aim = value if math.isnan(wanted) else wanted
+        aim = wanted if math.isnan(value) else value
         aim = 0.0 if math.isnan(aim) else aim
         tried[:] = 0.0
         i, chosen = _chosen(arcs, k, aim, task.joint < 0, tried)

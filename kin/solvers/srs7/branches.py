@@ -11,16 +11,17 @@ from kin.solvers.blocks import solve_each
 from kin.solvers.canonical import OFFSET, UPPER_ARM, canonical_box, canonical_pose
 from kin.solvers.common import HIGH, LOW, NEAR, clear, copy_row, excess, nearest_image, wrap
 from kin.solvers.srs7.geometry import FITS, SHAPE, STAY, affine, angles_at, seed_arm_angle, sign_of, triangle_of
-from kin.solvers.srs7.redundancy import COLUMNS, PSI, ROWS, intervals, lay_out, shorter_way, squared_step, weigh
+from kin.solvers.srs7.minima import LANE_ROWS, LANES, best_of
+from kin.solvers.srs7.nearest import FARTHER, Work, add_best, add_others, refine
+from kin.solvers.srs7.redundancy import COLUMNS, GRID, ROWS, intervals, lay_out, weigh
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
-_SHORT = 0.05**2  # rad²; a squared step below this is not worth another arm angle
 _LIMIT = TOLERANCES.limit
 _UNBOUND = 1e9  # rad; joint limits that never bind
-# (the requested ψ, NaN for the feasible one nearest to the seed's; whether ψ is chosen so that the joint limits
-# hold where that is possible; whether joint 7 is a redundancy parameter as well, which keeps its seed value;
-# whether branches are left out that cannot be the nearest to the seed inside the limits).
+# (the requested ψ, NaN for the feasible one at which the joints move least from the seed; whether ψ is chosen so
+# that the joint limits hold where that is possible; whether joint 7 is a redundancy parameter as well, which keeps
+# its seed value; whether branches are left out that cannot be the nearest to the seed inside the limits).
 Options = tuple[float, bool, bool, bool]
 
 
@@ -64,38 +65,54 @@ def _least_inside(box: Array, elbow: int, out: Array) -> float:
 
 @jit
 def _elbow(
-    parts: Array, theta4: float, box: Array, request: tuple[float, float, bool, int], W: Array, arcs: Array,
-    found: int, out: Array,
-) -> int:  # fmt: skip
-    """out ``(8, 8)`` ← the four branches with one θ4, canonical; returns the number of intervals.
+    parts: Array, theta4: float, box: Array, request: tuple[float, float, bool, int], work: Work, arcs: Array,
+    found: int, best: float, out: Array,
+) -> tuple[int, float]:  # fmt: skip
+    """out ``(8, 8)`` ← the four branches with one θ4, canonical: (number of intervals, least squared step).
 
     parts: as from `affine`. request: the arm angle that is preferred, the one that is requested or NaN, whether
-    the limits count, and how many joints are to move little.
+    the limits count, and how many joints are to move little. best: the least squared step of other branches.
     """
     preferred, value, respect_limits, joints = request
-    free = math.isnan(value)
+    W, L, _ = work
+    free, lanes, spans, least = math.isnan(value), 0, np.empty((4, 2), dtype=np.int64), np.empty(4)
+    tested = np.empty(4)
     elbow = 1 if theta4 < 0.0 else 0
-    limits, count, filled = lay_out(parts, box, respect_limits, free, W)
+    limits, filled = lay_out(parts, box, respect_limits, preferred if free else math.nan, W)
     # Shoulder and wrist are independent: each is weighed once per arm angle and sign.
-    weigh(parts, 0, 3, filled, box, W)
-    weigh(parts, 1, joints - 4, filled, box, W)
+    singular = weigh(parts, 0, 3, filled, box, W) + weigh(parts, 1, joints - 4, filled, box, W)
     misfit = excess(theta4, box[LOW, 3], box[HIGH, 3])
-    step = _elbow_step(theta4, box)
-    for other in range(4):
-        branch = 4 * (other >> 1) + 2 * elbow + (other & 1)
+    step, grid = _elbow_step(theta4, box), filled - GRID
+    for k in range(4):
+        branch = 4 * (k >> 1) + 2 * elbow + (k & 1)
+        spans[k, 0], row = found, out[branch]
         psi, found = intervals(branch, misfit, limits, preferred, W, arcs, found)
-        row = out[branch]
-        row[7] = psi if free else value
-        angles_at(parts, theta4, branch, row[7], box, row)
-        least = 0.25 * squared_step(row, box, joints) if free else 0.0
-        if least >= 0.25 * _SHORT:
-            # Near sin θ2 = 0 or sin θ6 = 0 an elbow that does not move makes two joints turn against each other.
-            # A small elbow motion keeps them still: another ψ is taken if it at least halves the step.
-            j = shorter_way(branch, (misfit, step), limits, count, respect_limits, least, W)
-            if j >= 0:
-                row[7] = W[PSI, j]
-                angles_at(parts, theta4, branch, row[7], box, row)
-    return found
+        spans[k, 1], row[7], least[k] = found, psi if free else value, math.inf
+        if free and (found > spans[k, 0] or not respect_limits):
+            least[k], tested[k], lanes = add_best(branch, grid, (spans[k, 0], found), psi, W, arcs, lanes, L)
+            best = min(best, least[k] + step)
+    for k in range(4):
+        # The nearest of all branches is looked for everywhere, others from where they are nearest already.
+        if least[k] + step - FARTHER < best:
+            branch, span = 4 * (k >> 1) + 2 * elbow + (k & 1), (spans[k, 0], spans[k, 1])
+            lanes = add_others(
+                (parts, box, joints - 4), branch, (limits, grid), span, best - step, work, arcs, lanes
+            )
+    if lanes > 0:
+        lanes = refine(parts, box, joints - 4, lanes, L)
+    refined, nearest = math.inf, 0
+    for k in range(4):
+        branch = 4 * (k >> 1) + 2 * elbow + (k & 1)
+        out[branch, 7], reached = best_of(branch, out[branch, 7], lanes, L)
+        refined, nearest = min(refined, reached), k if least[k] < least[nearest] else nearest
+    # At one arm angle alone two joints may turn about one line, which is no minimum of a smooth function. Two
+    # branches are one there, so only the nearest one goes to it.
+    if singular > 0 and least[nearest] < refined - _LIMIT:
+        out[4 * (nearest >> 1) + 2 * elbow + (nearest & 1), 7] = tested[nearest]
+    for k in range(4):
+        branch = 4 * (k >> 1) + 2 * elbow + (k & 1)
+        angles_at(parts, theta4, branch, out[branch, 7], box, out[branch])
+    return found, min(best, refined + step)
 
 
 @jit
@@ -110,7 +127,8 @@ def solve(
     """
     value, respect_limits, free_roll, nearest_only = options
     clear(out)
-    M, triangle, W = np.empty((4, 4)), np.empty((4, 3)), np.empty((ROWS, COLUMNS))
+    M, triangle = np.empty((4, 4)), np.empty((4, 3))
+    work = np.empty((ROWS, COLUMNS)), np.empty((LANE_ROWS, LANES)), np.empty((LANE_ROWS, GRID))
     box = _box(arm, seed, lower, upper, free_roll)
     canonical_pose(arm, T, M)
     code, gap = triangle_of(arm, M, triangle)
@@ -122,10 +140,10 @@ def solve(
     first = 1 if nearest_only and bend > 0.0 and _elbow_step(-bend, box) < _elbow_step(bend, box) else 0
     parts, sign = np.empty((2, 3, 3, 3)), sign_of(first, 0)
     affine(arm, M, triangle, sign, parts)
-    found = _elbow(parts, sign * bend, box, request, W, arcs, 0, out)
+    found, best = _elbow(parts, sign * bend, box, request, work, arcs, 0, math.inf, out)
     if bend > 0.0 and not (nearest_only and _elbow_step(-sign * bend, box) > _least_inside(box, first, out)):
         affine(arm, M, triangle, -sign, parts)
-        found = _elbow(parts, -sign * bend, box, request, W, arcs, found, out)
+        found, _ = _elbow(parts, -sign * bend, box, request, work, arcs, found, best, out)
     for branch in range(8):
         for i in range(7):
             out[branch, i] = wrap(out[branch, i] - arm[OFFSET + i])
@@ -136,6 +154,21 @@ def solve(
         for branch in (0, 1, 4, 5):
             copy_row(out, branch, branch + 2)
     return FITS, 0.0, found
+
+
+@jit
+def answer(
+    arm: Array, T: Array, value: float, respect_limits: bool, free_roll: bool, joints: Array, arcs: Array,
+    out: Array, gap: Array,
+) -> int:  # fmt: skip
+    """`solve` without tuples, so that it can be called without type dispatch.
+
+    joints ``(3, 7)``: seed, lower and upper limits. gap ``(1,)`` ← the gap in metres. Returns 256 times the code,
+    and the number of intervals added.
+    """
+    options = value, respect_limits, free_roll, False
+    code, gap[0], count = solve(arm, T, options, joints[0], joints[1], joints[2], arcs, out)
+    return 256 * code + min(count, 255)
 
 
 @jit

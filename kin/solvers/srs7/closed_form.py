@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 
 from kin.axes import inverse, is_along, is_zero, links_by_rows, screw_z
+from kin.kernels.compile import direct
 from kin.robot import Robot
 from kin.solvers.canonical import Geometry7
 from kin.solvers.contract import (
@@ -22,8 +25,8 @@ from kin.solvers.contract import (
 from kin.solvers.names import Names, bent, eight, flipped, front_or_back, names_of, stance_of
 from kin.solvers.singular import JointValue, Singularity, elbow_at, off_line, off_perpendicular, those_within
 from kin.solvers.srs7.batch import branches_many, branches_one
-from kin.solvers.srs7.branches import solve, solve_many
-from kin.solvers.srs7.geometry import TOO_FAR, TOO_NEAR
+from kin.solvers.srs7.branches import answer, solve_many
+from kin.solvers.srs7.geometry import TOO_FAR, TOO_NEAR, arm_angle
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
@@ -31,6 +34,12 @@ NAME = "srs7"
 TITLE = "closed form, S-R-S arm"
 _PSI = RedundancyParameter("psi", "arm angle ψ", circular=True)
 _THETA7 = RedundancyParameter("theta7", "θ7", joint=6)
+
+
+@cache
+def _answer() -> Callable[[Array, Array, float, bool, bool, Array, Array, Array, Array], int]:
+    """`answer` without type dispatch."""
+    return direct(answer, 1, 2, float, bool, bool, 2, 2, 2, 1)
 
 
 def match(robot: Robot) -> Srs7 | None:
@@ -81,13 +90,14 @@ class Srs7(ClosedForm):
         return (_PSI, _THETA7) if task == APPROACH else (_PSI,)
 
     def solve(self, problem: SolverInput) -> Candidates:
-        """All branches, each at the feasible arm angle nearest to the seed's (or at the requested one)."""
+        """All branches, each at the arm angle at which it is nearest to the seed (or at the requested one)."""
         g, free_roll = self.geometry, problem.task == APPROACH
-        out, arcs = np.empty((8, 8)), np.empty((256, 3))
-        options = problem.values[0], problem.respect_limits, free_roll, False
-        code, gap, count = solve(
-            self.kernels.params, problem.T, options, problem.seed, problem.lower, problem.upper, arcs, out
+        out, arcs, gaps, p = np.empty((8, 8)), np.empty((255, 3)), np.empty(1), problem
+        joints = np.array((p.seed, p.lower, p.upper))
+        found = _answer()(
+            self.kernels.params, p.T, p.values[0], p.respect_limits, free_roll, joints, arcs, out, gaps
         )
+        code, count = divmod(found, 256)
         values, all_arcs = out[:, 7:], [arcs[:count]]
         if free_roll:
             # Joint 7 turns the tool about its own axis and nothing else: it stays, or takes the requested value.
@@ -101,11 +111,15 @@ class Srs7(ClosedForm):
             obstacle = Obstacle("wrist centre too far from the shoulder", g.d3 + g.d5)
         elif code == TOO_NEAR:
             obstacle = Obstacle("wrist centre too near to the shoulder", abs(g.d3 - g.d5))
-        return Candidates(out[:, :7], values, tuple(all_arcs), gap, obstacle)
+        return Candidates(out[:, :7], values, tuple(all_arcs), gaps.item(0), obstacle)
 
     def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """The branches of many poses."""
         solve_many(self.kernels.params, T, seeds, lower, upper, q)
+
+    def value_at(self, T: Array, q: Array) -> float:
+        """The arm angle of a configuration."""
+        return float(arm_angle(self.kernels.params, np.array(T), q))
 
     def branch_of(self, q: Array) -> int:
         """The branch a configuration is on: the signs of s2, s4 and s6."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from kin.kernels.compile import jit
 from kin.kernels.fk import sine_cosine
-from kin.solvers.canonical import FOREARM, UPPER_ARM
+from kin.solvers.canonical import FOREARM, OFFSET, UPPER_ARM, canonical_pose
 from kin.solvers.common import HIGH, LOW, NEAR, merged, zyz
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -153,3 +153,12 @@ def seed_arm_angle(arm: Array, theta: Array, triangle: Array) -> float:
     if triangle[SHAPE, 2] == 0.0 and math.sin(theta[3]) < 0.0:
         psi += math.pi
     return psi
+
+
+@jit
+def arm_angle(arm: Array, T: Array, q: Array) -> float:
+    """ψ of a configuration q ``(7,)`` that meets the target T ``(4, 4)``; NaN if the target is out of reach."""
+    M, triangle = np.empty((4, 4)), np.empty((4, 3))
+    canonical_pose(arm, T, M)
+    code, _ = triangle_of(arm, M, triangle)
+    return seed_arm_angle(arm, q + arm[OFFSET:UPPER_ARM], triangle) if code == FITS else math.nan

@@ -1,8 +1,9 @@
 """Kernels that find the feasible intervals of the arm angle ψ and choose a value of it.
 
 A finite set of arm angles decides everything: those where a joint meets a limit, the middles between neighbours
-of these, and those at which some joint keeps its seed value. `lay_out` collects them, `weigh` finds for each how
-far the joints are outside their limits and how far they move, `intervals` and `shorter_way` use that. All of it is
+of these, those at which some joint keeps its seed value, and a grid. `lay_out` collects them, `weigh` finds for
+each how far the joints are outside their limits and how far they move, `intervals` and
+:mod:`kin.solvers.srs7.nearest` use that. All of it is
 one workspace array W ``(ROWS, COLUMNS)``, a column per arm angle, so that the loops are vectorised.
 """
 
@@ -18,9 +19,9 @@ from kin.solvers.common import (
     HIGH,
     LOW,
     NEAR,
+    UNBOUNDED,
     add_extremes,
     lay_probes,
-    nearest_image,
     nearest_in_arcs,
     zyz,
     zyz_conditions,
@@ -30,32 +31,42 @@ from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 # Rows of the workspace W: the arm angle, then for either sign of sin θ2 and of sin θ6 how far the shoulder or the
-# wrist is outside its limits and its squared step from the seed, then the Z-Y-Z angles of one spherical joint.
+# wrist is outside its limits and its squared step from the seed, then the Z-Y-Z angles of one spherical joint, and
+# the cell of the grid that the arm angle is in.
 PSI, SHOULDER_MISFIT, WRIST_MISFIT, SHOULDER_STEP, WRIST_STEP, FIRST = 0, 1, 3, 5, 7, 9
-ROWS, COLUMNS = 12, 160
+CELL, ROWS, COLUMNS = 12, 13, 160
+GRID = 24  # arm angles of the grid, a whole number of vectors
 _CONDITIONS, _VECTOR = 24, 8  # at most 18 of the first; values in a vector of the processor
 _SINGULAR = TOLERANCES.singular
 _LIMIT = TOLERANCES.limit
+_INSET = TOLERANCES.interval_inset
 _PER_TURN = 1.0 / TURN
 
 
 @jit
-def lay_out(parts: Array, box: Array, respect_limits: bool, keep: bool, W: Array) -> tuple[int, int, int]:
-    """W[PSI] ← the arm angles to test. Returns how many come from limits, how many there are, and how many columns
-    are filled: whole vectors, the last ones with copies.
+def lay_out(parts: Array, box: Array, respect_limits: bool, start: float, W: Array) -> tuple[int, int]:
+    """W[PSI] ← the arm angles to test. Returns how many come from limits, and how many columns are filled: whole
+    vectors, the last ones before the grid with copies.
 
-    parts ``(2, 3, 3, 3)``: as from `affine`. Those from limits alternate between limit and middle. `keep` adds
-    those at which a joint keeps its seed value.
+    parts ``(2, 3, 3, 3)``: as from `affine`. Those from limits alternate between limit and middle. Unless `start`
+    is NaN, others are added: those at which a joint keeps its seed value, those on either side of where the image
+    of a joint jumps by a turn, at a limit, and a grid that begins with `start`.
     """
-    psi, rows, breaks = W[PSI], np.zeros((3, _CONDITIONS)), np.empty(64)
+    psi, rows, breaks, ends = W[PSI], np.zeros((3, _CONDITIONS)), np.empty(64), np.empty((2, 7))
     bounds, held = (box[LOW], box[HIGH]), (box[NEAR], box[STAY])
     first = last = 0
+    keep = not math.isnan(start)
     if respect_limits:
         first = zyz_conditions(parts[0], bounds, 0, rows, 0)
         first = last = zyz_conditions(parts[1], bounds, 4, rows, first)
+    wide = last
     if keep:
         last = zyz_conditions(parts[0], held, 0, rows, last)
-        last = zyz_conditions(parts[1], held, 4, rows, last)
+        wide = last = zyz_conditions(parts[1], held, 4, rows, last)
+        for side in range(2 if respect_limits else 0):
+            if _ends_of_wide(box, side, ends):
+                wide = zyz_conditions(parts[0], (ends[0], ends[1]), 0, rows, wide)
+                wide = zyz_conditions(parts[1], (ends[0], ends[1]), 4, rows, wide)
     _roots(rows)
     limits = count = 0
     if respect_limits:
@@ -66,10 +77,37 @@ def lay_out(parts: Array, box: Array, respect_limits: bool, keep: bool, W: Array
         count = _those_that_are(rows, first, last, psi, count)
         count = add_extremes(parts[0], psi, count)
         count = add_extremes(parts[1], psi, count)
+        after = _those_that_are(rows, last, wide, psi, count)
+        for j in range(after - count):
+            psi[after + j] = psi[count + j] + _INSET
+            psi[count + j] -= _INSET
+        count = 2 * after - count
     filled = (count + _VECTOR - 1) // _VECTOR * _VECTOR
     for j in range(count, filled):
         psi[j] = psi[0]
-    return limits, count, filled
+    if keep:
+        for j in range(filled):
+            past = (psi[j] - start) * _PER_TURN
+            W[CELL, j] = min(math.floor((past - math.floor(past)) * GRID), GRID - 1.0)
+        for j in range(GRID):
+            psi[filled + j] = start + j * (TURN / GRID)
+        filled += GRID
+    return limits, filled
+
+
+@jit
+def _ends_of_wide(box: Array, side: int, ends: Array) -> bool:
+    """ends ``(2, 7)`` ← the lower (side 0) or upper limits of the joints that have a turn or more, for
+    `zyz_conditions`, if the image nearest to the seed may be beyond; returns whether there is any.
+    """
+    found = False
+    for i in range(7):
+        width, beyond = box[HIGH, i] - box[LOW, i], abs(box[LOW + side, i] - box[NEAR, i])
+        wide = (TURN <= width < UNBOUNDED) & (beyond < math.pi)
+        ends[0, i] = box[LOW + side, i] if wide else 0.0
+        ends[1, i] = ends[0, i] if wide else 2.0 * TURN
+        found = found or wide
+    return found
 
 
 @jit
@@ -101,7 +139,7 @@ def _those_that_are(rows: Array, first: int, last: int, out: Array, count: int) 
 
 
 @inlined
-def _image(x: float, near: float, low: float, high: float) -> tuple[float, float]:
+def image_of(x: float, near: float, low: float, high: float) -> tuple[float, float]:
     """How far the angle x is outside [low, high] at its best whole turn, and its step from `near`.
 
     The step is that of the image inside the limits, if there is one. Does the same as `kin.solvers.common.excess`
@@ -168,12 +206,13 @@ def _split_singular(parts: Array, joint: int, count: int, box: Array, W: Array) 
 
 
 @jit
-def weigh(parts: Array, joint: int, moving: int, count: int, box: Array, W: Array) -> None:
+def weigh(parts: Array, joint: int, moving: int, count: int, box: Array, W: Array) -> int:
     """Weigh a spherical joint (0 shoulder, 1 wrist) at `count` arm angles, for either sign of sin B.
 
     Rows SHOULDER_… or WRIST_… of W ← how far its angles are outside the limits, and the squared steps from the
     seed of its first `moving` angles. ``Rz(A) Ry(B) Rz(C) = M0 + M1 cos ψ + M2 sin ψ``; the solution with the
-    other sign is A + π, −B, C + π. Every operation is applied to all arm angles at once, as vectors.
+    other sign is A + π, −B, C + π. Every operation is applied to all arm angles at once, as vectors. Returns at
+    how many of them sin B vanishes.
     """
     widest()
     singular = _split(parts, joint, count, box, W)
@@ -189,7 +228,7 @@ def weigh(parts: Array, joint: int, moving: int, count: int, box: Array, W: Arra
             sign = -1.0 if i == 1 and side == 1 else 1.0
             turn = math.pi if i != 1 and side == 1 else 0.0
             for j in range(count):
-                outside, way = _image(sign * W[FIRST + i, j] + turn, near, low, high)
+                outside, way = image_of(sign * W[FIRST + i, j] + turn, near, low, high)
                 W[misfit + side, j] += outside
                 W[step + side, j] += weight * (way * way)
     if singular > 0:
@@ -197,6 +236,7 @@ def weigh(parts: Array, joint: int, moving: int, count: int, box: Array, W: Arra
             if abs(math.sin(W[FIRST + 1, j])) < _SINGULAR:  # both signs are the same solution
                 W[misfit + 1, j] = W[misfit, j]
                 W[step + 1, j] = W[step, j]
+    return singular
 
 
 @jit
@@ -250,39 +290,3 @@ def _with_run(arcs: Array, first: int, found: int, branch: int, psi: Array, run:
         arcs[found, 0], arcs[found, 1], arcs[found, 2] = branch, low, high
         found += 1
     return found
-
-
-@jit
-def shorter_way(
-    branch: int, elbow: tuple[float, float], limits: int, count: int, respect_limits: bool, least: float, W: Array
-) -> int:
-    """The tested arm angle at which the joints move least, if the squared step is below `least`; else −1.
-
-    elbow: how far θ4 is outside its limits, and its squared step. The middles between limits do not count.
-    """
-    elbow_misfit, elbow_step = elbow
-    if respect_limits and elbow_misfit > 0.0:
-        return -1
-    side, flip = branch >> 2, branch & 1
-    moved, turned = W[SHOULDER_STEP + side], W[WRIST_STEP + flip]
-    shorter = 0
-    for j in range(count):
-        shorter += 1 if elbow_step + moved[j] + turned[j] < least else 0
-    best = -1
-    if shorter > 0:
-        shoulder, wrist = W[SHOULDER_MISFIT + side], W[WRIST_MISFIT + flip]
-        for j in range(count):
-            middle = j % 2 == 1 and j < limits
-            way = elbow_step + moved[j] + turned[j]
-            if way < least and not middle and not (respect_limits and shoulder[j] + wrist[j] > 0.0):
-                least, best = way, j
-    return best
-
-
-@jit
-def squared_step(angles: Array, box: Array, joints: int) -> float:
-    """Sum of the squared steps of the first `joints` angles from the seed, each at its best whole turn."""
-    total = 0.0
-    for i in range(joints):
-        total += (nearest_image(angles[i], box[NEAR, i], box[LOW, i], box[HIGH, i]) - box[NEAR, i]) ** 2
-    return total

@@ -257,7 +257,7 @@ def test_images_are_whole_turns_of_the_nearest_ones(robot_id):
         expected = set()
         for s in nearest.solutions:
             spans = [
-                [x + 2 * math.pi * k for k in range(-3, 4) if low <= x + 2 * math.pi * k <= high]
+                [y for y in (x + 2 * math.pi * k for k in range(-3, 4)) if low - 1e-9 <= y <= high + 1e-9]
                 for x, low, high in zip(s.q, robot.lower, robot.upper, strict=True)
             ]
             expected |= {tuple(np.round(image, 9)) for image in itertools.product(*spans)}
