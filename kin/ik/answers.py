@@ -142,7 +142,7 @@ def _missed(problem: IKProblem, branches: Branches, closed: Flags) -> IKResult |
     if form is None or form.off == 0.0 or problem.requested:  # a descent would change a requested value
         return None
     near = nearest.closest(problem, branches.q)
-    if near is not None and nearest.mismatch(near) < _SUSPICIOUS * form.off * size(problem.robot):
+    if near is not None and nearest.mismatch(problem, near) < _SUSPICIOUS * form.off * size(problem.robot):
         found = _by_descents(problem)
         if found is not None and (found.status is Status.SOLVED or not closed.any()):
             return found

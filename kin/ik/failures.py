@@ -189,7 +189,7 @@ def _compromised(
         "roll" if first.compromise == "roll" else "rotation",
         details,
         solutions=solutions,
-        closest=min((*solutions, *filter(None, (closest,))), key=nearest.mismatch),
+        closest=min((*solutions, *filter(None, (closest,))), key=lambda near: nearest.mismatch(problem, near)),
         blocked=blocked,
     )
 
@@ -248,7 +248,7 @@ def _point_restriction(problem: IKProblem, distance: float) -> tuple[Restriction
     nearer, left = nearest.nearest_to_point(free, None)
     if left == 0.0:
         return restriction, "outside"
-    if left > distance - TOLERANCES.same_distance:
+    if left > distance - TOLERANCES.same_distance * problem.unit:
         return None
     return restriction._replace(distance=left), side_of(free, nearer.q)
 
@@ -273,7 +273,7 @@ def side_of(problem: IKProblem, q: Array) -> Cause:
     For a target in a hole, the direction to the nearest point tells which hole it is: straight away from the axis,
     or away from the shoulder.
     """
-    robot = problem.robot
+    robot, same, none = problem.robot, TOLERANCES.same_distance * problem.unit, TOLERANCES.geometry * problem.unit
     first = link_frames(robot, q)[0]
     axis = robot.T_world_base[:3, 2] if robot.convention == "standard" else first[:3, 2]
     foot = robot.T_world_base[:3, 3]
@@ -281,19 +281,15 @@ def side_of(problem: IKProblem, q: Array) -> Cause:
     reached = fk(robot, q)[:3, 3] - shoulder
     target = problem.T[:3, 3] - shoulder
     far, near = float(np.linalg.norm(target)), float(np.linalg.norm(reached))
-    if far > near + TOLERANCES.same_distance:
+    if far > near + same:
         return "too far"
     out = reached - target
     radial = out - axis * float(axis @ out)
-    away = float(out @ target) / far if far > TOLERANCES.geometry else math.inf
+    away = float(out @ target) / far if far > none else math.inf
     off_axis = [float(np.linalg.norm(v - axis * float(axis @ v))) for v in (target, reached)]
-    if (
-        robot.turns_as_one
-        and off_axis[1] > off_axis[0] + TOLERANCES.same_distance
-        and np.linalg.norm(radial) > away - TOLERANCES.geometry
-    ):
+    if robot.turns_as_one and off_axis[1] > off_axis[0] + same and np.linalg.norm(radial) > away - none:
         return "around the axis"
-    return "too near" if far < near - TOLERANCES.same_distance else "outside"
+    return "too near" if far < near - same else "outside"
 
 
 def _blocked(problem: IKProblem, q: Array, order: list[int], branch: Sequence[int]) -> tuple[BlockedBranch, ...]:

@@ -57,7 +57,7 @@ class Found(NamedTuple):
 
     Attributes:
         q: configuration ``(n,)`` inside the limits.
-        error: its distance E from the target, in metres.
+        error: its distance E from the target, in the arm's unit of length.
         starts: number of descents.
     """
 
@@ -83,24 +83,25 @@ def solve_numerically(problem: IKProblem, budget: int = BUDGET) -> Found:
     minimum reached. The search is deterministic.
     """
     out = problem.seed.copy()
-    weight = min(max(_LEVER * problem.robot.reach, _LEAST_LEVER), _MOST_LEVER)
+    weight = min(max(_LEVER * problem.robot.reach / problem.unit, _LEAST_LEVER), _MOST_LEVER)
     search = _search(problem, problem.code, weight)
     error, starts = solve(problem.robot.model, search.goal, search.bounds, budget, search.enough, out)
     if error > search.enough:
         q, errors = out[None], np.array([error])
         if error < _beside(problem):
             more, others = descend_each(problem, problem.code, starting_points(problem), weight)
-            q, errors = np.concatenate([q, more]), np.concatenate([errors, others])
+            q, errors = np.concatenate([q, more]), np.concatenate([errors, others * problem.unit])
         followed = _followed(problem, search, q, errors)
         if followed is not None:
             out, error = followed, 0.0
-    return Found(out, float(error), int(starts))
+    return Found(out, float(error) / problem.unit, int(starts))
 
 
 def _search(problem: IKProblem, code: int, weight: float) -> _Search:
-    """Descents to the target in a task, at so many metres per radian."""
-    goal = (problem.T, code, problem.mask, weight)
-    return _Search(goal, (problem.low, problem.high, problem.turns), _EXACT * min(1.0, weight))
+    """Descents to the target in a task, at so many units of length per radian; what they count in is metres."""
+    goal = (problem.T, code, problem.mask, weight * problem.unit)
+    bounds = (problem.low, problem.high, problem.turns)
+    return _Search(goal, bounds, _EXACT * problem.unit * min(1.0, weight))
 
 
 def _followed(problem: IKProblem, search: _Search, q: Array, errors: Array) -> Array | None:
@@ -149,7 +150,7 @@ def _apart(rows: list[Array]) -> list[Array]:
 def descend(
     problem: IKProblem, code: int, starts: Array, weight: float, enough: float = 0.0
 ) -> tuple[Array, float]:
-    """Best configuration ``(n,)`` over descents from the starts ``(k, n)``, and its error E in metres.
+    """Best configuration ``(n,)`` over descents from the starts ``(k, n)``, and its error E in units of length.
 
     Stops early at E ≤ `enough`, or when `_MEETINGS` descents have ended at the best minimum.
     """
@@ -180,11 +181,14 @@ def descend_each(problem: IKProblem, code: int, starts: Array, weight: float) ->
 def _descend(
     problem: IKProblem, code: int, starts: Array, weight: float, enough: float, meetings: int
 ) -> tuple[Array, Array]:
-    """Where the descents end ``(m, n)``, and their errors ``(m,)``; m < k if the search stopped early."""
+    """Where the descents end ``(m, n)``, and their errors ``(m,)``; m < k if the search stopped early.
+
+    Errors are in the arm's unit of length, as is `enough`.
+    """
     q, errors = np.array(starts, order="C"), np.empty(len(starts))
     goal, bounds, _ = _search(problem, code, weight)
-    count = each_of(problem.robot.model, goal, bounds, enough, meetings, q, errors)
-    return q[:count], errors[:count]
+    count = each_of(problem.robot.model, goal, bounds, enough * problem.unit, meetings, q, errors)
+    return q[:count], errors[:count] / problem.unit
 
 
 def starting_points(problem: IKProblem, candidates: Array | None = None, count: int = STARTS) -> Array:
@@ -222,9 +226,9 @@ def polish(problem: IKProblem, q: Array, stats: Array) -> Flags:
     target exactly, and so its orientation too badly.
     """
     position, rotation = problem.requirement.position, problem.requirement.rotation
-    near_miss = max(TOLERANCES.near_miss, _NEAR * (position + rotation))
+    near_miss = max(TOLERANCES.near_miss, _NEAR * (position / problem.unit + rotation))
     good = np.zeros(len(q), dtype=bool)
-    miss = stats[:, POSITION_ERROR] + stats[:, ROTATION_ERROR]
+    miss = stats[:, POSITION_ERROR] / problem.unit + stats[:, ROTATION_ERROR]
     if problem.respect:
         miss = miss + stats[:, OVERRUN]
     for i in np.flatnonzero(miss < near_miss).tolist():
@@ -251,16 +255,16 @@ def closest(problem: IKProblem, candidates: Array | None) -> IKSolution | None:
     q = ends[_best(errors)]
     if not _is_decided(problem):
         search = _search(problem, problem.code, ORIENTATION_WEIGHT)
-        followed = _followed(problem, search, ends, errors)
+        followed = _followed(problem, search, ends, errors * problem.unit)
         if followed is not None and (problem.branches is None or problem.allows(problem.branch_of(followed))):
             q = followed
     found, stats = measure(problem, q[None])
     return solution(problem, found[0], stats[0], compromise="closest")
 
 
-def mismatch(found: IKSolution) -> float:
+def mismatch(problem: IKProblem, found: IKSolution) -> float:
     """The distance E in metres that `closest` minimises."""
-    return math.hypot(found.position_error, ORIENTATION_WEIGHT * found.rotation_error)
+    return math.hypot(found.position_error, ORIENTATION_WEIGHT * problem.unit * found.rotation_error)
 
 
 def is_exact(problem: IKProblem, found: IKSolution) -> bool:
@@ -277,13 +281,13 @@ def nearest_to_point(problem: IKProblem, known: IKSolution | None) -> tuple[IKSo
 
     For a mask, only the coordinates of the point that it keeps count.
     """
-    if known is not None and (known.position_error <= TOLERANCES.closure_position or problem.code == MASK):
+    if known is not None and (known.position_error <= problem.closure or problem.code == MASK):
         return known, known.position_error if problem.code == MASK else 0.0
     starts = starting_points(problem, None if known is None else known.q[None], _MOST_STARTS)
     q, distance = descend(problem, POSITION, starts, 1.0, enough=1e-11)
     found, stats = measure(problem, q[None])
     closest_point = solution(problem, found[0], stats[0], compromise="closest")
-    return closest_point, 0.0 if distance <= TOLERANCES.point_met else distance
+    return closest_point, 0.0 if distance <= TOLERANCES.point_met else distance * problem.unit
 
 
 def _different_minima(errors: Array, same: float) -> list[int]:
@@ -323,7 +327,7 @@ def nearest_orientation(problem: IKProblem, candidates: Array | None) -> IKSolut
     known = solve_branches(problem, T, APPROACH if problem.robot.n < 6 else POSE, q)
     if known is not None:
         miss = np.abs(known.q - q).max(axis=1)
-        miss[~(known.stats[:, POSITION_ERROR] <= TOLERANCES.closure_position)] = math.inf
+        miss[~(known.stats[:, POSITION_ERROR] <= problem.closure)] = math.inf
         if problem.respect:
             miss[known.stats[:, OVERRUN] > 0.0] = math.inf
         best = int(np.argmin(miss))

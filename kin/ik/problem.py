@@ -25,6 +25,7 @@ from kin.robot import Robot
 from kin.solvers.common import TURN
 from kin.solvers.contract import POSITION, ClosedForm, RedundancyParameter
 from kin.solvers.locked import form_with_locked
+from kin.solvers.scaled import unit_of
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array, as_transform, finite_array
 
@@ -61,6 +62,8 @@ class IKProblem:
         branches: the requested rows, None for all.
         target_error: how rounded the target is, if that matters.
         stop: called now and then by long computations; raises to cancel them.
+        unit: metres that stand for one where lengths are judged to be none; not 1.0 for an arm that is much
+            smaller or larger, see :mod:`kin.solvers.scaled`.
     """
 
     robot: Robot
@@ -83,6 +86,7 @@ class IKProblem:
     branches: frozenset[int] | None
     target_error: float = 0.0
     stop: Callable[[], None] = never_cancel
+    unit: float = 1.0
 
     @classmethod
     def of(
@@ -128,7 +132,7 @@ class IKProblem:
         turns the tool by a larger angle to meet it.
         """
         options = self.options
-        position = options.position_tolerance or max(TOLERANCES.closure_position, 2.0 * self.target_error)
+        position = options.position_tolerance or max(self.closure, 2.0 * self.target_error)
         rotation = options.rotation_tolerance or max(TOLERANCES.closure_rotation, self.target_error / _LEVER)
         return Requirement(
             self.robot.model,
@@ -141,6 +145,11 @@ class IKProblem:
             position,
             rotation,
         )
+
+    @property
+    def closure(self) -> float:
+        """The largest position error in metres of what meets a point exactly."""
+        return TOLERANCES.closure_position * self.unit
 
     @cached_property
     def free(self) -> Whole:
@@ -229,6 +238,7 @@ def prepare(robot: Robot, options: IKOptions) -> IKProblem:
         redundancies=redundancies,
         values=values,
         branches=_requested_branches(robot, options, closed_form),
+        unit=unit_of(robot),
     )
     _ = problem.requirement, problem.free  # computed here, so that all copies share them
     return problem

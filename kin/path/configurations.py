@@ -46,7 +46,7 @@ def meeting(problem: IKProblem, relaxed: bool, q: Array, near: Array) -> Array:
         q = q[[problem.allows(i % count) for i in range(len(q))]]
     q, stats = measure(problem, q[~np.isnan(q[:, 0])], near)
     good = _meets(problem, stats)
-    miss = stats[:, POSITION_ERROR] + stats[:, ROTATION_ERROR] + stats[:, OVERRUN]
+    miss = stats[:, POSITION_ERROR] / problem.unit + stats[:, ROTATION_ERROR] + stats[:, OVERRUN]
     close = np.flatnonzero(~good & (miss < TOLERANCES.near_miss))[:8]
     if len(close):
         missed, figures = q[close], stats[close]

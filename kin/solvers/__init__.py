@@ -34,6 +34,7 @@ from kin.solvers import (
 from kin.solvers.contract import APPROACH, ClosedForm
 from kin.solvers.reversed import ReversedJoints, readings
 from kin.solvers.rounded import Rounded, Rounded7, intended_arm
+from kin.solvers.scaled import Scaled, in_unit, unit_of
 
 FAMILIES: tuple[Callable[[Robot], ClosedForm | None], ...] = (
     wrist5.match,
@@ -71,9 +72,16 @@ def closed_form_of(robot: Robot) -> ClosedForm | None:
 
     A table that is rounded gets the family that was meant. Where no family fits then either, or the table is far
     from it, a general solver takes the arm. One with rows that follow joints is solved by that of its free arm,
-    where the joints decide which of its configurations they can make.
+    where the joints decide which of its configurations they can make. One that is much smaller or larger than a
+    metre is solved in another unit of length.
     """
-    return coupled.match(robot, closed_form_of) if robot.coupled else _closed_form(robot, GENERAL)
+    if robot.coupled:
+        return coupled.match(robot, closed_form_of)
+    unit = unit_of(robot)
+    if unit == 1.0:
+        return _closed_form(robot, GENERAL)
+    form = closed_form_of(in_unit(robot, unit))
+    return None if form is None else Scaled(form, robot, unit)
 
 
 def family_of(robot: Robot) -> str:
