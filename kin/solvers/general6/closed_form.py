@@ -37,6 +37,7 @@ from kin.solvers.general6.opposite import OppositeKernels, loop_with_opposite_sl
 from kin.solvers.general6.orders import Reading, readings
 from kin.solvers.numeric import each_of
 from kin.solvers.singular import Singularity, by_jacobian, those_within
+from kin.tolerances import TOLERANCES
 from kin.transforms import Array
 
 NAME = "general6"
@@ -60,6 +61,7 @@ _STEPS = tuple(
 _MASK = np.array([1.0] * 6 + [0.0])
 _MET, _SAME = 1e-10, 1e-6
 _JOINTS = np.arange(6)
+_COPIES = 1e-3  # rad, m: farther apart are no copies of one solution, whatever its multiplicity
 SolveAll = Callable[[Array, Array, Array], int]
 # Beside curves: random starts of each of two searches, rows that are compared.
 _STARTS, _MOST_ROWS = 40, 60
@@ -198,7 +200,28 @@ class General6(ClosedForm):
         return Candidates(out, values, tuple(ranges), completeness=completeness)
 
     def add_missing(self, T: Array, near: Array, q: Array) -> Completeness:
-        """q ``(16, 6)`` ← all solutions; how it is known that these are all."""
+        """q ``(16, 6)`` ← all solutions, a multiple one once; how it is known that these are all."""
+        known = self._all(T, near, q)
+        if known != "proved":
+            self._merge_copies(T, q)
+        return known
+
+    def _merge_copies(self, T: Array, q: Array) -> None:
+        """Leave one of the copies into which rounding splits a multiple solution, of q ``(16, 6)``, in place.
+
+        What is between two copies meets the target as well as they do; between two solutions nothing does.
+        """
+        rows = np.flatnonzero(~np.isnan(q[:, 0])).tolist()
+        for k, i in enumerate(rows):
+            close = [j for j in rows[:k] if not math.isnan(q[j, 0]) and _apart(self.robot, q[j], q[i]) < _COPIES]
+            off = q[close] - q[i]
+            off = np.where(self.robot.revolute, (off + math.pi) % TURN - math.pi, off)
+            miss = np.abs(fk(self.robot, q[i] + 0.5 * off) - T).max(axis=(1, 2), initial=0.0)
+            if (miss < TOLERANCES.closure_position).any():
+                q[i] = math.nan
+
+    def _all(self, T: Array, near: Array, q: Array) -> Completeness:
+        """`add_missing`, with the copies of multiple solutions."""
         known = self._solve_all(T, q)
         rows = q[~np.isnan(q[:, 0])]
         if curves_among(self.robot, T, POSE, _JOINTS, rows, list(range(len(rows))))[0]:

@@ -71,6 +71,18 @@ TX2 = arm(
     (0, 0, 0.05, PI / 2),
     (0, 0.1, 0, 0),
 )
+LITE = kin.Robot.from_dh(
+    [
+        (0.0, 0.2433, 0.0, PI / 2),
+        (PI / 2, 0.03, 0.28, PI),
+        (PI / 2, 0.02, 0.0, PI / 2),
+        (PI / 2, 0.245, 0.0, PI / 2),
+        (PI, 0.057, 0.0, PI / 2),
+        (PI / 2, 0.235, 0.0, 0.0),
+    ],
+    robot_id="lite",
+    source="the published table of the Gen3 lite",
+)
 SQUARE = arm(
     "right angles",
     (0, 0.3, 0.1, PI / 2),
@@ -254,3 +266,28 @@ def test_zeros_and_right_angles_are_no_special_case(robot, q):
     result = kin.solve_ik(robot, kin.fk(robot, q), q_seed=q)
     assert result.status is Status.SOLVED
     assert np.abs(kin.fk(robot, result.solutions[0].q) - kin.fk(robot, q)).max() < 1e-9
+
+
+def test_a_multiple_root_is_one_posture():
+    """Elbow at a right angle, all others at zero: rounding splits the root."""
+    q = np.array([0.0, 0.0, PI / 2, 0.0, 0.0, 0.0])
+    T = kin.fk(LITE, q)
+    near = [s for s in kin.solve_ik(LITE, T, q_seed=np.full(6, 0.3)).solutions if apart(s.q, q) < 1e-2]
+    assert len(near) == 1
+    assert apart(near[0].q, q) < 1e-6
+
+
+def test_two_postures_beside_a_fold_are_two():
+    rng = np.random.default_rng(4)
+    a, b = JACO.random_q(rng, 40)[2:4]  # the determinant changes its sign between them
+    determinants = [np.linalg.det(kin.jacobian(JACO, a + x * (b - a))) for x in np.linspace(0.0, 1.0, 60)]
+    k = int(np.flatnonzero(np.diff(np.sign(determinants)))[0])
+    low, high = k / 59, (k + 1) / 59
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        same = np.linalg.det(kin.jacobian(JACO, a + middle * (b - a))) * determinants[k] > 0.0
+        low, high = (middle, high) if same else (low, middle)
+    fold = a + low * (b - a)
+    off = 3e-4 * np.linalg.svd(kin.jacobian(JACO, fold))[2][5]
+    found = kin.solve_ik(JACO, kin.fk(JACO, fold + off), q_seed=fold, respect_limits=False).solutions
+    assert sum(apart(s.q, fold) < 2e-3 for s in found) == 2
