@@ -91,6 +91,15 @@ class KernelCompiler:
         self._end_idle()
 
     def _ask(self, line: str) -> bool:
+        try:
+            return self._compiled(line)
+        finally:
+            with self._lock:
+                del self._answers[line]
+            if self._stopped:
+                self._end_idle()
+
+    def _compiled(self, line: str) -> bool:
         with self._lock:
             if self._stopped:
                 raise CompilerStoppedError
@@ -101,7 +110,6 @@ class KernelCompiler:
             child = self.child
         done = _answer(child, line) == DONE
         with self._lock:
-            del self._answers[line]
             if not done:
                 kill(child)
                 self.child = None
