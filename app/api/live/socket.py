@@ -80,7 +80,7 @@ async def _find(lines: Lines, tries: Tries, client: str, code: str) -> Line:
             return line
         if code not in RESERVED:  # its page is not open yet
             tries.wrong(client)
-        expected = "the code of an open page" if is_code(code) else "8 replies and digits, such as K7QF-2M4A"
+        expected = "the code of an open page" if is_code(code) else "8 letters and digits, such as K7QF-2M4A"
         error = FieldError(field="code", value=show(show_code(code)), expected=expected)
         hint = "Press Connect a program in the tab Program of the page; the code is there."
         detail = f"No page has the code {show_code(code)}."
