@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 from inspect import getsourcefile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from constructs import REFUSED, RIGHT, fresh
 from numba import njit
 from playwright._impl._driver import compute_driver_executable
 
+import kin
 from kin.codegen import c, js
 from kin.codegen.rooms import Rooms
 from kin.codegen.source import OutsideSubsetError
@@ -96,6 +99,20 @@ def test_what_is_accepted_means_the_same_in_javascript(tmp_path):
     file.write_text(f'"use strict";\n{js.unit(program)}\n{run}\n')
     node = compute_driver_executable()[0]
     same_bits(subprocess.run([node, file], check=True, capture_output=True, text=True).stdout)
+
+
+def test_no_module_loads_the_translator_before_it_is_called():
+    root = Path(kin.__file__).parents[1]
+    importing = [
+        path
+        for folder in ("kin", "app")
+        for path in (root / folder).rglob("*.py")
+        if path.parent.name != "codegen" and "kin.codegen" in (text := path.read_text(encoding="utf-8"))
+        for node in ast.parse(text).body
+        if isinstance(node, ast.Import | ast.ImportFrom) and "kin.codegen" in ast.unparse(node)
+    ]
+    assert importing == []
+    assert "from kin.codegen.files import generate" in (root / "kin/__init__.py").read_text(encoding="utf-8")
 
 
 @pytest.mark.full
