@@ -169,6 +169,8 @@ class _Builder(Calls):
 
     def statement(self, node: ast.stmt) -> list[Statement]:
         match node:
+            case ast.Assign(targets=[ast.Name() as target], value=ast.BinOp(left=ast.Call()) as sum_):
+                return self.in_order(node, target, sum_)
             case ast.Assign(targets=[target]):
                 return self.assign(node, target, self.expr(node.value))
             case ast.Assign():
@@ -197,6 +199,14 @@ class _Builder(Calls):
             case ast.Break() | ast.Continue():
                 return [Leave(node, type(node).__name__.lower())]
         raise self.refuse(node, *subset.statement(node))
+
+    def in_order(self, node: ast.stmt, target: ast.Name, sum_: ast.BinOp) -> list[Statement]:
+        """``x = f(…) + g(…)``: by way of a new variable where both calls write to arrays."""
+        a, b, first = self.expr(sum_.left), self.expr(sum_.right), list[Statement]()
+        if isinstance(a, Call) and a.callee.written and any(isinstance(e, Call) for e in walk(b)):
+            first = self.assign(node, self.fresh(), a)
+            a = Variable(a.kind, _name_of(first[0]))
+        return [*first, *self.assign(node, target, self.operation(sum_, type(sum_.op), a, b))]
 
     def fresh(self) -> ast.Name:
         """A variable that the source does not have."""

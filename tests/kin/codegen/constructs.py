@@ -531,6 +531,11 @@ def nested_calls(x, y, a):
     return a[0] + (1.0 if np.isfinite(a).all() else 0.0)
 
 
+def writers_in_order(x, y, a):
+    n = get(a) + (2.0 if put(a, 0, 7.0) else 0.0)
+    return n + a[0]
+
+
 def library(x, y, a):
     return math.sqrt(abs(x)) + math.floor(-x) + math.ceil(y) + math.fabs(x) + math.pi
 
@@ -539,7 +544,7 @@ RIGHT = (
     negative_index, floor_large, zero_of_whole_numbers, shift, powers, quotients, least_and_most, rounded, both_conditions,
     loop_variable, range_that_changes, slices, conditions, chosen, truth_in_sums, tables, signs_and_brackets,
     bits_of_words, complex_numbers, arrays_of_all_kinds, swapped, chained, named_tuple, returned_array, passed_kernel,
-    whole_arrays, nested_calls, library,
+    whole_arrays, nested_calls, library, writers_in_order,
 )  # fmt: skip
 for each in list(globals().values()):
     if callable(each) and getattr(each, "__module__", "") == __name__ and not isinstance(each, type):
