@@ -25,7 +25,7 @@ from kin.solvers.contract import (
     SolverInput,
     weakest,
 )
-from kin.solvers.general7.motion import end_of_motion
+from kin.solvers.general7.motion import end_of_motion, nearest_on_motion, to_images
 from kin.solvers.reduced import fixed
 from kin.solvers.reversed import WrappedKernels
 from kin.solvers.singular import Singularity, by_jacobian, those_within
@@ -34,10 +34,14 @@ from kin.transforms import Array
 
 NAME = "general7"
 TITLE = "all solutions, seven revolute joints of which one is given"
-_SCAN = 64  # values that are tried where none near the seed's is feasible
+_SCAN = 64  # values that are tried where the nearest solution, or any feasible one, is looked for
 # Samples of a turn for the ranges of all solutions, and between two of them where solutions come close to the
 # limits; how close (rad, all joints together); motion between two samples that counts as going on (rad).
 _SAMPLES, _FINER, _CLOSE, _SAME_MOTION = 144, 12, 0.3, 0.3
+# Of the search for the nearest solution: parts of what is between two values where it is looked at closely, how
+# near what is there has to be, self-motions that are followed, how far from those before they begin, and how much
+# farther from the seed than the nearest one (rad).
+_PARTS, _NEARER, _DOWNHILL, _SAME_START, _BEYOND = 6, 0.3, 12, 0.2, 1.0
 
 
 Match = Callable[[Robot], ClosedForm | None]
@@ -59,6 +63,13 @@ def match(robot: Robot, form_of: Match, family_of: Match) -> General7 | None:
     if first := family_of(without_first) if last is not None else form_of(without_first):
         return General7(robot, 0, first)
     return None if last is None else General7(robot, 6, last)
+
+
+def _is_beside(q: Array, start: Array, end: Array) -> bool:
+    """Whether a configuration is near the segment between two others."""
+    along, to = end - start, q - start
+    share = min(max(float(to @ along) / max(float(along @ along), 1e-12), 0.0), 1.0)
+    return bool(np.abs(to - share * along).max() < _SAME_START)
 
 
 class _Fold:
@@ -128,15 +139,17 @@ class General7(ClosedForm):
         return rolled.parameters(self._parameter) if task == APPROACH else (self._parameter,)
 
     def solve(self, problem: SolverInput) -> Candidates:
-        """All solutions at the seed's value of the given joint, or as requested, and the ranges around it.
+        """All solutions at one value of the given joint, requested or that of the nearest one, and their ranges.
 
-        Where none of them is inside the limits, the feasible value nearest to the seed's is looked for.
+        Where none is found inside the limits, the feasible value nearest to the seed's is looked for.
         """
         if problem.task == APPROACH:
             return rolled.solve_approach(self, problem, self._roll)
         p, requested = problem, problem.values[0]
         low, high = float(p.lower[self.given]), float(p.upper[self.given])
         value = min(max(float(p.seed[self.given]), low), high) if math.isnan(requested) else requested
+        if math.isnan(requested):
+            value = self._value_of_nearest(p, value)
         out = self._at(p, np.array([value]))[0]
         if math.isnan(requested) and p.respect_limits and not self._inside(p, out).any():
             value, out = self._nearest_value(p, value, out)
@@ -146,6 +159,44 @@ class General7(ClosedForm):
         arcs = self._ranges(p, out) if p.respect_limits else np.empty((0, 3))
         further = (lambda: self._all_ranges(p)) if p.respect_limits else None
         return Candidates(out, values, (arcs,), completeness=completeness, further=further)
+
+    def _value_of_nearest(self, problem: SolverInput, value: float) -> float:
+        """The value of the given joint at the solution nearest to the seed; `value` if none is found.
+
+        Samples of a turn tell where solutions are; from the nearest ones self-motions are followed downhill.
+        """
+        p, i = problem, self.given
+        low, high = turn_around(float(p.lower[i]), float(p.upper[i]), value)
+        tried = np.unique(np.append(np.linspace(low, high, _SCAN), value))
+        found, lower, upper = self._at(p, tried), *(np.clip(x, -UNBOUNDED, UNBOUNDED) for x in (p.lower, p.upper))
+        q = found.reshape(-1, 7)
+        squares, outside = np.empty(len(q)), self._outside(p, found)
+        apart = np.linalg.norm((found - p.seed + math.pi) % TURN - math.pi, axis=-1)  # at least
+        to_images(q, p.seed, lower, upper, i, squares)
+        # Where solutions begin to exist, or come close to the limits, there may be nearer ones between two values.
+        near = apart < math.sqrt(squares.min()) + _NEARER
+        close, there = ((outside > 0.0) & (outside < _CLOSE) & near).any(axis=1), np.isfinite(apart).sum(axis=1)
+        folds = (there[1:] != there[:-1]) & (near[1:] | near[:-1]).any(axis=1)
+        cells = np.flatnonzero(folds | close[1:] | close[:-1])
+        shares = np.arange(1, _PARTS) / _PARTS
+        more = self._at(p, (tried[cells, None] + np.diff(tried)[cells, None] * shares).ravel()).reshape(-1, 7)
+        further = np.empty(len(more))
+        to_images(more, p.seed, lower, upper, i, further)
+        q, squares = np.concatenate([q, more]), np.concatenate([squares, further])
+        best, least = value, math.inf
+        walked: list[tuple[Array, Array]] = []
+        for k in np.argsort(squares).tolist():
+            if not math.sqrt(squares[k]) < math.sqrt(least) + _BEYOND or len(walked) == _DOWNHILL:
+                break
+            # A start beside a motion that has been followed ends where that one does.
+            if any(_is_beside(q[k], *ends) for ends in walked):
+                continue
+            start = q[k].copy()
+            distance = nearest_on_motion(self.robot.model, p.T, i, q[k], p.seed, lower, upper)
+            walked.append((start, q[k]))
+            if distance < least:
+                best, least = float(q[k, i]), distance
+        return best
 
     def _at(self, problem: SolverInput, values: Array) -> Array:
         """All solutions ``(N, rows, 7)`` at these values of the given joint."""

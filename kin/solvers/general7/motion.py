@@ -12,6 +12,7 @@ import numpy as np
 
 from kin.kernels.compile import jit
 from kin.kernels.jacobian import jacobian_into
+from kin.solvers.common import nearest_image
 from kin.solvers.numeric.error import relative_pose
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -22,6 +23,8 @@ _LEAST = 1e-10  # rad: a shorter step ends the motion
 _NEWTON = 6
 _THERE = 1e-12
 _STEPS = 2000
+# Of motions downhill: the longest step and one that does not count, rad of the moved joint; the most steps.
+_STRIDE, _CLOSE, _DOWNHILL = 0.3, 1e-5, 60
 _LIMIT = TOLERANCES.limit
 
 
@@ -125,3 +128,70 @@ def end_of_motion(
         else:
             step *= 0.5
     return float(at[joint])
+
+
+@jit
+def nearest_on_motion(
+    model: Array, target: Array, joint: int, q: Array, seed: Array, lower: Array, upper: Array
+) -> float:
+    """Move q ``(7,)``, in place, along its self-motion to where it is nearest to the seed, inside the limits.
+
+    Downhill only, from a configuration that meets the target; returns the squared distance there.
+    """
+    J, T, axes, e, x = np.empty((6, 7)), np.empty((4, 4)), np.empty((7, 7)), np.empty(6), np.empty(7)
+    there, most, step, before = np.empty(7), _STRIDE, 0.0, 0.0
+    least = _squared(q, seed)
+    for _ in range(_DOWNHILL):
+        if step != 0.0 or before == 0.0:
+            jacobian_into(model, q, J, T, axes)
+            for r in range(6):
+                e[r] = -J[r, joint]
+            if not _solved(J, joint, e, x):
+                break
+            down, rate = q[joint] - seed[joint], 1.0
+            for i in range(7):
+                down += (q[i] - seed[i]) * x[i]
+                rate += x[i] * x[i]
+            # The secant of the derivative where it rises, else the squared rate of the joints.
+            slope = (down - before) / step if step != 0.0 else 0.0
+            wanted = -down / (slope if slope > 0.1 * rate else rate)
+            before = down
+        # The other joints go no farther than a step of `_moved` may.
+        most = min(most, 0.8 * _MOST / math.sqrt(rate))
+        step = min(max(wanted, -most), most)
+        if abs(step) < _CLOSE:
+            break
+        nearer = _moved(model, target, joint, step, q, there) and _inside(there, lower, upper)
+        distance = _squared(there, seed) if nearer else math.inf
+        if distance < least:
+            least, most = distance, _STRIDE
+            for i in range(7):
+                q[i] = there[i]
+        else:
+            most, step = 0.4 * abs(step), 0.0
+    return least
+
+
+@jit
+def _squared(q: Array, seed: Array) -> float:
+    total = 0.0
+    for i in range(q.shape[0]):
+        total += (q[i] - seed[i]) ** 2
+    return total
+
+
+@jit
+def to_images(q: Array, seed: Array, lower: Array, upper: Array, joint: int, squares: Array) -> None:
+    """Bring configurations q ``(k, 7)``, in place, to the whole turns inside the limits nearest to the seed.
+
+    The given joint stays. squares ``(k,)`` ← the squared distance from the seed; infinity for those that do not
+    exist or are outside the limits.
+    """
+    for k in range(q.shape[0]):
+        squares[k] = 0.0 if q[k, 0] == q[k, 0] else math.inf
+        for i in range(7):
+            if squares[k] < math.inf:
+                if i != joint:
+                    q[k, i] = nearest_image(q[k, i], seed[i], lower[i], upper[i])
+                outside = q[k, i] < lower[i] - _LIMIT or q[k, i] > upper[i] + _LIMIT
+                squares[k] += math.inf if outside else (q[k, i] - seed[i]) ** 2

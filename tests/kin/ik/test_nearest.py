@@ -18,6 +18,7 @@ from kin.solvers.contract import POSE
 
 TURN = 2.0 * math.pi
 LIMIT = 1e-9
+ANY = ("gen3", "baxter", "sawyer")  # solved at values of their last joint
 SEVEN = ("redundant7", "redundant7-craig", "iiwa14", "iiwa7", "panda", "fr3", "xarm7")
 
 
@@ -66,6 +67,22 @@ def check_nearest(name, targets, values):
         assert best.position_error < 1e-9
         assert best.rotation_error < 1e-9
         assert best.in_limits
+
+
+@pytest.mark.parametrize("name", ANY)
+def test_the_nearest_solution_of_any_seven_joints_is_found(name):
+    check_nearest(name, 4, 100)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ANY)
+def test_of_many_targets_of_any_seven_joints_hardly_one_has_a_nearer_solution(name):
+    """A search: an interval narrower than a sample may be missed."""
+    robot, missed = kin.get_robot(name), 0
+    for target, seed in zip(*cases(robot, 200), strict=True):
+        best = kin.solve_ik(robot, target, q_seed=seed).best
+        missed += best.distance > least_distance(robot, target, seed, 400) + 1e-3
+    assert missed <= 4
 
 
 @pytest.mark.parametrize("name", SEVEN)
