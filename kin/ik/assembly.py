@@ -18,7 +18,7 @@ from kin.ik.options import Frame
 from kin.ik.problem import IKProblem
 from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
 from kin.singularity import Singularity, singularities_at
-from kin.solvers.contract import APPROACH, MASK, POSITION, ClosedForm, Completeness, weakest
+from kin.solvers.contract import APPROACH, MASK, POSITION, ClosedForm, Completeness, is_complete, weakest
 from kin.solvers.curves import curves_among
 from kin.solvers.numeric import spread
 from kin.tolerances import TOLERANCES
@@ -125,7 +125,7 @@ class Found:
     def details(self) -> Solved:
         """How many solutions there are, and what the task leaves free."""
         problem, names = self._problem, form_of(self._problem).branches
-        redundancy, complete = self.redundancies()[1], self.completeness != "unknown"
+        redundancy, complete = self.redundancies()[1], is_complete(self.completeness)
         postures = len({names[row] for row in self._order})
         if not redundancy and problem.options.redundancy is None:
             return Solved(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from kin.ik.details import Details, LimitViolation, OutOfReach, Redundancy
 from kin.ik.messages import Explanation, explain, rounded_target
-from kin.solvers.contract import Completeness
+from kin.solvers.contract import Completeness, is_complete
 from kin.solvers.singular import Singularity
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array
@@ -141,8 +141,9 @@ class IKResult(Deferred):
             ``orientation``), None if none was found.
         blocked: every posture that is outside the limits, the closest to them first (status ``limits``).
         completeness: how it is known that there is no further posture on the requested branches: ``"proved"`` by
-            the derivation of a closed form or by a certificate for this target, ``"agreed"`` if independent ways
-            found the same, or ``"unknown"``, as after a numeric search, which may miss some.
+            the derivation of a closed form or by a certificate for this target, ``"agreed"`` if two independent
+            ways found the same, ``"searched"`` if one way looked everywhere, or ``"unknown"``, as after a numeric
+            search, which may miss some.
         tolerances: errors that count as none, metres and radians; larger than 1e-9 if that was asked for, or for a
             target of few digits.
         target_error: how rounded the entries of the target are, if its rotation had to be made one or, for an arm
@@ -180,7 +181,7 @@ class IKResult(Deferred):
     @property
     def complete(self) -> bool:
         """Whether there is no further posture on the requested branches, proved or agreed."""
-        return self.completeness != "unknown"
+        return is_complete(self.completeness)
 
     @property
     def best(self) -> IKSolution | None:

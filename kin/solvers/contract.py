@@ -14,7 +14,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,12 +39,14 @@ ObstacleCode = Literal[
     "point",
     "given joint values",
 ]
-Completeness = Literal["proved", "agreed", "unknown"]
+Completeness = Literal["proved", "agreed", "searched", "unknown"]
 """How it is known that no configuration is missing.
 
 ``proved``: by the derivation of a closed form, or by a certificate that was checked for this target. ``agreed``:
-not proved, but independent ways have found the same configurations. ``unknown``: some may be missing.
+not proved, but two independent ways have found the same configurations. ``searched``: one way has looked
+everywhere, and nothing else has confirmed it. ``unknown``: some may be missing.
 """
+_STRENGTHS: tuple[Completeness, ...] = get_args(Completeness)
 One = Callable[[Array, Array, float, Array, Array], bool]
 Many = Callable[[Array, Array, Array, Array, Array], None]
 
@@ -159,7 +161,12 @@ class BatchKernels:
 
 def weakest(*known: Completeness) -> Completeness:
     """What is known of configurations of which each of several parts is known so."""
-    return "unknown" if "unknown" in known else "agreed" if "agreed" in known else "proved"
+    return max(known, key=_STRENGTHS.index)
+
+
+def is_complete(known: Completeness) -> bool:
+    """Whether that is enough to say that no configuration is missing."""
+    return known in ("proved", "agreed")
 
 
 class ClosedForm(ABC):

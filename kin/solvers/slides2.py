@@ -185,7 +185,7 @@ class Slides2(SlidesForm):
         there = ~np.isnan(q[:, 0])
         obstacle = None if there.any() else Obstacle("point")
         regular = _surely_regular(self.kernels.params, q) or not (self._smallest(q[there]) < REGULAR).any()
-        return Candidates(q, np.empty((2, 0)), (), 0.0, obstacle, "proved" if regular else "agreed")
+        return Candidates(q, np.empty((2, 0)), (), 0.0, obstacle, "proved" if regular else "searched")
 
     def solve_many(self, T: Array, seeds: Array, lower: Array, upper: Array, q: Array) -> None:
         """Both configurations of many targets."""

@@ -95,8 +95,8 @@ class IkAnswer(Answer):
     parameters and whole turns do not count."""
     completeness: Completeness
     """How that is known. "proved": by the derivation of a closed form, or by a certificate that was checked for
-    this target. "agreed": independent ways found the same postures. "unknown": some may be missing, as after a
-    numeric search."""
+    this target. "agreed": two independent ways found the same postures. "searched": one way looked
+    everywhere, and nothing else has confirmed it. "unknown": some may be missing, as after a numeric search."""
     solver: str
     """Name of the method that answered."""
     solver_reason: str

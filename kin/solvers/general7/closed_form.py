@@ -154,7 +154,8 @@ class General7(ClosedForm):
         if math.isnan(requested) and p.respect_limits and not self._inside(p, out).any():
             value, out = self._nearest_value(p, value, out)
         # All solutions at one value of the given joint: at others there may be further branches.
-        completeness = weakest(self._add_missing(p, value, out), "agreed")
+        known = self._add_missing(p, value, out)
+        completeness = weakest(known, "searched") if math.isnan(requested) and low < high else known
         values = np.where(np.isnan(out[:, :1]), math.nan, value)
         arcs = self._ranges(p, out) if p.respect_limits else np.empty((0, 3))
         further = (lambda: self._all_ranges(p)) if p.respect_limits else None

@@ -22,6 +22,7 @@ from kin.solvers.contract import (
     BatchKernels,
     Candidates,
     ClosedForm,
+    Completeness,
     Obstacle,
     ObstacleCode,
     RedundancyParameter,
@@ -113,7 +114,10 @@ class Offset7(ClosedForm):
                 span = turn_around(float(p.lower[i]), float(p.upper[i]), float(p.seed[i]))
                 tried = np.linspace(*span, SAMPLES).tolist()
             gap, obstacle = self._obstacle(p.T, tried)
-        return Candidates(out[:, :7], out[:, 7:], (found,), gap, obstacle, "agreed")
+        # The formulas leave nothing out at one value; where a branch has values is searched for.
+        free = math.isnan(requested) and p.lower[i] < p.upper[i]
+        known: Completeness = "searched" if free else "proved"
+        return Candidates(out[:, :7], out[:, 7:], (found,), gap, obstacle, known)
 
     def relaxed(self, by: float) -> Offset7:
         """The same with a reach that is wider by some metres, or narrower."""

@@ -86,7 +86,7 @@ class Rounded(ClosedForm):
             if r.joint >= 0:
                 values[:, k] = np.where(np.isnan(values[:, k]), math.nan, q[:, r.joint])
         obstacle = None if not np.isnan(q).all() else found.obstacle
-        completeness = weakest(found.completeness, "agreed") if met else "unknown"
+        completeness = weakest(found.completeness, "searched") if met else "unknown"
         if six is not None:
             q, completeness = six.completed(p.T, found.q, starts, q)
             if np.isnan(q).all() and found.gap < self._margin:  # the true table may just reach it

@@ -23,7 +23,7 @@ from kin.robot import Robot
 from kin.solvers import rolled
 from kin.solvers.canonical import OFFSET, UPPER_ARM, at_every_turn, turn_around
 from kin.solvers.common import TURN
-from kin.solvers.contract import APPROACH, POSE, BatchKernels, Candidates, ClosedForm, SolverInput
+from kin.solvers.contract import APPROACH, POSE, BatchKernels, Candidates, ClosedForm, Completeness, SolverInput
 from kin.solvers.reversed import ReversedJoints, WrappedKernels
 from kin.solvers.rounded.closed_form import Flags, Rounded
 from kin.solvers.rounded.ends import joined, move_ends
@@ -102,7 +102,8 @@ class Rounded7(Rounded):
             gap, obstacle = none.gap, none.obstacle
         if j >= 0:
             arcs = at_every_turn(arcs, float(problem.lower[j]), float(problem.upper[j]))
-        return Candidates(rows[:, :7], rows[:, 7:], (arcs,), gap, obstacle, "agreed" if sure else "unknown")
+        at_best: Completeness = "agreed" if self.form.exact_ranges else "searched"
+        return Candidates(rows[:, :7], rows[:, 7:], (arcs,), gap, obstacle, at_best if sure else "unknown")
 
     def rows_at(self, T: Array, values: Array, near: Array, branches: NDArray[np.intp]) -> Array:
         """One branch at each value, moved onto its target: most of the time goes into moving rows."""

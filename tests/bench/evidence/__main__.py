@@ -36,15 +36,15 @@ import kin  # noqa: E402
 
 PAGE, RECORD = ROOT / "docs" / "background" / "evidence.md", ROOT / "tests" / "data" / "evidence.json"
 BEGIN, END = "<!-- table: python tests/bench/evidence --record -->\n", "<!-- end of the table -->\n"
-HEAD = "| arms | number | targets | found | false | proved | agreed | unknown | largest error |"
+HEAD = "| arms | number | targets | found | false | proved | agreed | searched | unknown | largest error |"
 
 
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """The counts as a table in Markdown."""
-    lines = [HEAD, "|---|" + "---:|" * 8]
+    lines = [HEAD, "|---|" + "---:|" * 9]
     for kind, row in rows.items():
         targets, known = row["targets"], row["completeness"]
-        shares = [share(known.get(word, 0), targets) for word in ("proved", "agreed", "unknown")]
+        shares = [share(known.get(word, 0), targets) for word in ("proved", "agreed", "searched", "unknown")]
         error = f"{max(row['position_error'], row['rotation_error']):.0e}"
         cells = (kind, row["arms"], targets, share(row["found"], targets), row["false"], *shares, error)
         lines.append("| " + " | ".join(map(str, cells)) + " |")

@@ -120,7 +120,7 @@ def test_a_slide_of_any_length_is_found():
 @pytest.mark.parametrize(
     ("kinds", "rows", "off", "known"),
     [
-        ("PRP", [*CROSSED, REACH], 1e-5, "agreed"),
+        ("PRP", [*CROSSED, REACH], 1e-5, "searched"),
         ("PRPPRR", [*CROSSED, (0, 0, 0, 1.2), (0, 0, 0, 0.9), *WRIST[:2]], 1e-9, "unknown"),
     ],
     ids=["one joint turns", "three joints turn"],
