@@ -1,14 +1,12 @@
 """Names of numba that its manual does not promise, each with what it is for.
 
-A release of numba may rename or remove them, so they stand here and nowhere else in the core. They belong to three
+A release of numba may rename or remove them, so they stand here and nowhere else in the core. They belong to two
 gains. If a name is missing, its gain is done without, and importing this module warns of it once:
 
 - `CACHE`: machine code is kept and loaded by :mod:`kin.kernels.cache`. Without: by numba's own cache, in one
   folder for each text of the core.
 - `CALLS`: kernels are called without type dispatch and with borrowed arrays (:mod:`kin.kernels.arguments`), and
   compiled once for all constants that callers pass. Without: as numba does these by itself.
-- `EVENTS`: the service knows which requests wait for the compiler (:mod:`kin.kernels.compiler`). Without: such a
-  request is not answered before it has been compiled, and `kin.warm_up` loads all kernels.
 
 Attributes of objects that exist only while kernels are compiled cannot be looked up here. If one is missing,
 machine code cannot be loaded: kernels are then compiled in each process, of which :mod:`kin.kernels.cache` warns.
@@ -25,11 +23,9 @@ import numba
 
 CACHE: Final = "cache"
 CALLS: Final = "calls"
-EVENTS: Final = "events"
 WITHOUT = {
     CACHE: "compiled kernels are kept by numba's own cache and load more slowly",
     CALLS: "calls of kernels take longer",
-    EVENTS: "a request may wait while a kernel is compiled, and kin.warm_up takes longer",
 }
 MISSING: dict[str, str] = {}  # the gains that are done without → the first name that is missing
 
@@ -86,11 +82,6 @@ register_model = _find(CALLS, "numba.extending", "register_model")
 lower_cast = _find(CALLS, "numba.extending", "lower_cast")
 unbox = _find(CALLS, "numba.extending", "unbox")
 NativeValue = _find(CALLS, "numba.extending", "NativeValue")
-
-# Calls back when a thread enters or leaves the compiler, and when a kernel is compiled.
-Listener = _find(EVENTS, "numba.core.event", "Listener")
-register_listener = _find(EVENTS, "numba.core.event", "register")
-install_recorder = _find(EVENTS, "numba.core.event", "install_recorder")
 
 for _gain, _name in MISSING.items():
     warnings.warn(f"numba {numba.__version__}: {_name}. Answers stay; {WITHOUT[_gain]}.", stacklevel=2)
