@@ -65,7 +65,7 @@ _TOML_STRING = re.compile(
     re.DOTALL,
 )
 # A list of numbers and texts as tomli_w writes it: each on a line of its own.
-_TOML_LIST = re.compile(r"\[\n((?: +[^\s\[{][^\n]*,\n)+) *\]")
+_TOML_LIST = re.compile(r"\[\n((?: +[^\s\[{\]][^\n]*,\n)+) *\]")
 _LONGEST_LINE = 100  # characters, as in tomli_w
 _NO_BRACKETS = re.compile(r"[^][{}]++")
 _STEPS = {"[": 1, "{": 1, "]": -1, "}": -1}
@@ -115,6 +115,11 @@ def read_toml(text: str | bytes, limits: Limits) -> dict[str, Any]:
 def to_toml(data: Mapping[str, Any]) -> str:
     """The TOML text of a table; short lists, such as limits and positions, on one line."""
     return _TOML_LIST.sub(_on_one_line, tomli_w.dumps(data))
+
+
+def has_comments(text: str) -> bool:
+    """Whether a TOML text has comments, which are lost when its data is written again."""
+    return any(found[0].startswith("#") for found in _TOML_STRING.finditer(text))
 
 
 def _on_one_line(found: re.Match[str]) -> str:

@@ -22,7 +22,7 @@ from app.exercises.exercise import TOPICS, Exercise
 from app.exercises.fields import ExerciseFileError
 from app.exercises.files import Find, builtin_exercises, load_exercise, load_folder, parse_exercise
 from kin import InputError, get_robot
-from kin.parsing import to_toml
+from kin.parsing import has_comments
 
 EVERY = 1.0  # s between two looks at the folder for the list
 STALE = 60.0  # s after which a file that was being written was left behind by a process that has ended
@@ -239,8 +239,8 @@ def digest(text: str) -> str:
 
 
 def written_in_a_page(exercise: Exercise) -> bool:
-    """Whether a page would write the exercise's file as it is: nothing of it is lost when a page changes it."""
-    return to_toml(form.read(exercise.source)) == exercise.source
+    """Whether nothing of the exercise's file is lost when a page changes it, as comments would be."""
+    return bool(form.read(exercise.source)) and not has_comments(exercise.source)
 
 
 def _stamps(folder: Path) -> dict[str, _Stamp]:

@@ -37,6 +37,7 @@ from kin.robot import Robot
 from kin.solvers import closed_form_of, family_of, general6, general7
 from kin.solvers.contract import POSE, ClosedForm, SolverInput
 from kin.solvers.rounded import Rounded7
+from kin.solvers.wrist5.branches import solve
 from kin.transforms import Array
 from kin.workspace import (
     MEASURES,
@@ -80,7 +81,7 @@ def warm_up(everything: bool = False) -> None:
     """
     first, *others = one_of_each_family()
     _move(first)
-    if not fk_one.stats.cache_hits:  # type: ignore[attr-defined] # a dispatcher
+    if not solve.stats.cache_hits:  # type: ignore[attr-defined] # a dispatcher; kin.fk alone does not compile it
         for robot in others:
             _move(robot)
         for robot in (first, *others):

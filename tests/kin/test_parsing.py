@@ -100,7 +100,7 @@ def test_toml_that_is_written_is_read_as_the_same_values_and_its_short_lists_are
     data = {"texts": ["q, \u2028[", "," * 100], "home": {"q": [0, 1]}, "rows": [row, {"points": [{"at": [1]}]}]}
     text = to_toml(data)
     assert tomllib.loads(text) == data
-    for line in ("limits = [-1.5, 2]", "matrix = [", "    [1, 0],", "q = [0, 1]", "[[rows]]"):
+    for line in ("limits = [-1.5, 2]", "matrix = [", "    [1, 0],", "    [0, 1],", "]", "q = [0, 1]", "[[rows]]"):
         assert line in text.split("\n"), line
 
 

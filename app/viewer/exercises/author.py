@@ -71,7 +71,7 @@ class Drafted(Facts[AuthorSettings]):
     @property
     def is_saved(self) -> bool:
         """Whether the service has the draft as it is."""
-        return self.known is not None and self.is_mine and self.known.source == to_toml(self.data)
+        return self.known is not None and self.is_mine and forms.read(self.known.source) == self.data
 
     @property
     def exercise(self) -> Exercise | None:

@@ -291,15 +291,31 @@ class UrdfTree:
     def tips(self) -> tuple[Tip, ...]:
         """What carries fingers, and the links without children that joints move, those with the most joints first.
 
-        Fingers are joints of one link of which some follow another.
+        Fingers are joints of one link of which some follow another, and all but one of those behind it; otherwise
+        they are rods of the arm, as of a parallelogram.
         """
         inner = {joint.parent for joint in self.joints}
         fingers = {link: [each for each in joints if each.moves] for link, joints in self.children.items()}
-        hands = {link for link, each in fingers.items() if len(each) > 1 and any(joint.follows for joint in each)}
+        hands = {
+            link
+            for link, each in fingers.items()
+            if len(each) > 1 and any(joint.follows for joint in each) and self._leading_behind(link) <= 1
+        }
         found = [Tip(link, self.depths.get(link, 0)) for link in self.links if link not in inner - hands]
         return tuple(
             sorted((tip for tip in found if tip.joints), key=lambda tip: (tip.link not in hands, -tip.joints))
         )
+
+    def _leading_behind(self, link: str) -> int:
+        """The number of moving joints behind a link that follow none; 0 in a circle of links."""
+        if link not in self.depths:
+            return 0
+        count, links = 0, [link]
+        while links:
+            for joint in self.children.get(links.pop(), ()):
+                count += joint.moves and not joint.follows
+                links.append(joint.child)
+        return count
 
     def to_root(self, link: str) -> list[UrdfJoint]:
         """The joints from the root of a link's tree to the link."""

@@ -18,6 +18,7 @@ from app.exercises.shelf import digest, written_in_a_page
 from kin import InputError
 from kin.parsing import to_toml
 
+DATA = Path(__file__).parents[2] / "data"
 SOURCE = next(one for one in builtin_exercises() if one.id == "elbow-angle")
 
 
@@ -54,6 +55,15 @@ def test_what_one_process_saves_another_one_lists_and_opens(folder: Path, no_pau
     assert written_in_a_page(opened)
     assert titled(Exercises(folder)) == ["Mine"], "the service starts with it"
     assert sorted(path.name for path in folder.iterdir()) == ["mine.toml"], "nothing else is left there"
+
+
+def test_a_file_in_the_layout_of_an_earlier_version_can_be_changed_in_a_page(folder: Path) -> None:
+    (folder / "old.toml").write_text(
+        (DATA / "exercise-1.0.toml").read_text().replace("axis-counterexample", "old")
+    )
+    old = Exercises(folder).get("old")
+    assert old is not None
+    assert written_in_a_page(old)
 
 
 def test_an_id_that_is_not_known_is_looked_for_at_once(folder: Path) -> None:

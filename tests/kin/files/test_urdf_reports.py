@@ -133,6 +133,22 @@ def test_what_carries_fingers_is_offered_as_the_tip_and_all_say_as_many_joints()
         assert kin.read_urdf(text, tip=tip).robot.n == int(joints)
 
 
+def test_a_rod_of_a_parallelogram_is_no_finger():
+    joints = "".join(
+        f'<joint name="{child}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
+        f'<axis xyz="0 0 1"/><limit lower="-1" upper="1"/>{follows and f"""<mimic joint="{follows}"/>"""}</joint>'
+        for parent, child, follows in (
+            ("base", "column", ""),
+            ("column", "arm", ""),
+            ("column", "rod", "arm"),
+            ("arm", "fore", ""),
+            ("fore", "hand", ""),
+        )
+    )
+    links = "".join(f'<link name="{each}"/>' for each in ("base", "column", "arm", "rod", "fore", "hand"))
+    assert kin.urdf_tips(f'<robot name="a">{links}{joints}</robot>')[0].link == "hand"
+
+
 @pytest.mark.parametrize("name", ["comment_first", "blank_first", "amp", "latin1_undeclared", "type_case"])
 def test_the_doctor_mends_what_has_one_meaning(name):
     found = kin.examine_urdf(FILES / f"{name}.urdf")

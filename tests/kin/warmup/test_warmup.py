@@ -119,7 +119,7 @@ def test_kernels_of_all_arms_are_compiled_before_the_service_is_ready(monkeypatc
     assert len(arms) >= 6
 
     stats = SimpleNamespace(cache_hits={"signature": 1})
-    monkeypatch.setattr(warmup, "fk_one", SimpleNamespace(stats=stats))
+    monkeypatch.setattr(warmup, "solve", SimpleNamespace(stats=stats))
     monkeypatch.setattr(warmup, "_move", lambda robot: asked.append(("move", robot.id)))
     monkeypatch.setattr(warmup, "_calls", lambda robot: [lambda: asked.append(("all", robot.id))])
     kin.warm_up()
