@@ -285,10 +285,10 @@ def test_a_typed_time_and_a_sketch_are_drawn_beside_the_right_ones() -> None:
     assert "your answer" in wrong
     assert "right" not in wrong, "the right one is not given away"
     both = step.answered(0.8 * right, False, True)
-    assert both.count("stroke-dasharray") == wrong.count("stroke-dasharray") == 1, "broken and whole"
+    assert both.count("kb-motion-other") == wrong.count("kb-motion-other") == 1, "broken and whole"
     assert f'stroke="rgb{VERMILION}"' in both
     assert f'stroke="rgb{GREEN}"' in both
-    assert "stroke-dasharray" not in step.answered(right, True, True)
+    assert "kb-motion-other" not in step.answered(right, True, True)
     for given in (1e300, -1.0, 0.0, "x", None, [1]):
         assert step.answered(given, False, False) == ""
     sketch = steps["Sketch a profile"]

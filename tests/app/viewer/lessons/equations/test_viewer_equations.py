@@ -109,7 +109,7 @@ def test_another_arm_has_its_own_equations(tab: FakeBrowser) -> None:
     tab.wait(lambda: values_shown(tab) == [round(1000 * T[0, 3], 1)] * 2)
     tab.set("Robot", PIONEER.name)
     tab.wait(lambda: "Equation (6):" in tab.html)
-    assert len(drawn(tab)) == 2
+    tab.wait(lambda: len(drawn(tab)) == 2)
 
 
 def test_equations_that_are_derived_later_belong_to_the_choice_of_the_arm(
