@@ -38,6 +38,7 @@ from kin.transforms import pose_from_position_wxyz, wxyz_from_rotation
 ANSWER = 1.5  # s until a message is answered on a busy machine, by a service in another process
 PATIENCE = 30.0  # s until something that must happen has happened, on a machine that does much else
 LOOK = 0.005  # s between two looks at the channel
+SAME_STEP, LATE = 0.02, 0.2  # s between the two connections of one step; in all, while an arm moves
 WORK = 10.0  # s for which `settle` waits for a worker that has something to do
 
 # Of services in this process: workers that something was posted to, those that act, and how many messages of each
@@ -512,12 +513,18 @@ class FakeBrowser:
     # Time
 
     def wait(self, until: Callable[[], bool], timeout: float = PATIENCE) -> None:
-        """Read messages until a condition holds; fails after `timeout` seconds."""
+        """Read messages until a condition holds; fails after `timeout` seconds.
+
+        What the same step has sent by the other connection is read as well.
+        """
         end = time.monotonic() + timeout
         while not until():
             left = end - time.monotonic()
             assert left > 0, f"not seen within {timeout} s; page shows: {self.html[:600]}"
             self.read(left)
+        end = time.monotonic() + LATE
+        while time.monotonic() < end and self.read(SAME_STEP):
+            pass
 
     def settle(self, quiet: float = 0.3, timeout: float = PATIENCE) -> None:
         """Read messages until the service has handled all that was sent, and then none comes for `quiet` s."""

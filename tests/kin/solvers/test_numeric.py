@@ -286,7 +286,7 @@ def test_closest_is_as_close_as_the_best_of_four_hundred_descents(robot_id):
     for task in ("pose", "approach", "position"):
         for _ in range(8):
             problem = problem_of(robot, random_target(rng), task=task)
-            mine = nearest.mismatch(nearest.closest(problem, None))
+            mine = nearest.mismatch(problem, nearest.closest(problem, None))
             starts = nearest.starting_points(problem, count=400)
             _, ends = nearest.descend_each(problem, problem.code, starts, nearest.ORIENTATION_WEIGHT)
             missed += mine > ends.min() + 1e-6
