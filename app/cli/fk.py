@@ -102,12 +102,11 @@ def _run_many(robot: Robot, arguments: Namespace, T_world_frame: Array | None) -
 
 def _pieces(source: Source, robot: Robot, arguments: Namespace) -> Iterator[tuple[Array, dict[int, str]]]:
     """Configurations ``(m, n)``, NaN where a row has none, and what is wrong with rows of them."""
-    shown = robot.pendant_map if arguments.pendant else None
-    for q, wrong in source.configurations(robot):
+    for q, wrong in source.configurations(robot, robot.pendant_map if arguments.pendant else None):
         if wrong and arguments.strict:
             raise next(iter(wrong.values())).error()
         q[list(wrong)] = np.nan
-        yield q if shown is None else shown.joint_values(q), {i: str(each.error()) for i, each in wrong.items()}
+        yield q, {i: str(each.error()) for i, each in wrong.items()}
 
 
 def _put(

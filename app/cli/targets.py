@@ -253,10 +253,10 @@ def _lines(source: Path, table: PoseTable) -> Iterator[tuple[str, list[str], Col
         encoding = "utf-16" if file.read(2) in UTF16 else "utf-8-sig"
     with source.open(newline="", encoding=encoding, errors="replace") as file:
         preface = 0
-        while Columns.is_preface(line := file.readline()):
+        while (line := file.readline()) and (not line.strip() or Columns.is_preface(line)):
             preface += 1
         separator = Columns.separator(line)
-        lines = itertools.chain([line], file)
+        lines = (each.strip(" \r\n") + "\n" for each in itertools.chain([line], file))
         rows, columns = csv.reader(lines, delimiter=separator, skipinitialspace=True), None
         try:
             for row in rows:

@@ -70,7 +70,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         content: Any = event.get("bytes") or event.get("text") or b""
         size = len(content)
         wait = self._messages.spend(self.loop.time(), 1.0 if size <= SMALL else size * LARGE_COST)
-        if wait > 0.0 and event["type"] == "websocket.receive":
+        if wait > 0.0 and event["type"] == "websocket.receive" and not self.transport.is_closing():
             await sleep(wait)
         return event
 
@@ -106,7 +106,9 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
             super().send_receive_event_to_app()
 
     def _end(self, code: CloseCode, why: str) -> None:
-        """Disconnect a client because of what it has sent."""
+        """Disconnect a client because of what it has sent; nothing happens if that was done."""
+        if self.transport.is_closing():
+            return
         self.guard.note("frames", f"a client of a websocket sent {why}, and is disconnected")
         self.conn.fail(code, why)
         if self.conn.close_sent is None:  # the handshake is not complete

@@ -26,6 +26,7 @@ from app.cli.pipes.parquet import MAGIC, opened_columns, rows_of
 from app.cli.pipes.poses import NOTHING, PoseTable, Wrong
 from kin import InputError, Robot, Task
 from kin.ik.problem import read_pose
+from kin.joint import PendantMap
 from kin.poses.fields import FIELDS, ORIENTATIONS, orientation, text_target, whole_matrix
 from kin.solvers import contract
 from kin.transforms import frame_from_approach, pose_from_position_wxyz
@@ -82,28 +83,35 @@ class Source:
         start = self._first.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
         self.form: Form = "npy" if self._first.startswith(_NUMPY) else "ndjson" if start in (b"{", b"[") else "csv"
 
-    def configurations(self, robot: Robot) -> Iterator[tuple[Array, dict[int, Wrong]]]:
+    def configurations(
+        self, robot: Robot, shown: PendantMap | None = None
+    ) -> Iterator[tuple[Array, dict[int, Wrong]]]:
         """Joint values ``(m, n)`` in radians (metres), piece by piece; rows of NaN where there are none.
 
         With each piece comes what is wrong with rows of it, by their index.
 
         A table has the columns ``q1`` to ``qn`` among others, or nothing but these numbers in each row. A JSON
         line is a list of them, or an answer with `q` or `solutions`, of which the first counts.
+
+        Args:
+            shown: of values as the pendant shows them. Answers have joint values all the same.
         """
         names = [f"q{i + 1}" for i in range(robot.n)]
         if self.form == "npy":
             done = 0
             for q in self._arrays((robot.n,), f"an array of configurations (k, {robot.n})"):
                 odd = np.flatnonzero(~np.isfinite(q).all(axis=1) & ~np.isnan(q).all(axis=1)).tolist()
-                _, wrong = self._rows(robot, [(f"{self.field}[{done + i}]", q[i].tolist) for i in odd])
+                _, wrong = self._rows(robot, [(f"{self.field}[{done + i}]", q[i].tolist) for i in odd], shown)
                 done += len(q)
-                yield q, {odd[k]: each for k, each in wrong.items()}
+                yield q if shown is None else shown.joint_values(q), {odd[k]: each for k, each in wrong.items()}
         elif self.form == "csv":
             for rows in self._table(names):
-                yield self._rows(robot, rows)
+                yield self._rows(robot, rows, shown)
         else:
             for lines in self._lines():
-                yield self._rows(robot, [(place, partial(self._json, line, place)) for place, line in lines])
+                yield self._rows(
+                    robot, [(place, partial(self._json, line, place)) for place, line in lines], shown
+                )
 
     def goals(self, table: PoseTable, maker: str = "") -> Iterator[list[Goal]]:
         """Targets, piece by piece; a row that is none says what is wrong with it.
@@ -136,18 +144,19 @@ class Source:
                 yield place, found
 
     def _rows(
-        self, robot: Robot, rows: Sequence[tuple[str, Callable[[], object]]]
+        self, robot: Robot, rows: Sequence[tuple[str, Callable[[], object]]], shown: PendantMap | None
     ) -> tuple[Array, dict[int, Wrong]]:
         """The configurations of rows, each with its place and what reads it."""
         q, wrong = np.full((len(rows), robot.n), np.nan), dict[int, Wrong]()
         for i, (place, read) in enumerate(rows):
             try:
-                q[i] = self._q(robot, read(), place)
+                q[i] = self._q(robot, read(), place, shown)
             except InputError as error:
                 wrong[i] = Wrong.of(error)
         return q, wrong
 
-    def _q(self, robot: Robot, values: object, field: str) -> Array:
+    def _q(self, robot: Robot, values: object, field: str, shown: PendantMap | None) -> Array:
+        answered = isinstance(values, dict)
         if isinstance(values, dict):
             solutions = values.get("solutions", [values])
             if solutions == []:
@@ -156,9 +165,12 @@ class Source:
             values = first.get("q") if isinstance(first, dict) else None
         if not isinstance(values, list) or any(isinstance(value, list) for value in values):
             raise InputError(field, values, f"a list of {robot.n} joint values")
-        if len(values) == robot.n and all(value != value for value in values):
+        if len(values) != robot.n:
+            raise InputError(field, values, f"a list of {robot.n} joint values")
+        if all(value != value for value in values):
             return np.full(robot.n, np.nan)
-        return robot.check_q(values, field)
+        q = robot.check_q(values, field)
+        return q if answered or shown is None else shown.joint_values(q)
 
     def _line(self, place: str, line: str, maker: str) -> Goal:
         return self._goal(self._json(line, place), place, maker)

@@ -393,6 +393,16 @@ def test_configurations_may_be_as_the_pendant_shows_them(run):
     given = lines(kin.to_pendant("lrmate200id", q).tolist())
     _, out, _ = run("fk", "lrmate200id", "--configurations", "-", "--pendant", "--format", "npy", given=given)
     assert np.abs(np.load(io.BytesIO(out)) - kin.fk("lrmate200id", q)).max() < 1e-12
+    answers = "".join(json.dumps({"q": each.tolist()}) + "\n" for each in q)  # those of ik, with joint values
+    _, again, _ = run("fk", "lrmate200id", "--configurations", "-", "--pendant", "--format", "npy", given=answers)
+    assert again == out
+
+
+def test_rows_that_end_in_a_space_and_empty_lines_before_a_table_are_read_from_files_too(run, tmp_path):
+    (tmp_path / "in.csv").write_text("\n# a comment\n0.4 0.1 0.3 0 1 0 0 \n")
+    code, _, err = run("ik", "ur5", "--targets", tmp_path / "in.csv", "-o", tmp_path / "out.csv")
+    assert code == 0, err
+    assert (tmp_path / "out.csv").read_text().count("solved") == 1
 
 
 @pytest.mark.parametrize("mark", [",", ";"])
