@@ -1,10 +1,14 @@
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
 
-#ifdef __FAST_MATH__
-#error "rows that do not exist are NaN: compile without -ffast-math"
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error "rows that do not exist are NaN: compile without -ffast-math and -ffinite-math-only"
+#endif
+#if DBL_MANT_DIG < 53
+#error "double must have 64 bits"
 #endif
 #ifdef __cplusplus
 #define KINBOARD_ZERO {}

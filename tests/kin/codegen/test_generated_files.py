@@ -14,7 +14,7 @@ from emitted import STRICT, Built, compiled, targets
 from playwright._impl._driver import compute_driver_executable
 
 import kin
-from kin.codegen import files, js
+from kin.codegen import c, files, js
 from kin.codegen.arm import arm_of
 
 QUICK_C, QUICK_JS = "ur5", "pioneer5"
@@ -224,6 +224,23 @@ def test_names_of_arms_and_joints_stay_in_their_comment(language):
         assert line.isascii()
         assert "\\" not in line
         assert "??" not in line
+
+
+def test_what_would_make_wrong_answers_is_an_error_of_the_compiler(tmp_path):
+    narrow = c.RUNTIME.replace("#include <math.h>", "#undef DBL_MANT_DIG\n#define DBL_MANT_DIG 24", 1)
+    nan = 'without -ffast-math and -ffinite-math-only"'
+    file = tmp_path / "runtime.c"
+    for text, option, words in (
+        (c.RUNTIME, "-ffast-math", nan),
+        (c.RUNTIME, "-ffinite-math-only", nan),
+        (narrow, "-O1", '#error "double must have 64 bits"'),
+        (c.RUNTIME, "-O1", ""),
+    ):
+        file.write_text(text)
+        command = ["gcc", "-std=c99", "-fsyntax-only", option, file]
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert (done.returncode != 0) == bool(words)
+        assert words in done.stderr
 
 
 @pytest.mark.full
