@@ -19,7 +19,7 @@ from app.cli.xacro import expanded, is_xacro
 from app.exercises import Exercise, ExerciseFileError, VariantError, load_exercise
 from app.exercises.exercise import CHECKED_SEEDS
 from app.exercises.lesson_text import load_lesson
-from app.exports.robots import FORMATS, robot_file
+from app.exports.robots import file_name, robot_file
 from app.shared.answers.exchange import import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
 from app.shared.store import Store
@@ -78,7 +78,7 @@ def run_code(arguments: Namespace) -> int:
     """Print or write the solver of an arm in a language."""
     robot, language, name = robot_of(arguments), arguments.language, arguments.name
     text = kin.generate(robot, language, name=name, closest=not arguments.no_closest)
-    file = arguments.output or f"{name or robot.id}{FORMATS[language].suffix}"
+    file = arguments.output or file_name(robot, language, name)
     if file == "-":
         print(text, end="")
     else:

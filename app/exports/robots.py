@@ -37,6 +37,25 @@ FORMATS = {
 }
 
 
+SOURCES = ("c", "js", "mjs", "d.ts", "c-test")
+
+
+def file_name(robot: Robot, name: str, begins: str | None = None) -> str:
+    """The name of a file in one of `FORMATS`.
+
+    Source is named as the identifiers in it, because files of one arm include each other.
+
+    Args:
+        name: the format.
+        begins: what identifiers in source begin with, by default made of the arm's id.
+    """
+    if name in SOURCES:
+        from kin.codegen.files import name_for
+
+        return name_for(robot, begins) + FORMATS[name].suffix
+    return robot.id + FORMATS[name].suffix
+
+
 def robot_file(robot: Robot, name: str) -> str:
     """The text of a file in one of `FORMATS`; raises `InputError` for an arm that the format cannot describe."""
     if name == "urdf":
@@ -45,6 +64,6 @@ def robot_file(robot: Robot, name: str) -> str:
         return robot_to_mjcf(robot)
     if name == "toml":
         return robot_to_toml(robot)
-    if name in ("c", "js", "mjs", "d.ts", "c-test"):
+    if name in SOURCES:
         return kin.generate(robot, name)  # type: ignore[arg-type]  # one of these
     return robot_to_toml(convert_dh(robot, "standard" if name == "dh" else "modified"))

@@ -14,7 +14,7 @@ from app.api.arms.operation import operation
 from app.api.body import versioned
 from app.api.schemas import POST_REFUSALS, example, refusals, reply
 from app.api.work import Deadline, computed
-from app.exports.robots import FORMATS, robot_file
+from app.exports.robots import FORMATS, file_name, robot_file
 from app.shared.answers.examination import ExaminationAnswer, examination_answer
 from app.shared.answers.exchange import ConvertAnswer, ImportAnswer, convert_answer, import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
@@ -181,7 +181,7 @@ async def export_robot(request: Request, robot: Robot, query: ExportQuery) -> Re
     """
     kind = FORMATS[query.format]
     text = await computed(request, partial(_exported, robot, query.format))
-    name = f"{robot.id}{kind.suffix}"
+    name = file_name(robot, query.format)
     headers = {"content-disposition": f'attachment; filename="{name}"'}
     return Response(text, media_type=kind.media_type, headers=headers)
 

@@ -335,9 +335,16 @@ def add_code(commands: Any, parents: Parents) -> argparse.ArgumentParser:
         "c-test: a C file that checks the one in C",
     )
     parser.add_argument(
-        "-o", "--output", metavar="FILE", help="file to write (default: ROBOT.c or the like); - is standard output"
+        "-o",
+        "--output",
+        metavar="FILE",
+        help="file to write (default: NAME.c, NAME_test.c or the like); - is standard output",
     )
-    parser.add_argument("--name", metavar="NAME", help="what the names in it begin with (default: the arm's id)")
+    parser.add_argument(
+        "--name",
+        metavar="NAME",
+        help="what the names in it begin with (default: the arm's id, with _ for each hyphen)",
+    )
     parser.add_argument(
         "--no-closest", action="store_true", help="leave out what comes closest to a pose that cannot be reached"
     )

@@ -26,6 +26,7 @@ from app.exports import progress
 from app.exports.formats import FORMATS, encode
 from app.shared.clouds import Cloud, Clouds
 from app.shared.settings import Settings
+from kin.codegen import vectors
 from kin.solvers import closed_form_of
 from kin.workspace import STRATEGIES, Measure
 
@@ -666,6 +667,17 @@ def test_code_writes_a_file_and_names_bad_input(capsys, tmp_path, monkeypatch):
     ):
         code, _, error = run(capsys, "code", *words)
         assert (code, field in error) == (2, True)
+
+
+def test_files_of_code_have_the_names_by_which_they_include_each_other(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(vectors, "COUNT", 2)
+    for language in ("c", "c-test"):
+        assert run(capsys, "code", "redundant7-craig", "--language", language, "--no-closest")[0] == 0
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["redundant7_craig.c", "redundant7_craig_test.c"]
+    subprocess.run(["gcc", "-std=c99", "-O0", "redundant7_craig_test.c", "-o", "check", "-lm"], check=True)
+    done = subprocess.run(["./check"], check=True, capture_output=True, text=True)
+    assert "2 of 2 poses are right" in done.stdout
 
 
 @pytest.mark.full
