@@ -45,7 +45,7 @@ def generate(
 
     Raises:
         InputError: an arm that cannot be emitted, with why and what would help; an unknown language; a name that
-            is no identifier.
+            is no identifier, or a word of one of the languages.
 
     Examples:
         >>> import kin
@@ -67,15 +67,15 @@ def name_for(robot: Robot, name: str | None) -> str:
     if name is None:
         made = re.sub(r"\W", "_", robot.id, flags=re.ASCII).strip("_")[:40]
         return made if _NAME.fullmatch(made) and not _is_word(made) else f"arm_{made}"[:40]
-    if not _NAME.fullmatch(name) or _is_word(name):
+    if not isinstance(name, str) or not _NAME.fullmatch(name) or _is_word(name):
         raise InputError(
-            "name", name, "a letter, then at most 39 letters, digits and _, and no word of the language"
+            "name", name, "a letter, then at most 39 letters, digits and _, and no word of C or JavaScript"
         )
     return name
 
 
 def _is_word(name: str) -> bool:
-    return keyword.iskeyword(name) or name in c.WORDS
+    return keyword.iskeyword(name) or name in c.WORDS or name in js.WORDS
 
 
 def c_file(arm: Arm, name: str) -> str:

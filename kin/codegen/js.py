@@ -45,7 +45,8 @@ _TAKEN = (
     "arguments await break case catch class const continue debugger default delete do else enum eval "
     "export extends false finally for function if implements import in instanceof interface let new null "
     "package private protected public return static super switch this throw true try typeof undefined var "
-    "void while with yield Math Number Infinity NaN Object mark "
+    "void while with yield Math Number Infinity NaN Object mark Array ArrayBuffer Float64Array RangeError "
+    "TypeError module window document location "
 )
 WORDS = frozenset(_TAKEN.split()).union(re.findall(r"(?:function|class|const|let) (\w+)", RUNTIME))
 

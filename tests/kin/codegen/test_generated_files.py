@@ -56,6 +56,10 @@ def test_a_table_that_is_near_a_family_is_refused_and_never_emitted_as_that():
         ("name", {"name": "2r"}),
         ("name", {"name": "double"}),
         ("name", {"name": "a b"}),
+        ("name", {"name": "function"}),
+        ("name", {"name": "Math"}),
+        ("name", {"name": "RangeError"}),
+        ("name", {"name": 5}),
     ],
 )
 def test_bad_arguments_are_named(field, arguments):
