@@ -94,7 +94,11 @@ def arm_of(robot: Robot, closest: bool = True, primitives: Primitives = PRIMITIV
             made[name] = program.add(kernel, *kinds)
             rooms.enter(made[name], shapes)
     except OutsideSubsetError as error:
-        raise refused(robot, f"an arm whose kernels can be translated: {error}") from error
+        raise refused(
+            robot,
+            f"an arm whose kernels can be translated: those of {form.name} cannot; use kin.solve_ik or the REST "
+            "service",
+        ) from error
     return Arm(robot, form, found, parameter, constants, program, rooms, made)
 
 

@@ -15,6 +15,7 @@ import operator
 import textwrap
 from collections.abc import Callable, Mapping
 from functools import cache
+from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -32,7 +33,8 @@ class OutsideSubsetError(Exception):
     def __init__(self, function: FunctionType, node: Any, what: str, instead: str) -> None:
         line = function.__code__.co_firstlineno + getattr(node, "lineno", 1) - 1
         text = ast.unparse(node).split("\n")[0] if isinstance(node, ast.expr | ast.stmt) else ""
-        super().__init__(f"{inspect.getsourcefile(function)}:{line}: {what}: {text[:90]}; {instead}")
+        file = Path(function.__code__.co_filename).name
+        super().__init__(f"{file}:{line}: {what}: {text[:90]}; {instead}")
 
 
 def plain(value: Any) -> Any:
