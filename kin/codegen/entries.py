@@ -189,8 +189,8 @@ def nearest(
     """found.q[0] ← the configuration inside the limits that comes nearest to a pose, or to its point alone.
 
     At 0.1 m per radian, as `kin.solve_ik` does it: descents from the seed, from the branches (known ``(k, n)`` is
-    scratch) and from points spread over the limits ``(m, n)``. ORIENTATION if it meets the point, else
-    UNREACHABLE, or INVALID.
+    scratch) and from points spread over the limits ``(m, n)``. SOLVED if it meets the pose as exactly as
+    those of `solve`, ORIENTATION if it meets the point alone, else UNREACHABLE, or INVALID.
     """
     T = np.empty((4, 4))
     if not _is_valid(target, seed, T):
@@ -223,4 +223,6 @@ def nearest(
     lower, upper, turns = limits
     pose = Requirement(model, np.zeros(7), lower, upper, turns, POSE, True, _POSITION, _ROTATION)
     measure_rows(pose, T, seed, seed, found.q[:1], found.stats[:1])
+    if found.stats[0, 0] <= _POSITION and found.stats[0, 1] <= _ROTATION:
+        return SOLVED
     return ORIENTATION if found.stats[0, 0] <= _MET else UNREACHABLE

@@ -113,8 +113,7 @@ def test_c_answers_as_the_core_does(robot_id, tmp_path):
     assert compare(robot, answers, asked, given) < 1e-7
     assert names == [files._ascii(each) for each in arm.form.branches]
     check_refusals(built)
-    if not arm.alone.needs_value:
-        check_nearest(built, asked)
+    check_nearest(built, asked)
 
 
 def check_refusals(built: Built):
@@ -138,6 +137,11 @@ def check_nearest(built: Built, asked):
         expected = kin.solve_ik(robot, far, q_seed=seed)
         assert expected.status.value == "unreachable" == ("orientation", "unreachable")[status - 4]
         assert one.s[0] == pytest.approx(expected.distance, abs=1e-6)
+        assert built.call("nearest", T, seed, ctypes.c_bool(False), ctypes.byref(one)) == 0
+        assert max(one.s[0], one.s[1]) < 1e-9
+        status = built.call("nearest", T, seed, ctypes.c_bool(True), ctypes.byref(one))
+        assert one.s[0] < 1e-7
+        assert status == (0 if max(one.s[0], one.s[1]) <= 1e-9 else 4)
 
 
 @pytest.mark.parametrize("robot_id", others(QUICK_JS))
@@ -159,7 +163,7 @@ for (const [T, seed] of [[poses[0], [1]], [[[NaN]], seeds[0]], [scaled, seeds[0]
   try {{ {bad}; }} catch (error) {{ refused.push(error.message); }}
 console.log(JSON.stringify({{
   answers: poses.map((T, i) => {ask}), fk: q.map((each) => arm.fk(each)), J: arm.jacobian(q[0]),
-  near: arm.nearest(far, seeds[0], true), refused,
+  near: arm.nearest(far, seeds[0], true), met: arm.nearest(poses[0], seeds[0]), refused,
 }}));
 """
     (tmp_path / "run.js").write_text(run)
@@ -173,6 +177,7 @@ console.log(JSON.stringify({{
     assert np.abs(np.array(done["fk"]) - T).max() < 1e-14
     assert np.abs(np.array(done["J"]) - kin.jacobian(robot, q[0])).max() < 1e-14
     assert done["near"]["status"] == "unreachable"
+    assert done["met"]["status"] == "solved"
     assert len(done["refused"]) == 3
 
 
