@@ -68,12 +68,13 @@ def solve(
     rows: Inner, inner: Inner, model: Array, params: Array, signs: Array, target: Array, seed: Array,
     limits: Limits, value: float, arcs: Array, found: Rows,
 ) -> tuple[int, int]:  # fmt: skip
-    """All configurations of a pose: (what kind of answer, how many of found.order).
+    """Configurations of a pose: (what kind of answer, how many of found.order).
 
     SOLVED: those inside the limits, nearest to the seed first. APPROXIMATE, of an arm with fewer than six joints:
     those that meet the point and the approach direction, the smallest rotation about it first. LIMITS: those
     outside the limits, the least outside first. UNMET: none. INVALID: the target ``(4, 4)`` is no pose, or the
-    seed not finite. value: that of the redundancy parameter, NaN for one near the seed.
+    seed not finite. value: that of the redundancy parameter, NaN for, of each branch, the one nearest to the
+    seed's that the limits allow.
     """
     lower, upper, turns = limits
     T = np.empty((4, 4))

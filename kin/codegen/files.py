@@ -83,7 +83,7 @@ def c_file(arm: Arm, name: str) -> str:
     made = arm.entries
     values = _common(arm, name) | {
         "kernels": c.unit(arm.program, arm.rooms), "constants": _constants(arm, name),
-        "approximate": _approximate(arm, name), "rows_type": c.name_of(made["solve"].kinds[-1]),
+        "rows_type": c.name_of(made["solve"].kinds[-1]),
         "why_unmet": f"; {name}_nearest says why" if "nearest" in made else "",
         "home": _numbers(arm.robot.q_home), "example": _example(arm, name),
     }  # fmt: skip
@@ -138,7 +138,11 @@ def _file(arm: Arm, name: str, kind: str, values: dict[str, object]) -> str:
 def _sections(arm: Arm) -> set[str]:
     """The parts of the interface that an arm has."""
     found = {"intervals", "nearest"} & set(arm.entries)
-    return found | ({"ik"} if not arm.alone.needs_value else set()) | ({"ik_at"} if arm.parameter else set())
+    if arm.robot.n < 6:
+        found.add("few")
+    if not arm.alone.needs_value:
+        found |= {"ik", "one" if arm.parameter else "all"}
+    return found | ({"ik_at"} if arm.parameter else set())
 
 
 def _selected(text: str, sections: set[str]) -> str:
@@ -150,13 +154,6 @@ def _selected(text: str, sections: set[str]) -> str:
         elif keep:
             found.append(line)
     return "\n".join(found) + "\n"
-
-
-def _approximate(arm: Arm, name: str) -> str:
-    if arm.robot.n >= 6:
-        return ""
-    which = "those that meet the point and\n// the approach direction (z axis) alone"
-    return f" {name.upper()}_APPROXIMATE: {which}, the smallest rotation about it first."
 
 
 def _example(arm: Arm, name: str) -> str:
@@ -229,5 +226,10 @@ def _not_promised(arm: Arm) -> Iterable[str]:
     yield "configurations, where a singular pose has one."
     if arm.form.name == "general6":
         yield "Nor that the list is complete: Kinboard also asks targets close by, which takes Python."
-    if arm.alone.needs_value and arm.parameter is not None:
-        yield f"The value of {_ascii(arm.parameter.label)} must be given: only Kinboard searches for it."
+    if arm.parameter is not None:
+        yield "Nor all configurations, of which there is a continuum: each is one of its branch, at one value of"
+        label = _ascii(arm.parameter.label)
+        if arm.alone.needs_value:
+            yield f"{label}, which must be given: only Kinboard searches for it."
+        else:
+            yield f"{label}, given or the nearest to the seed's that the limits allow."

@@ -270,6 +270,18 @@ def test_vectors_check_the_file_and_notice_a_wrong_one(robot_id, tmp_path):
         assert ("50 of 50 poses are right" in done.stdout) == (code == 0)
 
 
+@pytest.mark.parametrize("language", ["c", "d.ts"])
+def test_all_configurations_are_claimed_only_where_there_is_no_continuum_of_them(language):
+    claims = "All configurations of a pose", "One configuration of each branch, at the value of", "at this value"
+    for robot_id, found in (("ur5", "all"), ("iiwa14", "one"), ("panda", "given")):
+        text = kin.generate(robot_id, language, closest=False)
+        there = [words in text for words in claims]
+        assert there == [found == "all", found == "one", found != "all"]
+        assert ("Nor all configurations" in text) == (found != "all")
+        assert "there is none" in text
+        assert "the limits, nearest to the seed first." in text
+
+
 def test_a_head_says_what_is_promised_and_what_not():
     text = kin.generate("crx10ia", "c")
     head = text.partition("#ifndef")[0]
