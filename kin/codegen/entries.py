@@ -108,7 +108,12 @@ def solve(
 
 
 def _is_valid(target: Array, seed: Array, T: Array) -> bool:
-    """T ← the target with its rotation made orthonormal, as `kin.solve_ik` does it; whether both can be used."""
+    """T ← the target with its rotation made orthonormal; whether both can be used.
+
+    Its rotation must have RᵀR = I within `TOLERANCES.rotation_matrix`: what is rounded more, for which
+    `kin.solve_ik` takes the nearest rotation and with fewer than six joints widens its tolerances, is not told
+    from what is no rotation.
+    """
     for j in range(seed.shape[0]):
         if not abs(seed[j]) <= FAR:
             return False

@@ -224,6 +224,10 @@ def _head(arm: Arm, name: str, kind: str) -> Iterable[str]:
 def _not_promised(arm: Arm) -> Iterable[str]:
     yield "Not promised: the same bits as Kinboard or with another compiler; more than single points of a curve of"
     yield "configurations, where a singular pose has one."
+    yield "Nor that poses may be rounded, as for Kinboard: rotations must have R^T R = I within 1e-6."
+    if arm.robot.n < 6:
+        yield "With fewer than six joints, a pose rounded beyond 1e-9 is approximate at best: only Kinboard"
+        yield "widens its tolerances."
     if arm.form.name == "general6":
         yield "Nor that the list is complete: Kinboard also asks targets close by, which takes Python."
     if arm.parameter is not None:

@@ -119,7 +119,10 @@ def test_c_answers_as_the_core_does(robot_id, tmp_path):
 def check_refusals(built: Built):
     n = built.arm.robot.n
     at = (0.3,) if built.arm.alone.needs_value else ()
+    turned = kin.pose_from_xyz_rpy([0.1, 0.2, 0.3], [0.3, 0.5, 0.7])
+    assert built.ik(turned + np.diag([9e-7 / 2.0, 0.0, 0.0, 0.0]), np.zeros(n), *at)[0] != "invalid"
     for T, seed in (
+        (np.round(turned, 4), np.zeros(n)),
         (np.full((4, 4), math.nan), np.zeros(n)),
         (2.0 * np.eye(4), np.zeros(n)),
         (np.eye(4), np.full(n, math.inf)),
@@ -179,6 +182,7 @@ console.log(JSON.stringify({{
     assert done["near"]["status"] == "unreachable"
     assert done["met"]["status"] == "solved"
     assert len(done["refused"]) == 3
+    assert "with a rotation within 1e-6" in done["refused"][2]
 
 
 def test_a_heap_that_overflows_is_an_error_of_its_own_and_leaves_the_solver_working(tmp_path):
@@ -288,5 +292,8 @@ def test_a_head_says_what_is_promised_and_what_not():
     limits = "Nor that the list is complete"
     for words in ("MIT License", "Promised:", "Not promised:", limits, kin.__version__, "-DCRX10IA_EXAMPLE"):
         assert words in head
+    assert "rotations must have R^T R = I within 1e-6" in head
+    assert "rounded beyond 1e-9 is approximate at best" in kin.generate("pioneer5", "d.ts")
+    assert "rounded beyond 1e-9" not in head
     assert all(len(line) <= 115 for line in head.splitlines())
     assert head.isascii()
