@@ -9,6 +9,7 @@ const channel = (() => {
   const LONGEST = 56000; // bytes of a message; the service closes a connection that sends more than 64 KiB at once
   const MOST = 200; // messages that wait for the connection; later ones are refused
   const AGAIN = 500, SELDOM = 4000; // ms until another try to connect
+  const ANSWER_WITHIN = 1000; // ms in which a text is answered, however many pictures of a moving arm come
   const DEAD = 6500; // ms without a sign of the service, which gives one every two seconds
   // Their order with changes of viser's controls matters: a mark tells it.
   const IN_ORDER = new Set(["undo", "redo", "travel", "released", "field", "lesson"]);
@@ -19,6 +20,7 @@ const channel = (() => {
   let tries = 0;
   let timer = 0; // of the next try
   let heardAt = 0; // ms
+  let answeredAt = 0; // ms
   let number = 0; // of the last message
   let unconfirmed = []; // [number, text]
   let again = false; // whether they wait to be sent over a new connection
@@ -92,8 +94,12 @@ const channel = (() => {
       const act = doers.get(what);
       if (act) attempt(act, value);
     }
-    // A picture of a moving arm needs no answer.
-    if (isOpen() && (notices.length || !Object.keys(set).length)) socket.send(JSON.stringify(["heard", noted]));
+    // A picture of a moving arm needs no answer, but who says nothing for long is taken for gone.
+    const due = notices.length || !Object.keys(set).length || performance.now() - answeredAt > ANSWER_WITHIN;
+    if (isOpen() && due) {
+      answeredAt = performance.now();
+      socket.send(JSON.stringify(["heard", noted]));
+    }
     tellLine("heard");
   }
 

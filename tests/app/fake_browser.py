@@ -102,6 +102,8 @@ def working() -> bool:
 # Messages with a mark in viser's connection, as static/channel.js has them.
 _SCRIPT = (Path(__file__).parents[2] / "static" / "channel.js").read_text(encoding="utf-8")
 IN_ORDER = frozenset(json.loads(_SCRIPT.split("IN_ORDER = new Set(", 1)[1].split(")", 1)[0]))
+# s in which a text is answered, also where it only shows something
+ANSWER_WITHIN = int(_SCRIPT.split("ANSWER_WITHIN = ", 1)[1].split(";", 1)[0]) / 1000.0
 
 
 class Wire:
@@ -211,6 +213,7 @@ class FakeBrowser:
         self.channel: Wire | None = None
         self.name = ""  # of the channel
         self._number = self._noted = 0  # of the last message and the last notice
+        self._answered_at = 0.0  # when a text of the channel was answered
         self.shown: dict[str, Any] = {}  # by the channel
         self.replied: list[Any] = [0, "", []]
         self._parts: dict[str, str] = {}  # uuids by the keys of what comes by the channel
@@ -397,8 +400,11 @@ class FakeBrowser:
             if number > self._noted:
                 self._noted = number
                 self._take(name, value)
-        with contextlib.suppress(ConnectionClosed):  # the service has ended it since
-            wire.send(json.dumps(["heard", self._noted]))
+        now = time.monotonic()
+        if "notices" in heard or "set" not in heard or now - self._answered_at > ANSWER_WITHIN:
+            self._answered_at = now
+            with contextlib.suppress(ConnectionClosed):  # the service has ended it since
+                wire.send(json.dumps(["heard", self._noted]))
         return "set" in heard or "notices" in heard
 
     def _show_part(self, key: str) -> None:

@@ -80,6 +80,26 @@ def test_a_message_that_the_service_cannot_read_ends_nothing_else(tab: SocketTab
     assert page.evaluate("kbSockets.length") == 2
 
 
+def test_a_page_that_is_only_shown_something_answers_once_a_second(tab: SocketTab) -> None:
+    counts = tab.page.evaluate("""() => {
+      const line = kbSockets.at(-1), sent = [], counts = [], now = performance.now();
+      let ahead = 0;
+      line.send = (text) => { sent.push(text); };
+      performance.now = () => now + ahead;
+      const bring = (text) => {
+        line.dispatchEvent(new MessageEvent("message", { data: JSON.stringify({ heard: 1e9, ...text }) }));
+        counts.push(sent.length);
+      };
+      bring({});
+      for (ahead of [500, 1000, 1001, 1500, 2001, 2002]) bring({ set: { "part-none": ahead } });
+      bring({});
+      delete performance.now;
+      delete line.send;
+      return counts;
+    }""")
+    assert counts == [1, 1, 1, 2, 2, 2, 3, 4]
+
+
 def test_a_large_file_shows_how_far_it_is_and_cancel_ends_it(tab: SocketTab, tmp_path: Path) -> None:
     files = robot_files() | {"two/meshes/noise.bin": random.Random(1).randbytes(12_000_000)}
     (tmp_path / "two.zip").write_bytes(packed(files))

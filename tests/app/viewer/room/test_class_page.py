@@ -790,6 +790,23 @@ def test_a_figure_in_another_page_takes_no_part(room: Class, embedded: str) -> N
     assert np.allclose(shown.q, q), "the figure's arm is not the student's on the wall"
 
 
+def test_who_watches_an_arm_that_moves_for_long_is_there(room: Class, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fake_browser.ANSWER_WITHIN", 0.1)
+    ann, ticket = room.join("Ann")
+    (place,) = [each for each in room.hub.lives[ticket.room].places if each.ticket.seat == ticket.seat]
+    turned = [1.0, *ROBOT.q_home[1:]]
+    segments = "".join(f"[[segments]]\nkind = 'ptp'\nq = {list(map(float, q))}\n" for q in (ROBOT.q_home, turned))
+    for serial, (name, value) in enumerate([("upload", ["turn.toml", segments]), ("loop", True), ("play", None)]):
+        ann.say("feature", ["program", [name, serial], value])
+    ann.wait(lambda: 'data-playing="1"' in ann.html)
+    end, longest = time.monotonic() + 1.5, 0.0
+    while time.monotonic() < end:
+        ann.read(0.1)
+        longest = max(longest, place.silence())
+    assert 'data-playing="1"' in ann.html
+    assert longest < 1.0, "no beat has come, and the pictures were answered"
+
+
 def test_who_has_never_come_is_removed_together(room: Class, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.classroom.live.AWAY", 0.2)
     monkeypatch.setattr("app.classroom.rooms.UNSEEN", 0.2)
