@@ -71,10 +71,13 @@ class Fence:
 
     def ask(self) -> None:
         """Ask, if something was sent since the last question and that one is answered."""
-        if self._wanted and self.asked == self.last:
-            self._wanted = False
-            self.asked += 1
+        if not self._wanted or self.asked != self.last:
+            return
+        try:
             threading.Thread(target=self._ask, name="fence", daemon=True).start()
+        except RuntimeError:  # the machine has no thread left; a later step asks
+            return
+        self._wanted, self.asked = False, self.asked + 1
 
     def _ask(self) -> None:
         wait_for_page(self._client)
