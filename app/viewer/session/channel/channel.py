@@ -151,9 +151,10 @@ class Channel:
         return time.monotonic() - self._heard_at
 
     def _wake(self) -> None:
-        line = self._line
-        self._due = self._held is not None
-        if line is not None and not self._due:
+        with self._lock:
+            held, line = self._held is not None, self._line
+            self._due = self._due or held
+        if line is not None and not held:
             line.wake()
 
     # The event loop

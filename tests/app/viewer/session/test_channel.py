@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import math
 from collections.abc import Callable, Coroutine
@@ -306,6 +307,28 @@ def test_values_of_one_step_come_together_with_the_message_that_they_follow() ->
             pass
         await rest()
         assert line.sent[2:] == [{"heard": 0, "done": 4}]
+
+    run(play)
+
+
+def test_what_a_step_holds_back_is_looked_at_under_the_lock() -> None:
+    class Guarded(Channel):
+        def __getattribute__(self, name: str) -> Any:
+            if name in ("_held", "_due"):
+                assert object.__getattribute__(self, "_lock").locked(), name
+            return super().__getattribute__(name)
+
+    async def play(page: Page) -> None:
+        page.channel = Guarded(lambda *_: None)
+        line = page.connect()
+        await rest()
+        for held in (contextlib.nullcontext(), page.channel.step(1)):
+            with held:
+                page.channel.show("a", 1)
+                page.channel.forget("a")
+                page.channel.notify("b", 2)
+        await rest()
+        assert [value for *_, value in line.notices] == [2, 2]
 
     run(play)
 
