@@ -99,12 +99,10 @@
     }
   }
 
-  /** The answer to a new row comes by another connection than the table, and may be earlier, or say that there is none. */
+  /** The answer to a new row comes with the table, or says that there is none. */
   function answeredRow(row) {
-    setTimeout(() => {
-      if (coming === row) coming = 0;
-      mark();
-    }, PATIENCE);
+    if (coming === row) coming = 0;
+    mark();
   }
 
   function change(action) {
