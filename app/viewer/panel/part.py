@@ -58,6 +58,14 @@ class Part:
 
     def __init__(self, place: viser.GuiHtmlHandle, key: str, content: str, channel: Shows) -> None:
         self._place, self._key, self._content, self._channel = place, key, content, channel
+        remove = place.remove
+
+        def removed() -> None:
+            remove()
+            channel.forget(key)
+
+        # viser calls it also where the container is removed; its handles refuse a plain assignment.
+        object.__setattr__(place, "remove", removed)
 
     @property
     def content(self) -> str:
@@ -91,4 +99,3 @@ class Part:
     def remove(self) -> None:
         """Remove it from the panel."""
         self._place.remove()
-        self._channel.forget(self._key)
