@@ -136,5 +136,6 @@ def _service(module: str, function: str) -> Any:
     """A module of the service, which is installed beside the core or not."""
     for package in _PACKAGES:
         if find_spec(package) is not None and find_spec(f"{package}.{module.partition('.')[0]}") is not None:
-            return import_module(f"{package}.{module}")
+            name = import_module(package).__name__  # in a checkout, kinboard is another name of app
+            return import_module(f"{name}.{module}")
     raise KinematicsError(f"kin.{function} needs the service of Kinboard: pip install kinboard")

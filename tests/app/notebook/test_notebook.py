@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import json
 import re
+import sys
 import threading
 import urllib.request
 from urllib.parse import parse_qs, urlsplit
@@ -18,6 +19,7 @@ import kin
 from app.notebook import child
 from app.viewer.session.state import decode
 from app.viewer.shown import ShownArms
+from kin.notebook import _service
 
 PIONEER = kin.get_robot("pioneer5")
 ROBOTS = tuple(kin.classic_robots().values())
@@ -168,3 +170,9 @@ def test_the_process_serves_and_ends_with_its_input(monkeypatch) -> None:
     assert not process.alive
     with pytest.raises(kin.KinematicsError, match="has ended"):
         process.send({})
+
+
+def test_a_checkout_has_one_copy_of_the_service():
+    """Also where kinboard is another name of it."""
+    assert _service("notebook", "show") is notebook
+    assert "kinboard.notebook" not in sys.modules
