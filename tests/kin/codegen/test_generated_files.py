@@ -6,6 +6,7 @@ import ctypes
 import dataclasses
 import json
 import math
+import re
 import subprocess
 
 import numpy as np
@@ -202,6 +203,25 @@ console.log(JSON.stringify(said));
     assert done[::2] == [f"{kin.fk('planar2r', [0.3, 0.8])[0, 3]:.9f}"] * 3
     assert [each.partition(":")[0] for each in done[1::2]] == ["RangeError"] * 3
     assert "more memory" in done[1]
+
+
+def test_javascript_reads_typed_arrays_and_refuses_what_is_no_number(tmp_path):
+    (tmp_path / "arm.js").write_text(kin.generate("planar2r", "js", name="arm", closest=False))
+    run = """
+const arm = require("./arm.js"), T = arm.fk([0.3, 0.8]), seed = [0.1, 0.1];
+const given = [T, T.map((row) => Float64Array.from(row)), Float64Array.from(T.flat()), T.flat()];
+const bad = [null, "", "0", [], [1], true, undefined, {}, 1n].map((x) => [x, 0.1]);
+const poses = [[null, ...T.slice(1)], [[null, ...T[0].slice(1)], ...T.slice(1)], null, "T"];
+const said = (call) => { try { return call() && "answered"; } catch (error) { return error.message; } };
+const refused = bad.flatMap((q) => [said(() => arm.fk(q)), said(() => arm.ik(T, q))]);
+refused.push(...poses.map((T) => said(() => arm.ik(T, seed))));
+console.log(JSON.stringify({ answers: given.map((T) => arm.ik(T, seed).solutions.length), refused }));
+"""
+    command = [compute_driver_executable()[0], "-e", run]
+    done = json.loads(subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True).stdout)
+    assert done["answers"] == [1] * 4
+    assert len(done["refused"]) == 22
+    assert all(re.match(r"(q|T|seed): ", each) for each in done["refused"]), done["refused"]
 
 
 def test_an_es_module_and_its_types_name_the_same_functions():
