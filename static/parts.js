@@ -12,6 +12,7 @@
   const UNSENT = Infinity;
 
   const part = (node) => (node instanceof Element ? node.closest("[data-part]") : null);
+  const block = (node) => (node instanceof Element ? node.closest(`${PLACE}, [data-part]`) : null);
   const shown = new WeakMap(); // part → the HTML that it shows
   const pending = new Set(); // parts with a field that was left alone
   const said = new WeakMap(); // element → what the service has said of it: name → value
@@ -19,20 +20,20 @@
   const unsent = new Set(); // fields without one
   const typing = new WeakSet(); // text fields that have changed since they were left
   let held = null; // the field under the pressed pointer
-  let last = null; // the part in which the visitor has done something last
+  let last = null; // the question, row or part in which the visitor has done something last
 
   // What visitors change
 
-  addEventListener("pointerdown", ({ target }) => { held = target; last = part(target); }, true);
+  addEventListener("pointerdown", ({ target }) => { held = target; last = block(target); }, true);
   for (const kind of ["pointerup", "pointercancel"]) addEventListener(kind, () => setTimeout(() => { held = null; }), true); // after its click
-  for (const kind of ["click", "keydown"]) addEventListener(kind, ({ target }) => { last = part(target) ?? last; }, true);
+  for (const kind of ["click", "keydown"]) addEventListener(kind, ({ target }) => { last = block(target) ?? last; }, true);
   addEventListener("keydown", ({ target, key, ctrlKey, metaKey }) => {
     if (key === "Escape" || ctrlKey || metaKey) typing.delete(target); // what was typed is given up or undone
   }, true);
   for (const kind of ["input", "change"]) {
     addEventListener(kind, ({ target }) => {
       if (!part(target)) return;
-      last = part(target);
+      last = block(target);
       typing[kind === "input" ? "add" : "delete"](target);
       if (kind === "change" && changed.has(target) && changed.get(target) !== UNSENT) return; // it was sent letter by letter
       changed.set(target, UNSENT);
@@ -41,7 +42,7 @@
   }
   channel.watchSent((number) => {
     for (const field of unsent) {
-      if (field.isConnected && part(field) !== last) continue;
+      if (field.isConnected && !last?.contains(field)) continue; // a message has what was typed in its own question
       unsent.delete(field);
       changed.set(field, number);
     }

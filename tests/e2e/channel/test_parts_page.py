@@ -90,3 +90,39 @@ def test_a_choice_is_left_alone_until_the_service_has_acted_on_it(page: Page) ->
     }""")
     assert found == ["z", "x", "y"]
     expect(page.locator("[data-part=part-test] select")).to_have_value("y")
+
+
+def test_what_is_typed_in_one_question_stays_where_another_one_is_answered(page: Page) -> None:
+    page.evaluate("""() => {
+      window.questions = (n) => `<p>${n}</p>
+        <fieldset data-question="a">
+          <input type="text" data-cell="0" value=""><button data-do="a">a</button>
+        </fieldset>
+        <fieldset data-question="b"><button data-do="b">b</button></fieldset>`;
+      window.sent = 0;
+      channel.watchSent((number) => { sent = number; });
+      bring({ heard: 0, set: { "part-test": questions(1) } });
+      box.addEventListener("click", ({ target }) => { if (target.matches("button")) channel.send("snap", true); });
+    }""")
+    field = page.locator("[data-part=part-test] [data-cell='0']")
+    field.click()
+    page.keyboard.type("half")
+    page.locator("[data-part=part-test] [data-do=b]").click()
+    page.evaluate("bring({ heard: sent, done: sent, set: { 'part-test': questions(2) } })")
+    assert page.evaluate("box.querySelector('p').textContent") == "2"
+    expect(field).to_have_value("half")
+    page.locator("[data-part=part-test] [data-do=a]").click()
+    page.evaluate("bring({ heard: sent, done: sent, set: { 'part-test': questions(3) } })")
+    expect(field).to_have_value("")  # the service has acted on it
+
+
+def test_a_table_that_is_being_typed_stays_where_the_comparison_is_set(page: Page) -> None:
+    page.get_by_role("tab", name="Robot").click()
+    page.locator("#kb-arm-other").select_option("typed")
+    table = page.locator("[data-compare-text]")
+    table.click()
+    page.keyboard.type("q1 89 0 90")
+    page.locator("#kb-arm-agree").focus()
+    page.locator("#kb-arm-agree").select_option("free")
+    expect(page.locator("#kb-arm-agree option[selected]")).to_have_attribute("value", "free")
+    expect(table).to_have_value("q1 89 0 90")
