@@ -111,8 +111,8 @@ def _is_valid(target: Array, seed: Array, T: Array) -> bool:
     """T ← the target with its rotation made orthonormal; whether both can be used.
 
     Its rotation must have RᵀR = I within `TOLERANCES.rotation_matrix`: what is rounded more, for which
-    `kin.solve_ik` takes the nearest rotation and with fewer than six joints widens its tolerances, is not told
-    from what is no rotation.
+    `kin.solve_ik` takes the nearest rotation and with fewer than six joints widens its tolerances, is refused as
+    what is no rotation is.
     """
     for j in range(seed.shape[0]):
         if not abs(seed[j]) <= FAR:
