@@ -200,23 +200,38 @@ const viserPage = (() => {
 
   /** viser applies all updates that wait for a frame after all removals that wait for it. In a slow page an update then
    *  finds no component, which is an error in the console. It is void: it is taken away when the removal comes.
-   *  A slider does not jump under the pointer that holds it: when it is released, the service says what it shows. */
+   *  A slider does not jump under the pointer that holds it: when it is released, the service says what it shows, if it
+   *  was moved; otherwise it shows then what came meanwhile. */
   function dropVoidUpdates(queue) {
     const isFor = (id) => ({ type: kind, uuid, updates }) => kind === "GuiUpdateMessage" && uuid === id && "value" in updates;
     queue.push = (...received) => {
       for (const { type: kind, uuid } of received) {
         HOOKS.hear++;
         if (kind !== "GuiRemoveMessage") continue;
+        if (uuid === held) missed = null;
         const kept = queue.filter((waiting) => waiting.type !== "GuiUpdateMessage" || waiting.uuid !== uuid);
         queue.splice(0, queue.length, ...kept);
       }
-      const jumps = isFor(held);
+      const jumps = isFor(held), last = received.findLast(jumps);
+      if (last) missed = () => queue.push(last);
       return Array.prototype.push.apply(queue, received.filter((message) => !jumps(message)));
     };
   }
   let held = null; // the id of the slider under the pressed pointer
-  addEventListener("pointerdown", ({ target }) => { held = closest(target, PARTS.slider)?.id ?? null; }, true);
-  for (const kind of ["pointerup", "pointercancel"]) addEventListener(kind, () => { held = null; }, true);
+  let heldValue = null; // what it showed when it was pressed
+  let missed = null; // shows what came last for it meanwhile
+  const valueAt = (id) => thumbOf(id)?.getAttribute(VALUE);
+  addEventListener("pointerdown", ({ target }) => {
+    held = closest(target, PARTS.slider)?.id ?? null;
+    [heldValue, missed] = [held && valueAt(held), null];
+  }, true);
+  for (const kind of ["pointerup", "pointercancel"]) {
+    addEventListener(kind, () => {
+      const show = held && valueAt(held) === heldValue ? missed : null;
+      held = missed = null;
+      show?.();
+    }, true);
+  }
 
   /** See what viser sends. */
   function hearSent(viewer) {

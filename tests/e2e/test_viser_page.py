@@ -164,6 +164,25 @@ def test_controls_pressed_within_one_moment_are_all_heard(tab: Tab) -> None:
     expect(tab.status).to_contain_text("No joint is locked")
 
 
+def test_a_slider_that_is_pressed_and_not_moved_shows_afterwards_what_came_meanwhile(tab: Tab) -> None:
+    page, name = tab.page, "1 rotating base"
+    thumb = tab.row(name).get_by_role("slider").first
+    home = thumb.get_attribute("aria-valuenow")
+    assert home is not None
+    tab.type_number(name, "50")
+    tab.wait_for_link(PIONEER, 0, 50)
+    page.evaluate("channel.send('released')")
+    tab.rest()
+    # The mouse would also move it by a part of its step.
+    thumb.evaluate("node => node.dispatchEvent(new PointerEvent('pointerdown', { bubbles: true }))")
+    page.get_by_role("button", name="Home").evaluate("button => button.click()")
+    tab.wait_for_tool(kin.fk(PIONEER, PIONEER.q_home)[:3, 3], within=0.06)
+    tab.rest()
+    expect(thumb).to_have_attribute("aria-valuenow", "50")
+    thumb.evaluate("node => node.dispatchEvent(new PointerEvent('pointerup', { bubbles: true }))")
+    expect(thumb).to_have_attribute("aria-valuenow", home)
+
+
 def test_undo_is_not_passed_by_the_slider_that_was_moved_before_it(tab: Tab) -> None:
     field = tab.row("1 rotating base").locator("input:visible").last
     tab.page.evaluate(AT_ONCE, ["right", "right", "right"])
