@@ -100,6 +100,7 @@ class JointSliders:
         self._units = units
         self._held = 0  # index of the folder whose slider was moved last
         self._crossings = Crossings[tuple[int, int]](fence, self._show_again)  # by folder and joint
+        self._meant: dict[tuple[int, int], float] = {}  # what each slider is to show, also while it is held
         if before is not None:  # what was sent to a slider is on its way to the one that replaces it
             self._crossings.sent(itertools.product(range(len(folders)), range(robot.n)))
         # Of each field: index and kind of its joint, and the unit of what is typed there.
@@ -177,7 +178,7 @@ class JointSliders:
         """
         for place, sliders in enumerate(self._sliders):
             for i, slider in enumerate(sliders):
-                value = self._value(slider, i, q)
+                self._meant[place, i] = value = self._value(slider, i, q)
                 held = i == dragged and place == self._held and slider.min <= slider.value <= slider.max
                 if not held and value != slider.value:
                     assign(slider, value)
@@ -187,7 +188,7 @@ class JointSliders:
 
     def _show_again(self, key: tuple[int, int]) -> None:
         slider = self._sliders[key[0]][key[1]]
-        show_value(slider, slider.value, again=True)
+        show_value(slider, self._meant.get(key, slider.value), again=True)
 
     def _value(self, slider: viser.GuiSliderHandle[float], i: int, q: Array) -> float:
         """What the slider of joint i shows at a configuration ``(n,)``."""

@@ -118,6 +118,7 @@ class RedundancySliders:
         self._html: Block | None = None
         self._uuids: dict[str, str] = {}
         self._crossings = Crossings[str](fence, self._show_again)
+        self._meant: dict[str, float] = {}  # what each slider is to show, also while it is held
         self._unit = DEFAULT_UNITS.angles
 
     def show(
@@ -133,7 +134,7 @@ class RedundancySliders:
         for parameter in parameters:
             slider = self._sliders[parameter.name]
             item = on_side_of(slider.value, parameter, self._unit)
-            value = min(max(self._unit.shown(item.value), slider.min), slider.max)
+            self._meant[item.name] = value = min(max(self._unit.shown(item.value), slider.min), slider.max)
             if item.name != dragged and value != slider.value:
                 assign(slider, value)
                 self._crossings.sent([item.name])
@@ -164,7 +165,8 @@ class RedundancySliders:
         return self._unit.read(float(value))
 
     def _show_again(self, name: str) -> None:
-        show_value(self._sliders[name], self._sliders[name].value, again=True)
+        slider = self._sliders[name]
+        show_value(slider, self._meant.get(name, slider.value), again=True)
 
     def remove(self) -> None:
         """Remove the sliders from the panel."""
