@@ -83,32 +83,40 @@ const viserPage = (() => {
   });
 
   // viser sends one change of the controls of a tab in 50 ms, the newest. So of buttons that are pressed within one moment,
-  // as in a busy page, some would be lost: here they take turns.
+  // as in a busy page, some would be lost: here they take turns. The next turn is counted from when the last one was, as
+  // timers that a busy page is late for all end at once.
   const HELD_BACK = 60; // ms
-  let free = 0; // when (ms) the next press has its turn
+  const turns = []; // what waits for its turn
+  let holding = false; // viser may hold back what the last turn was for
   let inTurn = false;
-  const untilFree = () => Math.max(0, free - performance.now());
+  function hold() {
+    holding = true;
+    setTimeout(() => {
+      holding = turns.length > 0;
+      if (holding) { turns.shift()(); hold(); }
+    }, HELD_BACK);
+  }
   addEventListener("click", (event) => {
     const button = closest(event.target, PARTS.button);
     if (!button || inTurn) return;
-    const wait = untilFree();
-    free = performance.now() + wait + HELD_BACK;
-    if (!wait) return;
+    if (!holding) return hold();
     event.stopImmediatePropagation();
-    setTimeout(() => {
+    turns.push(() => {
       inTurn = true;
       button.click();
       inTurn = false;
-    }, wait);
+    });
   }, true);
 
   // Marks: where a message of ours comes between the changes of viser's controls. A timer that is set now ends after those
-  // with which viser holds changes back. A mark is an answer to nobody's question about the browser's storage, which viser
-  // ignores.
+  // with which viser holds changes back, also changes of sliders, which take no turns. A mark is an answer to nobody's
+  // question about the browser's storage, which viser ignores.
   const canMark = () => typeof window.__viserMutable?.sendMessage === "function";
   function mark(number) {
     const answer = { type: "LocalStorageGetItemResponseMessage", request_uuid: "kinboard-mark", value: String(number), error: null };
-    setTimeout(() => window.__viserMutable.sendMessage(answer), untilFree() + HELD_BACK);
+    const send = () => setTimeout(() => window.__viserMutable.sendMessage(answer), HELD_BACK);
+    if (holding) turns.push(send);
+    else { send(); hold(); }
   }
 
   const setValue = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
