@@ -16,10 +16,7 @@ if TYPE_CHECKING:
 def __getattr__(name: str) -> object:
     if name in ("__all__", "__version__") or not name.startswith("__"):
         import kin
-        from kin import deprecated
 
-        if name in deprecated.MOVED:
-            return deprecated.moved(name)
         if name == "__all__" or name in kin.__all__:
             return getattr(kin, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,7 +8,6 @@
 
 from typing import TYPE_CHECKING
 
-from kin import deprecated
 from kin._version import __version__
 from kin.collision import (
     Capsule,
@@ -254,13 +253,11 @@ __all__ = [
 
 if TYPE_CHECKING:
     from kin.codegen.files import generate
-else:  # a type checker knows no name that has gone
+else:
 
     def __getattr__(name: str) -> object:
         if name == "generate":  # few programs translate kernels
             from kin.codegen.files import generate
 
             return generate
-        if name in deprecated.MOVED:
-            return deprecated.moved(name)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

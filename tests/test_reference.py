@@ -12,6 +12,7 @@ from pathlib import Path
 import griffe
 import pytest
 
+import app
 import kin
 from scripts.reference import OneByOne, one_by_one
 
@@ -76,6 +77,12 @@ def test_examples_run_and_give_what_is_shown(name):
     output: list[str] = []
     result = doctest.DocTestRunner().run(test, out=output.append)
     assert result.failed == 0, "".join(output)
+
+
+@pytest.mark.parametrize("package", [kin, app])
+def test_a_name_that_is_not_there_gives_the_error_of_python(package):
+    with pytest.raises(AttributeError, match="has no attribute 'section'"):
+        _ = package.section
 
 
 def test_options_of_a_call_have_the_texts_of_the_class(read):

@@ -84,6 +84,16 @@ def test_after_warm_up_rest_no_call_compiles_a_kernel():
     assert done.returncode == 0, done.stderr
 
 
+def test_everything_is_warmed_up_on_request(monkeypatch):
+    done = []
+    monkeypatch.setattr(warmup, "warm_up_rest", lambda: done.append("rest"))
+    monkeypatch.setattr(warmup, "one_of_each_family", lambda: (kin.get_robot("planar2r"),))
+    kin.warm_up()
+    assert done == []
+    kin.warm_up(everything=True)
+    assert done == ["rest"]
+
+
 def test_warm_up_rest_can_be_cancelled_between_kernels(monkeypatch):
     steps: list[int] = []
     made = [lambda i=i: steps.append(i) for i in range(9)]
