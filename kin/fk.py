@@ -144,16 +144,16 @@ def link_frames(robot: Robot | str, q: ArrayLike) -> Array:
     return frames.reshape(*q.shape[:-1], len(robot.rows), 4, 4)
 
 
-def jacobian(robot: Robot | str, q: ArrayLike, frame: Literal["base", "tool"] = "base") -> Array:
+def jacobian(robot: Robot | str, q: ArrayLike, frame: Literal["world", "tool"] = "world") -> Array:
     """Geometric Jacobian ``(..., 6, n)``: twist of the tool point = J q̇.
 
     Rows 0–2 are the linear velocity of the tool point (m/s per rad/s or m/s), rows 3–5 the angular velocity,
-    both with the axes of the world frame (``"base"``: that of an arm without a base of its own), or of the tool.
+    both with the axes of the world frame or of the tool.
 
     Args:
         robot: the arm, or the id of a built-in one.
         q: ``(n,)`` or any batch ``(..., n)`` of configurations, radians (metres for a slide).
-        frame: whose axes the twist is given in: ``"base"`` or ``"tool"``.
+        frame: whose axes the twist is given in: ``"world"`` or ``"tool"``.
 
     Returns:
         The Jacobians, one for each configuration.
@@ -169,7 +169,7 @@ def jacobian(robot: Robot | str, q: ArrayLike, frame: Literal["base", "tool"] = 
     """
     if not isinstance(robot, Robot):
         robot = robot_of(robot)
-    if frame == "base":
+    if frame == "world":
         if type(q) is _ndarray and q.ndim == 1:
             try:
                 J = _empty((6, len(q)))
@@ -178,7 +178,7 @@ def jacobian(robot: Robot | str, q: ArrayLike, frame: Literal["base", "tool"] = 
             except TypeError:  # as in `fk`
                 pass
     elif frame != "tool":
-        raise InputError("frame", frame, 'one of "base", "tool"')
+        raise InputError("frame", frame, 'one of "world", "tool"')
     q = _writable(robot.check_q(q))
     J = jacobian_kernels.jacobian_many(robot.model, q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 6, robot.n)
     if frame == "tool":

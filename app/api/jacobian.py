@@ -68,8 +68,8 @@ async def geometric_jacobian(request: Request, robot: Robot, body: JacobianReque
     """
     q, single = schemas.as_configurations(robot, body.q, settings_of(request))
     batch = Batch("q", len(q), single, REST + ENTRY * 6 * robot.n)
-    return await computed(request, partial(_answers, robot, q, body.frame, batch))
+    return await computed(request, partial(_answers, robot, q, "tool" if body.frame == "tool" else "world", batch))
 
 
-def _answers(robot: Robot, q: Array, frame: Literal["base", "tool"], batch: Batch, deadline: Deadline) -> Response:
+def _answers(robot: Robot, q: Array, frame: Literal["world", "tool"], batch: Batch, deadline: Deadline) -> Response:
     return one_or_all(lambda some: jacobian_answers(robot, q[some], frame), batch, deadline)

@@ -14,7 +14,6 @@ from kin.ik import preferences
 from kin.ik.branches import Branches, Flags, measure, redundancy_of, solution, with_further
 from kin.ik.candidates import select
 from kin.ik.details import Details, Redundancy, SolutionCurve, Solved
-from kin.ik.options import Frame
 from kin.ik.problem import IKProblem
 from kin.ik.results import BlockedBranch, Cause, IKResult, IKSolution, Status
 from kin.singularity import Singularity, singularities_at
@@ -206,8 +205,8 @@ def _has_width(redundancy: Redundancy) -> bool:
 
 def leaves_motion(problem: IKProblem) -> bool:
     """Whether the task leaves the joints that may move a motion, at almost all targets."""
-    frame: Frame = "base" if problem.code == MASK and problem.mask[6] else "tool"
-    J = jacobian(problem.robot, spread(problem.low, problem.high, 16), frame)
+    of_world = problem.code == MASK and bool(problem.mask[6])
+    J = jacobian(problem.robot, spread(problem.low, problem.high, 16), "world" if of_world else "tool")
     rows = {APPROACH: np.arange(5), POSITION: np.arange(3), MASK: np.flatnonzero(problem.mask[:6])}
     J = J[:, rows.get(problem.code, np.arange(6))][..., problem.low < problem.high]
     rank = int(np.linalg.matrix_rank(J, rtol=1e-9).max())

@@ -35,7 +35,7 @@ class JacobianAnswer(Answer):
     """Singular values of the whole Jacobian, largest first (min(6, n) values; mixed units)."""
 
 
-def jacobian_answers(robot: Robot, q: Array, frame: Literal["base", "tool"] = "base") -> list[JacobianAnswer]:
+def jacobian_answers(robot: Robot, q: Array, frame: Literal["world", "tool"] = "world") -> list[JacobianAnswer]:
     """Jacobians of configurations ``(k, n)`` in radians (metres), along axes of the world frame or of the tool."""
     J = jacobian(robot, q, frame)
     columns = zip(
