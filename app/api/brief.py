@@ -85,7 +85,7 @@ def briefly(
     seeds: Array | None,
     whole: Callable[[Any], IkAnswer | ReachableAnswer],
     names: tuple[str, ...],
-    stop: Callable[[], None],
+    cancel: Callable[[], None],
 ) -> list[dict[str, Any]]:
     """Brief answers to poses of the world frame ``(k, 4, 4)``, of fields that are `quick`.
 
@@ -95,9 +95,9 @@ def briefly(
         seeds: ``(k, n)``, or None for the home configuration.
         whole: the whole answer of a result, for targets that the compiled pass does not solve.
         names: of the fields.
-        stop: called now and then; raises to cancel.
+        cancel: called now and then; raises to cancel.
     """
-    results = solve_many(robot, T, options, seeds, stop=stop)
+    results = solve_many(robot, T, options, seeds, cancel=cancel)
     values = {"status": "solved", "reachable": True, "cause": "", "distance": 0.0}
     columns = [results.q.tolist() if name == "q" else [values[name]] * len(T) for name in names]
     found = [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]

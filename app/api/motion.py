@@ -173,7 +173,7 @@ def _planned(robot: Robot, body: MotionRequest, settings: Settings, deadline: De
             q_start,
             qd_start=qd_start,
             qdd_start=qdd_start,
-            stop=deadline.check,
+            cancel=deadline.check,
             **body.keywords,
         )
     except InputError as error:

@@ -121,7 +121,7 @@ def _postures(robot: Robot, body: PathRequest, settings: Settings, deadline: Dea
         options=options,
         q_start=q_start,
         max_step=body.max_step,
-        stop=deadline.check,
+        cancel=deadline.check,
         roundings=roundings,
     )
     return reply(postures_answer(found))

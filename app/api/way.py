@@ -85,10 +85,10 @@ def _find(robot: Robot, body: WayRequest, settings: Settings, deadline: Deadline
             goal,
             seed=body.seed,
             time_limit=body.time_limit,
-            stop=deadline.check,
+            cancel=deadline.check,
             **body.keywords,
         )
-        motion = way_program(found, stop=deadline.check, **body.keywords) if found.found else None
+        motion = way_program(found, cancel=deadline.check, **body.keywords) if found.found else None
     except InputError as error:
         if error.field == "goal":
             error.field = "T_goal"

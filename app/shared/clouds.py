@@ -63,13 +63,13 @@ class Cloud:
         """How many parts there are."""
         return len(self.edges) - 1
 
-    def slice(self, start: int, stop: int, with_q: bool = False) -> WorkspaceChunk:
-        """Points start, …, stop − 1, computed by this thread; raises `kin.InputError` as `kin.workspace_slice`."""
+    def slice(self, start: int, end: int, with_q: bool = False) -> WorkspaceChunk:
+        """Points start, …, end − 1, computed by this thread; raises `kin.InputError` as `kin.workspace_slice`."""
         return workspace_slice(
             self.robot,
             self.n,
             start,
-            stop,
+            end,
             seed=self.seed,
             strategy=self.strategy,
             constraints=self.constraints,

@@ -61,9 +61,9 @@ class Summaries:
         """
 
         def compute(computation: SharedComputation[WorkspaceFacts]) -> WorkspaceFacts:
-            volume, stop = effort is not None, computation.check
+            volume, cancel = effort is not None, computation.check
             tries = effort if effort is not None else 4
-            return workspace_facts(robot, constraints=constraints, effort=tries, volume=volume, stop=stop)
+            return workspace_facts(robot, constraints=constraints, effort=tries, volume=volume, cancel=cancel)
 
         key = (robot, constraints, effort)
         return self._facts.subscribe(key, compute, self._max_pending if limited else None)
@@ -80,9 +80,9 @@ class Summaries:
         """A section as by `kin.workspace_section`. `constraints` and `limited` as in `facts`."""
 
         def compute(computation: SharedComputation[Section]) -> Section:
-            stop = computation.check
+            cancel = computation.check
             return workspace_section(
-                robot, plane, constraints=constraints, resolution=resolution, signed=signed, stop=stop
+                robot, plane, constraints=constraints, resolution=resolution, signed=signed, cancel=cancel
             )
 
         key = (robot, plane, constraints, resolution, signed)
@@ -93,7 +93,7 @@ class Summaries:
 
         def compute(computation: SharedComputation[Comparison]) -> Comparison:
             computation.latest = compare(a, b, frames=frames, explain=False)
-            return compare(a, b, frames=frames, stop=computation.check)
+            return compare(a, b, frames=frames, cancel=computation.check)
 
         return self._comparisons.subscribe((a, b, frames), compute)
 

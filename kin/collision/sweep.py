@@ -24,7 +24,7 @@ from kin.transforms import Array
 
 CLOSE = 1e-5  # m; a motion that comes closer, but is never seen to touch, counts as touching
 MOST = 1 << 20  # configurations looked at; what is not proven by then counts as touching
-CHUNK = 1 << 14  # of them between two calls of `stop`
+CHUNK = 1 << 14  # of them between two calls of `cancel`
 LOOKS = 64  # for the deepest contact of a motion that touches something
 Rows = NDArray[np.int64]
 
@@ -34,7 +34,7 @@ def first_contacts(
     at: Callable[[Rows, Array], Array],
     moves: Array,
     farthest: Array,
-    stop: Callable[[], None],
+    cancel: Callable[[], None],
 ) -> Array:
     """The part of each motion ``(k,)``, from 0 to 1, after which something touches first; infinite: never.
 
@@ -43,7 +43,7 @@ def first_contacts(
         moves: bounds ``(k, n)`` of the slope of each joint (rad or m) over its motion, of which the part runs from
             0 to 1.
         farthest: the largest absolute joint values ``(n,)`` of all motions.
-        stop: cancels by raising.
+        cancel: cancels by raising.
     """
     body = near.bodies
     couples, paces = _approach_bounds(near, moves, farthest)
@@ -54,7 +54,7 @@ def first_contacts(
         """The smallest distances, and what is left of them ``(c, 2)``."""
         out = np.empty((len(rows), 2))
         for start in range(0, len(rows), CHUNK):
-            stop()
+            cancel()
             part = slice(start, start + CHUNK)
             q = np.ascontiguousarray(at(rows[part], shares[part]))
             parts = np.column_stack([rows[part].astype(float), half[part]])
@@ -135,18 +135,18 @@ class Touch(NamedTuple):
 
 
 def touches_along(
-    near: Surroundings, path: Array, jumps: Collection[int], stop: Callable[[], None]
+    near: Surroundings, path: Array, jumps: Collection[int], cancel: Callable[[], None]
 ) -> tuple[Touch, ...]:
     """Where the straight joint motions between neighbours of a path ``(k, n)`` touch something first.
 
     Those without a touch are proven free. The contact is the deepest of `LOOKS` along the rest of the motion. Of
-    the first row, and of `jumps`, by the row they lead to, only that row is looked at. `stop` cancels by raising.
+    the first row, and of `jumps`, by the row they lead to, only that row is looked at. `cancel` cancels by raising.
     """
     still = np.array([i == 0 or i in jumps for i in range(len(path))])
     start = np.where(still[:, None], path, np.concatenate([path[:1], path[:-1]]))
     ways = path - start
     shares = first_contacts(
-        near, lambda rows, s: start[rows] + s[:, None] * ways[rows], np.abs(ways), np.abs(path).max(axis=0), stop
+        near, lambda rows, s: start[rows] + s[:, None] * ways[rows], np.abs(ways), np.abs(path).max(axis=0), cancel
     )
     found = []
     for i in np.flatnonzero(np.isfinite(shares)).tolist():

@@ -58,7 +58,7 @@ def compare(
     tolerance: tuple[float, float] | None = None,
     explain: bool = True,
     seconds: float = 2.0,
-    stop: Callable[[], None] | None = None,
+    cancel: Callable[[], None] | None = None,
 ) -> Comparison:
     """Compare arm b with the reference a.
 
@@ -71,7 +71,7 @@ def compare(
             a tolerance, mistakes are also found in a table that is rounded elsewhere.
         explain: whether to look for mistakes in b.
         seconds: after which no further pairs of mistakes are tried; single ones are always tried.
-        stop: called every few milliseconds while mistakes are sought; what it raises ends the comparison.
+        cancel: called every few milliseconds while mistakes are sought; what it raises ends the comparison.
 
     Returns:
         the verdict, the mapping, the differences and likely mistakes.
@@ -107,7 +107,7 @@ def compare(
     reference = Reference(a, axes)
     result = _verdict(reference, b, allowed)
     if explain and result.verdict != "identical":
-        result = _explained(result, reference, b, frames == "fixed", allowed, deadline, stop or (lambda: None))
+        result = _explained(result, reference, b, frames == "fixed", allowed, deadline, cancel or (lambda: None))
     return result
 
 
@@ -118,17 +118,17 @@ def _explained(
     fixed: bool,
     allowed: Tolerance | None,
     deadline: float,
-    stop: Callable[[], None],
+    cancel: Callable[[], None],
 ) -> Comparison:
     """The comparison with likely mistakes in b."""
     unchanged = math.inf
     if result.mapping is not None and result.is_same:
         unchanged = result.mapping.cost(reference.tolerance) * (1.0 if fixed else FREE_FRAMES)
-    search = Search(reference, b, fixed, deadline, stop)
+    search = Search(reference, b, fixed, deadline, cancel)
     found = search.run(_MOST, unchanged)
     if not found and allowed is not None and not result.is_same:
         near = Reference(reference.robot, Tolerance(_SHARE * allowed.length, _SHARE * allowed.angle))
-        search = Search(near, b, fixed, deadline, stop)
+        search = Search(near, b, fixed, deadline, cancel)
         found = _within(reference.robot, search.run(_MOST, unchanged), allowed)
     return replace(result, explanations=tuple(found), complete=search.complete)
 

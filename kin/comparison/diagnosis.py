@@ -70,17 +70,17 @@ class Search:
         reference: arm a, and up to which differences axes count as one.
         fixed: whether the poses should agree as they are, so that base, tool and zeros are mistakes too.
         deadline: on `time.monotonic`; pairs are given up then.
-        stop: called between two steps.
+        cancel: called between two steps.
     """
 
     def __init__(
-        self, reference: Reference, b: Robot, fixed: bool, deadline: float, stop: Callable[[], None]
+        self, reference: Reference, b: Robot, fixed: bool, deadline: float, cancel: Callable[[], None]
     ) -> None:
         self._reference, self._b, self._fixed = reference, b, fixed
         a, tolerance = reference.robot, reference.tolerance
         self._a = a
         self._share = 1.0 if fixed else FREE_FRAMES  # of the cost of frames and zeros
-        self._tolerance, self._deadline, self._stop = tolerance, deadline, stop
+        self._tolerance, self._deadline, self._cancel = tolerance, deadline, cancel
         self._probes, self._poses, self._kinds, self._ends, self._zeros = _facts(a)
         self._invariants = invariants_of(a)
         self._found: dict[bytes, Explanation] = {}
@@ -142,7 +142,7 @@ class Search:
                 continue
             self._solve(level)
             for edit in known_edits(level.tables.rows, self._a, self._fixed):
-                self._stop()
+                self._cancel()
                 if time.monotonic() > self._deadline:
                     self.complete = False
                     return
@@ -158,7 +158,7 @@ class Search:
     def _second_rows(self, level: _Level) -> None:
         """One more row left out or put in, of tables that still have another number of joints."""
         for i, history in enumerate(level.history):
-            self._stop()
+            self._cancel()
             if time.monotonic() > self._deadline:
                 self.complete = False
                 return
@@ -214,7 +214,7 @@ class Search:
             i = int(fits[k])
             if matched >= _MOST_MATCHES or least[k] >= self._least() or time.monotonic() > self._deadline:
                 break
-            self._stop()
+            self._cancel()
             most = (self._limit - float(level.cost[i])) / self._share
             found = self._reference.plainest(side, most, float(needed[k]))
             matched += not isinstance(found, int)

@@ -156,7 +156,7 @@ class _Search:
     def at(self, values: tuple[float, ...]) -> tuple[Branches, Array]:
         """The branches at given values, and their keys ``(k,)``: smaller is better, infinite is none."""
         problem = self.problem
-        problem.stop()
+        problem.cancel()
         found = solve_branches(problem, problem.T, problem.code, None, values)
         assert found is not None
         key = np.full(len(found.q), math.inf)

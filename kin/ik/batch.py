@@ -186,13 +186,13 @@ def solve_many(
     options: IKOptions,
     q_seed: ArrayLike | None = None,
     rounding: Array | None = None,
-    stop: Callable[[], None] = never_cancel,
+    cancel: Callable[[], None] = never_cancel,
 ) -> IKResults:
     """`solve_ik_many` for callers that have an `IKOptions`, rounded frames, or too little time.
 
     Args:
         rounding: ``(k,)`` for each target, as in `kin.ik.solve`.
-        stop: called before each target that takes more than a compiled pass; raises to cancel.
+        cancel: called before each target that takes more than a compiled pass; raises to cancel.
 
     Raises:
         InputError: a malformed target (named ``targets[i]``) or seed, or an option that does not fit the arm.
@@ -202,7 +202,7 @@ def solve_many(
     if rounding is not None:
         errors += rounding
     seeds = prepared.seed[None] if q_seed is None else _seeds(robot, q_seed, len(targets))
-    stack = _Stack(prepared, poses, errors, seeds, stop)
+    stack = _Stack(prepared, poses, errors, seeds, cancel)
     return IKResults(stack.answer, stack.nearest())
 
 
@@ -218,12 +218,12 @@ class _Stack:
     poses: Array
     errors: Array
     seeds: Array
-    stop: Callable[[], None]
+    cancel: Callable[[], None]
     found: dict[int, Candidates] = field(default_factory=dict)
 
     def problem(self, i: int) -> IKProblem:
         """The problem of target i."""
-        self.stop()
+        self.cancel()
         return self.prepared.at(self.poses[i], float(self.errors[i]), self.seeds[min(i, len(self.seeds) - 1)])
 
     def answer(self, i: int) -> IKResult:

@@ -115,7 +115,7 @@ def _followed(problem: IKProblem, search: _Search, q: Array, errors: Array) -> A
     beside = _beside(problem)
     near = [q[i] for i in order if errors[i] < beside]
     for row in _apart(near)[:_VALLEYS]:
-        problem.stop()
+        problem.cancel()
         there, error = follow(problem.robot.model, *search, row)
         if error <= search.enough:
             return there

@@ -61,7 +61,7 @@ class IKProblem:
         values: one per redundancy parameter, NaN to let it be chosen.
         branches: the requested rows, None for all.
         target_error: how rounded the target is, if that matters.
-        stop: called now and then by long computations; raises to cancel them.
+        cancel: called now and then by long computations; raises to cancel them.
         unit: metres that stand for one where lengths are judged to be none; not 1.0 for an arm that is much
             smaller or larger, see :mod:`kin.solvers.scaled`.
     """
@@ -85,7 +85,7 @@ class IKProblem:
     values: tuple[float, ...]
     branches: frozenset[int] | None
     target_error: float = 0.0
-    stop: Callable[[], None] = never_cancel
+    cancel: Callable[[], None] = never_cancel
     unit: float = 1.0
 
     @classmethod

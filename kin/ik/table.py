@@ -66,7 +66,7 @@ class Table:
         T: Array,
         options: IKOptions,
         seeds: Array | None = None,
-        stop: Callable[[], None] = never_cancel,
+        cancel: Callable[[], None] = never_cancel,
     ) -> Table:
         """The answers to poses of the tool ``(k, 4, 4)``.
 
@@ -74,7 +74,7 @@ class Table:
             robot, options: as in `kin.ik.solve`.
             T: the poses, metres.
             seeds: ``(k, n)``, checked; the home configuration by default.
-            stop: called now and then; raises to cancel.
+            cancel: called now and then; raises to cancel.
 
         Raises:
             InputError: a malformed target (named ``targets[i]``), or an option that does not fit the arm.
@@ -85,7 +85,7 @@ class Table:
         last = len(near) - 1
 
         def problem_at(i: int) -> IKProblem:
-            stop()
+            cancel()
             return prepared.at(poses[i], float(errors[i]), near[min(i, last)])
 
         form = _table_form(prepared)
@@ -97,7 +97,7 @@ class Table:
         table = cls(kinds, count, q, branch, figures, () if form is None else form.branches, problem_at)
         if form is not None:
             for start in range(0, k, AT_ONCE):
-                stop()
+                cancel()
                 table._fill(prepared, form, poses, near, slice(start, start + AT_ONCE))
             kinds[errors != 0.0] = -1
         return table

@@ -25,6 +25,7 @@ from kin.collision.contacts import surroundings
 from kin.errors import InputError
 from kin.ik.options import IKOptions
 from kin.ik.problem import never_cancel
+from kin.motion import limits as assumed
 from kin.motion.arrivals import Arrival
 from kin.motion.limits import MotionLimits, motion_limits
 from kin.motion.planner import planned
@@ -74,11 +75,11 @@ def plan_motion(
     *,
     qd_start: ArrayLike | None = None,
     qdd_start: ArrayLike | None = None,
-    limits: MotionLimits | None = None,
+    motion_limits: MotionLimits | None = None,
     options: IKOptions | None = None,
     avoid_self_collision: bool = False,
     obstacles: Sequence[Obstacle] = (),
-    stop: Callable[[], None] = never_cancel,
+    cancel: Callable[[], None] = never_cancel,
 ) -> Motion:
     """The motion of a program, with every limit kept, or why it cannot be driven.
 
@@ -89,12 +90,12 @@ def plan_motion(
         qd_start, qdd_start: ``(n,)`` how the joints move at the start, radians (metres) per second and per s²,
             within their limits; at rest by default. A PTP without a blend goes on from this motion; before any
             other segment the arm brakes, and the segment begins where it then stands.
-        limits: other limits than those of `motion_limits`, in radians (metres) and seconds.
+        motion_limits: other limits than those of `kin.motion_limits`, in radians (metres) and seconds.
         options: the next two as one value. All others have to be the default: the program states the task, and
             its start the posture.
         avoid_self_collision, obstacles: the motion is checked, and refused at the first place where the arm
             touches itself or an obstacle. It is not led around them.
-        stop: called now and then; cancels the computation by raising.
+        cancel: called now and then; cancels the computation by raising.
 
     Returns:
         The motion to sample, or the refusal with its place and joint; its cause is ``"stop"`` where a joint that
@@ -116,16 +117,15 @@ def plan_motion(
     q = robot.q_home if q_start is None else robot.check_q(q_start, "q_start")
     if q.ndim != 1:
         raise InputError("q_start", f"shape {q.shape}", f"one configuration of {robot.n} values")
-    if limits is None:
-        limits = motion_limits(robot)
-    elif not isinstance(limits, MotionLimits) or len(limits.velocity) != robot.n:
-        raise InputError("limits", limits, f"MotionLimits of {robot.n} joints")
+    limits = assumed.motion_limits(robot) if motion_limits is None else motion_limits
+    if not isinstance(limits, MotionLimits) or len(limits.velocity) != robot.n:
+        raise InputError("motion_limits", limits, f"MotionLimits of {robot.n} joints")
     start = _in_motion(robot, limits, qd_start, qdd_start)
     wanted = IKOptions.of(options, avoid_self_collision=avoid_self_collision, obstacles=obstacles)
     wanted.check_only("avoid_self_collision", "obstacles")
-    found = planned(robot, program, limits, q.copy(), start, stop)
+    found = planned(robot, program, limits, q.copy(), start, cancel)
     if wanted.avoids:
-        return checked(found, surroundings(robot, wanted.obstacles, wanted.avoid_self_collision), stop)
+        return checked(found, surroundings(robot, wanted.obstacles, wanted.avoid_self_collision), cancel)
     return found
 
 

@@ -51,11 +51,11 @@ class MotionLimits:
         for key in ("velocity", "acceleration", "jerk"):
             values = _checked(key, getattr(self, key), n, f"numbers from {LEAST:g} to {MOST:g}")
             for i in np.flatnonzero(~((values >= LEAST) & (values <= MOST))).tolist():
-                raise InputError(f"limits.{key}[{i}]", float(values[i]), f"a number from {LEAST:g} to {MOST:g}")
+                raise InputError(f"motion_limits.{key}[{i}]", float(values[i]), f"a number from {LEAST:g} to {MOST:g}")
             object.__setattr__(self, key, values)
         efforts = _checked("effort", self.effort, n, f"numbers from 0 to {MOST:g} or NaN")
         for i in np.flatnonzero(~(((efforts >= 0.0) & (efforts <= MOST)) | np.isnan(efforts))).tolist():
-            raise InputError(f"limits.effort[{i}]", float(efforts[i]), f"a number from 0 to {MOST:g}, or NaN")
+            raise InputError(f"motion_limits.effort[{i}]", float(efforts[i]), f"a number from 0 to {MOST:g}, or NaN")
         object.__setattr__(self, "effort", efforts)
 
 
@@ -66,7 +66,7 @@ def _checked(key: str, values: ArrayLike, n: int, expected: str) -> Array:
     except (TypeError, ValueError, OverflowError):
         found = np.empty(0)
     if found.shape != (n,):
-        raise InputError(f"limits.{key}", values, f"{n} {expected}, one for each joint")
+        raise InputError(f"motion_limits.{key}", values, f"{n} {expected}, one for each joint")
     found.flags.writeable = False
     return found
 

@@ -21,11 +21,11 @@ def planned(
     limits: MotionLimits,
     q_start: Array,
     start: InMotion | None,
-    stop: Callable[[], None],
+    cancel: Callable[[], None],
 ) -> Motion:
     """The motion of a program from a configuration ``(n,)``, at rest or in motion."""
     _check_targets(robot, program)
-    plan = Plan(robot, program, limits, q_start.copy(), stop, start=start)
+    plan = Plan(robot, program, limits, q_start.copy(), cancel, start=start)
     outside = violations(robot, q_start)
     if outside:
         refused = plan.refused(0, "start", StartOutside(outside), (Help("start"),))

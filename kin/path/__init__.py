@@ -77,7 +77,7 @@ def solve_path(
     avoid_self_collision: bool = False,
     obstacles: Sequence[Obstacle] = (),
     max_step: float = MAX_STEP,
-    stop: Callable[[], None] = never_cancel,
+    cancel: Callable[[], None] = never_cancel,
 ) -> PathResult:
     """One joint path through all `targets`: as few jumps as possible, then as little joint motion as possible.
 
@@ -96,7 +96,7 @@ def solve_path(
             rotation_tolerance, avoid_self_collision, obstacles: as in `kin.solve_ik`, for every waypoint; the
             branch ``"seed"`` is that of `q_start`.
         max_step: the most a joint may move between neighbouring waypoints: radians, or 4 per metre.
-        stop: called now and then; cancels the computation by raising.
+        cancel: called now and then; cancels the computation by raising.
 
     Returns:
         The joint values at each waypoint, and where the path jumps or has a gap, with the cause.
@@ -126,7 +126,7 @@ def solve_path(
         avoid_self_collision=avoid_self_collision,
         obstacles=obstacles,
     )
-    return solve(robot, targets, wanted, q_start, max_step, stop)
+    return solve(robot, targets, wanted, q_start, max_step, cancel)
 
 
 def solve(
@@ -135,14 +135,14 @@ def solve(
     options: IKOptions,
     q_start: ArrayLike | None = None,
     max_step: float = MAX_STEP,
-    stop: Callable[[], None] = never_cancel,
+    cancel: Callable[[], None] = never_cancel,
     roundings: Sequence[float] | None = None,
 ) -> PathResult:
     """`solve_path` for callers that have an `IKOptions`, or rounded frames.
 
     `roundings` are one per target, each as in `kin.ik.solve`.
     """
-    settings, waypoints = _layers(robot_of(robot), targets, options, q_start, max_step, stop, roundings)
+    settings, waypoints = _layers(robot_of(robot), targets, options, q_start, max_step, cancel, roundings)
     return _chosen(settings, waypoints)
 
 
@@ -153,13 +153,13 @@ def path_postures(
     options: IKOptions | None = None,
     q_start: ArrayLike | None = None,
     max_step: float = MAX_STEP,
-    stop: Callable[[], None] = never_cancel,
+    cancel: Callable[[], None] = never_cancel,
     roundings: Sequence[float] | None = None,
 ) -> PathPostures:
     """At each target and in each posture of the arm what is in the way, and how far it gets without a jump.
 
     Args:
-        robot, targets, q_start, max_step, stop: as in `solve_path`.
+        robot, targets, q_start, max_step, cancel: as in `solve_path`.
         options: as in `solve_path`. With `avoid_self_collision` or `obstacles`, configurations that touch
             something are in the way.
         roundings: one per target: how rounded the numbers are from which it was computed, such as the pose of a
@@ -181,7 +181,7 @@ def path_postures(
         (2, (0, 1))
     """
     wanted = IKOptions.of(options)
-    settings, waypoints = _layers(robot_of(robot), targets, wanted, q_start, max_step, stop, roundings)
+    settings, waypoints = _layers(robot_of(robot), targets, wanted, q_start, max_step, cancel, roundings)
     return postures_along(settings, waypoints, _chosen(settings, waypoints))
 
 
@@ -191,13 +191,13 @@ def _layers(
     options: IKOptions,
     q_start: ArrayLike | None,
     max_step: float,
-    stop: Callable[[], None],
+    cancel: Callable[[], None],
     roundings: Sequence[float] | None,
 ) -> tuple[PathSettings, list[Waypoint]]:
     """The waypoints with their layers, and what is constant along the path."""
     if q_start is not None and robot.check_q(q_start, "q_start").ndim != 1:
         raise InputError("q_start", q_start, f"one configuration of {robot.n} values")
-    problem = replace(IKProblem.of(robot, np.eye(4), options, q_start), stop=stop)
+    problem = replace(IKProblem.of(robot, np.eye(4), options, q_start), cancel=cancel)
     step = _checked_step(max_step)
     poses, errors = read_poses(listed(targets), problem.code, always=robot.n < 6)
     settings = PathSettings.of(problem, step, q_start is not None, len(poses))

@@ -28,7 +28,7 @@ LARGE = 0.125  # a larger motion between neighbouring waypoints makes a search f
 
 def branches_near(problem: IKProblem, seed: Array, values: tuple[float, ...] | None = None) -> Branches:
     """The branches nearest to a seed ``(n,)``, of a problem that a closed form covers."""
-    problem.stop()
+    problem.cancel()
     found = solve_branches(problem, problem.T, problem.code, seed, values)
     assert found is not None
     return found
@@ -74,7 +74,7 @@ def alike(miss: Array, least: float) -> Flags:
 
 def descended(problem: IKProblem, starts: Array) -> Array:
     """Where descents from the starts ``(k, n)`` end, if they meet the problem ``(m, n)``: each once."""
-    problem.stop()
+    problem.cancel()
     if not len(starts):
         return starts
     q, errors = nearest.descend_each(problem, problem.code, starts, 1.0)

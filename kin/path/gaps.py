@@ -55,7 +55,7 @@ def _closest(waypoint: Waypoint, start: Array) -> Array:
     requested branches, the arm stays.
     """
     problem, q = waypoint.requested, start
-    problem.stop()
+    problem.cancel()
     if waypoint.gap is not None and waypoint.gap.status is Status.APPROXIMATE:
         for weight in (nearest.ORIENTATION_WEIGHT, 1e-2, 1e-4):
             q, _ = nearest.descend(problem, problem.code, q[None], weight)

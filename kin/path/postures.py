@@ -167,7 +167,7 @@ def postures_along(settings: PathSettings, waypoints: list[Waypoint], best: Path
     reach, joined = _followed_back(settings, layers, labels, len(names))
     table = _Table.of(problem.robot, len(layers), len(names))
     for i, waypoint in enumerate(waypoints):
-        problem.stop()
+        problem.cancel()
         table.fill(i, waypoint, labels[i], reach[i])
         if problem.closed_form is not None and problem.closed_form.named and has_closed_form(problem):
             table.fill_blocked(i, waypoint, names)
@@ -223,7 +223,7 @@ def _followed_back(
     joined = np.zeros((max(len(layers) - 1, 0), count, count), dtype=bool)
     allowed = settings.max_step * (1.0 + 1e-9)
     for i in range(len(layers) - 2, -1, -1):
-        settings.problem.stop()
+        settings.problem.cancel()
         after = layers[i + 1]
         if not len(after) or not len(layers[i]):
             continue

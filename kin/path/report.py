@@ -42,7 +42,7 @@ def report(sequence: LayerSequence, waypoints: list[Waypoint], q: Array, ends: l
     position, rotation = stats[:, POSITION_ERROR].copy(), stats[:, ROTATION_ERROR].copy()
     contacts: tuple[Touch, ...] = ()
     if settings.problem.options.avoids:
-        contacts = touches_along(around(settings.problem), q, steps, settings.problem.stop)
+        contacts = touches_along(around(settings.problem), q, steps, settings.problem.cancel)
     for array in (q, position, rotation):
         array.flags.writeable = False
     return PathResult(

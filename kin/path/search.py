@@ -76,10 +76,10 @@ def best_path(sequence: LayerSequence) -> tuple[Array, list[DeadEnd]]:
 def _searched(sequence: LayerSequence, layers: list[Array], allowed: float) -> Trellis:
     """The shortest path; while it jumps, continuations of the motions on both sides are added to the layers."""
     settings = sequence.settings
-    settings.problem.stop()
+    settings.problem.cancel()
     trellis = shortest(settings, layers, sequence.spans, settings.circle, allowed)
     for _ in range(_REPAIRS):
-        settings.problem.stop()
+        settings.problem.cancel()
         if trellis.jumps == 0:
             break
         starts = [(s, row, 1) for s, row in trellis.dead_ends()]

@@ -52,7 +52,7 @@ def find_way(
     seed: int = 0,
     time_limit: float = 5.0,
     progress: Callable[[float], None] | None = None,
-    stop: Callable[[], None] = never_cancel,
+    cancel: Callable[[], None] = never_cancel,
 ) -> Way:
     """Waypoints of the joints from a configuration to a configuration or a pose, with nothing touched between.
 
@@ -65,7 +65,7 @@ def find_way(
         time_limit: seconds, above 0 and at most 600, for the search; shortening may take a fifth of it more. A
             search that waits for another one of the same process does not count that.
         progress: called now and then with the part of the time that has passed, 0 to 1.
-        stop: called now and then; cancels the search by raising.
+        cancel: called now and then; cancels the search by raising.
 
     Raises:
         InputError: malformed arguments, or a search is needed and the package ``ompl`` is not installed
@@ -74,7 +74,7 @@ def find_way(
     """
     robot = robot_of(robot)
     start, seconds = _checked(robot, q_start, seed, time_limit)
-    space = Space.of(robot, surroundings(robot, tuple(obstacles), avoid_self_collision), stop)
+    space = Space.of(robot, surroundings(robot, tuple(obstacles), avoid_self_collision), cancel)
     goals, refused = _goals(robot, start, goal, space)
     refused = space.refusal(start, "start") or refused
     if refused is not None:
@@ -86,13 +86,13 @@ def find_way(
         part = (time.monotonic() - began) / seconds
         if progress is not None:
             progress(min(part, 1.0))
-        stop()
+        cancel()
         return part
 
     straight = next((q for q in goals if space.is_free(start, q)), None)
     found = None if straight is None else np.array([start, straight])
     if found is None:
-        with alone(stop):
+        with alone(cancel):
             began = time.monotonic()  # now it searches
             found = connect(space, start, goals, seed, passed)
     searched = time.monotonic() - began

@@ -26,22 +26,22 @@ class Space:
     Attributes:
         robot, near: the arm, and what it must not touch.
         lower, upper: ``(n,)`` what is searched.
-        stop: cancels by raising.
+        cancel: cancels by raising.
     """
 
     robot: Robot
     near: Surroundings
     lower: Array
     upper: Array
-    stop: Callable[[], None]
+    cancel: Callable[[], None]
 
     @classmethod
-    def of(cls, robot: Robot, near: Surroundings, stop: Callable[[], None]) -> Space:
+    def of(cls, robot: Robot, near: Surroundings, cancel: Callable[[], None]) -> Space:
         """The space of an arm; joints without limits are searched for a turn or a metre to both sides."""
         room = np.where(robot.revolute, TURNING, SLIDING)
         lower = np.where(np.isfinite(robot.lower), robot.lower, robot.q_home - room)
         upper = np.where(np.isfinite(robot.upper), robot.upper, robot.q_home + room)
-        return cls(robot, near, lower, upper, stop)
+        return cls(robot, near, lower, upper, cancel)
 
     @property
     def options(self) -> IKOptions:
@@ -58,7 +58,7 @@ class Space:
         way = end - start
         farthest = np.maximum(np.abs(start), np.abs(end))
         found = first_contacts(
-            self.near, lambda rows, share: start + share[:, None] * way, np.abs(way)[None], farthest, self.stop
+            self.near, lambda rows, share: start + share[:, None] * way, np.abs(way)[None], farthest, self.cancel
         )
         return not bool(np.isfinite(found[0]))
 

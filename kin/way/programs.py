@@ -26,7 +26,7 @@ def way_program(
     way: Way,
     obstacles: Sequence[Obstacle] = (),
     avoid_self_collision: bool = False,
-    stop: Callable[[], None] = never_cancel,
+    cancel: Callable[[], None] = never_cancel,
     like: Ptp | None = None,
 ) -> Motion:
     """The motion through the waypoints of a way, proven free; its `program` starts at the start of the way.
@@ -34,7 +34,7 @@ def way_program(
     Args:
         way: that was found.
         obstacles, avoid_self_collision: what must not be touched.
-        stop: called now and then; cancels by raising.
+        cancel: called now and then; cancels by raising.
         like: its segments have the speed, acceleration and limits of the tool of this one.
 
     Raises:
@@ -51,7 +51,7 @@ def way_program(
             for i, (row, zone) in enumerate(zip(q[1:], zones[1:], strict=True))
         ]
         motion = plan_motion(
-            way.robot, segments, q[0], avoid_self_collision=avoid_self_collision, obstacles=obstacles, stop=stop
+            way.robot, segments, q[0], avoid_self_collision=avoid_self_collision, obstacles=obstacles, cancel=cancel
         )
         if motion.refusal is None or motion.refusal.cause != "collision":
             return motion

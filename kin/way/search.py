@@ -31,10 +31,10 @@ def is_installed() -> bool:
 
 
 @contextmanager
-def alone(stop: Callable[[], None]) -> Iterator[None]:
-    """Wait until no other search runs; `stop` cancels by raising."""
+def alone(cancel: Callable[[], None]) -> Iterator[None]:
+    """Wait until no other search runs; `cancel` cancels by raising."""
     while not _ONE.acquire(timeout=_LOOK):
-        stop()
+        cancel()
     try:
         yield
     finally:

@@ -25,7 +25,7 @@ def workspace_facts(
     constraints: JointConstraints | None = None,
     effort: int = 4,
     volume: bool = True,
-    stop: Callable[[], None] = never_cancel,
+    cancel: Callable[[], None] = never_cancel,
 ) -> WorkspaceFacts:
     """Bounding box, reach, holes, volume and surface of the points the tool reaches.
 
@@ -36,7 +36,7 @@ def workspace_facts(
         effort: 2 to 64: points tried per cube, or the resolution of the section in steps of 24 squares. The error
             of the volume falls with its square root, or with its square where joint 1 turns all the way.
         volume: whether to estimate volume and surface, which takes some seconds; the rest takes a tenth of one.
-        stop: called now and then; raises to cancel the computation.
+        cancel: called now and then; raises to cancel the computation.
 
     Returns:
         The figures, each with its estimated error.
@@ -55,7 +55,7 @@ def workspace_facts(
     point, axis, shoulder = base_axis(region)
     x, y, z = (along(region, direction) for direction in np.eye(3))
     estimate = from_section if _turns(region) else from_probes
-    size = estimate(region, tries, stop) if volume else (None, None)
+    size = estimate(region, tries, cancel) if volume else (None, None)
     return WorkspaceFacts(
         x=x,
         y=y,

@@ -23,9 +23,9 @@ from kin.workspace.sections.cut import profile
 _SQUARES = 24  # along the longer side of the section, per unit of effort
 
 
-def from_probes(region: Region, tries: int, stop: Callable[[], None] = never_cancel) -> tuple[Estimate, Estimate]:
+def from_probes(region: Region, tries: int, cancel: Callable[[], None] = never_cancel) -> tuple[Estimate, Estimate]:
     """Volume (m³) and surface area (m²) from `tries` random points in each cell of the map."""
-    probes = probe_cells(region, tries, SEEDS, stop)
+    probes = probe_cells(region, tries, SEEDS, cancel)
     size = probes.map.size
     if (probes.map.edge == 0.0).any():
         flat = "the workspace is flat"
@@ -55,10 +55,10 @@ def _stratified(values: Array, cube: float) -> tuple[float, float]:
 
 
 def from_section(
-    region: Region, effort: int, stop: Callable[[], None] = never_cancel
+    region: Region, effort: int, cancel: Callable[[], None] = never_cancel
 ) -> tuple[Estimate, Estimate]:
     """Volume (m³) and surface area (m²) from (r, z) sections at a resolution and half of it."""
-    coarse, fine = (profile(region, _SQUARES * effort // part, stop=stop) for part in (2, 1))
+    coarse, fine = (profile(region, _SQUARES * effort // part, cancel=cancel) for part in (2, 1))
     method = f"(r, z) section with squares of {fine.step:.3g} m, and of twice that, revolved"
     pairs = zip(_revolved(coarse), _revolved(fine), strict=True)
     volume, surface = (Estimate(b, abs(b - a), method) for a, b in pairs)

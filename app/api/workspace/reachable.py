@@ -140,6 +140,6 @@ def _answers_together(
 
     if quick(names):
         return briefs
-    table = Table.of(robot, T, options, stop=deadline.check)
+    table = Table.of(robot, T, options, cancel=deadline.check)
     whole = WholeAnswers(table, reachable_answer, reachable_renewed)
     return lambda some: [brief(each, names) for each in whole.of(some)] if names else whole.of(some)

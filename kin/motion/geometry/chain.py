@@ -71,18 +71,18 @@ def first_nodes(starts: Array) -> Array:
 
 
 def followed(
-    robot: Robot, chain: Chain, q_start: Array, code: int, stop: Callable[[], None]
+    robot: Robot, chain: Chain, q_start: Array, code: int, cancel: Callable[[], None]
 ) -> tuple[Array, Array]:
     """The joint path of a chain: knots ``(k + 1,)`` and coefficients ``(k, n, 4)``.
 
     Raises:
         LostError: where it cannot be followed.
     """
-    s, q = _nodes(robot, chain, first_nodes(chain.starts), q_start, code, stop)
+    s, q = _nodes(robot, chain, first_nodes(chain.starts), q_start, code, cancel)
     if robot.n == ROWS[code] + 1:
-        _relax(robot, chain, s, q, ROWS[code], stop)
+        _relax(robot, chain, s, q, ROWS[code], cancel)
     for _ in range(_ROUNDS):
-        stop()
+        cancel()
         pieces = spline(s, q)
         off = _deviation(robot, chain, s, pieces, code)
         if not (off > DEVIATION).any():
@@ -104,12 +104,12 @@ def followed(
     raise LostError(s[: worst + 2], q[: worst + 2])
 
 
-def _relax(robot: Robot, chain: Chain, s: Array, q: Array, rows: int, stop: Callable[[], None]) -> None:
+def _relax(robot: Robot, chain: Chain, s: Array, q: Array, rows: int, cancel: Callable[[], None]) -> None:
     """Move a joint that is left over away from limits and singularities, further where a limit is passed."""
     bounds = np.ascontiguousarray(np.stack([robot.lower, robot.upper]))
     targets = chain.poses(s)
     for moving in _MOVING:
-        stop()
+        cancel()
         relax(robot.model, targets, s, rows, bounds, 2.0 * _STEP, moving, q)
         if (q >= robot.lower).all() and (q <= robot.upper).all():
             return
@@ -124,7 +124,7 @@ def _parted(s: Array, q: Array, parts: NDArray[np.int64]) -> tuple[Array, Array,
 
 
 def _nodes(
-    robot: Robot, chain: Chain, s: Array, q_start: Array, code: int, stop: Callable[[], None]
+    robot: Robot, chain: Chain, s: Array, q_start: Array, code: int, cancel: Callable[[], None]
 ) -> tuple[Array, Array]:
     """Configurations at the nodes, and at further ones where a joint moves far."""
     bounds = np.ascontiguousarray(np.stack([robot.lower, robot.upper]))
@@ -132,7 +132,7 @@ def _nodes(
     targets, q, done = chain.poses(s), np.empty((len(s), robot.n)), 1
     q[0] = q_start
     while True:
-        stop()
+        cancel()
         done = follow(robot.model, targets, s, ROWS[code], bounds, _STEP, done, q)
         if done >= len(s):
             return s, q

@@ -20,14 +20,14 @@ SLACK = 1.1  # how much faster a joint may be between the times at which its spe
 LEAST = 0.05  # of its highest speed in a piece: that of a joint which seems to rest in a part of it
 
 
-def checked(motion: Motion, near: Surroundings, stop: Callable[[], None]) -> Motion:
+def checked(motion: Motion, near: Surroundings, cancel: Callable[[], None]) -> Motion:
     """The motion, or its refusal at the first place where something touches.
 
     A motion that is not refused is proven free (:mod:`kin.collision.sweep`), provided that no joint is a tenth
     faster anywhere than at the times of `Piece.grid` around.
     """
     if not motion.planned:
-        part = None if motion.part is None else checked(motion.part, near, stop)
+        part = None if motion.part is None else checked(motion.part, near, cancel)
         if part is not None and not part.planned:  # something touches before the place that was refused
             return replace(part, program=motion.program)
         return motion
@@ -44,7 +44,7 @@ def checked(motion: Motion, near: Surroundings, stop: Callable[[], None]) -> Mot
             q[these] = pieces[k].at(times[these])[0]
         return q
 
-    found = first_contacts(near, at, speeds * spans[:, None], farthest, stop)
+    found = first_contacts(near, at, speeds * spans[:, None], farthest, cancel)
     touching = np.flatnonzero(np.isfinite(found))
     if not len(touching):
         return motion
@@ -59,8 +59,8 @@ def checked(motion: Motion, near: Surroundings, stop: Callable[[], None]) -> Mot
     refusal = Refusal(
         segment.index, segment.kind, segment.name, None, None, "collision", Collides(time, contact), helps
     )
-    part = part_of(motion, segment.index, stop)
-    free = None if part is None else checked(part, near, stop).driven
+    part = part_of(motion, segment.index, cancel)
+    free = None if part is None else checked(part, near, cancel).driven
     return replace(motion, refusal=refusal, segments=(), notes=(), pieces=(), part=free)
 
 

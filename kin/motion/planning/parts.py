@@ -30,7 +30,7 @@ def driven(plan: Plan, index: int) -> None:
     if plan.start is not None:
         index = set_off(plan)
     while index < len(plan.program.segments):
-        plan.stop()
+        plan.cancel()
         index = drive_fastest(plan, index)
 
 
@@ -60,9 +60,9 @@ def part_before(plan: Plan, q_start: Array, refusal: Refusal, start: InMotion | 
     return _motion(plan, whole, q_start, start)
 
 
-def part_of(motion: Motion, count: int, stop: Callable[[], None]) -> Motion | None:
+def part_of(motion: Motion, count: int, cancel: Callable[[], None]) -> Motion | None:
     """The motion of the first segments of a planned one, with a stop at their end; None if there are none."""
-    plan = Plan(motion.robot, motion.program, motion.limits, motion.q_start.copy(), stop, start=motion.start)
+    plan = Plan(motion.robot, motion.program, motion.limits, motion.q_start.copy(), cancel, start=motion.start)
     with suppress(RefusedError):
         _drive_first(plan, motion.program, count)
     return _motion(plan, motion.program, motion.q_start, motion.start)

@@ -38,7 +38,7 @@ class Plan:
     """A motion being planned: what is known so far, and where the arm is at its end.
 
     Attributes:
-        robot, program, limits, stop: what is asked for.
+        robot, program, limits, cancel: what is asked for.
         q: where the arm is ``(n,)``.
         start: how it moves at the start, until that is planned; None if it is at rest.
         stops: the segments at whose ends the arm stops although a blend is set.
@@ -54,7 +54,7 @@ class Plan:
     program: Program
     limits: MotionLimits
     q: Array
-    stop: Callable[[], None]
+    cancel: Callable[[], None]
     stops: frozenset[int] = frozenset()
     start: InMotion | None = None
     pieces: list[Piece] = field(default_factory=list)
@@ -73,7 +73,7 @@ class Plan:
 
     def branch(self, stops: frozenset[int] = frozenset()) -> Plan:
         """An empty plan that continues this one."""
-        return Plan(self.robot, self.program, self.limits, self.q, self.stop, stops, time=self.time)
+        return Plan(self.robot, self.program, self.limits, self.q, self.cancel, stops, time=self.time)
 
     def take(self, other: Plan) -> None:
         """Add what a branch has planned."""

@@ -145,7 +145,7 @@ def _tool_run(plan: Plan, first: int) -> Run | None:
     layout = Layout.of([curve.length for curve in curves], radii, first)
     chain = chained(curves, radii, layout)
     try:
-        knots, pieces = followed(robot, chain, plan.q, CODES[plan.task], plan.stop)
+        knots, pieces = followed(robot, chain, plan.q, CODES[plan.task], plan.cancel)
     except LostError as error:
         raise _lost(plan, layout, chain, error) from None
     run = Run(layout, knots, pieces, _ends(plan, curves, values(knots, pieces, layout.bounds)))
@@ -218,7 +218,7 @@ def _refused_at(
 
     def can_follow(q: Array) -> bool:
         try:
-            knots, pieces = followed(plan.robot, chain, q, CODES[plan.task], plan.stop)
+            knots, pieces = followed(plan.robot, chain, q, CODES[plan.task], plan.cancel)
         except LostError:
             return False
         return not outside(plan.robot, values(knots, pieces, np.linspace(0.0, float(knots[-1]), 999))).any()

@@ -43,13 +43,13 @@ def segment_poses(motion: Motion, index: int, count: int) -> Array | None:
     return poses(curve, np.linspace(0.0, curve.length, count))
 
 
-def start_as_recorded(motion: Motion, index: int, stop: Callable[[], None] = never_cancel) -> Array | None:
+def start_as_recorded(motion: Motion, index: int, cancel: Callable[[], None] = never_cancel) -> Array | None:
     """The configuration ``(n,)`` at the start of a segment from which it arrives as its target was recorded.
 
     Args:
         motion: planned, or refused at this segment or a later one.
         index: of a LIN or CIRC whose target has joint values.
-        stop: called now and then; cancels the computation by raising.
+        cancel: called now and then; cancels the computation by raising.
 
     Returns:
         None if there is none inside the limits, the segment is another one, or it is not known where it starts.
@@ -61,14 +61,14 @@ def start_as_recorded(motion: Motion, index: int, stop: Callable[[], None] = nev
     recorded = np.array(segment.target.q)
     back = replace(segment, target=PoseTarget.of(fk(robot, before)))
     code = CODES[task_of(motion.program, robot)]
-    start = _end_of(robot, back, recorded, code, stop)
+    start = _end_of(robot, back, recorded, code, cancel)
     if start is None:
         return None
-    end = _end_of(robot, segment, start, code, stop)
+    end = _end_of(robot, segment, start, code, cancel)
     return start if end is not None and Arrival.of(robot, segment, end).as_recorded else None
 
 
-def _end_of(robot: Robot, segment: Lin | Circ, q: Array, code: int, stop: Callable[[], None]) -> Array | None:
+def _end_of(robot: Robot, segment: Lin | Circ, q: Array, code: int, cancel: Callable[[], None]) -> Array | None:
     """Where a segment alone arrives from q ``(n,)``; None if it cannot be driven inside the limits."""
     curve = curve_of(robot, segment, fk(robot, q), code != CODES["approach"])
     if curve is None or isinstance(curve, tuple):
@@ -77,7 +77,7 @@ def _end_of(robot: Robot, segment: Lin | Circ, q: Array, code: int, stop: Callab
         return q
     layout = Layout.of([curve.length], [], 0)
     try:
-        knots, pieces = followed(robot, chained([curve], [], layout), q, code, stop)
+        knots, pieces = followed(robot, chained([curve], [], layout), q, code, cancel)
     except LostError:
         return None
     path = values(knots, pieces, np.linspace(0.0, float(knots[-1]), _LOOKS))

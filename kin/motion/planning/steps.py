@@ -63,7 +63,7 @@ def _time(plan: Plan, first: int, run: Run) -> None:
     moves = {i: move for i, move in enumerate(plan.program.segments) if isinstance(move, Move)}
     own = range(first, first + len(layout.bounds) - 1)
     path = limited(plan.robot, plan.limits, moves, layout, run.knots, run.pieces)
-    found = timed(path, plan.program.jerk_limited, plan.stop)
+    found = timed(path, plan.program.jerk_limited, plan.cancel)
     middles = found.when(0.5 * (layout.bounds[:-1] + layout.bounds[1:]))
     plan.halves.update(zip(own, (plan.time + middles).tolist(), strict=True))
     if len(own) > 1:

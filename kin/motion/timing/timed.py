@@ -95,12 +95,12 @@ class TimedPath:
         return np.asarray(p[0] + r * (p[1] + r * (p[2] + r * p[3])))
 
 
-def timed(path: JointPath, jerk_limited: bool, stop: Callable[[], None]) -> TimedPath:
+def timed(path: JointPath, jerk_limited: bool, cancel: Callable[[], None]) -> TimedPath:
     """The fastest motion along a path, at rest at both ends."""
     plain = _fastest(path)
     without = float(plain[0][-1])
     if jerk_limited:
-        return _limited(path, plain, stop)
+        return _limited(path, plain, cancel)
     endless = path.limits.copy()
     endless[:, :, 2] = np.inf
     free = JointPath(path.knots, path.joints, endless, path.most)
@@ -117,7 +117,7 @@ def shortest(path: JointPath) -> float:
     return float((2.0 * h / (speed[:-1] + speed[1:])).sum())
 
 
-def _limited(path: JointPath, plain: tuple[Array, Array], stop: Callable[[], None]) -> TimedPath:
+def _limited(path: JointPath, plain: tuple[Array, Array], cancel: Callable[[], None]) -> TimedPath:
     """The fastest motion that keeps the limits of jerk too, from the fastest one that does not."""
     moving = np.abs(path.joints[:, :, 1:]).max(axis=(0, 2)) > 0.0
     rise = float((path.limits[:, moving, 1] / path.limits[:, moving, 2]).max()) if moving.any() else 0.0
@@ -127,7 +127,7 @@ def _limited(path: JointPath, plain: tuple[Array, Array], stop: Callable[[], Non
     slower, best = np.ones(len(u) - 1), (np.inf, u, np.empty((0, 4)), 1.0)
     slower[[0, -1]] = _ENDS
     for round_ in range(_ROUNDS):
-        stop()
+        cancel()
         u, clocks = _improved(path, u, s, slower, _FAR if round_ == 0 else _NEAR)
         factors = _slowdowns(path, u, clocks)
         factor = float(factors.max())

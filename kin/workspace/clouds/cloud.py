@@ -87,7 +87,7 @@ def workspace_slice(
     robot: Robot | str,
     n: int,
     start: int,
-    stop: int,
+    end: int,
     *,
     seed: int = 0,
     strategy: Strategy = "uniform",
@@ -97,7 +97,7 @@ def workspace_slice(
     measure: Measure | Sequence[Measure] | None = None,
     with_q: bool = False,
 ) -> WorkspaceChunk:
-    """Points start, …, stop − 1 of the cloud that `sample_workspace` with the same arguments gives, bit by bit.
+    """Points start, …, end − 1 of the cloud that `sample_workspace` with the same arguments gives, bit by bit.
 
     The kernels release the GIL: threads may compute slices in parallel.
 
@@ -105,7 +105,7 @@ def workspace_slice(
         robot: the arm, or the id of a built-in one.
         n: points of the whole cloud.
         start: index of the first point.
-        stop: index after the last point.
+        end: index after the last point.
         seed, strategy, limits, locked, constraints, measure, with_q: as in `kin.sample_workspace`.
 
     Returns:
@@ -121,7 +121,7 @@ def workspace_slice(
     """
     total = _count("n", n)
     first = checked_integer("start", start, 0, total - 1, f"a whole number from 0 to {total - 1}")
-    last = checked_integer("stop", stop, first + 1, total, f"a whole number from {first + 1} to {total}")
+    last = checked_integer("end", end, first + 1, total, f"a whole number from {first + 1} to {total}")
     samples = _Samples.of(robot_of(robot), seed, strategy, JointConstraints.of(limits, locked, constraints))
     return samples.slice(first, last, total, measure_names(measure), with_q)
 
@@ -203,27 +203,27 @@ class _Samples:
         configurations_of(self.region.arm, self.streams, index, q)
         return q
 
-    def run(self, start: int, stop: int) -> Array:
-        """The configurations ``(k, n)`` of samples start, …, stop − 1."""
+    def run(self, start: int, end: int) -> Array:
+        """The configurations ``(k, n)`` of samples start, …, end − 1."""
         if self.by_target:
-            return self.configurations(np.arange(start, stop, dtype=np.uint64))
-        q = np.empty((stop - start, self.region.robot.n))
+            return self.configurations(np.arange(start, end, dtype=np.uint64))
+        q = np.empty((end - start, self.region.robot.n))
         sample_configurations(self.region.arm, self.streams, start, q)
         return q
 
-    def slice(self, start: int, stop: int, total: int, names: tuple[Measure, ...], with_q: bool) -> WorkspaceChunk:
-        """Samples start, …, stop − 1 of a cloud of `total`."""
+    def slice(self, start: int, end: int, total: int, names: tuple[Measure, ...], with_q: bool) -> WorkspaceChunk:
+        """Samples start, …, end − 1 of a cloud of `total`."""
         region = self.region
-        q = self.run(start, stop) if names or with_q or self.by_target else None
+        q = self.run(start, end) if names or with_q or self.by_target else None
         cloud: Points
         if self.by_target and q is not None:
             cloud = fk_positions(region.robot, q).astype(np.float32)
         else:
-            cloud = np.empty((stop - start, 3), dtype=np.float32)
+            cloud = np.empty((end - start, 3), dtype=np.float32)
             sample_points(region.arm, self.streams, start, cloud)
         measures: dict[str, Points] = {}
         if q is not None:
             measures = {name: measured(region, name, q) for name in names}
         return WorkspaceChunk(
-            points=cloud, q=q if with_q else None, measures=measures, start=start, done=stop, total=total
+            points=cloud, q=q if with_q else None, measures=measures, start=start, done=end, total=total
         )

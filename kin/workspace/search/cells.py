@@ -36,7 +36,7 @@ SEEDS = 8  # configurations kept per cube
 _SHARED = 2  # configurations a cube passes on to each neighbour
 _FLAT = 1e-9  # fraction of the longest side: the workspace is flat along a shorter one
 _BLOCK = 1 << 16
-_POINTS = 1 << 11  # whose nearest configurations are searched between two calls of `stop`
+_POINTS = 1 << 11  # whose nearest configurations are searched between two calls of `cancel`
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class CellMap:
         corners: ``(m, 3)`` least corner of each cube.
         seeds: ``(m, SEEDS, n)`` configurations to start from.
         occupied: ``(m,)`` whether a spread configuration reached the cube, not only a neighbour of it.
-        stop: called now and then by long searches; raises to cancel them.
+        cancel: called now and then by long searches; raises to cancel them.
     """
 
     region: Region
@@ -60,16 +60,16 @@ class CellMap:
     corners: Array
     seeds: Array
     occupied: NDArray[np.bool_]
-    stop: Callable[[], None] = never_cancel
+    cancel: Callable[[], None] = never_cancel
 
     @property
     def size(self) -> float:
         """Side of a cube, m."""
         return float(self.edge.max())
 
-    def stopped_by(self, stop: Callable[[], None]) -> CellMap:
-        """The same map, whose searches call `stop`."""
-        return replace(self, stop=stop)
+    def cancelled_by(self, cancel: Callable[[], None]) -> CellMap:
+        """The same map, whose searches call `cancel`."""
+        return replace(self, cancel=cancel)
 
     def cells(self, rows: Rows | slice = slice(None)) -> Cells:
         """Some cubes of the map, all by default, as compiled functions take them."""
@@ -98,7 +98,7 @@ class CellMap:
         distance = np.full(len(p), math.inf)
         p = np.ascontiguousarray(p)
         for start in range(0, len(p), _POINTS):
-            self.stop()
+            self.cancel()
             some = slice(start, start + _POINTS)
             nearest_each(
                 self.region.arm, p[some], rows[some], self.seeds, tolerance, alike, q[some], distance[some]

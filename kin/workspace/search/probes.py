@@ -32,7 +32,7 @@ CLOSE = 1e-3  # of a cube's side: a point that is missed by less counts as reach
 TOUCH = 1e-4  # of a cube's side: a descent ends there
 LAYER = 0.5  # of a cube's side: thickness of the layer around the workspace
 _STREAM = 0xA71A5  # of the random points
-_CUBES = 256  # probed between two calls of `stop`
+_CUBES = 256  # probed between two calls of `cancel`
 
 
 class _Sizes(NamedTuple):
@@ -188,16 +188,16 @@ def sampling_probes(region: Region) -> SamplingProbes:
     return SamplingProbes(region)
 
 
-def probe_cells(region: Region, tries: int, alike: int, stop: Callable[[], None] = never_cancel) -> CellProbes:
+def probe_cells(region: Region, tries: int, alike: int, cancel: Callable[[], None] = never_cancel) -> CellProbes:
     """Probes with `tries` points per cube; `alike` descents have to end alike before a point counts as missed.
 
-    `stop` is called now and then, and raises to cancel.
+    `cancel` is called now and then, and raises to cancel.
     """
     found = cell_map(region)
     distance = np.full((len(found.corners), tries), math.nan)
     key = np.array([stream_key(_STREAM, 0)], dtype=np.uint64)
     for first in range(0, len(distance), _CUBES):
-        stop()
+        cancel()
         some = slice(first, first + _CUBES)
         _probe_each(
             region.arm, found.cells(some), _UNKNOWN, first, key, TOUCH * found.size, alike, _ALL, distance[some]

@@ -52,7 +52,7 @@ def workspace_section(
     constraints: JointConstraints | None = None,
     resolution: int = 96,
     signed: bool = False,
-    stop: Callable[[], None] = never_cancel,
+    cancel: Callable[[], None] = never_cancel,
 ) -> Section:
     """The cut of the workspace with a plane, and its boundary.
 
@@ -64,7 +64,7 @@ def workspace_section(
         resolution: squares along the longer side of the plane's window, 8 to 1000.
         signed: give r of an (r, z) section a sign: negative where the tool is behind joint 1's axis, that is more
             than 90° from the direction in which joint 1 faces (`faced`).
-        stop: called now and then; raises to cancel the computation.
+        cancel: called now and then; raises to cancel the computation.
 
     Returns:
         The boundary as curves, its exact arcs, and the area inside.
@@ -84,7 +84,7 @@ def workspace_section(
             slides = region.robot.joints[0].kind == "prismatic"
             why = "slides" if slides else "does not turn the whole arm about its axis"
             raise InputError("plane", None, f"a point and a normal: joint 1 of {region.robot.id} {why}")
-        return profile(region, count, signed, stop)
+        return profile(region, count, signed, cancel)
     if not isinstance(plane, Sequence) or len(plane) != 2:
         raise InputError("plane", plane, "a point and a normal, three numbers each")
     origin, normal = finite_array("plane[0]", plane[0], (3,)), finite_array("plane[1]", plane[1], (3,))
@@ -92,7 +92,7 @@ def workspace_section(
     if origin.ndim != 1 or normal.ndim != 1 or not length > 0.0:
         raise InputError("plane", plane, "a point and a normal, three numbers each, the normal not zero")
     u, v = _axes(normal / length)
-    return _cut(cell_map(region).stopped_by(stop), origin, u, v, -math.inf, count)
+    return _cut(cell_map(region).cancelled_by(cancel), origin, u, v, -math.inf, count)
 
 
 def _turning(region: Region, most: float) -> Region:
@@ -115,16 +115,16 @@ def faced(robot: Robot, axis: Array) -> Array:
 
 
 def profile(
-    region: Region, resolution: int, signed: bool = False, stop: Callable[[], None] = never_cancel
+    region: Region, resolution: int, signed: bool = False, cancel: Callable[[], None] = never_cancel
 ) -> Section:
-    """The section in (r, z); `signed` and `stop` as of `workspace_section`.
+    """The section in (r, z); `signed` and `cancel` as of `workspace_section`.
 
     A point at the distance r in the half-plane that joint 1 faces at 0 is reached from there with |θ1| ≤ 90° if
     the tool is in front of the axis. In the opposite half-plane the same values reach what is behind.
     """
     point, axis, _ = base_axis(region)
     u = faced(region.robot, axis) if signed else _axes(axis)[0]
-    cells = cell_map(_turning(region, 0.5 * math.pi if signed else math.pi)).stopped_by(stop)
+    cells = cell_map(_turning(region, 0.5 * math.pi if signed else math.pi)).cancelled_by(cancel)
     least = -math.inf if signed else 0.0
     found = replace(_cut(cells, point - axis * (point @ axis), u, axis, least, resolution), signed=signed)
     return replace(found, arcs=arcs_of(cells, found))

@@ -49,11 +49,11 @@ class Endless:
         self.cancelled = threading.Event()
         self._facts = kin.workspace_facts
 
-    def __call__(self, robot, *, stop, **options):
+    def __call__(self, robot, *, cancel, **options):
         self.begun += 1
         try:
             while not self.released.wait(0.01):
-                stop()
+                cancel()
         except CancelledError:
             self.cancelled.set()
             raise

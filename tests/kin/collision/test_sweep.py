@@ -83,8 +83,8 @@ def test_a_cancelled_sweep_ends():
     near = surroundings(kin.get_robot("ur5"), OBSTACLES)
     path = kin.get_robot("ur5").random_q(np.random.default_rng(1), 20)
 
-    def stop() -> None:
+    def cancel() -> None:
         raise TimeoutError
 
     with pytest.raises(TimeoutError):
-        touches_along(near, path, (), stop)
+        touches_along(near, path, (), cancel)

@@ -39,7 +39,8 @@ OTHERS = {
     "qd_start",
     "qdd_start",
     "max_step",
-    "stop",
+    "motion_limits",
+    "cancel",
 }
 PROGRAM = [kin.Ptp(kin.JointTarget(ARM.home))]
 CALLS = {
@@ -86,8 +87,7 @@ def hints_of_the_class() -> dict[str, Any]:
 def test_keywords_have_the_types_and_defaults_of_the_class(name):
     function, names, _ = CALLS[name]
     signature, hints = inspect.signature(function).parameters, get_type_hints(function)
-    own = OTHERS | ({"limits"} if name == "plan_motion" else set())  # of a motion: velocities and accelerations
-    assert set(signature) - own == names
+    assert set(signature) - OTHERS == names
     for each in names:
         assert signature[each].default == DEFAULTS[each], each
         assert hints[each] == hints_of_the_class()[each], each

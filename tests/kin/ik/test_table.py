@@ -139,9 +139,9 @@ def test_a_table_can_be_stopped():
     class StoppedError(Exception):
         pass
 
-    def stop():
+    def cancel():
         raise StoppedError
 
     robot = kin.get_robot("ur5")
     with pytest.raises(StoppedError):
-        Table.of(robot, kin.fk(robot, robot.q_home[None]), IKOptions(), stop=stop)
+        Table.of(robot, kin.fk(robot, robot.q_home[None]), IKOptions(), cancel=cancel)

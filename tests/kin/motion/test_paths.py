@@ -475,8 +475,8 @@ def test_a_computation_can_be_cancelled():
     class CancelledError(Exception):
         pass
 
-    def stop():
+    def cancel():
         raise CancelledError
 
     with pytest.raises(CancelledError):
-        kin.plan_motion("panda", [line(0, 0.1, 0)], stop=stop)
+        kin.plan_motion("panda", [line(0, 0.1, 0)], cancel=cancel)

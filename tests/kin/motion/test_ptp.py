@@ -259,13 +259,13 @@ def test_a_distance_too_short_to_take_any_time_takes_none():
 @pytest.mark.parametrize(
     ("change", "field"),
     [
-        ({"velocity": np.zeros(6)}, "limits.velocity[0]"),
-        ({"acceleration": [1, 1, -1, 1, 1, 1]}, "limits.acceleration[2]"),
-        ({"jerk": [math.inf] * 6}, "limits.jerk[0]"),
-        ({"jerk": [1, 1, 1, 1, 1, math.nan]}, "limits.jerk[5]"),
-        ({"velocity": np.ones(5)}, "limits.velocity"),
-        ({"velocity": "fast"}, "limits.velocity"),
-        ({"effort": [-1] * 6}, "limits.effort[0]"),
+        ({"velocity": np.zeros(6)}, "motion_limits.velocity[0]"),
+        ({"acceleration": [1, 1, -1, 1, 1, 1]}, "motion_limits.acceleration[2]"),
+        ({"jerk": [math.inf] * 6}, "motion_limits.jerk[0]"),
+        ({"jerk": [1, 1, 1, 1, 1, math.nan]}, "motion_limits.jerk[5]"),
+        ({"velocity": np.ones(5)}, "motion_limits.velocity"),
+        ({"velocity": "fast"}, "motion_limits.velocity"),
+        ({"effort": [-1] * 6}, "motion_limits.effort[0]"),
     ],
 )
 def test_limits_are_checked(change, field):
@@ -279,14 +279,14 @@ def test_limits_are_checked(change, field):
 def test_limits_are_those_of_the_arm():
     ur5, panda = kin.get_robot("ur5"), kin.get_robot("panda")
     program = [kin.Ptp(kin.JointTarget(ur5.q_home + 0.5))]
-    with pytest.raises(kin.InputError, match=r"limits: .* of 6 joints"):
-        kin.plan_motion(ur5, program, limits=kin.motion_limits(panda))
+    with pytest.raises(kin.InputError, match=r"motion_limits: .* of 6 joints"):
+        kin.plan_motion(ur5, program, motion_limits=kin.motion_limits(panda))
     none = [math.nan] * 6
     whole = kin.MotionLimits([1] * 6, np.full(6, 2), [10**9] * 6, none, ((),) * 6)
     assert not whole.velocity.flags.writeable
-    assert kin.plan_motion(ur5, program, limits=whole).duration == pytest.approx(0.5 + 0.5)
+    assert kin.plan_motion(ur5, program, motion_limits=whole).duration == pytest.approx(0.5 + 0.5)
     wild = kin.Robot.from_dh([kin.Joint("a", velocity=1e308), (0, 0, 1, 0)])
-    with pytest.raises(kin.InputError, match=r"limits.velocity\[0\]"):
+    with pytest.raises(kin.InputError, match=r"motion_limits.velocity\[0\]"):
         kin.motion_limits(wild)
     fast = kin.motion_limits(kin.Robot.from_dh([kin.Joint("a", velocity=1e12), (0, 0, 1, 0)]))
     assert (fast.acceleration[0], fast.jerk[0]) == (1e12, 1e12)

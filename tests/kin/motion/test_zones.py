@@ -49,8 +49,8 @@ def without_blends(program):
 def assert_no_longer(arm, seed):
     robot = kin.get_robot(arm)
     program, start, limits = random_case(robot, seed)
-    blended = kin.plan_motion(robot, program, start, limits=limits)
-    stopped = kin.plan_motion(robot, without_blends(program), start, limits=limits)
+    blended = kin.plan_motion(robot, program, start, motion_limits=limits)
+    stopped = kin.plan_motion(robot, without_blends(program), start, motion_limits=limits)
     if blended.planned and stopped.planned:
         assert blended.duration <= (1 + LONGER) * stopped.duration, (arm, seed)
     return blended.planned and stopped.planned

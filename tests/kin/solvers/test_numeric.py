@@ -335,14 +335,14 @@ def test_following_valleys_can_be_cancelled():
     class CancelledError(Exception):
         pass
 
-    def stop():
+    def cancel():
         raise CancelledError
 
     robot, T = just_beyond("ur5")
     problem = problem_of(robot, T, solver="numeric")
     nearest.closest(problem, None)
     with pytest.raises(CancelledError):
-        nearest.closest(replace(problem, stop=stop), None)
+        nearest.closest(replace(problem, cancel=cancel), None)
 
 
 def test_a_slide_without_limits_makes_no_target_near(monkeypatch):

@@ -114,11 +114,11 @@ def test_none_found_in_time_is_not_called_none_and_a_search_reports_and_is_cance
     with pytest.raises(kin.InputError, match="a way that was found"):
         way_program(way, [obstacle])
 
-    def stop() -> None:
+    def cancel() -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        find_way(UR5, start, goal, obstacles=[obstacle], stop=stop)
+        find_way(UR5, start, goal, obstacles=[obstacle], cancel=cancel)
     parts: list[float] = []
     find_way(UR5, start, goal, obstacles=[obstacle], time_limit=60.0, progress=parts.append)
     assert parts
@@ -129,7 +129,7 @@ def test_none_found_in_time_is_not_called_none_and_a_search_reports_and_is_cance
 def test_a_search_that_waits_for_another_one_keeps_its_time_and_is_cancelled():
     start, goal, obstacle = scene(UR5)
 
-    def stop() -> None:
+    def cancel() -> None:
         raise KeyboardInterrupt
 
     found = []
@@ -138,7 +138,7 @@ def test_a_search_that_waits_for_another_one_keeps_its_time_and_is_cancelled():
             target=lambda: found.append(find_way(UR5, start, goal, obstacles=[obstacle], seed=3, time_limit=60.0))
         )
         waiting.start()
-        with pytest.raises(KeyboardInterrupt), alone(stop):
+        with pytest.raises(KeyboardInterrupt), alone(cancel):
             pass
         waiting.join(0.3)
         assert waiting.is_alive()

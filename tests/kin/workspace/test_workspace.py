@@ -317,8 +317,8 @@ def test_wrong_arguments_are_named_at_the_call(arguments, field):
     ("call", "field"),
     [
         (lambda robot: kin.workspace_slice(robot, 10, 10, 11), "start"),
-        (lambda robot: kin.workspace_slice(robot, 10, 5, 5), "stop"),
-        (lambda robot: kin.workspace_slice(robot, 10, 5, 11), "stop"),
+        (lambda robot: kin.workspace_slice(robot, 10, 5, 5), "end"),
+        (lambda robot: kin.workspace_slice(robot, 10, 5, 11), "end"),
         (lambda robot: kin.workspace_configurations(robot, -1), "index"),
         (lambda robot: kin.workspace_configurations(robot, 0.5), "index"),
         (lambda robot: kin.workspace_configurations(robot, 2**53), "index"),

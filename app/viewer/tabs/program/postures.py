@@ -82,7 +82,7 @@ def compute(chart: Chart) -> None:
         avoid_self_collision=avoid,
         obstacles=chart.arm.obstacles if avoid else (),
     )
-    chart.found = kin.path_postures(plan.motion.robot, poses, options=options, q_start=before, stop=chart.check)
+    chart.found = kin.path_postures(plan.motion.robot, poses, options=options, q_start=before, cancel=chart.check)
 
 
 def html(shown: Chart, units: Units) -> str:

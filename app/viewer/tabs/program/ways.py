@@ -105,7 +105,7 @@ def compute(search: Search, settings: Settings, report: Callable[[], None]) -> N
     start, goal = plan.met(before, len(plan.q[before]) - 1)[1], plan.q[search.index][-1]
     last = [time.monotonic()]
 
-    def stop() -> None:
+    def cancel() -> None:
         if search.cancelled.is_set():
             raise CancelledError
 
@@ -125,13 +125,13 @@ def compute(search: Search, settings: Settings, report: Callable[[], None]) -> N
         seed=settings.seed,
         time_limit=settings.seconds,
         progress=progress,
-        stop=stop,
+        cancel=cancel,
     )
     if way.q is None:
         search.explain = way.explain
         return
     like = Ptp(JointTarget(tuple(goal.tolist())), **options(plan.segments[search.index]) | {"blend": 0.0})
-    motion = way_program(way, arm.obstacles, itself, stop, like)
+    motion = way_program(way, arm.obstacles, itself, cancel, like)
     if not motion.planned:
         search.title, search.explain = "The way that was found cannot be driven", motion.explain
         return
