@@ -1,6 +1,6 @@
 """Extension of Griffe, which reads the docstrings for the reference in docs/python.md.
 
-In the code, one entry of a docstring may describe several parameters: ``limits, locked: as in `kin.solve_ik```.
+In the code, one entry of a docstring may describe several parameters: ``limits, locked: as in `kin.JointConstraints```.
 In the reference each parameter has its own entry. Where the entry names a class or a function, the text is that of
 the parameter there. MkDocs warns of an entry whose parameter does not exist.
 """

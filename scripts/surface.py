@@ -15,7 +15,7 @@ import inspect
 import json
 import sys
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import kin
 from app.cli.parser import subcommands
@@ -45,9 +45,13 @@ def described(value: object) -> Json:
 def _parameters(function: Any) -> list[str]:
     words: list[str] = []
     for each in inspect.signature(function).parameters.values():
-        if each.kind is each.KEYWORD_ONLY and "*" not in words:
+        if each.kind in (each.KEYWORD_ONLY, each.VAR_KEYWORD) and "*" not in words:
             words.append("*")
-        words.append(each.name if each.default is each.empty else f"{each.name}=")
+        if each.kind is each.VAR_KEYWORD:
+            (listed,) = get_args(get_type_hints(function)[each.name])
+            words += sorted(f"{name}=" for name in listed.__optional_keys__)
+        else:
+            words.append(each.name if each.default is each.empty else f"{each.name}=")
     return words
 
 

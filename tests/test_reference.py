@@ -87,9 +87,8 @@ def test_a_name_that_is_not_there_gives_the_error_of_python(package):
 
 def test_options_of_a_call_have_the_texts_of_the_class(read):
     described = {
-        each.name: each.description for each in read["solve_ik_many"].final_target.docstring.parsed[1].value
+        each.name: each.description for each in read["workspace_facts"].final_target.docstring.parsed[1].value
     }
-    assert described["prefer"].startswith("how to choose redundancy parameters")
     assert described["locked"].startswith("joint values to keep, in radians (metres)")
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from inspect import signature
 from itertools import cycle
 from typing import Annotated, Any, TypeVar, get_type_hints
 
@@ -24,10 +23,10 @@ from app.api.schemas import Number, OneOf, Vector3, Vector4, integral, numbers
 from app.shared.options import declared
 from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
-from kin import IKOptions, InputError, JointConstraints, Robot, Task, solve_path
+from kin import IKOptions, InputError, JointConstraints, Robot, Task
 from kin.collision.obstacles import KINDS, LONGEST_NAME, MOST_OBSTACLES, Shape, checked_obstacles
 from kin.frames import WORLD
-from kin.ik.options import DEFAULTS
+from kin.ik.options import DEFAULTS, PathKeywords
 from kin.ik.problem import FAR, read_pose
 from kin.kernels.checks import straighten_many
 from kin.poses import FORMS as POSES
@@ -366,7 +365,7 @@ def _options(given: tuple[tuple[str, Any], ...]) -> IKOptions:
     return IKOptions.of(None, **dict(given))
 
 
-@takes(name for name in signature(solve_path).parameters if name in DEFAULTS)
+@takes(name for name in DEFAULTS if name in PathKeywords.__optional_keys__)
 class OptionsBody(AvoidingBody, WorkpiecesBody):
     """Task, joint constraints, branch, errors that count as none, what is avoided."""
 

@@ -13,28 +13,14 @@ configuration to a target that cannot be reached, and solve tasks and arms witho
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
-from kin.collision import Obstacle
-from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.answers import answer, answer_at_once
-from kin.ik.options import (
-    Frame,
-    IKOptions,
-    Images,
-    JointConstraints,
-    Limits,
-    Locks,
-    Preference,
-    Solver,
-    Values,
-    WiderLimits,
-)
+from kin.ik.options import IKKeywords, IKOptions, JointConstraints
 from kin.ik.problem import IKProblem
 from kin.ik.results import IKResult
 from kin.named import robot_of
@@ -59,27 +45,9 @@ def solve_ik(
     *,
     options: IKOptions | None = None,
     q_seed: ArrayLike | None = None,
-    task: Task = "pose",
-    mask: Sequence[bool] | None = None,
-    mask_frame: Frame = "tool",
-    limits: Limits | None = None,
-    locked: Locks | None = None,
-    wider_limits: WiderLimits = "refuse",
-    respect_limits: bool = True,
-    branch: str | Sequence[str] | None = None,
-    images: Images = "nearest",
-    prefer: Preference = "nearest",
-    redundancy: Values | None = None,
-    max_solutions: int | None = None,
-    solver: Solver = "auto",
-    position_tolerance: float | None = None,
-    rotation_tolerance: float | None = None,
-    avoid_self_collision: bool = False,
-    obstacles: Sequence[Obstacle] = (),
+    **keywords: Unpack[IKKeywords],
 ) -> IKResult:
     """All configurations that bring the tool to `target`, or why there are none.
-
-    Long because every option is a keyword, for editors and type checkers.
 
     Args:
         robot: the arm, or the id of a built-in one.
@@ -87,9 +55,8 @@ def solve_ik(
             ``(3,)``.
         options: all further arguments but the seed as one value.
         q_seed: ``(n,)`` configuration to stay near, radians (metres); the home pose by default.
-        task, mask, mask_frame, limits, locked, wider_limits, respect_limits, branch, images, prefer, redundancy,
-            max_solutions, solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in
-            `kin.IKOptions`, `limits`, `locked` and `wider_limits` as in `kin.JointConstraints`.
+        keywords: the fields of `kin.IKOptions` one by one, with those of `kin.JointConstraints` in the place of
+            `constraints`, radians and metres.
 
     Returns:
         Solutions, the best first, each with its branch and the error measured by FK; without one, the status, the
@@ -112,27 +79,10 @@ def solve_ik(
         >>> left.solutions[0].branch.startswith("shoulder left")
         True
     """
-    plain = (
-        task, mask_frame, respect_limits, branch, images, prefer, max_solutions, solver, position_tolerance,
-        rotation_tolerance, avoid_self_collision,
-    )  # fmt: skip
-    constrained = limits is not None or locked is not None or wider_limits != "refuse"
-    if options is None and not (constrained or mask is not None or redundancy is not None or obstacles):
-        try:
-            wanted = _plain_options(*plain)
-        except TypeError:  # a list, for example, cannot be looked up
-            wanted = _plain_options.__wrapped__(*plain)
+    if options is None and all(type(value) in _PLAIN for value in keywords.values()):
+        wanted = _plain_options(**keywords)
     else:
-        wanted = IKOptions.of(
-            options,
-            mask=mask,
-            limits=limits,
-            locked=locked,
-            wider_limits=wider_limits,
-            redundancy=redundancy,
-            obstacles=obstacles,
-            **dict(zip(_PLAIN, plain, strict=True)),
-        )
+        wanted = IKOptions.of(options, **keywords)
     return answer(IKProblem.of(robot_of(robot), target, wanted, q_seed))
 
 
@@ -237,15 +187,11 @@ def branch_of(robot: Robot | str, q: ArrayLike) -> str:
 
 
 _DEFAULT = IKOptions()
-# The options of which most calls give no others, in the order of `_plain_options`.
-_PLAIN = (
-    "task", "mask_frame", "respect_limits", "branch", "images", "prefer", "max_solutions", "solver",
-    "position_tolerance", "rotation_tolerance", "avoid_self_collision",
-)  # fmt: skip
+_PLAIN = {bool, int, float, str, type(None)}  # values of other types are not equal only if they are equally valid
 
 
 # Typed, since True, 1 and 1.0 are not equally valid.
 @lru_cache(maxsize=256, typed=True)
-def _plain_options(*values: Any) -> IKOptions:
-    """The options of a call by the values of `_PLAIN`, which can be looked up."""
-    return IKOptions(**dict(zip(_PLAIN, values, strict=True)))
+def _plain_options(**keywords: Any) -> IKOptions:
+    """The options of a call whose keywords can be looked up."""
+    return IKOptions.of(None, **keywords)

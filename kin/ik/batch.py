@@ -15,18 +15,16 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple, overload
+from typing import NamedTuple, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kin.collision import Obstacle
-from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.answers import answer
 from kin.ik.branches import candidates_of
 from kin.ik.candidates import nearest_rows, take_seeds
-from kin.ik.options import Frame, IKOptions, Images, Limits, Locks, Preference, Solver, Values, WiderLimits
+from kin.ik.options import IKKeywords, IKOptions
 from kin.ik.problem import FAR, IKProblem, listed, never_cancel, prepare, read_poses, read_seed
 from kin.ik.results import IKResult, Status
 from kin.kernels import fk as fk_kernels
@@ -110,27 +108,9 @@ def solve_ik_many(
     *,
     options: IKOptions | None = None,
     q_seed: ArrayLike | None = None,
-    task: Task = "pose",
-    mask: Sequence[bool] | None = None,
-    mask_frame: Frame = "tool",
-    limits: Limits | None = None,
-    locked: Locks | None = None,
-    wider_limits: WiderLimits = "refuse",
-    respect_limits: bool = True,
-    branch: str | Sequence[str] | None = None,
-    images: Images = "nearest",
-    prefer: Preference = "nearest",
-    redundancy: Values | None = None,
-    max_solutions: int | None = None,
-    solver: Solver = "auto",
-    position_tolerance: float | None = None,
-    rotation_tolerance: float | None = None,
-    avoid_self_collision: bool = False,
-    obstacles: Sequence[Obstacle] = (),
+    **keywords: Unpack[IKKeywords],
 ) -> IKResults:
     """`kin.solve_ik` for each target of a stack, each on its own; `kin.solve_path` finds one path through all.
-
-    Long because every option is a keyword, for editors and type checkers.
 
     Args:
         robot: the arm, or the id of a built-in one.
@@ -139,9 +119,7 @@ def solve_ik_many(
         options: all further arguments but the seed as one value.
         q_seed: ``(n,)`` one seed for all targets, or ``(k, n)`` one for each, radians (metres); the home pose by
             default.
-        task, mask, mask_frame, limits, locked, wider_limits, respect_limits, branch, images, prefer, redundancy,
-            max_solutions, solver, position_tolerance, rotation_tolerance, avoid_self_collision, obstacles: as in
-            `kin.solve_ik`, for every target.
+        keywords: as in `kin.solve_ik`, for every target.
 
     Returns:
         The answers, one for each target, with the best solutions as one array.
@@ -156,28 +134,7 @@ def solve_ik_many(
         >>> answers.q.shape, bool(answers.solved.all())
         ((2, 6), True)
     """
-    robot = robot_of(robot)
-    wanted = IKOptions.of(
-        options,
-        task=task,
-        mask=mask,
-        mask_frame=mask_frame,
-        limits=limits,
-        locked=locked,
-        wider_limits=wider_limits,
-        respect_limits=respect_limits,
-        branch=branch,
-        images=images,
-        prefer=prefer,
-        redundancy=redundancy,
-        max_solutions=max_solutions,
-        solver=solver,
-        position_tolerance=position_tolerance,
-        rotation_tolerance=rotation_tolerance,
-        avoid_self_collision=avoid_self_collision,
-        obstacles=obstacles,
-    )
-    return solve_many(robot, listed(targets), wanted, q_seed)
+    return solve_many(robot_of(robot), listed(targets), IKOptions.of(options, **keywords), q_seed)
 
 
 def solve_many(

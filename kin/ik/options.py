@@ -5,8 +5,8 @@ and the seed are not options: they change from call to call. Whatever does not d
 value is made; :mod:`kin.ik.problem` checks the rest against an arm, once for each pair of arm and options.
 
 The class is the only description of the options: its annotations hold the choices, ranges and units, its docstring
-the texts. The fields of REST requests and the flags of the command line follow from it, and tests compare the
-keywords of `kin.solve_ik`, `kin.solve_ik_many`, `kin.solve_path` and `kin.plan_motion` with it.
+the texts. The fields of REST requests and the flags of the command line follow from it. `IKKeywords` lists the
+keywords of calls for editors and type checkers, and a test compares it with the class.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from functools import cache, cached_property, partial
-from typing import Annotated, Any, Literal, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple, TypedDict, TypeGuard, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,8 +33,8 @@ Images = Literal["nearest", "all"]
 Solver = Literal["auto", "numeric"]
 Preference = Literal["nearest", "limits", "manipulability"]
 WiderLimits = Literal["refuse", "intersect"]
-Limits = Sequence[Sequence[float] | None]
-Locks = Sequence[float | None]
+Limits = Sequence[Sequence[float] | None] | Mapping[str, Sequence[float]]
+Locks = Sequence[float | None] | Mapping[str, float]
 Values = float | Mapping[str, float] | tuple[tuple[str, float], ...]
 TASKS: tuple[Task, ...] = get_args(Task)
 LEAST_TOLERANCE, MOST_METRES, MOST_RADIANS = TOLERANCES.closure_position, 0.1, 0.5
@@ -79,6 +79,9 @@ class Coordinates(NamedTuple):
 @dataclass(frozen=True)
 class JointConstraints:
     """Limits and locks in addition to the robot's own limits. Lists and arrays are accepted and kept as tuples.
+
+    Both may also be given by the names of joints, ``{"elbow": (0.0, 1.0)}``, and are then kept as pairs of a name
+    and what is given for it; the joints that are not named keep their own limits.
 
     Attributes:
         limits: narrower joint limits, inside the robot's own, in radians (metres). One pair (lower, upper) per
@@ -149,18 +152,8 @@ class JointConstraints:
             array([-1.   , -3.142])
         """
         lower, upper = robot.lower.copy(), robot.upper.copy()
-        limits = (None,) * robot.n if self.limits is None else self.limits
-        locked = (None,) * robot.n if self.locked is None else self.locked
-        if len(limits) != robot.n:
-            expected = f"{robot.n} pairs (lower, upper), one per joint, or none for a joint's own limits"
-            raise InputError("limits", [None if pair is None else list(pair) for pair in limits], expected)
-        if len(locked) != robot.n:
-            expected = f"{robot.n} joint values, or none for a joint that may move"
-            raise InputError("locked", list(locked), expected)
-        for i, pair in enumerate(limits):
-            if pair is None:
-                continue
-            low, high = pair
+        expected = f"{robot.n} pairs (lower, upper), one per joint, or none for a joint's own limits"
+        for field, i, (low, high) in _by_joint(robot, "limits", self.limits, expected):
             own, expected = _span(lower[i], upper[i]), ""
             if max(low, lower[i]) > min(high, upper[i]) + TOLERANCES.limit:
                 expected = f"limits that overlap the joint's own, {own}"
@@ -169,16 +162,38 @@ class JointConstraints:
             ):
                 expected = f"limits inside the joint's own, {own}, or the option wider_limits intersect"
             if expected:
-                raise InputError(f"limits[{i}]", list(pair), expected)
+                raise InputError(field, [low, high], expected)
             lower[i], upper[i] = max(low, lower[i]), max(min(high, upper[i]), max(low, lower[i]))
-        for i, value in enumerate(locked):
-            if value is None:
-                continue
+        locks = self.locks(robot)
+        for field, i, value in _by_joint(robot, "locked", self.locked, ""):
             if not lower[i] - TOLERANCES.limit <= value <= upper[i] + TOLERANCES.limit:
                 expected = f"a value inside the limits, {_span(lower[i], upper[i])}"
-                raise InputError(f"locked[{i}]", value, expected)
+                raise InputError(field, value, expected)
             lower[i] = upper[i] = min(max(value, lower[i]), upper[i])
-        return Bounds(lower, upper, tuple(value is not None for value in locked))
+        return Bounds(lower, upper, tuple(value is not None for value in locks or (None,) * robot.n))
+
+    def locks(self, robot: Robot) -> tuple[float | None, ...] | None:
+        """The locked joints of an arm.
+
+        Args:
+            robot: the arm.
+
+        Returns:
+            The value that each joint keeps, in radians (metres), None for one that may move; None if none is locked.
+
+        Raises:
+            InputError: the wrong number of joints, or a name that no joint has.
+
+        Examples:
+            >>> import kin
+            >>> kin.JointConstraints(locked={"shoulder": 0.5}).locks(kin.get_robot("planar2r"))
+            (0.5, None)
+        """
+        if self.locked is None:
+            return None
+        expected = f"{robot.n} joint values, or none for a joint that may move"
+        values = {i: value for _, i, value in _by_joint(robot, "locked", self.locked, expected)}
+        return tuple(values.get(i) for i in range(robot.n))
 
 
 FREE = JointConstraints()
@@ -262,19 +277,16 @@ class IKOptions:
             >>> kin.IKOptions.of(None, task="position", locked=[None, 0.5]).constraints.locked
             (None, 0.5)
         """
-        if options is None:
-            if all(name in DEFAULTS and value is DEFAULTS[name] for name, value in keywords.items()):
-                return _defaults_checked()
-            names = [each.name for each in fields(JointConstraints)]
-            constraints = JointConstraints(**{name: keywords.pop(name) for name in names if name in keywords})
-            return cls(constraints=constraints, **keywords)
-        if not isinstance(options, cls):
+        if options is not None and not isinstance(options, cls):
             raise InputError("options", options, "a kin.IKOptions, or none")
-        for name, value in keywords.items():
-            default = DEFAULTS[name]
-            if value is not default and not (type(value) is type(default) and value == default):
-                raise InputError(name, value, f"no {name} besides options")
-        return options
+        if not keywords:
+            return options or _defaults_checked()
+        if options is not None:
+            name, value = next(iter(keywords.items()))
+            raise InputError(name, value, f"no {name} besides options")
+        names = [each.name for each in fields(JointConstraints)]
+        constraints = JointConstraints(**{name: keywords.pop(name) for name in names if name in keywords})
+        return cls(constraints=constraints, **keywords)
 
     def __hash__(self) -> int:
         return self._hash
@@ -340,6 +352,45 @@ def finite_number(field: str, value: object, expected: str) -> float:
     if not math.isfinite(number):
         raise InputError(field, value, expected)
     return number
+
+
+class MotionKeywords(TypedDict, total=False):
+    """The options of which `kin.plan_motion` takes keywords, as in `IKOptions`."""
+
+    avoid_self_collision: bool
+    obstacles: Sequence[Obstacle]
+
+
+class PathKeywords(MotionKeywords, total=False):
+    """The options of which `kin.solve_path` takes keywords, as in `IKOptions` and `JointConstraints`."""
+
+    task: Task
+    mask: Sequence[bool] | None
+    mask_frame: Frame
+    limits: Limits | None
+    locked: Locks | None
+    wider_limits: WiderLimits
+    branch: str | Sequence[str] | None
+    position_tolerance: float | None
+    rotation_tolerance: float | None
+
+
+class IKKeywords(PathKeywords, total=False):
+    """The options of `kin.solve_ik` and `kin.solve_ik_many`, as in `IKOptions` and `JointConstraints`."""
+
+    respect_limits: bool
+    images: Images
+    prefer: Preference
+    redundancy: Values | None
+    max_solutions: int | None
+    solver: Solver
+
+
+def options_of_call(names: type[MotionKeywords], options: IKOptions | None, keywords: Mapping[str, Any]) -> IKOptions:
+    """The options of a call that takes the keywords `names`; another one is an error as Python raises it."""
+    for name in keywords.keys() - names.__optional_keys__:
+        raise TypeError(f"got an unexpected keyword argument {name!r}")
+    return IKOptions.of(options, **keywords)
 
 
 def shape_of(value: ArrayLike) -> tuple[int, ...]:
@@ -410,28 +461,63 @@ def _in_range(allowed: Range, field: str, value: float | None) -> float | None:
     return number
 
 
-def _pairs(limits: Limits) -> tuple[tuple[float, float] | None, ...]:
-    if not _is_list(limits):
-        raise InputError("limits", limits, "pairs (lower, upper), one per joint, or none for a joint's own limits")
-    found: list[tuple[float, float] | None] = []
-    for i, pair in enumerate(limits):
-        if pair is None:
-            found.append(None)
-            continue
-        field = f"limits[{i}]"
-        is_pair = shape_of(pair) == (2,)
-        low, high = finite_array(field, pair, (2,)).tolist() if is_pair else (math.inf, -math.inf)
+def _pairs(limits: Limits) -> tuple[Any, ...] | None:
+    """Limits as tuples, in the order or by the names that they are given."""
+
+    def pair(field: str, value: Sequence[float] | None) -> tuple[float, float] | None:
+        if value is None:
+            return None
+        low, high = finite_array(field, value, (2,)).tolist() if shape_of(value) == (2,) else (math.inf, -math.inf)
         if low > high:
-            raise InputError(field, pair, "a lower limit and an upper one that is not below it")
-        found.append((low, high))
-    return tuple(found)
+            raise InputError(field, value, "a lower limit and an upper one that is not below it")
+        return low, high
+
+    expected = "pairs (lower, upper), one per joint, or none for a joint's own limits; or pairs by joint name"
+    return _checked_each("limits", limits, pair, expected)
 
 
-def _lock_values(locked: Locks) -> tuple[float | None, ...]:
-    if not _is_list(locked):
-        raise InputError("locked", locked, "joint values, or none for a joint that may move")
-    expected = "a finite number, or none for a joint that may move"
-    return tuple(v if v is None else finite_number(f"locked[{i}]", v, expected) for i, v in enumerate(locked))
+def _lock_values(locked: Locks) -> tuple[Any, ...] | None:
+    """Locks as tuples, in the order or by the names that they are given."""
+
+    def lock(field: str, value: float | None) -> float | None:
+        return None if value is None else finite_number(field, value, "a finite number, or none for a joint that may move")
+
+    expected = "joint values, or none for a joint that may move; or values by joint name"
+    return _checked_each("locked", locked, lock, expected)
+
+
+def _checked_each(
+    field: str, given: object, check: Callable[[str, Any], Any], expected: str
+) -> tuple[Any, ...] | None:
+    if _is_by_name(given):
+        given = dict(given)
+    if isinstance(given, Mapping):
+        return tuple((str(name), check(f"{field}.{name}", value)) for name, value in given.items()) or None
+    if not _is_list(given):
+        raise InputError(field, given, expected)
+    return tuple(check(f"{field}[{i}]", value) for i, value in enumerate(given))
+
+
+def _is_by_name(given: object) -> TypeGuard[tuple[tuple[str, Any], ...]]:
+    """Whether constraints are kept by the names of joints."""
+    if not isinstance(given, tuple) or not given:
+        return False
+    return all(isinstance(each, tuple) and len(each) == 2 and isinstance(each[0], str) for each in given)
+
+
+def _by_joint(robot: Robot, field: str, given: Any, expected: str) -> list[tuple[str, int, Any]]:
+    """For each constraint the name that an error gives it, the index of its joint, and its value."""
+    if given is None:
+        return []
+    if not _is_by_name(given):
+        if len(given) != robot.n:
+            raise InputError(field, [list(each) if isinstance(each, tuple) else each for each in given], expected)
+        return [(f"{field}[{i}]", i, value) for i, value in enumerate(given) if value is not None]
+    names = [joint.name for joint in robot.joints]
+    for name, value in given:
+        if names.count(name) != 1:
+            raise InputError(f"{field}.{name}", value, "one of the joints " + ", ".join(names))
+    return [(f"{field}.{name}", names.index(name), value) for name, value in given if value is not None]
 
 
 def _mask(field: str, mask: Sequence[bool] | None) -> tuple[bool, ...] | None:

@@ -208,7 +208,7 @@ def prepare(robot: Robot, options: IKOptions) -> IKProblem:
     """Check the options against an arm: a problem with the identity as target and the home pose as seed."""
     lower, upper, locked = options.constraints.bounds(robot)
     task, code, mask = options.coordinates
-    closed_form = form_with_locked(robot, _locks(options), code) if options.solver == "auto" else None
+    closed_form = form_with_locked(robot, options.constraints.locks(robot), code) if options.solver == "auto" else None
     handled = closed_form is not None and closed_form.handles(code)
     redundancies = closed_form.redundancies(code) if closed_form is not None and handled else ()
     values = _requested_values(robot, options, redundancies)
@@ -242,11 +242,6 @@ def prepare(robot: Robot, options: IKOptions) -> IKProblem:
     )
     _ = problem.requirement, problem.free  # computed here, so that all copies share them
     return problem
-
-
-def _locks(options: IKOptions) -> tuple[float | None, ...] | None:
-    locked = options.constraints.locked
-    return None if locked is None else tuple(locked)
 
 
 def read_pose(target: ArrayLike, code: int, field: str = "target", always: bool = False) -> tuple[Array, float]:

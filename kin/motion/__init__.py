@@ -15,15 +15,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, cast
+from typing import Any, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kin.collision import Obstacle
 from kin.collision.contacts import surroundings
 from kin.errors import InputError
-from kin.ik.options import IKOptions
+from kin.ik.options import IKOptions, MotionKeywords, options_of_call
 from kin.ik.problem import never_cancel
 from kin.motion import limits as assumed
 from kin.motion.arrivals import Arrival
@@ -77,9 +76,8 @@ def plan_motion(
     qdd_start: ArrayLike | None = None,
     motion_limits: MotionLimits | None = None,
     options: IKOptions | None = None,
-    avoid_self_collision: bool = False,
-    obstacles: Sequence[Obstacle] = (),
     cancel: Callable[[], None] = never_cancel,
+    **keywords: Unpack[MotionKeywords],
 ) -> Motion:
     """The motion of a program, with every limit kept, or why it cannot be driven.
 
@@ -91,11 +89,11 @@ def plan_motion(
             within their limits; at rest by default. A PTP without a blend goes on from this motion; before any
             other segment the arm brakes, and the segment begins where it then stands.
         motion_limits: other limits than those of `kin.motion_limits`, in radians (metres) and seconds.
-        options: the next two as one value. All others have to be the default: the program states the task, and
+        options: the keywords as one value. All others have to be the default: the program states the task, and
             its start the posture.
-        avoid_self_collision, obstacles: the motion is checked, and refused at the first place where the arm
-            touches itself or an obstacle. It is not led around them.
         cancel: called now and then; cancels the computation by raising.
+        keywords: `avoid_self_collision` and `obstacles`: the motion is checked, and refused at the first place
+            where the arm touches itself or an obstacle. It is not led around them.
 
     Returns:
         The motion to sample, or the refusal with its place and joint; its cause is ``"stop"`` where a joint that
@@ -121,7 +119,7 @@ def plan_motion(
     if not isinstance(limits, MotionLimits) or len(limits.velocity) != robot.n:
         raise InputError("motion_limits", limits, f"MotionLimits of {robot.n} joints")
     start = _in_motion(robot, limits, qd_start, qdd_start)
-    wanted = IKOptions.of(options, avoid_self_collision=avoid_self_collision, obstacles=obstacles)
+    wanted = options_of_call(MotionKeywords, options, keywords)
     wanted.check_only("avoid_self_collision", "obstacles")
     found = planned(robot, program, limits, q.copy(), start, cancel)
     if wanted.avoids:

@@ -24,14 +24,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kin.collision import Obstacle
-from kin.differential.task import Task
 from kin.errors import InputError
-from kin.ik.options import Frame, IKOptions, Limits, Locks, WiderLimits, finite_number
+from kin.ik.options import IKOptions, PathKeywords, finite_number, options_of_call
 from kin.ik.problem import IKProblem, listed, never_cancel, read_poses
 from kin.named import robot_of
 from kin.path.details import JumpCause
@@ -65,38 +64,25 @@ def solve_path(
     *,
     options: IKOptions | None = None,
     q_start: ArrayLike | None = None,
-    task: Task = "pose",
-    mask: Sequence[bool] | None = None,
-    mask_frame: Frame = "tool",
-    limits: Limits | None = None,
-    locked: Locks | None = None,
-    wider_limits: WiderLimits = "refuse",
-    branch: str | Sequence[str] | None = None,
-    position_tolerance: float | None = None,
-    rotation_tolerance: float | None = None,
-    avoid_self_collision: bool = False,
-    obstacles: Sequence[Obstacle] = (),
     max_step: float = MAX_STEP,
     cancel: Callable[[], None] = never_cancel,
+    **keywords: Unpack[PathKeywords],
 ) -> PathResult:
     """One joint path through all `targets`: as few jumps as possible, then as little joint motion as possible.
-
-    Long because every option is a keyword, for editors and type checkers.
 
     Args:
         robot: the arm, or the id of a built-in one.
         targets: poses ``(k, 4, 4)`` of the tool in the world frame, metres, k ≥ 1; for ``task="position"`` also
             points ``(k, 3)``.
-        options: the arguments from `task` to `obstacles` as one value. Those that choose among the solutions of
-            one target (`images`, `prefer`, `max_solutions`) have no effect: the path chooses.
+        options: the keywords as one value. Those that choose among the solutions of one target (`images`, `prefer`,
+            `max_solutions`) have no effect: the path chooses.
         q_start: ``(n,)`` where the arm is, radians (metres). The way from there to the first waypoint counts as
             motion, but never as a jump: the path begins at its first waypoint. Without it the path may start
             anywhere; of equally good paths, the one that starts nearest to the home pose is taken.
-        task, mask, mask_frame, limits, locked, wider_limits, branch, position_tolerance,
-            rotation_tolerance, avoid_self_collision, obstacles: as in `kin.solve_ik`, for every waypoint; the
-            branch ``"seed"`` is that of `q_start`.
         max_step: the most a joint may move between neighbouring waypoints: radians, or 4 per metre.
         cancel: called now and then; cancels the computation by raising.
+        keywords: those of `kin.solve_ik` that do not choose among the solutions of one target, for every waypoint;
+            the branch ``"seed"`` is that of `q_start`.
 
     Returns:
         The joint values at each waypoint, and where the path jumps or has a gap, with the cause.
@@ -112,20 +98,7 @@ def solve_path(
         >>> path.continuous, path.q.shape
         (True, (5, 6))
     """
-    wanted = IKOptions.of(
-        options,
-        task=task,
-        mask=mask,
-        mask_frame=mask_frame,
-        limits=limits,
-        locked=locked,
-        wider_limits=wider_limits,
-        branch=branch,
-        position_tolerance=position_tolerance,
-        rotation_tolerance=rotation_tolerance,
-        avoid_self_collision=avoid_self_collision,
-        obstacles=obstacles,
-    )
+    wanted = options_of_call(PathKeywords, options, keywords)
     return solve(robot, targets, wanted, q_start, max_step, cancel)
 
 

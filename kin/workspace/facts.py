@@ -31,7 +31,7 @@ def workspace_facts(
 
     Args:
         robot: the arm, or the id of a built-in one.
-        limits, locked: as in `kin.solve_ik`.
+        limits, locked: as in `kin.JointConstraints`.
         constraints: both as one value, instead of `limits` and `locked`.
         effort: 2 to 64: points tried per cube, or the resolution of the section in steps of 24 squares. The error
             of the volume falls with its square root, or with its square where joint 1 turns all the way.

@@ -193,7 +193,7 @@ def capability_grid(
         robot: the arm, or the id of a built-in one.
         voxel: side of a voxel in metres; None to derive it from `resolution`.
         resolution: voxels along the longest side of the box, 1 to 256.
-        limits, locked: as in `kin.solve_ik`.
+        limits, locked: as in `kin.JointConstraints`.
         constraints: both as one value, instead of `limits` and `locked`.
         directions: 12, 24, 48 or 96, see `kin.workspace.capability.sphere.spherical_design`.
 

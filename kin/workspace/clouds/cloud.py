@@ -57,7 +57,7 @@ def sample_workspace(
             on its envelope. The last two descend towards random points, which takes some ten and a few hundred
             microseconds per point, and half a second once per arm and limits; :mod:`kin.workspace.clouds.targets`
             describes their accuracy.
-        limits, locked: as in `kin.solve_ik`, respected exactly. A joint without limits is sampled from ±π.
+        limits, locked: as in `kin.JointConstraints`, respected exactly. A joint without limits is sampled from ±π.
         constraints: both as one value, instead of `limits` and `locked`.
         chunk: points per chunk; the points do not depend on it.
         measure: ``"manipulability"``, ``"limit_margin"``, or both.

@@ -59,7 +59,7 @@ def workspace_section(
     Args:
         robot: the arm, or the id of a built-in one.
         plane: a point (m) and a normal of it; None for the (r, z) section of an arm whose joint 1 is revolute.
-        limits, locked: as in `kin.solve_ik`. An (r, z) section ignores those of joint 1.
+        limits, locked: as in `kin.JointConstraints`. An (r, z) section ignores those of joint 1.
         constraints: both as one value, instead of `limits` and `locked`.
         resolution: squares along the longer side of the plane's window, 8 to 1000.
         signed: give r of an (r, z) section a sign: negative where the tool is behind joint 1's axis, that is more

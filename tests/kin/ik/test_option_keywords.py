@@ -5,49 +5,23 @@ from __future__ import annotations
 import inspect
 import re
 from dataclasses import fields
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, Unpack, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
 
 import kin
 from kin import IKOptions, InputError, JointConstraints
-from kin.ik.options import DEFAULTS, Range
+from kin.ik.options import DEFAULTS, IKKeywords, MotionKeywords, PathKeywords, Range
 
 ARM = kin.get_robot("redundant7-craig")
 T = kin.fk(ARM, ARM.q_home)
-OF_A_PATH = {
-    "task",
-    "mask",
-    "mask_frame",
-    "limits",
-    "locked",
-    "wider_limits",
-    "branch",
-    "position_tolerance",
-    "rotation_tolerance",
-}
-OF_A_MOTION = {"avoid_self_collision", "obstacles"}
-OTHERS = {
-    "robot",
-    "target",
-    "targets",
-    "program",
-    "options",
-    "q_seed",
-    "q_start",
-    "qd_start",
-    "qdd_start",
-    "max_step",
-    "motion_limits",
-    "cancel",
-}
 PROGRAM = [kin.Ptp(kin.JointTarget(ARM.home))]
 CALLS = {
-    "solve_ik": (kin.solve_ik, set(DEFAULTS), lambda **given: kin.solve_ik(ARM, T, **given)),
-    "solve_ik_many": (kin.solve_ik_many, set(DEFAULTS), lambda **given: kin.solve_ik_many(ARM, [T], **given)),
-    "solve_path": (kin.solve_path, OF_A_PATH | OF_A_MOTION, lambda **given: kin.solve_path(ARM, [T], **given)),
-    "plan_motion": (kin.plan_motion, OF_A_MOTION, lambda **given: kin.plan_motion(ARM, PROGRAM, **given)),
+    "solve_ik": (kin.solve_ik, IKKeywords, lambda **given: kin.solve_ik(ARM, T, **given)),
+    "solve_ik_many": (kin.solve_ik_many, IKKeywords, lambda **given: kin.solve_ik_many(ARM, [T], **given)),
+    "solve_path": (kin.solve_path, PathKeywords, lambda **given: kin.solve_path(ARM, [T], **given)),
+    "plan_motion": (kin.plan_motion, MotionKeywords, lambda **given: kin.plan_motion(ARM, PROGRAM, **given)),
 }
 # For each keyword a value that is valid and has an effect, and one that is not.
 VALUES: dict[str, tuple[Any, Any]] = {
@@ -83,23 +57,11 @@ def hints_of_the_class() -> dict[str, Any]:
     return {name: hints[name] for name in DEFAULTS}
 
 
-@pytest.mark.parametrize("name", CALLS)
-def test_keywords_have_the_types_and_defaults_of_the_class(name):
-    function, names, _ = CALLS[name]
-    signature, hints = inspect.signature(function).parameters, get_type_hints(function)
-    assert set(signature) - OTHERS == names
-    for each in names:
-        assert signature[each].default == DEFAULTS[each], each
-        assert hints[each] == hints_of_the_class()[each], each
-    assert hints["options"] == IKOptions | None
-
-
-@pytest.mark.parametrize("name", CALLS)
-def test_the_documentation_of_a_call_names_its_keywords_in_the_order_of_the_class(name):
-    function, names, _ = CALLS[name]
-    text = " ".join((inspect.getdoc(function) or "").split())
-    listed = [each for each in re.findall(r"[a-z_]+(?=, |: )", text.partition("Args:")[2]) if each in DEFAULTS]
-    assert list(dict.fromkeys(each for each in listed if each in names)) == [n for n in DEFAULTS if n in names]
+def test_keywords_have_the_types_of_the_class():
+    assert get_type_hints(IKKeywords) == hints_of_the_class()
+    for function, keywords, _ in CALLS.values():
+        assert get_type_hints(function)["keywords"] == Unpack[keywords]
+        assert get_type_hints(function)["options"] == IKOptions | None
 
 
 def test_every_field_is_described_with_its_choices_and_unit():
@@ -123,9 +85,11 @@ def test_every_field_is_described_with_its_choices_and_unit():
 @pytest.mark.parametrize("keyword", DEFAULTS)
 @pytest.mark.parametrize("name", CALLS)
 def test_every_keyword_reaches_the_call_and_options_hold_the_same(name, keyword):
-    _, names, call = CALLS[name]
+    _, keywords, call = CALLS[name]
     good, bad = VALUES[keyword]
-    if keyword not in names:
+    if keyword not in keywords.__optional_keys__:
+        with pytest.raises(TypeError, match=f"unexpected keyword argument '{keyword}'"):
+            call(**{keyword: good})
         if name == "plan_motion":
             with pytest.raises(InputError) as caught:
                 call(options=as_options(**{keyword: good}))
@@ -142,6 +106,40 @@ def test_every_keyword_reaches_the_call_and_options_hold_the_same(name, keyword)
     assert repr(once) == repr(whole)
     if name == "solve_ik":
         assert [s.q.tolist() for s in once.solutions] == [s.q.tolist() for s in whole.solutions]
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_keyword_that_is_none_is_an_error_of_python(name):
+    with pytest.raises(TypeError, match="unexpected keyword argument 'tasks'"):
+        CALLS[name][2](tasks="pose")
+
+
+@pytest.mark.parametrize("name", ["solve_ik", "solve_ik_many", "solve_path"])
+def test_limits_and_locks_may_be_by_the_names_of_joints(name):
+    call = CALLS[name][2]
+    third, last = ARM.joints[2].name, ARM.joints[6].name
+    listed = call(limits=[None, None, (-1.0, 1.0), *[None] * 4], locked=[*[None] * 6, 0.25])
+    named = call(limits={third: (-1.0, 1.0)}, locked={last: 0.25})
+    assert repr(named) == repr(listed)
+    assert repr(call(limits={}, locked={})) == repr(call())
+
+
+@pytest.mark.parametrize(
+    ("given", "field", "expected"),
+    [
+        ({"limits": {"elbw": (0.0, 1.0)}}, "limits.elbw", "one of the joints shoulder, elbow"),
+        ({"limits": {"elbow": (1.0, 0.0)}}, "limits.elbow", "a lower limit and an upper one"),
+        ({"limits": {"elbow": (0.0, 9.0)}}, "limits.elbow", "limits inside the joint's own"),
+        ({"locked": {"elbow": 9.0}}, "locked.elbow", "a value inside the limits"),
+        ({"locked": {"elbow": "9"}}, "locked.elbow", "a finite number"),
+        ({"locked": {1: 0.5}}, "locked.1", "one of the joints shoulder, elbow"),
+    ],
+)
+def test_a_constraint_by_name_that_is_wrong_is_named(given, field, expected):
+    with pytest.raises(InputError) as caught:
+        kin.solve_ik("planar2r", [0.5, 0.5, 0.0], task="position", **given)
+    assert caught.value.field == field
+    assert expected in caught.value.expected
 
 
 def test_options_are_an_ik_options():

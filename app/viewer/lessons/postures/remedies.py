@@ -101,7 +101,7 @@ def remedies(request: Request, units: Units = DEFAULT_UNITS) -> Iterator[Remedy 
 
 def _unlocking(request: Request) -> Iterator[Remedy | None]:
     """Unlocking one joint; if no single one helps, all of them."""
-    locked = request.options.constraints.locked or ()
+    locked = request.options.constraints.locks(request.robot) or ()
     joints = [i for i, value in enumerate(locked) if value is not None]
     helped = False
     for joint in joints:

@@ -237,8 +237,7 @@ def find_fault(plan: Plan | None, stage: Stage) -> Fault | None:
         return None
     if plan.motion.refusal is not None:
         return _refused(plan, plan.motion.refusal, stage.units)
-    constraints = stage.now.options.constraints
-    locked = () if constraints is None or constraints.locked is None else constraints.locked
+    locked = stage.now.options.constraints.locks(stage.now.robot) or ()
     for index, row in enumerate(plan.q):
         for q in row:
             for joint, value in enumerate(locked):

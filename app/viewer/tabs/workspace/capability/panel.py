@@ -71,7 +71,7 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
         self._state: views.State = "ready"
         self._blocks = (0, 0)
         self._request: MapRequest | None = None  # the map that was started last
-        self._locked = stage.now.options.constraints.locked  # joints locked in the map
+        self._locked = stage.now.options.constraints.locks(stage.now.robot)  # joints locked in the map
         self._found: CapabilityMap | None = None
         self._voxels: Voxels | None = None
         self._drawn = 0.0
@@ -167,7 +167,7 @@ class Capability(DeclaredFeature[MapSettings, Facts[MapSettings]]):
         self.clear()
         stage, self._request = self.stage, self._requested
         self._reader = stage.maps.subscribe(self._request)
-        self._locked = stage.now.options.constraints.locked
+        self._locked = stage.now.options.constraints.locks(stage.now.robot)
         self._state = "waiting"
         self._stale = True
 
