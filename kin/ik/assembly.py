@@ -62,7 +62,7 @@ class Found:
         result.closest = result.nearest_orientation = None
         result.blocked, result.task = (), problem.task
         result.solver, result.solver_reason = form.name, form.reason
-        result.tolerances = (requirement.position, requirement.rotation)
+        result.tolerances, result.joints = (requirement.position, requirement.rotation), problem.robot.n
         return result
 
     @property
@@ -252,6 +252,7 @@ def make_result(
         tolerances=(problem.requirement.position, problem.requirement.rotation),
         target_error=problem.target_error,
         completeness=completeness,
+        joints=problem.robot.n,
     )
 
 

@@ -276,14 +276,11 @@ def _straighten() -> Callable[[Array, float, Array], float]:
 
 
 def listed(targets: object) -> list[ArrayLike] | Array:
-    """Several targets as a list or an array; raises `InputError` for anything else, and for none."""
+    """Several targets as a list or an array; raises `InputError` for anything else."""
     several = targets.ndim > 0 if isinstance(targets, np.ndarray) else isinstance(targets, Sequence)
     if not several or isinstance(targets, str | bytes):
         raise InputError("targets", targets, "a sequence of poses (k, 4, 4)")
-    found: list[ArrayLike] | Array = targets if isinstance(targets, np.ndarray) else list(targets)  # type: ignore[call-overload]  # a sequence
-    if not len(found):
-        raise InputError("targets", targets, "at least one pose")
-    return found
+    return targets if isinstance(targets, np.ndarray) else list(targets)  # type: ignore[call-overload]  # a sequence
 
 
 def read_poses(targets: Sequence[ArrayLike] | Array, code: int, always: bool = False) -> tuple[Array, Array]:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
+import numpy as np
+
 from kin.ik.details import Details, LimitViolation, OutOfReach, Redundancy
 from kin.ik.messages import Explanation, explain, rounded_target
 from kin.solvers.contract import Completeness, is_complete
@@ -153,6 +155,7 @@ class IKResult(Deferred):
         distance: metres by which the point is out of reach, 0 if the point can be reached.
         redundancy: the redundancy parameters of the best solution, with the ranges of all branches together.
         singularities: those that the configuration `best` is at.
+        joints: how many joints the arm has.
     """
 
     status: Status
@@ -171,6 +174,7 @@ class IKResult(Deferred):
     completeness: Completeness = "unknown"
     tolerances: tuple[float, float] = (TOLERANCES.closure_position, TOLERANCES.closure_rotation)
     target_error: float = 0.0
+    joints: int = 0
 
     def __repr__(self) -> str:
         """Status, number of solutions, solver and reason: arrays and ranges are in the attributes."""
@@ -182,6 +186,11 @@ class IKResult(Deferred):
     def complete(self) -> bool:
         """Whether there is no further posture on the requested branches, proved or agreed."""
         return is_complete(self.completeness)
+
+    @property
+    def q(self) -> Array:
+        """``(k, n)`` joint values of the solutions in their order, radians or metres; k is 0 without one."""
+        return np.array([each.q for each in self.solutions]).reshape(-1, self.joints)
 
     @property
     def best(self) -> IKSolution | None:

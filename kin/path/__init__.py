@@ -172,7 +172,9 @@ def _layers(
         raise InputError("q_start", q_start, f"one configuration of {robot.n} values")
     problem = replace(IKProblem.of(robot, np.eye(4), options, q_start), cancel=cancel)
     step = _checked_step(max_step)
-    poses, errors = read_poses(listed(targets), problem.code, always=robot.n < 6)
+    if not len(targets := listed(targets)):
+        raise InputError("targets", targets, "at least one pose")
+    poses, errors = read_poses(targets, problem.code, always=robot.n < 6)
     settings = PathSettings.of(problem, step, q_start is not None, len(poses))
     more = np.zeros(len(poses)) if roundings is None else np.asarray(roundings)
     problems = [

@@ -41,7 +41,7 @@ def _by_answer(requested: IKProblem) -> Waypoint:
     """A waypoint whose layer stays empty, as `kin.solve_ik` answers it."""
     result = answer(requested)
     requested = replace(requested, target_error=result.target_error)
-    q = np.array([s.q for s in result.solutions]).reshape(-1, requested.robot.n)
+    q = result.q
     if result.status is not Status.SOLVED:
         return Waypoint(requested, requested, q[:0], result)
     return Waypoint(requested, requested, with_images(requested, q))

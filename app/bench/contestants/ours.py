@@ -121,7 +121,7 @@ def _chunks(chunks: list[kin.WorkspaceChunk]) -> list[Array]:
 
 
 def _solutions(result: kin.IKResult) -> list[Array]:
-    return [np.array([s.q for s in result.solutions])]
+    return [result.q]
 
 
 def plain_numpy(task: Task) -> list[Contestant]:

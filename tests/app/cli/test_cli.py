@@ -206,7 +206,7 @@ def test_ik_with_options_asks_the_core_the_same(capsys):
     got = answer(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options)
     result = kin.solve_ik(robot, T, q_seed=np.radians(seed), redundancy=math.radians(-20), respect_limits=False)
     assert len(got["solutions"]) == len(result.solutions) > 1
-    assert np.allclose([s["q"] for s in got["solutions"]], [s.q for s in result.solutions], atol=1e-9)
+    assert np.allclose([s["q"] for s in got["solutions"]], result.q, atol=1e-9)
     code, out, _ = run(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), *options)
     assert code == 0
     assert f"{result.redundancy[0].label} = -20.000°" in out
@@ -238,7 +238,7 @@ def test_every_option_of_ik_reaches_the_core(capsys, words, options):
     got = answer(capsys, "ik", robot.id, "--position", *(T[:3, 3] * 1e3), "--wxyz", *wxyz, "--all", *words)
     result = kin.solve_ik(robot, T, **options)
     assert len(got["solutions"]) == len(result.solutions) > 0
-    assert np.allclose([s["q"] for s in got["solutions"]], [s.q for s in result.solutions], atol=1e-6)
+    assert np.allclose([s["q"] for s in got["solutions"]], result.q, atol=1e-6)
 
 
 def test_blocked_branches_are_printed_with_what_they_need(capsys):

@@ -400,7 +400,6 @@ def test_one_seed_is_the_seed_of_all_targets_and_points_are_targets_too():
     ("given", "more", "message"),
     [
         (np.eye(4), {}, r"targets\[0\]: got 'shape \(4,\)'"),
-        ([], {}, "targets: got .*at least one pose"),
         ("poses", {}, "targets: .*a sequence of poses"),
         ([np.eye(4), np.eye(3)], {}, r"targets\[1\]"),
         ([np.eye(4)] * 2, {"q_seed": np.zeros((3, 6))}, "q_seed: .*one for each of the 2 targets"),
@@ -414,6 +413,12 @@ def test_one_seed_is_the_seed_of_all_targets_and_points_are_targets_too():
 def test_a_malformed_stack_is_refused_by_name(given, more, message):
     with pytest.raises(InputError, match=message):
         kin.solve_ik_many("ur5", given, **more)
+
+
+@pytest.mark.parametrize("none", [[], np.empty((0, 4, 4))])
+def test_no_target_has_no_answer(none):
+    found = kin.solve_ik_many("ur5", none, q_seed=[0.0] * 6)
+    assert (list(found), found.q.shape, found.status) == ([], (0, 6), ())
 
 
 def test_each_target_of_a_stack_is_read_once(monkeypatch):

@@ -50,7 +50,7 @@ def test_every_pose_gives_back_its_configuration_and_all_that_is_found_is_right(
         T = kin.fk(robot, q)
         result = kin.solve_ik(robot, T, max_solutions=None)
         assert (result.status.value, result.completeness) == ("solved", "proved"), result.reason
-        found = np.array([each.q for each in result.solutions])
+        found = result.q
         turned = np.abs(np.remainder(found - q + math.pi, 2.0 * math.pi) - math.pi).max(axis=1)
         assert turned.min() < 1e-9
         assert np.abs(kin.fk(robot, found) - T).max() < 1e-12

@@ -52,6 +52,16 @@ def assert_exact(robot, target, result, task="pose"):
     assert distances == sorted(distances)
 
 
+def test_q_has_a_row_for_each_solution():
+    robot = kin.get_robot("puma560")
+    found = solve_ik(robot, kin.fk(robot, robot.q_home))
+    assert found.q.tolist() == [each.q.tolist() for each in found.solutions]
+    assert found.q[0].tolist() == found.best.q.tolist()
+    assert solve_ik(robot, kin.pose_from_xyz_rpy([9.0, 0.0, 0.0])).q.shape == (0, 6)
+    few = solve_ik("pioneer5", kin.fk("puma560", robot.q_home))
+    assert few.q.shape == (len(few.solutions), 5)
+
+
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
 def test_all_golden_branches_and_no_others(robot_id, golden):
     """The complete 50-digit branch sets, for the same value of the redundancy parameter."""
@@ -62,7 +72,7 @@ def test_all_golden_branches_and_no_others(robot_id, golden):
         result = solve_ik(
             robot, case["T"], task="approach" if five else "pose", respect_limits=False, redundancy=parameter
         )
-        found = np.array([s.q for s in result.solutions])
+        found = result.q
         wanted = np.array(case["branches"])
         assert len(found) == len(wanted)
         for q in wanted:
@@ -93,7 +103,7 @@ def test_every_round_trip_is_solved(robot_id, task):
         if result.status is not Status.SOLVED:
             unsolved.append((q[i].tolist(), result.reason))
             continue
-        found = np.array([s.q for s in result.solutions])
+        found = result.q
         assert robot.in_limits(found).all()
         T = kin.fk(robot, found)
         worst_p = max(worst_p, float(np.abs(T[:, :3, 3] - targets[i, :3, 3]).max()))
@@ -153,7 +163,7 @@ def test_every_round_trip_inside_narrowed_limits_is_solved(robot_id, share):
             target = kin.fk(robot, q)
             result = solve_ik(robot, target)
             assert result.status is Status.SOLVED, (low.tolist(), high.tolist(), q.tolist(), result.reason)
-            assert robot.in_limits(np.array([s.q for s in result.solutions])).all()
+            assert robot.in_limits(result.q).all()
 
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
@@ -168,7 +178,7 @@ def test_solutions_are_exact_ordered_and_deterministic(robot_id, fractions):
     result = solve_ik(robot, target, q_seed=seed)
     assert_exact(robot, target, result)
     again = solve_ik(robot, target, q_seed=seed)
-    assert [s.q.tolist() for s in again.solutions] == [s.q.tolist() for s in result.solutions]
+    assert again.q.tolist() == result.q.tolist()
 
 
 @pytest.mark.parametrize("robot_id", CHAPTER_ARMS)
@@ -204,7 +214,7 @@ def test_solutions_outside_the_limits_are_rejected_and_the_joint_is_named():
     assert robot.in_limits(result.closest.q)
     free = solve_ik(robot, kin.fk(robot, q), task="approach", respect_limits=False)
     assert free.status is Status.SOLVED
-    assert angle_gap(np.array([s.q for s in free.solutions]), q).min() < 1e-9
+    assert angle_gap(free.q, q).min() < 1e-9
     assert not any(s.in_limits for s in free.solutions)
 
 
@@ -392,7 +402,7 @@ def test_max_solutions_keeps_the_nearest():
     every = solve_ik(robot, target)
     assert len(every.solutions) > 2
     two = solve_ik(robot, target, max_solutions=2)
-    assert [s.q.tolist() for s in two.solutions] == [s.q.tolist() for s in every.solutions[:2]]
+    assert two.q.tolist() == [s.q.tolist() for s in every.solutions[:2]]
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ def test_only_the_requested_branches_are_returned(robot_id, task):
                 task != "position"
             ):  # with two redundancy parameters, the choice on a branch depends on the other branches
                 wanted = [s for s in every.solutions if s.branch in names]
-                assert [s.q.tolist() for s in result.solutions] == [s.q.tolist() for s in wanted]
+                assert result.q.tolist() == [s.q.tolist() for s in wanted]
             if requested in ("seed", kin.branch_of(robot, q)):
                 assert result.status is Status.SOLVED
             if not result.solutions and result.closest is not None:
@@ -142,7 +142,7 @@ def test_wider_limits_are_intersected_where_that_is_wanted():
     inside = [(arm.lower[0], 3.0), (-3.0, 0.0), (0.0, arm.upper[2]), None, None, (arm.lower[5], arm.upper[5])]
     wanted = kin.solve_ik(arm, T, limits=inside)
     found = kin.solve_ik(arm, T, limits=narrow, wider_limits="intersect")
-    assert [s.q.tolist() for s in found.solutions] == [s.q.tolist() for s in wanted.solutions]
+    assert found.q.tolist() == wanted.q.tolist()
     assert 0 < len(found.solutions) < 8
     many = kin.solve_ik_many(arm, [T], limits=narrow, wider_limits="intersect")
     assert many.q[0].tolist() == found.solutions[0].q.tolist()
@@ -239,7 +239,7 @@ def test_all_golden_images_inside_the_limits(robot_id, golden):
         task = "approach" if robot.n == 5 else "pose"
         value = None if robot.n == 5 else case.get("theta1", case.get("psi"))
         result = solve_ik(robot, case["T"], task=task, redundancy=value, images="all")
-        found = np.array([s.q for s in result.solutions])
+        found = result.q
         assert len(found) == len(wanted)
         for q in wanted:
             assert np.abs(found - q).max(axis=1).min() < 1e-8
@@ -305,7 +305,7 @@ def test_masks_equivalent_to_a_task_give_its_result():
     ):
         masked, plain = solve_ik(robot, target, mask=mask, mask_frame=frame), solve_ik(robot, target, task=task)
         assert masked.task == task
-        assert [s.q.tolist() for s in masked.solutions] == [s.q.tolist() for s in plain.solutions]
+        assert masked.q.tolist() == plain.q.tolist()
     assert solve_ik(robot, target, mask=(True,) * 5 + (False,), mask_frame="base").task == "mask"
 
 
@@ -638,7 +638,7 @@ def test_results_survive_pickling():
     arm = kin.get_robot("redundant7-craig")
     result = solve_ik(arm, kin.fk(arm, arm.q_home))
     again = pickle.loads(pickle.dumps(result))
-    assert [s.q.tolist() for s in again.solutions] == [s.q.tolist() for s in result.solutions]
+    assert again.q.tolist() == result.q.tolist()
     assert (again.reason, again.redundancy) == (result.reason, result.redundancy)
     kin.ik_branches(arm, kin.fk(arm, arm.q_home))
     copy = pickle.loads(pickle.dumps(arm))
@@ -684,7 +684,7 @@ def test_keywords_and_options_give_the_same_result():
     one = solve_ik(arm, kin.fk(arm, q), q_seed=seed, limits=limits, locked=locked, branch="seed", prefer="limits")
     other = kin.ik.solve(arm, kin.fk(arm, q), options, seed)
     assert (one.status, one.reason, one.details) == (other.status, other.reason, other.details)
-    assert [s.q.tolist() for s in one.solutions] == [s.q.tolist() for s in other.solutions]
+    assert one.q.tolist() == other.q.tolist()
 
 
 def test_the_branch_of_the_seed_follows_each_seed():

@@ -89,7 +89,7 @@ def _round_trips(
         if result.status is not Status.SOLVED:
             unsolved.append((low.tolist(), high.tolist(), q.tolist(), result.reason))
             continue
-        found = np.array([s.q for s in result.solutions])
+        found = result.q
         assert not (found < low).any()
         assert not (found > high).any()
         T = kin.fk(robot, found)

@@ -144,7 +144,7 @@ def postures(robot: Robot, T, seed, value=None, **options):
     """The configurations ``(k, n)`` away from singularities, and all; limits are ignored."""
     result = solve_ik(robot, T, q_seed=seed, respect_limits=False, redundancy=value, **options)
     assert result.status is Status.SOLVED, (robot, seed.tolist(), result)
-    q = np.array([s.q for s in result.solutions])
+    q = result.q
     least = np.linalg.svd(kin.jacobian(robot, q), compute_uv=False)[:, min(robot.n, 6) - 1]
     return q[least > WELL], q
 

@@ -56,7 +56,7 @@ def exact(problem: Problem) -> Array:
     )
     if result.status != "solved":
         return np.empty((0, problem.robot.n))
-    found = np.array([solution.q for solution in result.solutions])
+    found = result.q
     order = np.argsort(found[:, -1], kind="stable")
     return np.asarray(found[order])
 
