@@ -174,7 +174,7 @@ def test_the_robot_file_is_a_robot():
         *(set(PAGES) - {"docs/exercises.md", "docs/robot-files.md", "docs/motion.md"}),
     )
     assert not others
-    robot = kin.parse_robot(robot_file)
+    robot = kin.load_robot(robot_file)
     assert kin.fk(robot, [0.0, 0.0])[:3, 3].tolist() == [0.5, 0.0, 0.0]
 
 

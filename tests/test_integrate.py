@@ -64,7 +64,7 @@ def run(folder, *words):
 
 
 def arm_of(folder):
-    return kin.load_urdf(folder / "ur5.urdf", tip="tool0").with_mounted(GRIPPER)
+    return kin.load_robot(folder / "ur5.urdf", tip="tool0").with_mounted(GRIPPER)
 
 
 def motion_of(folder):

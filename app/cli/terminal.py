@@ -26,7 +26,6 @@ from kin import (
     frame_pose,
     from_pendant,
     load_robot,
-    load_urdf,
     pose_from_xyz_rpy,
 )
 from kin.collision.obstacles import checked_obstacles
@@ -53,10 +52,8 @@ def robot_of(arguments: Namespace) -> Robot:
 
 def named_robot(arguments: Namespace, named: str) -> Robot:
     """A robot by its id, or by the path of a file."""
-    if Path(named).suffix in (".urdf", ".xml"):
-        return load_urdf(Path(named))
-    if Path(named).suffix == ".toml":
-        return load_robot(named)
+    if Path(named).suffix in (".urdf", ".xml", ".toml"):
+        return load_robot(Path(named))
     return store_of(arguments).get(named)
 
 

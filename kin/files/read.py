@@ -81,40 +81,23 @@ def load_robots(folder: Path | str) -> dict[str, Robot]:
         ['scara']
     """
     robots: dict[str, Robot] = {}
-    folder = _path("folder", folder)
+    if not isinstance(folder, str | os.PathLike):
+        raise InputError("folder", folder, "a path, as pathlib.Path or str")
+    folder = Path(folder)
     try:
         paths = sorted(path for path in folder.iterdir() if path.suffix == ".toml")
     except (OSError, ValueError) as error:  # glob would report an empty folder instead
         raise InputError("folder", str(error), "a folder that can be read") from error
     for path in paths:
-        robot = load_robot(path)
+        robot = load_toml(path)
         if robot.id in robots:
             raise RobotFileError(str(path), "id", robot.id, "an id that no other file of the folder uses")
         robots[robot.id] = robot
     return robots
 
 
-def load_robot(path: Path | str) -> Robot:
-    """The robot described by a TOML file.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        The arm.
-
-    Raises:
-        RobotFileError: the file is invalid or cannot be read.
-        InputError: `path` is no path.
-
-    Examples:
-        >>> import kin, tempfile, pathlib
-        >>> file = pathlib.Path(tempfile.mkdtemp()) / "mine.toml"
-        >>> kin.save_robot("scara", file)
-        >>> kin.load_robot(file) == kin.get_robot("scara")
-        True
-    """
-    path = _path("path", path)
+def load_toml(path: Path) -> Robot:
+    """The robot of a robot file; raises `RobotFileError`."""
     try:
         text = path.read_text(encoding="utf-8-sig")  # some editors on Windows write a byte order mark
     except (OSError, ValueError) as error:  # a path may contain a null character
@@ -123,7 +106,7 @@ def load_robot(path: Path | str) -> Robot:
 
 
 def parse_robot(text: str, file: str = "robot") -> Robot:
-    """The robot described by TOML text; `file` is the name used in messages.
+    """The robot described by TOML text, which is never a path; `file` is the name used in messages.
 
     Args:
         text: of a robot file (TOML).
@@ -138,7 +121,7 @@ def parse_robot(text: str, file: str = "robot") -> Robot:
 
     Examples:
         >>> import kin
-        >>> kin.parse_robot(kin.robot_to_toml("planar2r")).name
+        >>> kin.files.parse_robot(kin.robot_to_toml("planar2r")).name
         'Planar 2R'
     """
     if not isinstance(text, str):
@@ -174,15 +157,6 @@ def robot_from_dict(data: dict[str, Any], source: str = "robot") -> Robot:
     if not isinstance(data, dict):
         raise RobotFileError(source, "robot", data, "a table with the fields " + ", ".join(sorted(_TOP)))
     return Reader(source).robot(data)
-
-
-def _path(field: str, given: Path | str) -> Path:
-    """A path that a caller gave."""
-    if not isinstance(given, str | os.PathLike):
-        raise InputError(field, given, "a path, as pathlib.Path or str")
-    if isinstance(given, str) and "\n" in given:
-        raise InputError(field, given, "a path; kin.parse_robot takes the text of a robot file")
-    return Path(given)
 
 
 def is_path(text: str) -> bool:

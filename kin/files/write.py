@@ -70,7 +70,7 @@ def robot_to_toml(robot: Robot | str, length: Length | None = None, angle: Angle
         angle: unit of angles, ``"deg"`` or ``"rad"``; by default the one that needs fewer digits.
 
     Returns:
-        The text; `parse_robot` reads it.
+        The text; `load_robot` reads it.
 
     Raises:
         InputError: as in `robot_to_dict`.

@@ -151,7 +151,7 @@ def test_phone(phone: Tab) -> None:
 
 @pytest.mark.full
 def test_a_zip_or_several_files_show_the_real_arm_and_delete_removes_it(tab: Tab) -> None:
-    page, two = tab.page, kin.load_urdf(TWO_JOINTS)
+    page, two = tab.page, kin.load_robot(TWO_JOINTS)
     tab.open("Robot")
     files = {**robot_files(), "two/noise.bin": random.Random(1).randbytes(200_000)}  # in several parts
     file = {"name": "two.zip", "mimeType": "application/zip", "buffer": packed(files)}
@@ -191,7 +191,7 @@ DROP = """(text) => {
 
 
 def test_a_file_dropped_onto_the_scene_is_the_arm(tab: Tab) -> None:
-    page, two = tab.page, kin.load_urdf(TWO_JOINTS)
+    page, two = tab.page, kin.load_robot(TWO_JOINTS)
     assert "to open it" in page.evaluate(DROP, TWO_JOINTS)
     tab.wait_for_tool(kin.fk(two, two.q_home)[:3, 3], within=0.06)
     expect(page.get_by_role("tab", name="Robot")).to_have_attribute("aria-selected", "true")

@@ -162,7 +162,7 @@ def test_a_file_states_where_its_numbers_are_from(robot):
     assert "mass" not in data or "mass" in data["source"]
     for row in data["rows"]:
         assert row.get("kind") == "fixed" or "follows" in row or "limits" in row, row["name"]
-    assert kin.parse_robot(kin.robot_to_toml(robot)) == robot
+    assert kin.load_robot(kin.robot_to_toml(robot)) == robot
 
 
 @each_arm

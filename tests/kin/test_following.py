@@ -187,7 +187,7 @@ q = [0, 10, 20, 0]
 
 
 def test_a_robot_file_states_what_follows_and_is_written_again(tmp_path):
-    robot = kin.parse_robot(PALLETISER)
+    robot = kin.load_robot(PALLETISER)
     assert [joint.name for joint in robot.joints] == ["turn", "upper arm", "forearm", "tool turn"]
     assert [(row.follows, row.ratio) for row in robot.rows if row.follows] == [
         ("upper arm", -1.0),
@@ -214,7 +214,7 @@ def test_a_robot_file_states_what_follows_and_is_written_again(tmp_path):
 )
 def test_a_robot_file_with_a_wrong_relation_is_refused_by_its_field(old, new, field, valid):
     with pytest.raises(kin.RobotFileError, match=valid) as caught:
-        kin.parse_robot(PALLETISER.replace(old, new))
+        kin.load_robot(PALLETISER.replace(old, new))
     assert caught.value.field == field
 
 
@@ -226,7 +226,7 @@ def assert_same_arm(robot: Robot, other: Robot) -> None:
     assert other.upper == pytest.approx(robot.upper)
 
 
-@pytest.mark.parametrize("robot", [*ARMS, kin.parse_robot(PALLETISER)], ids=["standard", "modified", "palletiser"])
+@pytest.mark.parametrize("robot", [*ARMS, kin.load_robot(PALLETISER)], ids=["standard", "modified", "palletiser"])
 def test_urdf_and_mjcf_carry_what_follows(robot):
     urdf = kin.robot_to_urdf(robot)
     back, report = kin.read_urdf(urdf, tip="tool")
@@ -275,7 +275,7 @@ def test_a_mimic_joint_on_the_way_to_the_tool_follows_with_its_offset():
     assert report.difference < 1e-14
     # j1 = −2 j3 + 0.3 in ±1, and j4 = 0.1 j1 + 0.1 in 0 to 0.2: j1 from −1 to 1.
     assert robot.joints[1].limits == pytest.approx((-0.35, 0.65))
-    free = kin.load_urdf(text.replace('<mimic joint="j3" multiplier="-2" offset="0.3"/>', "").replace(
+    free = kin.load_robot(text.replace('<mimic joint="j3" multiplier="-2" offset="0.3"/>', "").replace(
         '<mimic joint="j1" multiplier="0.1" offset="0.1"/>', ""
     ))  # fmt: skip
     for j2, j3 in robot.random_q(np.random.default_rng(6), 10):
@@ -296,7 +296,7 @@ def test_the_first_follower_stands_for_a_leader_beside_the_arm():
     assert (report.joints, report.following) == (("j1",), ("j2",))
     assert robot.joints[0].limits == pytest.approx((-0.3, 0.7)), "2 times those of the motor, and 0.1"
     assert report.notes[0].startswith("Joint j1 follows motor, which is beside the arm")
-    free = kin.load_urdf(urdf_of("j1|continuous|", "j2|continuous|").replace('<link name="l3"/>', ""))
+    free = kin.load_robot(urdf_of("j1|continuous|", "j2|continuous|").replace('<link name="l3"/>', ""))
     motor = 0.25
     assert kin.fk(robot, [2.0 * motor + 0.1]) == pytest.approx(kin.fk(free, [0.6, -motor + 0.5]), abs=1e-14)
 
@@ -337,12 +337,12 @@ def test_an_equality_of_mjcf_counts_from_the_first_configuration():
 
     robot, report = kin.read_urdf(mjcf('polycoef="0.05 -2 0 0 0"'), tip="tip")
     assert (report.joints, report.following) == (("lead",), ("follow",))
-    free = kin.load_urdf(mjcf('active="false"'), tip="tip")
+    free = kin.load_robot(mjcf('active="false"'), tip="tip")
     follow = 0.1 + 0.05 - 2.0 * (0.7 - 0.4)
     assert kin.fk(robot, [0.7]) == pytest.approx(kin.fk(free, [0.7, follow]), abs=1e-15)
-    assert kin.fk(kin.load_urdf(mjcf(""), tip="tip"), [0.7]) == pytest.approx(kin.fk(free, [0.7, 0.4]), abs=1e-15)
+    assert kin.fk(kin.load_robot(mjcf(""), tip="tip"), [0.7]) == pytest.approx(kin.fk(free, [0.7, 0.4]), abs=1e-15)
     with pytest.raises(kin.RobotFileError, match="linear") as caught:
-        kin.load_urdf(mjcf('polycoef="0 1 0.5"'), tip="tip")
+        kin.load_robot(mjcf('polycoef="0 1 0.5"'), tip="tip")
     assert caught.value.field == "joint follow: equality polycoef"
 
 
@@ -375,7 +375,7 @@ def test_bodies_of_a_follower_are_where_its_offset_puts_them():
     ).replace('<link name="l3"/>', "")
     ball = '<link name="l2"><collision><origin xyz="0.1 0 0"/>'
     ball += '<geometry><sphere radius="0.05"/></geometry></collision>'
-    robot = kin.load_urdf(text.replace('<link name="l2"/>', ball + "</link>"))
+    robot = kin.load_robot(text.replace('<link name="l2"/>', ball + "</link>"))
     (capsule,) = [each for each in robot.capsules if not each.assumed]
     end = kin.link_frames(robot, [0.3])[capsule.row] @ [*capsule.start, 1.0]
     tool = kin.fk(robot, [0.3]) @ [0.1, 0.0, 0.0, 1.0]
@@ -383,7 +383,7 @@ def test_bodies_of_a_follower_are_where_its_offset_puts_them():
     assert capsule.link == 2
 
 
-@pytest.mark.parametrize("robot", [*ARMS, kin.parse_robot(PALLETISER)], ids=["standard", "modified", "palletiser"])
+@pytest.mark.parametrize("robot", [*ARMS, kin.load_robot(PALLETISER)], ids=["standard", "modified", "palletiser"])
 def test_levers_bound_how_far_bodies_move_with_what_follows(robot):
     """The proof that a motion touches nothing rests on these bounds."""
     near = surroundings(robot, ())
@@ -402,9 +402,9 @@ def test_levers_bound_how_far_bodies_move_with_what_follows(robot):
 
 
 def test_motions_keep_the_speeds_of_what_follows():
-    rows = list(kin.parse_robot(PALLETISER).rows)
+    rows = list(kin.load_robot(PALLETISER).rows)
     rows[4] = replace(rows[4], velocity=0.2)
-    robot = replace(kin.parse_robot(PALLETISER), rows=tuple(rows))
+    robot = replace(kin.load_robot(PALLETISER), rows=tuple(rows))
     target = robot.q_home + np.array([0.5, 0.4, 0.6, 1.0])
     T = kin.fk(robot, robot.q_home)
     T[:3, 3] += [0.1, 0.3, -0.1]

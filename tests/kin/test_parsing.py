@@ -167,7 +167,7 @@ def test_a_robot_file_with_a_key_of_many_parts_is_refused():
     with pytest.raises(
         kin.RobotFileError, match="mine: file: got 'a key of more than 16 parts', expected at most"
     ):
-        kin.parse_robot("a" + ".a" * 500 + " = 1", "mine")
+        kin.files.parse_robot("a" + ".a" * 500 + " = 1", "mine")
 
 
 @pytest.mark.parametrize("text", ["a" + ".a" * 500 + " = 1", '{"a": ' + "[" * 500 + "]" * 500 + "}"])

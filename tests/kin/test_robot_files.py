@@ -52,7 +52,7 @@ q = [45, 125]
 
 
 def test_a_file_names_its_units():
-    robot = kin.parse_robot(GOOD)
+    robot = kin.load_robot(GOOD)
     assert robot.n == 2
     assert robot.rows[0].alpha == pytest.approx(-math.pi / 2)
     assert robot.lower == pytest.approx([-math.pi / 2, 0])
@@ -64,16 +64,16 @@ def test_a_file_names_its_units():
 
 @pytest.mark.parametrize("mounting", kin.robot.MOUNTINGS)
 def test_mounting_and_floor_are_read_written_and_change_no_pose(mounting, tmp_path):
-    robot = kin.parse_robot(f'mounting = "{mounting}"\nfloor = -120.7\n{GOOD}')
+    robot = kin.load_robot(f'mounting = "{mounting}"\nfloor = -120.7\n{GOOD}')
     assert (robot.mounting, robot.floor) == (mounting, -0.1207)
     kin.save_robot(robot, tmp_path / "bench.toml")
     assert kin.load_robot(tmp_path / "bench.toml") == robot
     assert kin.robot_from_dict(kin.robot_to_dict(robot)) == robot
-    plain = kin.parse_robot(GOOD)
+    plain = kin.load_robot(GOOD)
     assert (plain.mounting, plain.floor) == (None, None)
     assert plain != robot
     assert np.array_equal(kin.fk(plain, plain.q_home), kin.fk(robot, plain.q_home))
-    assert kin.parse_robot(f'floor = "-0.5 m"\n{GOOD}').floor == -0.5
+    assert kin.load_robot(f'floor = "-0.5 m"\n{GOOD}').floor == -0.5
 
 
 @pytest.mark.parametrize(
@@ -88,14 +88,14 @@ def test_mounting_and_floor_are_read_written_and_change_no_pose(mounting, tmp_pa
 )
 def test_a_mounting_or_a_floor_that_is_none_is_named(field, value, valid):
     with pytest.raises(InputError, match=valid) as caught:
-        replace(kin.parse_robot(GOOD), **{field: value})
+        replace(kin.load_robot(GOOD), **{field: value})
     assert caught.value.field == field
 
 
 def test_metres_and_radians():
     text = GOOD.replace('length = "mm", angle = "deg"', 'length = "cm", angle = "rad"')
     text = text.replace("[-90, 180]", "[-1.5, 3]").replace("q = [45, 125]", "q = [1, 125]")
-    robot = kin.parse_robot(text)
+    robot = kin.load_robot(text)
     assert robot.rows[0].d == pytest.approx(1.0)
     assert robot.rows[0].alpha == -90
     assert robot.lower[0] == -1.5
@@ -103,7 +103,7 @@ def test_metres_and_radians():
 
 def test_missing_limits_and_home_get_defaults():
     text = GOOD.replace("limits = [-90, 180]\n", "").replace("limits = [0, 250]\n", "").split("[home]")[0]
-    robot = kin.parse_robot(text)
+    robot = kin.load_robot(text)
     assert robot.lower == pytest.approx([-math.pi, 0])
     assert robot.upper == pytest.approx([math.pi, 1])
     assert robot.in_limits(robot.q_home)
@@ -163,7 +163,7 @@ def test_files_that_cannot_be_read(tmp_path):
 
 def test_a_byte_order_mark_is_accepted(tmp_path):
     (tmp_path / "arm.toml").write_text(GOOD, encoding="utf-8-sig")
-    assert kin.load_robot(tmp_path / "arm.toml") == kin.parse_robot(GOOD)
+    assert kin.load_robot(tmp_path / "arm.toml") == kin.load_robot(GOOD)
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_a_byte_order_mark_is_accepted(tmp_path):
 )
 def test_endless_toml_is_rejected(text, valid):
     with pytest.raises(RobotFileError, match=valid) as caught:
-        kin.parse_robot(text, "arm.toml")
+        kin.files.parse_robot(text, "arm.toml")
     assert len(str(caught.value)) < 300
 
 
@@ -181,7 +181,7 @@ def test_the_number_of_rows_is_limited():
     head = GOOD.split("[[rows]]")[0]
     for text in (head, head + "rows = []", head + '[[rows]]\nkind = "fixed"', head + "[[rows]]\nname='%d'\n" * 40):
         with pytest.raises(RobotFileError) as caught:
-            kin.parse_robot(text)
+            kin.load_robot(text)
         assert caught.value.field in ("rows", "file")
 
 
@@ -227,12 +227,12 @@ def test_random_configurations_are_inside_the_limits():
 
 
 def test_reach_bounds_every_pose_and_is_infinite_without_limits():
-    for robot in (*kin.classic_robots().values(), kin.parse_robot(GOOD)):
+    for robot in (*kin.classic_robots().values(), kin.load_robot(GOOD)):
         q = robot.random_q(np.random.default_rng(1), 5000)
         origin = robot.T_world_base[:3, 3]
         assert np.linalg.norm(kin.fk(robot, q)[:, :3, 3] - origin, axis=-1).max() <= robot.reach
     slide = kin.Joint("slide", kind="prismatic", limits=None)
-    assert replace(kin.parse_robot(GOOD), rows=(slide,), home=(0.0,)).reach == math.inf
+    assert replace(kin.load_robot(GOOD), rows=(slide,), home=(0.0,)).reach == math.inf
 
 
 # -- plain data and writing ------------------------------------------------------------------------------------
@@ -241,7 +241,7 @@ def test_reach_bounds_every_pose_and_is_infinite_without_limits():
 def read_again(robot, **units):
     """The robot after a journey through a dict, JSON and a dict, and through TOML."""
     by_json = kin.robot_from_dict(json.loads(json.dumps(kin.robot_to_dict(robot, **units), allow_nan=False)))
-    by_toml = kin.parse_robot(kin.robot_to_toml(robot, **units))
+    by_toml = kin.load_robot(kin.robot_to_toml(robot, **units))
     assert by_json == by_toml
     return by_json
 
@@ -299,7 +299,7 @@ def test_round_values_are_written_round():
     assert isinstance(data["rows"][0]["alpha"], int)
     assert data["rows"][1]["a"] == 431.8
     assert data["home"]["q"] == [0, 45, -180, 0, 45, 0]
-    tilted = kin.robot_to_dict(kin.parse_robot(GOOD))
+    tilted = kin.robot_to_dict(kin.load_robot(GOOD))
     assert tilted["base"] == {"xyz": [0, 0, 500], "rpy": [0, 0, 90]}
     assert tilted["tool"] == {"xyz": [0, 0, 40], "rpy": [0, 0, 0]}
     # The shorter of degrees and radians.
@@ -334,14 +334,14 @@ def test_any_robot_is_written_exactly(seed, length, angle):
 
 def test_a_number_may_have_its_own_unit():
     text = GOOD.replace("d = 100", 'd = "0.1 m"').replace("alpha = -90", 'alpha = "-90°"')
-    assert kin.parse_robot(text) == kin.parse_robot(GOOD)
+    assert kin.load_robot(text) == kin.load_robot(GOOD)
     text = GOOD.replace("limits = [-90, 180]", 'limits = ["-1.5 rad", 180]\nvelocity = "2 rad/s"\neffort = 87')
-    row = kin.parse_robot(text).rows[0]
+    row = kin.load_robot(text).rows[0]
     assert (row.limits, row.velocity, row.effort) == ((-1.5, math.pi), 2.0, 87.0)
 
 
 def test_joints_without_limits():
-    robot = kin.parse_robot(GOOD.replace("limits = [-90, 180]", 'limits = "none"'))
+    robot = kin.load_robot(GOOD.replace("limits = [-90, 180]", 'limits = "none"'))
     assert robot.joints[0].limits is None
     assert robot.upper[0] == math.inf
     assert read_again(robot) == robot
@@ -349,7 +349,7 @@ def test_joints_without_limits():
 
 def test_base_and_tool_as_matrices():
     matrix = [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 500], [0, 0, 0, 1]]
-    data = {**kin.robot_to_dict(kin.parse_robot(GOOD)), "base": {"matrix": matrix}}
+    data = {**kin.robot_to_dict(kin.load_robot(GOOD)), "base": {"matrix": matrix}}
     assert kin.robot_from_dict(data).T_world_base[:3, 3] == pytest.approx([1e-3, 2e-3, 0.5])
     # A matrix typed with seven digits is made orthonormal, and stays as it is from then on.
     s = 0.7071068
@@ -468,11 +468,11 @@ def test_lengths_keep_their_digits_in_any_unit(unit, per_metre):
         (lambda: kin.load_robots(None), "folder", "a path"),
         (lambda: kin.load_robots("/no/such/folder"), "folder", "a folder that can be read"),
         (lambda: kin.load_robots(Path("with\0null")), "folder", "a folder that can be read"),
-        (lambda: kin.load_robot(None), "path", "a path"),
-        (lambda: kin.load_robot("id = 'a'\nname = 'A'"), "path", "a path; kin.parse_robot takes the text"),
-        (lambda: kin.parse_robot(b""), "text", "the text of a robot file"),
-        (lambda: kin.parse_robot(Path("arm.toml")), "text", "kin.load_robot takes a path"),
-        (lambda: kin.load_urdf(None), "source", "the text of a URDF"),
+        (lambda: kin.load_robot(None), "source", "the path of a file, or the text of a robot file, URDF or MJCF"),
+        (lambda: kin.load_robot(b"<robot/>"), "source", "the path of a file"),
+        (lambda: kin.load_robot(GOOD, tip="tool"), "tip", "a robot file has no links"),
+        (lambda: kin.files.parse_robot(b""), "text", "the text of a robot file"),
+        (lambda: kin.files.parse_robot(Path("arm.toml")), "text", "kin.load_robot takes a path"),
         (lambda: kin.urdf_tips(b"<robot/>"), "source", "the text of a URDF"),
     ],
 )
@@ -485,10 +485,10 @@ def test_what_is_no_file_is_refused_with_what_is_valid(call, field, valid):
 @pytest.mark.parametrize("path", ["arm.toml", "arms/mine", r"C:\arms\mine", " ~/arm.toml\n"])
 def test_a_path_instead_of_the_text_of_a_robot_file_is_named(path):
     with pytest.raises(RobotFileError, match=r"kin\.load_robot takes a path"):
-        kin.parse_robot(path)
+        kin.files.parse_robot(path)
     for text in ("x = 1.5", "[a.b]", "# arms/mine.toml", "a\nb.toml", "/" * 5000):
         with pytest.raises(RobotFileError) as caught:
-            kin.parse_robot(text)
+            kin.files.parse_robot(text)
         assert "path" not in str(caught.value)
 
 
@@ -507,14 +507,14 @@ def test_a_folder_may_be_given_as_text(tmp_path):
 )
 def test_names_for_ros_are_of_joints_and_different(table, field, expected):
     with pytest.raises(RobotFileError, match=expected) as caught:
-        kin.parse_robot(f"ros_joints = {table}{GOOD}")
+        kin.load_robot(f"ros_joints = {table}{GOOD}")
     assert caught.value.field == field
 
 
 def test_names_for_ros_are_kept_and_one_may_be_missing():
-    robot = kin.parse_robot('ros_joints = { slide = "lift_joint" }' + GOOD)
+    robot = kin.load_robot('ros_joints = { slide = "lift_joint" }' + GOOD)
     assert robot.ros_names == ["turn", "lift_joint"]
-    assert kin.parse_robot(kin.robot_to_toml(robot)) == robot
+    assert kin.load_robot(kin.robot_to_toml(robot)) == robot
     fewer = replace(robot, rows=tuple(row for row in robot.rows if row.name != "slide"), home=robot.home[:1])
     assert fewer.ros_names == ["turn"]
-    assert kin.parse_robot(kin.robot_to_toml(fewer)).ros_joints == ()
+    assert kin.load_robot(kin.robot_to_toml(fewer)).ros_joints == ()

@@ -328,7 +328,7 @@ def arm(*rows, home):
     for i, (d, a, alpha) in enumerate(rows):
         text += f'[[rows]]\nname = "{i}"\na = {a}\nalpha = {alpha}\n'
         text += 'kind = "prismatic"\nlimits = [0, 1]\n' if d == "slide" else f"d = {d}\nlimits = [-180, 180]\n"
-    return kin.parse_robot(ARM.format(rows=text, home=list(home)))
+    return kin.load_robot(ARM.format(rows=text, home=list(home)))
 
 
 def only_singularity(robot, q):

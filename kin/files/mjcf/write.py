@@ -33,7 +33,7 @@ def robot_to_mjcf(robot: Robot | str) -> str:
     """The arm as MJCF, for MuJoCo: joints, limits, capsules, the tool as a site, the home as a keyframe.
 
     A floor whose height is stated is a plane. All links but the first, which turns close to it, touch it. The
-    height, and what the arm is mounted on, are custom data too, which `load_urdf` reads.
+    height, and what the arm is mounted on, are custom data too, which `load_robot` reads.
 
     The values of the joints are those of the arm. A row that follows a joint is a joint of its own there, with an
     equality. Links that are not compared for collisions here are

@@ -93,29 +93,6 @@ class UrdfRobot(NamedTuple):
     report: UrdfReport
 
 
-def load_urdf(source: Path | str, base: str | None = None, tip: str | None = None) -> Robot:
-    """The robot that a URDF describes, by path or text; see `read_urdf`, which reports about it as well.
-
-    Args:
-        source: a `Path` of a file, or a `str`, which is the text itself and never a path.
-        base: the link the arm stands on; by default the root.
-        tip: the link that is the tool; needed if several are possible.
-
-    Returns:
-        The arm, as a standard DH table.
-
-    Raises:
-        RobotFileError: the file is invalid, or describes no serial arm.
-        InputError: `source` is neither a path nor a text.
-
-    Examples:
-        >>> import kin
-        >>> kin.load_urdf(kin.robot_to_urdf("ur5")).n
-        6
-    """
-    return read_urdf(source, base, tip).robot
-
-
 def read_urdf(
     source: Path | str,
     base: str | None = None,

@@ -25,7 +25,7 @@ def robot_to_urdf(robot: Robot | str) -> str:
     A row that follows a joint has `<mimic>`.
     A velocity or effort that is not known is written as 0. An arm whose mounting or floor is stated has a link
     ``world`` too, to which a fixed joint mounts its base. An element ``<kinboard>`` states what it is mounted on,
-    and how high the floor is. Other programs ignore that element, and `load_urdf` reads it.
+    and how high the floor is. Other programs ignore that element, and `load_robot` reads it.
 
     Args:
         robot: the arm, or the id of a built-in one.

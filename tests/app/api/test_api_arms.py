@@ -350,7 +350,7 @@ def test_import_of_urdf(client):
     assert found["report"]["difference"] <= 1e-12
     assert found["report"]["tips"][0]["joints"] == 7
     assert found["robot"]["n"] == 7
-    assert kin.parse_robot(found["toml"]) == kin.robot_from_dict(found["description"])
+    assert kin.load_robot(found["toml"]) == kin.robot_from_dict(found["description"])
     answer = post(client, "ik", {"robot": found["description"], "target": {"position": [0.4, 0.1, 0.5]}})
     assert answer["status"] == "solved"
     problem = post(client, "robots/import", {"urdf": text}, 422)
@@ -392,17 +392,17 @@ def test_export(client):
         response = client.get(f"/api/v1/robots/panda/export?format={name}")
         assert response.headers["content-type"].startswith("application/toml")
         assert response.headers["content-disposition"].endswith('.toml"')
-        assert kin.parse_robot(response.text) == kin.convert_dh(panda, convention)
+        assert kin.load_robot(response.text) == kin.convert_dh(panda, convention)
     response = client.get("/api/v1/robots/panda/export?format=mjcf")
     assert response.headers["content-disposition"] == 'attachment; filename="panda.xml"'
     again = post(client, "robots/import", {"urdf": response.text})
     assert again["robot"]["source"].startswith("MJCF, from body world")
-    assert kin.fk(kin.parse_robot(again["toml"]), panda.home) == pytest.approx(
+    assert kin.fk(kin.load_robot(again["toml"]), panda.home) == pytest.approx(
         kin.fk(panda, panda.home), abs=1e-12
     )
     response = client.get("/api/v1/robots/panda/export?format=urdf")
     assert response.headers["content-type"].startswith("application/xml")
-    assert kin.load_urdf(response.text).n == 7
+    assert kin.load_robot(response.text).n == 7
     response = client.get("/api/v1/robots/panda/export?format=js")
     assert response.headers["content-disposition"] == 'attachment; filename="panda.js"'
     assert response.text == kin.generate("panda", "js")

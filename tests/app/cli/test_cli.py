@@ -576,8 +576,8 @@ def test_import_prints_or_writes_a_robot_file(capsys, tmp_path):
     panda = URDF / "panda.urdf"
     code, out, _ = run(capsys, "import", panda, "--tip", "panda_link8")
     assert code == 0
-    robot = kin.parse_robot(out)
-    assert robot == kin.load_urdf(panda, tip="panda_link8")
+    robot = kin.load_robot(out)
+    assert robot == kin.load_robot(panda, tip="panda_link8")
     file = tmp_path / "panda.toml"
     code, out, _ = run(capsys, "import", panda, "--tip", "panda_link8", "--base", "panda_link0", "-o", file)
     assert code == 0
@@ -601,7 +601,7 @@ def test_import_reads_the_collision_meshes_beside_the_urdf(capsys, tmp_path):
     urdf = tmp_path / "two/urdf/two.urdf"
     code, out, _ = run(capsys, "import", urdf)
     assert code == 0
-    robot = kin.parse_robot(out)
+    robot = kin.load_robot(out)
     assert {c.link for c in robot.capsules} == {0, 1, 2}
     assert not any(c.assumed for c in robot.capsules)
     assert robot.capsules_source == "Capsules around the collision bodies of the URDF, for every link."
@@ -685,7 +685,7 @@ def test_files_of_code_have_the_names_by_which_they_include_each_other(capsys, t
 def test_export_in_every_format(capsys, tmp_path, form):
     code, out, _ = run(capsys, "export", "puma560", "--format", form)
     assert code == 0
-    robot = kin.load_urdf(out) if form in ("urdf", "mjcf") else kin.parse_robot(out)
+    robot = kin.load_robot(out) if form in ("urdf", "mjcf") else kin.load_robot(out)
     assert robot.convention == ("modified" if form == "mdh" else "standard")
     q = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
     assert kin.fk(robot, q) == pytest.approx(kin.fk(kin.get_robot("puma560"), q), abs=1e-12)

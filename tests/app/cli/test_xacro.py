@@ -40,7 +40,7 @@ def file(tmp_path: Path) -> Path:
 
 def test_xacro_becomes_a_robot_file(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["import", str(file), "--arg", "length:=0.7"]) == 0
-    robot = kin.parse_robot(capsys.readouterr().out)
+    robot = kin.load_robot(capsys.readouterr().out)
     assert robot.reach == pytest.approx(0.7)
     assert main(["check", str(file)]) == 0
     assert "reach       400.000 mm" in capsys.readouterr().out

@@ -93,7 +93,7 @@ def test_the_arm_of_a_recording_is_shown_with_it(page):
 
 @pytest.mark.full
 def test_an_arm_that_the_service_does_not_have_becomes_the_visitors_own(page):
-    own = kin.parse_robot(kin.robot_to_toml(ARM).replace("0.425", "0.525"), "longer.toml")
+    own = kin.files.parse_robot(kin.robot_to_toml(ARM).replace("0.425", "0.525"), "longer.toml")
     assert own != ARM
     opened(page, "longer.mcap", to_mcap(recording(own)))
     press(page, "Play recording")

@@ -48,7 +48,7 @@ def test_an_arm_that_cannot_be_emitted_is_refused_with_why(robot_id):
 
 def test_a_table_that_is_near_a_family_is_refused_and_never_emitted_as_that():
     text = kin.robot_to_toml("puma560").replace("90", "89.999").replace('id = "', 'id = "typed-')
-    robot = kin.parse_robot(text)
+    robot = kin.load_robot(text)
     with pytest.raises(kin.InputError, match=r"exact numbers.*pi/2"):
         kin.generate(robot)
 

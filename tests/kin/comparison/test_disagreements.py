@@ -32,7 +32,7 @@ def published(name: str) -> Robot:
     parts = [f'<robot name="{name}"><link name="0"/>']
     for i, joint in enumerate(about["joints"]):
         parts.append(f'<link name="{i + 1}"/>{_joint(joint, i)}')
-    return kin.load_urdf("".join([*parts, "</robot>"]))
+    return kin.load_robot("".join([*parts, "</robot>"]))
 
 
 def _joint(joint: dict[str, Any], i: int) -> str:
@@ -85,7 +85,7 @@ def test_a_printed_table_has_the_poses_that_its_source_has():
 @pytest.mark.parametrize("frames", ["fixed", "free"])
 def test_the_ur5_of_ros_counts_joint_1_from_behind(frames):
     """The base of the URDF is turned by half a turn against the maker's table; nothing is wrong in either."""
-    maker, ros = kin.get_robot("ur5"), kin.load_urdf(URDF / "ur5.urdf", base="base_link", tip="tool0")
+    maker, ros = kin.get_robot("ur5"), kin.load_robot(URDF / "ur5.urdf", base="base_link", tip="tool0")
     found = kin.compare(maker, ros, frames=frames)
     assert messages.verdict(found, maker, ros) == "The same arm: joint 1 counts from 180.0°."
     assert found.position < 1e-9
@@ -131,7 +131,7 @@ def test_d4_of_the_ur10e_in_an_older_xacro():
 
 def test_the_older_xacro_of_the_ur10e_itself_is_the_arm_within_2_mm():
     """Its URDF has what the table lacks: offsets of shoulder and elbow, 176 and −137 mm, beside d4."""
-    maker, ros = kin.get_robot("ur10e"), kin.load_urdf(URDF / "ur10e-xacro.urdf", tip="tool0")
+    maker, ros = kin.get_robot("ur10e"), kin.load_robot(URDF / "ur10e-xacro.urdf", tip="tool0")
     found = kin.compare(maker, ros, tolerance=(2e-3, 1e-3), explain=False)
     assert found.verdict == "close"
     assert 1e-3 < found.position < 2e-3
@@ -140,7 +140,7 @@ def test_the_older_xacro_of_the_ur10e_itself_is_the_arm_within_2_mm():
 
 
 def test_the_panda_of_ros_is_the_makers_table():
-    maker, ros = kin.get_robot("panda"), kin.load_urdf(URDF / "panda.urdf", tip="panda_link8")
+    maker, ros = kin.get_robot("panda"), kin.load_robot(URDF / "panda.urdf", tip="panda_link8")
     assert said(maker, ros)[0] == "Identical: equal joint values give equal poses."
 
 

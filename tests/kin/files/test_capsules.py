@@ -13,7 +13,7 @@ WITH = [robot for robot in kin.classic_robots().values() if robot.capsules]
 @pytest.mark.parametrize("robot", WITH, ids=lambda robot: robot.id)
 def test_capsules_survive_a_round_trip(robot):
     for length in ("m", "mm"):
-        again = kin.parse_robot(kin.robot_to_toml(robot, length=length))
+        again = kin.load_robot(kin.robot_to_toml(robot, length=length))
         assert again.capsules == robot.capsules
         assert again.capsules_source == robot.capsules_source
 

@@ -29,13 +29,13 @@ def test_the_default_home_of_every_arm_is_not_singular(robot_id):
 
 def test_the_middle_of_the_limits_is_preferred():
     text = HEAD + "[[rows]]\na = 1\nlimits = [0, 90]\n[[rows]]\na = 1\nlimits = [30, 150]\n"
-    assert kin.parse_robot(text).home == pytest.approx((math.pi / 4, math.pi / 2))
+    assert kin.load_robot(text).home == pytest.approx((math.pi / 4, math.pi / 2))
 
 
 def test_a_stretched_arm_is_bent_upward():
     """Two links in a vertical plane: collinear at zero; the highest bent pose is chosen."""
     text = HEAD + "[[rows]]\nalpha = 90\n[[rows]]\na = 1\n[[rows]]\na = 1\n"
-    robot = kin.parse_robot(text)
+    robot = kin.load_robot(text)
     assert robot.home == pytest.approx((0.0, 0.0, math.pi / 4))
     assert kin.fk(robot, robot.home)[2, 3] > 0.5
     assert all(joint.limits == (-math.pi, math.pi) for joint in robot.joints)
@@ -43,12 +43,12 @@ def test_a_stretched_arm_is_bent_upward():
 
 def test_prismatic_joints_start_in_the_middle():
     text = HEAD + '[[rows]]\nkind = "prismatic"\nalpha = 90\n[[rows]]\nkind = "prismatic"\nlimits = [1, 2]\n'
-    assert kin.parse_robot(text).home == (0.5, 1.5)
+    assert kin.load_robot(text).home == (0.5, 1.5)
 
 
 def test_an_explicit_home_is_used():
     text = HEAD + "[[rows]]\na = 1\n[[rows]]\na = 1\n[home]\nq = [0, 0]\n"
-    assert kin.parse_robot(text).home == (0.0, 0.0)
+    assert kin.load_robot(text).home == (0.0, 0.0)
 
 
 rows = st.lists(

@@ -133,7 +133,7 @@ def test_mounting_and_floor_are_written_and_read_back(mounting, floor, turn):
     mujoco.mj_kinematics(model, data)
     assert [data.geom_xpos[i].tolist() for i in planes] == ([] if floor is None else [[0.0, 0.0, floor]])
     for written in (text, kin.robot_to_urdf(robot)):
-        back = kin.load_urdf(written)
+        back = kin.load_robot(written)
         assert (back.mounting, back.floor) == (mounting, floor)
         q = robot.random_q(np.random.default_rng(1), 50)
         assert kin.fk(back, q) == pytest.approx(kin.fk(robot, q), abs=1e-11)
@@ -189,13 +189,13 @@ def test_a_urdf_with_a_mounting_is_loaded_by_mujoco():
 def test_what_is_no_mounting_is_refused_by_name(attributes, field):
     text = kin.robot_to_urdf(replace(UR5, mounting="floor")).replace('mounting="floor"', attributes)
     with pytest.raises(RobotFileError) as error:
-        kin.load_urdf(text)
+        kin.load_robot(text)
     assert error.value.field == field
 
 
 def test_what_an_inner_link_stands_on_is_not_what_the_world_holds():
     robot = replace(UR5, mounting="ceiling", floor=-2.0, base=np.diag([1.0, -1.0, -1.0, 1.0]))
-    inner = kin.load_urdf(kin.robot_to_urdf(robot), base="base")
+    inner = kin.load_robot(kin.robot_to_urdf(robot), base="base")
     assert (inner.mounting, inner.floor) == ("floor", 0.0)
 
 
@@ -274,7 +274,7 @@ def test_what_is_read_moves_as_in_mujoco(compiler):
 def test_radians_are_read_as_such():
     text = RICH.format(compiler='angle="radian"').replace("-100 120", "-2 2").replace('ref="25"', 'ref="0.4"')
     text = text.replace("1 2 3 40", "1 2 3 0.7").replace("10 20 30", "0.1 0.2 0.3")
-    robot = kin.load_urdf(text)
+    robot = kin.load_robot(text)
     assert robot.joints[0].limits == (-2.0, 2.0)
     assert_moves_alike(robot, text, "tcp")
 
@@ -282,7 +282,7 @@ def test_radians_are_read_as_such():
 @pytest.mark.full
 def test_capsules_of_mjcf_are_those_of_the_arm():
     arm = kin.get_robot("ur5")
-    back = kin.load_urdf(kin.robot_to_mjcf(arm))
+    back = kin.load_robot(kin.robot_to_mjcf(arm))
     q = arm.random_q(np.random.default_rng(9), 40)
     assert kin.clearance(back, q) == pytest.approx(kin.clearance(arm, q), abs=0.02)
 
@@ -312,18 +312,18 @@ def test_what_is_no_serial_arm_is_refused_with_its_place(old, new, field):
     text = RICH.format(compiler='angle="degree"')
     assert old in text
     with pytest.raises(RobotFileError) as caught:
-        kin.load_urdf(text.replace(old, new, 1))
+        kin.load_robot(text.replace(old, new, 1))
     assert caught.value.field == field
 
 
 def test_a_cup_on_the_table_is_no_end_of_the_arm_but_a_camera_on_a_pole_is():
     text = RICH.format(compiler='angle="degree"')
     cup = text.replace("</worldbody>", '<body name="cup"><freejoint/></body></worldbody>')
-    assert kin.load_urdf(cup) == kin.load_urdf(text)
+    assert kin.load_robot(cup) == kin.load_robot(text)
     pole = text.replace("</worldbody>", '<body name="pole"><joint/></body></worldbody>')
     with pytest.raises(RobotFileError, match=r"tip: got .*tcp \(4 joints\), pole \(1 joint\)"):
-        kin.load_urdf(pole)
-    assert kin.load_urdf(pole, tip="tcp").n == 4
+        kin.load_robot(pole)
+    assert kin.load_robot(pole, tip="tcp").n == 4
 
 
 def test_a_slide_may_be_unlimited():
@@ -336,10 +336,10 @@ def test_a_slide_may_be_unlimited():
 def test_deep_and_large_files_are_bounded():
     deep = "<mujoco><worldbody>" + "<body>" * 200 + "</body>" * 200 + "</worldbody></mujoco>"
     with pytest.raises(RobotFileError, match="nested"):
-        kin.load_urdf(deep)
+        kin.load_robot(deep)
     many = "<mujoco><worldbody>" + "<body><joint/></body>" * 6000 + "</worldbody></mujoco>"
     with pytest.raises(RobotFileError, match="at most 5000 links"):
-        kin.load_urdf(many)
+        kin.load_robot(many)
 
 
 @pytest.mark.parametrize(
@@ -356,14 +356,14 @@ def test_what_is_not_read_of_the_arm_is_named(old, new, words):
     assert old in text
     robot, report = kin.read_urdf(text.replace(old, new, 1))
     assert sum(words in note for note in report.notes) == 1
-    assert np.allclose(kin.fk(robot, robot.q_home), kin.fk(kin.load_urdf(text), robot.q_home), atol=1e-12)
+    assert np.allclose(kin.fk(robot, robot.q_home), kin.fk(kin.load_robot(text), robot.q_home), atol=1e-12)
 
 
 def test_a_range_of_zeros_is_none_and_an_unlimited_force_is_unknown():
     text = RICH.format(compiler='angle="degree"').replace(
         'name="roll" range="-3 3"', 'name="roll" range="0 0" actuatorfrcrange="-5 5" actuatorfrclimited="false"'
     )
-    joint = next(each for each in kin.load_urdf(text).joints if each.name == "roll")
+    joint = next(each for each in kin.load_robot(text).joints if each.name == "roll")
     assert (joint.limits, joint.effort) == (None, None)
 
 
@@ -375,7 +375,7 @@ def test_a_site_from_a_point_to_another_is_where_mujoco_has_it():
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    T = kin.fk(kin.load_urdf(text, tip="s"), [0.0])
+    T = kin.fk(kin.load_robot(text, tip="s"), [0.0])
     assert np.allclose(T[:3, 3], data.site_xpos[0], atol=1e-12)
     assert np.allclose(T[:3, :3], data.site_xmat[0].reshape(3, 3), atol=1e-12)
 
@@ -434,8 +434,8 @@ def test_which_ranges_count_and_which_are_refused_is_mujocos_choice(limited, val
         with pytest.raises(ValueError, match=r"range\[0\] should be smaller than range\[1\]"):
             mujoco.MjModel.from_xml_string(text)
         with pytest.raises(kin.RobotFileError, match="range"):
-            kin.load_urdf(text)
+            kin.load_robot(text)
         return
     model = mujoco.MjModel.from_xml_string(text)
     limits = tuple(model.jnt_range[0].tolist()) if model.jnt_limited[0] else None
-    assert kin.load_urdf(text).joints[0].limits == limits
+    assert kin.load_robot(text).joints[0].limits == limits

@@ -45,7 +45,7 @@ def test_expressions_are_read_as_everywhere_else(key, text, value):
 def test_a_file_with_expressions_is_the_arm_of_their_values():
     robot = kin.load_robot(FILES / "pi.toml")
     assert robot.rows[0].alpha == -math.pi / 2
-    assert kin.parse_robot("\ufeff" + (FILES / "pi.toml").read_text(encoding="utf-8")) == robot
+    assert kin.load_robot("\ufeff" + (FILES / "pi.toml").read_text(encoding="utf-8")) == robot
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,7 @@ def test_an_import_with_capsules_survives_a_round_trip(name):
         again = kin.robot_from_dict(kin.robot_to_dict(robot, length=length))
         assert again.capsules == robot.capsules
         assert again.capsules_source == robot.capsules_source
-    assert kin.parse_robot(kin.robot_to_toml(robot)) == robot
+    assert kin.load_robot(kin.robot_to_toml(robot)) == robot
 
 
 @pytest.mark.full
@@ -127,7 +127,7 @@ def test_a_mesh_that_is_not_at_hand_is_a_tube_and_the_words_say_so():
         assert words in report.about_bodies
     text = kin.robot_to_toml(robot)
     assert "assumed = true" in text
-    assert kin.parse_robot(text).capsules == robot.capsules
+    assert kin.load_robot(text).capsules == robot.capsules
 
 
 def test_a_mesh_that_can_be_read_is_fitted_with_its_scale():
@@ -208,7 +208,7 @@ def test_capsules_are_fitted_when_something_asks_for_them(monkeypatch):
     assert kin.solve_ik(robot, T, task="position").status == "solved"
     assert robot.with_tool(np.eye(4)).capsules
     assert "for every link" in report.about_bodies
-    assert kin.load_urdf(LINKS.format(upper=BOX, fore=BOX), tip="hand") is not robot
+    assert kin.load_robot(LINKS.format(upper=BOX, fore=BOX), tip="hand") is not robot
     assert asked == []
     assert [body.capsules > 0 for body in report.bodies] == [True, True, True]
     assert len(asked) == 4, "each URDF link with bodies once"

@@ -363,7 +363,7 @@ def test_files_in_other_encodings_are_mended_as_utf_8(tmp_path, encoding):
     assert 'encoding="utf-8"' in found.mended
     saved = tmp_path / "mended.urdf"
     saved.write_text(found.mended, encoding="utf-8")
-    assert kin.load_urdf(saved, **HAND).rows == found.mended_arm.robot.rows
+    assert kin.load_robot(saved, **HAND).rows == found.mended_arm.robot.rows
 
 
 def test_what_is_no_file_is_refused(tmp_path):

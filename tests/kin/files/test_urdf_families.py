@@ -46,7 +46,7 @@ def arms(paths: list[Path]) -> tuple[dict[str, Robot], Counter[str]]:
             if not 1 <= tip.joints <= MOST_JOINTS:
                 continue
             try:
-                robot = kin.load_urdf(path, tip=tip.link)
+                robot = kin.load_robot(path, tip=tip.link)
             except RobotFileError:
                 refused["tips"] += 1
                 continue

@@ -201,7 +201,7 @@ def test_acceleration_and_jerk_are_kept():
     robot, report = kin.read_urdf(OK.replace('velocity="1"/>', limit, 1))
     assert (robot.joints[0].acceleration, robot.joints[0].jerk) == (2.0, 5.0)
     assert report.notes == ("Joint j1 has acceleration 2 and deceleration 3: the smaller counts.",)
-    again = kin.load_urdf(kin.robot_to_urdf(robot))
+    again = kin.load_robot(kin.robot_to_urdf(robot))
     assert [(j.acceleration, j.jerk) for j in again.joints] == [(j.acceleration, j.jerk) for j in robot.joints]
     limits = kin.motion_limits(robot)
     assert (limits.acceleration[0], limits.jerk[0]) == (2.0, 5.0)

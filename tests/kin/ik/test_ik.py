@@ -458,7 +458,7 @@ def test_an_arm_with_base_other_lengths_and_twist_signs_has_the_closed_form():
       { name = "7", d = 8, limits = [-175, 175] },
     ]
     """
-    robot = kin.parse_robot(text)
+    robot = kin.load_robot(text)
     rng = np.random.default_rng(1)
     for q, seed in zip(robot.random_q(rng, 500), robot.random_q(rng, 500), strict=True):
         target = kin.fk(robot, q)
@@ -484,7 +484,7 @@ def test_an_arm_without_a_closed_form_is_solved_numerically():
       { name = "7", a = 0.1, alpha = 40 },
     ]
     """
-    robot = kin.parse_robot(text)
+    robot = kin.load_robot(text)
     for q in robot.random_q(np.random.default_rng(2), 40):
         target = kin.fk(robot, q)
         result = solve_ik(robot, target)

@@ -456,7 +456,7 @@ def test_every_blocked_branch_reports_its_violations(robot_id):
 
 def test_the_hole_around_the_first_axis_is_named():
     """A two-link arm on a rotating base that cannot fold back leaves a hole around axis 1."""
-    robot = kin.parse_robot(
+    robot = kin.load_robot(
         """
         id = "hole"
         name = "hole"

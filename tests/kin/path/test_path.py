@@ -641,7 +641,7 @@ def test_an_arm_with_a_slide_that_fits_no_family():
       { name = "6", d = 0.1, alpha = 95 },
     ]
     """
-    robot = kin.parse_robot(text)
+    robot = kin.load_robot(text)
     base = np.array([0.3, -0.4, 0.2, 0.5, 0.7, 0.1])
     shift = np.array([0.8, 0.7, 0.15, -0.6, 0.5, 2.5])
     path = base + np.linspace(0, 1, 31)[:, None] * shift

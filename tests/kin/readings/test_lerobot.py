@@ -44,7 +44,7 @@ def test_a_calibration_comes_in_and_goes_out_as_it_was():
     assert [motor.name for motor in motors] == list(NAMES)
     robot = replace(SO101, motors=motors)
     assert kin.motors_to_lerobot(robot) == FILE
-    assert kin.motors_to_lerobot(kin.parse_robot(kin.robot_to_toml(robot))) == FILE
+    assert kin.motors_to_lerobot(kin.load_robot(kin.robot_to_toml(robot))) == FILE
     assert kin.motors_from_lerobot(SO101, FILE) == motors, "what the file says, too"
 
 

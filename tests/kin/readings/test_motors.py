@@ -48,14 +48,14 @@ def text_with(extra: str) -> str:
 
 
 def test_a_file_states_motors_and_is_written_as_it_was_read():
-    robot = kin.parse_robot(text_with(FILE))
+    robot = kin.load_robot(text_with(FILE))
     pan, elbow, gripper = robot.motors
     assert pan == Motor(
         "shoulder pan", 1, "shoulder_pan", sign=-1, offset=91.4, range=(740, 3331), homing_offset=-1203
     )
     assert elbow == Motor("elbow flex", 3, "elbow flex", 1, 512.0, "ticks", 1024)
     assert (gripper.joint, gripper.name, gripper.drive_mode, gripper.range) == ("", "gripper", 1, (2013, 3500))
-    assert kin.parse_robot(kin.robot_to_toml(robot)) == robot
+    assert kin.load_robot(kin.robot_to_toml(robot)) == robot
     assert kin.robot_from_dict(json.loads(json.dumps(kin.robot_to_dict(robot)))) == robot
     assert "motors" not in kin.robot_to_dict(UR5), "arms without motors are written as before"
 
@@ -63,7 +63,7 @@ def test_a_file_states_motors_and_is_written_as_it_was_read():
 def test_the_motor_of_a_slide_states_how_far_a_turn_moves_it():
     name = PRR.joints[0].name
     robot = replace(PRR, motors=[Motor(name, 7, offset=-10.0, lead=0.008)])
-    assert kin.parse_robot(kin.robot_to_toml(robot, "mm")) == replace(robot, units="mm")
+    assert kin.load_robot(kin.robot_to_toml(robot, "mm")) == replace(robot, units="mm")
     assert kin.robot_to_dict(robot, "mm")["motors"][0]["lead"] == 8
     assert kin.readings_from_q(robot, PRR.q_home)[0] == pytest.approx(-10.0 + 360.0 * PRR.q_home[0] / 0.008)
 
@@ -96,7 +96,7 @@ def test_the_motor_of_a_slide_states_how_far_a_turn_moves_it():
 def test_errors_of_a_file_name_the_field_and_what_is_valid(old: str, new: str, field: str, words: str):
     assert old in FILE
     with pytest.raises(RobotFileError) as caught:
-        kin.parse_robot(text_with(FILE.replace(old, new, 1)))
+        kin.load_robot(text_with(FILE.replace(old, new, 1)))
     assert caught.value.field == field
     assert words in str(caught.value)
 

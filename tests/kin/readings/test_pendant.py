@@ -39,7 +39,7 @@ limits = [0, 100]
 
 
 def test_a_file_states_a_linear_map_of_the_joint_values(tmp_path):
-    robot = kin.parse_robot(FLIP)
+    robot = kin.load_robot(FLIP)
     shown = kin.to_pendant(robot, [0.2, 0.4, 0.03])
     assert shown == pytest.approx([-0.2, 0.2 - 0.2 + np.pi / 2, 0.07], abs=1e-15)
     assert kin.from_pendant(robot, shown) == pytest.approx([0.2, 0.4, 0.03], abs=1e-15)
@@ -89,12 +89,12 @@ def test_fanucs_j3_counts_from_the_horizontal(name):
 def test_what_is_wrong_is_named(old, new, field, valid):
     assert old in FLIP
     with pytest.raises(RobotFileError, match=valid) as caught:
-        kin.parse_robot(FLIP.replace(old, new))
+        kin.load_robot(FLIP.replace(old, new))
     assert caught.value.field == field
 
 
 def test_in_python_it_is_checked_too_and_an_arm_made_of_another_may_keep_it():
-    robot = kin.parse_robot(FLIP)
+    robot = kin.load_robot(FLIP)
     with pytest.raises(InputError, match="pairs of a name and a number"):
         Shown("elbow", (("elbow",),))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="each joint once"):
@@ -109,7 +109,7 @@ def test_in_python_it_is_checked_too_and_an_arm_made_of_another_may_keep_it():
 
 
 def test_a_program_may_have_joint_values_as_on_the_pendant():
-    robot = kin.parse_robot(FLIP)
+    robot = kin.load_robot(FLIP)
     text = """
 units = { length = "mm", angle = "deg" }
 pendant = true

@@ -232,7 +232,7 @@ def test_an_arm_with_a_base_transform_belongs_to_the_family():
       { name = "tool", kind = "fixed", d = 80 },
     ]
     """
-    robot = kin.parse_robot(text)
+    robot = kin.load_robot(text)
     # The rows are the same; which of them is in front depends on where the arm faces at θ1 = 0.
     assert set(kin.branch_names(robot)) == set(kin.branch_names(ROBOT))
     rng = np.random.default_rng(15)

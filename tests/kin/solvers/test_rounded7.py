@@ -44,7 +44,7 @@ def urdf(name, quarter, origins, limits):
         f'<limit lower="{low}" upper="{high}" effort="1" velocity="1"/></joint>'
         for i, ((xyz, roll), (low, high)) in enumerate(zip(origins, limits, strict=True))
     )
-    robot = kin.load_urdf(f'<robot name="{name}"><link name="l0"/>{joints}</robot>')
+    robot = kin.load_robot(f'<robot name="{name}"><link name="l0"/>{joints}</robot>')
     return replace(robot, id=f"{name} {quarter}")
 
 

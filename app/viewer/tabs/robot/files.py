@@ -12,6 +12,7 @@ from app.shared.memory.answers import Reservation
 from app.viewer.meshes.archive import MOST_OF_URDF, Archive, MeshError
 from app.viewer.own_arm import OwnArm, own_arm
 from kin import InputError, Robot, RobotFileError
+from kin.files.read import parse_robot
 from kin.files.urdf.collisions import Fitted, LinkPieces, collisions_of, said, with_bodies
 from kin.files.urdf.tree import Tip, read_tree
 from kin.units import general
@@ -100,7 +101,7 @@ def arm_of(name: str, text: str, tip: str | None = None, reading: bool = False) 
         kin.KinematicsError: naming the field, the value and what would be valid.
     """
     if not is_urdf(text):
-        robot = kin.parse_robot(text, name)
+        robot = parse_robot(text, name)
         return own_arm(kin.robot_to_dict(robot)), robot.description
     robot, report = kin.read_urdf(text, tip=tip, file=name)
     words = [f"From link {report.base} to {report.tip}.", *report.notes]

@@ -145,7 +145,7 @@ rows = [
   { name = "c", a = 1, limits = [-90, 90] },
 ]
 """
-    assert "θ₁ − θ₂ matters" in steps.verdict(kin.parse_robot(text), DEFAULT_UNITS)[0]
+    assert "θ₁ − θ₂ matters" in steps.verdict(kin.load_robot(text), DEFAULT_UNITS)[0]
 
 
 # The page

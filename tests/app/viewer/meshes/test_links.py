@@ -70,7 +70,7 @@ def reader():
 
 @pytest.fixture(scope="module")
 def two(reader: MeshReader) -> tuple[Robot, Drawing, Meshes]:
-    robot = kin.load_urdf(TWO_JOINTS)
+    robot = kin.load_robot(TWO_JOINTS)
     meshes = read_two(reader, robot)
     return robot, drawing_of(meshes.links), meshes
 
@@ -109,7 +109,7 @@ def test_colours_are_those_of_the_mesh_or_else_of_the_urdf(two: tuple[Robot, Dra
 @pytest.mark.full
 def test_a_mesh_in_millimetres_is_refused_with_the_remedy(reader: MeshReader) -> None:
     with pytest.raises(MeshError) as caught:
-        read_two(reader, kin.load_urdf(TWO_JOINTS), TWO_JOINTS.replace('scale="0.001 0.001 0.001"', ""))
+        read_two(reader, kin.load_robot(TWO_JOINTS), TWO_JOINTS.replace('scale="0.001 0.001 0.001"', ""))
     assert "upper.stl: size" in caught.value.field
     assert "0.001 0.001 0.001" in caught.value.expected
 
@@ -263,7 +263,7 @@ URDFS = {
 def test_a_detailed_body_is_where_the_urdf_of_its_package_has_it(name: str) -> None:
     package, path, tip, turned = URDFS[name]
     text = Path(str(metadata.distribution(package).locate_file(path))).read_text(encoding="utf-8")
-    robot, urdf = kin.get_robot(name), kin.load_urdf(text, tip=tip)
+    robot, urdf = kin.get_robot(name), kin.load_robot(text, tip=tip)
     source = detailed(robot)
     assert source is not None
     c, s = math.cos(turned), math.sin(turned)

@@ -196,7 +196,7 @@ def test_every_number_of_an_answered_capsule_becomes_a_float() -> None:
     assert fitted.capsules == [Segment((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.1)]
 
 
-TWO, URDF = kin.load_urdf(TWO_JOINTS), "two/urdf/two.urdf"
+TWO, URDF = kin.load_robot(TWO_JOINTS), "two/urdf/two.urdf"
 SHAPES = shapes_of(TWO, read_visuals(TWO_JOINTS))
 
 

@@ -128,7 +128,7 @@ HAND = """<robot name="picker">
 
 
 def test_fingers_of_a_urdf_are_beside_the_arm_and_have_the_range_of_the_one_that_leads() -> None:
-    robot, visuals = kin.load_urdf(HAND, tip="tool"), read_visuals(HAND, "tool")
+    robot, visuals = kin.load_robot(HAND, tip="tool"), read_visuals(HAND, "tool")
     assert robot.n == 1
     drawn = drawing_without_meshes(shapes_of(robot, visuals), fingers_of(robot, visuals))
     assert [len(parts) for parts in drawn.parts] == [1, 1]
@@ -161,7 +161,7 @@ def test_fingers_of_a_urdf_are_beside_the_arm_and_have_the_range_of_the_one_that
 )
 def test_fingers_without_a_range_of_their_own_stay_as_they_are_drawn(old: str, new: str, moving: int) -> None:
     text = HAND.replace(old, new)
-    robot, visuals = kin.load_urdf(text, tip="tool"), read_visuals(text, "tool")
+    robot, visuals = kin.load_robot(text, tip="tool"), read_visuals(text, "tool")
     drawn = drawing_without_meshes(shapes_of(robot, visuals), fingers_of(robot, visuals))
     assert len(drawn.fingers) == moving
     bodies = [part for parts in (*drawn.parts, *(each.parts for each in drawn.fingers)) for part in parts]
@@ -175,13 +175,13 @@ def test_a_finger_of_several_joints_moves_as_its_joints_do() -> None:
     mimic = '<mimic joint="finger" multiplier="-5" offset="0.1"/>'
     turning = f'name="tip" type="revolute"><axis xyz="1 0 0"/>{limit}{mimic}'
     text = HAND.replace('name="tip" type="fixed">', turning)
-    robot, visuals = kin.load_urdf(text, tip="tool"), read_visuals(text, "tool")
+    robot, visuals = kin.load_robot(text, tip="tool"), read_visuals(text, "tool")
     drawn = drawing_without_meshes(shapes_of(robot, visuals), fingers_of(robot, visuals))
     (nail,) = [finger for finger in drawn.fingers if finger.on is not None]
     assert len(drawn.fingers) == 3
     points = nail.parts[0].mesh.vertices
     drawn_at = [*(0.5 * (points.min(axis=0) + points.max(axis=0))), 1.0]
-    whole = kin.load_urdf(text, tip="nail")
+    whole = kin.load_robot(text, tip="nail")
     craig = kin.convert_dh(robot, "modified")
     moved = carried_over(drawn, robot, craig)
     assert moved is not None

@@ -34,7 +34,7 @@ def robot_of(convention: str, *rows: tuple[object, ...], extra: str = "") -> kin
     """A robot from rows of (name, kind, theta, d, a, alpha), in metres and degrees."""
     head = f'id = "test"\nname = "Test"\nsource = "made up"\nconvention = "{convention}"\n'
     units = 'units = { length = "m", angle = "deg" }\n'
-    return kin.parse_robot(head + units + extra + "".join(ROW.format(*row) for row in rows))
+    return kin.load_robot(head + units + extra + "".join(ROW.format(*row) for row in rows))
 
 
 BASE = "[base]\nxyz = [0.3, -0.2, 0.5]\nrpy = [90, 0, 30]\n"

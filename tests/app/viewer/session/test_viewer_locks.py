@@ -125,7 +125,7 @@ def test_what_each_arm_can_follow() -> None:
 
 
 def test_a_flat_arm_is_offered_its_plane() -> None:
-    flat = kin.parse_robot(
+    flat = kin.load_robot(
         'id = "flat"\nname = "Flat"\nsource = "test"\nconvention = "standard"\n'
         'units = { length = "m", angle = "deg" }\n'
         + "".join(f'[[rows]]\nname = "hinge {i}"\na = 0.3\n' for i in range(3))

@@ -163,4 +163,4 @@ def test_without_a_report_there_is_nothing_to_open() -> None:
     doctor.look(Source("ur5.toml", kin.robot_to_toml("ur5")))
     assert doctor.found is None
     doctor.look(Source("two.urdf", LONG))
-    assert np.allclose(kin.fk(kin.load_urdf(doctor.mended.text), [0.3, 0.2]), kin.fk(TWO, [0.3, 0.2]))
+    assert np.allclose(kin.fk(kin.load_robot(doctor.mended.text), [0.3, 0.2]), kin.fk(TWO, [0.3, 0.2]))

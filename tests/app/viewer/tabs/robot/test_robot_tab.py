@@ -324,7 +324,7 @@ def test_files_go_out_and_come_in(port: int) -> None:
         say(tab, "download", value="toml")
         tab.wait(lambda: any(m["type"] == "FileTransferPart" for m in tab.log))
         content = b"".join(bytes(m["content"]) for m in tab.log if m["type"] == "FileTransferPart").decode()
-        robot = kin.parse_robot(content)
+        robot = kin.load_robot(content)
         assert robot.rows[1].a == 0.25
         assert robot.id == "pioneer-arm-variant"
         text = kin.robot_to_toml(UR5)
@@ -435,7 +435,7 @@ def test_a_urdf_comes_in_with_the_tip_that_is_chosen(port: int) -> None:
         '<link name="camera"/><joint name="mount" type="revolute"><parent link="link_2"/><child link="camera"/>'
         '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
     )
-    there = kin.load_urdf(text)
+    there = kin.load_robot(text)
     with FakeBrowser(port) as tab:
         tab.settle()
         tab.open_file("robot", "ur5.urdf", text)
@@ -460,7 +460,7 @@ def test_a_urdf_comes_in_with_the_tip_that_is_chosen(port: int) -> None:
         say(tab, "download", value="urdf")
         tab.wait(lambda: any(m["type"] == "FileTransferPart" for m in tab.log))
         content = b"".join(bytes(m["content"]) for m in tab.log if m["type"] == "FileTransferPart").decode()
-        assert np.abs(kin.fk(kin.load_urdf(content), UR5.q_home) - kin.fk(UR5, UR5.q_home)).max() < 1e-12
+        assert np.abs(kin.fk(kin.load_robot(content), UR5.q_home) - kin.fk(UR5, UR5.q_home)).max() < 1e-12
 
 
 def test_a_target_out_of_reach_waits_for_a_longer_arm(port: int) -> None:

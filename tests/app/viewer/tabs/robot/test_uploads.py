@@ -24,7 +24,7 @@ from app.viewer.session.state import decode
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
-TWO = kin.load_urdf(TWO_JOINTS)
+TWO = kin.load_robot(TWO_JOINTS)
 
 
 def send(tab: FakeBrowser, name: str, data: bytes) -> None:
