@@ -24,14 +24,12 @@ from kin.comparison import Comparison, compare
 from kin.dh import Screws, convert_dh, exp_screw, robot_from_screws, screws
 from kin.differential.task import Task
 from kin.errors import InputError, KinematicsError, RobotFileError, UnknownRobotError
+from kin.doctor import UrdfExamination, UrdfFinding, examine_urdf
 from kin.files import (
-    UrdfExamination,
-    UrdfFinding,
     UrdfReport,
     UrdfRobot,
     builtin_robots,
     classic_robots,
-    examine_urdf,
     get_robot,
     load_robot,
     load_robots,
@@ -81,7 +79,7 @@ from kin.poses import (
     pose_to_text,
     rotation_from_wxyz,
 )
-from kin.readings import (
+from kin.motors import (
     MotorFinding,
     MotorMatch,
     from_pendant,

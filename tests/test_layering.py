@@ -40,8 +40,9 @@ RULES: dict[str, set[str]] = {
         *("numpy", "kin.collision", "kin.dh", "kin.files", "kin.fitting", "kin.frames", "kin.later", "kin.typed"),
         *MODEL,
     },
+    "kin/doctor": {"numpy", "kin.doctor", "kin.files", "kin.typed", *MODEL},
     "kin/fitting": {"numpy", "kin.fitting", "kin.joint", "kin.robot", "kin.transforms"},
-    "kin/readings": {"numpy", "kin.collision", "kin.readings", *MODEL},
+    "kin/motors": {"numpy", "kin.collision", "kin.readings", *MODEL},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
     "kin/ik": {"numpy", "kin.collision", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},
     "kin/collision": {"numpy", "kin.fitting", "kin.frames", "kin.kernels", "kin.collision", *MODEL},
@@ -188,6 +189,9 @@ MODULES = sorted(
 )
 
 
+NEIGHBOURS = ("kin.comparison", "kin.doctor", "kin.motors")
+
+
 def imports(source: str) -> set[str]:
     """Every module a source imports, at the top or inside a function, as dotted names."""
     found: set[str] = set()
@@ -219,6 +223,20 @@ def breaches(module: str, source: str) -> set[str]:
 @pytest.mark.parametrize("module", MODULES)
 def test_a_module_imports_only_what_its_layer_may(module):
     assert not breaches(module, (ROOT / module).read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        each
+        for each in MODULES
+        if each.startswith("kin/") and each != "kin/__init__.py" and not each.replace("/", ".").startswith(NEIGHBOURS)
+    ],
+)
+def test_nothing_in_the_core_imports_its_neighbours(module):
+    """Comparing arms, readings of motors and the doctor of URDFs are made of the core, and no part of it."""
+    found = imports((ROOT / module).read_text(encoding="utf-8"))
+    assert not {name for name in found if name.startswith(NEIGHBOURS)}
 
 
 @pytest.mark.parametrize("row", RULES)

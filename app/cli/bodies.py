@@ -19,7 +19,7 @@ from app.viewer.meshes.placing import Shapes
 from app.viewer.meshes.reader import MeshReader
 from kin import RobotFileError
 from kin.files.urdf.collisions import Fitted, LinkPieces, Piece, without_meshes
-from kin.files.urdf.doctor.meshes import extent_of
+from kin.doctor.meshes import extent_of
 from kin.files.urdf.visuals import MeshFile
 from kin.transforms import Array
 

@@ -10,7 +10,7 @@ from app.cli.files import source_of, write_file
 from app.cli.terminal import print_json
 from app.shared.answers.examination import TITLES, examination_answer, outcome
 from kin import InputError, UrdfExamination, examine_urdf
-from kin.files.urdf.doctor.findings import RANKS
+from kin.doctor.findings import RANKS
 
 
 def run(arguments: Namespace) -> int:

@@ -27,7 +27,7 @@ from kin import InputError, Robot, fk, to_pendant
 from kin.axes import inverse
 from kin.frames import TOOL, WORLD
 from kin.poses import form_named
-from kin.readings.pendant import shown_limits
+from kin.motors.pendant import shown_limits
 from kin.transforms import Array
 
 

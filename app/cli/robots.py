@@ -30,7 +30,7 @@ from app.shared.finding import find_robots
 from kin import Comparison, InputError, Robot, compare, match_motors, motor_poses, robot_to_toml
 from kin.comparison import messages
 from kin.files.numbers import LARGEST, number_of
-from kin.readings.joints import moving_motors
+from kin.motors.joints import moving_motors
 from kin.transforms import Array
 from kin.units import Units
 

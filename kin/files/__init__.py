@@ -38,20 +38,15 @@ from kin.files.builtin import builtin_robots, classic_robots, get_robot
 from kin.files.mjcf.write import robot_to_mjcf
 from kin.files.load import load_robot
 from kin.files.read import load_robots, parse_robot, robot_from_dict
-from kin.files.urdf.doctor.examine import examine_urdf
-from kin.files.urdf.doctor.findings import UrdfExamination, UrdfFinding
 from kin.files.urdf.read import UrdfReport, UrdfRobot, read_urdf, urdf_tips
 from kin.files.urdf.write import robot_to_urdf
 from kin.files.write import robot_to_dict, robot_to_toml, save_robot
 
 __all__ = [
-    "UrdfExamination",
-    "UrdfFinding",
     "UrdfReport",
     "UrdfRobot",
     "builtin_robots",
     "classic_robots",
-    "examine_urdf",
     "get_robot",
     "load_robot",
     "load_robots",

@@ -25,7 +25,7 @@ from app.shared.store import Store
 from kin import InputError, Robot, UnknownRobotError, program_from_dict, q_from_readings
 from kin.collision.obstacles import MOST_OBSTACLES, checked_obstacles
 from kin.poses import check_length
-from kin.readings.joints import moving_motors, of_moving
+from kin.motors.joints import moving_motors, of_moving
 from kin.transforms import Array
 
 MOST_BYTES = 64 * 1024  # of a message

@@ -21,7 +21,7 @@ from app.live.client.connection import Connection, Message, RefusedError
 from app.live.client.drawing import Drawing
 from app.live.recording import Bounds, Recording, read, save
 from kin import InputError, KinematicsError, Motion, Obstacle, Program, Robot
-from kin.readings.joints import moving_motors, of_moving
+from kin.motors.joints import moving_motors, of_moving
 from kin.transforms import Array, pose_from_position_wxyz
 
 VALUES: Final = ("q", "target", "result", "contacts", "program")

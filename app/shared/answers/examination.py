@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.shared.answers.answer import Answer
 from kin import UrdfExamination
-from kin.files.urdf.doctor.findings import Rank, Symptom
+from kin.doctor.findings import Rank, Symptom
 from kin.units import general
 
 TITLES: dict[Rank, str] = {

@@ -8,7 +8,7 @@ from app.shared.answers.answer import Answer, From
 from app.shared.answers.robots import MotorAnswer
 from kin import MotorMatch
 from kin.motor import MotorUnit
-from kin.readings.findings import MotorCause, MotorStatus
+from kin.motors.findings import MotorCause, MotorStatus
 
 
 class MotorFindingAnswer(Answer):

@@ -11,8 +11,8 @@ from app.viewer.meshes.archive import MB, Archive, MeshError
 from app.viewer.tabs.robot.files import Source, is_mjcf, is_urdf
 from app.viewer.views.templates import render
 from kin import InputError, RobotFileError, UrdfExamination, examine_urdf
-from kin.files.urdf.doctor.findings import RANKS, Symptom, UrdfFinding
-from kin.files.urdf.doctor.meshes import extent_of
+from kin.doctor.findings import RANKS, Symptom, UrdfFinding
+from kin.doctor.meshes import extent_of
 from kin.transforms import Array
 
 MOST_LISTED = 40  # findings of one rank

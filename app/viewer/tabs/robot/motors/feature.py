@@ -21,7 +21,7 @@ from app.viewer.tabs.robot.motors import views
 from app.viewer.tabs.robot.motors.run import COUNT, Run, begun, readings_of
 from kin import InputError, Motor, Robot
 from kin.motor import LARGEST_ID
-from kin.readings.joints import moving_motors
+from kin.motors.joints import moving_motors
 
 FIELDS = ("id", "sign", "offset", "unit", "lead")
 LEAD = 0.01  # m in a turn of the motor of a slide, until it is stated

@@ -12,7 +12,7 @@ import kin
 from app.viewer.scene.clearance import clearance
 from kin import InputError, MotorMatch, Obstacle, Robot
 from kin.files.numbers import LARGEST, number_of
-from kin.readings.joints import counted, moving_motors, of_moving
+from kin.motors.joints import counted, moving_motors, of_moving
 from kin.transforms import Array
 
 COUNT = 3  # poses

@@ -8,8 +8,8 @@ from difflib import get_close_matches
 from xml.etree.ElementTree import Element
 
 from kin.files.numbers import LARGEST, number_of
-from kin.files.urdf.doctor.notes import FindingLog, cut, spelled
-from kin.files.urdf.doctor.source import Edit
+from kin.doctor.notes import FindingLog, cut, spelled
+from kin.doctor.source import Edit
 from kin.files.urdf.fields import ignored_of
 from kin.files.urdf.tree import MOVING, TYPES, UNIT, UNLIMITED
 from kin.units import general

@@ -21,9 +21,9 @@ from numpy.typing import ArrayLike
 from kin.errors import InputError
 from kin.motor import Motor, MotorUnit
 from kin.named import robot_of
-from kin.readings.findings import MotorFinding, MotorMatch
-from kin.readings.joints import moving_motors, of_moving
-from kin.readings.words import sentence
+from kin.motors.findings import MotorFinding, MotorMatch
+from kin.motors.joints import moving_motors, of_moving
+from kin.motors.words import sentence
 from kin.robot import Robot
 from kin.transforms import Array, finite_array
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from kin.files.numbers import number_of
-from kin.files.urdf.doctor.findings import Rank, Symptom, UrdfFinding
-from kin.files.urdf.doctor.source import Edit, SourceText
+from kin.doctor.findings import Rank, Symptom, UrdfFinding
+from kin.doctor.source import Edit, SourceText
 from kin.typed import ReadError, read
 from kin.units import PLAIN
 

@@ -8,12 +8,12 @@
 [-1, -1]
 """
 
-from kin.readings.findings import MotorFinding, MotorMatch
-from kin.readings.joints import q_from_readings, readings_from_q, readings_from_ticks, ticks_from_readings
-from kin.readings.lerobot import motors_from_lerobot, motors_to_lerobot
-from kin.readings.match import match_motors
-from kin.readings.pendant import from_pendant, to_pendant
-from kin.readings.poses import motor_poses
+from kin.motors.findings import MotorFinding, MotorMatch
+from kin.motors.joints import q_from_readings, readings_from_q, readings_from_ticks, ticks_from_readings
+from kin.motors.lerobot import motors_from_lerobot, motors_to_lerobot
+from kin.motors.match import match_motors
+from kin.motors.pendant import from_pendant, to_pendant
+from kin.motors.poses import motor_poses
 
 __all__ = [
     "MotorFinding",

@@ -10,7 +10,7 @@ import pytest
 
 import kin
 from kin import RobotFileError
-from kin.files.urdf.doctor.bodies import nearest_possible
+from kin.doctor.bodies import nearest_possible
 
 FILES = Path(__file__).parents[2] / "data" / "urdf"
 DEGREE = math.pi / 180.0

@@ -9,7 +9,7 @@ import pytest
 
 import kin
 from kin import InputError, RobotFileError, Shown
-from kin.readings.pendant import shown_limits
+from kin.motors.pendant import shown_limits
 from kin.solvers.reduced import fixed
 
 FLIP = """

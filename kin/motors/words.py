@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from kin.motor import Motor
-from kin.readings.findings import MotorFinding
+from kin.motors.findings import MotorFinding
 from kin.units import fixed, general
 
 _UNITS = {
