@@ -94,7 +94,7 @@ class Guide:
         self._page, self._what, self._robot = page, what[:LONGEST], page.robot
         self._limits = _common(self._robot, limits)
         wanted = np.where(self._robot.revolute, np.radians(speed), SLOW_SLIDE)
-        self._speed = np.minimum(wanted, kin.motion_limits(self._robot).velocity)
+        self._speed = np.minimum(wanted, kin.motion.motion_limits(self._robot).velocity)
         self._size = np.where(self._robot.revolute, 1.0, 0.1)  # of what is far for a joint
         self.asked = measured.copy()
         self._moved, self._gap, self._away = (np.zeros(self._robot.n) for _ in range(3))

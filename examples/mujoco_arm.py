@@ -79,10 +79,10 @@ class Simulation:
             body.inertia *= self.mass / own
         for geom in spec.geoms:
             geom.density *= self.mass / own
-        stated = kin.motion_limits(robot).effort
+        stated = kin.motion.motion_limits(robot).effort
         self.effort = np.where(np.isnan(stated), _invented(spec.compile(), robot), stated)
         self.invented = [robot.joints[i].name for i in np.flatnonzero(np.isnan(stated))]
-        self._speed = kin.motion_limits(robot).velocity
+        self._speed = kin.motion.motion_limits(robot).velocity
         for i, joint in enumerate(spec.joints):
             stiffness = self.effort[i] / FULL[0 if robot.revolute[i] else 1]
             joint.armature = stiffness / FASTEST**2

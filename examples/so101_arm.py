@@ -75,7 +75,7 @@ class Bus:
         BusError: the port cannot be opened.
     """
 
-    def __init__(self, port: str, motors: Sequence[kin.Motor]) -> None:
+    def __init__(self, port: str, motors: Sequence[kin.motors.Motor]) -> None:
         self.port, self._motors = port, motors
         self._handler = scservo_sdk.PortHandler(port)
         self._packets = scservo_sdk.PacketHandler(0)  # little-endian
@@ -85,7 +85,9 @@ class Bus:
         except (OSError, ValueError) as error:  # SerialException is an OSError
             raise BusError(port_problem(port, error)) from None
 
-    def _ask(self, motor: kin.Motor, work: Callable[[], tuple[Any, int, int]], tolerant: bool = False) -> Any:
+    def _ask(
+        self, motor: kin.motors.Motor, work: Callable[[], tuple[Any, int, int]], tolerant: bool = False
+    ) -> Any:
         """Do something to which a servo answers, again if its answer is broken; `tolerant` of its errors."""
         result = 0
         for _ in range(TRIES):
@@ -132,7 +134,7 @@ class Bus:
         """Where the servos are ``(m,)``, ticks."""
         return np.array([self._read(motor, PRESENT_POSITION) for motor in self._motors], dtype=float)
 
-    def _read(self, motor: kin.Motor, address: int, tolerant: bool = False) -> int:
+    def _read(self, motor: kin.motors.Motor, address: int, tolerant: bool = False) -> int:
         read = self._packets.read2ByteTxRx
         value = int(self._ask(motor, lambda: read(self._handler, motor.id, address), tolerant))
         if value >= TURN:
@@ -175,7 +177,7 @@ class Bus:
         self._handler.closePort()
 
 
-def named(motor: kin.Motor) -> str:
+def named(motor: kin.motors.Motor) -> str:
     """A motor in words."""
     return f"motor {motor.id} ({motor.name or motor.joint})"
 
@@ -191,7 +193,7 @@ def port_problem(port: str, error: Exception) -> str:
     return f"{port} cannot be opened: {error}"
 
 
-def moving(robot: kin.Robot) -> list[kin.Motor]:
+def moving(robot: kin.Robot) -> list[kin.motors.Motor]:
     """The motors that move a joint."""
     return [motor for motor in robot.motors if motor.joint]
 
@@ -202,7 +204,7 @@ def motors_of(robot: kin.Robot, options: Namespace) -> kin.Robot:
         text = Path(options.calibration).read_text(encoding="utf-8")
         if not robot.motors:
             print("The page's arm states no motors: signs + and zeros in the middle of the ranges are assumed.")
-        robot = replace(robot, motors=kin.motors_from_lerobot(robot, text))
+        robot = replace(robot, motors=kin.motors.motors_from_lerobot(robot, text))
     bare = [motor for motor in moving(robot) if motor.range is None and motor.unit != "ticks"]
     if bare or {motor.joint for motor in moving(robot)} != {joint.name for joint in robot.joints}:
         lacking = f"no calibrated range of {', '.join(map(named, bare))}" if bare else "not a motor for each joint"
@@ -216,10 +218,10 @@ def motors_of(robot: kin.Robot, options: Namespace) -> kin.Robot:
 class Scale:
     """Joint values of a driven arm by the ticks of its servos, in a straight line over their calibrated ranges.
 
-    A reading tells a joint value only up to whole turns, and `kin.q_from_readings` chooses the one that fits the
-    limits best. Two ticks side by side may then be a turn apart, and the ends of a full turn, 0 and 4095, may both
-    become 180°. To a servo its goals are numbers on one line: it goes from 4095 to 0 all the way back. So the turn
-    is chosen once here, for all readings, goals and limits.
+    A reading tells a joint value only up to whole turns, and `q_from_readings` chooses the one that fits the
+    limits best. Two ticks side by side may then be a turn apart, and the ends of a full turn, 0 and 4095, may
+    both become 180°. To a servo its goals are numbers on one line: it goes from 4095 to 0 all the way back. So
+    the turn is chosen once here, for all readings, goals and limits.
 
     Args:
         robot: the arm with its motors.
@@ -234,7 +236,7 @@ class Scale:
         KinematicsError: a servo is outside its calibrated range.
     """
 
-    def __init__(self, robot: kin.Robot, motors: Sequence[kin.Motor], ticks: Array) -> None:
+    def __init__(self, robot: kin.Robot, motors: Sequence[kin.motors.Motor], ticks: Array) -> None:
         self._low, self._high = np.array([motor.range or (0, motor.ticks - 1) for motor in motors], dtype=float).T
         for motor, tick, low, high in zip(motors, ticks, self._low, self._high, strict=True):
             if not low - MARGIN <= tick <= high + MARGIN:
@@ -244,14 +246,14 @@ class Scale:
                 )
         self._ends = np.minimum(self._low, ticks), np.maximum(self._high, ticks)
         self._middle = 0.5 * (self._low + self._high)
-        first, last = kin.readings_from_ticks(motors, np.array([self._low, self._high]))
+        first, last = kin.motors.readings_from_ticks(motors, np.array([self._low, self._high]))
         scale = [motor.sign * motor.scale for motor in motors]
         self._slope = scale * (self._high - self._low) / (last - first)  # ticks of a radian (metre)
         names = [joint.name for joint in robot.joints]
         self._joints = np.array([names.index(motor.joint) for motor in motors])
         self._n = robot.n
-        self._zero = kin.q_from_readings(robot, 0.5 * (first + last))
-        q = kin.q_from_readings(robot, kin.readings_from_ticks(motors, ticks))
+        self._zero = kin.motors.q_from_readings(robot, 0.5 * (first + last))
+        q = kin.motors.q_from_readings(robot, kin.motors.readings_from_ticks(motors, ticks))
         turns = np.round((q - self.q(ticks)) / TAU)
         self._zero += TAU * np.where(robot.revolute & (q >= robot.lower) & (q <= robot.upper), turns, 0.0)
         ends = [self._each(end) for end in (self._low, self._high)]
@@ -299,7 +301,7 @@ class Servos:
 
     def show(self, page: Any, shown: kin.Robot) -> None:
         """Send where the arm is: as readings, for *Match motors*, where the page's arm has these motors."""
-        readings = kin.readings_from_ticks(self._motors, self._bus.positions())
+        readings = kin.motors.readings_from_ticks(self._motors, self._bus.positions())
         own = {
             (motor.id, motor.joint, motor.unit): value for motor, value in zip(self._motors, readings, strict=True)
         }
@@ -307,7 +309,7 @@ class Servos:
         if theirs and set(theirs) == set(own):
             page.readings = [own[motor] for motor in theirs]
         else:
-            page.measured = kin.q_from_readings(self._robot, readings)
+            page.measured = kin.motors.q_from_readings(self._robot, readings)
 
     def write(self, scale: Scale, q: Array, joints: NDArray[np.bool_]) -> None:
         """Lead the servos of these joints ``(n,)`` to a configuration ``(n,)``, within their calibrated ranges."""

@@ -9,7 +9,8 @@ import json
 from pathlib import Path
 
 from app.shared.solver_names import FILE, computed_names
-from kin import Robot, builtin_robots, classic_robots
+from kin import Robot, builtin_robots
+from kin.files import classic_robots
 from kin.solvers import family_of
 
 PAGE = Path(__file__).parents[1] / "docs" / "arms.md"

@@ -58,7 +58,7 @@ def on_files(files: Files, config: Any) -> Files:
             target = kin.fk(robot, robot.q_home) if figure.postures else None
             motion = None
             if figure.program:
-                program = kin.parse_program((ROOT / figure.program).read_text(encoding="utf-8"), robot)
+                program = kin.motion.parse_program((ROOT / figure.program).read_text(encoding="utf-8"), robot)
                 motion = kin.plan_motion(robot, program)
             path = kin.save_page(robot, Path(folder) / "page.html", target=target, motion=motion)
             files.append(File.generated(config, address(name), content=path.read_text(encoding="utf-8")))

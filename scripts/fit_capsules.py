@@ -19,8 +19,9 @@ import scipy.spatial
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from app.viewer.scene.bodies.drawing import FOLDER, MM, _loft
-from kin import classic_robots, link_frames
+from kin import link_frames
 from kin.axes import inverse
+from kin.files import classic_robots
 from kin.parsing import to_toml
 
 OUT = 0.008  # m

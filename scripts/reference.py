@@ -1,6 +1,6 @@
 """Extension of Griffe, which reads the docstrings for the reference in docs/python.md.
 
-In the code, one entry of a docstring may describe several parameters: ``limits, locked: as in `kin.JointConstraints```.
+One entry of a docstring may describe several parameters: ``limits, locked: as in `kin.JointConstraints```.
 In the reference each parameter has its own entry. Where the entry names a class or a function, the text is that of
 the parameter there. MkDocs warns of an entry whose parameter does not exist.
 """
@@ -21,7 +21,7 @@ SOURCES = {
     "kin.IKOptions": ("kin/ik/options.py", "IKOptions"),
     "kin.JointConstraints": ("kin/ik/options.py", "JointConstraints"),
     "kin.workspace.capability_grid": ("kin/workspace/capability/blocks.py", "capability_grid"),
-    "kin.sample_workspace": ("kin/workspace/clouds/cloud.py", "sample_workspace"),
+    "kin.workspace.sample_workspace": ("kin/workspace/clouds/cloud.py", "sample_workspace"),
     "kin.solve_ik": ("kin/ik/__init__.py", "solve_ik"),
     "kin.solve_path": ("kin/path/__init__.py", "solve_path"),
 }

@@ -32,7 +32,18 @@ def surface() -> Json:
 
 def python() -> Json:
     """The public names of `kin`: parameters of functions, members of classes."""
-    return {name: described(getattr(kin, name)) for name in kin.__all__ if name != "__version__"}
+    return {name: described(value) for name, value in public().items()}
+
+
+def public() -> dict[str, Any]:
+    """What `kin` and its public packages offer, by names such as ``fk`` and ``motion.Ptp``; each thing once."""
+    top = {name: getattr(kin, name) for name in kin.__all__ if name != "__version__"}
+    packages = {name: value for name, value in top.items() if inspect.ismodule(value)}
+    found = {name: value for name, value in top.items() if name not in packages}
+    for package, module in packages.items():
+        within = {name: getattr(module, name) for name in module.__all__ if name not in found}
+        found |= {f"{package}.{name}": value for name, value in within.items()}
+    return found
 
 
 def described(value: object) -> Json:

@@ -12,7 +12,8 @@ import numpy as np
 
 import kin
 from kin import Joint, Robot
-from kin.ik import IKOptions, IKProblem, JointConstraints
+from kin.ik import IKOptions, JointConstraints
+from kin.ik.problem import IKProblem
 
 HALF_TURN = np.diag([1.0, -1.0, -1.0, 1.0])  # Rx(π)
 # Expensive tests run over these, cheap ones over the whole library. Older trees, which the differential test asks

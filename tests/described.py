@@ -45,7 +45,7 @@ def triangles(name: str, path: str) -> np.ndarray:
 
 
 @lru_cache
-def imported(name: str) -> tuple[kin.UrdfRobot, list[LinkPieces]]:
+def imported(name: str) -> tuple[kin.files.UrdfRobot, list[LinkPieces]]:
     """The arm with capsules around all its collision bodies, and these bodies."""
     kept: list[LinkPieces] = []
 
@@ -55,4 +55,4 @@ def imported(name: str) -> tuple[kin.UrdfRobot, list[LinkPieces]]:
             fitted(link.pieces, most_of(len(links)), reach, lambda path: triangles(name, path)) for link in links
         ]
 
-    return kin.read_urdf(text_of(name), tip=ARMS[name][4], fit=fit), kept
+    return kin.files.read_urdf(text_of(name), tip=ARMS[name][4], fit=fit), kept

@@ -27,7 +27,7 @@ from app.shared.settings import Settings
 from app.viewer.lessons import LESSONS
 from kin.ik.results import Cause
 from kin.units import Units
-from scripts import figures
+from scripts import figures, surface
 
 ROOT = Path(__file__).parents[1]
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -181,7 +181,7 @@ def test_the_robot_file_is_a_robot():
 def test_the_programs_can_be_driven():
     for text in blocks("toml", "docs/motion.md"):
         robot = kin.get_robot("panda")
-        assert kin.plan_motion(robot, kin.parse_program(text, robot)).planned
+        assert kin.plan_motion(robot, kin.motion.parse_program(text, robot)).planned
 
 
 def test_the_built_in_arms_are_named():
@@ -190,7 +190,7 @@ def test_the_built_in_arms_are_named():
         for row in table(PAGES["docs/robot-files.md"], "arm")
         for robot_id in re.findall(r"`(.+?)`", row[0])
     ]
-    classics = kin.classic_robots()
+    classics = kin.files.classic_robots()
     assert sorted(rows) == sorted((robot.id, str(robot.n)) for robot in classics.values())
     assert len(classics) == 12
     assert "Twelve are classics" in PAGES["docs/robot-files.md"]
@@ -367,8 +367,8 @@ def test_the_site_has_a_page_per_solver_and_every_public_function(site):
         solver = kin.solve_ik(robot, kin.fk(robot, robot.q_home), max_solutions=1).solver
         assert (site / "background" / solver / "index.html").is_file(), f"{robot.id}: {solver}"
     python = (site / "python" / "index.html").read_text(encoding="utf-8")
-    for name in kin.__all__:
-        if not name.startswith(("_", "Task")):
+    for name, value in surface.public().items():
+        if callable(value):
             assert f'id="kin.{name}"' in python or f'id="kin.fk.{name}"' in python, name
 
 

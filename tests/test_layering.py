@@ -230,7 +230,9 @@ def test_a_module_imports_only_what_its_layer_may(module):
     [
         each
         for each in MODULES
-        if each.startswith("kin/") and each != "kin/__init__.py" and not each.replace("/", ".").startswith(NEIGHBOURS)
+        if each.startswith("kin/")
+        and each != "kin/__init__.py"
+        and not each.replace("/", ".").startswith(NEIGHBOURS)
     ],
 )
 def test_nothing_in_the_core_imports_its_neighbours(module):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import inspect
+import operator
 import re
 import subprocess
 import sys
@@ -15,21 +16,23 @@ import pytest
 import app
 import kin
 from scripts.reference import OneByOne, one_by_one
+from scripts.surface import public
 
 ROOT = Path(__file__).parents[1]
-FUNCTIONS = sorted(name for name in kin.__all__ if inspect.isfunction(inspect.unwrap(getattr(kin, name))))
-METHODS = sorted(
-    f"{name}.{method}"
-    for name in kin.__all__
-    if inspect.isclass(cls := getattr(kin, name)) and not issubclass(cls, Exception)
+PUBLIC = public()
+FUNCTIONS = sorted(name for name, value in PUBLIC.items() if inspect.isfunction(inspect.unwrap(value)))
+METHODS = {
+    f"{name}.{method}": value
+    for name, cls in PUBLIC.items()
+    if inspect.isclass(cls) and not issubclass(cls, Exception)
     for method, value in vars(cls).items()
     if not method.startswith("_") and (inspect.isfunction(value) or isinstance(value, classmethod))
     if value.__module__.startswith("kin.")
-)
+}
 # What has no example that can run here: a notebook, and what only fills the cache of compiled kernels.
 NO_EXAMPLE = {"connect", "save_page", "show", "warm_up"}
 # Nothing that they may be given is refused.
-NEVER_RAISES = {"builtin_robots", "classic_robots", "warm_up", "wxyz_from_rotation"}
+NEVER_RAISES = {"builtin_robots", "files.classic_robots", "warm_up", "wxyz_from_rotation"}
 # Numbers of a parameter with this annotation have units.
 NUMBERS = re.compile(r"\b(float|ArrayLike|Array|Limits|Locks|Values|MotionLimits)\b")
 UNITS = re.compile(
@@ -64,14 +67,13 @@ def test_every_function_and_method_is_described(read, name):
         if NUMBERS.search(str(wanted[parameter].annotation)):
             assert UNITS.search(f"{parameter}: {description}"), f"no unit: {parameter}: {description}"
     assert str(function.returns) in ("None", "Any") or "returns" in sections
-    assert "raises" in sections or name in NEVER_RAISES or "." in name
+    assert "raises" in sections or name in NEVER_RAISES or name in METHODS
     assert ("examples" in sections) != (name in NO_EXAMPLE)
 
 
 @pytest.mark.parametrize("name", [name for name in [*FUNCTIONS, *METHODS] if name not in NO_EXAMPLE])
 def test_examples_run_and_give_what_is_shown(name):
-    owner, _, method = name.rpartition(".")
-    described = getattr(getattr(kin, owner) if owner else kin, method)
+    described = operator.attrgetter(name)(kin)
     (test,) = doctest.DocTestFinder(recurse=False).find(inspect.unwrap(described), name)
     assert test.examples
     output: list[str] = []
@@ -87,7 +89,8 @@ def test_a_name_that_is_not_there_gives_the_error_of_python(package):
 
 def test_options_of_a_call_have_the_texts_of_the_class(read):
     described = {
-        each.name: each.description for each in read["workspace_facts"].final_target.docstring.parsed[1].value
+        each.name: each.description
+        for each in read["workspace.workspace_facts"].final_target.docstring.parsed[1].value
     }
     assert described["locked"].startswith("joint values to keep, in radians (metres)")
 

@@ -36,8 +36,8 @@ from app.shared.answers.ik import Brief, IkAnswer, WholeAnswers, add_pendant, ik
 from app.shared.metrics import SOLVE_SECONDS
 from app.shared.problems import FieldError
 from app.shared.settings import Settings
-from kin import IKOptions, IKResult, Robot, Status, Task
-from kin.ik import branch_names, solve, solve_at_once
+from kin import IKOptions, IKResult, Robot, Status
+from kin.ik import Task, branch_names, solve, solve_at_once
 from kin.ik.options import DEFAULTS
 from kin.ik.table import Table
 from kin.transforms import Array

@@ -71,5 +71,7 @@ async def geometric_jacobian(request: Request, robot: Robot, body: JacobianReque
     return await computed(request, partial(_answers, robot, q, "tool" if body.frame == "tool" else "world", batch))
 
 
-def _answers(robot: Robot, q: Array, frame: Literal["world", "tool"], batch: Batch, deadline: Deadline) -> Response:
+def _answers(
+    robot: Robot, q: Array, frame: Literal["world", "tool"], batch: Batch, deadline: Deadline
+) -> Response:
     return one_or_all(lambda some: jacobian_answers(robot, q[some], frame), batch, deadline)

@@ -27,8 +27,8 @@ from app.exports.motion_samples import with_joint_names
 from app.shared.answers.motion import MotionAnswer, motion_answer
 from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
-from kin import InputError, Motion, Robot, plan_motion
-from kin.motion import program_from_dict
+from kin import InputError, Robot, plan_motion
+from kin.motion import Motion, program_from_dict
 
 router = versioned("motion")
 

@@ -23,9 +23,10 @@ from app.api.schemas import Number, OneOf, Vector3, Vector4, integral, numbers
 from app.shared.options import declared
 from app.shared.problems import FieldError, from_input_error
 from app.shared.settings import Settings
-from kin import IKOptions, InputError, JointConstraints, Robot, Task
+from kin import IKOptions, InputError, JointConstraints, Robot
 from kin.collision.obstacles import KINDS, LONGEST_NAME, MOST_OBSTACLES, Shape, checked_obstacles
 from kin.frames import WORLD
+from kin.ik import Task
 from kin.ik.options import DEFAULTS, PathKeywords
 from kin.ik.problem import FAR, read_pose
 from kin.kernels.checks import straighten_many

@@ -18,9 +18,9 @@ from app.api.work import Deadline, computed
 from app.shared.answers.path import PathAnswer, PosturesAnswer, path_answer, postures_answer
 from app.shared.problems import FieldError
 from app.shared.settings import Settings
-from kin import Robot, path_postures
+from kin import Robot
 from kin.ik.options import IKOptions
-from kin.path import solve
+from kin.path import path_postures, solve
 from kin.transforms import Array
 
 router = versioned("kinematics")

@@ -15,7 +15,8 @@ from app.shared.answers.answer import as_json
 from app.shared.problems import FieldError, Problem, show
 from app.shared.settings import Settings
 from app.shared.store import Store
-from kin import InputError, Robot, from_pendant
+from kin import InputError, Robot
+from kin.motors import from_pendant
 from kin.transforms import Array
 
 LARGEST = 1e6

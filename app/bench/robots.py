@@ -80,4 +80,4 @@ def robots() -> dict[str, Robot]:
         )
         for robot_id, (name, table) in _TABLES.items()
     }
-    return {**kin.classic_robots(), **others}
+    return {**kin.files.classic_robots(), **others}

@@ -177,7 +177,7 @@ def prepare(row: Row, size: int, seed: int) -> Task | None:
     if robot is None or (row.kind == "branches" and closed_form_of(robot) is None):
         return None
     if row.kind == "cloud":
-        q = kin.workspace_configurations(robot, np.arange(CLOUD * size))
+        q = kin.workspace.workspace_configurations(robot, np.arange(CLOUD * size))
     else:
         q = robot.random_q(np.random.default_rng(seed), size)
     if row.lock is not None:

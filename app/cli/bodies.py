@@ -18,8 +18,8 @@ from app.viewer.meshes.fitting import bodies_of
 from app.viewer.meshes.placing import Shapes
 from app.viewer.meshes.reader import MeshReader
 from kin import RobotFileError
-from kin.files.urdf.collisions import Fitted, LinkPieces, Piece, without_meshes
 from kin.doctor.meshes import extent_of
+from kin.files.urdf.collisions import Fitted, LinkPieces, Piece, without_meshes
 from kin.files.urdf.visuals import MeshFile
 from kin.transforms import Array
 
@@ -31,7 +31,7 @@ _SCHEMES = ("package", "model", "file")
 
 @dataclass(frozen=True)
 class MeshesBeside:
-    """Fits capsules to bodies whose meshes are found from the place of a URDF, as `kin.read_urdf` takes it."""
+    """Fits capsules to bodies whose meshes are found from the place of a URDF: `fit` of `kin.files.read_urdf`."""
 
     urdf: Path
 
@@ -81,7 +81,7 @@ class MeshesBeside:
 
 @dataclass(frozen=True)
 class MeshFilesBeside:
-    """The meshes beside a URDF, as `kin.examine_urdf` takes them."""
+    """The meshes beside a URDF, as `kin.doctor.examine_urdf` takes them."""
 
     urdf: Path
 

@@ -15,8 +15,8 @@ from app.exports.capability import WRITERS
 from app.exports.progress import progress_bar
 from app.shared.answers.capability import CapabilityAnswer, capability_answer
 from app.shared.mapreduce import run_dask, run_local
-from kin import CapabilityMap, InputError
-from kin.workspace import CapabilityBlock, capability_grid, capability_join
+from kin import InputError
+from kin.workspace import CapabilityBlock, CapabilityMap, capability_grid, capability_join
 
 
 def run(arguments: Namespace) -> int:

@@ -9,7 +9,8 @@ from app.cli.bodies import MeshFilesBeside
 from app.cli.files import source_of, write_file
 from app.cli.terminal import print_json
 from app.shared.answers.examination import TITLES, examination_answer, outcome
-from kin import InputError, UrdfExamination, examine_urdf
+from kin import InputError
+from kin.doctor import UrdfExamination, examine_urdf
 from kin.doctor.findings import RANKS
 
 

@@ -23,7 +23,8 @@ from app.exports.robots import file_name, robot_file
 from app.shared.answers.exchange import import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
 from app.shared.store import Store
-from kin import InputError, UrdfReport, UrdfRobot, builtin_robots, load_robot, read_urdf, robot_to_toml
+from kin import InputError, builtin_robots, load_robot, robot_to_toml
+from kin.files import UrdfReport, UrdfRobot, read_urdf
 from kin.files.builtin import BUILTIN
 from kin.units import DEFAULT_UNITS
 

@@ -23,11 +23,12 @@ from app.cli.terminal import (
     units_of,
 )
 from app.shared.answers.fk import fk_answers
-from kin import InputError, Robot, fk, to_pendant
+from kin import InputError, Robot, fk
 from kin.axes import inverse
 from kin.frames import TOOL, WORLD
-from kin.poses import form_named
+from kin.motors import to_pendant
 from kin.motors.pendant import shown_limits
+from kin.poses import form_named
 from kin.transforms import Array
 
 

@@ -29,9 +29,9 @@ from app.cli.terminal import (
 )
 from app.shared.answers.ik import Blocked, IkAnswer, Solution, add_pendant, ik_answer
 from app.shared.options import Option, declared
-from kin import IKOptions, InputError, Robot, Task
+from kin import IKOptions, InputError, Robot
 from kin.frames import TOOL
-from kin.ik import solve
+from kin.ik import Task, solve
 from kin.ik.options import MASK_NAMES
 from kin.poses.fields import ORIENTATIONS, orientation
 from kin.transforms import Array, frame_from_approach
@@ -110,7 +110,7 @@ def _run_file(robot: Robot, arguments: Namespace, units: Units) -> int:
     if arguments.frame == TOOL:
         raise InputError("--frame", TOOL, "a frame that does not move, together with --targets")
     if arguments.pendant:
-        raise InputError("--pendant", "with --targets", "one target, or kin.to_pendant")
+        raise InputError("--pendant", "with --targets", "one target, or kin.motors.to_pendant")
     q_seed = (
         None
         if arguments.seed is None

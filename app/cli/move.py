@@ -26,8 +26,8 @@ from app.exports.motion_plot import motion_plot
 from app.exports.motion_samples import with_joint_names
 from app.exports.save import opened
 from app.shared.answers.motion import motion_answer
-from kin import InputError, Motion, Program, Robot, plan_motion, program_from_dict
-from kin.motion import parse_program
+from kin import InputError, Robot, plan_motion
+from kin.motion import Motion, Program, parse_program, program_from_dict
 from kin.transforms import Array
 from kin.units import Unit
 

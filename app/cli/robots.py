@@ -27,9 +27,10 @@ from app.shared.answers.comparison import comparison_answer
 from app.shared.answers.motors import motor_match_answer
 from app.shared.answers.robots import RobotAnswer, robot_answer
 from app.shared.finding import find_robots
-from kin import Comparison, InputError, Robot, compare, match_motors, motor_poses, robot_to_toml
-from kin.comparison import messages
+from kin import InputError, Robot, compare, robot_to_toml
+from kin.comparison import Comparison, messages
 from kin.files.numbers import LARGEST, number_of
+from kin.motors import match_motors, motor_poses
 from kin.motors.joints import moving_motors
 from kin.transforms import Array
 from kin.units import Units

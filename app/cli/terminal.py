@@ -22,15 +22,15 @@ from kin import (
     KinematicsError,
     Obstacle,
     Robot,
-    Task,
     frame_pose,
-    from_pendant,
     load_robot,
     pose_from_xyz_rpy,
 )
 from kin.collision.obstacles import checked_obstacles
 from kin.files.numbers import index_of
 from kin.frames import FRAMES
+from kin.ik import Task
+from kin.motors import from_pendant
 from kin.poses import read_target
 from kin.transforms import Array
 from kin.typed import ReadError, read, valid

@@ -14,15 +14,8 @@ from app.exports.picture import draw
 from app.exports.save import opened, reading, save
 from app.shared.answers.workspace import workspace_answer
 from app.shared.clouds import Cloud
-from kin import (
-    InputError,
-    JointConstraints,
-    Robot,
-    WorkspaceFacts,
-    sample_workspace,
-    workspace_facts,
-    workspace_section,
-)
+from kin import InputError, JointConstraints, Robot
+from kin.workspace import WorkspaceFacts, sample_workspace, workspace_facts, workspace_section
 
 _INTERRUPTED = 130  # exit code that shells expect after Ctrl-C
 

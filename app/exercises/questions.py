@@ -66,7 +66,7 @@ class Asked:
         form: how it is answered. ``fields``: one text per label. ``options``: the index of a label. ``order``: the
             indices of the labels, in order. ``posture``: a configuration ``(n,)``. ``postures``: rows of texts,
             one per label. ``frame``: a pose as x, y, z and a quaternion w, x, y, z. ``table``: rows of texts, one
-            per label. ``program``: a text, as `kin.parse_program` reads it.
+            per label. ``program``: a text, as `kin.motion.parse_program` reads it.
         labels: of fields, options or columns.
         units: of the fields or columns.
         note: the accepted error, and what else an answer needs.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kin import CapabilityMap
+from kin.workspace import CapabilityMap
 
 
 def _write_npz(found: CapabilityMap, path: Path) -> None:

@@ -31,9 +31,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.shared.clouds import Cloud, Clouds
-from kin import WorkspaceChunk
 from kin.transforms import Array
-from kin.workspace import Measure
+from kin.workspace import Measure, WorkspaceChunk
 
 MAGIC, VERSION = b"KINCLOUD", 1
 _HEADER = struct.Struct("<8sHHIQ")

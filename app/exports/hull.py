@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from kin import InputError, WorkspaceChunk
+from kin import InputError
+from kin.workspace import WorkspaceChunk
 
 SUFFIXES = ("stl", "ply", "obj", "off", "glb")
 

@@ -14,9 +14,9 @@ from app.exports.motion_samples import about
 from app.exports.snippets import robot_code
 from app.shared.answers.answer import as_plain
 from app.shared.answers.motion import motion_answer
-from kin import InputError, Motion, fk
+from kin import InputError, fk
 from kin.axes import inverse
-from kin.motion import Circ, Dwell, Lin, PoseTarget, Ptp, Spline, program_to_dict
+from kin.motion import Circ, Dwell, Lin, Motion, PoseTarget, Ptp, Spline, program_to_dict
 from kin.motion.details import BlendLeftOut, BlendShortened
 from kin.motion.program import Move, Segment
 from kin.transforms import Array, wxyz_from_rotation

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app.exports.svg import joint_colour, text_of, tick_labels
-from kin import Motion
+from kin.motion import Motion
 from kin.transforms import Array
 
 WIDTH, HEIGHT = 900.0, 636.0

@@ -13,9 +13,9 @@ from types import ModuleType
 from typing import Any
 
 from app.exports.motion_samples import about
-from kin import InputError, Motion, link_frames
+from kin import InputError, link_frames
 from kin._version import __version__
-from kin.motion import MotionSample, program_to_dict
+from kin.motion import Motion, MotionSample, program_to_dict
 from kin.transforms import Array, wxyz_from_rotation
 
 EXTRA = "pip install 'kinboard[mcap]'"

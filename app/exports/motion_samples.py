@@ -6,7 +6,8 @@ import json
 from collections.abc import Sequence
 from dataclasses import replace
 
-from kin import InputError, Motion
+from kin import InputError
+from kin.motion import Motion
 from kin.robot import Joint
 from kin.transforms import Array
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from app.exports.motion import FORMATS
 from app.exports.snippets import Service, named, posted
-from kin import InputError, Motion, robot_to_dict
-from kin.motion import program_to_dict
+from kin import InputError, robot_to_dict
+from kin.motion import Motion, program_to_dict
 
 RATE = 100.0  # samples per second
 

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.exports.svg import Axes, AxisStyle, Plot, joint_colour, png_url, text_of
-from kin import Robot, Section, WorkspaceChunk, WorkspaceFacts
+from kin import Robot
 from kin.units import fixed, grouped
-from kin.workspace import Span
+from kin.workspace import Section, Span, WorkspaceChunk, WorkspaceFacts
 
 CELLS = 360  # along the longest side
 SIZE = 420.0  # pixels of the longest side

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import kin
-from kin import Robot, convert_dh, robot_to_mjcf, robot_to_toml, robot_to_urdf
+from kin import Robot, robot_to_mjcf, robot_to_toml, robot_to_urdf
+from kin.dh import convert_dh
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from typing import BinaryIO
 from app.exports.formats import FORMATS, encode, slices, table_of
 from app.exports.progress import progress_bar
 from app.shared.clouds import Cloud, Clouds
-from kin import WorkspaceChunk
+from kin.workspace import WorkspaceChunk
 
 
 def save(cloud: Cloud, target: str, kind: str, with_q: bool, progress: bool) -> int:

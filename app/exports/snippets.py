@@ -22,7 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from kin import Joint, Obstacle, Robot, Task, builtin_robots, robot_to_dict
+from kin import Joint, Obstacle, Robot, builtin_robots, robot_to_dict
+from kin.ik import Task
 from kin.transforms import Array, wxyz_from_rotation
 
 DIGITS = 9

@@ -18,9 +18,9 @@ from functools import cached_property
 
 from app.shared.computations import ComputationCache
 from app.shared.threads import background_threads, lower_priority
-from kin import JointConstraints, Robot, WorkspaceChunk, workspace_slice
+from kin import JointConstraints, Robot
 from kin.ik.options import FREE
-from kin.workspace import Measure, Strategy
+from kin.workspace import Measure, Strategy, WorkspaceChunk, workspace_slice
 
 # Points of a part: a few milliseconds of work for sampled points, half a second for points found by descent.
 SAMPLED, DESCENDED = 1 << 16, 1 << 13
@@ -29,7 +29,7 @@ FIRST = 1 << 9  # of the first part of a cloud found by descent, so that somethi
 
 @dataclass(frozen=True)
 class Cloud:
-    """Description of a cloud: what `kin.sample_workspace` takes, hashable. Parts are numbered from 0."""
+    """Description of a cloud: what `kin.workspace.sample_workspace` takes, hashable. Parts are numbered from 0."""
 
     robot: Robot
     n: int
@@ -64,7 +64,7 @@ class Cloud:
         return len(self.edges) - 1
 
     def slice(self, start: int, end: int, with_q: bool = False) -> WorkspaceChunk:
-        """Points start, …, end − 1, computed by this thread; raises `kin.InputError` as `kin.workspace_slice`."""
+        """Points start, …, end − 1, computed by this thread; raises as `kin.workspace.workspace_slice`."""
         return workspace_slice(
             self.robot,
             self.n,

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.mapreduce import run_local
 from app.shared.threads import background_threads, lower_priority
-from kin import CapabilityMap, JointConstraints, Robot
+from kin import JointConstraints, Robot
 from kin.ik.options import FREE
-from kin.workspace import CapabilityBlock, capability_grid, capability_join
+from kin.workspace import CapabilityBlock, CapabilityMap, capability_grid, capability_join
 
 PUBLISHED_EVERY = 0.5  # s between two partial results
 

@@ -12,8 +12,9 @@ import json
 from functools import lru_cache
 from typing import NamedTuple
 
-from kin import Robot, branch_meanings, branch_names, builtin_robots
+from kin import Robot, branch_names, builtin_robots
 from kin.files.builtin import BUILTIN
+from kin.ik import branch_meanings
 from kin.solvers import family_of
 
 FILE = BUILTIN / "solvers.json"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kin import Robot, RobotFileError, UnknownRobotError, builtin_robots, load_robots
+from kin import Robot, RobotFileError, UnknownRobotError, builtin_robots
+from kin.files import load_robots
 
 
 class Store:

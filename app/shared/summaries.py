@@ -10,18 +10,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
 from app.shared.threads import background_threads, lower_priority
-from kin import (
-    Comparison,
-    JointConstraints,
-    Robot,
-    Section,
-    WorkspaceFacts,
-    compare,
-    workspace_facts,
-    workspace_section,
-)
-from kin.comparison import Frames
+from kin import JointConstraints, Robot, compare
+from kin.comparison import Comparison, Frames
 from kin.ik.options import FREE
+from kin.workspace import Section, WorkspaceFacts, workspace_facts, workspace_section
 
 Plane = tuple[tuple[float, ...], tuple[float, ...]]
 
@@ -29,7 +21,7 @@ KEPT = 64  # sizes, and as many sections
 
 
 class Summaries:
-    """Cache of `kin.workspace_facts`, `kin.workspace_section` and `kin.compare`. Any thread may use it.
+    """Cache of sizes of workspaces, of sections and of `kin.compare`. Any thread may use it.
 
     Args:
         kept: how many results of each kind are kept.
@@ -51,7 +43,7 @@ class Summaries:
         effort: int | None = 4,
         limited: bool = False,
     ) -> Subscription[WorkspaceFacts]:
-        """Sizes as by `kin.workspace_facts`.
+        """Sizes as by `kin.workspace.workspace_facts`.
 
         Args:
             robot: the arm.
@@ -77,7 +69,7 @@ class Summaries:
         limited: bool = False,
         signed: bool = False,
     ) -> Subscription[Section]:
-        """A section as by `kin.workspace_section`. `constraints` and `limited` as in `facts`."""
+        """A section as by `kin.workspace.workspace_section`. `constraints` and `limited` as in `facts`."""
 
         def compute(computation: SharedComputation[Section]) -> Section:
             cancel = computation.check

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
-from kin import Contact, IKOptions, JointConstraints, Obstacle, Robot, Task, fk
+from kin import IKOptions, JointConstraints, Obstacle, Robot, fk
+from kin.collision import Contact
 from kin.collision.contacts import surroundings
+from kin.ik import Task
 from kin.transforms import Array
 
 

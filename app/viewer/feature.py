@@ -29,7 +29,9 @@ from app.viewer.own_arm import OwnArm
 from app.viewer.panel.fence import Fence
 from app.viewer.panel.status import Notice
 from app.viewer.scene.camera import Sphere
-from kin import Contact, IKResult, InputError, Obstacle, Robot, Task
+from kin import IKResult, InputError, Obstacle, Robot
+from kin.collision import Contact
+from kin.ik import Task
 from kin.transforms import Array
 from kin.units import Units
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import kin
-from kin import IKOptions, IKResult, Redundancy, Robot, Task
+from kin import IKOptions, IKResult, Robot
 from kin.differential.null_space import null_space
 from kin.differential.task import free_motions
-from kin.ik import solve
+from kin.ik import Redundancy, Task, solve
 from kin.ik.problem import prepare
 from kin.transforms import Array
 

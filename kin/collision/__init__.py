@@ -69,7 +69,7 @@ def nearest_links(robot: Robot | str, q: ArrayLike) -> NearestLinks | None:
 
     Examples:
         >>> import kin
-        >>> kin.nearest_links("panda", kin.get_robot("panda").q_home).distance > 0.0
+        >>> kin.collision.nearest_links("panda", kin.get_robot("panda").q_home).distance > 0.0
         True
     """
     robot = robot_of(robot)
@@ -136,7 +136,7 @@ def nearest_contact(robot: Robot | str, q: ArrayLike, obstacles: Sequence[Obstac
     Examples:
         >>> import kin
         >>> crate = kin.Obstacle("box", xyz=(0.5, 0.0, 0.0), size=(2.0, 2.0, 2.0), name="crate")
-        >>> "crate" in kin.nearest_contact("ur5", kin.get_robot("ur5").q_home, [crate]).text
+        >>> "crate" in kin.collision.nearest_contact("ur5", kin.get_robot("ur5").q_home, [crate]).text
         True
     """
     robot = robot_of(robot)

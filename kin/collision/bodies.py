@@ -64,7 +64,7 @@ def capsules(robot: Robot | str) -> tuple[Capsule, ...]:
 
     Examples:
         >>> import kin
-        >>> len(kin.capsules("ur5")) > 6
+        >>> len(kin.collision.capsules("ur5")) > 6
         True
     """
     return bodies_of(robot_of(robot)).capsules

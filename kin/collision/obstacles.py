@@ -189,7 +189,7 @@ def obstacle_from_dict(data: object) -> Obstacle:
 
     Examples:
         >>> import kin
-        >>> kin.obstacle_from_dict({"shape": "sphere", "xyz": [0.5, 0.0, 0.2], "radius": 0.1}).shape
+        >>> kin.collision.obstacle_from_dict({"shape": "sphere", "xyz": [0.5, 0.0, 0.2], "radius": 0.1}).shape
         'sphere'
     """
     known = [each.name for each in fields(Obstacle)]

@@ -140,7 +140,7 @@ def touches_along(
     """Where the straight joint motions between neighbours of a path ``(k, n)`` touch something first.
 
     Those without a touch are proven free. The contact is the deepest of `LOOKS` along the rest of the motion. Of
-    the first row, and of `jumps`, by the row they lead to, only that row is looked at. `cancel` cancels by raising.
+    the first row, and of `jumps`, by the row they lead to, only that row is looked at. `cancel` may raise.
     """
     still = np.array([i == 0 or i in jumps for i in range(len(path))])
     start = np.where(still[:, None], path, np.concatenate([path[:1], path[:-1]]))

@@ -82,7 +82,7 @@ def compare(
 
     Examples:
         >>> import kin
-        >>> kin.compare("puma560", kin.convert_dh("puma560", "modified")).verdict
+        >>> kin.compare("puma560", kin.dh.convert_dh("puma560", "modified")).verdict
         'identical'
     """
     a, b = robot_of(a), robot_of(b)

@@ -148,7 +148,7 @@ class Comparison:
 
         Examples:
             >>> import kin
-            >>> found = kin.compare("ur5", kin.convert_dh("ur5", "modified"))
+            >>> found = kin.compare("ur5", kin.dh.convert_dh("ur5", "modified"))
             >>> found.to_b([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
             array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
         """

@@ -61,7 +61,7 @@ class Screws(NamedTuple):
         Examples:
             >>> import kin, numpy as np
             >>> arm = kin.get_robot("ur5")
-            >>> np.allclose(kin.screws(arm).pose(arm.q_home), kin.fk(arm, arm.q_home))
+            >>> np.allclose(kin.dh.screws(arm).pose(arm.q_home), kin.fk(arm, arm.q_home))
             True
         """
         values = finite_array("q", q, (self.S.shape[1],))
@@ -89,7 +89,7 @@ def exp_screw(S: ArrayLike, value: ArrayLike) -> Array:
 
     Examples:
         >>> import kin
-        >>> kin.exp_screw([0, 0, 0, 0, 0, 1], 0.2)[:3, 3]
+        >>> kin.dh.exp_screw([0, 0, 0, 0, 0, 1], 0.2)[:3, 3]
         array([0. , 0. , 0.2])
     """
     screw, angle = finite_array("S", S, (6,)), _values(value)
@@ -127,7 +127,7 @@ def screws(robot: Robot | str, q: ArrayLike | None = None) -> Screws:
 
     Examples:
         >>> import kin
-        >>> kin.screws("ur5").S.shape
+        >>> kin.dh.screws("ur5").S.shape
         (6, 6)
     """
     robot = robot_of(robot)
@@ -175,8 +175,8 @@ def robot_from_screws(
 
     Examples:
         >>> import kin
-        >>> given = kin.screws("ur5")
-        >>> arm = kin.robot_from_screws(given.S, given.M)
+        >>> given = kin.dh.screws("ur5")
+        >>> arm = kin.dh.robot_from_screws(given.S, given.M)
         >>> bool(abs(kin.fk(arm, [0.1] * 6) - kin.fk("ur5", [0.1] * 6)).max() < 1e-12)
         True
     """

@@ -49,7 +49,7 @@ def convert_dh(robot: Robot | str, convention: Convention) -> Robot:
     Examples:
         >>> import kin
         >>> arm = kin.get_robot("puma560")
-        >>> craig = kin.convert_dh(arm, "modified")
+        >>> craig = kin.dh.convert_dh(arm, "modified")
         >>> bool(abs(kin.fk(craig, arm.q_home) - kin.fk(arm, arm.q_home)).max() < 1e-12)
         True
     """

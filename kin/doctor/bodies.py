@@ -8,9 +8,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from kin.files.numbers import number_of
 from kin.doctor.joints import check_origin
 from kin.doctor.notes import FindingLog, cut, spelled
+from kin.files.numbers import number_of
 from kin.transforms import Array
 from kin.units import general
 

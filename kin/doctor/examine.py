@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin.errors import InputError, RobotFileError
-from kin.files.urdf.causes import Cause, decoded
 from kin.doctor.bodies import MeshFiles, check_link
 from kin.doctor.findings import RANKS, Symptom, UrdfExamination, UrdfFinding
 from kin.doctor.joints import check_joint
 from kin.doctor.notes import FindingLog, cut
 from kin.doctor.source import Edit, SourceText
 from kin.doctor.tree import LISTED, check_elements, check_root, check_tree
+from kin.errors import InputError, RobotFileError
+from kin.files.urdf.causes import Cause, decoded
 from kin.files.urdf.read import UrdfReport, UrdfRobot, read_urdf
 from kin.files.urdf.tree import UrdfTree, tree_of
 from kin.fk import fk

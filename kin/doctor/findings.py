@@ -87,7 +87,7 @@ class UrdfExamination:
 
         Examples:
             >>> import kin
-            >>> kin.examine_urdf(kin.robot_to_urdf("ur5")).count("wrong")
+            >>> kin.doctor.examine_urdf(kin.robot_to_urdf("ur5")).count("wrong")
             0
         """
         return sum(each.rank == rank for each in self.findings)

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from xml.etree.ElementTree import Element
 
-from kin.files.numbers import LARGEST, number_of
 from kin.doctor.notes import FindingLog, cut, spelled
 from kin.doctor.source import Edit
+from kin.files.numbers import LARGEST, number_of
 from kin.files.urdf.fields import ignored_of
 from kin.files.urdf.tree import MOVING, TYPES, UNIT, UNLIMITED
 from kin.units import general

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import Element
 
-from kin.files.numbers import number_of
 from kin.doctor.findings import Rank, Symptom, UrdfFinding
 from kin.doctor.source import Edit, SourceText
+from kin.files.numbers import number_of
 from kin.typed import ReadError, read
 from kin.units import PLAIN
 

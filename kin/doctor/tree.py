@@ -6,8 +6,8 @@ from difflib import get_close_matches
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
-from kin.files.names import unused
 from kin.doctor.notes import FindingLog, cut
+from kin.files.names import unused
 from kin.files.urdf.fields import ELEMENTS, ignored_of
 from kin.files.urdf.tree import Unread, UrdfTree
 

@@ -35,8 +35,8 @@ An error raises `RobotFileError` with the file, the field, the value and what wo
 """
 
 from kin.files.builtin import builtin_robots, classic_robots, get_robot
-from kin.files.mjcf.write import robot_to_mjcf
 from kin.files.load import load_robot
+from kin.files.mjcf.write import robot_to_mjcf
 from kin.files.read import load_robots, parse_robot, robot_from_dict
 from kin.files.urdf.read import UrdfReport, UrdfRobot, read_urdf, urdf_tips
 from kin.files.urdf.write import robot_to_urdf

@@ -27,7 +27,7 @@ def classic_robots() -> dict[str, Robot]:
 
     Examples:
         >>> import kin
-        >>> len(kin.classic_robots()), "ur3e" in kin.classic_robots(), "ur3e" in kin.builtin_robots()
+        >>> len(kin.files.classic_robots()), "ur3e" in kin.files.classic_robots(), "ur3e" in kin.builtin_robots()
         (12, False, True)
     """
     robots = load_robots(BUILTIN)

@@ -15,8 +15,8 @@ _XML = {".urdf", ".xml", ".mjcf"}
 def load_robot(source: Path | str, base: str | None = None, tip: str | None = None) -> Robot:
     """The robot of a robot file (TOML), a URDF or an MJCF model, by path or text.
 
-    `kin.files.read_urdf` reports about a URDF as well, and `kin.files.parse_robot` never opens a file: they are for
-    texts of strangers.
+    `kin.files.read_urdf` reports about a URDF as well. It and `kin.files.parse_robot` take no text for a path, and
+    are for texts of strangers.
 
     Args:
         source: the path of a file, or its text: a `str` with a ``<`` or several lines.
@@ -44,7 +44,9 @@ def load_robot(source: Path | str, base: str | None = None, tip: str | None = No
     text = source if isinstance(source, str) and ("<" in source or "\n" in source.strip()) else None
     if text is None and Path(source).suffix in _XML:
         return read_urdf(Path(source), base, tip).robot
-    if text is not None and (text.lstrip("\ufeff \t\r\n").startswith("<") or "<robot" in text or "<mujoco" in text):
+    if text is not None and (
+        text.lstrip("\ufeff \t\r\n").startswith("<") or "<robot" in text or "<mujoco" in text
+    ):
         return read_urdf(text, base, tip).robot
     for field, link in (("base", base), ("tip", tip)):
         if link is not None:

@@ -77,7 +77,7 @@ def load_robots(folder: Path | str) -> dict[str, Robot]:
         >>> import kin, tempfile, pathlib
         >>> folder = pathlib.Path(tempfile.mkdtemp())
         >>> kin.save_robot("scara", folder / "scara.toml")
-        >>> list(kin.load_robots(folder))
+        >>> list(kin.files.load_robots(folder))
         ['scara']
     """
     robots: dict[str, Robot] = {}

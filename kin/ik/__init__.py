@@ -18,24 +18,37 @@ from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
+from kin.differential.task import Task
 from kin.errors import InputError
 from kin.ik.answers import answer, answer_at_once
+from kin.ik.batch import IKResults, ik_branches, solve_ik_many
+from kin.ik.details import LimitViolation, Redundancy
 from kin.ik.options import IKKeywords, IKOptions, JointConstraints
 from kin.ik.problem import IKProblem
-from kin.ik.results import IKResult
+from kin.ik.results import BlockedBranch, IKResult, IKSolution, Status
 from kin.named import robot_of
 from kin.robot import Robot
 from kin.solvers import closed_form_of
+from kin.solvers.singular import Singularity
 
 __all__ = [
+    "BlockedBranch",
     "IKOptions",
-    "IKProblem",
+    "IKResult",
+    "IKResults",
+    "IKSolution",
     "JointConstraints",
+    "LimitViolation",
+    "Redundancy",
+    "Singularity",
+    "Status",
+    "Task",
     "branch_meanings",
     "branch_names",
     "branch_of",
-    "solve",
+    "ik_branches",
     "solve_ik",
+    "solve_ik_many",
 ]
 
 
@@ -151,7 +164,7 @@ def branch_meanings(robot: Robot | str) -> dict[str, str]:
 
     Examples:
         >>> import kin
-        >>> sorted(kin.branch_meanings("planar2r"))
+        >>> sorted(kin.ik.branch_meanings("planar2r"))
         ['elbow negative', 'elbow positive']
     """
     closed_form = closed_form_of(robot_of(robot))

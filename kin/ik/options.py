@@ -153,7 +153,7 @@ class JointConstraints:
         """
         lower, upper = robot.lower.copy(), robot.upper.copy()
         expected = f"{robot.n} pairs (lower, upper), one per joint, or none for a joint's own limits"
-        for field, i, (low, high) in _by_joint(robot, "limits", self.limits, expected):
+        for place, i, (low, high) in _by_joint(robot, "limits", self.limits, expected):
             own, expected = _span(lower[i], upper[i]), ""
             if max(low, lower[i]) > min(high, upper[i]) + TOLERANCES.limit:
                 expected = f"limits that overlap the joint's own, {own}"
@@ -162,13 +162,13 @@ class JointConstraints:
             ):
                 expected = f"limits inside the joint's own, {own}, or the option wider_limits intersect"
             if expected:
-                raise InputError(field, [low, high], expected)
+                raise InputError(place, [low, high], expected)
             lower[i], upper[i] = max(low, lower[i]), max(min(high, upper[i]), max(low, lower[i]))
         locks = self.locks(robot)
-        for field, i, value in _by_joint(robot, "locked", self.locked, ""):
+        for place, i, value in _by_joint(robot, "locked", self.locked, ""):
             if not lower[i] - TOLERANCES.limit <= value <= upper[i] + TOLERANCES.limit:
                 expected = f"a value inside the limits, {_span(lower[i], upper[i])}"
-                raise InputError(field, value, expected)
+                raise InputError(place, value, expected)
             lower[i] = upper[i] = min(max(value, lower[i]), upper[i])
         return Bounds(lower, upper, tuple(value is not None for value in locks or (None,) * robot.n))
 
@@ -179,7 +179,7 @@ class JointConstraints:
             robot: the arm.
 
         Returns:
-            The value that each joint keeps, in radians (metres), None for one that may move; None if none is locked.
+            What each joint keeps, in radians (metres), None for one that may move. None if none is locked.
 
         Raises:
             InputError: the wrong number of joints, or a name that no joint has.
@@ -386,7 +386,9 @@ class IKKeywords(PathKeywords, total=False):
     solver: Solver
 
 
-def options_of_call(names: type[MotionKeywords], options: IKOptions | None, keywords: Mapping[str, Any]) -> IKOptions:
+def options_of_call(
+    names: type[MotionKeywords], options: IKOptions | None, keywords: Mapping[str, Any]
+) -> IKOptions:
     """The options of a call that takes the keywords `names`; another one is an error as Python raises it."""
     for name in keywords.keys() - names.__optional_keys__:
         raise TypeError(f"got an unexpected keyword argument {name!r}")
@@ -480,7 +482,11 @@ def _lock_values(locked: Locks) -> tuple[Any, ...] | None:
     """Locks as tuples, in the order or by the names that they are given."""
 
     def lock(field: str, value: float | None) -> float | None:
-        return None if value is None else finite_number(field, value, "a finite number, or none for a joint that may move")
+        return (
+            None
+            if value is None
+            else finite_number(field, value, "a finite number, or none for a joint that may move")
+        )
 
     expected = "joint values, or none for a joint that may move; or values by joint name"
     return _checked_each("locked", locked, lock, expected)

@@ -208,7 +208,9 @@ def prepare(robot: Robot, options: IKOptions) -> IKProblem:
     """Check the options against an arm: a problem with the identity as target and the home pose as seed."""
     lower, upper, locked = options.constraints.bounds(robot)
     task, code, mask = options.coordinates
-    closed_form = form_with_locked(robot, options.constraints.locks(robot), code) if options.solver == "auto" else None
+    closed_form = (
+        form_with_locked(robot, options.constraints.locks(robot), code) if options.solver == "auto" else None
+    )
     handled = closed_form is not None and closed_form.handles(code)
     redundancies = closed_form.redundancies(code) if closed_form is not None and handled else ()
     values = _requested_values(robot, options, redundancies)

@@ -25,12 +25,10 @@ from kin.errors import InputError
 from kin.ik.options import IKOptions, MotionKeywords, options_of_call
 from kin.ik.problem import never_cancel
 from kin.motion import limits as assumed
-from kin.motion.arrivals import Arrival
 from kin.motion.limits import MotionLimits, motion_limits
 from kin.motion.planner import planned
 from kin.motion.planning.collisions import checked
-from kin.motion.planning.plan import task_of
-from kin.motion.planning.starts import segment_poses, start_as_recorded
+from kin.motion.planning.starts import start_as_recorded
 from kin.motion.program import Circ, Dwell, JointTarget, Lin, Move, PoseTarget, Program, Ptp, Segment, Spline
 from kin.motion.reading import parse_program, program_from_dict, program_to_dict
 from kin.motion.results import InMotion, Motion, MotionSample, Peak, Refusal, SegmentTimes
@@ -41,7 +39,6 @@ from kin.transforms import finite_array
 _ROUNDING = 1e-9  # part of a speed
 
 __all__ = [
-    "Arrival",
     "Circ",
     "Dwell",
     "JointTarget",
@@ -61,9 +58,7 @@ __all__ = [
     "plan_motion",
     "program_from_dict",
     "program_to_dict",
-    "segment_poses",
     "start_as_recorded",
-    "task_of",
 ]
 
 
@@ -88,7 +83,7 @@ def plan_motion(
         qd_start, qdd_start: ``(n,)`` how the joints move at the start, radians (metres) per second and per s²,
             within their limits; at rest by default. A PTP without a blend goes on from this motion; before any
             other segment the arm brakes, and the segment begins where it then stands.
-        motion_limits: other limits than those of `kin.motion_limits`, in radians (metres) and seconds.
+        motion_limits: other limits than those of `kin.motion.motion_limits`, in radians (metres) and seconds.
         options: the keywords as one value. All others have to be the default: the program states the task, and
             its start the posture.
         cancel: called now and then; cancels the computation by raising.
@@ -106,7 +101,7 @@ def plan_motion(
     Examples:
         >>> import kin
         >>> arm = kin.get_robot("ur5")
-        >>> motion = kin.plan_motion(arm, [kin.Ptp(kin.JointTarget(arm.q_home + 0.3))])
+        >>> motion = kin.plan_motion(arm, [kin.motion.Ptp(kin.motion.JointTarget(arm.q_home + 0.3))])
         >>> motion.refusal is None, motion.sample(motion.duration).q.shape
         (True, (6,))
     """

@@ -51,11 +51,15 @@ class MotionLimits:
         for key in ("velocity", "acceleration", "jerk"):
             values = _checked(key, getattr(self, key), n, f"numbers from {LEAST:g} to {MOST:g}")
             for i in np.flatnonzero(~((values >= LEAST) & (values <= MOST))).tolist():
-                raise InputError(f"motion_limits.{key}[{i}]", float(values[i]), f"a number from {LEAST:g} to {MOST:g}")
+                raise InputError(
+                    f"motion_limits.{key}[{i}]", float(values[i]), f"a number from {LEAST:g} to {MOST:g}"
+                )
             object.__setattr__(self, key, values)
         efforts = _checked("effort", self.effort, n, f"numbers from 0 to {MOST:g} or NaN")
         for i in np.flatnonzero(~(((efforts >= 0.0) & (efforts <= MOST)) | np.isnan(efforts))).tolist():
-            raise InputError(f"motion_limits.effort[{i}]", float(efforts[i]), f"a number from 0 to {MOST:g}, or NaN")
+            raise InputError(
+                f"motion_limits.effort[{i}]", float(efforts[i]), f"a number from 0 to {MOST:g}, or NaN"
+            )
         object.__setattr__(self, "effort", efforts)
 
 
@@ -86,7 +90,7 @@ def motion_limits(robot: Robot | str) -> MotionLimits:
 
     Examples:
         >>> import kin
-        >>> kin.motion_limits("ur5").velocity.round(3)
+        >>> kin.motion.motion_limits("ur5").velocity.round(3)
         array([3.142, 3.142, 3.142, 3.142, 3.142, 3.142])
     """
     robot = robot_of(robot)

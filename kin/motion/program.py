@@ -81,7 +81,7 @@ class PoseTarget:
 
         Examples:
             >>> import kin
-            >>> kin.PoseTarget.of(kin.pose_from_xyz_rpy([0.4, 0.1, 0.3])).position
+            >>> kin.motion.PoseTarget.of(kin.pose_from_xyz_rpy([0.4, 0.1, 0.3])).position
             (0.4, 0.1, 0.3)
         """
         pose = as_transform(T, "pose")
@@ -101,7 +101,7 @@ class PoseTarget:
         Examples:
             >>> import kin
             >>> import numpy as np
-            >>> kin.PoseTarget((0.4, 0.1, 0.3)).pose(np.eye(4))[:3, 3]
+            >>> kin.motion.PoseTarget((0.4, 0.1, 0.3)).pose(np.eye(4))[:3, 3]
             array([0.4, 0.1, 0.3])
         """
         T = pose_from_position_wxyz(self.position, self.wxyz)

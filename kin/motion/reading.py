@@ -83,7 +83,7 @@ def parse_program(
 
     Examples:
         >>> import kin
-        >>> len(kin.parse_program('[[segments]]\nkind = "dwell"\nseconds = 0.5').segments)
+        >>> len(kin.motion.parse_program('[[segments]]\nkind = "dwell"\nseconds = 0.5').segments)
         1
     """
     if not isinstance(text, str) or is_path(text):
@@ -117,7 +117,7 @@ def program_from_dict(
 
     Examples:
         >>> import kin
-        >>> kin.program_from_dict({"segments": [{"kind": "dwell", "seconds": 0.5}]}).segments[0].seconds
+        >>> kin.motion.program_from_dict({"segments": [{"kind": "dwell", "seconds": 0.5}]}).segments[0].seconds
         0.5
     """
     if not isinstance(data, Mapping):
@@ -149,11 +149,11 @@ def program_to_dict(program: Program) -> dict[str, Any]:
 
     Examples:
         >>> import kin
-        >>> kin.program_to_dict(kin.Program((kin.Dwell(0.5),)))["segments"]
+        >>> kin.motion.program_to_dict(kin.motion.Program((kin.motion.Dwell(0.5),)))["segments"]
         [{'kind': 'dwell', 'seconds': 0.5}]
     """
     if not isinstance(program, Program):
-        raise InputError("program", program, "a kin.Program")
+        raise InputError("program", program, "a kin.motion.Program")
     data: dict[str, Any] = {}
     if program.name:
         data["name"] = program.name

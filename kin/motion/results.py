@@ -64,7 +64,7 @@ class Peak:
         quantity: of what. `tool_speed` is that of the tool point (m/s), `tool_turn` the angular velocity (rad/s).
         peak, time: the largest size, and when it is met.
         limit: None if there is none.
-        assumed: whether the limit is assumed, see `kin.MotionLimits`.
+        assumed: whether the limit is assumed, see `kin.motion.MotionLimits`.
     """
 
     joint: int | None
@@ -118,7 +118,7 @@ class Refusal:
 
         Examples:
             >>> import kin
-            >>> far = kin.plan_motion("ur5", [kin.Lin(kin.PoseTarget((3.0, 0.0, 0.0)))])
+            >>> far = kin.plan_motion("ur5", [kin.motion.Lin(kin.motion.PoseTarget((3.0, 0.0, 0.0)))])
             >>> far.refusal.explain() == far.refusal.reason
             True
         """
@@ -230,7 +230,7 @@ class Motion:
 
         Examples:
             >>> import kin
-            >>> kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5]), kin.Dwell(1.0)]).explain()
+            >>> kin.plan_motion("planar2r", [kin.motion.Ptp([0.5, 0.5]), kin.motion.Dwell(1.0)]).explain()
             '1 motion and 1 pause in 1.529 s.'
         """
         if self.refusal is not None:
@@ -252,7 +252,7 @@ class Motion:
 
         Examples:
             >>> import kin
-            >>> motion = kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5]), kin.Ptp([0.0, 1.0])])
+            >>> motion = kin.plan_motion("planar2r", [kin.motion.Ptp([0.5, 0.5]), kin.motion.Ptp([0.0, 1.0])])
             >>> motion.q_before(1)
             array([0.5, 0.5])
         """
@@ -284,7 +284,7 @@ class Motion:
 
         Examples:
             >>> import kin
-            >>> motion = kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5])])
+            >>> motion = kin.plan_motion("planar2r", [kin.motion.Ptp([0.5, 0.5])])
             >>> q, qd, qdd, qddd = motion.derivatives([0.0, 0.5, motion.duration])
             >>> q[-1]
             array([0.5, 0.5])
@@ -318,7 +318,7 @@ class Motion:
         Examples:
             >>> import kin
             >>> import numpy as np
-            >>> motion = kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5])])
+            >>> motion = kin.plan_motion("planar2r", [kin.motion.Ptp([0.5, 0.5])])
             >>> motion.sample(np.linspace(0.0, motion.duration, 50)).T.shape
             (50, 4, 4)
         """
@@ -341,7 +341,7 @@ class Motion:
 
         Examples:
             >>> import kin
-            >>> kin.plan_motion("planar2r", [kin.Dwell(0.25)]).step_times(10.0)
+            >>> kin.plan_motion("planar2r", [kin.motion.Dwell(0.25)]).step_times(10.0)
             array([0.  , 0.1 , 0.2 , 0.25])
         """
         times = tables.step_times(self.duration, rate)
@@ -361,7 +361,7 @@ class Motion:
 
         Examples:
             >>> import kin
-            >>> motion = kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5])])
+            >>> motion = kin.plan_motion("planar2r", [kin.motion.Ptp([0.5, 0.5])])
             >>> sum(len(some.t) for some in motion.steps(1000.0)) == len(motion.step_times(1000.0))
             True
         """
@@ -383,7 +383,7 @@ class Motion:
 
         Examples:
             >>> import kin
-            >>> next(kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5])]).csv_pieces())[:8]
+            >>> next(kin.plan_motion("planar2r", [kin.motion.Ptp([0.5, 0.5])]).csv_pieces())[:8]
             't,q1,q2,'
         """
         yield ",".join(tables.columns(self.robot.n)) + "\n"
@@ -404,7 +404,7 @@ class Motion:
         Examples:
             >>> import kin, pathlib, tempfile
             >>> file = pathlib.Path(tempfile.mkdtemp()) / "motion.csv"
-            >>> kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5])]).to_csv(file, rate=50.0)
+            >>> kin.plan_motion("planar2r", [kin.motion.Ptp([0.5, 0.5])]).to_csv(file, rate=50.0)
             >>> file.read_text().splitlines()[0]
             't,q1,q2,qd1,qd2,qdd1,qdd2,x,y,z,qw,qx,qy,qz,tool_speed'
         """
@@ -439,7 +439,7 @@ class Motion:
 
         Examples:
             >>> import kin
-            >>> motion = kin.plan_motion("planar2r", [kin.Ptp([0.5, 0.5], speed=0.25)])
+            >>> motion = kin.plan_motion("planar2r", [kin.motion.Ptp([0.5, 0.5], speed=0.25)])
             >>> max(peak.ratio for peak in motion.segment_peaks(0) if peak.ratio) <= 1.0 + 1e-9
             True
         """

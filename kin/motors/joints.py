@@ -84,10 +84,10 @@ def q_from_readings(robot: Robot | str, readings: ArrayLike) -> Array:
 
     Examples:
         >>> import dataclasses, kin, numpy as np
-        >>> shoulder = kin.Motor("shoulder", 1, sign=-1, offset=90.0)
-        >>> elbow = kin.Motor("elbow", 2, offset=1024, unit="ticks")
+        >>> shoulder = kin.motors.Motor("shoulder", 1, sign=-1, offset=90.0)
+        >>> elbow = kin.motors.Motor("elbow", 2, offset=1024, unit="ticks")
         >>> arm = dataclasses.replace(kin.get_robot("planar2r"), motors=(shoulder, elbow))
-        >>> np.degrees(kin.q_from_readings(arm, [60.0, 2048])).round(3).tolist()
+        >>> np.degrees(kin.motors.q_from_readings(arm, [60.0, 2048])).round(3).tolist()
         [30.0, 90.0]
     """
     robot = robot_of(robot)
@@ -130,10 +130,10 @@ def readings_from_q(robot: Robot | str, q: ArrayLike) -> Array:
 
     Examples:
         >>> import dataclasses, kin, numpy as np
-        >>> shoulder = kin.Motor("shoulder", 1, sign=-1, offset=90.0)
-        >>> elbow = kin.Motor("elbow", 2, offset=1024, unit="ticks")
+        >>> shoulder = kin.motors.Motor("shoulder", 1, sign=-1, offset=90.0)
+        >>> elbow = kin.motors.Motor("elbow", 2, offset=1024, unit="ticks")
         >>> arm = dataclasses.replace(kin.get_robot("planar2r"), motors=(shoulder, elbow))
-        >>> kin.readings_from_q(arm, np.radians([30.0, 90.0])).round(9).tolist()
+        >>> kin.motors.readings_from_q(arm, np.radians([30.0, 90.0])).round(9).tolist()
         [60.0, 2048.0]
     """
     robot = robot_of(robot)
@@ -166,8 +166,8 @@ def readings_from_ticks(motors: Sequence[Motor], ticks: ArrayLike) -> Array:
 
     Examples:
         >>> import kin
-        >>> motor = kin.Motor("elbow", 3, unit="range_m100_100", range=(1000, 3000))
-        >>> kin.readings_from_ticks([motor], [[1000], [2500], [3900]]).tolist()
+        >>> motor = kin.motors.Motor("elbow", 3, unit="range_m100_100", range=(1000, 3000))
+        >>> kin.motors.readings_from_ticks([motor], [[1000], [2500], [3900]]).tolist()
         [[-100.0], [50.0], [100.0]]
     """
     motors = checked_motors(motors)
@@ -204,8 +204,8 @@ def ticks_from_readings(motors: Sequence[Motor], readings: ArrayLike) -> Array:
 
     Examples:
         >>> import kin
-        >>> motor = kin.Motor("elbow", 3, unit="range_m100_100", range=(1000, 3000))
-        >>> kin.ticks_from_readings([motor], [[-100.0], [50.0], [170.0]]).tolist()
+        >>> motor = kin.motors.Motor("elbow", 3, unit="range_m100_100", range=(1000, 3000))
+        >>> kin.motors.ticks_from_readings([motor], [[-100.0], [50.0], [170.0]]).tolist()
         [[1000.0], [2500.0], [3000.0]]
     """
     motors = checked_motors(motors)

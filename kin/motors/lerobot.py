@@ -51,7 +51,7 @@ def motors_from_lerobot(
     Examples:
         >>> import kin
         >>> pan = {"id": 1, "drive_mode": 0, "homing_offset": -12, "range_min": 740, "range_max": 3331}
-        >>> motors = kin.motors_from_lerobot("so101", {"shoulder_pan": pan})
+        >>> motors = kin.motors.motors_from_lerobot("so101", {"shoulder_pan": pan})
         >>> motors[0].joint, motors[0].range
         ('shoulder pan', (740, 3331))
     """
@@ -110,8 +110,9 @@ def motors_to_lerobot(robot: Robot | str) -> dict[str, dict[str, int]]:
 
     Examples:
         >>> import dataclasses, kin
-        >>> motor = kin.Motor("shoulder pan", 1, "shoulder_pan", range=(740, 3331))
-        >>> kin.motors_to_lerobot(dataclasses.replace(kin.get_robot("so101"), motors=[motor]))["shoulder_pan"]
+        >>> motor = kin.motors.Motor("shoulder pan", 1, "shoulder_pan", range=(740, 3331))
+        >>> arm = dataclasses.replace(kin.get_robot("so101"), motors=[motor])
+        >>> kin.motors.motors_to_lerobot(arm)["shoulder_pan"]
         {'id': 1, 'drive_mode': 0, 'homing_offset': 0, 'range_min': 740, 'range_max': 3331}
     """
     robot = robot_of(robot)

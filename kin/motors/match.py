@@ -20,10 +20,10 @@ from numpy.typing import ArrayLike
 
 from kin.errors import InputError
 from kin.motor import Motor, MotorUnit
-from kin.named import robot_of
 from kin.motors.findings import MotorFinding, MotorMatch
 from kin.motors.joints import moving_motors, of_moving
 from kin.motors.words import sentence
+from kin.named import robot_of
 from kin.robot import Robot
 from kin.transforms import Array, finite_array
 
@@ -62,8 +62,9 @@ def match_motors(
 
     Examples:
         >>> import kin, numpy as np
-        >>> arm, motors = kin.get_robot("planar2r"), [kin.Motor("shoulder", 1), kin.Motor("elbow", 2)]
-        >>> found = kin.match_motors(arm, np.radians([[0, 0], [40, 60]]), [[91, 10], [50, 71]], motors)
+        >>> arm = kin.get_robot("planar2r")
+        >>> motors = [kin.motors.Motor("shoulder", 1), kin.motors.Motor("elbow", 2)]
+        >>> found = kin.motors.match_motors(arm, np.radians([[0, 0], [40, 60]]), [[91, 10], [50, 71]], motors)
         >>> print(found.findings[0].text)
         Motor 1, shoulder, counts backwards, its zero is at 90.5°.
     """

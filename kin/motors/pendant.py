@@ -25,7 +25,7 @@ def to_pendant(robot: Robot | str, q: ArrayLike) -> Array:
 
     Examples:
         >>> import kin, numpy as np
-        >>> shown = kin.to_pendant("lrmate200id", np.radians([0, 30, 50, 0, -90, 0]))
+        >>> shown = kin.motors.to_pendant("lrmate200id", np.radians([0, 30, 50, 0, -90, 0]))
         >>> np.degrees(shown).round(6) + 0.0  # FANUC counts J3 from the horizontal
         array([  0.,  30.,  20.,   0., -90.,   0.])
     """
@@ -50,7 +50,7 @@ def from_pendant(robot: Robot | str, shown: ArrayLike) -> Array:
 
     Examples:
         >>> import kin, numpy as np
-        >>> q = kin.from_pendant("lrmate200id", np.radians([0, 30, 20, 0, -90, 0]))
+        >>> q = kin.motors.from_pendant("lrmate200id", np.radians([0, 30, 20, 0, -90, 0]))
         >>> np.degrees(q).round(6) + 0.0
         array([  0.,  30.,  50.,   0., -90.,   0.])
     """

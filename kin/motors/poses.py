@@ -46,7 +46,7 @@ def motor_poses(robot: Robot | str, count: int = 3, allowed: Callable[[Array], b
 
     Examples:
         >>> import kin, numpy as np
-        >>> poses = kin.motor_poses("so101")
+        >>> poses = kin.motors.motor_poses("so101")
         >>> bool(np.abs(poses[1] - poses[0]).min() > np.radians(35))
         True
     """

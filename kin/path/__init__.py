@@ -74,8 +74,8 @@ def solve_path(
         robot: the arm, or the id of a built-in one.
         targets: poses ``(k, 4, 4)`` of the tool in the world frame, metres, k ≥ 1; for ``task="position"`` also
             points ``(k, 3)``.
-        options: the keywords as one value. Those that choose among the solutions of one target (`images`, `prefer`,
-            `max_solutions`) have no effect: the path chooses.
+        options: the keywords as one value. Those that choose among the solutions of one target (`images`,
+            `prefer`, `max_solutions`) have no effect: the path chooses.
         q_start: ``(n,)`` where the arm is, radians (metres). The way from there to the first waypoint counts as
             motion, but never as a jump: the path begins at its first waypoint. Without it the path may start
             anywhere; of equally good paths, the one that starts nearest to the home pose is taken.
@@ -149,7 +149,7 @@ def path_postures(
         >>> arm = kin.get_robot("planar2r")
         >>> reach = float(arm.reach)
         >>> line = [[share * reach, 0.0, 0.0] for share in (0.5, 0.52, 0.54)]
-        >>> found = kin.path_postures(arm, line, options=kin.IKOptions(task="position"))
+        >>> found = kin.path.path_postures(arm, line, options=kin.IKOptions(task="position"))
         >>> len(found.postures), found.through
         (2, (0, 1))
     """

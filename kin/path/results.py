@@ -122,7 +122,7 @@ class PathResult:
         continuous: whether there is no jump.
         jumps, gaps: by rising index. A waypoint at which an arm of five joints meets point and approach direction
             but not the rotation about it is a gap of status ``approximate``.
-        position_error, rotation_error: ``(k,)``, measured by forward kinematics, as in `kin.IKSolution`.
+        position_error, rotation_error: ``(k,)``, measured by forward kinematics, as in `kin.ik.IKSolution`.
         solver: name of the closed form, ``"numeric"`` if the arm has none for this task.
         largest_step: the largest motion of a joint between neighbours; None for a single waypoint.
         tolerances: errors that count as none, metres and radians; the largest of all waypoints.

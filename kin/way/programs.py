@@ -51,7 +51,12 @@ def way_program(
             for i, (row, zone) in enumerate(zip(q[1:], zones[1:], strict=True))
         ]
         motion = plan_motion(
-            way.robot, segments, q[0], avoid_self_collision=avoid_self_collision, obstacles=obstacles, cancel=cancel
+            way.robot,
+            segments,
+            q[0],
+            avoid_self_collision=avoid_self_collision,
+            obstacles=obstacles,
+            cancel=cancel,
         )
         if motion.refusal is None or motion.refusal.cause != "collision":
             return motion

@@ -46,7 +46,7 @@ def workspace_facts(
 
     Examples:
         >>> import kin
-        >>> round(kin.workspace_facts("planar2r", volume=False).reach.largest.value, 3)
+        >>> round(kin.workspace.workspace_facts("planar2r", volume=False).reach.largest.value, 3)
         1.6
     """
     robot, constraints = robot_of(robot), JointConstraints.of(limits, locked, constraints)

@@ -19,8 +19,7 @@ class WorkspaceChunk:
     Attributes:
         points: ``(k, 3)`` float32, metres in the world frame. Single precision is the format of screens and point
             cloud files; a point is off by less than 1e-7 of the arm's size, its configuration is exact.
-        q: ``(k, n)`` float64 configurations if requested, else None; `kin.workspace_configurations` recomputes
-            any.
+        q: ``(k, n)`` float64 configurations if requested, else None; `workspace_configurations` recomputes any.
         measures: by name, ``(k,)`` float32: ``"manipulability"`` (`kin.manipulability`), ``"limit_margin"``: the
             margin of the joint closest to a limit, 0 at the limit, 1 if every joint is in the middle of its range.
         start: index of the first point in the whole cloud.

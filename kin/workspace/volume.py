@@ -23,7 +23,9 @@ from kin.workspace.sections.cut import profile
 _SQUARES = 24  # along the longer side of the section, per unit of effort
 
 
-def from_probes(region: Region, tries: int, cancel: Callable[[], None] = never_cancel) -> tuple[Estimate, Estimate]:
+def from_probes(
+    region: Region, tries: int, cancel: Callable[[], None] = never_cancel
+) -> tuple[Estimate, Estimate]:
     """Volume (m³) and surface area (m²) from `tries` random points in each cell of the map."""
     probes = probe_cells(region, tries, SEEDS, cancel)
     size = probes.map.size

@@ -187,7 +187,7 @@ def test_a_way_that_cannot_be_is_an_answer_and_no_program_is_written(client, run
 def test_postures_along_a_path_outside_the_workspace_are_an_answer_and_ten_thousand_places_are_too_many(client):
     T = np.repeat(kin.fk(UR5, HOME)[None], 5, axis=0)
     T[:, 0, 3] += 9.0
-    found = kin.path_postures(UR5, T)
+    found = kin.path.path_postures(UR5, T)
     assert found.through == ()
     assert found.reason == "The arm cannot be at the first place of the path in any posture."
     assert (found.states == kin.path.postures.STATES.index("none")).all()

@@ -13,7 +13,7 @@ from app.cli.parser import main
 
 ROBOT = kin.get_robot("lrmate200id")
 SHOWN = [0.0, 30.0, 0.0, 0.0, -90.0, 0.0]  # degrees, as on FANUC's pendant
-Q = kin.from_pendant(ROBOT, np.radians(SHOWN))
+Q = kin.motors.from_pendant(ROBOT, np.radians(SHOWN))
 
 
 def test_rest_reads_and_answers_values_of_the_pendant(client: TestClient) -> None:
@@ -55,7 +55,7 @@ def test_the_command_line_reads_and_prints_values_of_the_pendant(capsys: pytest.
     assert capsys.readouterr().out.splitlines()[3].split()[:7] == ["1", *(f"{x:.3f}°" for x in SHOWN)]
     main(["ik", "lrmate200id", "--pendant", *place, "--seed", *map(str, SHOWN), "--json"])
     first = json.loads(capsys.readouterr().out)["solutions"][0]
-    assert first["pendant"] == pytest.approx(kin.to_pendant(ROBOT, first["q"]), abs=1e-12)
+    assert first["pendant"] == pytest.approx(kin.motors.to_pendant(ROBOT, first["q"]), abs=1e-12)
 
 
 def test_the_table_of_an_arm_says_what_follows(capsys: pytest.CaptureFixture[str]) -> None:

@@ -43,7 +43,7 @@ def multiples(robot: Robot, lines: int, rounds: int = 3) -> Multiples:
     rng = np.random.default_rng(7)
     found = []
     for T in [line(robot, rng) for _ in range(lines)]:
-        times = [(spent(kin.path_postures, robot, T), spent(kin.solve_path, robot, T)) for _ in range(rounds)]
+        times = [(spent(kin.path.path_postures, robot, T), spent(kin.solve_path, robot, T)) for _ in range(rounds)]
         chart, path = np.min(times, axis=0)
         found.append(chart / path)
     return Multiples(*np.percentile(found, [50.0, 95.0]).tolist())

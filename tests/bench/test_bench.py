@@ -25,7 +25,7 @@ from app.cli import parser
 
 ROOT = Path(__file__).parents[2]
 ROWS_BY_ID = {row.id: row for row in ROWS}
-TURNING = [robot for robot in kin.classic_robots().values() if robot.revolute.all()]
+TURNING = [robot for robot in kin.files.classic_robots().values() if robot.revolute.all()]
 BRIEF = replace(Settings(peers=()).quick(), targets=4, batch=8, rounds=3, turn=1e-4)
 
 

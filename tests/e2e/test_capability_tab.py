@@ -32,7 +32,7 @@ def test_a_map_is_drawn_and_a_click_shows_the_voxel(tab: Tab) -> None:
     expect(tab.row("Cut").locator("input:visible").first).to_have_value("along the arm")  # it opens cut
     tab.screenshot("capability-opens-cut")
     tab.choose("Cut", "none")
-    found = kin.capability_map(PIONEER, resolution=15, directions=24)
+    found = kin.workspace.capability_map(PIONEER, resolution=15, directions=24)
     shown = tab.page.locator("[data-shown]")
     expect(shown).to_have_attribute("data-shown", str(len(found.index)))
     # A voxel on the outside that faces the camera, so that nothing hides it.

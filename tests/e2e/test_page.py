@@ -20,7 +20,7 @@ from app.viewer.session.state import decode
 
 pytestmark = pytest.mark.browser
 
-ROBOTS = tuple(kin.classic_robots().values())
+ROBOTS = tuple(kin.files.classic_robots().values())
 
 PUMA = kin.get_robot("puma560")
 ILLEGIBLE = """() => {

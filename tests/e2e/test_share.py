@@ -25,7 +25,7 @@ from app.viewer.session.state import PageState, decode, encode
 pytestmark = pytest.mark.browser
 
 PIONEER, UR5 = kin.get_robot("pioneer5"), kin.get_robot("ur5")
-ROBOTS = tuple(kin.classic_robots().values())
+ROBOTS = tuple(kin.files.classic_robots().values())
 
 
 class Proxy:

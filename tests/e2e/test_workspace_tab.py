@@ -38,7 +38,7 @@ def test_a_cloud_is_drawn_and_a_click_moves_the_arm_to_its_point(tab: Tab) -> No
     expect(tab.status).to_contain_text("Moved to point")
     found = int(re.sub(r"\D", "", re.search(r"point ([\d\s]+)", tab.status.inner_text())[1]))  # type: ignore[index]
     assert np.linalg.norm(tab.pixel(PIONEER, points[found], room) - tab.pixel(PIONEER, points[index], room)) < 12
-    q = kin.workspace_configurations(PIONEER, found)
+    q = kin.workspace.workspace_configurations(PIONEER, found)
     tab.wait_for_tool(kin.fk(PIONEER, q)[:3, 3], within=0.06)
     expect(tab.page.locator("table[aria-label='picked point']")).to_be_visible()
     tab.screenshot("workspace-picked")

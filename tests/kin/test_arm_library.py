@@ -27,7 +27,7 @@ PUBLISHED = {
     for file in sorted((Path(__file__).parents[1] / "data" / "library").glob("*.json"))
 }
 ROBOTS = kin.builtin_robots()
-LIBRARY = {name: robot for name, robot in ROBOTS.items() if name not in kin.classic_robots()}
+LIBRARY = {name: robot for name, robot in ROBOTS.items() if name not in kin.files.classic_robots()}
 FAMILIES = {
     "ur3 ur10 ur3e ur5e ur10e ur16e ur20 z1": "parallel6",
     "so100 so101 vx300 wx250 palletiser": "parallel5",

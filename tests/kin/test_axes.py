@@ -125,13 +125,13 @@ def test_axes_that_almost_align_are_reported(row, almost):
 
 
 def test_generic_configurations_are_inside_the_limits_and_regular():
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         q = axes.generic_q(robot)
         assert robot.in_limits(q)
         assert kin.manipulability(robot, q) > 1e-7
 
 
-@pytest.mark.parametrize("robot_id", kin.classic_robots())
+@pytest.mark.parametrize("robot_id", kin.files.classic_robots())
 @pytest.mark.parametrize("by_rows", [False, True])
 def test_links_reproduce_forward_kinematics(robot_id, by_rows):
     """Forward kinematics is base · L1 … Ln · tool, and each joint adds to its link with its sign."""
@@ -156,7 +156,7 @@ def test_links_reproduce_forward_kinematics(robot_id, by_rows):
 
 def test_axes_are_the_columns_of_the_jacobian():
     """A revolute column is (ω × r, ω) with r from the axis to the tool point; a prismatic one (ω, 0)."""
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         q = np.zeros(robot.n)
         J, tool = kin.jacobian(robot, q), kin.fk(robot, q)[:3, 3]
         for axis, column in zip(axes.joint_axes(robot), J.T, strict=True):

@@ -50,7 +50,7 @@ def test_a_jacobian_has_the_axes_of_the_world_frame_or_of_the_tool():
 
 def test_pose_targets_samples_and_twists_of_a_motion_are_in_the_world_frame():
     goal = world(Q + np.array([0.2, 0.1, -0.1, 0.05, 0.1, 0.3]))
-    motion = kin.plan_motion(ARM, [kin.Lin(kin.PoseTarget.of(goal))], Q)
+    motion = kin.plan_motion(ARM, [kin.motion.Lin(kin.motion.PoseTarget.of(goal))], Q)
     assert motion.refusal is None
     assert np.allclose(motion.sample(motion.duration).T, goal, atol=1e-8)
     t = 0.4 * motion.duration
@@ -60,7 +60,7 @@ def test_pose_targets_samples_and_twists_of_a_motion_are_in_the_world_frame():
 
 
 def test_the_table_of_a_motion_is_in_the_world_frame():
-    motion = kin.plan_motion(ARM, [kin.Ptp(Q + 0.2)], Q)
+    motion = kin.plan_motion(ARM, [kin.motion.Ptp(Q + 0.2)], Q)
     heading, *rows = "".join(motion.csv_pieces(20.0)).splitlines()
     names = heading.split(",")
     for row in rows[:: len(rows) - 1]:
@@ -78,7 +78,7 @@ def test_branches_paths_and_postures_are_of_targets_in_the_world_frame():
         assert np.allclose(world(q), targets[0], atol=1e-8)
     path = kin.solve_path(ARM, targets, q_start=Q)
     assert np.allclose([world(q) for q in path.q], targets, atol=1e-8)
-    found = kin.path_postures(ARM, targets, q_start=Q)
+    found = kin.path.path_postures(ARM, targets, q_start=Q)
     assert np.allclose(found.best.q, path.q, atol=1e-9)
 
 
@@ -86,7 +86,7 @@ def test_named_frames_and_screws_are_in_the_world_frame():
     assert np.allclose(kin.frame_pose(ARM, "base"), BASE, atol=1e-12)
     assert np.allclose(kin.frame_pose(ARM, "tool", q=Q), world(Q), atol=1e-12)
     assert np.allclose(kin.frame_pose(ARM, "table", {"table": TOOL}), TOOL, atol=1e-12)
-    screws = kin.screws(ARM)
+    screws = kin.dh.screws(ARM)
     assert np.allclose(screws.pose(Q), world(Q), atol=1e-12)
     assert np.allclose(screws.S[:3, 0], BASE[:3, 2], atol=1e-12)
     assert np.allclose(screws.S[3:, 0], np.cross(BASE[:3, 3], BASE[:3, 2]), atol=1e-12)
@@ -95,7 +95,7 @@ def test_named_frames_and_screws_are_in_the_world_frame():
 def test_sections_and_voxels_are_in_the_world_frame():
     arm = kin.get_robot("scara").with_base(BASE)
     plain = kin.get_robot("scara")
-    section = kin.workspace_section(arm)
+    section = kin.workspace.workspace_section(arm)
     arc = section.arcs[0]
     s, t = arc.points[0]
     point = (BASE @ kin.fk(plain, arc.q))[:3, 3]
@@ -104,7 +104,7 @@ def test_sections_and_voxels_are_in_the_world_frame():
     assert np.allclose([away, along], [s, t], atol=1e-6)
     assert np.allclose(section.v, BASE[:3, 2], atol=1e-9)
     plain = kin.get_robot("puma560")
-    found = kin.capability_map(plain.with_base(BASE), resolution=5, directions=12)
+    found = kin.workspace.capability_map(plain.with_base(BASE), resolution=5, directions=12)
     voxels, ways = np.nonzero(found.approachable)
     for k in range(0, len(voxels), len(voxels) // 10):
         T = np.eye(4)
@@ -128,9 +128,9 @@ def test_a_rotation_mask_has_the_axes_of_the_world_frame_or_of_the_target():
 
 
 def test_clouds_and_sizes_are_in_the_world_frame():
-    cloud = kin.workspace_slice(ARM, 50, 0, 50, with_q=True)
+    cloud = kin.workspace.workspace_slice(ARM, 50, 0, 50, with_q=True)
     assert np.allclose(cloud.points, [world(q)[:3, 3] for q in cloud.q], atol=1e-5)
-    facts = kin.workspace_facts(ARM, volume=False)
+    facts = kin.workspace.workspace_facts(ARM, volume=False)
     for axis, span in enumerate((facts.x, facts.y, facts.z)):
         assert np.isclose(world(span.largest.q)[axis, 3], span.largest.value, atol=1e-6)
     assert np.allclose(np.abs(facts.axis @ BASE[:3, 2]), 1.0)
@@ -138,9 +138,9 @@ def test_clouds_and_sizes_are_in_the_world_frame():
 
 def test_contacts_and_obstacles_are_in_the_world_frame():
     touched = kin.Obstacle("sphere", xyz=tuple(world(Q)[:3, 3] - 0.06 * world(Q)[:3, 2]), radius=0.05, name="ball")
-    assert "ball" in kin.nearest_contact(ARM, Q, [touched]).text
-    points = np.asarray(kin.nearest_links(ARM, Q).points)
-    plain = np.asarray(kin.nearest_links(PLAIN, Q).points)
+    assert "ball" in kin.collision.nearest_contact(ARM, Q, [touched]).text
+    points = np.asarray(kin.collision.nearest_links(ARM, Q).points)
+    plain = np.asarray(kin.collision.nearest_links(PLAIN, Q).points)
     assert np.allclose(points, plain @ BASE[:3, :3].T + BASE[:3, 3], atol=1e-9)
 
 

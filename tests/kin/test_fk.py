@@ -15,7 +15,7 @@ import kin
 from kin import InputError
 from kin.robot import Joint, Robot
 
-ROBOTS = tuple(kin.classic_robots())
+ROBOTS = tuple(kin.files.classic_robots())
 BOTTOMLESS: list[object] = []
 for _ in range(5000):
     BOTTOMLESS = [BOTTOMLESS]

@@ -60,8 +60,8 @@ def test_the_jacobian_is_that_of_the_free_arm_times_the_map(robot):
 @pytest.mark.parametrize("robot", ARMS, ids=["standard", "modified"])
 def test_a_cloud_holds_the_tool_points_of_its_configurations(robot):
     for strategy in ("uniform", "quasi"):
-        points = kin.workspace_slice(robot, 300, 0, 300, strategy=strategy)
-        q = kin.workspace_configurations(robot, range(300), strategy=strategy)
+        points = kin.workspace.workspace_slice(robot, 300, 0, 300, strategy=strategy)
+        q = kin.workspace.workspace_configurations(robot, range(300), strategy=strategy)
         assert points.points == pytest.approx(kin.fk_positions(robot, q), abs=1e-6)
 
 
@@ -74,7 +74,7 @@ def test_limits_and_peaks_of_a_joint_keep_those_of_what_follows_it():
     robot = Robot.from_dh(rows)
     assert robot.joints[0].limits == (-0.5, 0.2)
     assert (robot.lower.tolist(), robot.upper.tolist()) == ([-0.5], [0.2])
-    limits = kin.motion_limits(robot)
+    limits = kin.motion.motion_limits(robot)
     assert (limits.velocity.tolist(), limits.acceleration.tolist()) == ([1.0], [4.0])
     assert robot.rows[0].limits == (-2.0, 2.0), "the row itself keeps what was stated"
     unlimited = Robot.from_dh([Joint("lead", a=0.3), *rows[1:]])
@@ -229,15 +229,15 @@ def assert_same_arm(robot: Robot, other: Robot) -> None:
 @pytest.mark.parametrize("robot", [*ARMS, kin.load_robot(PALLETISER)], ids=["standard", "modified", "palletiser"])
 def test_urdf_and_mjcf_carry_what_follows(robot):
     urdf = kin.robot_to_urdf(robot)
-    back, report = kin.read_urdf(urdf, tip="tool")
+    back, report = kin.files.read_urdf(urdf, tip="tool")
     assert report.following == tuple(row.name for row in robot.rows if row.follows)
     assert report.joints == tuple(joint.name for joint in robot.joints)
     assert report.difference < 1e-12
     assert_same_arm(robot, back)
-    back, report = kin.read_urdf(kin.robot_to_mjcf(robot))
+    back, report = kin.files.read_urdf(kin.robot_to_mjcf(robot))
     assert report.following == tuple(row.name for row in robot.rows if row.follows)
     assert_same_arm(robot, back)
-    assert_same_arm(robot, kin.convert_dh(robot, "standard" if robot.convention == "modified" else "modified"))
+    assert_same_arm(robot, kin.dh.convert_dh(robot, "standard" if robot.convention == "modified" else "modified"))
 
 
 def urdf_of(*joints: str) -> str:
@@ -270,7 +270,7 @@ def test_a_mimic_joint_on_the_way_to_the_tool_follows_with_its_offset():
         f"j3|revolute|{limit}",
         'j4|prismatic|<limit lower="0" upper="0.2"/><mimic joint="j1" multiplier="0.1" offset="0.1"/>',
     ).replace('<link name="l5"/>', "")
-    robot, report = kin.read_urdf(text)
+    robot, report = kin.files.read_urdf(text)
     assert (report.joints, report.following) == (("j2", "j3"), ("j1", "j4"))
     assert report.difference < 1e-14
     # j1 = −2 j3 + 0.3 in ±1, and j4 = 0.1 j1 + 0.1 in 0 to 0.2: j1 from −1 to 1.
@@ -292,7 +292,7 @@ def test_the_first_follower_stands_for_a_leader_beside_the_arm():
         "motor",
         'lower="-0.2" upper="0.3"',
     )
-    robot, report = kin.read_urdf(text, tip="l2")
+    robot, report = kin.files.read_urdf(text, tip="l2")
     assert (report.joints, report.following) == (("j1",), ("j2",))
     assert robot.joints[0].limits == pytest.approx((-0.3, 0.7)), "2 times those of the motor, and 0.1"
     assert report.notes[0].startswith("Joint j1 follows motor, which is beside the arm")
@@ -323,7 +323,7 @@ def test_a_mimic_joint_that_cannot_be_followed_is_named(mimic, field, valid):
         "j4|fixed|",
     )
     with pytest.raises(kin.RobotFileError, match=valid) as caught:
-        kin.read_urdf(text, tip="l4")
+        kin.files.read_urdf(text, tip="l4")
     assert caught.value.field == field
 
 
@@ -335,7 +335,7 @@ def test_an_equality_of_mjcf_counts_from_the_first_configuration():
             <site name="tip" pos="0.2 0 0"/></body></body></worldbody>
             <equality><joint joint1="follow" joint2="lead" {polycoef}/></equality></mujoco>"""
 
-    robot, report = kin.read_urdf(mjcf('polycoef="0.05 -2 0 0 0"'), tip="tip")
+    robot, report = kin.files.read_urdf(mjcf('polycoef="0.05 -2 0 0 0"'), tip="tip")
     assert (report.joints, report.following) == (("lead",), ("follow",))
     free = kin.load_robot(mjcf('active="false"'), tip="tip")
     follow = 0.1 + 0.05 - 2.0 * (0.7 - 0.4)
@@ -360,12 +360,12 @@ def test_what_follows_a_locked_joint_stands_still_with_it():
 def test_what_has_no_meaning_for_rows_that_follow_is_refused():
     robot = arm()
     with pytest.raises(InputError, match=r"Robot\.free"):
-        kin.screws(robot)
+        kin.dh.screws(robot)
     with pytest.raises(InputError, match=r"Robot\.free"):
         kin.compare(robot, robot.free)
     q = robot.random_q(np.random.default_rng(4), 20)
-    assert np.abs(kin.screws(robot.free).pose(robot.expand(q)) - kin.fk(robot, q)).max() < 1e-12
-    assert kin.compare(robot, kin.convert_dh(robot, "modified")).verdict == "identical"
+    assert np.abs(kin.dh.screws(robot.free).pose(robot.expand(q)) - kin.fk(robot, q)).max() < 1e-12
+    assert kin.compare(robot, kin.dh.convert_dh(robot, "modified")).verdict == "identical"
 
 
 def test_bodies_of_a_follower_are_where_its_offset_puts_them():
@@ -408,7 +408,9 @@ def test_motions_keep_the_speeds_of_what_follows():
     target = robot.q_home + np.array([0.5, 0.4, 0.6, 1.0])
     T = kin.fk(robot, robot.q_home)
     T[:3, 3] += [0.1, 0.3, -0.1]
-    motion = kin.plan_motion(robot, [kin.Ptp(kin.JointTarget(tuple(target))), kin.Lin(kin.PoseTarget.of(T))])
+    motion = kin.plan_motion(
+        robot, [kin.motion.Ptp(kin.motion.JointTarget(tuple(target))), kin.motion.Lin(kin.motion.PoseTarget.of(T))]
+    )
     times = np.linspace(0.0, motion.duration, 200)
     sample = motion.sample(times)
     assert np.abs(sample.qd[:, 2]).max() == pytest.approx(0.2, rel=0.05)
@@ -425,8 +427,8 @@ def test_where_joint_1_is_followed_the_workspace_is_no_body_of_revolution():
     ]
     robot = Robot.from_dh(rows)
     with pytest.raises(InputError, match="does not turn the whole arm"):
-        kin.workspace_section(robot, resolution=8)
-    x = [end.value for end in kin.workspace_facts(robot, effort=2, volume=False).x]
+        kin.workspace.workspace_section(robot, resolution=8)
+    x = [end.value for end in kin.workspace.workspace_facts(robot, effort=2, volume=False).x]
     sampled = kin.fk_positions(robot, robot.random_q(np.random.default_rng(9), 20_000))[:, 0]
     assert (x[0] <= sampled.min(), sampled.max() <= x[1]) == (True, True)
     assert x == pytest.approx((sampled.min(), sampled.max()), abs=0.02)

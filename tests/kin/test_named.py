@@ -9,6 +9,7 @@ import pytest
 
 import kin
 from kin import InputError, UnknownRobotError
+from scripts.surface import public
 
 UR5 = kin.get_robot("ur5")
 T = kin.fk(UR5, UR5.q_home)
@@ -55,12 +56,13 @@ CALLS = {
 }
 # The same of those that take an arm with motors.
 OF_MOTORS = {
-    "match_motors": (POSES, kin.readings_from_q(SO101, POSES)),
+    "match_motors": (POSES, kin.motors.readings_from_q(SO101, POSES)),
     "motor_poses": (2,),
     "motors_from_lerobot": ({"shoulder_pan": PAN},),
-    "q_from_readings": (kin.readings_from_q(SO101, POSES),),
+    "q_from_readings": (kin.motors.readings_from_q(SO101, POSES),),
     "readings_from_q": (POSES,),
 }
+FUNCTIONS = {name.rpartition(".")[2]: value for name, value in public().items() if inspect.isfunction(value)}
 MORE = {
     "capability_map": {"resolution": 2, "directions": 12},
     "workspace_section": {"resolution": 8},
@@ -69,18 +71,17 @@ MORE = {
 
 
 def test_the_table_names_every_function_that_takes_a_robot():
-    functions = {name: value for name, value in vars(kin).items() if inspect.isfunction(value)}
-    first = {name: next(iter(inspect.signature(value).parameters), "") for name, value in functions.items()}
+    first = {name: next(iter(inspect.signature(value).parameters), "") for name, value in FUNCTIONS.items()}
     taking = {name for name, parameter in first.items() if parameter == "robot"}
     # `show` and `save_page` ask the service, which finds the robot; no built-in arm has a calibration to write.
-    assert taking & set(kin.__all__) == {*CALLS, *OF_MOTORS, "show", "save_page", "motors_to_lerobot"}
+    assert taking == {*CALLS, *OF_MOTORS, "show", "save_page", "motors_to_lerobot"}
 
 
 def found(name, robot, tmp_path):
     arguments = CALLS.get(name) or OF_MOTORS.get(name, ())
     if name == "save_robot":
         arguments = (tmp_path / "robot.toml",)
-    result = getattr(kin, name)(robot, *arguments, **MORE.get(name, {}))
+    result = FUNCTIONS[name](robot, *arguments, **MORE.get(name, {}))
     if name == "save_robot":
         return arguments[0].read_text()
     return repr(list(result) if name == "sample_workspace" else result)
@@ -112,8 +113,10 @@ def test_the_id_of_a_robot_is_as_good_as_the_robot(name, tmp_path):
 
 def test_a_program_is_read_for_a_robot_by_its_id():
     data = {"units": {"length": "mm", "angle": "deg"}, "segments": [{"kind": "ptp", "q": [10, 20, 30, 40]}]}
-    assert kin.program_from_dict(data, "scara") == kin.program_from_dict(data, kin.get_robot("scara"))
-    assert kin.program_from_dict(data, "scara") != kin.program_from_dict(data)
+    assert kin.motion.program_from_dict(data, "scara") == kin.motion.program_from_dict(
+        data, kin.get_robot("scara")
+    )
+    assert kin.motion.program_from_dict(data, "scara") != kin.motion.program_from_dict(data)
 
 
 def test_results_print_as_one_line():
@@ -122,9 +125,9 @@ def test_results_print_as_one_line():
     far[2, :3, 3] = 5.0
     path = kin.solve_path(UR5, far, max_step=0.05)
     narrowed = kin.solve_ik("ur5", T, limits=[(0.0, 0.1)] + [None] * 5)
-    (chunk,) = kin.sample_workspace("ur5", 8, with_q=True, measure="limit_margin")
-    facts = kin.workspace_facts("ur5", volume=False)
-    section = kin.workspace_section("ur5", resolution=8)
+    (chunk,) = kin.workspace.sample_workspace("ur5", 8, with_q=True, measure="limit_margin")
+    facts = kin.workspace.workspace_facts("ur5", volume=False)
+    section = kin.workspace.workspace_section("ur5", resolution=8)
     grid = kin.workspace.capability_grid("ur5", resolution=2, directions=12)
     block = kin.workspace.capability_block(grid, 0)
     results = [

@@ -34,7 +34,7 @@ CASES = [
 def test_every_call_is_answered(robot):
     assert inspect(robot).motions <= min(robot.n, 6)
     assert kin.robot_from_dict(kin.robot_to_dict(robot)) == robot
-    assert kin.convert_dh(kin.convert_dh(robot, "standard"), "modified").n == robot.n
+    assert kin.dh.convert_dh(kin.dh.convert_dh(robot, "standard"), "modified").n == robot.n
     q = robot.random_q(np.random.default_rng(1))
     T = kin.fk(robot, q)
     far = T.copy()

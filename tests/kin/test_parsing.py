@@ -173,14 +173,14 @@ def test_a_robot_file_with_a_key_of_many_parts_is_refused():
 @pytest.mark.parametrize("text", ["a" + ".a" * 500 + " = 1", '{"a": ' + "[" * 500 + "]" * 500 + "}"])
 def test_a_program_that_is_nested_deeply_is_refused(text):
     with pytest.raises(kin.InputError, match=r"program: got '.* more than 16 (parts|deep)', expected at most 16"):
-        kin.parse_program(text)
+        kin.motion.parse_program(text)
 
 
 def test_a_calibration_that_is_nested_deeply_is_refused():
     with pytest.raises(kin.InputError, match="calibration: got 'nested more than 4 deep', expected at most"):
-        kin.motors_from_lerobot("so101", '{"a": ' + "[" * 100 + "]" * 100 + "}")
+        kin.motors.motors_from_lerobot("so101", '{"a": ' + "[" * 100 + "]" * 100 + "}")
     with pytest.raises(kin.InputError, match="expected LeRobot's calibration"):
-        kin.motors_from_lerobot("so101", "{")
+        kin.motors.motors_from_lerobot("so101", "{")
 
 
 def test_the_arms_of_the_library_are_far_from_the_limits():

@@ -189,15 +189,15 @@ def test_two_files_with_the_same_id(tmp_path):
     for name in ("a.toml", "b.toml"):
         (tmp_path / name).write_text(GOOD, encoding="utf-8")
     with pytest.raises(RobotFileError, match="no other file"):
-        kin.load_robots(tmp_path)
+        kin.files.load_robots(tmp_path)
 
 
 def test_built_in_files_are_named_after_their_robots():
-    ids = list(kin.classic_robots())
+    ids = list(kin.files.classic_robots())
     assert sorted(path.stem for path in BUILTIN.glob("*.toml")) == sorted(ids)
     assert ids[:3] == list(CHAPTER_ARMS)  # these come first in every list
     assert ids[3:] == sorted(ids[3:])
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         assert robot.in_limits(robot.q_home)
         assert robot.source
         assert robot.description
@@ -227,7 +227,7 @@ def test_random_configurations_are_inside_the_limits():
 
 
 def test_reach_bounds_every_pose_and_is_infinite_without_limits():
-    for robot in (*kin.classic_robots().values(), kin.load_robot(GOOD)):
+    for robot in (*kin.files.classic_robots().values(), kin.load_robot(GOOD)):
         q = robot.random_q(np.random.default_rng(1), 5000)
         origin = robot.T_world_base[:3, 3]
         assert np.linalg.norm(kin.fk(robot, q)[:, :3, 3] - origin, axis=-1).max() <= robot.reach
@@ -246,7 +246,7 @@ def read_again(robot, **units):
     return by_json
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda robot: robot.id)
 def test_writing_and_reading_gives_an_equal_robot(robot, tmp_path):
     assert read_again(robot) == robot
     kin.save_robot(robot, tmp_path / "arm.toml")
@@ -465,15 +465,15 @@ def test_lengths_keep_their_digits_in_any_unit(unit, per_metre):
 @pytest.mark.parametrize(
     ("call", "field", "valid"),
     [
-        (lambda: kin.load_robots(None), "folder", "a path"),
-        (lambda: kin.load_robots("/no/such/folder"), "folder", "a folder that can be read"),
-        (lambda: kin.load_robots(Path("with\0null")), "folder", "a folder that can be read"),
+        (lambda: kin.files.load_robots(None), "folder", "a path"),
+        (lambda: kin.files.load_robots("/no/such/folder"), "folder", "a folder that can be read"),
+        (lambda: kin.files.load_robots(Path("with\0null")), "folder", "a folder that can be read"),
         (lambda: kin.load_robot(None), "source", "the path of a file, or the text of a robot file, URDF or MJCF"),
         (lambda: kin.load_robot(b"<robot/>"), "source", "the path of a file"),
         (lambda: kin.load_robot(GOOD, tip="tool"), "tip", "a robot file has no links"),
         (lambda: kin.files.parse_robot(b""), "text", "the text of a robot file"),
         (lambda: kin.files.parse_robot(Path("arm.toml")), "text", "kin.load_robot takes a path"),
-        (lambda: kin.urdf_tips(b"<robot/>"), "source", "the text of a URDF"),
+        (lambda: kin.files.urdf_tips(b"<robot/>"), "source", "the text of a URDF"),
     ],
 )
 def test_what_is_no_file_is_refused_with_what_is_valid(call, field, valid):
@@ -493,7 +493,7 @@ def test_a_path_instead_of_the_text_of_a_robot_file_is_named(path):
 
 
 def test_a_folder_may_be_given_as_text(tmp_path):
-    assert kin.load_robots(str(tmp_path)) == {}
+    assert kin.files.load_robots(str(tmp_path)) == {}
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import kin
 from kin.fk import manipulability
 
 GOLDEN = json.loads((Path(__file__).parent.parent / "data" / "golden-fk.json").read_text(encoding="utf-8"))
-ROBOTS = tuple(kin.classic_robots())
+ROBOTS = tuple(kin.files.classic_robots())
 
 
 def poses(robot_id):

@@ -273,7 +273,7 @@ def test_manipulability_of_the_srs_arm():
 # Reports
 
 
-@pytest.mark.parametrize("robot_id", kin.classic_robots())
+@pytest.mark.parametrize("robot_id", kin.files.classic_robots())
 def test_singularities_are_sorted_by_distance_with_lengths_relative_to_the_reach(robot_id):
     robot = kin.get_robot(robot_id)
     for q in robot.random_q(np.random.default_rng(8), 200):
@@ -301,7 +301,7 @@ def test_the_sentence_gives_the_joint_values_of_the_singular_posture():
     assert elbow.distance <= 1e-15
 
 
-@pytest.mark.parametrize("robot_id", kin.classic_robots())
+@pytest.mark.parametrize("robot_id", kin.files.classic_robots())
 @pytest.mark.parametrize("q", [[0.0], [0.0] * 8, [[0.0] * 7] * 2, [[0.0] * 5], [math.nan] * 7, "home"])
 def test_invalid_configurations_are_rejected(robot_id, q):
     with pytest.raises(InputError, match="q"):

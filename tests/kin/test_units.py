@@ -142,7 +142,7 @@ def test_sentences_are_in_the_units_of_the_reader() -> None:
     """Every kind of answer of every arm in other units: no millimetres, no degrees, and the sizes are the same."""
     rng = np.random.default_rng(2)
     seen = set()
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         for k in range(4):
             T = kin.fk(robot, robot.random_q(rng))
             T[:3, 3] *= 1.0 + 0.4 * k

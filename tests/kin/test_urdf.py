@@ -48,7 +48,7 @@ GOOD = """<?xml version="1.0"?>
 
 
 def test_a_chain_becomes_a_robot():
-    robot, report = kin.read_urdf(GOOD, tip="tcp")
+    robot, report = kin.files.read_urdf(GOOD, tip="tcp")
     assert (robot.id, robot.name, robot.n) == ("bench-arm-2", "Bench arm 2", 3)
     assert [row.kind for row in robot.joints] == ["revolute", "prismatic", "revolute"]
     assert [row.limits for row in robot.joints] == [(-1.0, 2.0), (0.0, 0.4), None]
@@ -57,7 +57,7 @@ def test_a_chain_becomes_a_robot():
     assert (report.base, report.tip, report.joints) == ("world", "tcp", ("shoulder", "slide", "wrist"))
     assert (report.merged, report.ignored) == (("stand", "flange"), ("mount",))
     assert [(tip.link, tip.joints) for tip in report.tips] == [("tcp", 3), ("camera", 1)]
-    assert kin.urdf_tips(GOOD) == report.tips
+    assert kin.files.urdf_tips(GOOD) == report.tips
     assert report.difference <= EXACT
     # Zero positions and directions are those of the file: the shoulder turns about −z.
     zero, turned = kin.fk(robot, [0, 0, 0]), kin.fk(robot, [0.5, 0, 0])
@@ -90,20 +90,22 @@ BESIDE = """
 def test_only_joints_of_the_chain_are_judged(old, new, placed):
     """A gripper joint beyond the tip may have limits without a range, or say what nobody can read."""
     text = GOOD.replace("</robot>", BESIDE.replace(old, new))
-    robot, report = kin.read_urdf(text, tip="tcp")
+    robot, report = kin.files.read_urdf(text, tip="tcp")
     assert (robot.n, "finger" in report.ignored) == (3, True)
     assert any("claw" in body.names for body in report.bodies) is placed
     if old:
         with pytest.raises(RobotFileError, match="joint finger"):
-            kin.read_urdf(text, tip="claw")
+            kin.files.read_urdf(text, tip="claw")
     else:
-        assert "Joint finger has limits that are both zero" in kin.read_urdf(text, tip="claw").report.notes[0]
+        assert (
+            "Joint finger has limits that are both zero" in kin.files.read_urdf(text, tip="claw").report.notes[0]
+        )
 
 
 def test_base_and_tip_may_be_any_links_of_the_chain(tmp_path):
     path = tmp_path / "bench.urdf"
     path.write_text(GOOD, encoding="utf-8")
-    robot, report = kin.read_urdf(path, base="upper", tip="hand")
+    robot, report = kin.files.read_urdf(path, base="upper", tip="hand")
     assert report.joints == ("slide", "wrist")
     assert robot.source == "URDF bench.urdf, from link upper to link hand"
 
@@ -212,8 +214,8 @@ def test_what_is_wrong_beside_the_chain_is_left_out(old, new, field):
     """Other readers take such a file; it concerns the arm only if it may be a part of it."""
     assert old in GRIPPER
     text = GOOD.replace("</robot>", GRIPPER.replace(old, new))
-    whole, _ = kin.read_urdf(GOOD.replace("</robot>", GRIPPER), base="world", tip="tcp")
-    robot, _ = kin.read_urdf(text, base="world", tip="tcp")
+    whole, _ = kin.files.read_urdf(GOOD.replace("</robot>", GRIPPER), base="world", tip="tcp")
+    robot, _ = kin.files.read_urdf(text, base="world", tip="tcp")
     assert robot == whole
     if "plam" not in new and new != "<joint":
         assert kin.load_robot(text, tip="tcp") == whole
@@ -261,7 +263,7 @@ BOMB = '<!DOCTYPE robot [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><robot name="&
 def test_hostile_xml_is_refused_at_once(text, field):
     start = time.process_time()
     with pytest.raises(RobotFileError) as caught:
-        kin.read_urdf(text)
+        kin.files.read_urdf(text)
     assert caught.value.field == field
     assert len(str(caught.value)) < 400
     assert time.process_time() - start < 5.0
@@ -282,7 +284,7 @@ def test_a_text_of_read_urdf_is_never_a_path(tmp_path):
     path.write_text(TWO, encoding="utf-8")
     assert kin.load_robot(path).n == kin.load_robot(str(path)).n == 2
     with pytest.raises(RobotFileError, match=r"the text of a URDF, or the Path of a file: pathlib\.Path"):
-        kin.read_urdf(str(path))
+        kin.files.read_urdf(str(path))
 
 
 @pytest.mark.parametrize("encoding", ["iso-8859-1", "utf-16", "klingon"])
@@ -293,21 +295,21 @@ def test_a_text_is_decoded_already(encoding):
 
 @pytest.mark.parametrize("axis", ["0 1e-8 1", "1e-8 0 -1", "1e-9 2e-9 1", "0 1e-300 1", "0 0 -1"])
 def test_axes_that_are_almost_z_are_kept(axis):
-    _, report = kin.read_urdf(TWO.replace('xyz="0 0 1"', f'xyz="{axis}"'))
+    _, report = kin.files.read_urdf(TWO.replace('xyz="0 0 1"', f'xyz="{axis}"'))
     assert report.difference < 2e-15
     assert report.notes == ()
 
 
 def test_a_difference_beyond_rounding_is_noted(monkeypatch):
     monkeypatch.setattr("kin.files.urdf.read._difference", lambda *_: 3e-12)
-    assert "up to 3.0e-12" in kin.read_urdf(TWO).report.notes[0]
+    assert "up to 3.0e-12" in kin.files.read_urdf(TWO).report.notes[0]
     far = TWO.replace('origin xyz="1 0 0"', 'origin xyz="2 0 0"')
-    assert kin.read_urdf(far).report.notes == ()  # of a reach of 4 m
+    assert kin.files.read_urdf(far).report.notes == ()  # of a reach of 4 m
 
 
 def test_huge_limits_stand_for_none():
     limit = '<limit lower="-1e16" upper="1e16" effort="1e6" velocity="inf"/>'
-    robot, report = kin.read_urdf(TWO.replace('<limit lower="-1" upper="1"/>', limit))
+    robot, report = kin.files.read_urdf(TWO.replace('<limit lower="-1" upper="1"/>', limit))
     joint = robot.joints[1]
     assert (joint.limits, joint.velocity, joint.effort) == (None, None, None)
     assert report.notes == (
@@ -319,7 +321,7 @@ def test_huge_limits_stand_for_none():
 
 def test_names_of_tilts_are_distinct():
     text = TWO.replace('xyz="0 0 1"', 'xyz="1e-3 0 1"').replace('name="k"', 'name="j tilt"')
-    robot, report = kin.read_urdf(text)
+    robot, report = kin.files.read_urdf(text)
     assert [row.name for row in robot.rows] == ["j", "j tilt 2", "j tilt"]
     assert report.tilts == ("j tilt 2",)
     assert kin.load_robot(kin.robot_to_toml(robot)) == robot
@@ -361,7 +363,7 @@ def steps_to_read(teeth: int) -> int:
 
     sys.settrace(count)
     try:
-        kin.read_urdf(text, tip="t3")
+        kin.files.read_urdf(text, tip="t3")
     finally:
         sys.settrace(before)
     return steps
@@ -376,15 +378,15 @@ def test_the_work_grows_no_faster_than_the_file():
 def test_the_number_of_links_is_bounded():
     largest = comb((MAX_LINKS - 1) // 2)
     assert len(largest) < MAX_BYTES
-    robot, report = kin.read_urdf(largest, tip="t3")
+    robot, report = kin.files.read_urdf(largest, tip="t3")
     assert robot.n == 4
     assert report.tips[0] == ("l2499", 2499)
     with pytest.raises(RobotFileError, match=r"link: got '5001 links'.*at most 5000 links"):
-        kin.read_urdf(comb(MAX_LINKS // 2), tip="t3")
+        kin.files.read_urdf(comb(MAX_LINKS // 2), tip="t3")
 
 
 def test_a_joint_without_limits_is_noted():
-    robot, report = kin.read_urdf(GOOD.replace('lower="-1" upper="2" ', ""), tip="tcp")
+    robot, report = kin.files.read_urdf(GOOD.replace('lower="-1" upper="2" ', ""), tip="tcp")
     assert robot.joints[0].limits == (-math.pi, math.pi)
     assert report.notes == ("Joint shoulder states no limits: it gets −180° to 180°.",)
 
@@ -398,7 +400,7 @@ def test_a_joint_without_limits_is_noted():
     ],
 )
 def test_manufacturers_files(name, tip, family, same_as):
-    robot, report = kin.read_urdf(FILES / f"{name}.urdf", tip=tip)
+    robot, report = kin.files.read_urdf(FILES / f"{name}.urdf", tip=tip)
     assert report.difference <= EXACT
     assert report.tilts == ()
     form = closed_form_of(robot)
@@ -410,9 +412,9 @@ def test_manufacturers_files(name, tip, family, same_as):
         assert np.abs(kin.fk(ours, q) - kin.fk(robot, q)).max() < 1e-9
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda robot: robot.id)
 def test_a_built_in_arm_written_and_read(robot):
-    again, report = kin.read_urdf(kin.robot_to_urdf(robot))
+    again, report = kin.files.read_urdf(kin.robot_to_urdf(robot))
     q = robot.random_q(np.random.default_rng(0), 100)
     assert np.abs(kin.fk(robot, q) - kin.fk(again, q)).max() <= EXACT
     assert report.difference <= EXACT
@@ -424,7 +426,7 @@ def test_a_built_in_arm_written_and_read(robot):
 @given(st.integers(0, 2**32 - 1))
 def test_any_arm_written_and_read(seed):
     robot = random_robot(seed)
-    again, report = kin.read_urdf(kin.robot_to_urdf(robot))
+    again, report = kin.files.read_urdf(kin.robot_to_urdf(robot))
     q = robot.random_q(np.random.default_rng(0), 16)
     assert np.abs(kin.fk(robot, q) - kin.fk(again, q)).max() <= EXACT
     assert report.difference <= EXACT
@@ -475,12 +477,12 @@ def test_names_and_limits_are_written():
 )
 def test_names_are_written_once(names, written):
     text = kin.robot_to_urdf(Robot.from_dh([Joint(name, a=0.1, limits=(-1, 1)) for name in names]))
-    _, report = kin.read_urdf(text)
+    _, report = kin.files.read_urdf(text)
     assert [*report.joints, *report.merged] == written
 
 
 def test_exchanged_limits_are_put_in_order_and_the_report_says_so():
-    robot, report = kin.read_urdf(GOOD.replace('lower="-1" upper="2"', 'lower="2" upper="-1"'), tip="tcp")
+    robot, report = kin.files.read_urdf(GOOD.replace('lower="-1" upper="2"', 'lower="2" upper="-1"'), tip="tcp")
     assert robot.joints[0].limits == (-1.0, 2.0)
     assert [note for note in report.notes if "shoulder" in note] == [
         "Joint shoulder has a lower limit above the upper one: they are read as -1 to 2 rad."
@@ -496,7 +498,7 @@ def test_exchanged_limits_are_put_in_order_and_the_report_says_so():
 )
 def test_a_joint_with_one_value_only_is_fixed_there(old, new, at, note):
     whole = kin.load_robot(GOOD, tip="tcp")
-    held, report = kin.read_urdf(GOOD.replace(old, new), tip="tcp")
+    held, report = kin.files.read_urdf(GOOD.replace(old, new), tip="tcp")
     assert held.n == 2
     assert note in " ".join(report.notes)
     assert report.difference < EXACT

@@ -18,7 +18,9 @@ from app.exports.robots import FORMATS, file_name, robot_file
 from app.shared.answers.examination import ExaminationAnswer, examination_answer
 from app.shared.answers.exchange import ConvertAnswer, ImportAnswer, convert_answer, import_answer
 from app.shared.answers.inspection import InspectionAnswer, inspect
-from kin import Robot, RobotFileError, examine_urdf, read_urdf
+from kin import Robot, RobotFileError
+from kin.doctor import examine_urdf
+from kin.files import read_urdf
 from kin.files.urdf.xml import MAX_BYTES
 
 router = versioned("robots")

@@ -17,7 +17,8 @@ from app.api.schemas import POST_REFUSALS, Configuration, as_configurations, exa
 from app.api.work import Deadline, computed
 from app.shared.answers.motors import MotorMatchAnswer, motor_match_answer
 from app.shared.problems import from_input_error
-from kin import Motor, Robot, RobotFileError, match_motors, robot_from_dict, robot_to_dict
+from kin import Robot, RobotFileError, robot_from_dict, robot_to_dict
+from kin.motors import Motor, match_motors
 from kin.transforms import Array
 
 router = versioned("robots")

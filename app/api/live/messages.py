@@ -22,10 +22,12 @@ from app.api.workspace.query import validated
 from app.live import VALUES
 from app.shared.problems import FieldError, from_input_error, show
 from app.shared.store import Store
-from kin import InputError, Robot, UnknownRobotError, program_from_dict, q_from_readings
+from kin import InputError, Robot, UnknownRobotError
 from kin.collision.obstacles import MOST_OBSTACLES, checked_obstacles
-from kin.poses import check_length
+from kin.motion import program_from_dict
+from kin.motors import q_from_readings
 from kin.motors.joints import moving_motors, of_moving
+from kin.poses import check_length
 from kin.transforms import Array
 
 MOST_BYTES = 64 * 1024  # of a message

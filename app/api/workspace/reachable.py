@@ -23,8 +23,8 @@ from app.shared.answers.answer import Answer
 from app.shared.answers.ik import Brief, ReachableAnswer, WholeAnswers, reachable_answer, reachable_renewed
 from app.shared.problems import Problem
 from app.shared.settings import Settings
-from kin import IKOptions, Robot, Task
-from kin.ik import solve
+from kin import IKOptions, Robot
+from kin.ik import Task, solve
 from kin.ik.table import Table
 from kin.transforms import Array
 

@@ -12,7 +12,7 @@ import numpy as np
 from app.bench.arms import Arm, ortho
 from app.bench.contestants.contestant import Contestant, our_joints, with_tool_rotation, without_tool_rotation
 from app.bench.rows import Task
-from kin.dh import table_of_chain
+from kin.dh.tables import table_of_chain
 from kin.robot import Joint, Kind
 from kin.transforms import Array
 

@@ -1,4 +1,4 @@
-"""Motions: ours, and those of other libraries. Limits are those of `kin.motion_limits`, assumed ones included."""
+"""Motions: ours, and those of other libraries. Limits are ours, assumed ones included."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _FREE = 1e6  # the largest squared speed along a path where nothing else limits 
 
 def limits_of(task: Task) -> Array:
     """Velocity, acceleration and jerk of each joint ``(n, 3)``."""
-    limits = kin.motion_limits(task.robot)
+    limits = kin.motion.motion_limits(task.robot)
     return np.stack([limits.velocity, limits.acceleration, limits.jerk], axis=1)
 
 
@@ -42,7 +42,9 @@ def ours(task: Task) -> list[Contestant]:
     robot, home, limits = task.robot, task.robot.q_home, limits_of(task)
     match task.row.kind:
         case "ptp":
-            programs = [kin.Program((kin.Ptp(kin.JointTarget(tuple(q))),)) for q in task.q.tolist()]
+            programs = [
+                kin.motion.Program((kin.motion.Ptp(kin.motion.JointTarget(tuple(q))),)) for q in task.q.tolist()
+            ]
             return [
                 Contestant(OURS, JointMotion.between, [(home, q, limits) for q in task.q], _of_piece),
                 Contestant(
@@ -67,18 +69,20 @@ def ours(task: Task) -> list[Contestant]:
             return [Contestant(OURS, timed, paths, lambda found: [_of_piece(found)[0][:3]])]
         case _:
 
-            def line(target: kin.PoseTarget) -> Array:
-                motion = kin.plan_motion(robot, [kin.Lin(target)])
+            def line(target: kin.motion.PoseTarget) -> Array:
+                motion = kin.plan_motion(robot, [kin.motion.Lin(target)])
                 return motion.sample(np.linspace(0.0, motion.duration, POINTS)).T
 
-            return [Contestant(OURS, line, [(kin.PoseTarget.of(T),) for T in task.T], lambda found: [found[-1]])]
+            return [
+                Contestant(OURS, line, [(kin.motion.PoseTarget.of(T),) for T in task.T], lambda found: [found[-1]])
+            ]
 
 
 def _of_piece(piece: Piece) -> list[Array]:
     return [piece.at(np.linspace(0.0, piece.duration, _LOOK))]
 
 
-def _of_motion(motion: kin.Motion) -> list[Array]:
+def _of_motion(motion: kin.motion.Motion) -> list[Array]:
     return [motion.derivatives(np.linspace(0.0, motion.duration, _LOOK))]
 
 

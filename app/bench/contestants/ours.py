@@ -55,7 +55,7 @@ def ours(task: Task) -> list[Contestant]:
     found = []
     if row.kind == "branches":
         found.append(Contestant(OURS, kin.ik_branches, [(robot, T, row.value) for T in task.T], one_answer))
-    kind: kin.Task = "approach" if row.approach else "pose"
+    kind: kin.ik.Task = "approach" if row.approach else "pose"
     anywhere = row.kind == "branches"
     free = None if math.isnan(row.value) else row.value
 
@@ -95,8 +95,8 @@ def _cloud(task: Task) -> list[Contestant]:
         sample_points(region.arm, streams, 0, out)
         return out
 
-    def generator() -> list[kin.WorkspaceChunk]:
-        return list(kin.sample_workspace(robot, count))
+    def generator() -> list[kin.workspace.WorkspaceChunk]:
+        return list(kin.workspace.sample_workspace(robot, count))
 
     def numbers() -> None:
         sample_configurations(region.arm, streams, 0, q)
@@ -116,7 +116,7 @@ def _cloud(task: Task) -> list[Contestant]:
     ]
 
 
-def _chunks(chunks: list[kin.WorkspaceChunk]) -> list[Array]:
+def _chunks(chunks: list[kin.workspace.WorkspaceChunk]) -> list[Array]:
     return [point for chunk in chunks for point in chunk.points]
 
 

@@ -15,8 +15,8 @@ from app.cli.pipes.poses import INVALID, NOTHING, Counted, PoseTable, Target, Wr
 from app.cli.pipes.sink import Sink, form_of, opened_sink
 from app.cli.pipes.source import Goal, opened_source
 from app.shared.answers.ik import IkAnswer, ik_answer
-from kin import IKOptions, InputError, Robot, Status, Task
-from kin.ik import solve
+from kin import IKOptions, InputError, Robot, Status
+from kin.ik import Task, solve
 from kin.ik.problem import read_pose
 from kin.solvers.contract import POSE
 

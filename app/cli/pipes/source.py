@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from app.cli.pipes.columns import Columns
 from app.cli.pipes.parquet import MAGIC, opened_columns, rows_of
 from app.cli.pipes.poses import NOTHING, PoseTable, Wrong
-from kin import InputError, Robot, Task
+from kin import InputError, Robot
+from kin.ik import Task
 from kin.ik.problem import read_pose
 from kin.joint import PendantMap
 from kin.poses.fields import FIELDS, ORIENTATIONS, orientation, text_target, whole_matrix

@@ -68,7 +68,7 @@ class DHKind(Kind):
 
     def _arm(self, variant: Variant) -> Robot:
         robot = variant.robot
-        arm = robot if self.convention is None else kin.convert_dh(robot, self.convention)
+        arm = robot if self.convention is None else kin.dh.convert_dh(robot, self.convention)
         if self.last >= len(arm.rows):
             raise ValueError(f"row {self.last + 1} does not exist: the arm has {len(arm.rows)} rows")
         return arm
@@ -92,7 +92,7 @@ class DHKind(Kind):
         parts = tuple((not why, f"Row {self.first + i + 1}: {why or 'right.'}") for i, why in enumerate(wrong))
         credit = round(sum(not why for why in wrong) / count, 3)
         other: Convention = "modified" if arm.convention == "standard" else "standard"
-        if not any(self._faults(kin.convert_dh(arm, other), variant.q, rows)):
+        if not any(self._faults(kin.dh.convert_dh(arm, other), variant.q, rows)):
             said = f"This is correct for the other convention, {_WORDS[other]}. Asked is {_WORDS[arm.convention]}."
             return Verdict(False, said, 0.5, parts)
         if slip := self._unit_slip(arm, variant.q, rows, units):

@@ -14,7 +14,8 @@ from app.exercises.contract import LONGEST_PROGRAM, Kind
 from app.exercises.expressions import Expression
 from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
-from kin import InputError, Motion
+from kin import InputError
+from kin.motion import Motion
 from kin.transforms import Array
 from kin.units import Units, general
 
@@ -47,7 +48,7 @@ class ProgramKind(Kind):
     def judge(self, variant: Variant, given: object, units: Units) -> Verdict:
         if not isinstance(given, str) or len(given) > LONGEST_PROGRAM:
             raise InputError("answer", given, f"a program of at most {LONGEST_PROGRAM} characters")
-        program = kin.parse_program(given, variant.robot)
+        program = kin.motion.parse_program(given, variant.robot)
         if len(program.segments) > MOST_SEGMENTS:
             raise InputError("segments", len(program.segments), f"at most {MOST_SEGMENTS} segments")
         motion = kin.plan_motion(variant.robot, program, variant.q)

@@ -16,7 +16,8 @@ from app.exercises.expressions import Expression
 from app.exercises.fields import Fields
 from app.exercises.questions import Asked, Verdict
 from app.exercises.variant import Variant
-from kin import IKOptions, JointConstraints, Robot, Task
+from kin import IKOptions, JointConstraints, Robot
+from kin.ik import Task
 from kin.ik.options import TASKS
 from kin.motion import Lin, PoseTarget, Program
 from kin.transforms import Array, rotation_angle, vector_angle
@@ -156,7 +157,7 @@ class ReachKind(Kind):
         T = np.repeat(variant.pose[None], PLACES, axis=0)
         way = np.array([variant.number(value) for value in self.line]) - variant.pose[:3, 3]
         T[:, :3, 3] += np.linspace(0.0, 1.0, PLACES)[:, None] * way
-        found = kin.path_postures(variant.robot, T, options=options)
+        found = kin.path.path_postures(variant.robot, T, options=options)
         if not found.through:
             raise ValueError(f"no posture leads along the line: {found.reason}")
         return found.q[0, found.through[0]].tolist()

@@ -15,7 +15,7 @@ from app.exercises.contract import Kind
 from app.exercises.questions import Asked, Verdict, index, texts
 from app.exercises.typed import read_number
 from app.exercises.variant import Variant
-from kin import Singularity
+from kin.ik import Singularity
 from kin.ik.messages.singularity import CONDITIONS, LOSSES, short
 from kin.transforms import Array
 from kin.typed import EntryError

@@ -16,7 +16,8 @@ from app.exercises.poses import errors
 from app.exercises.questions import Asked, Verdict
 from app.exercises.typed import read_number
 from app.exercises.variant import Variant
-from kin import IKOptions, InputError, Task
+from kin import IKOptions, InputError
+from kin.ik import Task
 from kin.ik.details import Solved
 from kin.ik.options import TASKS
 from kin.transforms import Array, vector_angle

@@ -20,7 +20,8 @@ import kin
 from app.live.client.connection import Connection, Message, RefusedError
 from app.live.client.drawing import Drawing
 from app.live.recording import Bounds, Recording, read, save
-from kin import InputError, KinematicsError, Motion, Obstacle, Program, Robot
+from kin import InputError, KinematicsError, Obstacle, Robot
+from kin.motion import Motion, Program
 from kin.motors.joints import moving_motors, of_moving
 from kin.transforms import Array, pose_from_position_wxyz
 
@@ -147,7 +148,7 @@ class Page:
 
     @property
     def readings(self) -> Array | None:
-        """What the motors of a real arm read ``(m,)``, in their order and units, as for `kin.q_from_readings`.
+        """What the motors of a real arm read ``(m,)``, in their order and units: see `kin.motors.q_from_readings`.
 
         Those of all motors may be assigned, too: what moves no joint, such as a gripper, is left out.
 
@@ -222,7 +223,7 @@ class Page:
         if isinstance(motion, Motion):
             motion = motion.program
         if isinstance(motion, Program):
-            motion = kin.program_to_dict(motion)
+            motion = kin.motion.program_to_dict(motion)
         self._ask(**({} if motion is None else {"program": motion}), play=True)
 
     def stop(self) -> None:

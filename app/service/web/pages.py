@@ -18,7 +18,8 @@ from starlette.types import Message, Receive, Scope, Send
 
 from app.api.problems import ProblemError, respond
 from app.shared.settings import static_folder
-from kin import __version__, builtin_robots, classic_robots
+from kin import __version__, builtin_robots
+from kin.files import classic_robots
 
 
 def page_routes() -> list[BaseRoute]:

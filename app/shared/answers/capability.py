@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.shared.answers.answer import Answer
 from app.shared.answers.fk import Matrix
-from kin import CapabilityMap
+from kin.workspace import CapabilityMap
 
 
 class CapabilityAnswer(Answer):
@@ -70,7 +70,7 @@ class CapabilityMapAnswer(Answer):
 
 
 def capability_answer(found: CapabilityMap) -> CapabilityAnswer:
-    """Figures of a map by `kin.capability_map`."""
+    """Figures of a map by `kin.workspace.capability_map`."""
     return CapabilityAnswer.of(
         found.grid,
         robot=found.grid.robot.id,
@@ -86,7 +86,7 @@ def capability_answer(found: CapabilityMap) -> CapabilityAnswer:
 
 
 def capability_map_answer(found: CapabilityMap, approachable: bool = False) -> CapabilityMapAnswer:
-    """A whole map by `kin.capability_map`; `approachable`: include the directions of each voxel."""
+    """A whole map by `kin.workspace.capability_map`; `approachable`: include the directions of each voxel."""
     fits = ["".join("01"[fit] for fit in row) for row in found.approachable.tolist()] if approachable else None
     return CapabilityMapAnswer(
         summary=capability_answer(found),

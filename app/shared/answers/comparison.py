@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from app.shared.answers.answer import Answer, From
-from kin import Comparison, Robot, robot_to_dict
-from kin.comparison import Explanation, messages
+from kin import Robot, robot_to_dict
+from kin.comparison import Comparison, Explanation, messages
 from kin.comparison.mistakes import Mistake
 from kin.comparison.results import Quantity, Verdict
 

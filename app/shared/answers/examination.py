@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.shared.answers.answer import Answer
-from kin import UrdfExamination
+from kin.doctor import UrdfExamination
 from kin.doctor.findings import Rank, Symptom
 from kin.units import general
 

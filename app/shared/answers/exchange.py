@@ -6,8 +6,10 @@ from typing import Any
 
 from app.shared.answers.answer import Answer
 from app.shared.answers.robots import RobotAnswer, robot_answer
-from kin import Robot, UrdfRobot, convert_dh, robot_to_dict, robot_to_toml
-from kin.dh import SAMPLES, largest_difference
+from kin import Robot, robot_to_dict, robot_to_toml
+from kin.dh import convert_dh
+from kin.dh.tables import SAMPLES, largest_difference
+from kin.files import UrdfRobot
 from kin.robot import Convention
 
 

@@ -11,11 +11,13 @@ from msgspec import UNSET, UnsetType
 
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.details import IkDetails, RedundancyAnswer, SingularityAnswer, Violation
-from kin import IKResult, PathResult, Robot, Status, to_pendant
+from kin import IKResult, Robot, Status
 from kin.ik.details import Solved
 from kin.ik.messages import explain
 from kin.ik.results import Cause
 from kin.ik.table import Table
+from kin.motors import to_pendant
+from kin.path import PathResult
 from kin.solvers.contract import Completeness
 from kin.tolerances import TOLERANCES
 from kin.units import DEFAULT_UNITS

@@ -10,10 +10,9 @@ from msgspec import UNSET, UnsetType
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.details import ContactAnswer, IkDetails, SingularityAnswer, Violation
 from app.shared.answers.fk import Matrix
-from kin import Motion
 from kin.ik.details import Details
 from kin.ik.results import Cause as IkCause
-from kin.motion import MotionLimits, Refusal, messages
+from kin.motion import Motion, MotionLimits, Refusal, messages
 from kin.motion.details import (
     ArrivesOtherwise,
     BlendLeftOut,

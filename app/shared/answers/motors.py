@@ -6,8 +6,8 @@ from typing import Annotated
 
 from app.shared.answers.answer import Answer, From
 from app.shared.answers.robots import MotorAnswer
-from kin import MotorMatch
 from kin.motor import MotorUnit
+from kin.motors import MotorMatch
 from kin.motors.findings import MotorCause, MotorStatus
 
 
@@ -50,5 +50,5 @@ class MotorMatchAnswer(Answer):
 
 
 def motor_match_answer(found: MotorMatch) -> MotorMatchAnswer:
-    """What `kin.match_motors` has found."""
+    """What `kin.motors.match_motors` has found."""
     return MotorMatchAnswer.of(found)

@@ -10,8 +10,8 @@ from app.shared.answers.answer import Answer, From
 from app.shared.answers.details import ContactAnswer, IkDetails, JumpDetailsAnswer, jump_details_answer
 from app.shared.answers.fk import Matrix
 from app.shared.answers.ik import Tolerances, tolerances_answer
-from kin import PathPostures, PathResult
 from kin.ik.results import Cause
+from kin.path import PathPostures, PathResult
 from kin.path.postures import STATES, State
 
 GapStatus = Literal["approximate", "limits", "orientation", "unreachable", "collision"]
@@ -143,7 +143,7 @@ class PosturesAnswer(Answer):
 
 
 def postures_answer(found: PathPostures) -> PosturesAnswer:
-    """One result of `kin.path_postures`."""
+    """One result of `kin.path.path_postures`."""
     return PosturesAnswer.of(
         found,
         through=list(found.through),

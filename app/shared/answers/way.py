@@ -8,8 +8,7 @@ from app.shared.answers.answer import Answer, From
 from app.shared.answers.details import ContactAnswer, Violation
 from app.shared.answers.fk import Matrix
 from app.shared.answers.motion import MotionAnswer, motion_answer
-from kin import Motion
-from kin.motion import program_to_dict
+from kin.motion import Motion, program_to_dict
 from kin.way import Way
 from kin.way.results import Code
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.shared.answers.answer import Answer
 from app.shared.answers.fk import Matrix
-from kin import Section, WorkspaceFacts
+from kin.workspace import Section, WorkspaceFacts
 
 
 class ExtremeAnswer(Answer):
@@ -107,5 +107,5 @@ class WorkspaceAnswer(Answer):
 
 
 def workspace_answer(facts: WorkspaceFacts, cut: Section | None = None) -> WorkspaceAnswer:
-    """Sizes by `kin.workspace_facts`, and a section by `kin.workspace_section`."""
+    """Sizes by `kin.workspace.workspace_facts`, and a section by `kin.workspace.workspace_section`."""
     return WorkspaceAnswer.of(facts, section=None if cut is None else SectionAnswer.of(cut))

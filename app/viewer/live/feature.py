@@ -29,7 +29,8 @@ from app.viewer.meshes.incoming import IncomingFile, not_sent
 from app.viewer.own_arm import own_arm
 from app.viewer.panel.status import Notice
 from app.viewer.skeleton import ghost
-from kin import Contact, KinematicsError, robot_to_dict
+from kin import KinematicsError, robot_to_dict
+from kin.collision import Contact
 from kin.transforms import Array
 
 STOPPED = "stopped"

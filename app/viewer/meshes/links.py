@@ -15,8 +15,9 @@ from app.viewer.scene.bodies.fingers import Finger
 from app.viewer.scene.bodies.parts import Part
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.shapes import Solid, ball, box, cylinder
-from kin import Capsule, Robot, link_frames
+from kin import Robot, link_frames
 from kin.axes import inverse
+from kin.collision import Capsule
 from kin.files.urdf.collisions import LinkPieces
 from kin.files.urdf.fingers import FingerMotion
 from kin.files.urdf.visuals import Box, Cylinder, MeshFile, Sphere, Visual

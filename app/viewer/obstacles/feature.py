@@ -23,7 +23,8 @@ from app.viewer.scene.gizmo import DragEvent, travel
 from app.viewer.scene.meshes import body
 from app.viewer.tabs.robot.views import text_of
 from app.viewer.views.templates import render
-from kin import Contact, InputError, Obstacle
+from kin import InputError, Obstacle
+from kin.collision import Contact
 from kin.collision.obstacles import KINDS, MOST_OBSTACLES
 from kin.collision.solids import SPHERE
 from kin.transforms import pose_from_position_wxyz

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kin import Contact
+from kin.collision import Contact
 from kin.units import Units
 
 NAMED = 2  # obstacles, and the arm itself, that the sentence names

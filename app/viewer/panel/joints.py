@@ -21,8 +21,9 @@ from app.viewer.panel.part import Block, add_html
 from app.viewer.panel.status import Notice
 from app.viewer.views.templates import render
 from app.viewer.viser_patches import show_value
-from kin import InputError, Robot, to_pendant
+from kin import InputError, Robot
 from kin.files.numbers import index_of
+from kin.motors import to_pendant
 from kin.transforms import Array
 from kin.typed import EntryError
 from kin.units import Unit, Units, general

@@ -18,7 +18,8 @@ from app.viewer.panel.fields import field, fields_html, limit_marks
 from app.viewer.panel.part import Block, add_html
 from app.viewer.views.templates import render
 from app.viewer.viser_patches import show_value
-from kin import InputError, Redundancy, Robot, branch_meanings, branch_names
+from kin import InputError, Robot, branch_names
+from kin.ik import Redundancy, branch_meanings
 from kin.units import DEFAULT_UNITS, Unit, Units
 
 CLOSEST = "Closest"

@@ -14,7 +14,8 @@ from app.viewer.panel import update_html
 from app.viewer.panel.part import add_html
 from app.viewer.panel.posture import short
 from app.viewer.views.templates import render
-from kin import IKResult, IKSolution, Robot
+from kin import IKResult, Robot
+from kin.ik import IKSolution
 from kin.ik.details import OrientationNotMet, OutOfReach, OutsideLimits, RollError, RotationError, Solved, Touching
 from kin.units import Units, typeset
 

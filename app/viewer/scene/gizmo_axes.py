@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kin import Robot, Task, fk, jacobian
+from kin import Robot, fk, jacobian
+from kin.ik import Task
 from kin.transforms import Array
 
 _SAMPLES = 9

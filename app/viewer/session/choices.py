@@ -7,7 +7,7 @@ from typing import Final
 
 from app.viewer.declared.fields import Settings, choice, flag, part
 from app.viewer.scene.arm.looks import AxesShown, Look
-from kin import Task
+from kin.ik import Task
 from kin.poses import ANGLES, QUATERNIONS, Rotations
 from kin.units import DEFAULT_UNITS, LENGTHS, Length, Units
 

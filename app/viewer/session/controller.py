@@ -33,8 +33,8 @@ from app.viewer.scene.gizmo_axes import gizmo_axes
 from app.viewer.scene.motion import Motion, Pace
 from app.viewer.session.choices import DEFAULT_TASK
 from app.viewer.session.listener import ArmListener
-from kin import Obstacle, Robot, Task
-from kin.ik import solve
+from kin import Obstacle, Robot
+from kin.ik import Task, solve
 from kin.transforms import Array, rotation_angle, rotation_from_wxyz
 
 # A node name is never used twice: browsers keep the poses of removed nodes.

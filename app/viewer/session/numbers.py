@@ -24,8 +24,9 @@ from app.viewer.scene.key_number import KeyNumber
 from app.viewer.scene.motion import Pace
 from app.viewer.session.controller import ArmController
 from app.viewer.session.posture import PosturePanel
-from kin import Contact, IKResult
+from kin import IKResult
 from kin.axes import inverse
+from kin.collision import Contact
 from kin.frames import WORLD
 from kin.transforms import Array
 from kin.units import Units

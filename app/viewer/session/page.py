@@ -65,7 +65,8 @@ from app.viewer.tabs.robot.tab import RobotTab
 from app.viewer.views.templates import render
 from app.viewer.viser_outbox import in_one_frame
 from app.viewer.viser_patches import SceneFilter, hear_marks
-from kin import IKResult, Robot, Task
+from kin import IKResult, Robot
+from kin.ik import Task
 from kin.transforms import Array
 from kin.units import DEFAULT_UNITS
 

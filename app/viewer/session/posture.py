@@ -12,8 +12,8 @@ from app.viewer.panel import Post
 from app.viewer.panel.posture import BranchChoice, RedundancySliders, short
 from app.viewer.panel.status import Notice
 from app.viewer.self_motion import self_motion
-from kin import IKResult, IKSolution, Redundancy
-from kin.ik import solve
+from kin import IKResult
+from kin.ik import IKSolution, Redundancy, solve
 from kin.ik.messages.values import listed, need, ranges
 from kin.transforms import Array
 from kin.typed import EntryError

@@ -31,7 +31,8 @@ from app.viewer.own_arm import OwnArm
 from app.viewer.panel.script import read_page_json
 from app.viewer.scene.viewpoints import UP
 from app.viewer.session.choices import ViewState
-from kin import KinematicsError, Robot, Task, branch_names, robot_to_dict
+from kin import KinematicsError, Robot, branch_names, robot_to_dict
+from kin.ik import Task
 from kin.poses import FARTHEST
 from kin.transforms import Array, pose_from_position_wxyz, wxyz_from_rotation
 from kin.units import DEFAULT_UNITS, LENGTHS, Units

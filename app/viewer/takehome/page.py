@@ -31,8 +31,9 @@ from app.viewer.scene.bodies.parts import Part, joint_color
 from app.viewer.scene.chain import Link, chain
 from app.viewer.scene.meshes import Body, body
 from app.viewer.views.templates import render
-from kin import IKOptions, InputError, Motion, Obstacle, Robot, __version__, solve_ik
+from kin import IKOptions, InputError, Obstacle, Robot, __version__, solve_ik
 from kin.collision.solids import BOX, CYLINDER
+from kin.motion import Motion
 from kin.named import robot_of
 from kin.robot import Joint
 from kin.transforms import Array

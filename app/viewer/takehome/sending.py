@@ -6,7 +6,7 @@ from app.exports.snippets import named
 from app.viewer.feature import Stage
 from app.viewer.panel.status import Notice
 from app.viewer.takehome.page import SavedArm, web_page
-from kin import Motion
+from kin.motion import Motion
 
 OPEN = Notice("advice", "Not now", "The page would contain what the open question asks for.")
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from kin.axes import frame_of, inverse, perpendicular_to
 from kin.checks import one_of
-from kin.dh import SAMPLES, table_of_chain
+from kin.dh.tables import SAMPLES, table_of_chain
 from kin.errors import InputError, RobotFileError
 from kin.files.home import default_home
 from kin.files.names import unused
@@ -122,7 +122,7 @@ def read_urdf(
 
     Examples:
         >>> import kin
-        >>> kin.read_urdf(kin.robot_to_urdf("ur5")).robot.n
+        >>> kin.files.read_urdf(kin.robot_to_urdf("ur5")).robot.n
         6
     """
     tree = _tree(source, file)
@@ -150,7 +150,7 @@ def urdf_tips(source: Path | str, file: str = "") -> tuple[Tip, ...]:
 
     Examples:
         >>> import kin
-        >>> kin.urdf_tips(kin.robot_to_urdf("ur5"))[0].link
+        >>> kin.files.urdf_tips(kin.robot_to_urdf("ur5"))[0].link
         'tool'
     """
     return _tree(source, file).tips

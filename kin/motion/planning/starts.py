@@ -53,6 +53,16 @@ def start_as_recorded(motion: Motion, index: int, cancel: Callable[[], None] = n
 
     Returns:
         None if there is none inside the limits, the segment is another one, or it is not known where it starts.
+
+    Raises:
+        IndexError: there is no such segment.
+
+    Examples:
+        >>> import kin
+        >>> arm = kin.get_robot("ur5")
+        >>> motion = kin.plan_motion(arm, [kin.motion.Lin(kin.motion.JointTarget(arm.q_home + 0.02))])
+        >>> kin.motion.start_as_recorded(motion, 0).shape
+        (6,)
     """
     robot, segment = motion.robot, motion.program.segments[index]
     before = motion.q_before(index)

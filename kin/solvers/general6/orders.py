@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kin.axes import Lines, frame_of, inverse, is_zero, lines_of, perpendicular_to
-from kin.dh import table_of_chain
+from kin.dh.tables import table_of_chain
 from kin.robot import Robot
 from kin.solvers.contract import BatchKernels
 from kin.solvers.reversed import WrappedKernels

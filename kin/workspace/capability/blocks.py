@@ -331,7 +331,7 @@ def capability_map(
 
     Examples:
         >>> import kin
-        >>> bool(kin.capability_map("planar2r", resolution=6, directions=12).share.max() > 0.0)
+        >>> bool(kin.workspace.capability_map("planar2r", resolution=6, directions=12).share.max() > 0.0)
         True
     """
     allowed = JointConstraints.of(limits, locked, constraints)

@@ -71,7 +71,7 @@ def sample_workspace(
 
     Examples:
         >>> import kin
-        >>> sum(len(chunk.points) for chunk in kin.sample_workspace("ur5", 1000, chunk=400))
+        >>> sum(len(chunk.points) for chunk in kin.workspace.sample_workspace("ur5", 1000, chunk=400))
         1000
     """
     total = _count("n", n)
@@ -106,7 +106,7 @@ def workspace_slice(
         n: points of the whole cloud.
         start: index of the first point.
         end: index after the last point.
-        seed, strategy, limits, locked, constraints, measure, with_q: as in `kin.sample_workspace`.
+        seed, strategy, limits, locked, constraints, measure, with_q: as in `kin.workspace.sample_workspace`.
 
     Returns:
         The points, and what was asked for with them.
@@ -116,7 +116,7 @@ def workspace_slice(
 
     Examples:
         >>> import kin
-        >>> kin.workspace_slice("ur5", 1000, 100, 110, with_q=True).q.shape
+        >>> kin.workspace.workspace_slice("ur5", 1000, 100, 110, with_q=True).q.shape
         (10, 6)
     """
     total = _count("n", n)
@@ -141,7 +141,7 @@ def workspace_configurations(
     Args:
         robot: the arm, or the id of a built-in one.
         index: of the points, from 0.
-        seed, strategy, limits, locked, constraints: as in `kin.sample_workspace`.
+        seed, strategy, limits, locked, constraints: as in `kin.workspace.sample_workspace`.
 
     Returns:
         The configurations.
@@ -151,7 +151,7 @@ def workspace_configurations(
 
     Examples:
         >>> import kin
-        >>> kin.workspace_configurations("ur5", [0, 17]).shape
+        >>> kin.workspace.workspace_configurations("ur5", [0, 17]).shape
         (2, 6)
     """
     robot = robot_of(robot)

@@ -74,7 +74,7 @@ def workspace_section(
 
     Examples:
         >>> import kin
-        >>> len(kin.workspace_section("scara", resolution=48).curves) > 0
+        >>> len(kin.workspace.workspace_section("scara", resolution=48).curves) > 0
         True
     """
     region = Region.finite(robot_of(robot), JointConstraints.of(limits, locked, constraints))

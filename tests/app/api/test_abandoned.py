@@ -47,7 +47,7 @@ class Endless:
         self.begun = 0
         self.released = threading.Event()
         self.cancelled = threading.Event()
-        self._facts = kin.workspace_facts
+        self._facts = kin.workspace.workspace_facts
 
     def __call__(self, robot, *, cancel, **options):
         self.begun += 1

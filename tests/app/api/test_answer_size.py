@@ -78,7 +78,7 @@ def test_an_answer_that_is_larger_than_estimated_is_refused_all_the_same(bounded
     refused(bounded.post(f"{API}/ur5/ik", json={"target": [POSE] * 60, "images": "all"}), "target")
 
 
-@pytest.mark.parametrize("robot_id", tuple(kin.classic_robots()))
+@pytest.mark.parametrize("robot_id", tuple(kin.files.classic_robots()))
 @pytest.mark.parametrize("images", ["nearest", "all"])
 def test_the_estimate_of_an_answer_is_close(client, robot_id, images):
     robot = kin.get_robot(robot_id)
@@ -93,7 +93,7 @@ def test_the_estimate_of_an_answer_is_close(client, robot_id, images):
 
 def test_the_largest_lists_of_the_default_settings_are_allowed():
     settings = Settings()
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         request = ik.IkRequest.model_validate({"target": [POSE]})
         assert ik._size(robot, request.options("pose")) * settings.max_batch < settings.max_answer
 

@@ -14,7 +14,7 @@ from app.shared.answers.jacobian import JacobianAnswer
 from app.shared.answers.robots import RobotAnswer
 from kin.transforms import rotation_from_wxyz
 
-ROBOTS = tuple(kin.classic_robots().values())
+ROBOTS = tuple(kin.files.classic_robots().values())
 each_robot = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.id)
 
 

@@ -51,9 +51,9 @@ def schema(app):
     return jsonschema_rs.validator_for({"$ref": "#/components/schemas/RobotDescription", "components": components})
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda robot: robot.id)
 def test_what_is_written_fits_the_schema(schema, robot):
-    other = kin.convert_dh(robot, "modified" if robot.convention == "standard" else "standard")
+    other = kin.dh.convert_dh(robot, "modified" if robot.convention == "standard" else "standard")
     for arm in (robot, other):
         for length in ("m", "cm", "mm"):
             for angle in ("deg", "rad"):
@@ -321,7 +321,7 @@ def test_jacobians_and_motions_with_base_and_tool_are_in_the_world_frame(client)
 
 
 def test_what_an_arm_is(client):
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         found = client.get(f"/api/v1/robots/{robot.id}/inspect").json()
         assert found["motions"] + found["redundancy"] == robot.n
         assert not found["singular_at_home"]
@@ -337,7 +337,7 @@ def test_conversion_with_proof(client):
     found = client.get("/api/v1/robots/panda/convert").json()
     assert found["robot"]["convention"] == "standard"
     assert found["difference"] <= 1e-12
-    assert kin.robot_from_dict(found["description"]) == kin.convert_dh(kin.get_robot("panda"), "standard")
+    assert kin.robot_from_dict(found["description"]) == kin.dh.convert_dh(kin.get_robot("panda"), "standard")
     again = post(client, "robots/convert", {"robot": found["description"], "convention": "modified"})
     assert again["robot"]["rows"][3] == pytest.approx(client.get("/api/v1/robots/panda").json()["rows"][3])
     same = post(client, "robots/convert", {"robot": found["description"], "convention": "standard"})
@@ -392,14 +392,12 @@ def test_export(client):
         response = client.get(f"/api/v1/robots/panda/export?format={name}")
         assert response.headers["content-type"].startswith("application/toml")
         assert response.headers["content-disposition"].endswith('.toml"')
-        assert kin.load_robot(response.text) == kin.convert_dh(panda, convention)
+        assert kin.load_robot(response.text) == kin.dh.convert_dh(panda, convention)
     response = client.get("/api/v1/robots/panda/export?format=mjcf")
     assert response.headers["content-disposition"] == 'attachment; filename="panda.xml"'
     again = post(client, "robots/import", {"urdf": response.text})
     assert again["robot"]["source"].startswith("MJCF, from body world")
-    assert kin.fk(kin.load_robot(again["toml"]), panda.home) == pytest.approx(
-        kin.fk(panda, panda.home), abs=1e-12
-    )
+    assert kin.fk(kin.load_robot(again["toml"]), panda.home) == pytest.approx(kin.fk(panda, panda.home), abs=1e-12)
     response = client.get("/api/v1/robots/panda/export?format=urdf")
     assert response.headers["content-type"].startswith("application/xml")
     assert kin.load_robot(response.text).n == 7

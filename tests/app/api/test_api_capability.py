@@ -57,7 +57,7 @@ def test_the_answer_is_the_map_of_the_core(client):
     answer = client.get(f"{ADDRESS}?{query}").json()
     TypeAdapter(CapabilityMapAnswer).validate_python(answer, strict=True)
     limits, locked = [None, (0.0, 1.0), None, None, None], [0.25, None, None, None, None]
-    found = kin.capability_map(PIONEER, resolution=7, directions=12, limits=limits, locked=locked)
+    found = kin.workspace.capability_map(PIONEER, resolution=7, directions=12, limits=limits, locked=locked)
     assert answer["summary"] == as_plain(capability_answer(found))
     assert answer["directions"] == found.grid.directions.tolist()
     voxels = answer["voxels"]

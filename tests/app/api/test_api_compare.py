@@ -27,7 +27,7 @@ def asked(client: TestClient, path: str, body: dict[str, object], status: int = 
 
 
 def test_an_arm_is_identical_to_its_other_table(client):
-    modified = kin.robot_to_dict(kin.convert_dh("ur5", "modified"))
+    modified = kin.robot_to_dict(kin.dh.convert_dh("ur5", "modified"))
     found = asked(client, "robots/ur5/compare", {"other": modified})
     assert found["verdict"] == "identical"
     assert found["text"] == "Identical: equal joint values give equal poses."

@@ -16,7 +16,7 @@ from app.equations.derive import derive
 from app.shared.computations import ComputationCache
 from kin import chapter
 
-ROBOTS = tuple(kin.classic_robots().values())
+ROBOTS = tuple(kin.files.classic_robots().values())
 each_robot = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.id)
 
 

@@ -76,7 +76,7 @@ def test_targets_checked_in_time_are_returned_with_a_problem():
 
 def test_a_summary_that_took_too_long_is_cached_for_the_next_request(hurried, monkeypatch):
     done = threading.Event()
-    facts = kin.workspace_facts
+    facts = kin.workspace.workspace_facts
 
     def slow(robot, **asked):
         done.wait(30)

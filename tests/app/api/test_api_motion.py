@@ -325,7 +325,7 @@ def test_postures_along_a_path_are_those_of_the_core(client):
     body = {"targets": [{"matrix": pose.tolist()} for pose in T], "max_step": 2.0}
     response = client.post("/api/v1/robots/ur5/ik/path/postures", json=body)
     assert response.status_code == 200, response.text
-    answer, found = response.json(), kin.path_postures(UR5, T, max_step=2.0)
+    answer, found = response.json(), kin.path.path_postures(UR5, T, max_step=2.0)
     assert answer["postures"] == list(found.postures)
     assert answer["through"] == list(found.through)
     assert answer["reach"] == found.reach.tolist()

@@ -75,10 +75,10 @@ def test_a_mask_of_positions_accepts_a_point_without_orientation(client):
 
 
 def test_the_robot_lists_its_branches(client):
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         answer = client.get(f"{API}/{robot.id}").json()
         assert answer["branches"] == list(kin.branch_names(robot))
-        assert answer["branch_meanings"] == kin.branch_meanings(robot)
+        assert answer["branch_meanings"] == kin.ik.branch_meanings(robot)
 
 
 @pytest.mark.parametrize("robot", [PIONEER, SRS], ids=lambda robot: robot.id)

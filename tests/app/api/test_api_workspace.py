@@ -106,7 +106,7 @@ def test_defaults_give_the_plain_cloud(client, app):
 
 
 def test_all_strategies_and_all_arms(client):
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         answer = client.get(f"{API}/{robot.id}/workspace?n=100&format=csv&q=true")
         assert answer.text.count("\n") == 101
     answers = {s: client.get(WORKSPACE, params={"n": 50, "strategy": s}).content for s in kin.workspace.STRATEGIES}
@@ -252,7 +252,7 @@ def extent(answer):
 def test_the_summary_agrees_with_the_core(client):
     answer = client.get(f"{WORKSPACE}/summary?section=true&resolution=24&effort=2").json()
     TypeAdapter(WorkspaceAnswer).validate_python(answer, strict=True)
-    facts = kin.workspace_facts(PIONEER, effort=2)
+    facts = kin.workspace.workspace_facts(PIONEER, effort=2)
     for name in ("x", "y", "z", "radius", "reach"):
         assert extent(answer[name]) == span(getattr(facts, name))
     for name in ("axis_point", "axis", "shoulder"):
@@ -260,7 +260,7 @@ def test_the_summary_agrees_with_the_core(client):
     for name in ("volume", "surface"):
         estimate = getattr(facts, name)
         assert answer[name] == {"value": estimate.value, "error": estimate.error, "method": estimate.method}
-    cut = kin.workspace_section(PIONEER, resolution=24)
+    cut = kin.workspace.workspace_section(PIONEER, resolution=24)
     assert answer["section"]["curves"] == [curve.tolist() for curve in cut.curves]
     assert answer["section"]["area"] == cut.area
     assert len(answer["section"]["arcs"]) == len(cut.arcs) > 0
@@ -274,7 +274,9 @@ def test_any_plane_can_be_cut(client):
     answer = client.get(f"{WORKSPACE}/summary?volume=false&resolution=16&plane=0:0:0.1:0:0:2&lock=5:0.5").json()
     TypeAdapter(WorkspaceAnswer).validate_python(answer, strict=True)
     locked = [None, None, None, None, 0.5]
-    cut = kin.workspace_section(PIONEER, ([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]), locked=locked, resolution=16)
+    cut = kin.workspace.workspace_section(
+        PIONEER, ([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]), locked=locked, resolution=16
+    )
     assert answer["section"]["area"] == cut.area > 0.1
     assert answer["section"]["curves"] == [curve.tolist() for curve in cut.curves]
     assert (answer["section"]["u"], answer["section"]["v"]) == (cut.u.tolist(), cut.v.tolist())
@@ -296,9 +298,9 @@ def test_an_invalid_plane_is_refused(client, plane):
 def test_limits_and_locks_are_respected(client):
     limits, locked = [None, (0.5, 1.0), None, None, None], [0.25, None, None, None, None]
     answer = client.get(f"{WORKSPACE}/summary?volume=false&limit=2:0.5:1&lock=1:0.25").json()
-    facts = kin.workspace_facts(PIONEER, limits=limits, locked=locked, volume=False)
+    facts = kin.workspace.workspace_facts(PIONEER, limits=limits, locked=locked, volume=False)
     assert extent(answer["x"]) == span(facts.x)
-    assert extent(answer["x"]) != span(kin.workspace_facts(PIONEER, volume=False).x)
+    assert extent(answer["x"]) != span(kin.workspace.workspace_facts(PIONEER, volume=False).x)
 
 
 def test_parts_that_are_not_requested_are_null(client):

@@ -499,7 +499,7 @@ def test_check_tells_what_an_arm_is(capsys):
 
 @pytest.mark.full
 def test_check_names_the_solver_and_why(capsys):
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         got = answer(capsys, "check", ROOT / "kin" / "robots" / f"{robot.id}.toml")
         match = closed_form_of(robot)
         assert got["solver"] == ("numeric" if match is None else match.name)
@@ -685,7 +685,7 @@ def test_files_of_code_have_the_names_by_which_they_include_each_other(capsys, t
 def test_export_in_every_format(capsys, tmp_path, form):
     code, out, _ = run(capsys, "export", "puma560", "--format", form)
     assert code == 0
-    robot = kin.load_robot(out) if form in ("urdf", "mjcf") else kin.load_robot(out)
+    robot = kin.load_robot(out)
     assert robot.convention == ("modified" if form == "mdh" else "standard")
     q = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
     assert kin.fk(robot, q) == pytest.approx(kin.fk(kin.get_robot("puma560"), q), abs=1e-12)
@@ -723,7 +723,7 @@ def clouds():
 
 @pytest.mark.full
 def test_workspace_tells_sizes(capsys):
-    facts = kin.workspace_facts(PIONEER, effort=2)
+    facts = kin.workspace.workspace_facts(PIONEER, effort=2)
     code, out, err = run(capsys, "workspace", "pioneer5", "--effort", 2)
     assert (code, err) == (0, "")
     for name, span in (
@@ -909,7 +909,7 @@ PICK, SIX = str(ROOT / "tests" / "data" / "pick.toml"), str(ROOT / "tests" / "da
 
 def test_move_answers_as_the_core_and_writes_each_format(capsys, tmp_path):
     panda = kin.get_robot("panda")
-    expected = kin.plan_motion(panda, kin.parse_program(Path(PICK).read_text(encoding="utf-8"), panda))
+    expected = kin.plan_motion(panda, kin.motion.parse_program(Path(PICK).read_text(encoding="utf-8"), panda))
     got = answer(capsys, "move", "panda", PICK)
     assert got["duration"] == pytest.approx(expected.duration)
     assert got["reason"] == expected.reason

@@ -12,7 +12,7 @@ from app.cli.parser import main
 
 
 def test_equal_arms_end_with_zero(tmp_path, capsys):
-    kin.save_robot(kin.convert_dh("ur5", "modified"), tmp_path / "mine.toml")
+    kin.save_robot(kin.dh.convert_dh("ur5", "modified"), tmp_path / "mine.toml")
     assert main(["compare", "ur5", str(tmp_path / "mine.toml")]) == 0
     assert capsys.readouterr().out == "Identical: equal joint values give equal poses.\n"
 

@@ -107,7 +107,7 @@ def test_what_is_no_file_is_invalid_input(tmp_path: Path, capsys) -> None:
 
 def test_what_the_examination_mends_is_read(sick: Path) -> None:
     text = sick.read_text().replace('lower="-6.28318530718"', 'lower="-360"', 1)
-    found = kin.examine_urdf(text, tip="tool0")
+    found = kin.doctor.examine_urdf(text, tip="tool0")
     assert found.mended_arm is not None
     assert np.isclose(found.mended_arm.robot.lower.min(), -2 * np.pi)
 

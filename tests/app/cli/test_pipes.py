@@ -390,7 +390,7 @@ def test_a_configuration_that_cannot_be_read_loses_no_other(run, form):
 
 def test_configurations_may_be_as_the_pendant_shows_them(run):
     q = np.radians([[0, 10, 20, 0, -90, 0], [5, 30, 50, 0, -90, 0]])
-    given = lines(kin.to_pendant("lrmate200id", q).tolist())
+    given = lines(kin.motors.to_pendant("lrmate200id", q).tolist())
     _, out, _ = run("fk", "lrmate200id", "--configurations", "-", "--pendant", "--format", "npy", given=given)
     assert np.abs(np.load(io.BytesIO(out)) - kin.fk("lrmate200id", q)).max() < 1e-12
     answers = "".join(json.dumps({"q": each.tolist()}) + "\n" for each in q)  # those of ik, with joint values

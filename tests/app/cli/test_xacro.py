@@ -90,7 +90,7 @@ def test_no_module_of_the_folder_is_imported(file: Path, monkeypatch: pytest.Mon
     monkeypatch.setenv("PYTHONPATH", str(file.parent))
     for place in (".", "", str(file.parent), str(file.parents[1])):
         monkeypatch.syspath_prepend(place)
-    assert kin.read_urdf(xacro.expanded(file)).robot.reach == pytest.approx(0.9)
+    assert kin.files.read_urdf(xacro.expanded(file)).robot.reach == pytest.approx(0.9)
 
 
 def test_places_of_the_file_are_known(file: Path) -> None:
@@ -102,7 +102,7 @@ def test_places_of_the_file_are_known(file: Path) -> None:
     file.write_text(
         ARM.replace("$(arg length)", "$(optenv PATH 0.3)").replace("$(find links)", "$(dirname)/../links")
     )
-    assert kin.read_urdf(xacro.expanded(file)).robot.reach == pytest.approx(0.3)
+    assert kin.files.read_urdf(xacro.expanded(file)).robot.reach == pytest.approx(0.3)
 
 
 MISSING = {

@@ -36,7 +36,7 @@ from app.shared.computations import ComputationCache, TooManyPendingError
 from kin import chapter
 
 ROOT = Path(__file__).parents[3]
-ROBOTS = tuple(kin.classic_robots().values())
+ROBOTS = tuple(kin.files.classic_robots().values())
 CHAPTER = tuple(kin.get_robot(robot_id) for robot_id in chapter.LENGTHS)
 each_robot = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.id)
 

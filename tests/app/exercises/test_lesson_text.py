@@ -17,7 +17,7 @@ from app.viewer.lessons.velocity.questions import facts
 from kin.units import Units
 
 FILES = lesson_files()
-ARMS = [kin.get_robot(name) for name in kin.classic_robots()]
+ARMS = [kin.get_robot(name) for name in kin.files.classic_robots()]
 UNITS = (Units(), Units(degrees=False, length="m"), Units(length="cm"))
 SMALL = """
 goal = "You can count."

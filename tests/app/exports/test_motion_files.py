@@ -20,7 +20,7 @@ RATE = 50.0
 UR5, STANFORD = kin.get_robot("ur5"), kin.get_robot("stanford")
 
 
-def motion_of(robot: kin.Robot) -> kin.Motion:
+def motion_of(robot: kin.Robot) -> kin.motion.Motion:
     """A PTP to a place nearby, with values such as 1e-05 on the way, and a pause."""
     q = robot.clip(robot.q_home + 0.3 * np.where(robot.revolute, 1.0, 0.1))
     segments = (kin.motion.Ptp(kin.motion.JointTarget(tuple(q.tolist())), name="über"), kin.motion.Dwell(0.1))
@@ -28,15 +28,15 @@ def motion_of(robot: kin.Robot) -> kin.Motion:
 
 
 @pytest.fixture(params=[UR5, STANFORD], ids=lambda robot: robot.id)
-def motion(request: pytest.FixtureRequest) -> kin.Motion:
+def motion(request: pytest.FixtureRequest) -> kin.motion.Motion:
     return motion_of(request.param)
 
 
-def written(motion: kin.Motion, name: str) -> bytes:
+def written(motion: kin.motion.Motion, name: str) -> bytes:
     return b"".join(FORMATS[name].pieces(motion, RATE))
 
 
-def check_trajectory(message: dict, motion: kin.Motion) -> None:
+def check_trajectory(message: dict, motion: kin.motion.Motion) -> None:
     times = motion.step_times(RATE)
     assert message["joint_names"] == motion.robot.ros_names
     assert message["header"]["stamp"] == {"sec": 0, "nanosec": 0}
@@ -51,7 +51,7 @@ def check_trajectory(message: dict, motion: kin.Motion) -> None:
         assert np.array_equal(np.array(values), wanted[row])
 
 
-def says_what_is_in_it(words: str, motion: kin.Motion) -> None:
+def says_what_is_in_it(words: str, motion: kin.motion.Motion) -> None:
     assert motion.robot.id in words
     assert "radians" in words
     assert "seconds" in words
@@ -60,19 +60,19 @@ def says_what_is_in_it(words: str, motion: kin.Motion) -> None:
     assert "acceleration of" in words, "what is assumed"
 
 
-def test_a_trajectory_as_yaml_is_the_message_of_ros(motion: kin.Motion) -> None:
+def test_a_trajectory_as_yaml_is_the_message_of_ros(motion: kin.motion.Motion) -> None:
     text = written(motion, "trajectory-yaml").decode()
     check_trajectory(yaml.safe_load(text), motion)
     says_what_is_in_it("".join(line for line in text.splitlines() if line.startswith("#")), motion)
 
 
-def test_a_trajectory_as_json_has_the_message_in_a_field(motion: kin.Motion) -> None:
+def test_a_trajectory_as_json_has_the_message_in_a_field(motion: kin.motion.Motion) -> None:
     found = json.loads(written(motion, "trajectory-json"))
     check_trajectory(found.pop("joint_trajectory"), motion)
     says_what_is_in_it(json.dumps(found), motion)
 
 
-def test_the_commented_table_is_the_table_behind_its_comments(motion: kin.Motion) -> None:
+def test_the_commented_table_is_the_table_behind_its_comments(motion: kin.motion.Motion) -> None:
     lines = written(motion, "csv-commented").decode().splitlines(keepends=True)
     head = [line for line in lines if line.startswith("#")]
     assert "".join(lines[len(head) :]).encode() == written(motion, "csv")
@@ -83,7 +83,7 @@ def test_the_commented_table_is_the_table_behind_its_comments(motion: kin.Motion
     says_what_is_in_it("".join(head), motion)
 
 
-def test_a_recording_is_read_by_the_reader_of_mcap(motion: kin.Motion) -> None:
+def test_a_recording_is_read_by_the_reader_of_mcap(motion: kin.motion.Motion) -> None:
     reader = make_reader(io.BytesIO(written(motion, "mcap")), validate_crcs=True)
     times = motion.step_times(RATE)
     summary = reader.get_summary()
@@ -117,7 +117,7 @@ def test_a_recording_is_read_by_the_reader_of_mcap(motion: kin.Motion) -> None:
     (metadata,) = reader.iter_metadata()
     says_what_is_in_it(json.dumps(metadata.metadata), motion)
     (program,) = reader.iter_attachments()
-    assert kin.program_from_dict(json.loads(program.data), motion.robot) == motion.program
+    assert kin.motion.program_from_dict(json.loads(program.data), motion.robot) == motion.program
     assert program_to_dict(motion.program) == json.loads(program.data)
 
 

@@ -21,17 +21,17 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 @pytest.fixture(scope="module")
 def facts():
-    return kin.workspace_facts(ARM, volume=False)
+    return kin.workspace.workspace_facts(ARM, volume=False)
 
 
 @pytest.fixture(scope="module")
 def section():
-    return kin.workspace_section(ARM, resolution=24)
+    return kin.workspace.workspace_section(ARM, resolution=24)
 
 
 @pytest.fixture(scope="module")
 def drawing(facts, section):
-    return ET.fromstring(draw(ARM, kin.sample_workspace(ARM, 20_000, chunk=4096), facts, section))
+    return ET.fromstring(draw(ARM, kin.workspace.sample_workspace(ARM, 20_000, chunk=4096), facts, section))
 
 
 def images(drawing):
@@ -63,12 +63,12 @@ def test_every_view_has_one_scale(drawing, facts):
 
 def test_every_point_is_counted_once_where_it_is(facts, section):
     picture = Picture(ARM, facts, section)
-    for chunk in kin.sample_workspace(ARM, 5000, chunk=1000):
+    for chunk in kin.workspace.sample_workspace(ARM, 5000, chunk=1000):
         picture.add(chunk)
     assert [int(counts.sum()) for counts in picture._counts] == [5000] * 4
-    point = next(kin.sample_workspace(ARM, 1)).points[0]
+    point = next(kin.workspace.sample_workspace(ARM, 1)).points[0]
     alone = Picture(ARM, facts, section)
-    alone.add(next(kin.sample_workspace(ARM, 1)))
+    alone.add(next(kin.workspace.sample_workspace(ARM, 1)))
     i, j = np.argwhere(alone._counts[0])[0]
     assert facts.x.least.value + (i + 0.5) * alone._cell == pytest.approx(point[0], abs=alone._cell)
     assert facts.y.least.value + (j + 0.5) * alone._cell == pytest.approx(point[1], abs=alone._cell)
@@ -109,8 +109,8 @@ def test_a_png_holds_exactly_the_given_pixels():
 
 def test_an_arm_without_a_section_has_three_views():
     stanford = kin.get_robot("scara")
-    facts = kin.workspace_facts(stanford, volume=False)
-    drawing = ET.fromstring(draw(stanford, kin.sample_workspace(stanford, 1000), facts, None))
+    facts = kin.workspace.workspace_facts(stanford, volume=False)
+    drawing = ET.fromstring(draw(stanford, kin.workspace.sample_workspace(stanford, 1000), facts, None))
     assert len(list(drawing.iter(f"{SVG}image"))) == 3
 
 
@@ -121,8 +121,13 @@ def test_a_flat_workspace_is_drawn(tmp_path):
         '[[rows]]\nname = "a"\na = 300\nlimits = [-90, 90]\n[[rows]]\nname = "b"\na = 200\nlimits = [-90, 90]\n'
     )
     flat = kin.load_robot(tmp_path / "flat.toml")
-    facts = kin.workspace_facts(flat, volume=False)
-    text = draw(flat, kin.sample_workspace(flat, 1000), facts, kin.workspace_section(flat, resolution=16))
+    facts = kin.workspace.workspace_facts(flat, volume=False)
+    text = draw(
+        flat,
+        kin.workspace.sample_workspace(flat, 1000),
+        facts,
+        kin.workspace.workspace_section(flat, resolution=16),
+    )
     assert "Flat &amp; &lt;thin&gt;" in text
     assert len(list(ET.fromstring(text).iter(f"{SVG}image"))) == 4
 
@@ -138,5 +143,5 @@ def test_ticks_are_round_and_few(low, high):
 
 
 def test_pictures_of_as_many_points_as_one_likes_have_one_size(facts, section):
-    sizes = [len(draw(ARM, kin.sample_workspace(ARM, n), facts, section)) for n in (300_000, 1_200_000)]
+    sizes = [len(draw(ARM, kin.workspace.sample_workspace(ARM, n), facts, section)) for n in (300_000, 1_200_000)]
     assert sizes[1] < 1.5 * sizes[0]

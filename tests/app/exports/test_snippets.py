@@ -19,7 +19,7 @@ from app.service.main import create_app
 from app.shared.settings import Settings
 from kin import Joint, Robot
 
-ARMS = list(kin.classic_robots().values())
+ARMS = list(kin.files.classic_robots().values())
 
 
 def moment(robot: Robot, **changes: object) -> Moment:
@@ -275,13 +275,13 @@ def asked_by_requests(code: str) -> dict[str, object]:
 
 def test_obstacles_that_are_avoided_are_asked_for(client):
     here = moment(kin.get_robot("ur5"), obstacles=(CRATE, POLE), avoid=True, address="http://testserver/")
-    expected = [kin.obstacle_from_dict(item) for item in (CRATE.as_dict(), POLE.as_dict())]
+    expected = [kin.collision.obstacle_from_dict(item) for item in (CRATE.as_dict(), POLE.as_dict())]
     for question in (
         json.loads(shlex.split(curl(here).replace("\\\n", "").splitlines()[1])[-1]),
         asked_by_requests(python_requests(here)),
     ):
         assert question["avoid_self_collision"] is True
-        assert [kin.obstacle_from_dict(item) for item in question["obstacles"]] == expected
+        assert [kin.collision.obstacle_from_dict(item) for item in question["obstacles"]] == expected
         answer = client.post("/api/v1/robots/ur5/ik", json=question)
         assert answer.status_code == 200, answer.text
     found: dict[str, object] = {}

@@ -19,7 +19,7 @@ from app.exports.worksheet.labels import BASE, Label
 from app.exports.worksheet.words import to_latex
 from kin.units import Units
 
-ROBOTS = tuple(kin.classic_robots().values())
+ROBOTS = tuple(kin.files.classic_robots().values())
 PIONEER = kin.get_robot("pioneer5")
 SLANTED = replace(
     PIONEER, base=((0.8, 0.0, 0.6, 0.2), (0.0, 1.0, 0.0, 0.3), (-0.6, 0.0, 0.8, 0.9), (0, 0, 0, 1.0))

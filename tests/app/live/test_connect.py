@@ -157,7 +157,9 @@ def test_readings_of_motors_show_the_real_arm_and_match_motors_takes_them(page, 
 
 def test_a_motion_is_played_and_its_events_are_heard(page, arm):
     arm.q = Q
-    program = kin.Program((kin.Ptp(kin.JointTarget(Q)), kin.Ptp(kin.JointTarget(Q + 0.2))))
+    program = kin.motion.Program(
+        (kin.motion.Ptp(kin.motion.JointTarget(Q)), kin.motion.Ptp(kin.motion.JointTarget(Q + 0.2)))
+    )
     events = arm.events()
     arm.play(kin.plan_motion(ARM, program, Q))
     playing = [event.value["playing"] for event in until(events, "program", lambda value: value["time"] > 0.1)]

@@ -561,7 +561,7 @@ def test_ticks_and_joint_values_are_in_a_straight_line(drawn):
     scale = so101_arm.Scale(robot, robot.motors, ticks)
     q = scale.q(ticks)
     assert scale.ticks(q).tolist() == ticks.tolist(), "where it is, nothing moves"
-    read = kin.q_from_readings(robot, kin.readings_from_ticks(robot.motors, ticks))
+    read = kin.motors.q_from_readings(robot, kin.motors.readings_from_ticks(robot.motors, ticks))
     turns = (read - q) / (2.0 * np.pi)
     assert turns == pytest.approx(np.round(turns), abs=1e-9), "the same place as the mirror shows"
     inside = (read >= robot.lower) & (read <= robot.upper)

@@ -341,7 +341,11 @@ PUBLISHED: dict[str, list[Any]] = {
     "result": [None, kin.solve_ik(ARM, kin.fk(ARM, np.full(6, 0.5))), kin.solve_ik(ARM, FAR)],
     "contacts": [
         (),
-        (kin.Contact(-0.01, 6, 2), kin.Contact(-0.002, 3, None, 0, 'a "table"', True), kin.Contact(-1e-9, 2, 0)),
+        (
+            kin.collision.Contact(-0.01, 6, 2),
+            kin.collision.Contact(-0.002, 3, None, 0, 'a "table"', True),
+            kin.collision.Contact(-1e-9, 2, 0),
+        ),
     ],
     "program": [{"items": 2, "playing": True, "time": 0.25, "duration": 1.5, "complete": False}],
 }

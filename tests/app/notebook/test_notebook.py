@@ -22,7 +22,7 @@ from app.viewer.shown import ShownArms
 from kin.notebook import _service
 
 PIONEER = kin.get_robot("pioneer5")
-ROBOTS = tuple(kin.classic_robots().values())
+ROBOTS = tuple(kin.files.classic_robots().values())
 
 
 class Service:

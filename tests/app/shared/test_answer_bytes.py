@@ -40,7 +40,7 @@ def poses_of(robot: kin.Robot) -> list[np.ndarray]:
     return [*found, far, signed, found[0]]
 
 
-def solution(found: kin.IKSolution) -> dict[str, Any]:
+def solution(found: kin.ik.IKSolution) -> dict[str, Any]:
     return {
         "q": [float(value) for value in found.q],
         "branch": found.branch,
@@ -98,7 +98,7 @@ def expected(results: list[kin.IKResult]) -> bytes:
     return b'{"results":[' + b",".join(to_json(plain(each)) for each in results) + b"]}"
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda robot: robot.id)
 def test_a_list_of_targets_is_answered_in_the_bytes_of_plain_answers(client, robot):
     statuses = set()
     for task in ("pose", "approach", "position"):

@@ -11,7 +11,9 @@ import pytest
 
 from app.shared.clouds import FIRST, SAMPLED, Cloud, Clouds
 from app.shared.threads import NICENESS
-from kin import InputError, classic_robots, sample_workspace
+from kin import InputError
+from kin.files import classic_robots
+from kin.workspace import sample_workspace
 
 ARM = classic_robots()["pioneer5"]
 

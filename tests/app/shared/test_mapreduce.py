@@ -152,7 +152,9 @@ def test_threads_do_not_change_a_bit(threads):
     grid = kin.workspace.capability_grid(kin.get_robot("puma560"), resolution=10)
     blocks = list(mapreduce.run_local(grid, threads))
     assert len(blocks) == len(grid.blocks) > 2
-    assert_same(kin.workspace.capability_join(grid, blocks), kin.capability_map(grid.robot, resolution=10))
+    assert_same(
+        kin.workspace.capability_join(grid, blocks), kin.workspace.capability_map(grid.robot, resolution=10)
+    )
 
 
 def test_closing_the_iterator_cancels_what_has_not_begun(monkeypatch):
@@ -209,7 +211,7 @@ def test_files_hold_the_map(capsys, tmp_path, ending):
     words = ["capability", "puma560", "--resolution", "5", "--directions", "12", "-o", str(path), "--json"]
     assert parser.main(words) == 0
     answer = json.loads(capsys.readouterr().out)
-    found = kin.capability_map(kin.get_robot("puma560"), resolution=5, directions=12)
+    found = kin.workspace.capability_map(kin.get_robot("puma560"), resolution=5, directions=12)
     assert answer["reachable"] == len(found.index)
     assert answer["mean_share"] == pytest.approx(found.share.mean())
     assert answer["best_manipulability_at"] == found.centres[found.manipulability.argmax()].tolist()

@@ -57,7 +57,7 @@ def slowly(monkeypatch):
 
 
 def same(found, robot, **wanted):
-    expected = kin.capability_map(robot, **wanted)
+    expected = kin.workspace.capability_map(robot, **wanted)
     for name in ("index", "centres", "approachable", "share", "manipulability"):
         assert np.array_equal(getattr(found, name), getattr(expected, name)), name
 

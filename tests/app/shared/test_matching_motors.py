@@ -18,13 +18,13 @@ from app.service.main import create_app
 from app.shared.settings import Settings
 
 SO101 = kin.get_robot("so101")
-POSES = kin.motor_poses(SO101)
+POSES = kin.motors.motor_poses(SO101)
 # Two motors of the real arm count backwards, and all zeros are elsewhere.
 REAL = tuple(
     replace(motor, sign=-1 if motor.id in (2, 5) else 1, offset=20.0 * motor.id - 50.0) if motor.joint else motor
     for motor in SO101.motors
 )
-READINGS = kin.readings_from_q(replace(SO101, motors=REAL), POSES).round(2).tolist()
+READINGS = kin.motors.readings_from_q(replace(SO101, motors=REAL), POSES).round(2).tolist()
 
 
 @pytest.fixture(scope="module")

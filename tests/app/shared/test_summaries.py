@@ -26,11 +26,13 @@ def summaries():
 
 def test_sizes_and_sections_are_those_of_the_core(summaries):
     facts = summaries.facts(ARM, kin.JointConstraints(locked=LOCKED), effort=None).future.result(60)
-    expected = kin.workspace_facts(ARM, locked=LOCKED, volume=False)
+    expected = kin.workspace.workspace_facts(ARM, locked=LOCKED, volume=False)
     assert facts.volume is None
     assert facts.reach.largest.value == expected.reach.largest.value
     cut = summaries.section(ARM, constraints=kin.JointConstraints(locked=LOCKED), resolution=16).future.result(60)
-    assert np.array_equal(cut.curves[0], kin.workspace_section(ARM, locked=LOCKED, resolution=16).curves[0])
+    assert np.array_equal(
+        cut.curves[0], kin.workspace.workspace_section(ARM, locked=LOCKED, resolution=16).curves[0]
+    )
 
 
 def test_equal_requests_share_one_result_and_others_do_not(summaries):

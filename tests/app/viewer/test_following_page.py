@@ -83,8 +83,8 @@ def test_a_link_carries_what_follows_and_the_pendant() -> None:
     back = unpack(json.loads(json.dumps(pack(own))))
     assert back == own
     assert [(row.follows, row.ratio) for row in back.robot.rows] == [(r.follows, r.ratio) for r in ROBOT.rows]
-    assert kin.to_pendant(back.robot, ROBOT.q_home) == pytest.approx(
-        kin.to_pendant(kin.robot_from_dict(data), ROBOT.q_home), abs=1e-15
+    assert kin.motors.to_pendant(back.robot, ROBOT.q_home) == pytest.approx(
+        kin.motors.to_pendant(kin.robot_from_dict(data), ROBOT.q_home), abs=1e-15
     )
     data["rows"][3]["name"] = "fore\u200barm"  # which cannot be shown as it is
     data["rows"][4]["follows"] = "fore\u200barm"

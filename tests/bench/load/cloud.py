@@ -83,7 +83,7 @@ async def page(visitor: Visitor, n: int) -> None:
 
 
 def _generator(n: int) -> None:
-    for _ in kin.sample_workspace(kin.get_robot(ROBOT), n):
+    for _ in kin.workspace.sample_workspace(kin.get_robot(ROBOT), n):
         pass
 
 

@@ -29,7 +29,7 @@ def test_three_poses_and_what_was_read_in_them_give_signs_and_zeros(tab: Tab) ->
     tab.screenshot("motors-table")
     page.get_by_role("button", name="Match motors").click()
     poses = begun(SO101, ()).poses
-    for i, readings in enumerate(kin.readings_from_q(replace(SO101, motors=REAL), poses).round(1).tolist()):
+    for i, readings in enumerate(kin.motors.readings_from_q(replace(SO101, motors=REAL), poses).round(1).tolist()):
         shown = page.locator(f'[data-motors-pose="{i + 1}"]')
         expect(shown).to_be_visible()
         tab.wait_for_tool(kin.fk(SO101, poses[i])[:3, 3], within=0.06)

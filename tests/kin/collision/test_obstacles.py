@@ -70,13 +70,13 @@ def test_moving_arm_and_obstacle_together_changes_nothing(obstacle, start, end, 
 
 @given(obstacles())
 def test_an_obstacle_survives_a_round_trip(obstacle):
-    assert kin.obstacle_from_dict(obstacle.as_dict()) == obstacle
+    assert kin.collision.obstacle_from_dict(obstacle.as_dict()) == obstacle
 
 
 @pytest.mark.parametrize("robot_id", GOLDEN["arms"])
 def test_clearances_agree_with_coal(robot_id):
     """Recorded by tests/data/make_golden_clearance.py; coal measures deeper where an axis is inside."""
-    given_obstacles = [kin.obstacle_from_dict(each) for each in GOLDEN["obstacles"]]
+    given_obstacles = [kin.collision.obstacle_from_dict(each) for each in GOLDEN["obstacles"]]
     q = np.array([each["q"] for each in GOLDEN["arms"][robot_id]])
     theirs = np.array([each["distance"] for each in GOLDEN["arms"][robot_id]])
     ours = kin.clearance(robot_id, q, given_obstacles)
@@ -87,7 +87,7 @@ def test_clearances_agree_with_coal(robot_id):
 
 def test_a_contact_names_what_touches():
     box = kin.Obstacle("box", (0.0, 0.0, 0.0), size=(9.0, 9.0, 9.0), name="room")
-    found = kin.nearest_contact("ur5", kin.get_robot("ur5").q_home, [box])
+    found = kin.collision.nearest_contact("ur5", kin.get_robot("ur5").q_home, [box])
     assert (found.obstacle, found.other, found.name) == (0, None, "room")
     assert found.text == f"link {found.link} touches room"
     assert found.distance < 0.0

@@ -19,7 +19,7 @@ from kin.collision.kernels import segment_distance
 from kin.kernels.compile import jit
 
 GOLDEN = json.loads((Path(__file__).parents[2] / "data" / "golden-clearance.json").read_text("utf-8"))
-ROBOTS = list(kin.classic_robots().values())
+ROBOTS = list(kin.files.classic_robots().values())
 
 
 @jit
@@ -27,7 +27,7 @@ def distance(A, B):
     return segment_distance(A, 0, B, 0)
 
 
-def ends(capsule: kin.Capsule, robot: kin.Robot, q: np.ndarray) -> np.ndarray:
+def ends(capsule: kin.collision.Capsule, robot: kin.Robot, q: np.ndarray) -> np.ndarray:
     T = robot.T_world_base if capsule.row < 0 else kin.link_frames(robot, q)[capsule.row]
     return np.array([T[:3, :3] @ p + T[:3, 3] for p in (capsule.start, capsule.end)])
 
@@ -66,7 +66,7 @@ def test_the_capsules_follow_the_arm(robot):
     """Assumed capsules of a link begin where it is joined to the link before, and the last ends at the tool."""
     robot = replace(robot, capsules=())
     q = robot.random_q(np.random.default_rng(3))
-    found = kin.capsules(robot)
+    found = kin.collision.capsules(robot)
     assert [c.link for c in found] == sorted(c.link for c in found)
     frames = kin.link_frames(robot, q)
     axes = np.concatenate([robot.T_world_base[None], frames])[:, :3, 3]
@@ -83,7 +83,7 @@ def test_the_capsules_follow_the_arm(robot):
 @pytest.mark.parametrize("robot", [robot for robot in ROBOTS if robot.capsules], ids=lambda robot: robot.id)
 def test_stated_capsules_reach_every_link_and_the_tool(robot):
     """Every link has a body, home is clear, and the last one ends at the tool point."""
-    found = kin.capsules(robot)
+    found = kin.collision.capsules(robot)
     assert {c.link for c in found} == set(range(robot.n + 1))
     assert kin.clearance(robot, robot.q_home) > 0.0
     tool, far = kin.fk(robot, robot.q_home)[:3, 3], []
@@ -97,25 +97,25 @@ def test_stated_capsules_reach_every_link_and_the_tool(robot):
 
 def test_a_longer_tool_gets_a_body():
     arm = kin.get_robot("ur5").with_tool(kin.pose_from_xyz_rpy((0.0, 0.0, 0.4)))
-    last = kin.capsules(arm)[-1]
+    last = kin.collision.capsules(arm)[-1]
     assert (last.link, last.end) == (6, (0.0, 0.0, 0.4))
-    assert len(kin.capsules(arm)) == len(arm.capsules) + 1
+    assert len(kin.collision.capsules(arm)) == len(arm.capsules) + 1
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.id)
 def test_links_that_share_a_joint_are_not_compared(robot):
-    links = np.array([c.link for c in kin.capsules(robot)])
+    links = np.array([c.link for c in kin.collision.capsules(robot)])
     pairs = links[bodies_of(robot).pairs]
     assert (pairs[:, 1] > pairs[:, 0] + 1).all()
 
 
 def test_a_folded_planar_arm_touches_itself_and_a_straight_one_does_not():
     arm = kin.get_robot("planar3r")
-    radius = kin.capsules(arm)[0].radius
+    radius = kin.collision.capsules(arm)[0].radius
     straight, folded = np.zeros(3), np.array([0.0, 2.8, 2.8])
     lengths = [row.a for row in arm.rows]
     assert kin.clearance(arm, straight) == pytest.approx(lengths[1] - 2.0 * radius)
-    touching = kin.nearest_links(arm, folded)
+    touching = kin.collision.nearest_links(arm, folded)
     assert touching is not None
     assert touching.links == (1, 3)
     tip = kin.fk(arm, folded)[:3, 3]
@@ -131,7 +131,7 @@ def test_a_folded_planar_arm_touches_itself_and_a_straight_one_does_not():
 @pytest.mark.parametrize("robot", [r for r in ROBOTS if len(bodies_of(r).pairs)], ids=lambda robot: robot.id)
 def test_the_points_lie_on_the_surfaces_of_the_links_named(robot):
     for q in robot.random_q(np.random.default_rng(7), 8):
-        found = kin.nearest_links(robot, q)
+        found = kin.collision.nearest_links(robot, q)
         assert found is not None
         apart = np.linalg.norm(found.points[1] - found.points[0])
         if apart < 1e-9 and found.distance < -1e-9:
@@ -139,7 +139,7 @@ def test_the_points_lie_on_the_surfaces_of_the_links_named(robot):
         assert apart == pytest.approx(abs(found.distance), abs=1e-9)
         for link, point in zip(found.links, found.points, strict=True):
             surfaces = []
-            for capsule in kin.capsules(robot):
+            for capsule in kin.collision.capsules(robot):
                 if capsule.link == link:
                     a, b = ends(capsule, robot, q)
                     along = np.clip((point - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
@@ -149,7 +149,7 @@ def test_the_points_lie_on_the_surfaces_of_the_links_named(robot):
 
 def test_an_arm_of_two_links_cannot_touch_itself():
     assert kin.clearance("planar2r", [[0.0, 3.0], [1.0, 1.0]]).tolist() == [np.inf, np.inf]
-    assert kin.nearest_links("planar2r", [0.0, 3.0]) is None
+    assert kin.collision.nearest_links("planar2r", [0.0, 3.0]) is None
 
 
 def test_a_rod_that_slides_back_may_touch_what_is_behind():
@@ -159,7 +159,7 @@ def test_a_rod_that_slides_back_may_touch_what_is_behind():
         {"kind": "prismatic", "limits": (0.0, 0.4)},
     ]
     arm = kin.Robot.from_dh(rows)
-    rod = kin.capsules(arm)[-1]
+    rod = kin.collision.capsules(arm)[-1]
     assert np.linalg.norm(np.subtract(rod.end, rod.start)) == pytest.approx(0.4)
     drawn, in_ = ends(rod, arm, np.array([0.0, 0.0, 0.4])), ends(rod, arm, np.zeros(3))
     axis = kin.link_frames(arm, np.zeros(3))[1][:3, 3]
@@ -175,4 +175,4 @@ def test_a_wrong_configuration_is_refused(q):
 
 def test_nearest_links_takes_one_configuration():
     with pytest.raises(kin.InputError, match="one configuration of 6"):
-        kin.nearest_links("puma560", np.zeros((2, 6)))
+        kin.collision.nearest_links("puma560", np.zeros((2, 6)))

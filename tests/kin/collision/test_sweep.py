@@ -19,7 +19,7 @@ OBSTACLES = (
 
 
 def robots() -> list[kin.Robot]:
-    return [kin.get_robot(name) for name in kin.classic_robots()]
+    return [kin.get_robot(name) for name in kin.files.classic_robots()]
 
 
 @pytest.mark.parametrize("robot", robots(), ids=lambda r: r.id)
@@ -67,7 +67,7 @@ def test_no_point_of_a_capsule_moves_farther_than_its_lever_says(robot):
 def test_a_path_through_a_sheet_of_paper_touches_it():
     """Samples every 0.02 rad step over a sheet of a tenth of a millimetre beside a thin arm."""
     robot = kin.get_robot("planar2r")
-    radius = max(each.radius for each in kin.capsules(robot))
+    radius = max(each.radius for each in kin.collision.capsules(robot))
     reach = robot.reach
     sheet = kin.Obstacle("box", (0.0, reach + 0.9 * radius, 0.0), size=(1e-4, 0.19 * radius, 10.0), name="sheet")
     path = np.array([[math.radians(80.0), 0.0], [math.radians(100.0), 0.0]])

@@ -22,7 +22,7 @@ from kin.robot import Joint, Robot
 from kin.transforms import pose_from_position_wxyz
 from kin.units import Units
 
-ARMS = list(kin.classic_robots().values())
+ARMS = list(kin.files.classic_robots().values())
 HALF = 0.5 * math.pi
 
 
@@ -39,12 +39,12 @@ def in_other_frames(a: Robot, rng: np.random.Generator) -> Robot:
     signs = rng.choice([-1.0, 1.0], a.n)
     offsets = rng.integers(0, 2, a.n) * np.where(a.revolute, rng.uniform(-3, 3, a.n), rng.uniform(-0.1, 0.1, a.n))
     B, E = random_frame(rng), random_frame(rng)
-    there = kin.screws(a, -signs * offsets)
+    there = kin.dh.screws(a, -signs * offsets)
     R, p = inverse(B)[:3, :3], inverse(B)[:3, 3]
     omega, v = R @ there.S[:3], R @ there.S[3:]
     v += np.cross(p, omega, axisb=0, axisc=0)
-    b = kin.robot_from_screws(signs * np.concatenate([omega, v]), inverse(B) @ there.M @ inverse(E))
-    return kin.convert_dh(b, rng.choice(["standard", "modified"]))
+    b = kin.dh.robot_from_screws(signs * np.concatenate([omega, v]), inverse(B) @ there.M @ inverse(E))
+    return kin.dh.convert_dh(b, rng.choice(["standard", "modified"]))
 
 
 def random_arm(rng: np.random.Generator) -> Robot:
@@ -89,7 +89,7 @@ def test_differences_of_poses_are_distances_and_angles():
 @pytest.mark.parametrize("arm", ARMS, ids=ids)
 def test_an_arm_is_identical_to_itself_in_both_conventions(arm):
     for convention in ("standard", "modified"):
-        found = kin.compare(arm, kin.convert_dh(arm, convention))
+        found = kin.compare(arm, kin.dh.convert_dh(arm, convention))
         assert found.verdict == "identical"
         assert found.first is None
         assert found.explanations == ()

@@ -159,7 +159,9 @@ def test_the_panda_of_a_toolbox_has_a_tool():
 
 def test_a_standard_table_of_the_panda_is_identical():
     maker = kin.get_robot("panda")
-    assert said(maker, kin.convert_dh(maker, "standard"))[0] == "Identical: equal joint values give equal poses."
+    assert (
+        said(maker, kin.dh.convert_dh(maker, "standard"))[0] == "Identical: equal joint values give equal poses."
+    )
 
 
 def test_two_lengths_of_the_puma_differ_between_two_papers():
@@ -189,7 +191,7 @@ def test_lee_turns_the_pumas_axes_the_other_way():
 def test_two_books_turn_the_second_axis_of_the_puma_the_other_way():
     """The sign of alpha in row 2 of the modified table is also another zero of joints 1 and 2."""
     puma = kin.get_robot("puma560")
-    modified = kin.convert_dh(puma, "modified")
+    modified = kin.dh.convert_dh(puma, "modified")
     verdict, first = said(puma, with_cell(modified, 1, alpha=-modified.rows[1].alpha))
     assert verdict == "The same arm: joint 1 counts from 180.0°; joint 2 counts from 180.0°."
     assert first.startswith("Likely α of row 2 has the wrong sign")

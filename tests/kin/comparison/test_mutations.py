@@ -44,7 +44,7 @@ def single(table: Tables, reference: Robot) -> list[Edit]:
 
 def mutated(arm: Robot, count: int, rng: np.random.Generator) -> Case | None:
     """The arm with so many random mistakes; None if poses cannot see them, or no arm is left."""
-    a = kin.convert_dh(arm, str(rng.choice(["standard", "modified"])))
+    a = kin.dh.convert_dh(arm, str(rng.choice(["standard", "modified"])))
     table, made = Tables.of(a), []
     for _ in range(count):
         several = single(table, a)

@@ -14,36 +14,36 @@ from hypothesis import strategies as st
 import kin
 from kin import InputError, Joint, Robot
 from kin.axes import inverse, screw_x, screw_z
-from kin.dh import convert_dh, largest_difference, table_of_chain
+from kin.dh.tables import convert_dh, largest_difference, table_of_chain
 
 EXACT = 1e-12
 OTHER = {"standard": "modified", "modified": "standard"}
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda robot: robot.id)
 def test_both_conventions_describe_the_same_arm(robot):
-    other = kin.convert_dh(robot, OTHER[robot.convention])
+    other = kin.dh.convert_dh(robot, OTHER[robot.convention])
     assert other.convention != robot.convention
     assert (other.joints[0].limits, other.home, other.id) == (robot.joints[0].limits, robot.home, robot.id)
     assert largest_difference(robot, other) <= EXACT
     # The table itself is another one: read in the wrong convention it is another arm.
     assert largest_difference(robot, replace(other, convention=robot.convention)) > 1e-3
-    again = kin.convert_dh(other, robot.convention)
+    again = kin.dh.convert_dh(other, robot.convention)
     assert largest_difference(robot, again) <= EXACT
-    assert kin.convert_dh(robot, robot.convention) is robot
+    assert kin.dh.convert_dh(robot, robot.convention) is robot
 
 
 def test_converting_shifts_the_table_by_half_a_row():
     puma = kin.get_robot("puma560")
-    modified = kin.convert_dh(puma, "modified")
+    modified = kin.dh.convert_dh(puma, "modified")
     assert [(row.theta, row.d) for row in modified.rows] == [(row.theta, row.d) for row in puma.rows]
     assert [(row.a, row.alpha) for row in modified.rows[1:]] == [(row.a, row.alpha) for row in puma.rows[:-1]]
     assert modified.tool == puma.tool
-    pioneer = kin.convert_dh(kin.get_robot("pioneer5"), "modified")
+    pioneer = kin.dh.convert_dh(kin.get_robot("pioneer5"), "modified")
     last = kin.get_robot("pioneer5").rows[-1]
     assert pioneer.T_last_tool == pytest.approx(screw_x(last.a, last.alpha))
     with pytest.raises(InputError, match="convention"):
-        kin.convert_dh(puma, "craig")
+        kin.dh.convert_dh(puma, "craig")
 
 
 @settings(max_examples=100, deadline=None)

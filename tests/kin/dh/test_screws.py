@@ -35,38 +35,38 @@ def product(S, M, q):
     return T @ M
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda robot: robot.id)
 def test_the_formula_is_the_arm_and_comes_back(robot):
     rng = np.random.default_rng(1)
-    S, M = kin.screws(robot)
+    S, M = kin.dh.screws(robot)
     for q in robot.random_q(rng, 4):
         assert np.allclose(product(S, M, q), kin.fk(robot, q), atol=1e-13)
     zero = robot.random_q(rng)
-    there = kin.screws(robot, zero)
+    there = kin.dh.screws(robot, zero)
     assert np.allclose(product(*there, robot.q_home - zero), kin.fk(robot, robot.q_home), atol=1e-13)
     limits = [joint.limits for joint in robot.joints]
     for convention in ("standard", "modified"):
-        back = kin.robot_from_screws(S, M, limits=limits, home=robot.home, convention=convention)
+        back = kin.dh.robot_from_screws(S, M, limits=limits, home=robot.home, convention=convention)
         assert back.convention == convention
         assert [j.kind for j in back.joints] == [j.kind for j in robot.joints]
         assert (back.lower.tolist(), back.home) == (robot.lower.tolist(), robot.home)
         q = robot.random_q(rng, 100)
         assert np.abs(kin.fk(back, q) - kin.fk(robot, q)).max() < 1e-13
-        again = kin.screws(back)
+        again = kin.dh.screws(back)
         assert max(np.abs(again.S - S).max(), np.abs(again.M - M).max()) < 1e-13
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda robot: robot.id)
 def test_space_and_body_form_are_forward_kinematics(robot):
     rng = np.random.default_rng(2)
     q = robot.random_q(rng, 20)
     T = kin.fk(robot, q)
     for zero in (np.zeros(robot.n), robot.q_home):
-        found = kin.screws(robot, zero)
+        found = kin.dh.screws(robot, zero)
         assert np.abs(found.pose(q - zero) - T).max() < 1e-12
         body = np.broadcast_to(found.M, T.shape)
         for i, B in enumerate(found.B.T):
-            body = body @ kin.exp_screw(B, q[:, i] - zero[i])
+            body = body @ kin.dh.exp_screw(B, q[:, i] - zero[i])
         assert np.abs(body - T).max() < 1e-12
         J = kin.jacobian(robot, zero, frame="tool")
         assert np.abs(found.B - np.concatenate([J[3:], J[:3]])).max() < 1e-12, "at zero: the body Jacobian"
@@ -78,18 +78,18 @@ def test_a_screw_with_any_pitch_and_speed(S, value):
     S = np.array(S)
     if 0.0 < np.linalg.norm(S[:3]) < 1e-3:  # the axis is then kilometres away
         S[:3] = 0.0
-    assert np.abs(kin.exp_screw(S, value) - exponential(S, value)).max() < 1e-6
-    one = kin.exp_screw(S, value / 2)
-    assert np.abs(one @ one - kin.exp_screw(S, value)).max() < 1e-6
-    assert kin.exp_screw(S, [[0.0, value]]).shape == (1, 2, 4, 4)
+    assert np.abs(kin.dh.exp_screw(S, value) - exponential(S, value)).max() < 1e-6
+    one = kin.dh.exp_screw(S, value / 2)
+    assert np.abs(one @ one - kin.dh.exp_screw(S, value)).max() < 1e-6
+    assert kin.dh.exp_screw(S, [[0.0, value]]).shape == (1, 2, 4, 4)
 
 
 def test_a_screw_is_six_numbers():
     for S in (np.zeros(5), np.zeros((2, 6)), [0, 0, np.nan, 0, 0, 0]):
         with pytest.raises(InputError):
-            kin.exp_screw(S, 1.0)
+            kin.dh.exp_screw(S, 1.0)
     with pytest.raises(InputError, match="q"):
-        kin.screws("ur5").pose(np.zeros(5))
+        kin.dh.screws("ur5").pose(np.zeros(5))
 
 
 def random_screws(seed):
@@ -109,8 +109,8 @@ def random_screws(seed):
 @given(st.integers(0, 2**32 - 1))
 def test_any_screws_become_an_arm_with_these_screws(seed):
     S, M = random_screws(seed)
-    arm = kin.robot_from_screws(S, M)
-    found = kin.screws(arm)
+    arm = kin.dh.robot_from_screws(S, M)
+    found = kin.dh.screws(arm)
     assert np.abs(found.S - S).max() < 1e-11
     assert np.abs(found.M - M).max() < 1e-11
     q = arm.random_q(np.random.default_rng(0))
@@ -121,8 +121,8 @@ def test_any_screws_become_an_arm_with_these_screws(seed):
 def test_a_moved_base_moves_the_screws():
     ur5 = kin.get_robot("ur5")
     T = np.array(Draw(3).pose())
-    S, M = kin.screws(ur5)
-    moved = kin.screws(ur5.with_base(T))
+    S, M = kin.dh.screws(ur5)
+    moved = kin.dh.screws(ur5.with_base(T))
     assert np.allclose(moved.M, T @ M)
     for one, other in zip(S.T, moved.S.T, strict=True):
         assert np.allclose(exponential(other, 0.4), T @ exponential(one, 0.4) @ inverse(T), atol=1e-13)
@@ -154,14 +154,16 @@ UNIT = np.array([[0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0]]).T
 )
 def test_what_is_no_product_of_exponentials_is_refused(S, more, field):
     with pytest.raises(InputError, match=field):
-        kin.robot_from_screws(S, more.pop("M", np.eye(4)), **more)
+        kin.dh.robot_from_screws(S, more.pop("M", np.eye(4)), **more)
 
 
 def test_names_and_limits_may_come_one_by_one():
-    arm = kin.robot_from_screws(UNIT, np.eye(4), names=(n for n in "ab"), limits=((-1.0, x) for x in (2.0, 3.0)))
+    arm = kin.dh.robot_from_screws(
+        UNIT, np.eye(4), names=(n for n in "ab"), limits=((-1.0, x) for x in (2.0, 3.0))
+    )
     assert [(j.name, j.limits) for j in arm.joints] == [("a", (-1.0, 2.0)), ("b", (-1.0, 3.0))]
 
 
 def test_screws_are_those_of_one_configuration():
     with pytest.raises(InputError, match=r"^q: "):
-        kin.screws("ur5", np.zeros((2, 6)))
+        kin.dh.screws("ur5", np.zeros((2, 6)))

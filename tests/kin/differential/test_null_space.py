@@ -9,15 +9,16 @@ import pytest
 
 import kin
 from app.viewer.self_motion import leaders
-from kin import Robot, Task
+from kin import Robot
 from kin.differential.null_space import error, hold, lead, margin, measure, null_space, secondary
 from kin.differential.task import free_motions, task_rows
+from kin.ik import Task
 from kin.transforms import rotation_angle, vector_angle
 
 TASKS: tuple[Task, ...] = ("pose", "approach", "position")
 TURN = math.pi / 2
 EIGHT = Robot.from_dh([(0, 0.2, 0.1, TURN), (0, 0, 0.2, -TURN)] * 4, home=[0.3, 0.4, -0.5, 0.6] * 2)
-ROBOTS = [kin.get_robot(name) for name in kin.classic_robots()]
+ROBOTS = [kin.get_robot(name) for name in kin.files.classic_robots()]
 CASES = [(robot, task) for robot in [*ROBOTS, EIGHT] for task in TASKS]
 
 

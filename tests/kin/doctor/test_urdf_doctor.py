@@ -59,12 +59,12 @@ def line_of(text: str, part: str) -> int:
     return text[: text.index(part)].count("\n") + 1
 
 
-def worth_saying(found: kin.UrdfExamination) -> list[kin.UrdfFinding]:
+def worth_saying(found: kin.doctor.UrdfExamination) -> list[kin.doctor.UrdfFinding]:
     return [each for each in found.findings if each.rank != "left out"]
 
 
 def test_a_healthy_file_has_no_findings_but_what_is_left_out():
-    found = kin.examine_urdf(WELL, **HAND)
+    found = kin.doctor.examine_urdf(WELL, **HAND)
     assert worth_saying(found) == []
     assert (found.refusal, found.mended, found.moved) == ("", None, None)
     assert found.arm.report.joints == ("shoulder", "elbow", "slide")
@@ -151,7 +151,7 @@ CASES = [
 def test_what_is_wrong_is_found_on_its_line_and_mended(old, new, symptom, rank, mended):
     assert WELL.count(old) == 1
     text = WELL.replace(old, new)
-    found = kin.examine_urdf(text, **HAND)
+    found = kin.doctor.examine_urdf(text, **HAND)
     first = next(each for each in worth_saying(found) if each.symptom == symptom)
     assert first.rank == rank
     place = WELL.index(old)
@@ -162,7 +162,7 @@ def test_what_is_wrong_is_found_on_its_line_and_mended(old, new, symptom, rank, 
     assert first.automatic
     assert found.mended is not None
     assert mended is None or mended in found.mended
-    after = kin.examine_urdf(found.mended, **HAND)
+    after = kin.doctor.examine_urdf(found.mended, **HAND)
     assert worth_saying(after) == []
     assert after.arm is not None
     # Everything else is as it was written.
@@ -204,7 +204,7 @@ def test_what_is_wrong_is_found_on_its_line_and_mended(old, new, symptom, rank, 
 )
 def test_what_needs_a_decision_is_named_with_advice(old, new, symptom, words):
     text = WELL.replace(old, new, 1)
-    found = kin.examine_urdf(text, **HAND)
+    found = kin.doctor.examine_urdf(text, **HAND)
     assert any(each.symptom == symptom and words in each.text for each in worth_saying(found)), found.findings
     assert all(each.mend for each in worth_saying(found))
 
@@ -214,7 +214,7 @@ def test_ordinary_limits_are_not_suspicious():
     """Turns of a joint that count in radians: ±2π of the UR arms, ±4π, five turns of a joint without stops."""
     for limit in (2 * math.pi, 4 * math.pi, 6.2832, 10 * math.pi, 7.5):
         text = WELL.replace('lower="-2" upper="2"', f'lower="{-limit!r}" upper="{limit!r}"')
-        assert worth_saying(kin.examine_urdf(text, **HAND)) == []
+        assert worth_saying(kin.doctor.examine_urdf(text, **HAND)) == []
 
 
 @pytest.mark.full
@@ -222,7 +222,7 @@ def test_angles_that_were_meant_are_not_rounded():
     for angle in ("1.5", "0.79", "3.1", "1.570796326794897", "0.123", "-2.36"):
         text = WELL.replace('rpy="1.5707963267948966 0 0"', f'rpy="{angle} 0 0"')
         off = abs(float(angle) / (math.pi / 4) - round(float(angle) / (math.pi / 4)))
-        found = worth_saying(kin.examine_urdf(text, **HAND))
+        found = worth_saying(kin.doctor.examine_urdf(text, **HAND))
         assert bool(found) == (1e-7 < off < 6e-3), (angle, found)
 
 
@@ -231,7 +231,7 @@ def test_a_chain_of_followers_becomes_one_step():
     third = """<link name="tip2"/><joint name="third" type="prismatic"><parent link="claw"/><child link="tip2"/>
     <axis xyz="0 0 1"/><limit lower="0" upper="0.02" velocity="1" effort="1"/>
     <mimic joint="grip" multiplier="-2" offset="0.1"/></joint></robot>"""
-    found = kin.examine_urdf(WELL.replace("</robot>", third), **HAND)
+    found = kin.doctor.examine_urdf(WELL.replace("</robot>", third), **HAND)
     (finding,) = worth_saying(found)
     assert finding.text == "It follows grip, which follows slide; many readers take one step only."
     # q3 = −2 (0.5 q + 0.01) + 0.1
@@ -240,7 +240,7 @@ def test_a_chain_of_followers_becomes_one_step():
 
 @pytest.mark.full
 def test_a_follower_on_the_way_to_the_tool_follows():
-    found = kin.examine_urdf(WELL, base="foot", tip="claw")
+    found = kin.doctor.examine_urdf(WELL, base="foot", tip="claw")
     assert worth_saying(found) == []
     assert (found.arm.report.joints, found.arm.report.following) == (("shoulder", "elbow", "slide"), ("grip",))
     assert "Following one of them: grip." in found.read
@@ -252,7 +252,7 @@ def test_a_follower_on_the_way_to_the_tool_follows():
 def test_a_follower_on_the_way_to_the_tool_is_never_mended_into_a_joint(leader, said):
     """It would be another arm, with a joint that nobody drives."""
     text = WELL.replace('<mimic joint="slide"', f'<mimic joint="{leader}"')
-    found = kin.examine_urdf(text, base="foot", tip="claw")
+    found = kin.doctor.examine_urdf(text, base="foot", tip="claw")
     (finding,) = worth_saying(found)
     assert (finding.symptom, finding.line) == ("mimic", line_of(text, "<mimic"))
     assert said in finding.text
@@ -263,7 +263,7 @@ def test_a_follower_on_the_way_to_the_tool_is_never_mended_into_a_joint(leader, 
 @pytest.mark.full
 def test_the_effect_of_mends_on_the_tool_is_measured():
     text = WELL.replace('rpy="1.5707963267948966 0 0"', 'rpy="1.57 0 0"')
-    found = kin.examine_urdf(text, **HAND)
+    found = kin.doctor.examine_urdf(text, **HAND)
     q = found.arm.robot.random_q(np.random.default_rng(5), 500)
     apart = np.linalg.norm(
         kin.fk(found.arm.robot, q)[:, :3, 3] - kin.fk(found.mended_arm.robot, q)[:, :3, 3], axis=1
@@ -271,19 +271,19 @@ def test_the_effect_of_mends_on_the_tool_is_measured():
     assert apart.max() == pytest.approx(found.moved, rel=0.3)
     assert found.moved > 1e-5
     limits = WELL.replace('lower="-2" upper="2"', 'lower="-120" upper="120"')
-    assert kin.examine_urdf(limits, **HAND).moved == 0.0
+    assert kin.doctor.examine_urdf(limits, **HAND).moved == 0.0
 
 
 @pytest.mark.parametrize("name", ["ur5.urdf", "panda.urdf", "so101.urdf"])
 def test_makers_files_are_read_and_only_rounded_angles_are_suspicious(name):
-    found = kin.examine_urdf(FILES / name)
+    found = kin.doctor.examine_urdf(FILES / name)
     assert {each.symptom for each in worth_saying(found)} <= {"rounded"}
     assert "It has several ends" in found.read[1]
     assert found.refusal == ""
 
 
 def test_every_end_is_tried():
-    found = kin.examine_urdf(
+    found = kin.doctor.examine_urdf(
         WELL.replace(
             "</robot>",
             '<link name="eye"/><joint name="e" type="fixed">'
@@ -317,7 +317,7 @@ class Sent:
     [(250.0, "0.001 0.001 0.001"), (0.25, None), (0.0, None), (2.5e-4, "1000.0 1000.0 1000.0")],
 )
 def test_a_mesh_in_another_unit_gets_a_scale(side, scale):
-    found = kin.examine_urdf(WELL, **HAND, files=Sent(fore=side))
+    found = kin.doctor.examine_urdf(WELL, **HAND, files=Sent(fore=side))
     if scale is None:
         assert worth_saying(found) == []
         return
@@ -328,12 +328,12 @@ def test_a_mesh_in_another_unit_gets_a_scale(side, scale):
 
 @pytest.mark.full
 def test_a_mesh_that_is_missing_is_named_and_found_elsewhere():
-    found = kin.examine_urdf(WELL, **HAND, files=Sent())
+    found = kin.doctor.examine_urdf(WELL, **HAND, files=Sent())
     (finding,) = worth_saying(found)
     assert finding.text == "The mesh “package://small/fore.stl” cannot be used: no file of that name came along."
     assert not finding.automatic
     gone = WELL.replace("package://small/fore", "package://small/gone/fore")
-    assert 'filename="meshes/fore.stl"' in kin.examine_urdf(gone, **HAND, files=Sent(fore=0.1)).mended
+    assert 'filename="meshes/fore.stl"' in kin.doctor.examine_urdf(gone, **HAND, files=Sent(fore=0.1)).mended
 
 
 def test_the_nearest_possible_inertia_is_that_of_a_body():
@@ -358,7 +358,7 @@ def test_files_in_other_encodings_are_mended_as_utf_8(tmp_path, encoding):
     text = text.replace("A small arm.", "Für Ärmel.").replace('lower="-2"', 'lower="-200"')
     path = tmp_path / "small.urdf"
     path.write_bytes(text.encode(encoding))
-    found = kin.examine_urdf(path, **HAND)
+    found = kin.doctor.examine_urdf(path, **HAND)
     assert "Für Ärmel." in found.mended
     assert 'encoding="utf-8"' in found.mended
     saved = tmp_path / "mended.urdf"
@@ -368,20 +368,20 @@ def test_files_in_other_encodings_are_mended_as_utf_8(tmp_path, encoding):
 
 def test_what_is_no_file_is_refused(tmp_path):
     with pytest.raises(RobotFileError, match="readable"):
-        kin.examine_urdf(tmp_path / "none.urdf")
+        kin.doctor.examine_urdf(tmp_path / "none.urdf")
     with pytest.raises(kin.InputError, match="source"):
-        kin.examine_urdf(7)
+        kin.doctor.examine_urdf(7)
     path = tmp_path / "bytes.urdf"
     path.write_bytes(b"\xff\x00<robot/>\x9d")
-    assert "no XML" in kin.examine_urdf(path).refusal
+    assert "no XML" in kin.doctor.examine_urdf(path).refusal
     path.write_bytes(b'<?xml version="1.0" encoding="klingon"?><robot/>')
     with pytest.raises(RobotFileError, match="encoding"):
-        kin.examine_urdf(path)
+        kin.doctor.examine_urdf(path)
 
 
 def test_many_findings_are_bounded():
     joints = "".join(f'<joint name="j{k}"/>' for k in range(3000))
-    found = kin.examine_urdf(f'<robot name="x">{joints}</robot>')
+    found = kin.doctor.examine_urdf(f'<robot name="x">{joints}</robot>')
     assert len(found.findings) == 501
     assert "more findings" in found.findings[-1].text
 
@@ -400,23 +400,23 @@ THREE = (
 
 
 def test_findings_are_mended_one_by_one():
-    whole = kin.examine_urdf(THREE)
+    whole = kin.doctor.examine_urdf(THREE)
     can = [i for i, each in enumerate(whole.findings) if each.automatic]
     assert len(can) >= 5
     assert [each.done for each in whole.findings] == [each.automatic for each in whole.findings]
     for i in can:
-        one = kin.examine_urdf(THREE, mends=[i])
+        one = kin.doctor.examine_urdf(THREE, mends=[i])
         assert [k for k, each in enumerate(one.findings) if each.done] == [i]
         assert one.mends == 1
         assert one.mendable == len(can)
         assert one.mended is not None
-        left = {(e.place, e.symptom, e.text) for e in kin.examine_urdf(one.mended).findings if e.automatic}
+        left = {(e.place, e.symptom, e.text) for e in kin.doctor.examine_urdf(one.mended).findings if e.automatic}
         before = {k: (e.place, e.symptom, e.text) for k, e in enumerate(whole.findings) if e.automatic}
         assert before[i] not in left
         others = [each for k, each in before.items() if k != i and each[0] != before[i][0]]
         assert set(others) <= left, "another place was mended too"
-    assert kin.examine_urdf(THREE, mends=can).mended == whole.mended
-    none = kin.examine_urdf(THREE, mends=[])
+    assert kin.doctor.examine_urdf(THREE, mends=can).mended == whole.mended
+    none = kin.doctor.examine_urdf(THREE, mends=[])
     assert none.mended is None
     assert none.mends == 0
 
@@ -426,6 +426,6 @@ def test_what_cannot_be_mended_is_refused(mends):
     with pytest.raises(
         kin.InputError, match=r"mends: got .*, expected indices of findings that can be mended: 0, 1"
     ):
-        kin.examine_urdf(THREE, mends=mends)
+        kin.doctor.examine_urdf(THREE, mends=mends)
     with pytest.raises(kin.InputError, match="none, for nothing can be mended"):
-        kin.examine_urdf(kin.robot_to_urdf("planar2r"), mends=[0])
+        kin.doctor.examine_urdf(kin.robot_to_urdf("planar2r"), mends=[0])

@@ -7,7 +7,7 @@ import pytest
 
 import kin
 
-WITH = [robot for robot in kin.classic_robots().values() if robot.capsules]
+WITH = [robot for robot in kin.files.classic_robots().values() if robot.capsules]
 
 
 @pytest.mark.parametrize("robot", WITH, ids=lambda robot: robot.id)
@@ -20,7 +20,7 @@ def test_capsules_survive_a_round_trip(robot):
 
 @pytest.mark.parametrize("robot", WITH, ids=lambda robot: robot.id)
 def test_a_converted_arm_has_the_same_bodies(robot):
-    other = kin.convert_dh(robot, "modified" if robot.convention == "standard" else "standard")
+    other = kin.dh.convert_dh(robot, "modified" if robot.convention == "standard" else "standard")
     q = robot.random_q(np.random.default_rng(2), 20)
     assert np.abs(kin.clearance(other, q) - kin.clearance(robot, q)).max() < 1e-12
 

@@ -17,7 +17,7 @@ from kin.robot import Joint, Robot
 HEAD = 'id = "x"\nname = "x"\nsource = "x"\nconvention = "standard"\nunits = { length = "m", angle = "deg" }\n'
 
 
-@pytest.mark.parametrize("robot_id", kin.classic_robots())
+@pytest.mark.parametrize("robot_id", kin.files.classic_robots())
 def test_the_default_home_of_every_arm_is_not_singular(robot_id):
     robot = kin.get_robot(robot_id)
     home = np.array(default_home(robot))

@@ -52,7 +52,7 @@ def test_a_built_in_arm_is_loaded_by_mujoco_and_read_back(robot):
         list(row.limits) for row in robot.rows if row.limits is not None
     ]
     assert model.key("home").qpos.tolist() == robot.expand(robot.q_home).tolist()
-    back, report = kin.read_urdf(text)
+    back, report = kin.files.read_urdf(text)
     assert report.difference < 1e-12
     assert [joint.limits for joint in back.joints] == [joint.limits for joint in robot.joints]
     assert [joint.effort for joint in back.joints] == [joint.effort for joint in robot.joints]
@@ -94,8 +94,10 @@ def test_capsules_are_where_the_arm_has_them_and_touch_where_it_says(robot):
     text = kin.robot_to_mjcf(robot)
     model, data = loaded(text)
     solid = model.geom_type != mujoco.mjtGeom.mjGEOM_PLANE
-    assert solid.sum() == len(kin.capsules(robot))
-    assert sorted(model.geom_size[solid, 0]) == pytest.approx(sorted(c.radius for c in kin.capsules(robot)))
+    assert solid.sum() == len(kin.collision.capsules(robot))
+    assert sorted(model.geom_size[solid, 0]) == pytest.approx(
+        sorted(c.radius for c in kin.collision.capsules(robot))
+    )
     touching = 0
     for q in robot.random_q(np.random.default_rng(4), 150 if robot in CLASSICS else 25):
         distance = float(kin.clearance(robot, q))
@@ -205,7 +207,7 @@ def test_masses_are_said_to_be_assumed(robot):
     assert "Masses and inertia are assumed: 1000 kg/m3" in text
     model, data = loaded(text)
     assert (model.body_mass[2:] > 0.0).all(), "MuJoCo refuses a moving body without mass"
-    shapes = kin.capsules(robot)
+    shapes = kin.collision.capsules(robot)
     volume = sum(math.pi * c.radius**2 * (math.dist(c.start, c.end) + 4.0 / 3.0 * c.radius) for c in shapes)
     balls = len(robot.moving_rows) - len({c.link for c in shapes} - {0})  # links without a capsule weigh 0.1 kg
     assert model.body_mass.sum() == pytest.approx(1000.0 * volume + 0.1 * balls)
@@ -259,7 +261,7 @@ RICH = """<mujoco model="rich">
 )
 def test_what_is_read_moves_as_in_mujoco(compiler):
     text = RICH.format(compiler=compiler)
-    robot, report = kin.read_urdf(text)
+    robot, report = kin.files.read_urdf(text)
     assert (report.base, report.tip, report.joints) == ("world", "tcp", ("pan", "tilt", "boom", "roll"))
     assert robot.source.startswith("MJCF")
     assert_moves_alike(robot, text, "tcp")
@@ -328,7 +330,7 @@ def test_a_cup_on_the_table_is_no_end_of_the_arm_but_a_camera_on_a_pole_is():
 
 def test_a_slide_may_be_unlimited():
     text = RICH.format(compiler='angle="degree"').replace('range="0 0.3"', 'range="0 0.3" limited="false"')
-    robot, report = kin.read_urdf(text)
+    robot, report = kin.files.read_urdf(text)
     assert "Joint boom states no range: it gets 0 to 1 m." in report.notes
     assert (0.0, 1.0) in [joint.limits for joint in robot.joints]
 
@@ -354,7 +356,7 @@ def test_deep_and_large_files_are_bounded():
 def test_what_is_not_read_of_the_arm_is_named(old, new, words):
     text = RICH.format(compiler='angle="degree"')
     assert old in text
-    robot, report = kin.read_urdf(text.replace(old, new, 1))
+    robot, report = kin.files.read_urdf(text.replace(old, new, 1))
     assert sum(words in note for note in report.notes) == 1
     assert np.allclose(kin.fk(robot, robot.q_home), kin.fk(kin.load_robot(text), robot.q_home), atol=1e-12)
 
@@ -395,7 +397,7 @@ ONE = """<mujoco model="one"><compiler angle="radian"/><worldbody><body name="ba
     ],
 )
 def test_notes_are_in_the_words_of_mujoco(joint, words):
-    robot, report = kin.read_urdf(ONE.format(joint=joint))
+    robot, report = kin.files.read_urdf(ONE.format(joint=joint))
     assert words in report.notes
     assert robot.source.startswith("MJCF, from body ")
     assert robot.source.endswith(" to body arm")
@@ -415,7 +417,7 @@ def test_notes_are_in_the_words_of_mujoco(joint, words):
 )
 def test_refusals_are_in_the_words_of_mujoco(joint, keywords, field, valid):
     with pytest.raises(kin.RobotFileError) as refused:
-        kin.read_urdf(ONE.format(joint=joint), **keywords)
+        kin.files.read_urdf(ONE.format(joint=joint), **keywords)
     assert refused.value.field == field
     assert valid in refused.value.expected
     assert "URDF" not in str(refused.value)
@@ -423,7 +425,7 @@ def test_refusals_are_in_the_words_of_mujoco(joint, keywords, field, valid):
 
 def test_a_file_without_joints_of_an_arm_says_which_it_lacks():
     with pytest.raises(kin.RobotFileError, match="a chain with hinge or slide joints"):
-        kin.read_urdf('<mujoco><worldbody><body name="a"><geom size="1"/></body></worldbody></mujoco>')
+        kin.files.read_urdf('<mujoco><worldbody><body name="a"><geom size="1"/></body></worldbody></mujoco>')
 
 
 @pytest.mark.parametrize("limited", ["auto", "true", "false"])

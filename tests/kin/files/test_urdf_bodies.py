@@ -42,8 +42,8 @@ BOX = '<collision><origin xyz="0.25 0 0"/><geometry><box size="0.5 0.06 0.06"/><
 MESH = '<collision><geometry><mesh filename="package://two/fore.stl"/></geometry></collision>'
 
 
-def read(upper: str = BOX, fore: str = BOX, **more) -> kin.UrdfRobot:
-    return kin.read_urdf(LINKS.format(upper=upper, fore=fore), tip="hand", **more)
+def read(upper: str = BOX, fore: str = BOX, **more) -> kin.files.UrdfRobot:
+    return kin.files.read_urdf(LINKS.format(upper=upper, fore=fore), tip="hand", **more)
 
 
 @pytest.mark.full
@@ -168,7 +168,7 @@ def test_a_malformed_body_is_a_tube_and_never_refuses_the_arm(wrong, words):
 
 def test_without_collision_bodies_all_is_assumed():
     text = kin.robot_to_urdf(kin.get_robot("puma560"))
-    robot, report = kin.read_urdf(text, tip="tool")
+    robot, report = kin.files.read_urdf(text, tip="tool")
     assert robot.capsules == ()
     assert "all bodies are assumed" in report.about_bodies
     assert "states no collision bodies" in report.about_bodies
@@ -187,12 +187,12 @@ def test_the_home_of_an_import_is_free_of_contacts():
     """In the middle of its limits this arm is folded onto its base."""
     fold = '<limit lower="-2" upper="2"/>'
     text = LINKS.format(upper=BOX, fore=BOX).replace('<link name="plate"/>', '<link name="plate"/>')
-    free = kin.read_urdf(text, tip="hand").robot
+    free = kin.files.read_urdf(text, tip="hand").robot
     long = text.replace('radius="0.1" length="0.2"', 'radius="0.1" length="0.1"')
     wall = '<collision><origin xyz="0.9 0 0.3"/><geometry><box size="0.1 0.3 0.3"/></geometry></collision>'
     walled = long.replace("</collision></link>", f"</collision>{wall}</link>", 1)
     assert fold in walled
-    robot = kin.read_urdf(walled, tip="hand").robot
+    robot = kin.files.read_urdf(walled, tip="hand").robot
     assert robot.home != free.home
     assert kin.clearance(robot, robot.q_home) > 0.0
     assert kin.clearance(robot, free.q_home) < 0.0

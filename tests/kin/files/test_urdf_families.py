@@ -38,7 +38,7 @@ def arms(paths: list[Path]) -> tuple[dict[str, Robot], Counter[str]]:
     refused: Counter[str] = Counter()
     for path in paths:
         try:
-            tips = kin.urdf_tips(path)
+            tips = kin.files.urdf_tips(path)
         except RobotFileError:
             refused["files"] += 1
             continue

@@ -41,7 +41,7 @@ READ = {
 
 @pytest.mark.parametrize(("name", "note"), READ.items())
 def test_what_has_one_meaning_is_read(name, note):
-    robot, report = kin.read_urdf(FILES / f"{name}.urdf")
+    robot, report = kin.files.read_urdf(FILES / f"{name}.urdf")
     assert report.joints == ("j1", "j2", "j3")
     assert kin.fk(robot, Q)[:3, 3] == pytest.approx(TOOL, abs=1e-6)
     assert robot.joints[0].velocity == (None if name == "vel_neg" else 1.0)
@@ -50,7 +50,7 @@ def test_what_has_one_meaning_is_read(name, note):
 
 
 def test_a_joint_that_follows_is_read_and_its_arm_is_solved():
-    robot, report = kin.read_urdf(FILES / "mimic_chain.urdf")
+    robot, report = kin.files.read_urdf(FILES / "mimic_chain.urdf")
     assert (report.joints, report.following) == (("j1", "j2"), ("j3",))
     # q3 = 0.05 q2 + 0.1, along x of a frame that j1 and j2 turn.
     q = [0.3, 0.5]
@@ -71,8 +71,8 @@ def test_what_is_no_file_of_an_arm_is_named(name, words):
     path = FILES / f"{name}.urdf"
     for source in (path, path.read_text(encoding="utf-8")):
         with pytest.raises(RobotFileError, match=words):
-            kin.read_urdf(source)
-    assert words in kin.examine_urdf(path).findings[0].text
+            kin.files.read_urdf(source)
+    assert words in kin.doctor.examine_urdf(path).findings[0].text
 
 
 @pytest.mark.parametrize(
@@ -90,26 +90,26 @@ def test_another_file_in_its_place_is_named(tmp_path, text, words):
     path = tmp_path / "arm.urdf"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(RobotFileError, match=words):
-        kin.read_urdf(path)
-    assert re.search(words.replace(": got", ":"), kin.examine_urdf(path).findings[0].text)
+        kin.files.read_urdf(path)
+    assert re.search(words.replace(": got", ":"), kin.doctor.examine_urdf(path).findings[0].text)
 
 
 def test_a_limit_that_is_not_stated_is_zero_and_that_is_said():
-    found = kin.examine_urdf(OK.replace('lower="-2" upper="2"', 'lower="-2"'))
+    found = kin.doctor.examine_urdf(OK.replace('lower="-2" upper="2"', 'lower="-2"'))
     assert found.arm.robot.joints[1].limits == (-2.0, 0.0)
     assert found.arm.report.notes == ("Joint j2 states no upper limit, which is 0 then.",)
     assert [(each.rank, each.automatic) for each in found.findings] == [("suspicious", False)]
 
 
 def test_expressions_in_numbers_are_mended():
-    found = kin.examine_urdf(OK.replace('lower="-2" upper="2"', 'lower="-pi/2" upper="2*pi/4"'))
+    found = kin.doctor.examine_urdf(OK.replace('lower="-2" upper="2"', 'lower="-pi/2" upper="2*pi/4"'))
     assert found.arm is None
     assert found.mended_arm.robot.joints[1].limits == pytest.approx((-math.pi / 2, math.pi / 2))
-    assert kin.examine_urdf(OK.replace('upper="2"', 'upper="two"')).mended_arm is None
+    assert kin.doctor.examine_urdf(OK.replace('upper="2"', 'upper="two"')).mended_arm is None
 
 
 def test_expressions_of_xacro_in_names_are_noted():
-    found = kin.read_urdf(OK.replace('name="j1"', 'name="${prefix}j1"'))
+    found = kin.files.read_urdf(OK.replace('name="j1"', 'name="${prefix}j1"'))
     assert found.report.notes == (
         "Names such as ${prefix}j1 have expressions of xacro: they are taken as they stand.",
     )
@@ -126,11 +126,11 @@ def test_what_carries_fingers_is_offered_as_the_tip_and_all_say_as_many_joints()
     with pytest.raises(
         RobotFileError, match=r"tool0 \(3 joints\), left \(4 joints\), right \(4 joints\)"
     ) as caught:
-        kin.read_urdf(text)
+        kin.files.read_urdf(text)
     ends = re.findall(r"(\w+) \((\d) joints\)", caught.value.expected)
-    assert ends == re.findall(r"(\w+) \((\d) joints\)", " ".join(kin.examine_urdf(text).read))
+    assert ends == re.findall(r"(\w+) \((\d) joints\)", " ".join(kin.doctor.examine_urdf(text).read))
     for tip, joints in ends:
-        assert kin.read_urdf(text, tip=tip).robot.n == int(joints)
+        assert kin.files.read_urdf(text, tip=tip).robot.n == int(joints)
 
 
 def test_a_rod_of_a_parallelogram_is_no_finger():
@@ -146,18 +146,18 @@ def test_a_rod_of_a_parallelogram_is_no_finger():
         )
     )
     links = "".join(f'<link name="{each}"/>' for each in ("base", "column", "arm", "rod", "fore", "hand"))
-    assert kin.urdf_tips(f'<robot name="a">{links}{joints}</robot>')[0].link == "hand"
+    assert kin.files.urdf_tips(f'<robot name="a">{links}{joints}</robot>')[0].link == "hand"
 
 
 @pytest.mark.parametrize("name", ["comment_first", "blank_first", "amp", "latin1_undeclared", "type_case"])
 def test_the_doctor_mends_what_has_one_meaning(name):
-    found = kin.examine_urdf(FILES / f"{name}.urdf")
+    found = kin.doctor.examine_urdf(FILES / f"{name}.urdf")
     assert found.count("wrong") == (2 if name == "type_case" else 1)
     assert all(each.automatic and each.line for each in found.findings if each.rank == "wrong")
-    again = kin.examine_urdf(found.mended)
+    again = kin.doctor.examine_urdf(found.mended)
     assert again.count("wrong") == again.count("suspicious") == 0
     assert found.moved == 0.0
-    assert kin.examine_urdf(FILES / f"{name}.urdf", mends=[]).mended is None
+    assert kin.doctor.examine_urdf(FILES / f"{name}.urdf", mends=[]).mended is None
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_the_doctor_mends_what_has_one_meaning(name):
 )
 def test_the_doctor_asks_where_two_things_may_be_meant(old, new):
     assert old in OK
-    found = kin.examine_urdf(OK.replace(old, new, 1))
+    found = kin.doctor.examine_urdf(OK.replace(old, new, 1))
     suspicious = [each for each in found.findings if each.rank == "suspicious"]
     assert [each.automatic for each in suspicious] == [False]
     assert suspicious[0].mend
@@ -181,29 +181,29 @@ def test_the_doctor_asks_where_two_things_may_be_meant(old, new):
 
 
 def test_a_speed_that_is_not_known_stays_unknown_when_it_is_mended():
-    found = kin.examine_urdf(FILES / "vel_neg.urdf")
+    found = kin.doctor.examine_urdf(FILES / "vel_neg.urdf")
     assert 'velocity="0"' in found.mended
     assert found.mended_arm.robot.joints[0].velocity is None
 
 
 def test_a_slide_without_limits_is_read():
-    robot, report = kin.read_urdf(FILES / "slide.urdf")
+    robot, report = kin.files.read_urdf(FILES / "slide.urdf")
     assert kin.fk(robot, [10.0])[0, 3] == pytest.approx(20.0)
     assert report.notes == ("Joint m1 states no limits: it gets 0 to 1 m.",)
     huge = OK.replace('lower="0" upper="0.2"', 'lower="-999999" upper="999999"')
-    assert kin.read_urdf(huge).report.notes == (
+    assert kin.files.read_urdf(huge).report.notes == (
         "Joint j3 has limits of 10000 m or more both ways, which stand for none: it gets 0 to 1 m.",
     )
 
 
 def test_acceleration_and_jerk_are_kept():
     limit = 'velocity="1" acceleration="2" deceleration="3" jerk="5"/>'
-    robot, report = kin.read_urdf(OK.replace('velocity="1"/>', limit, 1))
+    robot, report = kin.files.read_urdf(OK.replace('velocity="1"/>', limit, 1))
     assert (robot.joints[0].acceleration, robot.joints[0].jerk) == (2.0, 5.0)
     assert report.notes == ("Joint j1 has acceleration 2 and deceleration 3: the smaller counts.",)
     again = kin.load_robot(kin.robot_to_urdf(robot))
     assert [(j.acceleration, j.jerk) for j in again.joints] == [(j.acceleration, j.jerk) for j in robot.joints]
-    limits = kin.motion_limits(robot)
+    limits = kin.motion.motion_limits(robot)
     assert (limits.acceleration[0], limits.jerk[0]) == (2.0, 5.0)
     assert limits.assumed[0] == ()
 
@@ -246,10 +246,10 @@ def test_each_attribute_of_urdf_is_read_or_beside_the_geometry(tag, key):
     element.set(key, "?")
     written = tostring(root, encoding="unicode")
     try:
-        changed = kin.read_urdf(written)
+        changed = kin.files.read_urdf(written)
     except RobotFileError:
         return
-    was = kin.read_urdf(OK)
+    was = kin.files.read_urdf(OK)
     assert (changed.robot.name, changed.report.joints, changed.report.notes) != (
         was.robot.name,
         was.report.joints,
@@ -275,16 +275,16 @@ def test_each_attribute_of_urdf_is_read_or_beside_the_geometry(tag, key):
 def test_what_is_not_read_is_named(old, new, words):
     assert old in OK
     text = OK.replace(old, new, 1)
-    (note,) = kin.read_urdf(text).report.notes
+    (note,) = kin.files.read_urdf(text).report.notes
     assert re.search(words, note), note
     if "<link" not in new:
-        suspicious = [each for each in kin.examine_urdf(text).findings if each.rank == "suspicious"]
+        suspicious = [each for each in kin.doctor.examine_urdf(text).findings if each.rank == "suspicious"]
         assert any(each.symptom == "element" for each in suspicious)
 
 
 def test_many_notes_about_what_is_not_read_are_bounded():
     extra = "".join(f' x{k}="1"' for k in range(50))
-    notes = kin.read_urdf(OK.replace('<robot name="r"', f'<robot name="r"{extra}')).report.notes
+    notes = kin.files.read_urdf(OK.replace('<robot name="r"', f'<robot name="r"{extra}')).report.notes
     assert (len(notes), notes[-1]) == (21, "30 more elements and attributes are not read.")
 
 
@@ -299,7 +299,7 @@ def test_many_notes_about_what_is_not_read_are_bounded():
 )
 def test_xacro_that_adds_to_the_arm_is_refused(text):
     with pytest.raises(RobotFileError, match=r"xacro|well-formed"):
-        kin.read_urdf(text)
+        kin.files.read_urdf(text)
 
 
 @pytest.mark.parametrize("part", ["<!--", "<![CDATA[", "<?", "<?xml ", "&", "&a", "<" * 7 + " "])

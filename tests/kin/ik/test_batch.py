@@ -24,7 +24,7 @@ from kin.solvers import closed_form_of
 from kin.solvers.contract import POSE, SolverInput
 
 ROBOTS = CHAPTER_ARMS
-CLOSED = tuple(robot.id for robot in kin.classic_robots().values() if closed_form_of(robot) is not None)
+CLOSED = tuple(robot.id for robot in kin.files.classic_robots().values() if closed_form_of(robot) is not None)
 
 
 def moved(robot):

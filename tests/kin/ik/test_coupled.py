@@ -40,7 +40,7 @@ def hollow_wrist() -> Robot:
     return replace(puma, rows=tuple(rows), capsules=())
 
 
-ARMS = [palletiser(), kin.convert_dh(palletiser(), "modified"), hollow_wrist()]
+ARMS = [palletiser(), kin.dh.convert_dh(palletiser(), "modified"), hollow_wrist()]
 IDS = ["palletiser", "palletiser, modified", "hollow wrist"]
 
 

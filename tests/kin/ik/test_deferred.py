@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import kin.ik.assembly
-from kin import IKResult, IKSolution, fk, get_robot, solve_ik
+from kin import IKResult, fk, get_robot, solve_ik
+from kin.ik import IKSolution
 from kin.ik.results import Deferred
 
 

@@ -147,7 +147,7 @@ def test_wider_limits_are_intersected_where_that_is_wanted():
     many = kin.solve_ik_many(arm, [T], limits=narrow, wider_limits="intersect")
     assert many.q[0].tolist() == found.solutions[0].q.tolist()
     constraints = kin.JointConstraints(narrow, wider_limits="intersect")
-    points = kin.sample_workspace(arm, 50, constraints=constraints, with_q=True)
+    points = kin.workspace.sample_workspace(arm, 50, constraints=constraints, with_q=True)
     assert all((chunk.q <= arm.upper).all() and (chunk.q[:, 0] <= 3.0).all() for chunk in points)
 
 

@@ -16,7 +16,7 @@ from kin.ik.options import DEFAULTS, IKKeywords, MotionKeywords, PathKeywords, R
 
 ARM = kin.get_robot("redundant7-craig")
 T = kin.fk(ARM, ARM.q_home)
-PROGRAM = [kin.Ptp(kin.JointTarget(ARM.home))]
+PROGRAM = [kin.motion.Ptp(kin.motion.JointTarget(ARM.home))]
 CALLS = {
     "solve_ik": (kin.solve_ik, IKKeywords, lambda **given: kin.solve_ik(ARM, T, **given)),
     "solve_ik_many": (kin.solve_ik_many, IKKeywords, lambda **given: kin.solve_ik_many(ARM, [T], **given)),

@@ -194,7 +194,7 @@ few = settings(max_examples=6, deadline=None)
 @given(seeds)
 def test_postures_do_not_depend_on_the_convention(seed):
     robot, q, T, value, _ = case(seed)
-    other = kin.convert_dh(robot, "modified" if robot.convention == "standard" else "standard")
+    other = kin.dh.convert_dh(robot, "modified" if robot.convention == "standard" else "standard")
     assert_same(postures(robot, T, q, value), postures(other, T, q, value))
 
 

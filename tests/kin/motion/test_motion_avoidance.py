@@ -15,7 +15,7 @@ POST = kin.Obstacle("cylinder", MIDDLE.tolist(), radius=0.05, height=0.3, name="
 
 
 def test_a_motion_is_refused_at_its_first_touch():
-    program = [kin.Ptp(kin.JointTarget(AWAY)), kin.Dwell(1.0)]
+    program = [kin.motion.Ptp(kin.motion.JointTarget(AWAY)), kin.motion.Dwell(1.0)]
     refused = kin.plan_motion(UR5, program, obstacles=[POST])
     assert not refused.planned
     details = refused.refusal.details
@@ -31,7 +31,7 @@ def test_slow_motions_and_pauses_take_no_more_checks_than_fast_ones(monkeypatch,
     checks = []
     margins = sweep.margins
     monkeypatch.setattr(sweep, "margins", lambda *args: checks.append(len(args[5])) or margins(*args))
-    moves = [kin.Ptp(kin.JointTarget(AWAY), speed=speed), *[kin.Dwell(3600.0)] * 100]
+    moves = [kin.motion.Ptp(kin.motion.JointTarget(AWAY), speed=speed), *[kin.motion.Dwell(3600.0)] * 100]
     far = kin.Obstacle("sphere", (9.0, 0.0, 0.0), radius=0.1)
     assert kin.plan_motion(UR5, moves, obstacles=[far]).planned
     assert 0 < sum(checks) < 20 * 101
@@ -40,7 +40,7 @@ def test_slow_motions_and_pauses_take_no_more_checks_than_fast_ones(monkeypatch,
 def test_a_wire_that_is_grazed_for_a_moment_is_not_missed():
     """So little that samples every 0.01 rad pass it."""
     x, y, z = kin.fk(UR5, 0.37 * UR5.q_home + 0.63 * AWAY)[:3, 3].tolist()
-    program = [kin.Ptp(kin.JointTarget(AWAY))]
+    program = [kin.motion.Ptp(kin.motion.JointTarget(AWAY))]
     free = kin.plan_motion(UR5, program)
     q = free.derivatives(np.linspace(0.0, free.duration, 8001))[0]
 
@@ -62,6 +62,6 @@ def test_a_wire_that_is_grazed_for_a_moment_is_not_missed():
 
 def test_an_arm_that_rests_is_checked_where_it_is():
     here = kin.Obstacle("sphere", kin.fk(UR5, UR5.q_home)[:3, 3].tolist(), radius=0.1)
-    refused = kin.plan_motion(UR5, [kin.Ptp(kin.JointTarget(UR5.q_home))], obstacles=[here])
+    refused = kin.plan_motion(UR5, [kin.motion.Ptp(kin.motion.JointTarget(UR5.q_home))], obstacles=[here])
     assert refused.refusal.details.time == 0.0
     assert refused.refusal.helps == ()

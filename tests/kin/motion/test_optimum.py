@@ -10,7 +10,7 @@ from kin.motion.geometry.curves import natural
 from kin.motion.geometry.splines import parted
 from kin.motion.timing.timed import JointPath, TimedPath, finer_ends, timed
 
-ARMS = tuple(kin.classic_robots())
+ARMS = tuple(kin.files.classic_robots())
 
 # Paths on which other programs failed (problem_suite_1.yaml of toppra, MIT): waypoints, velocity, acceleration.
 HARD = [
@@ -91,8 +91,8 @@ def lines(robot, seed):
         robot.clip(robot.q_home + rng.normal(0, 0.15, robot.n) * np.where(robot.revolute, 1, 0.1))
         for _ in range(3)
     ]
-    targets = [kin.PoseTarget.of(kin.fk(robot, each)) for each in q[1:]]
-    return [kin.Lin(targets[0], blend=0.02), kin.Lin(targets[1], speed=0.6)], q[0]
+    targets = [kin.motion.PoseTarget.of(kin.fk(robot, each)) for each in q[1:]]
+    return [kin.motion.Lin(targets[0], blend=0.02), kin.motion.Lin(targets[1], speed=0.6)], q[0]
 
 
 @pytest.mark.slow
@@ -101,7 +101,7 @@ def test_times_are_within_one_percent_of_a_linear_program_on_a_finer_grid(arm):
     robot, compared = kin.get_robot(arm), 0
     for seed in range(12):
         segments, q = lines(robot, seed)
-        motion = kin.plan_motion(robot, kin.Program(segments, jerk_limited=False), q)
+        motion = kin.plan_motion(robot, kin.motion.Program(segments, jerk_limited=False), q)
         for piece in motion.pieces:
             assert isinstance(piece, TimedPath)
             compared += 1

@@ -22,7 +22,7 @@ BESIDE = PoseTarget(beside([0.05, 0.1, -0.05]))
 TOO_FAR = PoseTarget((float(HERE[0]) * 4.0, float(HERE[1]), float(HERE[2])))
 
 
-def rests(motion: kin.Motion) -> bool:
+def rests(motion: kin.motion.Motion) -> bool:
     return bool(np.abs(motion.derivatives(motion.duration)[1]).max() < 1e-9)
 
 

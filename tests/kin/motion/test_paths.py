@@ -12,7 +12,7 @@ import kin
 from kin.motion.geometry.curves import arc_through, poses, rotations, turning
 from kin.transforms import rotation_vector
 
-ARMS = tuple(kin.classic_robots())
+ARMS = tuple(kin.files.classic_robots())
 
 
 def by(*offset):
@@ -24,7 +24,7 @@ def moved(robot, q, rng, size):
 
 
 def target(robot, q):
-    return kin.PoseTarget.of(kin.fk(robot, q))
+    return kin.motion.PoseTarget.of(kin.fk(robot, q))
 
 
 def assert_limits(motion):
@@ -61,13 +61,13 @@ def random_program(robot, seed):
         }
         kind = rng.choice(["lin", "lin", "circ", "ptp"])
         if kind == "lin":
-            segments.append(kin.Lin(target(robot, q), **common))
+            segments.append(kin.motion.Lin(target(robot, q), **common))
         elif kind == "circ":
             via = kin.fk(robot, moved(robot, q, rng, 0.1))[:3, 3]
-            segments.append(kin.Circ(via, target(robot, q), orientation="two-axis", **common))
+            segments.append(kin.motion.Circ(via, target(robot, q), orientation="two-axis", **common))
         else:
-            segments.append(kin.Ptp(kin.JointTarget(q), **common))
-    return kin.Program(segments, jerk_limited=bool(rng.random() < 0.7)), q_start
+            segments.append(kin.motion.Ptp(kin.motion.JointTarget(q), **common))
+    return kin.motion.Program(segments, jerk_limited=bool(rng.random() < 0.7)), q_start
 
 
 def check(arm, seed):
@@ -100,7 +100,7 @@ def test_many_random_programs_keep_every_limit(arm):
 
 
 def line_of(robot, q_start, q_end, **fields):
-    return kin.plan_motion(robot, [kin.Lin(target(robot, q_end), **fields)], q_start)
+    return kin.plan_motion(robot, [kin.motion.Lin(target(robot, q_end), **fields)], q_start)
 
 
 @pytest.mark.parametrize("arm", ARMS)
@@ -136,7 +136,7 @@ def test_an_arc_is_round_and_passes_its_via_point():
     T = kin.fk(robot, robot.q_home)
     p = T[:3, 3]
     via, end = p + by(0.05, 0.05, 0), p + by(0.1, 0, 0)
-    motion = kin.plan_motion(robot, [kin.Circ(via, kin.PoseTarget(end))])
+    motion = kin.plan_motion(robot, [kin.motion.Circ(via, kin.motion.PoseTarget(end))])
     points = motion.sample(np.linspace(0, motion.duration, 3000)).T[:, :3, 3]
     assert np.abs(np.linalg.norm(points - (p + by(0.05, 0, 0)), axis=1) - 0.05).max() < 1e-6
     assert np.linalg.norm(points - via, axis=1).min() < 1e-4
@@ -149,7 +149,13 @@ def test_a_blend_leaves_the_corner_within_its_radius_and_saves_time():
     corner, end = p + by(0.0, 0.15, 0.0), p + by(0.0, 0.15, 0.12)
 
     def drive(blend):
-        return kin.plan_motion(robot, [kin.Lin(kin.PoseTarget(corner), blend=blend), kin.Lin(kin.PoseTarget(end))])
+        return kin.plan_motion(
+            robot,
+            [
+                kin.motion.Lin(kin.motion.PoseTarget(corner), blend=blend),
+                kin.motion.Lin(kin.motion.PoseTarget(end)),
+            ],
+        )
 
     stopped, blended = drive(0), drive(0.03)
     assert blended.duration < stopped.duration
@@ -169,7 +175,9 @@ def test_a_blend_leaves_the_corner_within_its_radius_and_saves_time():
 def test_ptp_with_a_blend_does_not_stop():
     robot = kin.get_robot("puma560")
     a, b = robot.q_home + 0.3, robot.q_home + by(0.6, 0, 0.1, 0, 0.4, 0)
-    motion = kin.plan_motion(robot, [kin.Ptp(kin.JointTarget(a), blend=0.05), kin.Ptp(kin.JointTarget(b))])
+    motion = kin.plan_motion(
+        robot, [kin.motion.Ptp(kin.motion.JointTarget(a), blend=0.05), kin.motion.Ptp(kin.motion.JointTarget(b))]
+    )
     assert motion.planned
     assert_limits(motion)
     assert_continuous(motion)
@@ -188,9 +196,9 @@ def test_ptp_and_lines_are_blended_in_the_joints(arm):
     p = kin.fk(robot, q)[:3, 3]
     end = p + by(0.0, 0.08, 0.0 if arm == "scara" else -0.03)
     segments = [
-        kin.Ptp(kin.JointTarget(q), blend=0.02),
-        kin.Lin(kin.PoseTarget(end), blend=0.015, speed=0.5),
-        kin.Ptp(kin.JointTarget(robot.q_home)),
+        kin.motion.Ptp(kin.motion.JointTarget(q), blend=0.02),
+        kin.motion.Lin(kin.motion.PoseTarget(end), blend=0.015, speed=0.5),
+        kin.motion.Ptp(kin.motion.JointTarget(robot.q_home)),
     ]
     motion = kin.plan_motion(robot, segments)
     assert motion.planned
@@ -217,7 +225,7 @@ def test_splines_pass_their_points():
     robot = kin.get_robot("panda")
     T = kin.fk(robot, robot.q_home)
     points = [T[:3, 3] + by(*d) for d in ([0, 0.1, 0.02], [0, 0.15, -0.05], [0.05, 0.1, -0.1])]
-    motion = kin.plan_motion(robot, [kin.Spline([kin.PoseTarget(p) for p in points])])
+    motion = kin.plan_motion(robot, [kin.motion.Spline([kin.motion.PoseTarget(p) for p in points])])
     assert motion.planned
     found = motion.sample(np.linspace(0, motion.duration, 5000)).T[:, :3, 3]
     assert max(np.linalg.norm(found - p, axis=1).min() for p in points) < 1e-3
@@ -226,7 +234,7 @@ def test_splines_pass_their_points():
         robot.q_home + 0.1 * np.array(k)
         for k in ([1, 0, 0, 1, 0, 0, 0], [2, 1, 0, 2, 0, 0, 1], [1, 2, 0, 3, 0, 0, 2])
     ]
-    joints = kin.plan_motion(robot, [kin.Spline([kin.JointTarget(q) for q in rows])])
+    joints = kin.plan_motion(robot, [kin.motion.Spline([kin.motion.JointTarget(q) for q in rows])])
     q = joints.sample(np.linspace(0, joints.duration, 5000)).q
     assert max(np.abs(q - row).max(axis=1).min() for row in rows) < 1e-3
     assert_limits(joints)
@@ -235,12 +243,12 @@ def test_splines_pass_their_points():
 def test_the_speed_of_the_tool_is_limited():
     robot = kin.get_robot("ur5")
     p = kin.fk(robot, robot.q_home)[:3, 3]
-    motion = kin.plan_motion(robot, [kin.Lin(kin.PoseTarget(p + by(0.2, 0, 0)), tool_speed=0.1)])
+    motion = kin.plan_motion(robot, [kin.motion.Lin(kin.motion.PoseTarget(p + by(0.2, 0, 0)), tool_speed=0.1)])
     speed = motion.sample(np.linspace(0, motion.duration, 999)).tool_speed
     assert 0.0995 < speed.max() <= 0.1
     T = kin.fk(robot, robot.q_home)
     T[:3, :3] = rotations(np.array([0, 0, 1.0]), np.ones(1))[0] @ T[:3, :3]
-    turned = kin.plan_motion(robot, [kin.Lin(kin.PoseTarget.of(T), tool_turn=0.5)])
+    turned = kin.plan_motion(robot, [kin.motion.Lin(kin.motion.PoseTarget.of(T), tool_turn=0.5)])
     turn = turned.sample(np.linspace(0, turned.duration, 999)).tool_turn
     assert 0.497 < turn.max() <= 0.5
 
@@ -262,7 +270,9 @@ def test_close_to_a_singularity_it_slows_down_and_says_where():
 def test_a_line_out_of_the_workspace_is_refused_at_its_place():
     robot = kin.get_robot("irb120")
     p = kin.fk(robot, robot.q_home)[:3, 3]
-    motion = kin.plan_motion(robot, [kin.Dwell(0.1), kin.Lin(kin.PoseTarget(p + by(0.5, 0, 0)))])
+    motion = kin.plan_motion(
+        robot, [kin.motion.Dwell(0.1), kin.motion.Lin(kin.motion.PoseTarget(p + by(0.5, 0, 0)))]
+    )
     refusal = motion.refusal
     assert (refusal.segment, refusal.cause) == (1, "unreachable")
     assert 0 < refusal.fraction < 1
@@ -273,7 +283,7 @@ def test_a_line_out_of_the_workspace_is_refused_at_its_place():
 def test_a_joint_limit_on_the_way_is_named_with_what_would_help():
     robot = kin.get_robot("puma560")
     p = kin.fk(robot, robot.q_home)[:3, 3]
-    motion = kin.plan_motion(robot, [kin.Lin(kin.PoseTarget(p + by(0, 0, -0.9)))])
+    motion = kin.plan_motion(robot, [kin.motion.Lin(kin.motion.PoseTarget(p + by(0, 0, -0.9)))])
     refusal = motion.refusal
     assert refusal.cause == "limits"
     violation = refusal.details.violation
@@ -290,7 +300,9 @@ def test_a_line_is_refused_where_the_joint_reaches_its_limit(arm):
         T = kin.fk(robot, q)
         offset = rng.normal(size=3)
         offset *= 0.25 / np.linalg.norm(offset)
-        refusal = kin.plan_motion(robot, [kin.Lin(kin.PoseTarget(tuple(T[:3, 3] + offset)))], q).refusal
+        refusal = kin.plan_motion(
+            robot, [kin.motion.Lin(kin.motion.PoseTarget(tuple(T[:3, 3] + offset)))], q
+        ).refusal
         if refusal is None or refusal.cause != "limits":
             continue
         count += 1
@@ -311,7 +323,7 @@ def test_the_refused_share_of_a_line_is_no_sample_beyond_the_limit():
     """A search in steps gave 0.7292 for 0.7267, where joint 3 is at 70°."""
     robot, way = kin.get_robot("irb120"), by(-0.2790033962141, 0, -0.2790033962141)
     T = kin.fk(robot, robot.q_home)
-    refusal = kin.plan_motion(robot, [kin.Lin(kin.PoseTarget(tuple(T[:3, 3] + way)))]).refusal
+    refusal = kin.plan_motion(robot, [kin.motion.Lin(kin.motion.PoseTarget(tuple(T[:3, 3] + way)))]).refusal
     assert refusal.fraction == pytest.approx(0.7267, abs=1e-6)
     T[:3, 3] += 0.7267 * way
     bent = [s.q[2] for s in kin.solve_ik(robot, T, respect_limits=False).solutions]
@@ -323,7 +335,7 @@ def test_a_suggested_posture_can_follow_the_line(arm, seed):
     robot = kin.get_robot(arm)
     rng = np.random.default_rng(seed)
     q0 = moved(robot, robot.q_home, rng, 0.6)
-    line = [kin.Lin(target(robot, moved(robot, q0, rng, 0.8)))]
+    line = [kin.motion.Lin(target(robot, moved(robot, q0, rng, 0.8)))]
     refusal = kin.plan_motion(robot, line, q0).refusal
     (posture,) = [help_.posture for help_ in refusal.helps if help_.code == "posture"]
     assert posture != kin.branch_of(robot, q0)
@@ -349,16 +361,18 @@ def test_a_joint_that_is_left_over_moves_away_from_limits_along_the_line(arm, se
 def test_what_few_joints_cannot_keep_is_refused():
     robot = kin.get_robot("scara")
     T = kin.fk(robot, robot.q_home)
-    motion = kin.plan_motion(robot, [kin.Lin(kin.PoseTarget(T[:3, 3] + by(0.01, 0, 0), (1, 0, 0, 0)))])
+    motion = kin.plan_motion(
+        robot, [kin.motion.Lin(kin.motion.PoseTarget(T[:3, 3] + by(0.01, 0, 0), (1, 0, 0, 0)))]
+    )
     assert motion.refusal.cause == "task"
     assert "4 joints cannot keep the path" in motion.reason
-    kept = kin.plan_motion(robot, [kin.Lin(kin.PoseTarget(T[:3, 3] + by(0.01, 0.02, 0.03)))])
+    kept = kin.plan_motion(robot, [kin.motion.Lin(kin.motion.PoseTarget(T[:3, 3] + by(0.01, 0.02, 0.03)))])
     assert kept.planned
 
 
 def line(*offset, **fields):
     robot = kin.get_robot("panda")
-    return kin.Lin(kin.PoseTarget(kin.fk(robot, robot.q_home)[:3, 3] + offset), **fields)
+    return kin.motion.Lin(kin.motion.PoseTarget(kin.fk(robot, robot.q_home)[:3, 3] + offset), **fields)
 
 
 @pytest.mark.parametrize(
@@ -367,12 +381,15 @@ def line(*offset, **fields):
         ([line(0, 0, 0)], []),
         ([line(0, 0, 0, blend=0.1), line(0, 0.1, 0)], ["short"]),
         ([line(0, 0.1, 0, blend=0.1), line(0, 0.1, 0)], ["short"]),
-        ([line(0, 0.1, 0, blend=0.1), kin.Dwell(0.1)], ["dwell"]),
+        ([line(0, 0.1, 0, blend=0.1), kin.motion.Dwell(0.1)], ["dwell"]),
         ([line(0, 0.1, 0, blend=0.1)], ["last"]),
-        ([line(0, 0.1, 0, blend=0.1), kin.Ptp(kin.JointTarget(kin.get_robot("panda").home))], [0.05]),
-        ([line(0, 0.1, 0, blend=0.1), kin.Ptp(line(0, 0.1, 0).target)], ["short"]),
-        ([kin.Ptp(line(0, 0.1, 0).target, blend=0.01), line(0, 0.1, 0)], ["short"]),
-        ([kin.Ptp(line(0, 0, 0).target, blend=0.01), line(0, 0.1, 0)], ["short"]),
+        (
+            [line(0, 0.1, 0, blend=0.1), kin.motion.Ptp(kin.motion.JointTarget(kin.get_robot("panda").home))],
+            [0.05],
+        ),
+        ([line(0, 0.1, 0, blend=0.1), kin.motion.Ptp(line(0, 0.1, 0).target)], ["short"]),
+        ([kin.motion.Ptp(line(0, 0.1, 0).target, blend=0.01), line(0, 0.1, 0)], ["short"]),
+        ([kin.motion.Ptp(line(0, 0, 0).target, blend=0.01), line(0, 0.1, 0)], ["short"]),
         ([line(0, 0.1, 0, blend=9), line(0, 0, 0.1)], [0.05]),
         ([line(0, 0.1, 0, blend=0.02), line(0, 0, 0)], []),
         ([line(0, 0.1, 0, blend=0.02), line(0, 0.2, 0)], []),
@@ -389,7 +406,7 @@ def test_degenerate_programs_are_driven_sensibly(segments, notes):
 
 
 def to(robot, kind, q, **fields):
-    return {"L": kin.Lin, "P": kin.Ptp}[kind](target(robot, q), **fields)
+    return {"L": kin.motion.Lin, "P": kin.motion.Ptp}[kind](target(robot, q), **fields)
 
 
 @pytest.mark.parametrize("blend", [1e-5, 1e-6, 1e-9, 1e-12])
@@ -413,9 +430,9 @@ def test_a_zone_that_is_too_small_is_left_out(arm, kinds, blend):
 
 def test_a_zone_beside_a_short_segment_is_left_out():
     segments = [
-        kin.Lin(line(0, 0.2, 0).target, blend=0.01),
-        kin.Lin(line(0, 0.20001, 0).target, blend=0.01),
-        kin.Lin(line(0, 0.2, 0.2).target),
+        kin.motion.Lin(line(0, 0.2, 0).target, blend=0.01),
+        kin.motion.Lin(line(0, 0.20001, 0).target, blend=0.01),
+        kin.motion.Lin(line(0, 0.2, 0.2).target),
     ]
     motion = kin.plan_motion("panda", segments)
     assert [note.why for note in motion.notes if hasattr(note, "why")] == ["small", "small"]
@@ -463,9 +480,9 @@ def test_both_ways_to_turn_begin_and_end_at_the_given_orientations(seed):
 def test_another_task_keeps_less():
     robot = kin.get_robot("ur5")
     T = kin.fk(robot, robot.q_home)
-    end = kin.PoseTarget(T[:3, 3] + by(0.1, 0, 0))
+    end = kin.motion.PoseTarget(T[:3, 3] + by(0.1, 0, 0))
     for task in ("approach", "position"):
-        motion = kin.plan_motion(robot, kin.Program([kin.Lin(end)], task=task))
+        motion = kin.plan_motion(robot, kin.motion.Program([kin.motion.Lin(end)], task=task))
         points = motion.sample(np.linspace(0, motion.duration, 500)).T[:, :3, 3]
         assert np.abs(points[:, 1:] - T[1:3, 3]).max() < 1e-6
         assert_limits(motion)

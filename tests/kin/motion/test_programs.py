@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 import kin
 
 number = st.floats(-5, 5)
-joints = st.builds(kin.JointTarget, st.tuples(*[number] * 6))
+joints = st.builds(kin.motion.JointTarget, st.tuples(*[number] * 6))
 poses = st.builds(
-    kin.PoseTarget,
+    kin.motion.PoseTarget,
     st.tuples(number, number, number),
     st.none() | st.just((1.0, 0.0, 0.0, 0.0)) | st.just((0.0, 0.6, 0.0, -0.8)),
 )
@@ -28,14 +28,16 @@ common = {
 }
 orientation = st.sampled_from(["geodesic", "two-axis"])
 segments = (
-    st.builds(kin.Ptp, targets, **common)
-    | st.builds(kin.Lin, targets, orientation=orientation, **common)
-    | st.builds(kin.Circ, st.tuples(number, number, number), targets, orientation=orientation, **common)
-    | st.builds(kin.Spline, st.lists(poses, min_size=1, max_size=3) | st.lists(joints, min_size=1, max_size=3))
-    | st.builds(kin.Dwell, st.floats(0, 5))
+    st.builds(kin.motion.Ptp, targets, **common)
+    | st.builds(kin.motion.Lin, targets, orientation=orientation, **common)
+    | st.builds(kin.motion.Circ, st.tuples(number, number, number), targets, orientation=orientation, **common)
+    | st.builds(
+        kin.motion.Spline, st.lists(poses, min_size=1, max_size=3) | st.lists(joints, min_size=1, max_size=3)
+    )
+    | st.builds(kin.motion.Dwell, st.floats(0, 5))
 )
 programs = st.builds(
-    kin.Program,
+    kin.motion.Program,
     st.lists(segments, min_size=1, max_size=4),
     task=st.sampled_from([None, "pose", "approach", "position"]),
     jerk_limited=st.booleans(),
@@ -45,11 +47,11 @@ programs = st.builds(
 @settings(max_examples=20)
 @given(programs)
 def test_what_is_written_is_read_again(program):
-    assert kin.program_from_dict(kin.program_to_dict(program)) == program
+    assert kin.motion.program_from_dict(kin.motion.program_to_dict(program)) == program
 
 
 def test_units_and_toml():
-    program = kin.parse_program(
+    program = kin.motion.parse_program(
         """
         name = "pick"
         units = { length = "mm", angle = "deg" }
@@ -74,7 +76,7 @@ def test_units_and_toml():
     assert ptp.target.q == pytest.approx((math.pi / 2, 0, 0.1, math.pi))
     assert (circ.via, circ.target.position, circ.target.wxyz) == ((0.1, 0, 0), (0.2, 0, 0), None)
     assert (circ.tool_speed, circ.tool_turn, circ.blend) == pytest.approx((0.25, math.pi / 2, 0.005))
-    assert lin.target == kin.PoseTarget((0.3, 0, 0.01), (1, 0, 0, 0))
+    assert lin.target == kin.motion.PoseTarget((0.3, 0, 0.01), (1, 0, 0, 0))
 
 
 LIN = {"kind": "lin", "position": [0, 0, 0]}
@@ -130,7 +132,7 @@ PTP = {"kind": "ptp", "q": [0, 0]}
 )
 def test_a_malformed_program_names_the_field(data, field):
     with pytest.raises(kin.InputError) as caught:
-        kin.program_from_dict(data)
+        kin.motion.program_from_dict(data)
     assert caught.value.field == field
     assert str(caught.value).startswith(f"{field}: got ")
 
@@ -138,15 +140,15 @@ def test_a_malformed_program_names_the_field(data, field):
 @pytest.mark.parametrize(
     ("make", "field"),
     [
-        (lambda: kin.Ptp(target=(0, -1, math.nan, 0, 1, 0)), "target[2]"),
-        (lambda: kin.Ptp(target=np.full((4, 4), 2.0)), "target[3]"),
-        (lambda: kin.Ptp(target=np.zeros((2, 6))), "target"),
-        (lambda: kin.Ptp(target="home"), "target"),
-        (lambda: kin.Lin(target=None), "target"),
-        (lambda: kin.Circ(via=(0, 0, 0), target=5), "target"),
-        (lambda: kin.Spline(points=[(1, 2), "x"]), "points[1]"),
-        (lambda: kin.Spline(points=3), "points"),
-        (lambda: kin.Program(5), "segments"),
+        (lambda: kin.motion.Ptp(target=(0, -1, math.nan, 0, 1, 0)), "target[2]"),
+        (lambda: kin.motion.Ptp(target=np.full((4, 4), 2.0)), "target[3]"),
+        (lambda: kin.motion.Ptp(target=np.zeros((2, 6))), "target"),
+        (lambda: kin.motion.Ptp(target="home"), "target"),
+        (lambda: kin.motion.Lin(target=None), "target"),
+        (lambda: kin.motion.Circ(via=(0, 0, 0), target=5), "target"),
+        (lambda: kin.motion.Spline(points=[(1, 2), "x"]), "points[1]"),
+        (lambda: kin.motion.Spline(points=3), "points"),
+        (lambda: kin.motion.Program(5), "segments"),
     ],
 )
 def test_targets_have_a_type(make, field):
@@ -158,46 +160,54 @@ def test_targets_have_a_type(make, field):
 def test_lengths_are_those_that_are_written():
     pose = [[1, 0, 0, 102], [0, 1, 0, 0], [0, 0, 1, 100.7], [0, 0, 0, 1]]
     rows = [{"kind": "lin", "position": [102, 0, 100.7], "blend": 102.5}, {"kind": "lin", "pose": pose}]
-    first, second = kin.program_from_dict({"units": {"length": "mm"}, "segments": rows}).segments
+    first, second = kin.motion.program_from_dict({"units": {"length": "mm"}, "segments": rows}).segments
     assert (first.target.position, first.blend) == ((0.102, 0, 0.1007), 0.1025)
     assert second.target.position == (0.102, 0, 0.1007)
 
 
 def test_the_number_of_joint_values_is_checked_against_the_arm():
     with pytest.raises(kin.InputError, match=r"segments\[0\].q: .* 6 joint values"):
-        kin.program_from_dict({"segments": [PTP]}, kin.get_robot("ur5"))
+        kin.motion.program_from_dict({"segments": [PTP]}, kin.get_robot("ur5"))
     with pytest.raises(kin.InputError, match=r"segments\[0\].q: .* 6 joint values"):
-        kin.plan_motion(kin.get_robot("ur5"), [kin.Ptp(kin.JointTarget((0, 0)))])
+        kin.plan_motion(kin.get_robot("ur5"), [kin.motion.Ptp(kin.motion.JointTarget((0, 0)))])
     with pytest.raises(kin.InputError, match="TOML"):
-        kin.parse_program("segments = [")
+        kin.motion.parse_program("segments = [")
 
 
 @pytest.mark.parametrize("text", [Path("program.toml"), "program.toml", "programs/first", b"[[segments]]", None])
 def test_a_path_instead_of_the_text_of_a_program_is_named(text):
     with pytest.raises(kin.InputError, match=r"text: .* the text of a program, such as .*read_text\(\)"):
-        kin.parse_program(text)
+        kin.motion.parse_program(text)
 
 
 def test_what_is_no_program_is_not_written():
     with pytest.raises(kin.InputError, match=r"program: .* a kin\.Program"):
-        kin.program_to_dict([kin.Dwell(1.0)])
+        kin.motion.program_to_dict([kin.motion.Dwell(1.0)])
 
 
 def test_limits_are_those_of_an_arm_or_of_its_id():
-    assert np.array_equal(kin.motion_limits("ur5").jerk, kin.motion_limits(kin.get_robot("ur5")).jerk)
+    assert np.array_equal(
+        kin.motion.motion_limits("ur5").jerk, kin.motion.motion_limits(kin.get_robot("ur5")).jerk
+    )
     with pytest.raises(kin.UnknownRobotError):
-        kin.motion_limits("nobody")
+        kin.motion.motion_limits("nobody")
 
 
 def test_poses_and_joint_values_are_targets_as_they_are():
     T = kin.pose_from_position_wxyz([0.4, 0.1, 0.3], [0.0, 1.0, 0.0, 0.0])
     q = np.array([0.1, -1.0, 1.2, 0.3, 1.1, 0.2])
-    assert kin.Lin(T).target == kin.Lin(T.tolist()).target == kin.PoseTarget.of(T)
-    assert kin.Ptp(q, speed=0.5).target == kin.Ptp(q.tolist(), speed=0.5).target == kin.JointTarget(tuple(q))
-    arc = kin.Circ(T, T, blend=0.01)
-    assert (arc.via, arc.target) == ((0.4, 0.1, 0.3), kin.PoseTarget.of(T))
-    assert kin.Spline(np.stack([T, T])).points == (kin.PoseTarget.of(T),) * 2
-    assert kin.Spline([q, kin.JointTarget(tuple(q))]).points == (kin.JointTarget(tuple(q)),) * 2
+    assert kin.motion.Lin(T).target == kin.motion.Lin(T.tolist()).target == kin.motion.PoseTarget.of(T)
+    assert (
+        kin.motion.Ptp(q, speed=0.5).target
+        == kin.motion.Ptp(q.tolist(), speed=0.5).target
+        == kin.motion.JointTarget(tuple(q))
+    )
+    arc = kin.motion.Circ(T, T, blend=0.01)
+    assert (arc.via, arc.target) == ((0.4, 0.1, 0.3), kin.motion.PoseTarget.of(T))
+    assert kin.motion.Spline(np.stack([T, T])).points == (kin.motion.PoseTarget.of(T),) * 2
+    assert (
+        kin.motion.Spline([q, kin.motion.JointTarget(tuple(q))]).points == (kin.motion.JointTarget(tuple(q)),) * 2
+    )
 
 
 def test_frames_of_workpieces_become_poses_in_the_world():
@@ -213,7 +223,7 @@ def test_frames_of_workpieces_become_poses_in_the_world():
             {"kind": "spline", "points": [{**where, "frame": "table"}, {**where, "frame": "world"}]},
         ]
     }
-    lin, ptp, circ, spline = kin.program_from_dict(data, arm, {"table": table}).segments
+    lin, ptp, circ, spline = kin.motion.program_from_dict(data, arm, {"table": table}).segments
     identity = np.eye(4)
     assert np.allclose(lin.target.pose(identity), table @ T, atol=1e-12)
     assert np.allclose(ptp.target.pose(identity), arm.T_world_base @ T, atol=1e-12)
@@ -226,7 +236,9 @@ def test_frames_of_workpieces_become_poses_in_the_world():
 
 def test_a_motion_is_written_as_a_table(tmp_path):
     arm = kin.get_robot("ur5")
-    motion = kin.plan_motion(arm, [kin.Ptp(arm.q_home + 0.3), kin.Lin(kin.fk(arm, arm.q_home + 0.25))])
+    motion = kin.plan_motion(
+        arm, [kin.motion.Ptp(arm.q_home + 0.3), kin.motion.Lin(kin.fk(arm, arm.q_home + 0.25))]
+    )
     motion.to_csv(tmp_path / "motion.csv", rate=200)
     lines = (tmp_path / "motion.csv").read_text().splitlines()
     assert lines[0].startswith("t,q1,")
@@ -238,7 +250,7 @@ def test_a_motion_is_written_as_a_table(tmp_path):
     assert np.abs(kin.fk(arm, rows[:, 1:7])[:, :3, 3] - rows[:, 19:22]).max() < 1e-12
     speeds = np.linalg.norm(np.gradient(rows[:-1, 19:22], rows[:-1, 0], axis=0), axis=1)
     assert np.abs(speeds - rows[:-1, 26])[1:-1].max() < 0.02
-    refused = kin.plan_motion(arm, [kin.Ptp([9.0, 0, 0, 0, 0, 0])])
+    refused = kin.plan_motion(arm, [kin.motion.Ptp([9.0, 0, 0, 0, 0, 0])])
     with pytest.raises(kin.InputError, match="outside the limits"):
         refused.to_csv(tmp_path / "none.csv")
     with pytest.raises(kin.InputError, match="rate"):

@@ -15,7 +15,7 @@ from kin.motion.pieces import JointMotion
 from kin.motion.tasks import most_kept, motion_dimension
 
 CASES = json.loads((Path(__file__).parents[2] / "data/motion-times.json").read_text(encoding="utf-8"))
-ARMS = tuple(kin.classic_robots())
+ARMS = tuple(kin.files.classic_robots())
 positive = st.floats(1e-2, 1e3)
 
 
@@ -54,7 +54,7 @@ def test_position_velocity_and_acceleration_are_continuous(end, v, a, j):
 
 def test_start_and_end_the_same_takes_no_time():
     robot = kin.get_robot("ur5")
-    motion = kin.plan_motion(robot, [kin.Ptp(kin.JointTarget(robot.home))])
+    motion = kin.plan_motion(robot, [kin.motion.Ptp(kin.motion.JointTarget(robot.home))])
     assert (motion.planned, motion.duration) == (True, 0.0)
     assert motion.sample(0.0).q.tolist() == list(robot.home)
     assert [peak.peak for peak in motion.peaks] == [0.0] * 20
@@ -66,9 +66,10 @@ def test_random_programs_keep_every_limit_on_every_arm(arm, seed, speed, acceler
     robot = kin.get_robot(arm)
     targets = robot.random_q(np.random.default_rng(seed), 3)
     program = [
-        kin.Ptp(kin.JointTarget(tuple(q)), speed=speed, acceleration=acceleration) for q in targets.tolist()
+        kin.motion.Ptp(kin.motion.JointTarget(tuple(q)), speed=speed, acceleration=acceleration)
+        for q in targets.tolist()
     ]
-    program.insert(1, kin.Dwell(0.25))
+    program.insert(1, kin.motion.Dwell(0.25))
     motion = kin.plan_motion(robot, program)
     assert motion.planned
     assert all(peak.ratio <= 1 + 1e-9 for peak in motion.peaks if peak.ratio is not None)
@@ -87,18 +88,18 @@ def test_a_pose_target_is_reached_in_the_nearest_posture():
     robot = kin.get_robot("panda")
     T = kin.fk(robot, robot.q_home)
     T[0, 3] += 0.1
-    motion = kin.plan_motion(robot, [kin.Ptp(kin.PoseTarget.of(T))])
+    motion = kin.plan_motion(robot, [kin.motion.Ptp(kin.motion.PoseTarget.of(T))])
     end = motion.sample(motion.duration)
     assert np.abs(end.T - T).max() < 1e-9
     assert np.abs(end.q - robot.q_home).max() < 0.6
-    kept = kin.plan_motion(robot, [kin.Ptp(kin.PoseTarget(tuple(T[:3, 3])))])
+    kept = kin.plan_motion(robot, [kin.motion.Ptp(kin.motion.PoseTarget(tuple(T[:3, 3])))])
     assert np.abs(kept.sample(kept.duration).T - T).max() < 1e-9
 
 
 def test_before_and_after_the_motion_the_arm_is_at_rest():
     robot = kin.get_robot("scara")
     q = [0.1, 0.2, 0.05, 1.0]
-    motion = kin.plan_motion(robot, [kin.Ptp(kin.JointTarget(q))])
+    motion = kin.plan_motion(robot, [kin.motion.Ptp(kin.motion.JointTarget(q))])
     sample = motion.sample([-1.0, 99.0])
     assert sample.q.tolist() == [list(robot.home), pytest.approx(q)]
     assert not sample.qd.any()
@@ -109,7 +110,7 @@ def test_before_and_after_the_motion_the_arm_is_at_rest():
 
 def test_derivatives_are_those_of_the_joint_values():
     robot = kin.get_robot("puma560")
-    motion = kin.plan_motion(robot, [kin.Ptp(kin.JointTarget((1, 0.5, -1, 0.5, -1, 2)))])
+    motion = kin.plan_motion(robot, [kin.motion.Ptp(kin.motion.JointTarget((1, 0.5, -1, 0.5, -1, 2)))])
     t, h = np.linspace(0.05, motion.duration - 0.05, 40), 1e-5
     q, qd, qdd, _ = motion.derivatives(t)
     before, after = motion.derivatives(t - h)[0], motion.derivatives(t + h)[0]
@@ -123,7 +124,7 @@ def test_a_target_outside_the_limits_is_refused_with_joint_and_value():
     robot = kin.get_robot("panda")
     q = list(robot.home)
     q[3] = 0.5
-    motion = kin.plan_motion(robot, [kin.Dwell(1), kin.Ptp(kin.JointTarget(q), name="up")])
+    motion = kin.plan_motion(robot, [kin.motion.Dwell(1), kin.motion.Ptp(kin.motion.JointTarget(q), name="up")])
     refusal = motion.refusal
     assert (refusal.segment, refusal.cause, motion.duration, motion.segments) == (1, "target", 0.0, ())
     assert motion.reason == (
@@ -133,29 +134,29 @@ def test_a_target_outside_the_limits_is_refused_with_joint_and_value():
 
 def test_a_pose_out_of_reach_and_a_start_outside_are_refused():
     robot = kin.get_robot("ur5")
-    motion = kin.plan_motion(robot, [kin.Ptp(kin.PoseTarget((3, 0, 0)))])
+    motion = kin.plan_motion(robot, [kin.motion.Ptp(kin.motion.PoseTarget((3, 0, 0)))])
     assert motion.refusal.cause == "unreachable"
     assert "out of reach" in motion.reason
     assert "closer" in motion.reason
-    outside = kin.plan_motion(robot, [kin.Dwell(1)], [7, 0, 0, 0, 0, 0])
+    outside = kin.plan_motion(robot, [kin.motion.Dwell(1)], [7, 0, 0, 0, 0, 0])
     assert outside.refusal.cause == "start"
     assert "joint 1 (base) at 401.1° (limit 360.0°)" in outside.reason
 
 
 def test_assumed_limits_are_marked():
-    panda, ur5 = kin.motion_limits(kin.get_robot("panda")), kin.motion_limits(kin.get_robot("ur5"))
+    panda, ur5 = kin.motion.motion_limits(kin.get_robot("panda")), kin.motion.motion_limits(kin.get_robot("ur5"))
     assert panda.assumed == ((),) * 7
     assert panda.jerk[0] == 7500
     assert ur5.assumed == (("acceleration", "jerk"),) * 6
     assert ur5.velocity[0] == pytest.approx(math.pi)
-    scara = kin.motion_limits(kin.get_robot("scara"))
+    scara = kin.motion.motion_limits(kin.get_robot("scara"))
     assert scara.velocity[2] == pytest.approx(1.1)
     assert np.isnan(scara.effort).all()
     own = kin.Robot.from_dh([kin.Joint("slide", kind="prismatic", limits=(0, 1)), (0, 0, 1, 0)])
-    found = kin.motion_limits(own)
+    found = kin.motion.motion_limits(own)
     assert found.assumed == (("velocity", "acceleration", "jerk"),) * 2
     assert found.velocity.tolist() == [1.0, math.pi]
-    peaks = kin.plan_motion(own, [kin.Ptp(kin.JointTarget((0.2, 1)))]).peaks
+    peaks = kin.plan_motion(own, [kin.motion.Ptp(kin.motion.JointTarget((0.2, 1)))]).peaks
     assert all(peak.assumed for peak in peaks if peak.joint is not None)
 
 
@@ -166,11 +167,13 @@ def test_assumed_limits_are_marked():
 def test_a_compromise_is_no_target(arm, task, why):
     robot = kin.get_robot(arm)
     T = kin.fk(robot, robot.q_home) @ kin.pose_from_xyz_rpy((0, 0, 0), (0.3, 0, 0))
-    motion = kin.plan_motion(robot, kin.Program([kin.Ptp(kin.PoseTarget.of(T))], task=task))
+    motion = kin.plan_motion(robot, kin.motion.Program([kin.motion.Ptp(kin.motion.PoseTarget.of(T))], task=task))
     assert motion.refusal.cause == "unreachable"
     assert why in motion.reason
     assert [help_.code for help_ in motion.refusal.helps] == ["task"]
-    kept = kin.plan_motion(robot, kin.Program([kin.Ptp(kin.PoseTarget.of(T))], task="position"))
+    kept = kin.plan_motion(
+        robot, kin.motion.Program([kin.motion.Ptp(kin.motion.PoseTarget.of(T))], task="position")
+    )
     assert np.abs(kept.sample(kept.duration).T[:3, 3] - T[:3, 3]).max() < 1e-9
 
 
@@ -178,7 +181,7 @@ def test_a_compromise_is_no_target(arm, task, why):
 def test_arms_of_few_joints_meet_whole_poses_where_they_can(joints):
     planar = kin.Robot.from_dh([(0, 0, 0.3, 0)] * joints, home=[0.3, 0.5, 0.7, 0.4, 0.2][:joints])
     T = kin.fk(planar, planar.q_home + np.array([0.2, 0.3, -0.2, 0.1, 0.1])[:joints])
-    motion = kin.plan_motion(planar, [kin.Ptp(kin.PoseTarget.of(T))])
+    motion = kin.plan_motion(planar, [kin.motion.Ptp(kin.motion.PoseTarget.of(T))])
     assert motion.planned
     assert np.abs(motion.sample(motion.duration).T - T).max() < 1e-9
 
@@ -202,8 +205,16 @@ def test_what_an_arm_keeps_follows_from_the_group_of_its_motions(rows, dimension
 
 def test_the_peaks_of_a_segment_are_its_own():
     robot = kin.get_robot("ur5")
-    q = kin.JointTarget(robot.q_home + 0.5)
-    motion = kin.plan_motion(robot, [kin.Ptp(q), kin.Dwell(0.5), kin.Ptp(q), kin.Ptp(kin.JointTarget(robot.home))])
+    q = kin.motion.JointTarget(robot.q_home + 0.5)
+    motion = kin.plan_motion(
+        robot,
+        [
+            kin.motion.Ptp(q),
+            kin.motion.Dwell(0.5),
+            kin.motion.Ptp(q),
+            kin.motion.Ptp(kin.motion.JointTarget(robot.home)),
+        ],
+    )
     assert motion.segments[2].start == motion.segments[2].end
     assert [max(peak.peak for peak in motion.segment_peaks(i)) > 0 for i in range(4)] == [True, False, False, True]
     whole = [
@@ -214,15 +225,15 @@ def test_the_peaks_of_a_segment_are_its_own():
 
 def test_a_slow_segment_after_a_fast_one_has_its_own_peaks():
     robot = kin.get_robot("ur5")
-    ends = [kin.JointTarget(robot.q_home + 0.01 * k * (-1) ** k) for k in range(60)]
-    motion = kin.plan_motion(robot, [kin.Ptp(q, acceleration=(0.05, 1)[k % 2]) for k, q in enumerate(ends)])
+    ends = [kin.motion.JointTarget(robot.q_home + 0.01 * k * (-1) ** k) for k in range(60)]
+    motion = kin.plan_motion(robot, [kin.motion.Ptp(q, acceleration=(0.05, 1)[k % 2]) for k, q in enumerate(ends)])
     for i in range(len(ends)):
         assert all(peak.ratio <= 1 + 1e-9 for peak in motion.segment_peaks(i) if peak.ratio is not None)
 
 
 def test_the_peak_of_the_tool_is_not_understated():
     robot = kin.get_robot("puma560")
-    motion = kin.plan_motion(robot, [kin.Ptp(kin.JointTarget((1, 0.5, -1, 0.5, -1, 2)))])
+    motion = kin.plan_motion(robot, [kin.motion.Ptp(kin.motion.JointTarget((1, 0.5, -1, 0.5, -1, 2)))])
     sample = motion.sample(np.linspace(0, motion.duration, 20001))
     for peak, sizes in zip(motion.peaks[-2:], (sample.tool_speed, sample.tool_turn), strict=True):
         assert sizes.max() <= peak.peak * (1 + 1e-9)
@@ -269,30 +280,30 @@ def test_a_distance_too_short_to_take_any_time_takes_none():
     ],
 )
 def test_limits_are_checked(change, field):
-    given = kin.motion_limits(kin.get_robot("ur5"))
+    given = kin.motion.motion_limits(kin.get_robot("ur5"))
     values = {key: getattr(given, key) for key in ("velocity", "acceleration", "jerk", "effort", "assumed")}
     with pytest.raises(kin.InputError) as caught:
-        kin.MotionLimits(**values | change)
+        kin.motion.MotionLimits(**values | change)
     assert caught.value.field == field
 
 
 def test_limits_are_those_of_the_arm():
     ur5, panda = kin.get_robot("ur5"), kin.get_robot("panda")
-    program = [kin.Ptp(kin.JointTarget(ur5.q_home + 0.5))]
+    program = [kin.motion.Ptp(kin.motion.JointTarget(ur5.q_home + 0.5))]
     with pytest.raises(kin.InputError, match=r"motion_limits: .* of 6 joints"):
-        kin.plan_motion(ur5, program, motion_limits=kin.motion_limits(panda))
+        kin.plan_motion(ur5, program, motion_limits=kin.motion.motion_limits(panda))
     none = [math.nan] * 6
-    whole = kin.MotionLimits([1] * 6, np.full(6, 2), [10**9] * 6, none, ((),) * 6)
+    whole = kin.motion.MotionLimits([1] * 6, np.full(6, 2), [10**9] * 6, none, ((),) * 6)
     assert not whole.velocity.flags.writeable
     assert kin.plan_motion(ur5, program, motion_limits=whole).duration == pytest.approx(0.5 + 0.5)
     wild = kin.Robot.from_dh([kin.Joint("a", velocity=1e308), (0, 0, 1, 0)])
     with pytest.raises(kin.InputError, match=r"motion_limits.velocity\[0\]"):
-        kin.motion_limits(wild)
-    fast = kin.motion_limits(kin.Robot.from_dh([kin.Joint("a", velocity=1e12), (0, 0, 1, 0)]))
+        kin.motion.motion_limits(wild)
+    fast = kin.motion.motion_limits(kin.Robot.from_dh([kin.Joint("a", velocity=1e12), (0, 0, 1, 0)]))
     assert (fast.acceleration[0], fast.jerk[0]) == (1e12, 1e12)
 
 
 @pytest.mark.parametrize("bad", [[1, 2], [[0] * 6] * 2, ["a"] * 6])
 def test_a_malformed_start_raises(bad):
     with pytest.raises(kin.InputError, match="q_start"):
-        kin.plan_motion(kin.get_robot("ur5"), [kin.Dwell(1)], bad)
+        kin.plan_motion(kin.get_robot("ur5"), [kin.motion.Dwell(1)], bad)

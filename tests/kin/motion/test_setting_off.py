@@ -58,7 +58,7 @@ def test_from_rest_it_is_the_fastest_motion_from_rest_to_rest():
 
 
 def test_a_ptp_goes_on_from_the_motion_at_the_start():
-    motion = kin.plan_motion(UR5, [kin.Ptp(HOME + 0.5)], qd_start=QD, qdd_start=QDD)
+    motion = kin.plan_motion(UR5, [kin.motion.Ptp(HOME + 0.5)], qd_start=QD, qdd_start=QDD)
     assert motion.refusal is None
     assert motion.notes == ()
     start, end = motion.sample([0.0, motion.duration]).qd
@@ -72,11 +72,15 @@ def test_a_ptp_goes_on_from_the_motion_at_the_start():
 
 @pytest.mark.parametrize(
     "segment",
-    [kin.Lin(kin.PoseTarget.of(kin.fk(UR5, HOME + 0.1))), kin.Dwell(0.5), kin.Ptp(HOME, tool_speed=0.2)],
+    [
+        kin.motion.Lin(kin.motion.PoseTarget.of(kin.fk(UR5, HOME + 0.1))),
+        kin.motion.Dwell(0.5),
+        kin.motion.Ptp(HOME, tool_speed=0.2),
+    ],
     ids=["lin", "dwell", "tool speed"],
 )
 def test_before_any_other_segment_the_arm_brakes_and_says_so(segment):
-    motion = kin.plan_motion(UR5, [segment, kin.Ptp(HOME)], qd_start=QD)
+    motion = kin.plan_motion(UR5, [segment, kin.motion.Ptp(HOME)], qd_start=QD)
     assert motion.refusal is None
     brakes = motion.pieces[0]
     assert motion.sample(0.0).qd == pytest.approx(QD)
@@ -88,17 +92,17 @@ def test_before_any_other_segment_the_arm_brakes_and_says_so(segment):
 
 
 def test_a_segment_that_is_gentle_is_gentle_from_the_start_unless_there_is_no_room():
-    gentle = [kin.Ptp(HOME + 0.5, acceleration=0.2)]
+    gentle = [kin.motion.Ptp(HOME + 0.5, acceleration=0.2)]
     found = kin.plan_motion(UR5, gentle, qd_start=QD)
     assert {peak.quantity: peak.ratio for peak in found.peaks if peak.joint == 4}["acceleration"] <= 0.2 + 1e-9
     near = HOME.copy()
     near[0] = UR5.upper[0] - 0.05
-    hard = kin.plan_motion(UR5, [kin.Ptp(HOME, acceleration=0.2)], near, qd_start=QD)
+    hard = kin.plan_motion(UR5, [kin.motion.Ptp(HOME, acceleration=0.2)], near, qd_start=QD)
     assert hard.refusal is None
     assert {peak.quantity: peak.ratio for peak in hard.peaks if peak.joint == 0}["acceleration"] > 0.2
 
 
-@pytest.mark.parametrize("segment", [kin.Ptp(HOME), kin.Dwell(1.0)])
+@pytest.mark.parametrize("segment", [kin.motion.Ptp(HOME), kin.motion.Dwell(1.0)])
 def test_a_joint_that_cannot_stop_before_its_limit_is_named_with_its_place(segment):
     q = HOME.copy()
     q[0] = UR5.upper[0] - 0.01
@@ -109,11 +113,11 @@ def test_a_joint_that_cannot_stop_before_its_limit_is_named_with_its_place(segme
     facts = refusal.details
     assert (facts.violation.joint, facts.violation.limit, facts.speed) == (0, UR5.upper[0], 3.0)
     assert facts.time == pytest.approx(0.01 / 3.0, rel=0.01), "it hardly brakes so soon"
-    limits = kin.motion_limits(UR5)
+    limits = kin.motion.motion_limits(UR5)
     row = np.stack([limits.velocity, limits.acceleration, limits.jerk], axis=1)[:1]
     stop = moving.braked(q[:1], np.array([3.0]), np.zeros(1), row)
     needed = float(stop.at(np.array([stop.duration]))[0, 0, 0])
-    if isinstance(segment, kin.Dwell):
+    if isinstance(segment, kin.motion.Dwell):
         assert facts.violation.value == pytest.approx(needed, abs=1e-9)
     else:  # the joint turns back without a rest
         assert UR5.upper[0] < facts.violation.value < needed
@@ -121,7 +125,7 @@ def test_a_joint_that_cannot_stop_before_its_limit_is_named_with_its_place(segme
 
 
 def test_a_part_of_a_refused_program_starts_in_motion_too():
-    program = [kin.Ptp(HOME + 0.2), kin.Lin(kin.PoseTarget((5.0, 0.0, 0.0)))]
+    program = [kin.motion.Ptp(HOME + 0.2), kin.motion.Lin(kin.motion.PoseTarget((5.0, 0.0, 0.0)))]
     motion = kin.plan_motion(UR5, program, qd_start=QD)
     assert motion.refusal is not None
     assert motion.part is not None
@@ -151,5 +155,5 @@ def test_a_part_of_a_refused_program_starts_in_motion_too():
 )
 def test_a_start_outside_the_limits_is_refused_with_what_is_valid(start, field, valid):
     with pytest.raises(kin.InputError, match=field) as refused:
-        kin.plan_motion(UR5, [kin.Ptp(HOME)], **start)
+        kin.plan_motion(UR5, [kin.motion.Ptp(HOME)], **start)
     assert valid in str(refused.value)

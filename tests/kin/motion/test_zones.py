@@ -11,7 +11,7 @@ import kin
 from kin.motion.planning import zones
 from kin.motion.planning.plan import RefusedError
 
-ARMS = tuple(kin.classic_robots())
+ARMS = tuple(kin.files.classic_robots())
 LONGER = 0.01  # the timing of a path is within this part of the best
 
 
@@ -34,12 +34,12 @@ def random_case(robot, seed):
             "tool_speed": 10 ** rng.uniform(-2, 0) if rng.random() < 0.2 else None,
         }
         if rng.random() < 0.6:
-            segments.append(kin.Lin(kin.PoseTarget.of(kin.fk(robot, q)), **fields))
+            segments.append(kin.motion.Lin(kin.motion.PoseTarget.of(kin.fk(robot, q)), **fields))
         else:
-            segments.append(kin.Ptp(kin.JointTarget(q), **fields))
-    limits = kin.motion_limits(robot)
+            segments.append(kin.motion.Ptp(kin.motion.JointTarget(q), **fields))
+    limits = kin.motion.motion_limits(robot)
     limits = replace(limits, jerk=limits.jerk * 10 ** rng.uniform(-1, 1))
-    return kin.Program(segments, jerk_limited=bool(rng.random() < 0.7)), start, limits
+    return kin.motion.Program(segments, jerk_limited=bool(rng.random() < 0.7)), start, limits
 
 
 def without_blends(program):
@@ -75,7 +75,7 @@ def corners(*blends):
     at, segments = kin.fk(robot, robot.q_home)[:3, 3], []
     for k, blend in enumerate([*blends, 0.0]):
         at = at + 0.1 * np.array([k % 2 == 0, 0.0, k % 2])
-        segments.append(kin.Lin(kin.PoseTarget(at), blend=blend))
+        segments.append(kin.motion.Lin(kin.motion.PoseTarget(at), blend=blend))
     return kin.plan_motion(robot, segments)
 
 
@@ -107,7 +107,7 @@ def test_zones_that_save_time_are_kept():
 
 
 def test_a_stop_that_cannot_be_driven_leaves_the_blend(monkeypatch):
-    refused = kin.plan_motion("ur5", [kin.Lin(kin.PoseTarget((9.0, 0.0, 0.0)))]).refusal
+    refused = kin.plan_motion("ur5", [kin.motion.Lin(kin.motion.PoseTarget((9.0, 0.0, 0.0)))]).refusal
 
     def refuse(plan, index, *, drive=zones.drive):
         if plan.stops:

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import kin
-from kin import InputError, Motor
+from kin import InputError
+from kin.motors import Motor
 
 SO101 = replace(kin.get_robot("so101"), motors=())
 UNITS: list[dict[str, Any]] = [
@@ -38,7 +39,7 @@ def unknown(motors: list[Motor]) -> list[Motor]:
 
 
 def read(robot: kin.Robot, motors: list[Motor], q: Any) -> Any:
-    return kin.readings_from_q(replace(robot, motors=motors), q)
+    return kin.motors.readings_from_q(replace(robot, motors=motors), q)
 
 
 @pytest.mark.parametrize("fields", UNITS, ids=lambda fields: fields["unit"])
@@ -46,7 +47,7 @@ def read(robot: kin.Robot, motors: list[Motor], q: Any) -> Any:
 def test_signs_and_zeros_are_found_from_two_and_three_poses(robot_id: str, fields: dict[str, Any]):
     robot, rng = kin.get_robot(robot_id), np.random.default_rng(3)
     for count in (2, 3):
-        poses = kin.motor_poses(robot, count)
+        poses = kin.motors.motor_poses(robot, count)
         for _ in range(4):
             motors = motors_of(robot, rng, **fields)
             # The arm was put into the poses by hand, and the shafts have turned since the motors were switched on.
@@ -54,12 +55,12 @@ def test_signs_and_zeros_are_found_from_two_and_three_poses(robot_id: str, field
             readings = read(robot, motors, put)
             turns = rng.integers(-3, 4, readings.shape)
             readings += [m.turn * m.begins_again for m in motors] * turns
-            found = kin.match_motors(robot, poses, readings, unknown(motors))
+            found = kin.motors.match_motors(robot, poses, readings, unknown(motors))
             assert found.complete, [finding.text for finding in found.findings]
             assert [m.sign for m in found.motors] == [m.sign for m in motors]
             # What counts is where the arm is drawn: at joint values as close as it was put to them.
             q = robot.random_q(rng, 20)
-            made = kin.q_from_readings(replace(robot, motors=found.motors), read(robot, motors, q))
+            made = kin.motors.q_from_readings(replace(robot, motors=found.motors), read(robot, motors, q))
             away = np.abs(made - q)
             away = np.where(robot.revolute, np.minimum(away, np.abs(away - 2 * math.pi)), away)
             assert away.max() < math.radians(3.1)
@@ -73,8 +74,8 @@ def test_exact_readings_give_exact_zeros_and_say_so():
         Motor("wrist flex", 4, offset=12.0, unit="range_m100_100", range=(1000, 3000)),
         Motor("wrist roll", 5),
     ]
-    poses = kin.motor_poses(SO101)
-    found = kin.match_motors(SO101, poses, read(SO101, motors, poses), unknown(motors))
+    poses = kin.motors.motor_poses(SO101)
+    found = kin.motors.match_motors(SO101, poses, read(SO101, motors, poses), unknown(motors))
     assert [m.sign for m in found.motors] == [m.sign for m in motors]
     assert [m.offset for m in found.motors] == pytest.approx([m.offset for m in motors], abs=0.5)
     assert [finding.text for finding in found.findings] == [
@@ -87,15 +88,15 @@ def test_exact_readings_give_exact_zeros_and_say_so():
     assert max(abs(e) for finding in found.findings for e in finding.error) < 1e-3
 
 
-def case(change: Any, count: int = 3, unit: str = "deg") -> kin.MotorMatch:
+def case(change: Any, count: int = 3, unit: str = "deg") -> kin.motors.MotorMatch:
     """What is found where readings ``(k, 5)`` and poses are changed before."""
     motors = [Motor(joint.name, i + 1, offset=20.0 * i, unit=unit) for i, joint in enumerate(SO101.joints)]  # type: ignore[arg-type]
-    poses = kin.motor_poses(SO101, count)
+    poses = kin.motors.motor_poses(SO101, count)
     poses, readings = change(poses.copy(), read(SO101, motors, poses), motors)
-    return kin.match_motors(SO101, poses, readings, unknown(motors))
+    return kin.motors.match_motors(SO101, poses, readings, unknown(motors))
 
 
-def only(found: kin.MotorMatch, k: int, cause: str, *words: str) -> kin.MotorFinding:
+def only(found: kin.motors.MotorMatch, k: int, cause: str, *words: str) -> kin.motors.MotorFinding:
     """The one motor that is not matched."""
     bad = [i for i, finding in enumerate(found.findings) if finding.status != "matched"]
     assert bad == [k], [finding.text for finding in found.findings]
@@ -197,11 +198,11 @@ def test_readings_without_sense_are_a_contradiction_with_both_numbers():
 
 
 def test_no_wrong_sign_is_found_in_careless_runs():
-    rng, poses = np.random.default_rng(8), kin.motor_poses(SO101)
+    rng, poses = np.random.default_rng(8), kin.motors.motor_poses(SO101)
     for _ in range(200):
         motors = motors_of(SO101, rng)
         put = poses + rng.normal(0.0, math.radians(6.0), poses.shape)
-        found = kin.match_motors(SO101, poses, read(SO101, motors, put), unknown(motors))
+        found = kin.motors.match_motors(SO101, poses, read(SO101, motors, put), unknown(motors))
         for finding, motor in zip(found.findings, motors, strict=True):
             if finding.status == "matched":
                 assert finding.motor.sign == motor.sign
@@ -223,7 +224,7 @@ def test_no_wrong_sign_is_found_in_careless_runs():
 def test_poses_and_readings_that_do_not_fit_are_refused(q: Any, readings: Any, field: str):
     motors = [Motor(joint.name, i) for i, joint in enumerate(SO101.joints)]
     with pytest.raises(InputError) as caught:
-        kin.match_motors(SO101, q, readings, motors)
+        kin.motors.match_motors(SO101, q, readings, motors)
     assert caught.value.field.startswith(field)
 
 
@@ -237,17 +238,17 @@ def test_other_invalid_input_is_refused():
         ({"tolerance": "wide"}, "tolerance"),
     ):
         with pytest.raises(InputError, match=words):
-            kin.match_motors(SO101, np.zeros((2, 5)), np.zeros((2, 5)), **({"motors": motors} | arguments))
+            kin.motors.match_motors(SO101, np.zeros((2, 5)), np.zeros((2, 5)), **({"motors": motors} | arguments))
     with pytest.raises(InputError, match="an arm with motors"):
-        kin.match_motors(SO101, np.zeros((2, 5)), np.zeros((2, 0)))
+        kin.motors.match_motors(SO101, np.zeros((2, 5)), np.zeros((2, 0)))
 
 
 @pytest.mark.parametrize("robot_id", sorted(kin.builtin_robots()))
 def test_poses_move_every_joint_clearly_inside_its_limits_and_touch_nothing(robot_id: str):
     robot = kin.get_robot(robot_id)
-    poses = kin.motor_poses(robot)
+    poses = kin.motors.motor_poses(robot)
     assert poses.shape == (3, robot.n)
-    assert np.array_equal(poses, kin.motor_poses(robot)), "the same poses each time"
+    assert np.array_equal(poses, kin.motors.motor_poses(robot)), "the same poses each time"
     assert robot.in_limits(poses).all()
     assert (kin.clearance(robot, poses) > 0.0).all()
     moved, span = np.abs(poses[1] - poses[0]), robot.upper - robot.lower
@@ -260,9 +261,9 @@ def test_poses_move_every_joint_clearly_inside_its_limits_and_touch_nothing(robo
 
 def test_poses_obey_what_a_caller_allows():
     arm = kin.get_robot("planar2r")
-    poses = kin.motor_poses(arm, 2, lambda q: kin.fk(arm, q)[1, 3] > 0.2)
+    poses = kin.motors.motor_poses(arm, 2, lambda q: kin.fk(arm, q)[1, 3] > 0.2)
     assert (kin.fk(arm, poses)[:, 1, 3] > 0.2).all()
     with pytest.raises(InputError, match="move each joint clearly"):
-        kin.motor_poses(arm, 2, lambda q: False)
+        kin.motors.motor_poses(arm, 2, lambda q: False)
     with pytest.raises(InputError, match="2 or 3"):
-        kin.motor_poses(arm, 4)
+        kin.motors.motor_poses(arm, 4)

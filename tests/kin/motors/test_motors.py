@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import kin
-from kin import InputError, Motor, RobotFileError
+from kin import InputError, RobotFileError
+from kin.motors import Motor
 
 UR5, PRR = kin.get_robot("ur5"), kin.get_robot("prr")
 NAMES = [joint.name for joint in UR5.joints]
@@ -65,7 +66,7 @@ def test_the_motor_of_a_slide_states_how_far_a_turn_moves_it():
     robot = replace(PRR, motors=[Motor(name, 7, offset=-10.0, lead=0.008)])
     assert kin.load_robot(kin.robot_to_toml(robot, "mm")) == replace(robot, units="mm")
     assert kin.robot_to_dict(robot, "mm")["motors"][0]["lead"] == 8
-    assert kin.readings_from_q(robot, PRR.q_home)[0] == pytest.approx(-10.0 + 360.0 * PRR.q_home[0] / 0.008)
+    assert kin.motors.readings_from_q(robot, PRR.q_home)[0] == pytest.approx(-10.0 + 360.0 * PRR.q_home[0] / 0.008)
 
 
 @pytest.mark.parametrize(
@@ -116,14 +117,14 @@ def test_motors_of_python_are_checked():
     with pytest.raises(InputError, match="a moving joint"):
         kin.robot_to_toml(replace(UR5, motors=[Motor("hip", 1)]))
     with pytest.raises(InputError, match="an arm with motors"):
-        kin.q_from_readings(UR5, np.zeros(6))
+        kin.motors.q_from_readings(UR5, np.zeros(6))
     few = replace(UR5, motors=[Motor(NAMES[0], 1)])
     with pytest.raises(InputError, match=f"a motor of {NAMES[1]}"):
-        kin.q_from_readings(few, [0.0])
+        kin.motors.q_from_readings(few, [0.0])
     with pytest.raises(InputError, match="finite"):
-        kin.q_from_readings(few, [math.nan])
+        kin.motors.q_from_readings(few, [math.nan])
     with pytest.raises(InputError, match="readings"):
-        kin.q_from_readings(few, [0.0, 1.0])
+        kin.motors.q_from_readings(few, [0.0, 1.0])
 
 
 def test_readings_of_every_motor_count_without_those_that_move_no_joint():
@@ -131,9 +132,9 @@ def test_readings_of_every_motor_count_without_those_that_move_no_joint():
     arm = replace(SO101, motors=motors)
     moving = np.array([[10.0, -20.0, 30.0, 40.0, -50.0], [11.0, -21.0, 31.0, 41.0, -51.0]])
     every = np.hstack([[[70.0], [71.0]], moving, [[1.0], [0.0]]])
-    assert np.array_equal(kin.q_from_readings(arm, every), kin.q_from_readings(arm, moving))
+    assert np.array_equal(kin.motors.q_from_readings(arm, every), kin.motors.q_from_readings(arm, moving))
     with pytest.raises(InputError) as caught:
-        kin.q_from_readings(arm, every[:, :6])
+        kin.motors.q_from_readings(arm, every[:, :6])
     assert "6 values" in caught.value.value
     assert "5 values, of motors 1 shoulder pan, " in caught.value.expected
     assert caught.value.expected.endswith("5 wrist roll, or 7, with 9 gripper, 7 lamp in its place")
@@ -144,7 +145,7 @@ def test_ticks_of_a_calibrated_arm_show_where_it_is():
     ranges = [(745, 3398), (822, 3201), (866, 3078), (890, 3224), (0, 4095), (2026, 3500)]
     arm = replace(SO101, motors=[replace(m, range=r) for m, r in zip(SO101.motors, ranges, strict=True)])
     ticks = [round((low + high) / 2) + 1024 for low, high in ranges]
-    q = kin.q_from_readings(arm, kin.readings_from_ticks(arm.motors, ticks))
+    q = kin.motors.q_from_readings(arm, kin.motors.readings_from_ticks(arm.motors, ticks))
     assert np.degrees(q) == pytest.approx([90.0] * 5, abs=0.1)  # ticks are whole, and 4095 of them are a turn
 
 
@@ -161,9 +162,9 @@ def test_readings_and_joint_values_are_each_others_inverse():
         SO101, motors=[Motor(j.name, i, **u) for i, (j, u) in enumerate(zip(SO101.joints, units, strict=True))]
     )
     q = SO101.random_q(rng, (3, 400))
-    readings = kin.readings_from_q(robot, q)
+    readings = kin.motors.readings_from_q(robot, q)
     assert readings.shape == (3, 400, 5)
-    found = kin.q_from_readings(robot, readings)
+    found = kin.motors.q_from_readings(robot, readings)
     tick = 2.0 * math.pi / 4096
     away = np.abs(found - q).max(axis=(0, 1))
     assert away[2] <= 0.5 * tick + 1e-12, "ticks are whole"
@@ -178,11 +179,11 @@ def test_readings_and_joint_values_are_each_others_inverse():
 def test_a_turn_of_the_shaft_does_not_change_the_joint_value():
     robot = replace(SO101, motors=[Motor(j.name, i, offset=170.0) for i, j in enumerate(SO101.joints)])
     q = SO101.random_q(np.random.default_rng(1), 200)
-    readings = kin.readings_from_q(robot, q)
+    readings = kin.motors.readings_from_q(robot, q)
     for turns in (-2, 1, 5):
-        assert kin.q_from_readings(robot, readings + 360.0 * turns) == pytest.approx(q, abs=1e-9)
+        assert kin.motors.q_from_readings(robot, readings + 360.0 * turns) == pytest.approx(q, abs=1e-9)
     beyond = SO101.upper + math.radians(4.0)
-    again = kin.q_from_readings(robot, kin.readings_from_q(robot, beyond))
+    again = kin.motors.q_from_readings(robot, kin.motors.readings_from_q(robot, beyond))
     assert again == pytest.approx(beyond), "a little too far"
 
 
@@ -190,11 +191,11 @@ def test_a_joint_of_two_turns_keeps_what_its_motor_counts():
     robot = replace(UR5, motors=[Motor(name, i) for i, name in enumerate(NAMES)])
     q = np.array([-6.0, 6.0, 3.0, -4.0, 5.0, 0.5])
     assert UR5.in_limits(q)
-    assert kin.q_from_readings(robot, np.degrees(q)) == pytest.approx(q)
+    assert kin.motors.q_from_readings(robot, np.degrees(q)) == pytest.approx(q)
 
 
 def test_a_joint_with_two_motors_has_the_mean():
     pair = [Motor("shoulder", 2), Motor("shoulder", 3, sign=-1, offset=180.0), Motor("elbow", 4)]
     robot = replace(kin.get_robot("planar2r"), motors=pair)
-    assert kin.readings_from_q(robot, np.radians([30.0, 10.0])) == pytest.approx([30.0, 150.0, 10.0])
-    assert np.degrees(kin.q_from_readings(robot, [30.0, 146.0, 10.0])) == pytest.approx([32.0, 10.0])
+    assert kin.motors.readings_from_q(robot, np.radians([30.0, 10.0])) == pytest.approx([30.0, 150.0, 10.0])
+    assert np.degrees(kin.motors.q_from_readings(robot, [30.0, 146.0, 10.0])) == pytest.approx([32.0, 10.0])

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import kin
-from kin import InputError, RobotFileError, Shown
+from kin import InputError, RobotFileError
+from kin.motors import Shown
 from kin.motors.pendant import shown_limits
 from kin.solvers.reduced import fixed
 
@@ -40,11 +41,11 @@ limits = [0, 100]
 
 def test_a_file_states_a_linear_map_of_the_joint_values(tmp_path):
     robot = kin.load_robot(FLIP)
-    shown = kin.to_pendant(robot, [0.2, 0.4, 0.03])
+    shown = kin.motors.to_pendant(robot, [0.2, 0.4, 0.03])
     assert shown == pytest.approx([-0.2, 0.2 - 0.2 + np.pi / 2, 0.07], abs=1e-15)
-    assert kin.from_pendant(robot, shown) == pytest.approx([0.2, 0.4, 0.03], abs=1e-15)
+    assert kin.motors.from_pendant(robot, shown) == pytest.approx([0.2, 0.4, 0.03], abs=1e-15)
     q = robot.random_q(np.random.default_rng(1), (3, 4))
-    assert kin.from_pendant(robot, kin.to_pendant(robot, q)) == pytest.approx(q, abs=1e-15)
+    assert kin.motors.from_pendant(robot, kin.motors.to_pendant(robot, q)) == pytest.approx(q, abs=1e-15)
     assert shown_limits(robot)[0] == pytest.approx(np.radians([-45, 90]))
     assert shown_limits(robot)[1] is None, "where other joints move them"
     assert shown_limits(robot)[2] == pytest.approx((0.01, 0.21))
@@ -55,7 +56,9 @@ def test_a_file_states_a_linear_map_of_the_joint_values(tmp_path):
 
 def test_an_arm_without_a_pendant_shows_its_joint_values():
     q = kin.get_robot("ur5").q_home
-    assert kin.to_pendant("ur5", q) is kin.from_pendant("ur5", q) or np.array_equal(kin.to_pendant("ur5", q), q)
+    assert kin.motors.to_pendant("ur5", q) is kin.motors.from_pendant("ur5", q) or np.array_equal(
+        kin.motors.to_pendant("ur5", q), q
+    )
     assert kin.get_robot("ur5").pendant_map is None
 
 
@@ -65,10 +68,10 @@ def test_fanucs_j3_counts_from_the_horizontal(name):
     robot = kin.get_robot(name)
     for j2 in (-40.0, 0.0, 35.0):
         for j3, height in ((0.0, 0.0), (90.0, 1.0), (30.0, 0.5)):
-            q = kin.from_pendant(robot, np.radians([20.0, j2, j3, 0.0, 0.0, 0.0]))
+            q = kin.motors.from_pendant(robot, np.radians([20.0, j2, j3, 0.0, 0.0, 0.0]))
             axis = kin.link_frames(robot, q)[2][:3, 2]
             assert abs(axis[2]) == pytest.approx(height, abs=1e-9)
-    assert kin.to_pendant(robot, np.zeros(6)).tolist() == [0.0] * 6
+    assert kin.motors.to_pendant(robot, np.zeros(6)).tolist() == [0.0] * 6
 
 
 @pytest.mark.parametrize(
@@ -102,9 +105,9 @@ def test_in_python_it_is_checked_too_and_an_arm_made_of_another_may_keep_it():
     with pytest.raises(InputError, match="a Shown"):
         replace(robot, pendant=({"lift": 1},))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="3 joint values"):
-        kin.from_pendant(robot, [0.0, 0.0])
+        kin.motors.from_pendant(robot, [0.0, 0.0])
     rest = fixed(robot, {1: 0.3})
-    assert kin.to_pendant(rest, [0.2, 0.03]) == pytest.approx([-0.2, 0.07])
+    assert kin.motors.to_pendant(rest, [0.2, 0.03]) == pytest.approx([-0.2, 0.07])
     assert "elbow" not in kin.robot_to_dict(rest)["pendant"]
 
 
@@ -117,11 +120,13 @@ pendant = true
 kind = "ptp"
 q = [20, 100, 70]
 """
-    (segment,) = kin.parse_program(text, robot).segments
-    assert segment.target.q == pytest.approx(kin.from_pendant(robot, [*np.radians([20, 100]), 0.07]), abs=1e-15)
-    (plain,) = kin.parse_program(text.replace("true", "false"), robot).segments
+    (segment,) = kin.motion.parse_program(text, robot).segments
+    assert segment.target.q == pytest.approx(
+        kin.motors.from_pendant(robot, [*np.radians([20, 100]), 0.07]), abs=1e-15
+    )
+    (plain,) = kin.motion.parse_program(text.replace("true", "false"), robot).segments
     assert plain.target.q == pytest.approx([*np.radians([20, 100]), 0.07])
     for given, arm, valid in (("true", None, "a robot as well"), ('"yes"', robot, "true or false")):
         with pytest.raises(InputError, match=valid) as caught:
-            kin.parse_program(text.replace("true", given), arm)
+            kin.motion.parse_program(text.replace("true", given), arm)
         assert caught.value.field == "pendant"

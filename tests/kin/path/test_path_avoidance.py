@@ -11,9 +11,9 @@ from kin.transforms import wxyz_from_rotation
 IIWA, UR5 = kin.get_robot("iiwa14"), kin.get_robot("ur5")
 
 
-def pose(q: np.ndarray) -> kin.PoseTarget:
+def pose(q: np.ndarray) -> kin.motion.PoseTarget:
     T = kin.fk(UR5, q)
-    return kin.PoseTarget(tuple(T[:3, 3].tolist()), tuple(wxyz_from_rotation(T[:3, :3]).tolist()))
+    return kin.motion.PoseTarget(tuple(T[:3, 3].tolist()), tuple(wxyz_from_rotation(T[:3, :3]).tolist()))
 
 
 def line(robot: kin.Robot, q: np.ndarray, way: tuple[float, float, float], count: int) -> np.ndarray:
@@ -67,8 +67,11 @@ def test_a_program_is_refused_where_it_touches(kind):
     q = np.array([0.0, -1.2, 1.2, -1.5, -1.5, 0.0])
     other = q.copy()
     other[0] += 0.4
-    target = kin.JointTarget(tuple(other)) if kind == "ptp" else pose(other)
-    program = [kin.Ptp(kin.JointTarget(tuple(q))), kin.Ptp(target) if kind == "ptp" else kin.Lin(target)]
+    target = kin.motion.JointTarget(tuple(other)) if kind == "ptp" else pose(other)
+    program = [
+        kin.motion.Ptp(kin.motion.JointTarget(tuple(q))),
+        kin.motion.Ptp(target) if kind == "ptp" else kin.motion.Lin(target),
+    ]
     plain = kin.plan_motion(UR5, program, q)
     middle = plain.sample(0.5 * plain.duration).T[:3, 3]
     post = kin.Obstacle("cylinder", middle.tolist(), radius=0.01, height=0.2, name="post")
@@ -76,7 +79,7 @@ def test_a_program_is_refused_where_it_touches(kind):
     assert found.refusal is not None
     assert (found.refusal.cause, found.refusal.segment) == ("collision", 1)
     assert "touches post after" in found.reason
-    contact = kin.nearest_contact(UR5, plain.sample(found.refusal.details.time).q, [post])
+    contact = kin.collision.nearest_contact(UR5, plain.sample(found.refusal.details.time).q, [post])
     assert contact.distance < 0.0
     assert contact.distance > -0.02  # the first touch, not a later one
     away = kin.Obstacle("sphere", (3.0, 0.0, 0.0), radius=0.1)

@@ -19,7 +19,7 @@ def line(robot: kin.Robot, by: tuple[float, float, float], places: int = PLACES)
     return T
 
 
-def state(found: kin.PathPostures, place: int, row: int) -> str:
+def state(found: kin.path.PathPostures, place: int, row: int) -> str:
     return STATES[found.states[place, row]]
 
 
@@ -29,7 +29,7 @@ CASES = [(UR5, (-0.3, 0.5, -0.1)), (UR5, (0.55, 0.0, 0.0)), (PANDA, (0.2, 0.3, -
 @pytest.mark.parametrize(("robot", "by"), CASES)
 def test_each_cell_is_what_forward_kinematics_and_limits_say(robot, by):
     poses = line(robot, by)
-    found = kin.path_postures(robot, poses)
+    found = kin.path.path_postures(robot, poses)
     seen = set()
     for place, row in np.ndindex(found.states.shape):
         q, what = found.q[place, row], state(found, place, row)
@@ -55,7 +55,7 @@ def test_each_cell_is_what_forward_kinematics_and_limits_say(robot, by):
 @pytest.mark.full
 @pytest.mark.parametrize(("robot", "by"), CASES[:2])
 def test_the_postures_that_lead_through_are_those_from_which_the_line_can_be_driven(robot, by):
-    found = kin.path_postures(robot, line(robot, by, 200))
+    found = kin.path.path_postures(robot, line(robot, by, 200))
     end = kin.motion.PoseTarget.of(line(robot, by)[-1])
     driven = []
     for row in range(len(found.postures)):
@@ -73,7 +73,7 @@ def test_reach_is_what_following_place_by_place_finds():
     """An arm of two joints: its two postures meet only where it is stretched, and it cannot go beyond."""
     lengths = PLANAR.rows[0].a + PLANAR.rows[1].a
     points = np.stack([np.linspace(0.3, 1.2, 91) * lengths, np.full(91, 0.05), np.zeros(91)], axis=1)
-    found = kin.path_postures(PLANAR, points, options=kin.IKOptions(task="position"))
+    found = kin.path.path_postures(PLANAR, points, options=kin.IKOptions(task="position"))
     last = int(np.flatnonzero(np.linalg.norm(points, axis=1) <= lengths)[-1])
     assert (found.reach[0] == last).all()
     assert (found.reach[last] == last).all()
@@ -84,11 +84,11 @@ def test_reach_is_what_following_place_by_place_finds():
 
 def test_what_touches_is_named_and_ends_the_way():
     poses = line(UR5, (-0.3, 0.5, -0.1))
-    free = kin.path_postures(UR5, poses)
+    free = kin.path.path_postures(UR5, poses)
     row = free.rows[0]
     middle = kin.fk(UR5, free.best.q[PLACES // 2])[:3, 3]
     ball = kin.Obstacle("sphere", middle.tolist(), radius=0.06, name="ball")
-    found = kin.path_postures(UR5, poses, options=kin.IKOptions(obstacles=(ball,)))
+    found = kin.path.path_postures(UR5, poses, options=kin.IKOptions(obstacles=(ball,)))
     assert state(found, PLACES // 2, row) == "touches"
     assert "touches ball" in found.reasons[PLACES // 2, row].explain()
     assert found.through == ()
@@ -101,7 +101,7 @@ def test_what_touches_is_named_and_ends_the_way():
 
 def test_stretches_are_the_table_and_best_is_the_path():
     poses = line(PANDA, (0.2, 0.3, -0.2))
-    found = kin.path_postures(PANDA, poses, q_start=PANDA.q_home)
+    found = kin.path.path_postures(PANDA, poses, q_start=PANDA.q_home)
     table = np.full(found.states.shape, -1)
     for stretch in found.stretches:
         table[stretch.first : stretch.last + 1, stretch.posture] = STATES.index(stretch.state)
@@ -114,10 +114,10 @@ def test_stretches_are_the_table_and_best_is_the_path():
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
 def test_bad_steps_are_named(value):
     with pytest.raises(kin.InputError, match="max_step"):
-        kin.path_postures(UR5, line(UR5, (0.1, 0.0, 0.0), 2), max_step=value)
+        kin.path.path_postures(UR5, line(UR5, (0.1, 0.0, 0.0), 2), max_step=value)
 
 
 def test_a_path_outside_the_workspace_is_an_answer():
-    found = kin.path_postures(UR5, line(UR5, (9.0, 0.0, 0.0), 5)[1:])
+    found = kin.path.path_postures(UR5, line(UR5, (9.0, 0.0, 0.0), 5)[1:])
     assert set(np.unique(found.states)) == {STATES.index("none")}
     assert found.reason == "The arm cannot be at the first place of the path in any posture."

@@ -12,13 +12,13 @@ KUKA = "X 400 Y 100 Z 300 A 10 B 120 C 30"
 
 def target(
     pose: object, units: dict[str, str] | None = None, robot: str | None = None, **more: object
-) -> kin.PoseTarget:
+) -> kin.motion.PoseTarget:
     """The target of a program of one segment."""
     data = {"units": units or {}, "segments": [{"kind": "ptp", "pose": pose, **more}]}
     frames = {"table": kin.pose_from_xyz_rpy([1.0, 0.0, 0.0], [0.0, 0.0, np.pi / 2])}
-    segment = kin.program_from_dict(data, robot, frames).segments[0]
-    assert isinstance(segment, kin.Ptp)
-    assert isinstance(segment.target, kin.PoseTarget)
+    segment = kin.motion.program_from_dict(data, robot, frames).segments[0]
+    assert isinstance(segment, kin.motion.Ptp)
+    assert isinstance(segment.target, kin.motion.PoseTarget)
     return segment.target
 
 
@@ -48,5 +48,5 @@ def test_a_text_that_is_no_pose_names_its_field(pose: str, said: str) -> None:
 
 def test_a_quaternion_far_from_unit_length_is_no_target() -> None:
     with pytest.raises(kin.InputError, match=r"wxyz: .*this one has the length 0\.24"):
-        kin.PoseTarget((0.4, 0.1, 0.3), (0.0, 0.24, 0.0, 0.0))
-    assert kin.PoseTarget((0.4, 0.1, 0.3), (0.0, 1.01, 0.0, 0.0)).wxyz == (0.0, 1.0, 0.0, 0.0)
+        kin.motion.PoseTarget((0.4, 0.1, 0.3), (0.0, 0.24, 0.0, 0.0))
+    assert kin.motion.PoseTarget((0.4, 0.1, 0.3), (0.0, 1.01, 0.0, 0.0)).wxyz == (0.0, 1.0, 0.0, 0.0)

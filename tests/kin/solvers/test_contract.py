@@ -26,7 +26,7 @@ from kin.solvers.singular import Condition, Lost
 
 PI = math.pi
 FAR = 1e6
-BUILT_IN = tuple(kin.classic_robots().values())
+BUILT_IN = tuple(kin.files.classic_robots().values())
 SOLVED = tuple(robot for robot in BUILT_IN if closed_form_of(robot) is not None)
 # Joints whose direction no closed form accepts.
 REVERSED = tuple(

@@ -20,7 +20,7 @@ PI = math.pi
 # The names of pair2 are tested in test_pair2.py.
 BUILT_IN = tuple(
     robot
-    for robot in kin.classic_robots().values()
+    for robot in kin.files.classic_robots().values()
     if (form := closed_form_of(robot)) is not None and form.name != "pair2"
 )
 CEILING = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -266,7 +266,7 @@ def test_no_name_speaks_of_height_where_a_branch_has_no_one_height():
 
 @pytest.mark.parametrize("robot", [*BUILT_IN, *OTHERS], ids=lambda robot: robot.id)
 def test_every_part_of_a_name_has_a_meaning(robot):
-    meanings = kin.branch_meanings(robot)
+    meanings = kin.ik.branch_meanings(robot)
     parts = {part for name in kin.branch_names(robot) for part in name.split(" · ")}
     assert set(meanings) == parts
     assert len(set(meanings.values())) == len(parts)
@@ -274,4 +274,4 @@ def test_every_part_of_a_name_has_a_meaning(robot):
 
 def test_an_arm_without_a_closed_form_has_no_names_and_no_meanings():
     assert kin.branch_names(eight_joints(GET("panda"))) == ()
-    assert kin.branch_meanings(eight_joints(GET("panda"))) == {}
+    assert kin.ik.branch_meanings(eight_joints(GET("panda"))) == {}

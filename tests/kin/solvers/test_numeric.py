@@ -26,7 +26,7 @@ from kin.solvers.numeric import valley
 from kin.solvers.numeric.error import look, quadratic_model
 from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
 
-ROBOTS = tuple(kin.classic_robots())
+ROBOTS = tuple(kin.files.classic_robots())
 POSES = int(os.environ.get("KINBOARD_TEST_POSES", "10000"))
 FEW = 300
 TURN = 2 * math.pi
@@ -197,7 +197,7 @@ def test_limits_and_locks_hold_exactly():
 def test_narrowed_limits():
     """Random limits a quarter as wide: poses inside them are still solved, inside them."""
     rng = np.random.default_rng(9)
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         width = robot.upper - robot.lower
         for _ in range(40):
             low = robot.lower + rng.random(robot.n) * 0.75 * width
@@ -213,7 +213,7 @@ def test_narrowed_limits():
 def test_the_seed_comes_first():
     """If the seed meets the target it is the result, after one descent."""
     rng = np.random.default_rng(10)
-    for robot in kin.classic_robots().values():
+    for robot in kin.files.classic_robots().values():
         for q in robot.random_q(rng, 20):
             target = kin.fk(robot, q)
             found = nearest.solve_numerically(problem_of(robot, target, task=task_of(robot), q_seed=q))
@@ -247,7 +247,7 @@ def test_the_same_problem_has_the_same_solution_in_any_thread():
     rng = np.random.default_rng(13)
     problems = [
         problem_of(robot, kin.fk(robot, q), task=task_of(robot), q_seed=seed)
-        for robot in kin.classic_robots().values()
+        for robot in kin.files.classic_robots().values()
         for q, seed in zip(robot.random_q(rng, 60), robot.random_q(rng, 60), strict=True)
     ]
     serial = [nearest.solve_numerically(problem) for problem in problems]

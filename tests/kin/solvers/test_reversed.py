@@ -416,7 +416,9 @@ def test_paths_are_those_of_the_plain_arm(name, joints):
 )
 def test_reversing_joints_does_not_change_the_capability_map(name, joints):
     base = ARMS[name]
-    a, b = (kin.capability_map(r, resolution=5, directions=12) for r in (base, reversed_at(base, joints)))
+    a, b = (
+        kin.workspace.capability_map(r, resolution=5, directions=12) for r in (base, reversed_at(base, joints))
+    )
     assert a.grid.method == b.grid.method == "closed form"
     assert np.array_equal(a.index, b.index)
     assert np.array_equal(a.approachable, b.approachable)

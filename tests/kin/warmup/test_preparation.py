@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from kin import classic_robots
+from kin.files import classic_robots
 from kin.solvers import NUMERIC, family_of
 from kin.warmup import MADE_UP, all_of, first_family, made_up_arms, parts
 from kin.warmup.preparation import Preparation

@@ -18,6 +18,7 @@ import kin
 import numpy as np
 from arms import random_arms
 from kin.ik.table import Table
+from kin.motion import Lin, Ptp
 from numba.core.dispatcher import Dispatcher
 
 def compilations():
@@ -28,7 +29,7 @@ def compilations():
 kin.warm_up(everything=True)
 before = compilations()
 assert len(before) > 40, before
-for robot in kin.classic_robots().values():
+for robot in kin.files.classic_robots().values():
     T = kin.fk(robot, robot.home)
     kin.jacobian(robot, robot.home)
     for task in ("pose", "approach", "position"):
@@ -49,29 +50,29 @@ obstacles = [
     kin.Obstacle("cylinder", (-0.5, 0.3, 0.2), radius=0.1, height=0.4),
     kin.Obstacle("table", (0.0, 0.0, -0.3), size=(1.0, 1.0, 0.05)),
 ]
-for robot in (*kin.classic_robots().values(), *random_arms(8)):
+for robot in (*kin.files.classic_robots().values(), *random_arms(8)):
     for q in (robot.q_home, robot.q_home + 0.01, [robot.home] * 3):
         kin.clearance(robot, q)
         kin.clearance(robot, q, obstacles)
-    kin.nearest_links(robot, robot.q_home)
-    kin.nearest_contact(robot, robot.home, obstacles)
+    kin.collision.nearest_links(robot, robot.q_home)
+    kin.collision.nearest_contact(robot, robot.home, obstacles)
     T = kin.fk(robot, robot.home)
     kin.solve_ik(robot, T, avoid_self_collision=True, obstacles=obstacles[:2])
     kin.solve_path(robot, [T, T], avoid_self_collision=True)
-    kin.plan_motion(robot, [kin.Ptp(kin.JointTarget(robot.home))], obstacles=obstacles)
+    kin.plan_motion(robot, [kin.motion.Ptp(kin.motion.JointTarget(robot.home))], obstacles=obstacles)
 arm = kin.get_robot("pioneer5")
 locked = [None, None, None, 0.3, 0.3]
 for strategy in ("uniform", "quasi", "boundary", "volume"):
-    kin.workspace_slice(arm, 9, 2, 7, strategy=strategy, measure="limits", with_q=True, locked=locked)
-kin.workspace_section(arm, ((0.0, 0.0, 0.1), (0.0, 1.0, 1.0)), resolution=8, locked=locked)
-kin.workspace_section(arm, resolution=8, locked=locked)
-kin.workspace_facts(arm, effort=2, locked=locked)
-for robot in kin.classic_robots().values():
-    end = kin.JointTarget(robot.q_home + 0.05)
-    back = kin.JointTarget(robot.home)
-    moves = [kin.Lin(end, blend=0.01), kin.Lin(back, tool_speed=0.1), kin.Ptp(end, blend=0.01), kin.Ptp(back)]
+    kin.workspace.workspace_slice(arm, 9, 2, 7, strategy=strategy, measure="limits", with_q=True, locked=locked)
+kin.workspace.workspace_section(arm, ((0.0, 0.0, 0.1), (0.0, 1.0, 1.0)), resolution=8, locked=locked)
+kin.workspace.workspace_section(arm, resolution=8, locked=locked)
+kin.workspace.workspace_facts(arm, effort=2, locked=locked)
+for robot in kin.files.classic_robots().values():
+    end = kin.motion.JointTarget(robot.q_home + 0.05)
+    back = kin.motion.JointTarget(robot.home)
+    moves = [Lin(end, blend=0.01), Lin(back, tool_speed=0.1), Ptp(end, blend=0.01), Ptp(back)]
     for jerk_limited in (True, False):
-        kin.plan_motion(robot, kin.Program(moves, jerk_limited=jerk_limited))
+        kin.plan_motion(robot, kin.motion.Program(moves, jerk_limited=jerk_limited))
 after = compilations()
 assert after == before, {k: n for k, n in after.items() if before.get(k) != n}
 """

@@ -38,7 +38,7 @@ def arm(name):
 
 @lru_cache
 def mapped(name, resolution=7, directions=12):
-    return kin.capability_map(arm(name), resolution=resolution, directions=directions)
+    return kin.workspace.capability_map(arm(name), resolution=resolution, directions=directions)
 
 
 def dense(found):
@@ -201,7 +201,7 @@ def test_blocks_are_bit_identical_in_any_order_thread_and_copy():
     assert count > 1
     blocks = [workspace.capability_block(grid, block) for block in range(count)]
     whole = workspace.capability_join(grid, blocks)
-    assert same(whole, kin.capability_map(grid.robot, resolution=10))
+    assert same(whole, kin.workspace.capability_map(grid.robot, resolution=10))
     assert (np.diff(np.ravel_multi_index(whole.index.T, grid.shape)) > 0).all()
     assert same(whole, workspace.capability_join(grid, [*blocks[::-1], blocks[0]]))
     copy = pickle.loads(pickle.dumps(grid))
@@ -238,7 +238,7 @@ def test_voxels_have_the_right_indices_and_centres():
     assert (found.share == found.approachable.mean(axis=1).astype(np.float32)).all()
     assert found.volume == pytest.approx(len(found.index) * grid.voxel**3)
     # The voxels cover exactly the bounding box of the workspace.
-    facts = kin.workspace_facts(grid.robot, volume=False)
+    facts = kin.workspace.workspace_facts(grid.robot, volume=False)
     low = np.array([span.least.value for span in (facts.x, facts.y, facts.z)])
     high = np.array([span.largest.value for span in (facts.x, facts.y, facts.z)])
     end = np.array(grid.origin) + np.array(grid.shape) * grid.voxel
@@ -252,7 +252,7 @@ def test_voxels_have_the_right_indices_and_centres():
 @pytest.mark.full
 def test_a_finer_map_has_the_volume_of_the_workspace():
     found = mapped("puma560", 18, 12)
-    volume = kin.workspace_facts(kin.get_robot("puma560"), effort=2).volume
+    volume = kin.workspace.workspace_facts(kin.get_robot("puma560"), effort=2).volume
     assert found.volume == pytest.approx(volume.value, rel=0.03)
 
 
@@ -265,7 +265,7 @@ def test_limits_and_locks_are_respected():
         "limits": [(-1.0, 0.5), None, None, (-0.5, 0.5), None, (2.0, 2.5)],
         "locked": [None, None, 0.4, None, None, None],
     }
-    found = kin.capability_map(robot, resolution=5, directions=12, **asked_for)
+    found = kin.workspace.capability_map(robot, resolution=5, directions=12, **asked_for)
     pairs = np.array([*compared(found, np.random.default_rng(5), 40, **asked_for)])
     # With joint 3 locked four joints are left for a task of dimension five: points are reachable, directions
     # rarely.
@@ -291,7 +291,7 @@ def made(*joints):
 
 def test_maps_of_arms_with_too_few_joints_for_directions_have_points_only():
     flat = made(Joint("a", a=0.3, limits=(-3.0, 3.0)), Joint("b", a=0.2, limits=(-2.0, 2.0)))
-    found = kin.capability_map(flat, resolution=9, directions=12)
+    found = kin.workspace.capability_map(flat, resolution=9, directions=12)
     assert found.grid.shape[2] == 1
     assert found.grid.method == "closed form"
     assert len(found.index) > 20
@@ -302,7 +302,7 @@ def test_maps_of_arms_with_too_few_joints_for_directions_have_points_only():
 def test_joints_without_limits_take_any_value():
     robot = kin.get_robot("puma560")
     free = replace(robot, rows=tuple(replace(row, limits=None) for row in robot.rows))
-    found = kin.capability_map(free, resolution=5, directions=12)
+    found = kin.workspace.capability_map(free, resolution=5, directions=12)
     assert found.share.mean() > mapped("puma560", 5).share.mean()
     pairs = np.array([*compared(found, np.random.default_rng(6), 15)])
     assert (pairs[:, 0] == pairs[:, 1]).all()

@@ -57,7 +57,7 @@ def test_most_probes_are_not_made():
 def test_no_reachable_point_is_outside_of_the_sizes(region):
     sizes = SamplingProbes(region)._sizes
     points = next(
-        kin.sample_workspace(region.robot, 20_000, chunk=20_000, constraints=_as_constraints(region))
+        kin.workspace.sample_workspace(region.robot, 20_000, chunk=20_000, constraints=_as_constraints(region))
     ).points
     farthest = max(probes._outside(p, sizes) for p in points.astype(np.float64))
     assert farthest < 1e-6

@@ -17,7 +17,7 @@ OVERSHOOTING = (
     pytest.param("panda", 400, marks=pytest.mark.slow),
     pytest.param("iiwa14", 350, marks=pytest.mark.slow),
 )
-ROBOTS = tuple(kin.classic_robots())
+ROBOTS = tuple(kin.files.classic_robots())
 PER_REGION = 20
 
 
@@ -29,7 +29,7 @@ def winding(curve: Array, at: Array) -> Array:
     return np.asarray(((turn + math.pi) % (2.0 * math.pi) - math.pi).sum(axis=1) / (2.0 * math.pi))
 
 
-def check(found: kin.Section, robot: kin.Robot) -> None:
+def check(found: kin.workspace.Section, robot: kin.Robot) -> None:
     """Every curve is closed, finite and runs along the grid: neighbours are at most two squares apart."""
     for curve in found.curves:
         assert len(curve) >= 3
@@ -45,10 +45,10 @@ def check(found: kin.Section, robot: kin.Robot) -> None:
 @pytest.mark.parametrize(("robot_id", "resolution"), OVERSHOOTING)
 def test_a_section_reaches_beyond_the_points_that_made_its_map(robot_id, resolution):
     robot = kin.get_robot(robot_id)
-    found = kin.workspace_section(robot, resolution=resolution)
+    found = kin.workspace.workspace_section(robot, resolution=resolution)
     assert found.arcs
     check(found, robot)
-    points = kin.workspace_slice(robot, 2000, 0, 2000).points.astype(float)
+    points = kin.workspace.workspace_slice(robot, 2000, 0, 2000).points.astype(float)
     at = np.stack([np.hypot(points[:, 0], points[:, 1]), points[:, 2]], axis=1)
     outside = at[sum(winding(curve, at) for curve in found.curves) < 0.5]
     assert len(outside) < 0.02 * len(at)
@@ -74,7 +74,7 @@ def random_sections(seed: int, count: int, finest: int) -> None:
         if robot.joints[0].kind == "prismatic" or rng.random() < 0.5:
             plane = robot.reach * rng.uniform(-0.3, 0.3, 3), rng.normal(size=3)
         resolution = int(np.exp(rng.uniform(math.log(8), math.log(finest))))
-        found = kin.workspace_section(robot, plane, limits=limits, locked=locked, resolution=resolution)
+        found = kin.workspace.workspace_section(robot, plane, limits=limits, locked=locked, resolution=resolution)
         try:
             check(found, robot)
         except AssertionError:

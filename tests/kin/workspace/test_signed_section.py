@@ -39,7 +39,7 @@ def inside(section, points):
     "robot", [PIONEER, kin.get_robot("ur5"), replace(PIONEER, base=SLANTED)], ids=["pioneer5", "ur5", "slanted"]
 )
 def test_all_tool_points_are_inside_and_on_both_sides(robot):
-    section = kin.workspace_section(robot, resolution=40, signed=True)
+    section = kin.workspace.workspace_section(robot, resolution=40, signed=True)
     assert section.signed
     points = signed_points(robot, section, robot.random_q(np.random.default_rng(2), 4000))
     assert (points[:, 0] < 0.0).any()
@@ -53,17 +53,17 @@ def test_all_tool_points_are_inside_and_on_both_sides(robot):
 
 
 def test_the_pioneer_reaches_less_far_behind_its_axis():
-    section = kin.workspace_section(PIONEER, resolution=40, signed=True)
+    section = kin.workspace.workspace_section(PIONEER, resolution=40, signed=True)
     s = np.concatenate(section.curves)[:, 0]
     assert s.min() == pytest.approx(-0.326, abs=0.005)
     assert s.max() == pytest.approx(0.487, abs=0.002)
     assert np.allclose(section.u, [1.0, 0.0, 0.0])
-    plain = kin.workspace_section(PIONEER, resolution=40)
+    plain = kin.workspace.workspace_section(PIONEER, resolution=40)
     assert not plain.signed
     assert np.concatenate(plain.curves)[:, 0].min() >= -1e-12
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda robot: robot.id)
 def test_joint_1_faces_to_the_side_of_the_bases_x_axis(robot):
     ahead = faced(robot, np.array([0.0, 0.0, 1.0]))
     assert np.allclose(ahead, [1.0, 0.0, 0.0], atol=1e-12)

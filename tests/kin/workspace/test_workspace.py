@@ -22,7 +22,7 @@ from kin.workspace.search.cells import cell_map
 from kin.workspace.search.probes import ALIKE, TRIES, probe_cells
 from kin.workspace.volume import from_probes
 
-ALL = tuple(kin.classic_robots())
+ALL = tuple(kin.files.classic_robots())
 # x, y, z, distance from joint 1's axis, distance from the shoulder: least and largest, inside the printed limits.
 REFERENCE = {
     "pioneer5": (
@@ -47,12 +47,12 @@ FEW = {"uniform": 30_000, "quasi": 30_000, "volume": 2000, "boundary": 400}
 
 
 def cloud(robot, n, **options):
-    return np.concatenate([chunk.points for chunk in kin.sample_workspace(robot, n, **options)])
+    return np.concatenate([chunk.points for chunk in kin.workspace.sample_workspace(robot, n, **options)])
 
 
 @lru_cache
 def facts(robot_id):
-    return kin.workspace_facts(kin.get_robot(robot_id), volume=False)
+    return kin.workspace.workspace_facts(kin.get_robot(robot_id), volume=False)
 
 
 def chain(*joints):
@@ -83,7 +83,7 @@ def test_a_cloud_does_not_depend_on_chunks_threads_or_length(strategy):
     ends = [*range(0, n, n // 9), n]
 
     def part(i):
-        return kin.workspace_slice(robot, n, ends[i], ends[i + 1], seed=7, strategy=strategy).points
+        return kin.workspace.workspace_slice(robot, n, ends[i], ends[i + 1], seed=7, strategy=strategy).points
 
     with ThreadPoolExecutor(4) as pool:
         parts = list(pool.map(part, reversed(range(len(ends) - 1))))
@@ -105,12 +105,12 @@ def test_another_seed_gives_another_cloud(strategy):
 def test_points_are_those_of_their_configurations(robot_id, strategy):
     robot = kin.get_robot(robot_id)
     n = min(FEW[strategy], 2000)
-    (chunk,) = kin.sample_workspace(robot, n, seed=3, strategy=strategy, with_q=True)
-    q = kin.workspace_configurations(robot, np.arange(n), seed=3, strategy=strategy)
+    (chunk,) = kin.workspace.sample_workspace(robot, n, seed=3, strategy=strategy, with_q=True)
+    q = kin.workspace.workspace_configurations(robot, np.arange(n), seed=3, strategy=strategy)
     assert (q == chunk.q).all()
     assert np.abs(fk_positions(robot, q) - chunk.points).max() < 1e-7
     assert robot.in_limits(q).all()
-    one = kin.workspace_configurations(robot, n - 1, seed=3, strategy=strategy)
+    one = kin.workspace.workspace_configurations(robot, n - 1, seed=3, strategy=strategy)
     assert one.shape == (robot.n,)
     assert (one == q[-1]).all()
 
@@ -119,17 +119,17 @@ def test_samples_late_in_the_sequence_are_evenly_distributed():
     robot = kin.get_robot("redundant7")
     far = 2**52
     for strategy in ("uniform", "quasi"):
-        chunk = kin.workspace_slice(robot, far + 5000, far, far + 5000, strategy=strategy, with_q=True)
+        chunk = kin.workspace.workspace_slice(robot, far + 5000, far, far + 5000, strategy=strategy, with_q=True)
         assert chunk.start == far
         assert chunk.done == chunk.total == far + 5000
         part = (chunk.q - robot.lower) / (robot.upper - robot.lower)
         assert np.abs(part.mean(axis=0) - 0.5).max() < 0.02
-        assert (kin.workspace_configurations(robot, far + 17, strategy=strategy) == chunk.q[17]).all()
+        assert (kin.workspace.workspace_configurations(robot, far + 17, strategy=strategy) == chunk.q[17]).all()
 
 
 def test_joints_are_sampled_evenly_and_independently():
     robot = kin.get_robot("redundant7")
-    q = kin.workspace_configurations(robot, np.arange(100_000), seed=11)
+    q = kin.workspace.workspace_configurations(robot, np.arange(100_000), seed=11)
     part = (q - robot.lower) / (robot.upper - robot.lower)
     counts = np.stack([np.histogram(part[:, j], 50, (0.0, 1.0))[0] for j in range(7)])
     assert np.abs(counts / 2000.0 - 1.0).max() < 0.12  # five standard deviations
@@ -141,7 +141,7 @@ def test_quasi_random_samples_are_more_even():
     robot = kin.get_robot("redundant7")
     spread = {}
     for strategy in ("uniform", "quasi"):
-        q = kin.workspace_configurations(robot, np.arange(4096), strategy=strategy)
+        q = kin.workspace.workspace_configurations(robot, np.arange(4096), strategy=strategy)
         part = (q - robot.lower) / (robot.upper - robot.lower)
         counts = np.stack([np.histogram(part[:, j], 64, (0.0, 1.0))[0] for j in range(7)])
         spread[strategy] = counts.std()
@@ -153,7 +153,9 @@ def test_narrowed_limits_and_locks_are_respected_exactly(strategy):
     robot = kin.get_robot("redundant7-craig")
     limits = [(0.1, 0.4), None, (-1.0, -0.5), None, None, None, None]
     locked = [None, None, None, 0.75, None, None, -1.25]
-    q = kin.workspace_configurations(robot, np.arange(300), strategy=strategy, limits=limits, locked=locked)
+    q = kin.workspace.workspace_configurations(
+        robot, np.arange(300), strategy=strategy, limits=limits, locked=locked
+    )
     assert (q[:, 3] == 0.75).all()
     assert (q[:, 6] == -1.25).all()
     assert (q[:, [0, 2]] >= [0.1, -1.0]).all()
@@ -165,7 +167,7 @@ def test_narrowed_limits_and_locks_are_respected_exactly(strategy):
 
 def test_joints_without_limits_are_sampled_from_a_whole_turn():
     robot = chain(Joint("a", a=0.3), Joint("b", a=0.2))
-    q = kin.workspace_configurations(robot, np.arange(20_000))
+    q = kin.workspace.workspace_configurations(robot, np.arange(20_000))
     assert np.abs(q).max() <= math.pi
     assert (np.abs(q).max(axis=0) > 3.13).all()
 
@@ -244,8 +246,10 @@ def test_volume_samples_are_even_in_space(robot_id):
 def test_measures_are_those_of_their_points():
     robot = kin.get_robot("pioneer5")
     limits = [(0.5, 1.5), None, None, None, None]
-    (chunk,) = kin.sample_workspace(robot, 500, measure=MEASURES, limits=limits, locked=[None] * 4 + [0.5])
-    q = kin.workspace_configurations(robot, np.arange(500), limits=limits, locked=[None] * 4 + [0.5])
+    (chunk,) = kin.workspace.sample_workspace(
+        robot, 500, measure=MEASURES, limits=limits, locked=[None] * 4 + [0.5]
+    )
+    q = kin.workspace.workspace_configurations(robot, np.arange(500), limits=limits, locked=[None] * 4 + [0.5])
     assert chunk.q is None
     assert np.abs(chunk.measures["manipulability"] - kin.manipulability(robot, q)).max() < 1e-7
     low, high = np.maximum(robot.lower, [0.5, *robot.lower[1:]]), np.minimum(robot.upper, [1.5, *robot.upper[1:]])
@@ -256,7 +260,7 @@ def test_measures_are_those_of_their_points():
 
 def test_the_older_name_of_the_limit_margin_is_accepted():
     robot = kin.get_robot("pioneer5")
-    (chunk,) = kin.sample_workspace(robot, 50, measure=("limits", "limit_margin"))
+    (chunk,) = kin.workspace.sample_workspace(robot, 50, measure=("limits", "limit_margin"))
     assert [*chunk.measures] == ["limits", "limit_margin"]
     assert np.array_equal(chunk.measures["limits"], chunk.measures["limit_margin"])
 
@@ -266,13 +270,16 @@ def test_limits_and_locks_may_be_given_as_one_value():
     limits, locked = [(0.5, 1.5), None, None, None, None], [None, None, None, 0.25, None]
     one = kin.JointConstraints(limits, locked)
     for function, attribute in (
-        (lambda **given: kin.workspace_configurations(robot, 7, **given), None),
-        (lambda **given: kin.workspace_slice(robot, 10, 2, 9, **given), "points"),
-        (lambda **given: next(kin.sample_workspace(robot, 10, **given)), "points"),
-        (lambda **given: kin.workspace_facts(robot, volume=False, **given).x.largest, "q"),
-        (lambda **given: kin.workspace_section(robot, resolution=8, **given).curves[0], None),
+        (lambda **given: kin.workspace.workspace_configurations(robot, 7, **given), None),
+        (lambda **given: kin.workspace.workspace_slice(robot, 10, 2, 9, **given), "points"),
+        (lambda **given: next(kin.workspace.sample_workspace(robot, 10, **given)), "points"),
+        (lambda **given: kin.workspace.workspace_facts(robot, volume=False, **given).x.largest, "q"),
+        (lambda **given: kin.workspace.workspace_section(robot, resolution=8, **given).curves[0], None),
         (lambda **given: kin.workspace.capability_grid(robot, resolution=3, **given), "bounds"),
-        (lambda **given: kin.capability_map(robot, resolution=2, directions=12, **given), "manipulability"),
+        (
+            lambda **given: kin.workspace.capability_map(robot, resolution=2, directions=12, **given),
+            "manipulability",
+        ),
     ):
         a, b, free = function(limits=limits, locked=locked), function(constraints=one), function()
         if attribute is not None:
@@ -309,28 +316,28 @@ def test_limits_and_locks_may_be_given_as_one_value():
 )
 def test_wrong_arguments_are_named_at_the_call(arguments, field):
     with pytest.raises(InputError) as caught:
-        kin.sample_workspace(kin.get_robot("pioneer5"), **{"n": 10, **arguments})
+        kin.workspace.sample_workspace(kin.get_robot("pioneer5"), **{"n": 10, **arguments})
     assert caught.value.field == field
 
 
 @pytest.mark.parametrize(
     ("call", "field"),
     [
-        (lambda robot: kin.workspace_slice(robot, 10, 10, 11), "start"),
-        (lambda robot: kin.workspace_slice(robot, 10, 5, 5), "end"),
-        (lambda robot: kin.workspace_slice(robot, 10, 5, 11), "end"),
-        (lambda robot: kin.workspace_configurations(robot, -1), "index"),
-        (lambda robot: kin.workspace_configurations(robot, 0.5), "index"),
-        (lambda robot: kin.workspace_configurations(robot, 2**53), "index"),
-        (lambda robot: kin.workspace_configurations(robot, [[0], [1, 2]]), "index"),
-        (lambda robot: kin.workspace_facts(robot, effort=1), "effort"),
-        (lambda robot: kin.workspace_facts(robot, limits=3), "limits"),
-        (lambda robot: kin.workspace_section(robot, resolution=4), "resolution"),
-        (lambda robot: kin.workspace_section(robot, 3), "plane"),
-        (lambda robot: kin.workspace_section(robot, ([0, 0, 0], [0, 0, 0])), "plane"),
-        (lambda robot: kin.workspace_section(robot, ([0, 0], [0, 0, 1])), "plane[0]"),
-        (lambda robot: kin.workspace_section(robot, ([0, 0, 0], [0, math.inf, 1])), "plane[1][1]"),
-        (lambda robot: kin.workspace_section(GANTRY), "plane"),
+        (lambda robot: kin.workspace.workspace_slice(robot, 10, 10, 11), "start"),
+        (lambda robot: kin.workspace.workspace_slice(robot, 10, 5, 5), "end"),
+        (lambda robot: kin.workspace.workspace_slice(robot, 10, 5, 11), "end"),
+        (lambda robot: kin.workspace.workspace_configurations(robot, -1), "index"),
+        (lambda robot: kin.workspace.workspace_configurations(robot, 0.5), "index"),
+        (lambda robot: kin.workspace.workspace_configurations(robot, 2**53), "index"),
+        (lambda robot: kin.workspace.workspace_configurations(robot, [[0], [1, 2]]), "index"),
+        (lambda robot: kin.workspace.workspace_facts(robot, effort=1), "effort"),
+        (lambda robot: kin.workspace.workspace_facts(robot, limits=3), "limits"),
+        (lambda robot: kin.workspace.workspace_section(robot, resolution=4), "resolution"),
+        (lambda robot: kin.workspace.workspace_section(robot, 3), "plane"),
+        (lambda robot: kin.workspace.workspace_section(robot, ([0, 0, 0], [0, 0, 0])), "plane"),
+        (lambda robot: kin.workspace.workspace_section(robot, ([0, 0], [0, 0, 1])), "plane[0]"),
+        (lambda robot: kin.workspace.workspace_section(robot, ([0, 0, 0], [0, math.inf, 1])), "plane[1][1]"),
+        (lambda robot: kin.workspace.workspace_section(GANTRY), "plane"),
     ],
 )
 def test_wrong_arguments_of_other_functions_are_named(call, field):
@@ -364,7 +371,9 @@ def test_sizes_equal_the_reference(robot_id):
 def test_sizes_of_narrowed_limits_are_smaller_and_reached():
     robot = kin.get_robot("pioneer5")
     limits = [(1.0, 1.5), (0.5, 1.0), None, None, None]
-    found = kin.workspace_facts(robot, limits=limits, locked=[None, None, None, 0.25, None], volume=False)
+    found = kin.workspace.workspace_facts(
+        robot, limits=limits, locked=[None, None, None, 0.25, None], volume=False
+    )
     points = cloud(robot, 200_000, limits=limits, locked=[None, None, None, 0.25, None]).astype(float)
     for axis, span in enumerate((found.x, found.y, found.z)):
         assert 0.0 <= points[:, axis].min() - span.least.value + 1e-7 < 0.02
@@ -375,12 +384,12 @@ def test_sizes_of_narrowed_limits_are_smaller_and_reached():
 
 
 def test_a_gantry_is_a_box():
-    found = kin.workspace_facts(GANTRY)
+    found = kin.workspace.workspace_facts(GANTRY)
     sides = [span.largest.value - span.least.value for span in (found.x, found.y, found.z)]
     assert sorted(sides) == pytest.approx([0.25, 0.5, 1.0], abs=1e-12)
     assert found.volume.value == pytest.approx(0.125, abs=1e-4)
     assert abs(found.surface.value - 1.75) < 3.0 * found.surface.error
-    assert kin.workspace_section(GANTRY, ([0, 0, 0.3], [0, 0, 1])).area == pytest.approx(0.125, abs=1e-6)
+    assert kin.workspace.workspace_section(GANTRY, ([0, 0, 0.3], [0, 0, 1])).area == pytest.approx(0.125, abs=1e-6)
 
 
 def test_a_height_that_all_configurations_have_is_that_of_the_first_one():
@@ -388,17 +397,17 @@ def test_a_height_that_all_configurations_have_is_that_of_the_first_one():
     region = Region.of(PLANAR)
     first = np.empty((1, 2))
     sample_configurations(region.arm, joint_streams(0, region.movable, quasi=True), 0, first)
-    found = kin.workspace_facts(PLANAR, volume=False)
+    found = kin.workspace.workspace_facts(PLANAR, volume=False)
     assert found.z.least.q.tolist() == found.z.largest.q.tolist() == first[0].tolist()
 
 
 def test_a_planar_arm_is_a_ring():
     inner = math.sqrt(0.3**2 + 0.2**2 + 2 * 0.3 * 0.2 * math.cos(2.6))
-    found = kin.workspace_facts(PLANAR)
+    found = kin.workspace.workspace_facts(PLANAR)
     assert found.radius.least.value == pytest.approx(inner, abs=1e-9)
     assert found.radius.largest.value == pytest.approx(0.5, abs=1e-9)
     assert found.volume.value == pytest.approx(0.0, abs=1e-6)
-    ring = kin.workspace_section(PLANAR, ([0, 0, 0], [0, 0, 1]), resolution=64)
+    ring = kin.workspace.workspace_section(PLANAR, ([0, 0, 0], [0, 0, 1]), resolution=64)
     assert len(ring.curves) == 2
     assert ring.area == pytest.approx(math.pi * (0.25 - inner**2), rel=1e-3)
 
@@ -406,7 +415,7 @@ def test_a_planar_arm_is_a_ring():
 @pytest.mark.full
 def test_both_methods_give_the_same_volume():
     robot = kin.get_robot("redundant7")
-    revolved = kin.workspace_facts(robot, effort=3)
+    revolved = kin.workspace.workspace_facts(robot, effort=3)
     volume, surface = from_probes(Region.of(robot), 2)
     assert revolved.volume.error < 0.002 * revolved.volume.value
     assert abs(volume.value - revolved.volume.value) < 4.0 * math.hypot(volume.error, revolved.volume.error)
@@ -426,11 +435,11 @@ def test_errors_shrink_with_effort():
 
 def test_the_section_of_the_pioneer_arm_equals_the_reference():
     robot = kin.get_robot("pioneer5")
-    found = kin.workspace_section(robot)
+    found = kin.workspace.workspace_section(robot)
     # The reference, a raster of 2 mm, includes the cells on the boundary, on average half a cell too many.
     rim = sum(np.linalg.norm(curve - np.roll(curve, 1, axis=0), axis=1).sum() for curve in found.curves)
     assert found.area == pytest.approx(0.1879 - 0.001 * rim, abs=0.001)
-    upright = kin.workspace_section(robot, ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0]))
+    upright = kin.workspace.workspace_section(robot, ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0]))
     front = sum(area_of(np.maximum(curve * [1.0, 0.0], 0.0) + curve * [0.0, 1.0]) for curve in upright.curves)
     assert upright.u.tolist() == [0.0, 1.0, 0.0]
     assert front == pytest.approx(0.1023, abs=0.0025)
@@ -445,7 +454,7 @@ def area_of(curve):
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_no_point_is_outside_of_the_section(robot_id):
     robot = kin.get_robot(robot_id)
-    found = kin.workspace_section(robot, resolution=64)
+    found = kin.workspace.workspace_section(robot, resolution=64)
     p = cloud(robot, 3000).astype(float)
     at = np.stack([np.hypot(p[:, 0], p[:, 1]), p[:, 2]], axis=1)
     turns = sum(windings(curve, at) for curve in found.curves)
@@ -467,7 +476,7 @@ def windings(curve, at):
 
 def test_vertices_of_a_section_are_on_the_boundary():
     robot = kin.get_robot("redundant7")
-    (curve,) = kin.workspace_section(robot, resolution=48).curves
+    (curve,) = kin.workspace.workspace_section(robot, resolution=48).curves
     # The straight forearm traces a circle around the end of the horizontal upper arm.
     around = np.hypot(curve[:, 0] - 0.35, curve[:, 1] - 0.30)
     far = curve[:, 0] > 0.5
@@ -476,7 +485,7 @@ def test_vertices_of_a_section_are_on_the_boundary():
 
 def test_the_arcs_of_the_pioneer_arm_equal_the_reference():
     robot = kin.get_robot("pioneer5")
-    found = kin.workspace_section(robot)
+    found = kin.workspace.workspace_section(robot)
     front = next(arc for arc in found.arcs if arc.radius and abs(arc.radius - 0.417069130) < 1e-8)
     assert front.joint == 1
     assert front.centre == pytest.approx((0.070, 0.130), abs=1e-9)
@@ -495,7 +504,7 @@ def test_the_arcs_of_the_pioneer_arm_equal_the_reference():
 @pytest.mark.parametrize("robot_id", ROBOTS)
 def test_arcs_lie_on_the_boundary_and_are_traced_by_one_joint(robot_id):
     robot = kin.get_robot(robot_id)
-    found = kin.workspace_section(robot, resolution=48)
+    found = kin.workspace.workspace_section(robot, resolution=48)
     edges = np.concatenate([halfway(curve) for curve in found.curves])
     assert found.arcs
     for arc in found.arcs:
@@ -520,15 +529,15 @@ def test_the_workspace_of_a_slide_without_limits_has_no_end():
     rail = kin.Joint("rail", kind="prismatic")
     robot = replace(arm, id="railed", rows=(rail, *arm.rows), home=(0.0, *arm.home))
     with pytest.raises(InputError, match=r"limits of rail.*slides without end"):
-        kin.workspace_facts(robot, volume=False)
-    for ask in (kin.workspace_slice, kin.workspace_section, kin.capability_map):
-        given = (10, 0, 10) if ask is kin.workspace_slice else ()
+        kin.workspace.workspace_facts(robot, volume=False)
+    for ask in (kin.workspace.workspace_slice, kin.workspace.workspace_section, kin.workspace.capability_map):
+        given = (10, 0, 10) if ask is kin.workspace.workspace_slice else ()
         with pytest.raises(InputError, match=r"limits of rail.*slides without end"):
             ask(robot, *given)
     limits = [(-1.0, 1.0), *[None] * 6]
-    found = kin.workspace_facts(robot, limits=limits, volume=False)
+    found = kin.workspace.workspace_facts(robot, limits=limits, volume=False)
     assert found.z.largest.value - found.z.least.value > 2.0
     locked = [0.3, *[None] * 6]
-    held = kin.workspace_facts(robot, locked=locked, volume=False).z
-    own = kin.workspace_facts(arm, volume=False).z
+    held = kin.workspace.workspace_facts(robot, locked=locked, volume=False).z
+    own = kin.workspace.workspace_facts(arm, volume=False).z
     assert held.largest.value == pytest.approx(own.largest.value + 0.3, abs=1e-9)

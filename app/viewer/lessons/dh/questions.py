@@ -18,9 +18,9 @@ from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import DOWN, UP, direction, level, line
 from app.viewer.lessons.guide.outline import Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration, distance, moved
-from kin import Comparison, Robot, compare, fk, link_frames
+from kin import Robot, compare, fk, link_frames
 from kin.axes import joint_axes, pairs
-from kin.comparison import messages
+from kin.comparison import Comparison, messages
 from kin.transforms import Array
 from kin.units import Units
 

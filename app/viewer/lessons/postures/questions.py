@@ -14,10 +14,10 @@ from app.viewer.lessons.guide.outline import Configuration, Ghost, Lead, Outline
 from app.viewer.lessons.guide.poses import as_configuration, distance
 from app.viewer.lessons.postures import planar
 from app.viewer.scene.chain import rotation
-from kin import IKOptions, IKSolution, Robot, Status, branch_meanings, branch_names, branch_of, fk, jacobian
+from kin import IKOptions, Robot, Status, branch_names, branch_of, fk, jacobian
 from kin.axes import NEARLY
 from kin.differential.task import free_motions, rank
-from kin.ik import solve
+from kin.ik import IKSolution, branch_meanings, solve
 from kin.transforms import Array, wxyz_from_rotation
 from kin.units import Units
 

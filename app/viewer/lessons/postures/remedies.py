@@ -17,8 +17,8 @@ from app.exports.worksheet.sheet import indexed
 from app.viewer.panel.posture import short
 from app.viewer.panel.status import LOOKS, notice
 from app.viewer.views.templates import render
-from kin import IKOptions, IKResult, Robot, Task
-from kin.ik import solve
+from kin import IKOptions, IKResult, Robot
+from kin.ik import Task, solve
 from kin.ik.options import Locks
 from kin.transforms import Array, rotation_angle
 from kin.units import DEFAULT_UNITS, Units

@@ -19,8 +19,9 @@ from app.viewer.panel.posture import parts, short
 from app.viewer.scene.bodies.nodes import TOUCHING
 from app.viewer.scene.bodies.parts import JOINT_COLORS, Color
 from app.viewer.views.templates import render
-from kin import Contact, IKOptions, IKSolution, LimitViolation, Robot
-from kin.ik import solve
+from kin import IKOptions, Robot
+from kin.collision import Contact
+from kin.ik import IKSolution, LimitViolation, solve
 from kin.ik.branches import is_closed, solve_branches, violations_of
 from kin.ik.candidates import OVERRUN
 from kin.ik.problem import IKProblem

@@ -13,7 +13,8 @@ from app.viewer.lessons.redundancy.ring import FLAT, Circle, arc_segments, elbow
 from app.viewer.scene.bodies.parts import JOINT_COLORS
 from app.viewer.scene.meshes import body
 from app.viewer.self_motion import End
-from kin import Redundancy, Robot
+from kin import Robot
+from kin.ik import Redundancy
 from kin.transforms import Array
 
 RING = 1.32  # radius of the ring, relative to the elbow's circle

@@ -12,7 +12,7 @@ from app.viewer.lessons.redundancy import views
 from app.viewer.lessons.redundancy.ring import Circle, coaxial, elbow_circle
 from app.viewer.lessons.redundancy.settings import RedundancySettings
 from app.viewer.self_motion import leaders, redundancy_at
-from kin import Redundancy
+from kin.ik import Redundancy
 from kin.transforms import Array
 
 

@@ -29,8 +29,9 @@ from app.viewer.lessons.redundancy.settings import RedundancySettings
 from app.viewer.panel.posture import on_side_of
 from app.viewer.panel.status import Notice
 from app.viewer.self_motion import INSET, SMOOTH, End, ends, range_of, self_motion
-from kin import IKResult, Redundancy
+from kin import IKResult
 from kin.differential.null_space import lead, within
+from kin.ik import Redundancy
 from kin.transforms import Array
 from kin.warmup import ALL
 

@@ -7,7 +7,8 @@ import numpy as np
 import kin
 from app.viewer.lessons.redundancy.ring import joint_axis
 from app.viewer.self_motion import INSET
-from kin import Redundancy, Robot
+from kin import Robot
+from kin.ik import Redundancy
 from kin.solvers import closed_form_of
 from kin.solvers.contract import POSE
 from kin.transforms import Array

@@ -11,8 +11,9 @@ import kin
 from app.viewer.panel.posture import feasible_html
 from app.viewer.self_motion import End
 from app.viewer.views.templates import render
-from kin import Redundancy, Robot, Task
+from kin import Robot
 from kin.differential.task import free_motions
+from kin.ik import Redundancy, Task
 from kin.transforms import Array, rotation_angle, vector_angle
 from kin.units import Unit, Units, power
 

@@ -12,10 +12,10 @@ from app.viewer.declared.facts import Facts
 from app.viewer.lessons.axes import axes_at
 from app.viewer.lessons.screws.product import origin_of, partial, seen
 from app.viewer.lessons.screws.settings import ScrewsSettings
-from kin import Screws
+from kin.dh import Screws
 from kin.transforms import Array
 
-zero_screws = lru_cache(maxsize=64)(kin.screws)
+zero_screws = lru_cache(maxsize=64)(kin.dh.screws)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class ScrewsFacts(Facts[ScrewsSettings]):
     @cached_property
     def screws(self) -> Screws:
         """The screws where the axes are drawn."""
-        return kin.screws(self.robot, self.q) if self.now else self.zero
+        return kin.dh.screws(self.robot, self.q) if self.now else self.zero
 
     @cached_property
     def axes(self) -> tuple[Array, Array]:

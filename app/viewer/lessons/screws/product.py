@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from kin import Screws, exp_screw
+from kin.dh import Screws, exp_screw
 from kin.transforms import Array
 
 Form = Literal["space", "body"]

@@ -11,7 +11,8 @@ from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.outline import LEAST, Configuration, Ghost, Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
 from app.viewer.lessons.screws.product import foot
-from kin import Robot, screws
+from kin import Robot
+from kin.dh import screws
 from kin.transforms import Array
 from kin.units import Units, fixed
 

@@ -29,7 +29,7 @@ def joints(robot: Robot) -> Mapping[str, int]:
 
 def far(robot: Robot) -> int:
     """The number of the first joint whose axis does not meet the origin."""
-    return max(far_joint(kin.screws(robot).S), 0) + 1
+    return max(far_joint(kin.dh.screws(robot).S), 0) + 1
 
 
 @dataclass(frozen=True)

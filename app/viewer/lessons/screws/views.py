@@ -11,7 +11,8 @@ from app.viewer.lessons.screws.product import Form, foot, product
 from app.viewer.scene.bodies.parts import joint_color
 from app.viewer.views import mathml as m
 from app.viewer.views.templates import render
-from kin import Robot, Screws, exp_screw, fk
+from kin import Robot, fk
+from kin.dh import Screws, exp_screw
 from kin.transforms import Array
 from kin.units import Units, fixed, power
 

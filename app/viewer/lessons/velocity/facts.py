@@ -14,7 +14,7 @@ from app.viewer.lessons.velocity.along import controllable
 from app.viewer.lessons.velocity.settings import SPEEDS, VelocitySettings
 from app.viewer.lessons.velocity.views import SAMPLE, State, lost_words, nice, real, state_of
 from app.viewer.scene.meshes import body
-from kin import Robot, Singularity, Task
+from kin import Robot
 from kin.differential.ellipsoids import (
     Axes,
     Ellipsoid,
@@ -26,6 +26,7 @@ from kin.differential.ellipsoids import (
     task_rates,
 )
 from kin.differential.null_space import NullSpace, margin, measure, null_space, secondary
+from kin.ik import Singularity, Task
 from kin.transforms import Array
 
 STILL = 1e-6  # m/s or rad/s along a direction that is lost, at unit speeds of the joints

@@ -15,9 +15,10 @@ from app.viewer.lessons.guide.outline import Lead, Outline, Pose, SemiAxis
 from app.viewer.lessons.guide.poses import as_configuration, distance, first_clear, moved
 from app.viewer.lessons.velocity.facts import scale_of
 from app.viewer.lessons.velocity.views import SAMPLE
-from kin import Robot, Singularity, fk, jacobian, singularities
+from kin import Robot, fk, jacobian, singularities
 from kin.axes import NEARLY, joint_axes, size
 from kin.differential.task import lifts, natural_task, rank, task_jacobian, usual_rank
+from kin.ik import Singularity
 from kin.ik.messages.singularity import short
 from kin.transforms import Array
 from kin.units import Units, general

@@ -13,8 +13,9 @@ from app.exports.worksheet.sheet import indexed
 from app.viewer.views.mathml import ident, sub, text
 from app.viewer.views.mathml import math as formula
 from app.viewer.views.templates import render
-from kin import Robot, Singularity
+from kin import Robot
 from kin.differential.ellipsoids import Ellipsoid, TaskRates, condition
+from kin.ik import Singularity
 from kin.ik.messages.singularity import short, there
 from kin.tolerances import TOLERANCES
 from kin.transforms import Array

@@ -11,8 +11,8 @@ from app.viewer.scene.bodies.fingers import Finger
 from app.viewer.scene.bodies.parts import Color, Part
 from app.viewer.scene.shapes import merged, placed
 from app.viewer.viser_patches import assign
-from kin import Contact
 from kin.axes import inverse
+from kin.collision import Contact
 from kin.transforms import Array
 
 GHOST = 0.35  # opacity of the hand at a target

@@ -13,7 +13,7 @@ from app.viewer.session.choices import DEFAULT_TASK
 from app.viewer.session.parts import Page
 from app.viewer.session.robots import robot_of
 from app.viewer.session.state import PageState
-from kin import Task
+from kin.ik import Task
 from kin.units import Units
 
 

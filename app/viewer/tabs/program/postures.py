@@ -20,8 +20,10 @@ from app.viewer.panel.posture import short
 from app.viewer.tabs.program.plan import Plan
 from app.viewer.tabs.program.program import Segments
 from app.viewer.views.templates import render
-from kin import IKOptions, PathPostures
-from kin.motion import segment_poses
+from kin import IKOptions
+from kin.motion.planning.plan import task_of
+from kin.motion.planning.starts import segment_poses
+from kin.path import PathPostures
 from kin.path.postures import STATES, Reason, State
 from kin.units import Units, typeset
 
@@ -78,11 +80,13 @@ def compute(chart: Chart) -> None:
         chart.words = "There is no way to show: the program ends before this waypoint, or it has no length."
         return
     options = IKOptions(
-        task=kin.motion.task_of(plan.motion.program, plan.motion.robot),
+        task=task_of(plan.motion.program, plan.motion.robot),
         avoid_self_collision=avoid,
         obstacles=chart.arm.obstacles if avoid else (),
     )
-    chart.found = kin.path_postures(plan.motion.robot, poses, options=options, q_start=before, cancel=chart.check)
+    chart.found = kin.path.path_postures(
+        plan.motion.robot, poses, options=options, q_start=before, cancel=chart.check
+    )
 
 
 def html(shown: Chart, units: Units) -> str:

@@ -9,9 +9,10 @@ import kin
 from app.viewer.own_arm import clean
 from app.viewer.panel.entry import read_value
 from app.viewer.tabs.program.program import NAME, Point, point, recorded, with_target
-from kin import InputError, Robot, Task
+from kin import InputError, Robot
 from kin.axes import inverse
 from kin.files.numbers import index_of
+from kin.ik import Task
 from kin.motion import Circ, Dwell, JointTarget
 from kin.motion.program import LONGEST_DWELL, Segment
 from kin.poses import PoseKind, read_pose, roll_pitch_yaw

@@ -15,7 +15,8 @@ from app.viewer.tabs.program.program import MOST, Segments, places, start_of
 from app.viewer.tabs.program.typed import Fields
 from app.viewer.tabs.workspace.colours import bar
 from app.viewer.views.templates import render
-from kin.motion import Arrival, Dwell, Motion, MotionLimits, Peak, Spline
+from kin.motion import Dwell, Motion, MotionLimits, Peak, Spline
+from kin.motion.arrivals import Arrival
 from kin.motion.program import Kind, Segment, kind_of
 from kin.motion.results import Quantity
 from kin.transforms import Array

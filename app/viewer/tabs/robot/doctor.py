@@ -10,7 +10,8 @@ from app.shared.answers.examination import TITLES, outcome
 from app.viewer.meshes.archive import MB, Archive, MeshError
 from app.viewer.tabs.robot.files import Source, is_mjcf, is_urdf
 from app.viewer.views.templates import render
-from kin import InputError, RobotFileError, UrdfExamination, examine_urdf
+from kin import InputError, RobotFileError
+from kin.doctor import UrdfExamination, examine_urdf
 from kin.doctor.findings import RANKS, Symptom, UrdfFinding
 from kin.doctor.meshes import extent_of
 from kin.transforms import Array
@@ -21,7 +22,7 @@ MOST_OF_TEXT = 2 * MB  # of a mesh that is text, which takes longer
 
 
 class MeshesSent:
-    """The meshes of a zip, as `kin.examine_urdf` takes them; the size of a few is looked at."""
+    """The meshes of a zip, as `kin.doctor.examine_urdf` takes them; the size of a few is looked at."""
 
     def __init__(self, archive: Archive, urdf: str) -> None:
         self._archive, self._urdf, self._left = archive, urdf, MOST_MEASURED

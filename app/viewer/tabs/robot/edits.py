@@ -17,8 +17,9 @@ from app.viewer.own_arm import NAME, OF_MAKER, OwnArm, own_arm
 from app.viewer.panel.entry import read_cell
 from app.viewer.scene.meshes import body
 from app.viewer.scene.mounting import turn_of
-from kin import InputError, KinematicsError, Motor, Robot, RobotFileError
+from kin import InputError, KinematicsError, Robot, RobotFileError
 from kin.files.read import PER
+from kin.motors import Motor
 from kin.poses import roll_pitch_yaw
 from kin.robot import MOUNTINGS, PEAK_FIELDS
 from kin.typed import ReadError, cut
@@ -316,7 +317,7 @@ def _cell_of(field: str, texts: Mapping[Cell, str]) -> Cell | None:
 
 def converted(robot: Robot, own: OwnArm | None) -> OwnArm:
     """The same arm as a table in the other convention; raises `EditError`."""
-    other = kin.convert_dh(robot, "modified" if robot.convention == "standard" else "standard")
+    other = kin.dh.convert_dh(robot, "modified" if robot.convention == "standard" else "standard")
     return with_table(robot, own, other)
 
 

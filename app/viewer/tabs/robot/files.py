@@ -103,7 +103,7 @@ def arm_of(name: str, text: str, tip: str | None = None, reading: bool = False) 
     if not is_urdf(text):
         robot = parse_robot(text, name)
         return own_arm(kin.robot_to_dict(robot)), robot.description
-    robot, report = kin.read_urdf(text, tip=tip, file=name)
+    robot, report = kin.files.read_urdf(text, tip=tip, file=name)
     words = [f"From link {report.base} to {report.tip}.", *report.notes]
     if report.tilts:
         words.append(f"Almost parallel axes are kept exactly by fixed rows: {', '.join(report.tilts)}.")

@@ -227,7 +227,7 @@ class RobotTab(Feature):
         if "table" in self.stage.activity.withheld:
             self._show("convert", "")
             return
-        other = kin.convert_dh(robot, OTHER[robot.convention]) if self._converting else None
+        other = kin.dh.convert_dh(robot, OTHER[robot.convention]) if self._converting else None
         self._show("convert", views.conversion(robot, other, self.stage.units))
 
     def _show_files(self) -> None:

@@ -29,7 +29,7 @@ from app.viewer.tabs.robot.presets import TITLES
 from app.viewer.tabs.robot.texts import Texts
 from app.viewer.views.templates import render
 from kin import Joint, Robot
-from kin.dh import SAMPLES, largest_difference
+from kin.dh.tables import SAMPLES, largest_difference
 from kin.files.read import PER
 from kin.robot import MOUNTINGS
 from kin.units import Unit, Units, general, power
@@ -96,7 +96,7 @@ def table(robot: Robot, units: Units, revision: int, written: int, texts: Texts)
 
 def motion(robot: Robot, units: Units, texts: Texts) -> str:
     """Fields for the home configuration and for the limits of motion; those that are assumed are empty."""
-    limits, rows = kin.motion_limits(robot), []
+    limits, rows = kin.motion.motion_limits(robot), []
     moving = [(index, row) for index, row in enumerate(robot.rows) if row.driven]
     for joint, (index, row) in enumerate(moving):
         angle, cells = row.kind == "revolute", []

@@ -11,9 +11,10 @@ import viser
 from app.exports.svg import tick_labels
 from app.viewer.labels import add_label
 from app.viewer.scene.floor import INK_DARK, INK_LIGHT
-from kin import Robot, workspace_slice
+from kin import Robot
 from kin.transforms import Array
 from kin.units import Units
+from kin.workspace import workspace_slice
 
 SAMPLES = 4096  # configurations that determine the box
 LEAST = 0.02  # m: an axis along which the workspace is thinner has no ticks

@@ -25,7 +25,7 @@ from app.shared.clouds import Cloud, Clouds
 from app.viewer.scene.camera import Sphere, round_points
 from app.viewer.tabs.workspace.colours import By, Bytes, Colour, measures, paint, quantity, scale_of
 from app.viewer.tabs.workspace.cut import Cut
-from kin import WorkspaceChunk
+from kin.workspace import WorkspaceChunk
 
 AHEAD = 2  # parts requested in advance: one is computed while another is drawn
 TOGETHER = 1 << 19  # points of a cut cloud whose parts share nodes

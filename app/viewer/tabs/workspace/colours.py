@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.viewer.views.templates import render
-from kin import Robot, WorkspaceChunk, workspace_slice
+from kin import Robot
 from kin.transforms import Array
 from kin.units import Units, general
-from kin.workspace import Measure
+from kin.workspace import Measure, WorkspaceChunk, workspace_slice
 from kin.workspace.region import Region
 from kin.workspace.search.extremes import base_axis
 

@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.viewer.tabs.workspace.colours import SAMPLES, Bytes, axis_of_joint_1
-from kin import Robot, fk, workspace_slice
+from kin import Robot, fk
 from kin.transforms import Array
+from kin.workspace import workspace_slice
 
 Axis = Literal["x", "y", "z", "arm"]
 Keep = Literal["below", "above", "slice"]

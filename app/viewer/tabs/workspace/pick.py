@@ -111,7 +111,7 @@ class PointPicker:
                     best = found
             q = None
             if best is not None:
-                q = kin.workspace_configurations(
+                q = kin.workspace.workspace_configurations(
                     cloud.robot,
                     best.index,
                     seed=cloud.seed,

@@ -12,9 +12,9 @@ from app.viewer.panel import Post
 from app.viewer.tabs.workspace.background import run_in_background
 from app.viewer.tabs.workspace.said import Said
 from app.viewer.views.templates import render
-from kin import Robot, WorkspaceFacts
+from kin import Robot
 from kin.units import Unit, Units
-from kin.workspace import Estimate, Span
+from kin.workspace import Estimate, Span, WorkspaceFacts
 
 SMALLEST_HOLE = 5e-4  # m; smaller holes are not reported
 

@@ -30,9 +30,10 @@ from app.viewer.tabs.workspace.section.panel import SectionPanel
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.tabs.workspace.settings import WorkspaceSettings
 from app.viewer.tabs.workspace.sizes import Sizes
-from kin import CapabilityMap, Robot, Section
+from kin import Robot
 from kin.transforms import Array
 from kin.warmup import CAPABILITY, CLOUDS
+from kin.workspace import CapabilityMap, Section
 
 REDRAW = 1.0  # s between two updates of the section plot with more points
 DOT = 0.05  # s between two updates of the tool in the section plot

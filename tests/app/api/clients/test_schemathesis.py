@@ -43,7 +43,7 @@ def contract():
         for operation in item.values():
             for parameter in operation.get("parameters", []):
                 if parameter["name"] == "robot_id":  # any text is an id, but most answers would be 404
-                    parameter["schema"]["enum"] = list(kin.classic_robots())
+                    parameter["schema"]["enum"] = list(kin.files.classic_robots())
 
     return schemathesis.openapi.from_asgi(
         "/openapi.json", without_viewer(service), config=SchemathesisConfig.from_dict({"checks": CHECKS})
@@ -68,12 +68,12 @@ def quick_answers(monkeypatch):
     def coarse(function, most):
         return lambda *given, **asked: function(*given, **asked | {"resolution": min(asked["resolution"], most)})
 
-    facts = kin.workspace_facts
+    facts = kin.workspace.workspace_facts
     monkeypatch.setattr(
         "app.shared.summaries.workspace_facts",
         lambda robot, **asked: facts(robot, **asked | {"effort": 2, "volume": False}),
     )
-    monkeypatch.setattr("app.shared.summaries.workspace_section", coarse(kin.workspace_section, 16))
+    monkeypatch.setattr("app.shared.summaries.workspace_section", coarse(kin.workspace.workspace_section, 16))
     monkeypatch.setattr("app.shared.maps.capability_grid", coarse(kin.workspace.capability_grid, 4))
     monkeypatch.setattr("app.api.arms.compare.compare", partial(kin.compare, seconds=0.1))
 

@@ -23,7 +23,7 @@ from app.service.compiler import Compilers
 from app.service.main import create_app
 from app.shared.settings import Settings
 
-ARM = next(iter(kin.classic_robots().values()))  # whose kernels every service has
+ARM = next(iter(kin.files.classic_robots().values()))  # whose kernels every service has
 ROUTE = f"/api/v1/robots/{ARM.id}"
 BODY = {"target": {"position": kin.fk(ARM, ARM.q_home)[:3, 3].tolist()}, "max_solutions": 1}
 HOME = ARM.q_home.tolist()

@@ -30,7 +30,8 @@ from app.viewer.lessons.guide.outline import Number
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, decode, encode
-from kin import Robot, classic_robots, get_robot
+from kin import Robot, get_robot
+from kin.files import classic_robots
 from kin.parsing import to_toml
 from kin.units import Units
 

@@ -24,7 +24,7 @@ from kin.dh.tables import convert_dh
 from kin.transforms import Array
 from kin.units import Units
 
-BUILT_IN = [*kin.classic_robots().values()]
+BUILT_IN = [*kin.files.classic_robots().values()]
 ARMS = [arm for robot in BUILT_IN for arm in (robot, convert_dh(robot, OTHER[robot.convention]))]
 NAMES = [f"{arm.id}-{arm.convention}" for arm in ARMS]
 WRONG = {"theta": math.radians(17.0), "d": 0.013, "a": 0.017, "alpha": math.radians(23.0)}

@@ -25,7 +25,7 @@ from app.viewer.scene.meshes import body
 from kin.dh.tables import convert_dh
 from kin.units import DEFAULT_UNITS, Units
 
-BUILT_IN = [*kin.classic_robots().values()]
+BUILT_IN = [*kin.files.classic_robots().values()]
 ARMS = [arm for robot in BUILT_IN for arm in (robot, convert_dh(robot, OTHER[robot.convention]))]
 arms = pytest.mark.parametrize("robot", ARMS, ids=lambda r: f"{r.id}-{r.convention}")
 PIONEER, CRAIG = kin.get_robot("pioneer5"), kin.get_robot("redundant7-craig")

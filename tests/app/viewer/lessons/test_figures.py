@@ -115,7 +115,7 @@ def test_a_line_without_a_name_has_no_label() -> None:
     assert label.props["text"] == "z₁"
 
 
-@pytest.mark.parametrize("robot", [*kin.classic_robots().values()], ids=lambda r: r.id)
+@pytest.mark.parametrize("robot", [*kin.files.classic_robots().values()], ids=lambda r: r.id)
 def test_labels_are_clear_of_the_links_that_they_measure(robot: kin.Robot) -> None:
     size = body(robot).size
     points = np.vstack([robot.T_world_base[:3, 3], kin.link_frames(robot, robot.q_home)[:, :3, 3]])

@@ -31,7 +31,7 @@ FIVE_OF_SIX = Robot.from_dh(
 )
 PLANAR4 = Robot.from_dh([(0, 0, 0.3, 0)] * 4, home=[0.1, 0.3, 0.4, 0.5])
 TYPED = (FIVE_OF_SIX, PLANAR4)
-ARMS = [kin.get_robot(name) for name in kin.classic_robots()]
+ARMS = [kin.get_robot(name) for name in kin.files.classic_robots()]
 
 
 def rolled(roll: float) -> Robot:

@@ -62,7 +62,7 @@ def test_a_line_goes_through_in_the_posture_that_the_chart_of_postures_says() ->
     assert tuple(row.a for row in arm.rows) == LINKS
     share, found = motions.both_elbows(START, END, LINKS)
     points = np.array([[*(np.array(START) + s * np.subtract(END, START)), 0.0] for s in share])
-    postures = kin.path_postures(arm, points, options=kin.IKOptions(task="position"))
+    postures = kin.path.path_postures(arm, points, options=kin.IKOptions(task="position"))
     assert [postures.postures[row] for row in postures.through] == ["elbow positive"]
     for name, angles in zip(("elbow positive", "elbow negative"), found, strict=True):
         row = postures.postures.index(name)

@@ -80,7 +80,9 @@ def test_a_ptp_through_a_singularity_is_not_slowed_there() -> None:
     for first, last in ((-0.6, 0.6), (0.4, 1.6)):
         ends = [middle.copy(), middle.copy()]
         ends[0][4], ends[1][4] = first, last
-        motion = kin.plan_motion(robot, [kin.Ptp(target=kin.JointTarget(tuple(ends[1].tolist())))], ends[0])
+        motion = kin.plan_motion(
+            robot, [kin.motion.Ptp(target=kin.motion.JointTarget(tuple(ends[1].tolist())))], ends[0]
+        )
         times.append(motion.duration)
         rates = np.abs(motion.sample(np.linspace(0.0, motion.duration, 101)).qd[:, 4])
         assert rates[50] == pytest.approx(rates.max(), rel=1e-6), "fastest in the middle, as any other motion"

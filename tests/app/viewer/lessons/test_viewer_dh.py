@@ -23,7 +23,7 @@ from app.viewer.server import ViewerServer
 from kin.dh.tables import convert_dh
 from kin.units import DEFAULT_UNITS, Units
 
-ROBOTS = [*kin.classic_robots().values()]
+ROBOTS = [*kin.files.classic_robots().values()]
 READINGS = [reading for robot in ROBOTS for reading in (robot, steps.reread(robot))]
 PIONEER, PRINTED, CRAIG = (kin.get_robot(name) for name in ("pioneer5", "redundant7", "redundant7-craig"))
 SCARA = kin.get_robot("scara")

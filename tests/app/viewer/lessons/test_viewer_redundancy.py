@@ -20,7 +20,7 @@ from app.viewer.lessons.redundancy import views
 from app.viewer.lessons.redundancy.path import STEPS, elbow_paths, has_path
 from app.viewer.lessons.redundancy.ring import arc_segments, coaxial, elbow_circle, joint_axis, trade_segments
 from app.viewer.panel.joints import label
-from kin import Redundancy
+from kin.ik import Redundancy
 from kin.units import DEFAULT_UNITS, RADIANS, Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
@@ -189,7 +189,7 @@ def test_residuals_are_measured_by_the_task_and_never_rounded_to_nothing() -> No
 
 
 def test_the_redundancy_is_explained_for_every_arm_and_task() -> None:
-    def idea(robot: kin.Robot, task: kin.Task) -> str:
+    def idea(robot: kin.Robot, task: kin.ik.Task) -> str:
         free = self_motion.redundancy_at(robot, home(robot), kin.IKOptions(task=task), robot.q_home)
         elbow = elbow_circle(robot, robot.q_home) is not None
         return views.idea(robot, task, free, coaxial(robot), elbow)

@@ -54,7 +54,7 @@ def matrix(html: str, by: str) -> list[str]:
 
 def test_the_screws_are_those_of_the_axes(robot: kin.Robot) -> None:
     for q in (np.zeros(robot.n), robot.q_home):
-        found = kin.screws(robot, q)
+        found = kin.dh.screws(robot, q)
         points, z = axes_at(robot, q)
         for i in range(robot.n):
             S = found.S[:, i]
@@ -78,7 +78,7 @@ def test_the_screws_are_those_of_the_axes(robot: kin.Robot) -> None:
 
 @pytest.mark.parametrize("form", BOTH)
 def test_the_table_and_both_products_agree_with_the_core(robot: kin.Robot, form: Form) -> None:
-    zero = kin.screws(robot)
+    zero = kin.dh.screws(robot)
     q = robot.random_q(np.random.default_rng(4))
     columns = seen(zero, form)
     html = views.table_html(robot, columns, form, False, 0)
@@ -92,7 +92,7 @@ def test_the_table_and_both_products_agree_with_the_core(robot: kin.Robot, form:
         expected = zero.M
         joints = range(robot.n - 1, robot.n - 1 - factors, -1) if form == "space" else range(factors)
         for i in joints:
-            step = kin.exp_screw(columns[:, i], q[i])
+            step = kin.dh.exp_screw(columns[:, i], q[i])
             expected = step @ expected if form == "space" else expected @ step
         assert np.abs(expected - T).max() < 1e-12
         html = views.product_html(robot, zero, part, factors, form)
@@ -113,14 +113,14 @@ def test_the_body_form_asks_for_a_length_that_is_not_zero(robot: kin.Robot) -> N
     if away.size and away.max() > 0.05 * robot.reach:
         assert step.question.answer > 0.01 * robot.reach
         joint = int(re.findall(r"joint (\d+)", step.question.prompt)[0]) - 1
-        space = float(np.linalg.norm(kin.screws(robot).S[3:, joint]))
+        space = float(np.linalg.norm(kin.dh.screws(robot).S[3:, joint]))
         named = [mistake.value for mistake in step.question.mistakes if "space form" in mistake.reason]
         assert named == [pytest.approx(space)] or abs(space - step.question.answer) < 1e-3
 
 
 def test_a_wrong_screw_shows_in_the_product() -> None:
     robot = STORE.get("ur5")
-    zero = kin.screws(robot)
+    zero = kin.dh.screws(robot)
     wrong = zero._replace(S=np.where(np.arange(6)[:, None] == 3, zero.S + 1e-4, zero.S))
     html = views.product_html(robot, wrong, robot.q_home, robot.n, "space")
     assert matrix(html, "screws") != matrix(html, "table")
@@ -129,7 +129,7 @@ def test_a_wrong_screw_shows_in_the_product() -> None:
 
 def test_one_screw_in_numbers() -> None:
     robot = STORE.get("scara")
-    S = kin.screws(robot).S
+    S = kin.dh.screws(robot).S
     slide = int(np.flatnonzero(~robot.revolute)[0])
     html = views.one_html(robot, slide, S[:, slide], 0.05, "space", UNITS)
     assert "Pitch ∞" in html
@@ -166,7 +166,7 @@ def test_the_questions_by_another_way(robot: kin.Robot) -> None:
 
     far = asked["2"]
     assert isinstance(far, Number)
-    if far_joint(kin.screws(robot).S) >= 0:
+    if far_joint(kin.dh.screws(robot).S) >= 0:
         point, z = line(int(far.prompt.split("joint ")[1].split()[0]) - 1)
         assert far.answer == pytest.approx(np.linalg.norm(np.cross(point, z)), abs=1e-12)
         near = asked["c4"]
@@ -201,7 +201,7 @@ def server() -> Iterator[int]:
 @pytest.mark.full
 def test_the_controls_change_table_product_and_scene(server: int) -> None:
     pioneer = CLASSICS[0]
-    zero = kin.screws(pioneer)
+    zero = kin.dh.screws(pioneer)
     with FakeBrowser(server) as tab:
         tab.settle()
         tab.open_lesson("Screws")
@@ -209,7 +209,7 @@ def test_the_controls_change_table_product_and_scene(server: int) -> None:
         assert shown(tab.html, "data-s") == pytest.approx(zero.S.T.ravel(), abs=0.5001e-3)
         assert "both products are the pose of the tool" in tab.html
         tab.set("Axes", list(PLACES)[1])
-        now = kin.screws(pioneer, pioneer.q_home)
+        now = kin.dh.screws(pioneer, pioneer.q_home)
         tab.wait(lambda: shown(tab.html, "data-s") == pytest.approx(now.S.T.ravel(), abs=0.5001e-3))
         tab.set("Form", list(FORMS)[1])
         tab.wait(lambda: shown(tab.html, "data-s") == pytest.approx(now.B.T.ravel(), abs=0.5001e-3))

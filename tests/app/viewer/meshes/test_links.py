@@ -132,7 +132,7 @@ def test_the_body_stays_on_another_table_of_the_same_arm(two: tuple[Robot, Drawi
     T = np.eye(4)
     T[:3, 3] = 0.1, 0.2, 0.3
     assert carried_over(body, robot, robot.with_tool(T)) is body
-    others = [kin.convert_dh(robot, "modified"), replace(robot, base=tuple(map(tuple, T @ robot.T_world_base)))]
+    others = [kin.dh.convert_dh(robot, "modified"), replace(robot, base=tuple(map(tuple, T @ robot.T_world_base)))]
     for other, moved in zip(others, (np.eye(4), T), strict=True):
         carried = carried_over(body, robot, other)
         assert carried is not None
@@ -286,7 +286,7 @@ def test_a_detailed_body_is_where_the_urdf_of_its_package_has_it(name: str) -> N
 @pytest.mark.full
 def test_the_library_loads_a_body_once_and_says_when(reader: MeshReader) -> None:
     library = Library(reader)
-    offered = {robot.id for robot in library.offered(tuple(kin.classic_robots().values()))}
+    offered = {robot.id for robot in library.offered(tuple(kin.files.classic_robots().values()))}
     assert offered == set(DETAILED)
     puma = kin.get_robot("puma560")
     loaded: list[str] = []

@@ -33,7 +33,7 @@ from app.viewer.session.worker.threads import BUILDS
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
-ROBOT = kin.classic_robots()["pioneer5"]
+ROBOT = kin.files.classic_robots()["pioneer5"]
 EXERCISE = "which-joint-goes-down"
 
 
@@ -87,7 +87,7 @@ def press(browser: FakeBrowser, *key: str, value: object = None) -> None:
 
 def opened(browser: FakeBrowser) -> dict[str, Any]:
     """The lesson, and the states of the features, that the page has stored last."""
-    state = decode(browser.kept[-1], [*kin.classic_robots().values()])
+    state = decode(browser.kept[-1], [*kin.files.classic_robots().values()])
     return {"lesson": state.lesson, **state.features}
 
 

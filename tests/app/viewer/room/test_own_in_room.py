@@ -17,7 +17,7 @@ from app.exercises.said import answer_in_words
 from app.viewer.exercises.author import Author
 from app.viewer.room.following import shared
 from app.viewer.session.state import PageState, decode, encode
-from kin import classic_robots
+from kin.files import classic_robots
 from kin.parsing import to_toml
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")

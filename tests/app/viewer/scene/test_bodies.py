@@ -39,7 +39,7 @@ def links(robot: kin.Robot, q: Array) -> list[Array]:
 
 def test_the_arms_of_makers_have_bodies() -> None:
     assert FILES == ["iiwa14", "irb120", "panda", "puma560", "scara", "stanford", "ur5"]
-    assert set(FILES) <= set(kin.classic_robots())
+    assert set(FILES) <= set(kin.files.classic_robots())
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -78,7 +78,7 @@ def test_a_finger_may_turn_about_its_axis() -> None:
 
 
 def test_another_table_of_the_arm_keeps_its_gripper() -> None:
-    craig = kin.convert_dh(ROBOT, "modified")
+    craig = kin.dh.convert_dh(ROBOT, "modified")
     moved = carried_over(DRAWN, ROBOT, craig)
     assert moved is not None
     q = ROBOT.q_home[None]
@@ -182,7 +182,7 @@ def test_a_finger_of_several_joints_moves_as_its_joints_do() -> None:
     points = nail.parts[0].mesh.vertices
     drawn_at = [*(0.5 * (points.min(axis=0) + points.max(axis=0))), 1.0]
     whole = kin.load_robot(text, tip="nail")
-    craig = kin.convert_dh(robot, "modified")
+    craig = kin.dh.convert_dh(robot, "modified")
     moved = carried_over(drawn, robot, craig)
     assert moved is not None
     (same,) = [finger for finger in moved.fingers if finger.on is not None]

@@ -164,17 +164,17 @@ def test_beyond_the_feasible_range_the_arm_stops_at_its_end_and_says_which_joint
 
 
 def test_the_strip_draws_and_words_the_ranges() -> None:
-    free = kin.Redundancy("psi", "arm angle ψ", 0.0, ((-math.pi, -math.pi / 2), (0.0, math.pi / 2)))
+    free = kin.ik.Redundancy("psi", "arm angle ψ", 0.0, ((-math.pi, -math.pi / 2), (0.0, math.pi / 2)))
     strip = feasible_html(free, -180, 180, DEGREES)
     assert strip.count("kb-range") == 2
     assert "left:50.00%;width:max(2px,25.00%)" in strip
     assert "feasible: −180.0 … −90.0°, 0.0 … 90.0°" in strip
-    nothing = feasible_html(kin.Redundancy("psi", "arm angle ψ", 0.0, ()), -180, 180, DEGREES)
+    nothing = feasible_html(kin.ik.Redundancy("psi", "arm angle ψ", 0.0, ()), -180, 180, DEGREES)
     assert "no value is feasible" in nothing
 
 
 def test_half_a_turn_is_shown_where_the_slider_is() -> None:
-    free = kin.Redundancy("psi", "arm angle ψ", -math.pi + 1e-7, ((-math.pi, math.pi),))
+    free = kin.ik.Redundancy("psi", "arm angle ψ", -math.pi + 1e-7, ((-math.pi, math.pi),))
     assert on_side_of(180.0, free, DEGREES).value == pytest.approx(math.pi)
     assert on_side_of(-180.0, free, DEGREES).value == pytest.approx(-math.pi)
     assert "calc(100.00% - 1px)" in feasible_html(on_side_of(180.0, free, DEGREES), -180, 180, DEGREES)
@@ -202,7 +202,7 @@ def test_hostile_choices_are_refused_and_the_session_lives(port: int) -> None:
         assert np.allclose(tab.tool_pose(), kin.fk(SRS, SRS.q_home), atol=1e-9)
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda r: r.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda r: r.id)
 def test_the_answer_to_a_pose_tells_what_asking_again_where_it_leads_would_tell(robot: kin.Robot) -> None:
     """So that a drag need not ask twice."""
     rng = np.random.default_rng(5)

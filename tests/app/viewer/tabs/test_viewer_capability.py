@@ -34,8 +34,8 @@ PIONEER, PUMA = STORE.get("pioneer5"), STORE.get("puma560")
 LENGTH = 15
 
 
-def the_map(robot: kin.Robot = PIONEER, directions: int = 12) -> kin.CapabilityMap:
-    return kin.capability_map(robot, resolution=LENGTH, directions=directions)
+def the_map(robot: kin.Robot = PIONEER, directions: int = 12) -> kin.workspace.CapabilityMap:
+    return kin.workspace.capability_map(robot, resolution=LENGTH, directions=directions)
 
 
 # Levels, settings, words
@@ -251,7 +251,7 @@ def test_the_map_respects_locked_joints(tab):
     tab.wait(lambda: "Joint 1 locked" in tab.html)
     tab.compute()
     locked = (float(PIONEER.q_home[0]), None, None, None, None)
-    found = kin.capability_map(PIONEER, resolution=15, directions=12, locked=locked)
+    found = kin.workspace.capability_map(PIONEER, resolution=15, directions=12, locked=locked)
     tab.done(len(found.index))
     assert same_places(tab.centres(), found.centres)
     assert "With joint 1 locked." in tab.html

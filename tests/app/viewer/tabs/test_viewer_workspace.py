@@ -64,7 +64,7 @@ def test_values_outside_a_scale_have_its_end_colours():
     assert np.array_equal(painted, table[[0, 0, 127, 255, 255]])
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda r: r.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda r: r.id)
 @pytest.mark.parametrize("by", [b for b in colours.BY.values() if b != "one"])
 def test_a_scale_covers_nearly_all_points(robot, by):
     chunk = Cloud(robot, 5000, seed=8, measures=colours.measures(by)).slice(0, 5000)
@@ -80,7 +80,7 @@ def test_a_scale_covers_nearly_all_points(robot, by):
 def test_radius_and_height_are_those_of_the_section():
     turned = replace(PIONEER, base=tuple(map(tuple, _pose(0.3, -0.2, 0.5).tolist())))
     q = turned.random_q(np.random.default_rng(3), 20)
-    section = kin.workspace_section(turned, resolution=8)
+    section = kin.workspace.workspace_section(turned, resolution=8)
     p = kin.fk_positions(turned, q) - section.origin
     height = p @ section.v
     r, z = colours.radius_and_height(turned, kin.fk_positions(turned, q))
@@ -217,7 +217,7 @@ def test_figures_of_the_chapter_are_offered_while_one_of_its_arms_is_on_show() -
 
 
 def test_the_drawn_cloud_is_inside_the_drawn_boundary():
-    found = kin.workspace_section(PIONEER, resolution=32)
+    found = kin.workspace.workspace_section(PIONEER, resolution=32)
     frame = plot.frame_of(found)
     density = plot.Density(frame)
     points = Cloud(PIONEER, 30_000).slice(0, 30_000).points
@@ -239,7 +239,7 @@ def test_the_drawn_cloud_is_inside_the_drawn_boundary():
 
 
 def test_the_plot_of_an_arm_in_a_plane_has_room_for_the_title_of_its_axis():
-    found = kin.workspace_section(kin.get_robot("planar2r"), resolution=32)
+    found = kin.workspace.workspace_section(kin.get_robot("planar2r"), resolution=32)
     height = np.concatenate(found.curves)[:, 1]
     frame = plot.frame_of(found)
     assert np.ptp(height) < 1e-5
@@ -281,7 +281,7 @@ def test_sizes_legend_and_picked_point_follow_the_units(length, scale, decimals)
     ("length", "ticks"), [("mm", ["0", "100", "200"]), ("cm", ["0", "10", "20"]), ("m", ["0.0", "0.1", "0.2"])]
 )
 def test_the_drawing_of_the_section_follows_the_units(length, ticks):
-    found = kin.workspace_section(PIONEER, resolution=32)
+    found = kin.workspace.workspace_section(PIONEER, resolution=32)
     drawn = plot.plot_html(found, plot.frame_of(found), "", Units(length=length))
     shown = re.findall(r'text-anchor="middle" class="kb-axis">([−\d.]+)</text>', drawn)
     assert [text for text in ticks if text in shown] == ticks
@@ -375,7 +375,7 @@ def tab(service) -> Iterator[Visitor]:
         yield opened
 
 
-def whole(robot: kin.Robot, n: int, seed: int = 0, measures=()) -> kin.WorkspaceChunk:
+def whole(robot: kin.Robot, n: int, seed: int = 0, measures=()) -> kin.workspace.WorkspaceChunk:
     return Cloud(robot, n, seed, measures=measures).slice(0, n)
 
 
@@ -631,7 +631,7 @@ def test_a_click_moves_the_arm_to_the_configuration_of_the_point(tab):
     index = int(np.argmax(points @ np.array([1.0, 1.0, 0.3])))  # on the outside, towards the eye
     tab.send("ScenePointerMessage", **ray_to(points[index].astype(float), np.array([2.0, 2.0, 0.6])))
     tab.wait(lambda: f"Moved to point {grouped(index)}" in tab.html)
-    q = kin.workspace_configurations(PIONEER, index, seed=17)
+    q = kin.workspace.workspace_configurations(PIONEER, index, seed=17)
     tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, q), atol=1e-9))
     tab.settle()
     shown = [tab.value(label) for label in tab.sliders_in("Joints")]
@@ -679,12 +679,12 @@ def test_the_cloud_respects_locked_joints(tab):
         tab.set("Locked", joint)
     tab.wait(lambda: ">joints 3, 5 locked<" in tab.html)
     tab.draw(N, seed=30)
-    (chunk,) = kin.sample_workspace(PIONEER, N, seed=30, locked=locked, chunk=N)
+    (chunk,) = kin.workspace.sample_workspace(PIONEER, N, seed=30, locked=locked, chunk=N)
     assert np.abs(tab.points() - chunk.points).max() < HALF
     index = int(np.argmax(chunk.points @ np.array([1.0, 1.0, 0.3])))
     tab.send("ScenePointerMessage", **ray_to(chunk.points[index].astype(float), np.array([2.0, 2.0, 0.6])))
     tab.wait(lambda: f"Moved to point {grouped(index)}" in tab.html)
-    q = kin.workspace_configurations(PIONEER, index, seed=30, locked=locked)
+    q = kin.workspace.workspace_configurations(PIONEER, index, seed=30, locked=locked)
     tab.wait(lambda: np.allclose(tab.tool_pose(), kin.fk(PIONEER, q), atol=1e-9))
     tab.set("Compare with", PUMA.name)
     tab.done(2 * N)
@@ -730,7 +730,7 @@ def test_a_figure_of_the_chapter_is_one_click(tab):
     tab.wait(lambda: not any("(mm)" in m["props"].get("text", "") for m in tab.nodes.values()))
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda robot: robot.id)
 def test_the_box_of_the_axes_contains_the_workspace(robot):
     low, high = axes.box_of(robot)
     points = kin.fk_positions(robot, robot.random_q(np.random.default_rng(3), 500))
@@ -836,11 +836,11 @@ def test_section_and_sizes_appear_when_they_are_ready(tab):
     tab.set(next(label for label in tab.sliders if label.startswith(("2 ", "Joint 2"))), 25)
     tab.wait(lambda: re.search(r'data-plot="tool".*?cx="([\d.]+)"', tab.html)[1] != before)
     tab.settle()
-    frame = plot.frame_of(kin.workspace_section(robot))
+    frame = plot.frame_of(kin.workspace.workspace_section(robot))
     r, z = colours.radius_and_height(robot, tab.tool_pose()[None, :3, 3])
     x, y = frame.at(np.stack([r, z], axis=1))[0]
     assert f'cx="{x:.1f}" cy="{y:.1f}"' in tab.html
-    signed = kin.workspace_section(robot, signed=True)
+    signed = kin.workspace.workspace_section(robot, signed=True)
     outline: list[str] = []
 
     def drawn():
@@ -865,7 +865,7 @@ def test_section_and_sizes_appear_when_they_are_ready(tab):
 
 
 def test_the_outline_faces_as_joint_1_does_and_contains_the_tool():
-    section = kin.workspace_section(PIONEER, resolution=8, signed=True)
+    section = kin.workspace.workspace_section(PIONEER, resolution=8, signed=True)
     panel = SectionPanel.__new__(SectionPanel)
     panel._signed, panel._left = section, np.cross(section.v, section.u)
     panel._outline, panel._angle = SimpleNamespace(wxyz=None), math.nan

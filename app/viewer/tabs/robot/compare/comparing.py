@@ -23,8 +23,8 @@ from app.viewer.tabs.robot.compare.drawing import Overlay
 from app.viewer.tabs.robot.compare.reference import Reference
 from app.viewer.tabs.robot.edits import EditError
 from app.viewer.tabs.robot.files import MOST
-from kin import Comparison, InputError, KinematicsError
-from kin.comparison import Frames
+from kin import InputError, KinematicsError
+from kin.comparison import Comparison, Frames
 from kin.files.numbers import index_of
 from kin.transforms import Array
 

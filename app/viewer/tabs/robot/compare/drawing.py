@@ -8,9 +8,9 @@ from app.viewer.lessons.figure_shapes import BLUE, VERMILION
 from app.viewer.scene.chain import link_poses
 from app.viewer.scene.meshes import body
 from app.viewer.skeleton import ghost
-from kin import Comparison, Robot
+from kin import Robot
 from kin.axes import inverse
-from kin.comparison import Mapping
+from kin.comparison import Comparison, Mapping
 from kin.comparison.frames import no_mapping
 from kin.transforms import Array, wxyz_from_rotation
 

@@ -12,8 +12,8 @@ from app.viewer.panel.share import box_html
 from app.viewer.tabs.robot.compare.reference import Reference
 from app.viewer.tabs.robot.files import MOST
 from app.viewer.views.templates import render
-from kin import Comparison, Robot
-from kin.comparison import Mapping, messages
+from kin import Robot
+from kin.comparison import Comparison, Mapping, messages
 from kin.poses import roll_pitch_yaw
 from kin.transforms import Array
 from kin.units import Units

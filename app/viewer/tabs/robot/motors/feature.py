@@ -19,8 +19,9 @@ from app.viewer.tabs.robot import edits
 from app.viewer.tabs.robot.edits import EditError
 from app.viewer.tabs.robot.motors import views
 from app.viewer.tabs.robot.motors.run import COUNT, Run, begun, readings_of
-from kin import InputError, Motor, Robot
+from kin import InputError, Robot
 from kin.motor import LARGEST_ID
+from kin.motors import Motor
 from kin.motors.joints import moving_motors
 
 FIELDS = ("id", "sign", "offset", "unit", "lead")
@@ -172,7 +173,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
         try:
             match value:
                 case [str(file), str(text)] if len(text.encode(errors="replace")) <= LARGEST:
-                    motors = kin.motors_from_lerobot(self.stage.now.robot, text)
+                    motors = kin.motors.motors_from_lerobot(self.stage.now.robot, text)
                     self._use(motors, f"The calibration {clean(file, 60)} is used")
                 case [str(file), _]:
                     raise InputError("file", clean(file, 60), f"a file of at most {LARGEST // 1000} kB")
@@ -187,7 +188,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
             typed = self.settings.calibration
             self.change(calibration="")
             self._write = True
-            self._use(kin.motors_from_lerobot(self.stage.now.robot, typed), "The calibration is used")
+            self._use(kin.motors.motors_from_lerobot(self.stage.now.robot, typed), "The calibration is used")
         elif path in FIELDS and motor is not None:
             self._write = True  # a field whose text was refused shows what counts
             changed = replace(motor, **{path: getattr(self.settings, path)})
@@ -256,7 +257,7 @@ class Motors(DeclaredFeature[MotorSettings, MotorFacts]):
 
     def on_save(self) -> None:
         """Save LeRobot's calibration."""
-        data = json.dumps(kin.motors_to_lerobot(self.stage.now.robot), indent=4)
+        data = json.dumps(kin.motors.motors_to_lerobot(self.stage.now.robot), indent=4)
         self.stage.client.send_file_download("calibration.json", data.encode(), save_immediately=True)
         self.stage.notify(Notice("hand", "calibration.json is saved", SAVED))
 

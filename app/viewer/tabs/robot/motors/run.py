@@ -10,8 +10,9 @@ import numpy as np
 
 import kin
 from app.viewer.scene.clearance import clearance
-from kin import InputError, MotorMatch, Obstacle, Robot
+from kin import InputError, Obstacle, Robot
 from kin.files.numbers import LARGEST, number_of
+from kin.motors import MotorMatch
 from kin.motors.joints import counted, moving_motors, of_moving
 from kin.transforms import Array
 
@@ -67,14 +68,14 @@ class Run:
     def solved(self) -> Run:
         """The same with what the readings of the poses say; raises `InputError`: fewer than two poses are read."""
         known = [i for i, values in enumerate(self.readings) if values is not None]
-        found = kin.match_motors(self.robot, self.poses[known], [self.readings[i] for i in known])  # type: ignore[arg-type]
+        found = kin.motors.match_motors(self.robot, self.poses[known], [self.readings[i] for i in known])  # type: ignore[arg-type]
         return replace(self, match=found)
 
 
 def begun(robot: Robot, obstacles: Sequence[Obstacle]) -> Run:
     """A run at its first pose; raises `InputError` if the arm has no motors, or no such poses."""
     moving_motors(robot)
-    return Run(robot, kin.motor_poses(robot, COUNT, free(robot, obstacles)))
+    return Run(robot, kin.motors.motor_poses(robot, COUNT, free(robot, obstacles)))
 
 
 def free(robot: Robot, obstacles: Sequence[Obstacle]) -> Callable[[Array], bool]:

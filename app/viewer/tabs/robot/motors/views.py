@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from app.viewer.tabs.robot.motors.run import COUNT, Run
 from app.viewer.views.templates import render
-from kin import Motor, Robot
+from kin import Robot
+from kin.motors import Motor
 from kin.motors.joints import moving_motors
 from kin.units import Units, general
 

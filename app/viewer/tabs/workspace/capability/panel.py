@@ -27,7 +27,7 @@ from app.viewer.tabs.workspace.capability.voxels import Look, Voxels, mark
 from app.viewer.tabs.workspace.cut import Cut
 from app.viewer.tabs.workspace.send_window import SendWindow
 from app.viewer.views.templates import render
-from kin import CapabilityMap
+from kin.workspace import CapabilityMap
 
 POLL = 0.2  # s between two polls of a growing map
 REDRAW = 0.25  # s between two updates of the voxels

@@ -13,9 +13,9 @@ from app.viewer.tabs.workspace.capability.settings import LEVELS, By
 from app.viewer.tabs.workspace.capability.voxels import first_level, largest, levels, values_of
 from app.viewer.tabs.workspace.views import GAP, locks
 from app.viewer.views.templates import render
-from kin import CapabilityMap
 from kin.ik.options import Locks
 from kin.units import Units, general, grouped
+from kin.workspace import CapabilityMap
 from kin.workspace.capability.evaluation import ROLLS, STARTS, Method
 
 State = Literal["ready", "waiting", "computing", "stopped", "out of time", "done", "failed"]

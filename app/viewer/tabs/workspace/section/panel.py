@@ -19,9 +19,10 @@ from app.viewer.tabs.workspace.background import run_in_background
 from app.viewer.tabs.workspace.colours import radius_and_height
 from app.viewer.tabs.workspace.section import plot
 from app.viewer.views.templates import render
-from kin import Robot, Section
+from kin import Robot
 from kin.transforms import Array
 from kin.units import Units
+from kin.workspace import Section
 
 WIDTH = 340  # pixels of the panel
 PLAIN = (110, 110, 110)

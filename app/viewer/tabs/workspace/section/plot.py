@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from app.exports.svg import Axes, Plot, chart, joint_colour, png_url
 from app.viewer.tabs.workspace.colours import radius_and_height
 from app.viewer.views.templates import render
-from kin import Robot, Section
+from kin import Robot
 from kin.units import Unit, Units, general
-from kin.workspace import SectionArc
+from kin.workspace import Section, SectionArc
 
 CLOUD = (0, 114, 178)
 WIDTH, TALLEST = 320.0, 500.0

@@ -225,7 +225,7 @@ def test_an_arm_with_very_many_rows_has_no_equations() -> None:
 # -- as HTML ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("robot", kin.classic_robots().values(), ids=lambda robot: robot.id)
+@pytest.mark.parametrize("robot", kin.files.classic_robots().values(), ids=lambda robot: robot.id)
 def test_every_equation_of_every_arm_can_be_shown(robot) -> None:
     found = book(robot)
     assert views.summary(found)

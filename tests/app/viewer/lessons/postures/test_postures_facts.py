@@ -19,7 +19,7 @@ from app.viewer.lessons.postures.lesson import Postures
 from app.viewer.lessons.postures.settings import PosturesSettings, names_of
 
 ARMS = pytest.mark.parametrize("robot", CLASSICS, ids=[robot.id for robot in CLASSICS])
-TASKS: dict[str, kin.Task] = {"planar2r": "position", "pioneer5": "approach"}
+TASKS: dict[str, kin.ik.Task] = {"planar2r": "position", "pioneer5": "approach"}
 
 
 def facts(robot: kin.Robot, seed: int, **settings: object) -> PosturesFacts:
@@ -29,7 +29,7 @@ def facts(robot: kin.Robot, seed: int, **settings: object) -> PosturesFacts:
     return PosturesFacts(PosturesSettings(**settings), arm)
 
 
-def misses(robot: kin.Robot, q: np.ndarray, known: PosturesFacts, task: kin.Task) -> float:
+def misses(robot: kin.Robot, q: np.ndarray, known: PosturesFacts, task: kin.ik.Task) -> float:
     """How far a configuration is from the target, in what the task asks for."""
     T, here = numpy_arm.pose(robot, known.q), numpy_arm.pose(robot, q)
     rows = {"position": T[:3, 3:], "approach": T[:3, 2:], "pose": T[:3]}

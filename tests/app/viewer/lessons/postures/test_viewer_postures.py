@@ -42,7 +42,7 @@ def home(robot: kin.Robot) -> np.ndarray:
 @pytest.mark.parametrize("robot", SOME, ids=lambda robot: robot.id)
 def test_the_list_agrees_with_the_core_for_every_branch(robot: kin.Robot) -> None:
     T = home(robot)
-    task: kin.Task = "approach" if robot.n < 6 else "pose"
+    task: kin.ik.Task = "approach" if robot.n < 6 else "pose"
     found = survey(robot, T, kin.IKOptions(task=task), robot.q_home)
     assert tuple(p.name for p in found) == kin.branch_names(robot)
     blocked = 0
@@ -151,7 +151,7 @@ def test_ghosts_are_posed_as_the_arm_would_be(robot: kin.Robot) -> None:
 
 
 def remedies_for(
-    robot: kin.Robot, T: np.ndarray, task: kin.Task = "pose", locked=None, branch=None
+    robot: kin.Robot, T: np.ndarray, task: kin.ik.Task = "pose", locked=None, branch=None
 ) -> list[Remedy]:
     target = T[:3, 3] if task == "position" else T
     q = robot.q_home

@@ -17,16 +17,16 @@ from app.viewer.lessons.redundancy.settings import RedundancySettings
 from app.viewer.lessons.redundancy.views import frame_origins
 
 ARMS = pytest.mark.parametrize("robot", CLASSICS, ids=[robot.id for robot in CLASSICS])
-TASKS: tuple[kin.Task, ...] = ("pose", "approach", "position")
+TASKS: tuple[kin.ik.Task, ...] = ("pose", "approach", "position")
 
 
-def facts(robot: kin.Robot, q: np.ndarray, task: kin.Task, goal: np.ndarray | None = None) -> RedundancyFacts:
+def facts(robot: kin.Robot, q: np.ndarray, task: kin.ik.Task, goal: np.ndarray | None = None) -> RedundancyFacts:
     goal = q if goal is None else goal
     arm = Arm(robot, q, goal, task=task, locks=(False,) * robot.n)
     return RedundancyFacts(RedundancySettings(), arm, numpy_arm.pose(robot, goal), frame_origins(robot, goal))
 
 
-def rows(robot: kin.Robot, q: np.ndarray, task: kin.Task) -> np.ndarray:
+def rows(robot: kin.Robot, q: np.ndarray, task: kin.ik.Task) -> np.ndarray:
     J, R = numpy_arm.jacobian(robot, q), numpy_arm.pose(robot, q)[:3, :3]
     return {"pose": J, "approach": np.vstack([J[:3], R[:, :2].T @ J[3:]]), "position": J[:3]}[task]
 
@@ -34,7 +34,7 @@ def rows(robot: kin.Robot, q: np.ndarray, task: kin.Task) -> np.ndarray:
 @ARMS
 @pytest.mark.parametrize("task", TASKS)
 def test_there_are_parameters_where_joints_can_move_and_the_task_does_not(
-    robot: kin.Robot, task: kin.Task
+    robot: kin.Robot, task: kin.ik.Task
 ) -> None:
     rng = np.random.default_rng(8)
     for q in robot.random_q(rng, 3):

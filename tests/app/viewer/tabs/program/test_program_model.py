@@ -88,7 +88,10 @@ def test_a_line_is_straight() -> None:
     off = np.linalg.norm(np.cross(points - points[0], along / np.linalg.norm(along)), axis=1)
     assert off.max() < 1e-5
     assert unpack(pack(program), UR5) == program
-    assert opened(kin.parse_program(toml_of(program, "UR5"), UR5), UR5, UR5.q_home).segments == program.segments
+    assert (
+        opened(kin.motion.parse_program(toml_of(program, "UR5"), UR5), UR5, UR5.q_home).segments
+        == program.segments
+    )
 
 
 @pytest.mark.parametrize(
@@ -104,8 +107,8 @@ def test_a_line_is_straight() -> None:
 def test_a_page_and_its_link_hold_whatever_a_program_has(fields: dict[str, object]) -> None:
     start = {"kind": "ptp", "q": UR5.q_home.tolist()}
     data = {**fields, "segments": [start, *fields.get("segments", ())]}  # type: ignore[misc]
-    program = opened(kin.program_from_dict(data, UR5), UR5, UR5.q_home)
-    assert program == kin.program_from_dict(data, UR5)
+    program = opened(kin.motion.program_from_dict(data, UR5), UR5, UR5.q_home)
+    assert program == kin.motion.program_from_dict(data, UR5)
     assert unpack(json.loads(json.dumps(pack(program))), UR5) == program
 
 
@@ -324,7 +327,7 @@ def test_a_spline_leads_through_its_points_and_a_circle_through_its_via_point() 
     assert speeds.max() <= 0.1 * (1 + 1e-9)
     again = unpack(json.loads(json.dumps(pack(program))), UR5)
     assert again == program
-    assert opened(kin.parse_program(toml_of(program, "UR5"), UR5), UR5, UR5.q_home) == program
+    assert opened(kin.motion.parse_program(toml_of(program, "UR5"), UR5), UR5, UR5.q_home) == program
 
 
 def test_refusals_and_notes_have_the_numbers_of_the_rows() -> None:
@@ -391,20 +394,22 @@ def test_splines_are_compared_point_by_point() -> None:
 def test_a_file_holds_the_whole_program() -> None:
     program = Program(ROWS)
     text = toml_of(program, "Pioneer\narm")
-    assert kin.parse_program(text, PIONEER) == program
-    assert opened(kin.parse_program(text, PIONEER), PIONEER, PIONEER.q_home) == program
+    assert kin.motion.parse_program(text, PIONEER) == program
+    assert opened(kin.motion.parse_program(text, PIONEER), PIONEER, PIONEER.q_home) == program
 
 
 def test_a_file_of_poses_keeps_them_but_for_the_start() -> None:
     T = kin.fk(PIONEER, POSES[1])
     rows = [{"kind": "ptp", "pose": T.tolist()}] * 2
-    first, second = opened(kin.program_from_dict({"segments": rows}, PIONEER), PIONEER, PIONEER.q_home).segments
+    first, second = opened(
+        kin.motion.program_from_dict({"segments": rows}, PIONEER), PIONEER, PIONEER.q_home
+    ).segments
     assert np.allclose(kin.fk(PIONEER, np.array(first.target.q)), T, atol=1e-6)
     assert isinstance(second.target, PoseTarget)
-    far = kin.program_from_dict({"segments": [rows[0], {"kind": "ptp", "position": [9, 9, 9]}]}, PIONEER)
+    far = kin.motion.program_from_dict({"segments": [rows[0], {"kind": "ptp", "position": [9, 9, 9]}]}, PIONEER)
     with pytest.raises(InputError, match="a point that the arm can reach"):
         opened(far, PIONEER, PIONEER.q_home)
-    line = kin.program_from_dict({"segments": [{"kind": "lin", "pose": T.tolist()}]}, PIONEER)
+    line = kin.motion.program_from_dict({"segments": [{"kind": "lin", "pose": T.tolist()}]}, PIONEER)
     start, row = opened(line, PIONEER, POSES[2]).segments
     assert np.allclose(start.target.q, POSES[2], atol=1e-7), "it starts where the arm is"
     assert row == line.segments[0]

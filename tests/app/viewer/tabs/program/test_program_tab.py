@@ -21,6 +21,7 @@ from app.viewer.session.state import decode
 from app.viewer.tabs.program.files import MOTIONS
 from app.viewer.tabs.program.postures import PLACES
 from app.viewer.tabs.program.program import MOST
+from kin.motion.planning.starts import segment_poses
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -388,9 +389,9 @@ def test_postures_on_the_way_are_shown_and_a_click_starts_there(ur5: FakeBrowser
     ur5.wait(lambda: "kb-posture-list" in part(ur5, "postures"))
     shown = html.unescape(part(ur5, "postures"))
     motion = kin.plan_motion(
-        UR5, kin.parse_program(f"[[segments]]\nkind='lin'\nq={np.radians(FAR).tolist()}"), before
+        UR5, kin.motion.parse_program(f"[[segments]]\nkind='lin'\nq={np.radians(FAR).tolist()}"), before
     )
-    found = kin.path_postures(UR5, kin.motion.segment_poses(motion, 0, PLACES), q_start=before)
+    found = kin.path.path_postures(UR5, segment_poses(motion, 0, PLACES), q_start=before)
     assert shown.count("<li>") == len(found.postures)
     assert f"gets through in {len(found.through)} of {len(found.postures)} postures" in shown
     assert shown.count("<span>the whole way") == len(found.through)
@@ -506,7 +507,7 @@ def test_the_points_of_a_spline_are_added_typed_moved_and_deleted_in_its_row(tab
 
     def points() -> list[np.ndarray]:
         tab.wait(lambda: bool(tab.kept) and "pioneer5" in programs(tab.kept[-1]))
-        row = kin.program_from_dict(programs(tab.kept[-1])["pioneer5"], PIONEER).segments[-1]  # type: ignore[arg-type]
+        row = kin.motion.program_from_dict(programs(tab.kept[-1])["pioneer5"], PIONEER).segments[-1]  # type: ignore[arg-type]
         return [np.array(each.position) for each in getattr(row, "points", ())]
 
     def shown(count: int) -> bool:

@@ -113,7 +113,7 @@ def test_a_way_around_a_post_is_put_into_the_program_in_one_step(port: int) -> N
 def programs(tab: FakeBrowser) -> tuple[Any, ...]:
     """The rows of the only program in the page's link."""
     (found,) = decode(tab.kept[-1], ROBOTS).features["program"]["programs"].values()  # type: ignore[union-attr]
-    return kin.program_from_dict(found, UR5).segments
+    return kin.motion.program_from_dict(found, UR5).segments
 
 
 @needs_ompl

@@ -252,7 +252,7 @@ def test_a_long_text_stays_out_of_the_link_and_a_bad_link_is_ignored():
 
 def test_the_ghost_stands_where_the_mapping_puts_it() -> None:
     """The tool of the ghost is at that of the arm on show, for another base, sense and zero."""
-    other = kin.convert_dh(kin.robot_from_screws(*_moved(UR5)), "modified")
+    other = kin.dh.convert_dh(kin.dh.robot_from_screws(*_moved(UR5)), "modified")
     found = kin.compare(other, UR5, frames="free")
     assert found.verdict == "same"
     mapping = mapping_of(found, UR5.n)
@@ -263,7 +263,7 @@ def test_the_ghost_stands_where_the_mapping_puts_it() -> None:
 
 def _moved(robot: kin.Robot) -> tuple[np.ndarray, np.ndarray]:
     """Screws and home pose with joint 2 counting the other way, and a base that is turned and shifted."""
-    screws = kin.screws(robot, np.zeros(robot.n))
+    screws = kin.dh.screws(robot, np.zeros(robot.n))
     signs = np.array([1.0, -1.0, 1.0, 1.0, 1.0, 1.0])
     S = signs * screws.S
     shift = np.array([0.1, -0.2, 0.3])
@@ -274,7 +274,7 @@ def _moved(robot: kin.Robot) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_the_code_that_is_shown_maps_joint_values():
-    other = kin.convert_dh(kin.robot_from_screws(*_moved(UR5)), "standard")
+    other = kin.dh.convert_dh(kin.dh.robot_from_screws(*_moved(UR5)), "standard")
     found = kin.compare(other, UR5, frames="free")
     assert found.mapping is not None
     names: dict[str, object] = {}

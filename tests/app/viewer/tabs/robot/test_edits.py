@@ -76,8 +76,8 @@ def test_home_and_limits_of_motion_are_typed_in_the_units_of_the_joint():
     assert robot.q_home.tolist() == [UR5.q_home[0], math.radians(-80), *UR5.q_home[2:]]
     assert robot.rows[1].velocity == pytest.approx(math.pi / 2)
     assert robot.rows[2].acceleration == 3.0
-    assert kin.motion_limits(robot).jerk[3] == pytest.approx(math.radians(5000))
-    assert "jerk" not in kin.motion_limits(robot).assumed[3]
+    assert kin.motion.motion_limits(robot).jerk[3] == pytest.approx(math.radians(5000))
+    assert "jerk" not in kin.motion.motion_limits(robot).assumed[3]
     assumed = type_in(robot, ((1, "velocity"), " "), own=own)
     assert assumed.robot.rows[1].velocity is None
     assert assumed.robot.rows[2].acceleration == 3.0

@@ -15,7 +15,8 @@ import kin
 from app.viewer.scene.clearance import clearance
 from app.viewer.session.state import decode
 from app.viewer.tabs.robot.motors.run import COUNT, begun, free, readings_of
-from kin import InputError, Motor
+from kin import InputError
+from kin.motors import Motor
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")
 
@@ -30,7 +31,7 @@ REAL = [
 
 
 def read(run_or_poses: np.ndarray) -> list[list[float]]:
-    return kin.readings_from_q(replace(SO101, motors=REAL), run_or_poses).round(1).tolist()
+    return kin.motors.readings_from_q(replace(SO101, motors=REAL), run_or_poses).round(1).tolist()
 
 
 @pytest.mark.parametrize("robot_id", sorted(ROBOTS))

@@ -22,7 +22,7 @@ from app.viewer.tabs.robot.presets import PRESETS
 from kin import KinematicsError
 from kin.files.read import MAX_ROWS
 
-ROBOTS = tuple(kin.classic_robots().values())
+ROBOTS = tuple(kin.files.classic_robots().values())
 
 
 def packed(said: object) -> str:
@@ -58,7 +58,7 @@ def test_every_example_is_an_arm_with_a_regular_home(key):
 
 @pytest.mark.parametrize(("key", "robot_id"), [("planar-2r", "planar2r"), ("planar-3r", "planar3r")])
 def test_the_planar_examples_are_the_arms_of_the_service(key, robot_id):
-    own, builtin = own_arm(PRESETS[key], key).robot, kin.classic_robots()[robot_id]
+    own, builtin = own_arm(PRESETS[key], key).robot, kin.files.classic_robots()[robot_id]
     assert own.rows == builtin.rows
     assert own.name == builtin.name
     assert np.allclose(own.q_home, builtin.q_home, atol=1e-12)
