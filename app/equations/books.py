@@ -93,7 +93,7 @@ class Values:
     """One equation at configurations: arrays ``(...)``, in metres for p, else pure numbers.
 
     `printed` is None where nothing is printed. `difference` and `turn` are those of what is on show, the printed
-    form if there is one, from the DH product: the latter as an angle, see `kin.chapter.turned`.
+    form if there is one, from the DH product: the latter as an angle, see `app.equations.chapter.turned`.
     """
 
     printed: Array | None

@@ -1,8 +1,8 @@
 """The right-hand side of an equation as a tree, from which its value and its typeset forms are made.
 
 The shown and the computed form are always the same: `value`, `latex` and `mathml` (:mod:`app.equations.typeset`)
-walk the same tree. The chapter's equations get theirs from the text of :mod:`kin.chapter`, in the order of the
-print; derived ones get theirs from sympy, in an order that people would write.
+walk the same tree. The chapter's equations get theirs from the text of :mod:`app.equations.chapter`, in
+the order of the print; derived ones get theirs from sympy, in an order that people would write.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from kin import chapter
+from app.equations import chapter
 from kin.transforms import Array
 
 

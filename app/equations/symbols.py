@@ -9,8 +9,8 @@ from typing import Literal
 
 import numpy as np
 
+from app.equations.chapter import LENGTHS
 from kin import Robot
-from kin.chapter import LENGTHS
 from kin.transforms import Array
 
 Kind = Literal["cos", "sin", "length", "slide", "number"]

@@ -2,7 +2,7 @@
 
 The landing page is served at once and shows "warming up" until ``/readyz`` reports ready. Kernels are loaded from
 numba's cache in milliseconds, or are compiled, which takes seconds. The service is ready when those of the first
-arm are; all others are compiled after that, part by part (:mod:`kin.warmup.preparation`), by another process
+arm are; all others are compiled after that, part by part (:mod:`app.shared.preparation`), by another process
 (:mod:`app.service.compiler`). Those of the first arm are compiled by two such processes at once. A request that
 needs a kernel before its turn has it compiled at once, by a process of its own. The processes that compute for
 REST load what is compiled.
@@ -21,10 +21,10 @@ from app.service.compiler import Compilers, CompilerStoppedError, ahead, compile
 from app.service.compute.child import load_first, load_rest
 from app.service.compute.pool import Pool
 from app.service.web.viewer_proxy import ViewerBridge
+from app.shared.preparation import Preparation
 from app.shared.threads import every_processor, lower_priority, unpin
 from kin.kernels.elsewhere import compile_elsewhere
 from kin.warmup import compiled, parts, rest_compiled, warm_up_first, warm_up_rest
-from kin.warmup.preparation import Preparation
 
 if TYPE_CHECKING:
     from app.viewer.server import ViewerServer

@@ -13,7 +13,7 @@ from starlette.responses import PlainTextResponse
 from app.classroom import Hub
 from app.service.startup import Status
 from app.shared.metrics import CONTENT_TYPE, exposition
-from kin.warmup.preparation import Preparation
+from app.shared.preparation import Preparation
 
 router = APIRouter(tags=["service"], generate_unique_id_function=lambda route: route.name)
 

@@ -24,6 +24,7 @@ from app.shared.connection import (
     SentFile,
 )
 from app.shared.maps import Maps
+from app.shared.preparation import Preparation
 from app.shared.security import Rights
 from app.shared.settings import Settings
 from app.shared.store import Store
@@ -44,7 +45,6 @@ from app.viewer.viser_patches import (
     set_events_in_their_loop,
 )
 from app.viewer.viser_server import PortlessServer, client_page, start_viser
-from kin.warmup.preparation import Preparation
 
 log = logging.getLogger(__name__)
 

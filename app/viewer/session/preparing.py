@@ -13,6 +13,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from app.shared.preparation import Preparation
 from app.viewer.feature import Feature, message_of
 from app.viewer.own_arm import own_arm
 from app.viewer.session.events import LINK, RULES, name_of
@@ -22,7 +23,6 @@ from app.viewer.session.state import PageState
 from kin import InputError, Robot
 from kin.solvers import family_of
 from kin.warmup import ALL, COLLISIONS, all_of
-from kin.warmup.preparation import Preparation
 
 LOOK_AGAIN: Final = 0.2  # s
 HELD: Final = 64  # events of one page; the oldest are dropped

@@ -9,12 +9,12 @@ from app.classroom.courses import Courses
 from app.live import Lines
 from app.shared.clouds import Clouds
 from app.shared.maps import Maps
+from app.shared.preparation import Preparation
 from app.shared.store import Store
 from app.shared.summaries import Summaries
 from app.viewer.meshes.library.library import Library
 from app.viewer.meshes.reader import MeshReader
 from app.viewer.scene.motion import Pace
-from kin.warmup.preparation import Preparation
 
 
 @dataclass(frozen=True)

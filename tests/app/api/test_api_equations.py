@@ -11,10 +11,9 @@ from pydantic import TypeAdapter
 
 import kin
 from app.api.equations import EquationsAnswer, EquationValues
-from app.equations import book, book_later, books
+from app.equations import book, book_later, books, chapter
 from app.equations.derive import derive
 from app.shared.computations import ComputationCache
-from kin import chapter
 
 ROBOTS = tuple(kin.files.classic_robots().values())
 each_robot = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.id)

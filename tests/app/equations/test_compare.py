@@ -9,10 +9,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import kin
-from app.equations import book, compared, gram, suspects
+from app.equations import book, chapter, compared, gram, suspects
 from app.equations.compare import SMALLEST
 from app.equations.expression import from_text, names, value
-from kin import chapter
 from kin.transforms import rotation_from_wxyz
 
 CHAPTER = tuple(kin.get_robot(robot_id) for robot_id in chapter.LENGTHS)

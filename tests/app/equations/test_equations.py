@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import kin
-from app.equations import DerivationError, NotDerivedError, book, book_later, check, typeset
+from app.equations import DerivationError, NotDerivedError, book, book_later, chapter, check, typeset
 from app.equations import books as module
 from app.equations.derive import LONGEST, derive
 from app.equations.expression import (
@@ -33,7 +33,6 @@ from app.equations.expression import (
     value,
 )
 from app.shared.computations import ComputationCache, TooManyPendingError
-from kin import chapter
 
 ROOT = Path(__file__).parents[3]
 ROBOTS = tuple(kin.files.classic_robots().values())

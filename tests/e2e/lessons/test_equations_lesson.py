@@ -8,7 +8,7 @@ from page import Tab
 from playwright.sync_api import Locator, expect
 
 import kin
-from kin import chapter
+from app.equations import chapter
 
 pytestmark = [pytest.mark.browser, pytest.mark.full]
 

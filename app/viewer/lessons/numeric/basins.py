@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.viewer.lessons.numeric.iteration import STILL, Problem, Settings, advance
 from kin import Robot, solve_ik
-from kin.differential.iteration import STILL, Problem, Settings, advance
 from kin.transforms import Array
 
 CELLS = 96  # along each side

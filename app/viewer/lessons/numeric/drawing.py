@@ -8,9 +8,9 @@ from app.viewer.declared.scene import Node, axes, bars
 from app.viewer.lessons.figure_nodes import FigureNodes
 from app.viewer.lessons.figure_shapes import AMBER, BLUE, GREEN
 from app.viewer.lessons.numeric.facts import Iterated
+from app.viewer.lessons.numeric.iteration import Problem
 from app.viewer.skeleton import cylinder, places, skeleton
 from kin import Robot, fk
-from kin.differential.iteration import Problem
 from kin.transforms import Array
 
 COPIES = 10  # ghosts at most, with the first and the last iterate among them

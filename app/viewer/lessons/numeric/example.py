@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.viewer.lessons.numeric import iteration
+from app.viewer.lessons.numeric.iteration import Match, Problem, Run, Settings
 from app.viewer.scene.clearance import clearance
 from kin import Robot, fk
-from kin.differential import iteration
-from kin.differential.iteration import Match, Problem, Run, Settings
 from kin.transforms import Array
 
 _SAMPLES, _OFFSETS = 64, (0.3, 0.15, 0.075, 0.03)

@@ -10,12 +10,11 @@ from functools import lru_cache
 import numpy as np
 
 from app.viewer.declared.facts import Facts
-from app.viewer.lessons.numeric import basins
+from app.viewer.lessons.numeric import basins, iteration
 from app.viewer.lessons.numeric.basins import Basins
+from app.viewer.lessons.numeric.iteration import METHODS, Match, Method, Problem, Run
 from app.viewer.lessons.numeric.settings import LIMITS, Numbers, NumericSettings
 from kin import Robot, fk, get_robot
-from kin.differential import iteration
-from kin.differential.iteration import METHODS, Match, Method, Problem, Run
 from kin.transforms import Array
 
 UNLIMITED = LIMITS[1] - 1e-4

@@ -12,12 +12,12 @@ from app.viewer.lessons.guide.content import LessonFacts, outline_of
 from app.viewer.lessons.guide.leads import bar
 from app.viewer.lessons.guide.outline import Lead, Outline, Pose
 from app.viewer.lessons.guide.poses import as_configuration
+from app.viewer.lessons.numeric import iteration
 from app.viewer.lessons.numeric.example import Example, example
+from app.viewer.lessons.numeric.iteration import Method, Problem, Run, Settings
 from app.viewer.lessons.numeric.settings import LIMITS
 from app.viewer.lessons.numeric.views import NAMES, amount, error_chart
 from kin import Robot, fk, get_robot
-from kin.differential import iteration
-from kin.differential.iteration import Method, Problem, Run, Settings
 from kin.transforms import Array
 from kin.units import Units, power
 

@@ -10,9 +10,9 @@ import numpy as np
 import kin
 from app.viewer.declared.fields import Settings, choice, flag, kept, numbers, ordinal, slider
 from app.viewer.lessons.numeric.example import example, usual_match
+from app.viewer.lessons.numeric.iteration import Match, Method
 from app.viewer.lessons.numeric.views import NAMES
 from kin import Robot
-from kin.differential.iteration import Match, Method
 
 MATCHES: dict[str, Match] = {"Point": "point", "Pose": "pose"}
 DAMPINGS, GAINS = (0.005, 0.5), (0.1, 2.0)

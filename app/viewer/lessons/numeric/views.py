@@ -12,9 +12,9 @@ from markupsafe import Markup
 from app.exports.curves import Curve, Row, with_legend
 from app.exports.svg import Axes, Plot, chart, png_url
 from app.viewer.lessons.numeric.basins import COLOURS, Basins, off_by, pixels, turned_within
+from app.viewer.lessons.numeric.iteration import MOST, Method, Problem, Run
 from app.viewer.views.templates import render
 from kin import Robot
-from kin.differential.iteration import MOST, Method, Problem, Run
 from kin.transforms import Array
 from kin.units import Unit, Units, power
 

@@ -9,11 +9,11 @@ from markupsafe import Markup
 
 from app.exercises.typed import read_number
 from app.exports.curves import Curve, Row, with_legend
+from app.viewer import profiles
 from app.viewer.lessons.figure_shapes import GREEN, VERMILION
 from app.viewer.lessons.guide.outline import Answered
 from app.viewer.lessons.trajectories.motions import Sketched, Ways, example, family, frequency, sampled, swing
 from kin import Robot
-from kin.motion import profiles
 from kin.transforms import Array
 from kin.typed import EntryError
 from kin.units import Unit, Units

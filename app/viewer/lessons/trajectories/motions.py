@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 import kin
+from app.viewer import profiles
+from app.viewer.profiles import Profile
 from kin import Robot
-from kin.motion import JointTarget, Lin, Motion, PoseTarget, Ptp, motion_limits, profiles
-from kin.motion.profiles import Profile
+from kin.motion import JointTarget, Lin, Motion, PoseTarget, Ptp, motion_limits
 from kin.transforms import Array
 
 SAMPLES = 161

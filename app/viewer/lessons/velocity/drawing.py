@@ -9,13 +9,13 @@ from functools import lru_cache
 import numpy as np
 
 from app.viewer.declared.scene import Color, Lazy, Node, arrows, ends, frame, handle, label, lines, mesh
+from app.viewer.lessons.velocity.ellipsoids import Ellipsoid
 from app.viewer.lessons.velocity.facts import VelocityFacts, scale_of
 from app.viewer.lessons.velocity.views import COLORS, COLUMN, LOST, SAMPLE, SLOW, label_texts
 from app.viewer.scene.arm.arm_scene import GIZMO
 from app.viewer.scene.meshes import body
 from app.viewer.scene.shapes import Solid, cone, merged, placed, tube
 from kin import Robot
-from kin.differential.ellipsoids import Ellipsoid
 from kin.transforms import Array, frame_from_approach, wxyz_from_rotation
 
 AXIS_LINE = (90, 90, 90)

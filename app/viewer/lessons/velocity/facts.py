@@ -11,11 +11,7 @@ import numpy as np
 import kin
 from app.viewer.declared.facts import Facts
 from app.viewer.lessons.velocity.along import controllable
-from app.viewer.lessons.velocity.settings import SPEEDS, VelocitySettings
-from app.viewer.lessons.velocity.views import SAMPLE, State, lost_words, nice, real, state_of
-from app.viewer.scene.meshes import body
-from kin import Robot
-from kin.differential.ellipsoids import (
+from app.viewer.lessons.velocity.ellipsoids import (
     Axes,
     Ellipsoid,
     TaskRates,
@@ -25,6 +21,10 @@ from kin.differential.ellipsoids import (
     semi_axes,
     task_rates,
 )
+from app.viewer.lessons.velocity.settings import SPEEDS, VelocitySettings
+from app.viewer.lessons.velocity.views import SAMPLE, State, lost_words, nice, real, state_of
+from app.viewer.scene.meshes import body
+from kin import Robot
 from kin.differential.null_space import NullSpace, margin, measure, null_space, secondary
 from kin.ik import Singularity, Task
 from kin.transforms import Array

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.viewer.declared.fields import Number, Settings, choice, flag, joint, number, part, vector
+from app.viewer.lessons.velocity.ellipsoids import Ellipsoid
 from app.viewer.lessons.velocity.jog import Frame
-from kin.differential.ellipsoids import Ellipsoid
 from kin.differential.null_space import Goal
 from kin.transforms import Array
 

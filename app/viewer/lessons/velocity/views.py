@@ -10,11 +10,11 @@ import numpy as np
 from markupsafe import Markup
 
 from app.exports.worksheet.sheet import indexed
+from app.viewer.lessons.velocity.ellipsoids import Ellipsoid, TaskRates, condition
 from app.viewer.views.mathml import ident, sub, text
 from app.viewer.views.mathml import math as formula
 from app.viewer.views.templates import render
 from kin import Robot
-from kin.differential.ellipsoids import Ellipsoid, TaskRates, condition
 from kin.ik import Singularity
 from kin.ik.messages.singularity import short, there
 from kin.tolerances import TOLERANCES

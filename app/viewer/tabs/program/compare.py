@@ -10,11 +10,12 @@ from typing import Literal, get_args
 import numpy as np
 
 import kin
+from app.viewer import profiles
+from app.viewer.profiles import Profile
 from app.viewer.tabs.program.plan import Plan, looped, start
 from app.viewer.tabs.program.program import as_kind
-from kin.motion import Dwell, Motion, Program, Ptp, profiles
+from kin.motion import Dwell, Motion, Program, Ptp
 from kin.motion.pieces import Piece, look_between
-from kin.motion.profiles import Profile
 from kin.transforms import Array
 
 Choice = Literal["ptp", "lin", "zone", "cubic", "quintic", "trapezoidal", "s_curve", "fastest"]

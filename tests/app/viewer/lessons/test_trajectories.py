@@ -10,11 +10,11 @@ from fake_browser import FakeBrowser
 
 import kin
 from app.exports.curves import WIDTH, Curve, Row, with_legend
+from app.viewer import profiles
 from app.viewer.lessons.guide.outline import Number
 from app.viewer.lessons.trajectories import motions
 from app.viewer.lessons.trajectories.questions import END, LINKS, OFFSETS, SPEED, START, outline
 from kin import Robot
-from kin.motion import profiles
 from kin.units import Units
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")

@@ -22,12 +22,12 @@ from app.shared.store import Store
 from app.viewer.declared.press import Press
 from app.viewer.lessons.velocity import views
 from app.viewer.lessons.velocity.drawing import ring_arrow, sides, wxyz_along
+from app.viewer.lessons.velocity.ellipsoids import axes_of, condition, lost, part_of, semi_axes, task_rates
 from app.viewer.lessons.velocity.jog import BUTTONS, button, moved, step
 from app.viewer.lessons.velocity.lesson import VelocityLesson
 from app.viewer.lessons.velocity.views import NEAR, nice, real, state_of
 from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
-from kin.differential.ellipsoids import axes_of, condition, lost, part_of, semi_axes, task_rates
 from kin.differential.task import natural_task, task_jacobian, usual_rank
 from kin.transforms import rotation_angle, rotation_from_wxyz, vector_angle
 from kin.units import Units

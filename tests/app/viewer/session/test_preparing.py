@@ -22,6 +22,7 @@ from app.live.client import page as client_page
 from app.live.line import Line, Program, Reply
 from app.service.web.rooms.limits import Limits
 from app.shared.clouds import Clouds
+from app.shared.preparation import Preparation
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.arm import Arm
@@ -31,7 +32,6 @@ from app.viewer.session.preparing import HELD, Preparing
 from app.viewer.session.state import PageState, encode
 from kin.solvers import family_of
 from kin.warmup import COLLISIONS, MOTIONS, all_of, parts
-from kin.warmup.preparation import Preparation
 
 STORE = Store()
 PIONEER, UR5, PLANAR, PUMA, SCARA = map(STORE.get, ("pioneer5", "ur5", "planar3r", "puma560", "scara"))

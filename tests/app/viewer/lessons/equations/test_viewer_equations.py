@@ -16,7 +16,7 @@ from fake_browser import FakeBrowser
 from live_server import serve_viewer
 
 import kin
-from app.equations import book, books, typeset
+from app.equations import book, books, chapter, typeset
 from app.equations.derive import derive
 from app.shared.clouds import Clouds
 from app.shared.computations import ComputationCache
@@ -26,7 +26,6 @@ from app.viewer.lessons.equations import views
 from app.viewer.lessons.equations.lesson import EquationsLesson
 from app.viewer.own_arm import OwnArm
 from app.viewer.server import ViewerServer
-from kin import chapter
 from kin.units import DEFAULT_UNITS, Units, fixed
 
 pytestmark = pytest.mark.filterwarnings("ignore:Queued a .* on a closed connection")

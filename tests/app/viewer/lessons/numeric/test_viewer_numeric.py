@@ -23,12 +23,12 @@ from app.shared.store import Store
 from app.viewer.lessons.numeric import basins, questions, views
 from app.viewer.lessons.numeric.drawing import COPIES, chosen
 from app.viewer.lessons.numeric.example import example
+from app.viewer.lessons.numeric.iteration import METHODS, Match, Method, Problem, Settings, advance, factors, run
 from app.viewer.scene.clearance import clearance
 from app.viewer.scene.meshes import body
 from app.viewer.server import ViewerServer
 from app.viewer.session.state import PageState, encode
 from kin import Robot
-from kin.differential.iteration import METHODS, Match, Method, Problem, Settings, advance, factors, run
 from kin.transforms import Array
 from kin.units import Units
 

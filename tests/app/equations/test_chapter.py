@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import kin
-from kin import chapter
+from app.equations import chapter
 
 WRONG = {
     6: 0.14 * math.cos(math.radians(15)),

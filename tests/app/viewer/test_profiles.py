@@ -6,7 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import kin
-from kin.motion import profiles
+from app.viewer import profiles
 
 value = st.floats(-5, 5)
 size = st.floats(0.1, 10)
@@ -85,3 +85,10 @@ def test_an_s_curve_is_slower_than_a_trapezoid_by_its_jerk(start, end, v, a, j):
 def test_what_cannot_be_names_the_field(call, field):
     with pytest.raises(kin.InputError, match=f"^{field}:"):
         call()
+
+
+@pytest.mark.parametrize("jerk", [1e6, 1e12, 2e17, 1e20])
+def test_a_large_jerk_does_not_exceed_the_acceleration(jerk):
+    profile = profiles.s_curve(0.0, 0.33, 1, 4, jerk)
+    times = np.linspace(0.0, profile.duration, 1001)
+    assert (np.abs(profile.sample(times)[2]) <= 4 * (1 + 1e-9)).all()

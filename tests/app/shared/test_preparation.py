@@ -7,10 +7,10 @@ import sys
 
 import pytest
 
+from app.shared.preparation import Preparation
 from kin.files import classic_robots
 from kin.solvers import NUMERIC, family_of
 from kin.warmup import MADE_UP, all_of, first_family, made_up_arms, parts
-from kin.warmup.preparation import Preparation
 
 
 def begun() -> Preparation:
