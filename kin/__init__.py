@@ -42,7 +42,17 @@ from kin.ik import (
 from kin.motion import plan_motion
 from kin.notebook import connect, save_page, show
 from kin.path import solve_path
-from kin.poses import pose_from_position_wxyz, pose_from_text, pose_to_text, rotation_from_wxyz
+from kin.poses import (
+    interpolate_poses,
+    pose_exp,
+    pose_from_position_wxyz,
+    pose_from_text,
+    pose_log,
+    pose_to_text,
+    position_wxyz_from_pose,
+    rotation_from_wxyz,
+    xyz_rpy_from_pose,
+)
 from kin.robot import Joint, Robot
 from kin.singularity import singularities
 from kin.transforms import wxyz_from_rotation
@@ -79,6 +89,7 @@ __all__ = [
     "get_robot",
     "ik",
     "ik_branches",
+    "interpolate_poses",
     "jacobian",
     "link_frames",
     "load_robot",
@@ -87,10 +98,13 @@ __all__ = [
     "motors",
     "path",
     "plan_motion",
+    "pose_exp",
     "pose_from_position_wxyz",
     "pose_from_text",
     "pose_from_xyz_rpy",
+    "pose_log",
     "pose_to_text",
+    "position_wxyz_from_pose",
     "robot_from_dict",
     "robot_to_dict",
     "robot_to_mjcf",
@@ -107,6 +121,7 @@ __all__ = [
     "warm_up",
     "workspace",
     "wxyz_from_rotation",
+    "xyz_rpy_from_pose",
 ]
 
 

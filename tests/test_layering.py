@@ -51,7 +51,7 @@ RULES: dict[str, set[str]] = {
         *("numpy", "kin.collision", "kin.files", "kin.kernels", "kin.solvers", "kin.ik", "kin.path", "kin.motion"),
         *("kin.frames", "kin.poses", "kin.typed", *MODEL),
     },
-    "kin/poses": {"numpy", "kin.frames", "kin.poses", "kin.typed", *MODEL},
+    "kin/poses": {"numpy", "kin.dh", "kin.frames", "kin.poses", "kin.typed", *MODEL},
     "kin/way": {"numpy", "ompl", "kin.collision", "kin.ik", "kin.motion", "kin.way", *MODEL},
     # It looks the service up by name when it is called.
     "kin/notebook": {"numpy", "kin.collision", "kin.errors", "kin.motion", "kin.robot"},

@@ -13,6 +13,7 @@ from kin.poses.quaternions import (
 )
 from kin.poses.reading import FARTHEST, PoseKind, pose_from_text, read_pose, read_target, turned_to
 from kin.poses.rotations import ANGLES, DEFAULT, QUATERNIONS, RPY, VECTOR, Notation, Rotations, roll_pitch_yaw
+from kin.poses.values import interpolate_poses, pose_exp, pose_log, position_wxyz_from_pose, xyz_rpy_from_pose
 
 __all__ = [
     "ANGLES",
@@ -31,12 +32,17 @@ __all__ = [
     "checked_wxyz",
     "far_from_unit",
     "form_named",
+    "interpolate_poses",
+    "pose_exp",
     "pose_from_position_wxyz",
     "pose_from_text",
+    "pose_log",
     "pose_to_text",
+    "position_wxyz_from_pose",
     "read_pose",
     "read_target",
     "roll_pitch_yaw",
     "rotation_from_wxyz",
     "turned_to",
+    "xyz_rpy_from_pose",
 ]

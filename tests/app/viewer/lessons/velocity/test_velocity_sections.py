@@ -16,7 +16,7 @@ from app.shared.clouds import Clouds
 from app.shared.settings import Settings
 from app.shared.store import Store
 from app.viewer.lessons.velocity import section_views as views
-from app.viewer.lessons.velocity.along import SAMPLES, along, between, controllable
+from app.viewer.lessons.velocity.along import SAMPLES, along, controllable
 from app.viewer.lessons.velocity.ellipsoids import axes_of
 from app.viewer.lessons.velocity.facts import torques
 from app.viewer.lessons.velocity.settings import GOALS
@@ -108,7 +108,7 @@ def test_a_line_is_followed_on_its_branch(robot: kin.Robot) -> None:
     for share, q, least, kappa, rank in zip(
         found.share, found.q, found.least, found.kappa, found.rank, strict=True
     ):
-        on_line = between(start, end, float(share))
+        on_line = kin.interpolate_poses(start, end, float(share))
         assert np.abs(kin.fk(robot, q)[:3, 3] - on_line[:3, 3]).max() < 1e-8
         if task == "pose":
             assert np.abs(kin.fk(robot, q) - on_line).max() < 1e-8
