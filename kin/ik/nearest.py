@@ -105,7 +105,7 @@ def _search(problem: IKProblem, code: int, weight: float) -> _Search:
 
 
 def _followed(problem: IKProblem, search: _Search, q: Array, errors: Array) -> Array | None:
-    """The configuration ``(n,)`` that meets the task in the valleys where descents ended ``(k, n)``, if any does.
+    """The configuration ``(n,)`` that meets the task along weakly controllable directions from ``(k, n)``, if any.
 
     None if a descent met the task itself.
     """
@@ -123,17 +123,17 @@ def _followed(problem: IKProblem, search: _Search, q: Array, errors: Array) -> A
 
 
 def at_floor(problem: IKProblem, q: Array, weight: float) -> tuple[Array, float]:
-    """Where the floor of the valley around q ``(n,)`` comes nearest to the target, and the error E there."""
+    """The closest configuration along the weakly controllable directions from q ``(n,)``, and its error E."""
     return follow(problem.robot.model, *_search(problem, problem.code, weight), q)
 
 
 def _beside(problem: IKProblem) -> float:
-    """The error in metres below which a descent may have ended in a valley that leads to the target."""
+    """The error in metres below which weakly controllable directions may lead from a descent to the target."""
     return _BESIDE * size(problem.robot)
 
 
 def _is_decided(problem: IKProblem) -> bool:
-    """Whether an exact closed form lists all configurations that meet the task: no valley leads to another one."""
+    """Whether an exact closed form lists all configurations that meet the task: no search finds another one."""
     form = problem.closed_form
     return form is not None and form.off == 0.0 and form.exact_ranges and form.handles(problem.code)
 

@@ -21,7 +21,7 @@ from kin.transforms import Array
 
 POOL = 24  # starts of descents, and the most of their ends that are kept
 _ASIDE = (0.1, -0.1, 0.25, -0.25, 0.5, -0.5)  # rad or m, along the slowest motion
-_FOLLOWED = 4  # descents that end a little beside a target are led on along the floor of their valley
+_FOLLOWED = 4  # descents that end beside a target are continued along the weakly controllable directions
 _WAYS = 4  # motions that are followed from one configuration
 LARGE = 0.125  # a larger motion between neighbouring waypoints makes a search for a nearer solution worthwhile
 

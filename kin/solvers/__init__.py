@@ -70,7 +70,7 @@ GENERAL: tuple[Callable[[Robot], ClosedForm | None], ...] = (
 def closed_form_of(robot: Robot) -> ClosedForm | None:
     """The closed form of the first family that fits the robot's axes, None if there is none.
 
-    A table that is rounded gets the family that was meant. Where no family fits then either, or the table is far
+    A table that is rounded gets the nominal family. Where no family fits then either, or the table is far
     from it, a general solver takes the arm. One with rows that follow joints is solved by that of its free arm,
     where the joints decide which of its configurations they can make. One that is much smaller or larger than a
     metre is solved in another unit of length.

@@ -1,4 +1,4 @@
-"""Arms whose tables are rounded: the family that was meant, and every posture on the table as it is.
+"""Arms whose tables are rounded: the nominal family, and every posture on the table as it is.
 
 A right angle typed as 1.5708 is not one, and the closed form of the family does not apply. Its postures are close
 to those of the arm whose axes are exactly parallel, perpendicular or intersecting where the table misses that by

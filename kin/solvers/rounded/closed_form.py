@@ -41,9 +41,9 @@ _ABOUT = 1e-9  # m, rad: what is closer needs no descent with another task
 
 
 class Rounded(ClosedForm):
-    """The closed form of the arm that was meant by a rounded table; its postures are exact on the table itself.
+    """The closed form of the nominal arm of a rounded table; its postures are exact on the table itself.
 
-    Ranges of redundancy parameters and distances to singularities are those of the arm that was meant. A row whose
+    Ranges of redundancy parameters and distances to singularities are those of the nominal arm. A row whose
     descent ends elsewhere is left out: a joint that is free in the family may have one value only on the table.
     """
 
@@ -175,7 +175,7 @@ class Rounded(ClosedForm):
         return out
 
     def value_at(self, T: Array, q: Array) -> float:
-        """The redundancy parameter of the arm that was meant."""
+        """The redundancy parameter of the nominal arm."""
         return self.form.value_at(T, q)
 
     def branch_of(self, q: Array) -> int:
@@ -183,5 +183,5 @@ class Rounded(ClosedForm):
         return self.form.branch_of(q)
 
     def singularities(self, q: Array, within: float = math.inf) -> tuple[Singularity, ...]:
-        """Those of the arm that was meant."""
+        """Those of the nominal arm."""
         return self.form.singularities(q, within)

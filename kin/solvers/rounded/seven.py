@@ -1,9 +1,9 @@
-"""Typed tables with seven joints: branches, feasible intervals and choices are those of the table as it is.
+"""Tables as entered with seven joints: branches, feasible intervals and choices are those of the table as it is.
 
-The family gives the structure, the typed table the numbers. First the ends of the intervals are moved from the arm
-that was meant to the typed table (:mod:`kin.solvers.rounded.ends`). If the structure is in doubt, the self-motions
-of the typed table are followed (:mod:`kin.solvers.rounded.tracing`). Then each branch gets its row strictly inside
-the interval, with the redundancy parameter held (:mod:`kin.solvers.rounded.rows`).
+The family gives the structure, the table as entered the numbers. First the ends of the intervals are moved from
+the nominal arm to the table as entered (:mod:`kin.solvers.rounded.ends`). If the structure is in doubt, the
+self-motions of the table as entered are followed (:mod:`kin.solvers.rounded.tracing`). Then each branch gets
+its row strictly inside the interval, with the redundancy parameter held (:mod:`kin.solvers.rounded.rows`).
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _FREE = (math.nan,)
 
 
 class Rounded7(Rounded):
-    """The closed form of the arm with seven joints that was meant, and every number on the typed table."""
+    """The closed form of the nominal arm with seven joints, and every number on the table as entered."""
 
     def __init__(self, robot: Robot, form: ClosedForm, off: float) -> None:
         parameter = form.redundancies(POSE)[0]
@@ -155,7 +155,7 @@ class Rounded7(Rounded):
         return out
 
     def _rows(self, p: SolverInput) -> tuple[Array, Flags]:
-        """Rows ``(8, 8)`` of the arm that was meant, with their values, and which exist for certain."""
+        """Rows ``(8, 8)`` of the nominal arm, with their values, and which exist for certain."""
         found = self.form.solve(p)
         rows = np.column_stack([found.q, found.values])
         missing = np.isnan(rows[:, 0])
@@ -167,9 +167,9 @@ class Rounded7(Rounded):
         return rows, ~missing
 
     def _intervals(self, p: SolverInput, setting: Array, limits: Array) -> tuple[Array, Array, Array, Flags, bool]:
-        """The intervals of the typed table, and what choosing rows needs.
+        """The intervals of the table as entered, and what choosing rows needs.
 
-        Returns intervals ``(m, 3)``, their postures ``(m, 3, 7)``, rows ``(8, 8)`` of the arm that was meant,
+        Returns intervals ``(m, 3)``, their postures ``(m, 3, 7)``, rows ``(8, 8)`` of the nominal arm,
         which of these exist for certain, and whether the intervals are certain.
         """
         wide, narrow = (
@@ -203,7 +203,7 @@ class Rounded7(Rounded):
         return out[: joined(np.ascontiguousarray(arcs), out)]
 
     def _postures(self, p: SolverInput, arcs: Array, shares: Array) -> Array:
-        """Postures ``(m, k, 7)`` of the arm that was meant at shares ``(k,)`` of intervals ``(m, 3)``."""
+        """Postures ``(m, k, 7)`` of the nominal arm at shares ``(k,)`` of intervals ``(m, 3)``."""
         m, k = len(arcs), len(shares)
         if not m:
             return np.empty((0, k, 7))
@@ -212,7 +212,7 @@ class Rounded7(Rounded):
         return np.asarray(self._all_at(p, values)[np.arange(m * k), branch].reshape(m, k, 7))
 
     def _all_at(self, p: SolverInput, values: Array) -> Array:
-        """Rows ``(k, 8, 7)`` of the arm that was meant, of all branches at values ``(k,)`` of the parameter."""
+        """Rows ``(k, 8, 7)`` of the nominal arm, of all branches at values ``(k,)`` of the parameter."""
         T = np.empty((len(values), 4, 4))
         T[:] = p.T
         out = np.empty((len(values), 8, 7))
@@ -226,8 +226,8 @@ class Rounded7(Rounded):
     def _part(self, p: SolverInput, setting: Array, rows: Array) -> None:
         """Rows ``(8, 7)`` at the requested value that two branches share, each moved to its own posture, in place.
 
-        Between the folds of the two tables the arm that was meant has one row for the two branches, and the typed
-        table has two: each is begun where the arm that was meant has two, on either side of that value.
+        Between the folds of the two tables the nominal arm has one row for the two branches, and the table
+        as entered has two: each is begun where the nominal arm has two, on either side of that value.
         """
         shared = _merged(rows)
         if self._joint < 0 or not shared.any():
@@ -247,7 +247,7 @@ class Rounded7(Rounded):
     ) -> None:
         """Rows ``(8, 8)`` at the requested value that are missing or shared, from intervals with it, in place.
 
-        Beside a fold the typed table's row may be farther from that of the arm that was meant than a row may move.
+        Beside a fold the row of the table as entered may be farther from the nominal one than a row may move.
         """
         arcs, places = intervals
         sought = np.isnan(rows[:, 0]) | _merged(rows[:, :7])
@@ -329,7 +329,7 @@ class Rounded7(Rounded):
     def _whose(self, p: SolverInput, values: Array, postures: Array) -> tuple[list[float], bool]:
         """The branches of pieces with these values ``(k, 3)`` and postures ``(k, 3, 7)``; whether all are clear.
 
-        That of a piece is the one of the nearest row of the arm that was meant, where the next one is farthest
+        That of a piece is the one of the nearest row of the nominal arm, where the next one is farthest
         away: at a fold two branches meet, and the signs that name them may differ between the two tables. If all
         its postures are beside rows of two branches that have merged, the one farthest from there names it.
         """
@@ -371,7 +371,7 @@ class Rounded7(Rounded):
         return [(low, min(high, last))] if high < last + _ALIKE else [(low, last), (first, high - TURN)]
 
     def _kernels(self, form: BatchKernels) -> BatchKernels:
-        """The batch kernels: those of the family, and each row moved onto the target on the typed table."""
+        """The batch kernels: those of the family, and each row moved onto the target on the table as entered."""
         model, params, setting = self.robot.model, self._params, self._setting
 
         def many(_: Array, T: Array, values: Array, near: Array, out: Array) -> None:

@@ -1,4 +1,4 @@
-"""The arm that was meant by a rounded table: nearly parallel axes are parallel, and so on."""
+"""The nominal arm of a rounded table: its nearly parallel axes are parallel, its nearly right angles right."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class IntendedArm(NamedTuple):
 
 
 def intended_arm(robot: Robot) -> IntendedArm | None:
-    """The arm that was meant by a rounded table; None if the table is exact, or the arm another one."""
+    """The nominal arm of a rounded table; None if the table is exact, or the arm another one."""
     if robot.n < 2:
         return None
     scale = size(robot)
