@@ -50,7 +50,7 @@ def described(value: object) -> Json:
     if inspect.isclass(value):
         fields = {name for each in value.__mro__ for name in vars(each).get("__annotations__", {})}
         return {"members": sorted(name for name in fields | set(dir(value)) if not name.startswith("_"))}
-    return {"call": _parameters(value)} if callable(value) and hasattr(value, "__name__") else {}
+    return {"call": _parameters(value)} if inspect.isfunction(inspect.unwrap(value)) else {}
 
 
 def _parameters(function: Any) -> list[str]:

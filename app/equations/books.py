@@ -14,11 +14,12 @@ from typing import Literal
 
 import numpy as np
 
+from app.equations import chapter
 from app.equations.derive import AXES, COLUMNS, Line, derive
 from app.equations.expression import Expression, astray, from_text, names, value, written_out
 from app.equations.symbols import Symbol, chapter_symbols
 from app.shared.computations import ComputationCache, SharedComputation, Subscription
-from kin import Robot, chapter, fk, get_robot
+from kin import Robot, fk, get_robot
 from kin.transforms import Array
 
 Verdict = Literal["right", "misprinted", "unreadable", "derived"]
