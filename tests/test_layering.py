@@ -42,7 +42,7 @@ RULES: dict[str, set[str]] = {
     },
     "kin/doctor": {"numpy", "kin.doctor", "kin.files", "kin.typed", *MODEL},
     "kin/fitting": {"numpy", "kin.fitting", "kin.joint", "kin.robot", "kin.transforms"},
-    "kin/motors": {"numpy", "kin.collision", "kin.readings", *MODEL},
+    "kin/motors": {"numpy", "kin.collision", "kin.motors", *MODEL},
     "kin/solvers": {"numpy", "kin.dh", "kin.kernels", "kin.solvers", *MODEL - {"kin.singularity"}},
     "kin/ik": {"numpy", "kin.collision", "kin.kernels", "kin.solvers", "kin.ik", *MODEL},
     "kin/collision": {"numpy", "kin.fitting", "kin.frames", "kin.kernels", "kin.collision", *MODEL},

@@ -32,7 +32,13 @@ METHODS = {
 # What has no example that can run here: a notebook, and what only fills the cache of compiled kernels.
 NO_EXAMPLE = {"connect", "save_page", "show", "warm_up"}
 # Nothing that they may be given is refused.
-NEVER_RAISES = {"builtin_robots", "files.classic_robots", "warm_up", "wxyz_from_rotation"}
+NEVER_RAISES = {
+    "builtin_robots",
+    "files.classic_robots",
+    "warm_up",
+    "workspace.capability_join",
+    "wxyz_from_rotation",
+}
 # Numbers of a parameter with this annotation have units.
 NUMBERS = re.compile(r"\b(float|ArrayLike|Array|Limits|Locks|Values|MotionLimits)\b")
 UNITS = re.compile(

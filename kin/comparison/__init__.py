@@ -47,7 +47,7 @@ _SHARE = 0.1  # of an allowed difference of poses, as the tolerance of a search,
 # The senses of n joints are 2ⁿ cases, and exchanged rows are pairs.
 _MAX_JOINTS, _MAX_ROWS = 12, 40
 
-__all__ = ["Change", "Comparison", "Difference", "Explanation", "LimitDifference", "Mapping", "compare"]
+__all__ = ["Change", "Comparison", "Difference", "Explanation", "LimitDifference", "compare"]
 
 
 def compare(

@@ -105,7 +105,7 @@ def exp_screw(S: ArrayLike, value: ArrayLike) -> Array:
         return out
     W = np.cross(np.eye(3), omega / speed)  # [ω]: W a = ω × a
     turn = (angle * speed)[..., None, None]
-    sine, cosine = np.sin(turn), 1.0 - np.cos(turn)
+    sine, cosine = np.sin(turn), 2.0 * np.sin(0.5 * turn) ** 2  # 1 − cos, whose digits would cancel
     out[..., :3, :3] = np.eye(3) + sine * W + cosine * (W @ W)
     out[..., :3, 3] = (turn * np.eye(3) + cosine * W + (turn - sine) * (W @ W)) @ (v / speed)
     return out

@@ -386,9 +386,7 @@ class IKKeywords(PathKeywords, total=False):
     solver: Solver
 
 
-def options_of_call(
-    names: type[MotionKeywords], options: IKOptions | None, keywords: Mapping[str, Any]
-) -> IKOptions:
+def options_of_call(names: Any, options: IKOptions | None, keywords: Mapping[str, Any]) -> IKOptions:
     """The options of a call that takes the keywords `names`; another one is an error as Python raises it."""
     for name in keywords.keys() - names.__optional_keys__:
         raise TypeError(f"got an unexpected keyword argument {name!r}")
@@ -493,7 +491,7 @@ def _lock_values(locked: Locks) -> tuple[Any, ...] | None:
 
 
 def _checked_each(
-    field: str, given: object, check: Callable[[str, Any], Any], expected: str
+    field: str, given: Any, check: Callable[[str, Any], Any], expected: str
 ) -> tuple[Any, ...] | None:
     if _is_by_name(given):
         given = dict(given)

@@ -51,7 +51,6 @@ __all__ = [
     "PathPostures",
     "PathResult",
     "path_postures",
-    "solve",
     "solve_path",
 ]
 

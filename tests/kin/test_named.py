@@ -21,6 +21,7 @@ CALLS = {
     "branch_meanings": (),
     "branch_names": (),
     "branch_of": (UR5.q_home,),
+    "capability_grid": (),
     "capability_map": (),
     "capsules": (),
     "clearance": (UR5.q_home,),
@@ -64,6 +65,7 @@ OF_MOTORS = {
 }
 FUNCTIONS = {name.rpartition(".")[2]: value for name, value in public().items() if inspect.isfunction(value)}
 MORE = {
+    "capability_grid": {"resolution": 2, "directions": 12},
     "capability_map": {"resolution": 2, "directions": 12},
     "workspace_section": {"resolution": 8},
     "workspace_facts": {"volume": False},
@@ -74,7 +76,7 @@ def test_the_table_names_every_function_that_takes_a_robot():
     first = {name: next(iter(inspect.signature(value).parameters), "") for name, value in FUNCTIONS.items()}
     taking = {name for name, parameter in first.items() if parameter == "robot"}
     # `show` and `save_page` ask the service, which finds the robot; no built-in arm has a calibration to write.
-    assert taking == {*CALLS, *OF_MOTORS, "show", "save_page", "motors_to_lerobot"}
+    assert taking == {*CALLS, *OF_MOTORS, "generate", "show", "save_page", "motors_to_lerobot"}
 
 
 def found(name, robot, tmp_path):

@@ -226,8 +226,9 @@ class CloudView:
             if self.busy and not self._running:
                 state = "recolouring"
         speed = drawn / elapsed if elapsed > 0.0 else 0.0
-        now, cloud = self._stage.now, self.nodes[0].cloud if self.nodes else None
-        locked = cloud.constraints.locks(cloud.robot) if cloud else now.options.constraints.locks(now.robot)
+        cloud = self.nodes[0].cloud if self.nodes else None
+        constraints = self._stage.now.options.constraints if cloud is None else cloud.constraints
+        locked = constraints.locks(self._stage.now.robot if cloud is None else cloud.robot)
         old = bool(self.nodes) and not self._is_shown(self._requested)
         line = views.progress(state, drawn, total or self.settings.n, speed, locked, old)
         percent = round(100.0 * drawn / total, 1) if total else 0.0

@@ -10,8 +10,8 @@ from app.viewer.scene.meshes import body
 from app.viewer.skeleton import ghost
 from kin import Robot
 from kin.axes import inverse
-from kin.comparison import Comparison, Mapping
-from kin.comparison.frames import no_mapping
+from kin.comparison import Comparison
+from kin.comparison.frames import Mapping, no_mapping
 from kin.transforms import Array, wxyz_from_rotation
 
 GHOST = VERMILION

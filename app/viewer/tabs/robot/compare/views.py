@@ -13,7 +13,8 @@ from app.viewer.tabs.robot.compare.reference import Reference
 from app.viewer.tabs.robot.files import MOST
 from app.viewer.views.templates import render
 from kin import Robot
-from kin.comparison import Comparison, Mapping, messages
+from kin.comparison import Comparison, messages
+from kin.comparison.frames import Mapping
 from kin.poses import roll_pitch_yaw
 from kin.transforms import Array
 from kin.units import Units
